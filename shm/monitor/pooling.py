@@ -1,0 +1,242 @@
+"""Windows of an hour, six hours or a day as one reading; its errors allow for what repeats."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+
+import numpy as np
+
+from shm.values import NAN, BoolArray, FloatArray, ModalTest, Mode, Plane, ShapePoint, as_test_id
+from shm.values.stream import Period, PooledReading, WindowReading
+
+LENGTHS: dict[Period, timedelta] = {
+    "hour": timedelta(hours=1),
+    "six hours": timedelta(hours=6),
+    "day": timedelta(days=1),
+}
+_OUTLYING = 4.0
+"""judgement: usual deviations; of 144 windows of a day one in a hundred days by chance."""
+_USUAL_SD = 1.4826  # of the median absolute deviation of normal numbers
+_LEAST_TO_JUDGE = 3  # technical: two windows do not say which of them is wrong
+_LEAST_SHARE = 0.2
+"""judgement: of the windows, in which a mode must have been found: one that is seen now and then is
+seen when chance raises it."""
+_LEAST_TO_REGRESS = 12  # judgement: six windows a slope
+_LEAST_SPREAD = 0.1, 0.5
+"""judgement: of the level (a fraction) and the temperature (degrees), for a slope to matter."""
+_LEAST_BATCHES, _LEAST_TO_BATCH = 6, 24
+"""technical: their scatter knows a standard deviation to a third, and one of four windows forgets
+what comes before it."""
+_REPEATS = 1e-5
+"""Of a frequency: what stays the same in every window, see tests/benchmarks/stream_windows.py."""
+
+
+def pooled(
+    readings: Sequence[WindowReading], period: Period, start: datetime
+) -> PooledReading | None:
+    """The windows that begin in a period, as one reading; None where no mode was found.
+
+    Frequencies are at the mean level and temperature of the pooled windows.
+    """
+    end = start + LENGTHS[period]
+    inside = sorted(
+        (each for each in readings if start <= each.window.start < end),
+        key=lambda each: each.window.start,
+    )
+    kept = _without_outlying([each for each in inside if each.modes])
+    least = max(1, math.ceil(_LEAST_SHARE * len(kept)))
+    keys = sorted({(mode.plane, mode.order) for each in kept for mode in each.modes}, key=_place)
+    series = [_Series.of(kept, *key) for key in keys]
+    modes = tuple(each.mode() for each in series if len(each.modes) >= least)
+    if not modes:
+        return None
+    windows = [each.window for each in kept]
+    return PooledReading(
+        stream=windows[0].stream,
+        hanger=windows[0].hanger,
+        start=start,
+        period=period,
+        modes=modes,
+        windows=len(kept),
+        left_out=len(inside) - len(kept),
+        level_m_s2=_mean([each.level_m_s2 for each in windows]),
+        temperature_c=_mean([each.temperature_c for each in windows]),
+        wind_m_s=_mean([each.wind_m_s for each in windows]),
+    )
+
+
+def as_modal_test(reading: PooledReading, reference_level_m_s2: float = NAN) -> ModalTest:
+    """A pooled reading as a test like any other, in the middle of its period.
+
+    Its amplitude is the level over the reference level, unknown unless that is given.
+    """
+    length = LENGTHS[reading.period]
+    name = f"{reading.stream}-{reading.start:%Y-%m-%d}"
+    if reading.period != "day":
+        name += f"T{reading.start:%H}" + ("" if reading.period == "hour" else "-6h")
+    return ModalTest(
+        id=as_test_id(name),
+        modes=reading.modes,
+        hanger=reading.hanger,
+        time=reading.start + length / 2,
+        temperature_c=reading.temperature_c,
+        amplitude=reading.level_m_s2 / reference_level_m_s2,
+    )
+
+
+def _place(key: tuple[Plane, int]) -> tuple[str, int]:
+    return key[0], key[1]
+
+
+def _mean(values: Sequence[float]) -> float:
+    known = [value for value in values if math.isfinite(value)]
+    return float(np.mean(known)) if known else NAN
+
+
+def _without_outlying(readings: list[WindowReading]) -> list[WindowReading]:
+    """The readings without those of which most modes are off what they usually are."""
+    if len(readings) < _LEAST_TO_JUDGE:
+        return readings
+    off: list[list[float]] = [[] for _ in readings]
+    keys = {(mode.plane, mode.order) for each in readings for mode in each.modes}
+    for key in sorted(keys, key=_place):
+        series = _Series.of(readings, *key)
+        for number, value in zip(series.numbers, np.abs(series.deviations()), strict=True):
+            off[number].append(float(value))
+    return [
+        each
+        for each, own in zip(readings, off, strict=True)
+        if not own or np.median(own) <= _OUTLYING
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Series:
+    """One mode over the windows in which it was found; `numbers` are theirs; arrays (windows,)."""
+
+    modes: tuple[Mode, ...]
+    numbers: tuple[int, ...]
+    temperature_c: FloatArray
+
+    @classmethod
+    def of(cls, readings: Sequence[WindowReading], plane: Plane, order: int) -> _Series:
+        found = [
+            (number, mode, each.window.temperature_c)
+            for number, each in enumerate(readings)
+            for mode in each.modes
+            if (mode.plane, mode.order) == (plane, order) and mode.frequency_hz > 0
+        ]
+        numbers, modes, temperature = zip(*found, strict=True)
+        return cls(modes, numbers, np.array(temperature))
+
+    @property
+    def hz(self) -> FloatArray:
+        return np.array([mode.frequency_hz for mode in self.modes])
+
+    @property
+    def sd_hz(self) -> FloatArray:
+        """Formal; where one is not known, the largest of the others or 1e-3."""
+        sd = np.array([mode.frequency_sd_hz for mode in self.modes])
+        known = sd[sd > 0]
+        # judgement: what identify allows a frequency
+        instead = float(known.max()) if len(known) else 1e-3 * float(np.median(self.hz))
+        return np.where(sd > 0, sd, instead)
+
+    def deviations(self) -> FloatArray:
+        """From the median, in usual ones."""
+        off = self.hz - np.median(self.hz)
+        usual = _USUAL_SD * float(np.median(np.abs(off)))
+        deviations: FloatArray = off / np.maximum(self.sd_hz, usual)
+        return deviations
+
+    def mode(self) -> Mode:
+        """The mode of all these windows."""
+        hz, sd, used = self._regressed()
+        kept = [mode for mode, use in zip(self.modes, used, strict=True) if use]
+        damping, damping_sd = _weighted(
+            [mode.damping_ratio for mode in kept], [mode.damping_sd for mode in kept]
+        )
+        return replace(
+            kept[-1],
+            frequency_hz=hz,
+            frequency_sd_hz=math.hypot(sd, _REPEATS * hz),
+            damping_ratio=damping,
+            damping_sd=damping_sd,
+            shape=_mean_shape(kept),
+            acceleration_m_s2=_mean([mode.acceleration_m_s2 for mode in kept]),
+        )
+
+    def _regressed(self) -> tuple[float, float, BoolArray]:
+        """Frequency at the mean conditions, its standard deviation, and which windows were used."""
+        design, sd = self._design(), self.sd_hz
+        used = np.abs(self.deviations()) <= _OUTLYING if len(sd) >= _LEAST_TO_JUDGE else sd > 0
+        weight = np.where(used, sd**-2.0, 0.0)
+        inverse = np.linalg.pinv((design.T * weight) @ design)
+        found = inverse @ (design.T * weight) @ self.hz
+        off = self.hz - design @ found
+        if design.shape[1] > 1:
+            usual = _USUAL_SD * float(np.median(np.abs(off[used])))
+            used &= np.abs(off) <= _OUTLYING * np.maximum(sd, usual)
+            weight = np.where(used, sd**-2.0, 0.0)
+            inverse = np.linalg.pinv((design.T * weight) @ design)
+            found = inverse @ (design.T * weight) @ self.hz
+            off = self.hz - design @ found
+        freedom = max(1, int(used.sum()) - design.shape[1])
+        excess = float(weight @ off**2) / freedom
+        together = _together(off[used] / sd[used])
+        return float(found[0]), math.sqrt(inverse[0, 0] * max(1.0, excess, excess * together)), used
+
+    def _design(self) -> FloatArray:
+        """1, and level and temperature off their means where windows differ in them."""
+        level = np.array([mode.acceleration_m_s2 for mode in self.modes])
+        columns = [np.ones(len(self.modes))]
+        if len(self.modes) >= _LEAST_TO_REGRESS:
+            if np.std(level) > _LEAST_SPREAD[0] * np.mean(level):
+                columns.append(level / np.mean(level) - 1)
+            if np.std(self.temperature_c) > _LEAST_SPREAD[1]:
+                columns.append(self.temperature_c - np.mean(self.temperature_c))
+        return np.array(columns).T
+
+
+def _together(off: FloatArray) -> float:
+    """Windows a window that stands for itself: the variance of means of batches over that of
+    independent windows; 1 where there are too few to say.
+    """
+    if len(off) < _LEAST_TO_BATCH:
+        return 1.0
+    size = max(len(off) // (2 * _LEAST_BATCHES), len(off) // int(len(off) ** 0.5))
+    count = len(off) // size
+    batches = off[: count * size].reshape(count, size).mean(axis=1)
+    return size * float(np.var(batches, ddof=1)) / float(np.mean(off**2))
+
+
+def _weighted(values: Sequence[float], sds: Sequence[float]) -> tuple[float, float]:
+    """Mean of positive values by their relative precision; the plain mean where none is known."""
+    value, sd = np.array(values), np.array(sds)
+    known = (sd > 0) & (value > 0)
+    if not known.any():
+        return _mean(values), NAN
+    weight = (value[known] / sd[known]) ** 2
+    log = float(weight @ np.log(value[known]) / weight.sum())
+    excess = float(weight @ (np.log(value[known]) - log) ** 2) / max(1, known.sum() - 1)
+    return math.exp(log), math.exp(log) * math.sqrt(max(1.0, excess) / float(weight.sum()))
+
+
+def _mean_shape(modes: Sequence[Mode]) -> tuple[ShapePoint, ...]:
+    """Medians by position, of the shapes that have all positions of the last one."""
+    positions = [point.x_m for point in modes[-1].shape]
+    alike = [mode for mode in modes if [point.x_m for point in mode.shape] == positions]
+    if not positions:
+        return ()
+    values = np.array([[(p.value, p.cross, p.sd) for p in mode.shape] for mode in alike])
+    middle = np.median(values, axis=0)
+    scatter = _USUAL_SD * np.median(np.abs(values - middle), axis=0)[:, 0]
+    formal = middle[:, 2]
+    sd = np.maximum(formal, scatter) / math.sqrt(len(alike))
+    return tuple(
+        ShapePoint(x_m, float(value), float(cross), float(own))
+        for x_m, (value, cross, _), own in zip(positions, middle, sd, strict=True)
+    )

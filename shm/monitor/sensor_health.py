@@ -1,0 +1,176 @@
+"""Faults of permanent sensors: dead, saturated, drifting, swapped with another, turned round."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import timedelta
+from itertools import combinations
+
+import numpy as np
+
+from shm.monitor.spectrum import Stretch, shape_on, stretch, strongest
+from shm.values import FloatArray, Mode
+from shm.values.stream import Piece, Stream, StreamChannel, StreamEvent, StreamEventKind
+
+_AT_FULL_SCALE, _CLIPPED = 0.99, 1e-3
+"""judgement: of the full scale, and the share of samples beyond; 0.6 s of ten minutes."""
+_LEAST_EARLIER, _DRIFT = 6, 8.0
+"""judgement: an hour of windows, and a change of their median by so many usual deviations, which
+takes 8 normal ones: no chance of noise, and more than a day's temperature moves a sensor in it."""
+_USUAL_SD = 1.4826  # of the median absolute deviation of normal numbers
+_LEAST_MODES = 3  # judgement: one mode or two agree with an exchange by chance
+_AS_KNOWN, _GAIN = 0.9, 0.15
+"""judgement: modal assurance with the exchange, and by how much it must be better without."""
+
+
+def broken_channels(pieces: Sequence[Piece], stream: Stream) -> dict[str, str]:
+    """Channels of a window that cannot be used, and why."""
+    found = {}
+    for channel in stream.channels:
+        if fault := _fault(channel, _samples(pieces, channel.name)):
+            found[channel.name] = fault[1]
+    return found
+
+
+def offsets(pieces: Sequence[Piece]) -> dict[str, float]:
+    """Median of each channel in m/s^2: what `sensor_faults` compares with that of later windows."""
+    names = {name for piece in pieces for name in piece.channels}
+    found = {}
+    for name in sorted(names):
+        known = _samples(pieces, name)
+        known = known[np.isfinite(known)]
+        if len(known):
+            found[name] = float(np.median(known))
+    return found
+
+
+def sensor_faults(
+    pieces: Sequence[Piece],
+    stream: Stream,
+    known: Sequence[Mode],
+    earlier: Sequence[Mapping[str, float]] = (),
+) -> tuple[StreamEvent, ...]:
+    """Faults that a window shows; `earlier` are the `offsets` of windows before, oldest first."""
+    if not pieces:
+        return ()
+    found: list[tuple[StreamEventKind, str, str]] = []
+    now = offsets(pieces)
+    broken = set()
+    for channel in stream.channels:
+        if fault := _fault(channel, _samples(pieces, channel.name)):
+            found.append((fault[0], channel.name, fault[1]))
+            broken.add(channel.name)
+        elif drift := _drift(channel.name, now, earlier):
+            found.append(("drifting", channel.name, drift))
+    usable = [channel for channel in stream.channels if channel.name not in broken]
+    stretches = [
+        stretch(part, piece.sampling_rate_hz)
+        for piece in pieces
+        for part in [_rows(piece, usable)]
+        if part.shape[1] > piece.sampling_rate_hz and np.isfinite(part).all()
+    ]
+    if exchange := exchanged(stretches, usable, known):
+        found.append(("swapped", *exchange))
+    start = min(piece.start for piece in pieces)
+    end = max(
+        piece.start + timedelta(seconds=piece.values.shape[1] / piece.sampling_rate_hz)
+        for piece in pieces
+    )
+    return tuple(
+        StreamEvent(stream.name, kind, start, end, detail, name) for kind, name, detail in found
+    )
+
+
+def exchanged(
+    stretches: Sequence[Stretch], channels: Sequence[StreamChannel], known: Sequence[Mode]
+) -> tuple[str, str] | None:
+    """The channel that another one's signal is on, or that is turned round, and what was seen.
+
+    Each known mode moves the sensors as it always did. Where most modes do so with two channels
+    exchanged, or with the sign of one reversed, and else do not, that is what happened.
+    """
+    shapes = np.array([shape_on(channels, mode) for mode in known]).reshape(len(known), -1)
+    told = np.all(np.isfinite(shapes), axis=1) & np.any(shapes != 0, axis=1)
+    if told.sum() < _LEAST_MODES or not stretches:
+        return None
+    seen = np.array([
+        strongest(stretches, mode.frequency_hz, within=0.02)
+        for mode, use in zip(known, told, strict=True)
+        if use
+    ])  # fmt: skip
+    shapes = shapes[told]
+    straight = _likeness(seen, shapes)
+    best = max(
+        (
+            (_likeness(seen, changed), name, detail)
+            for changed, name, detail in _changes(shapes, channels)
+        ),
+        default=(0.0, "", ""),
+    )
+    if best[0] < _AS_KNOWN or best[0] < straight + _GAIN:
+        return None
+    return best[1], f"{best[2]} (the modes' shapes agree to {best[0]:.2f}, else to {straight:.2f})"
+
+
+def _changes(
+    shapes: FloatArray, channels: Sequence[StreamChannel]
+) -> Iterator[tuple[FloatArray, str, str]]:
+    for one, two in combinations(range(len(channels)), 2):
+        order = np.arange(len(channels))
+        order[[one, two]] = two, one
+        names = channels[one].name, channels[two].name
+        yield shapes[:, order], names[0], f"the signals of {names[0]} and {names[1]} are exchanged"
+    for row, channel in enumerate(channels):
+        sign = np.ones(len(channels))
+        sign[row] = -1
+        yield shapes * sign, channel.name, f"{channel.name} measures with the opposite sign"
+
+
+def _likeness(seen: FloatArray, shapes: FloatArray) -> float:
+    """Median modal assurance; seen shapes are of length 1."""
+    product = np.sum(seen * shapes, axis=1) ** 2
+    return float(np.median(product / np.sum(shapes**2, axis=1)))
+
+
+def _fault(channel: StreamChannel, values: FloatArray) -> tuple[StreamEventKind, str] | None:
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return "dead", "no samples"
+    if np.ptp(known) == 0:
+        return "dead", f"its value never changes ({known[0]:.4g} m/s^2)"
+    if math.isfinite(channel.full_scale):
+        share = float(np.mean(np.abs(known) >= _AT_FULL_SCALE * channel.full_scale))
+        if share > _CLIPPED:
+            return "saturated", f"{share:.1%} of its samples are at full scale"
+    return None
+
+
+def _drift(name: str, now: Mapping[str, float], earlier: Sequence[Mapping[str, float]]) -> str:
+    before = np.array([each[name] for each in earlier if name in each])
+    if len(before) < _LEAST_EARLIER or name not in now:
+        return ""
+    usual = float(np.median(before))
+    scatter = _USUAL_SD * float(np.median(np.abs(before - usual)))
+    change = now[name] - usual
+    if abs(change) <= _DRIFT * scatter or scatter == 0:
+        return ""
+    return (
+        f"its offset is {now[name]:.3g} m/s^2, {change:+.2g} from its median before "
+        f"(usual scatter {scatter:.1g})"
+    )
+
+
+def _samples(pieces: Sequence[Piece], name: str) -> FloatArray:
+    parts = [
+        np.asarray(piece.values[piece.channels.index(name)], dtype=float)
+        for piece in pieces
+        if name in piece.channels
+    ]
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _rows(piece: Piece, channels: Sequence[StreamChannel]) -> FloatArray:
+    rows = [piece.channels.index(channel.name) for channel in channels]
+    found: FloatArray = np.asarray(piece.values, dtype=float)[rows]
+    return found

@@ -1,0 +1,185 @@
+"""The spectrum of a window in stretches, and where in it the known modes' peaks have gone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from shm.values import ComplexArray, FloatArray, Mode
+from shm.values.stream import StreamChannel
+
+REACH = 0.06
+"""A tenth of the tension lost moves the frequencies of a taut string by 5 %."""
+_STEP = 2e-4  # technical: of a grid of frequencies, a fifth of the peaks' width at 0.5 % of damping
+_ALONE, _ALONE_SHARE = 0.004, 0.3
+"""judgement: how far a mode may be from where the others say that all have gone: what temperature
+does to one more than to another between windows, and a share of the whole change."""
+_DAMPING = 0.003
+"""judgement: of a mode whose damping is not known; bars have 0.001, strands 0.005."""
+_SAME_PLACE_M = 0.01
+"""technical: positions are read off a tape."""
+_EXPONENTIAL_MEDIAN = math.log(2)
+"""Median over mean of the lines of a spectrum of noise, whose powers are exponential."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Lines of one stretch without a gap.
+
+    `values` (channels, lines): its Fourier transform from 0 Hz up, scaled so that the mean square
+    of a line is the two-sided power density, in (m/s^2)^2/Hz.
+    """
+
+    seconds: float
+    values: ComplexArray
+
+    def between(self, low_hz: float, high_hz: float) -> slice:
+        """Lines of a band."""
+        first = max(1, math.ceil(low_hz * self.seconds))
+        return slice(first, max(first, math.floor(high_hz * self.seconds) + 1))
+
+
+def stretch(values: FloatArray, sampling_rate_hz: float) -> Stretch:
+    """The spectrum of `values` (channels, samples), of which a few go for the transform's sake."""
+    samples = values.shape[1]
+    while scipy.fft.next_fast_len(samples, real=True) != samples:
+        samples -= 1
+    used = values[:, :samples] - values[:, :samples].mean(axis=1, keepdims=True)
+    lines = scipy.fft.rfft(used) / math.sqrt(samples * sampling_rate_hz)
+    return Stretch(samples / sampling_rate_hz, np.asarray(lines, dtype=np.complex128))
+
+
+def channel_floors(stretches: Sequence[Stretch], low_hz: float, high_hz: float) -> FloatArray:
+    """Power density (channels,) of what is no peak in a band: the median of its lines."""
+    lines = np.concatenate(
+        [each.values[:, each.between(low_hz, high_hz)] for each in stretches], axis=1
+    )
+    floors: FloatArray = np.median(np.abs(lines) ** 2, axis=1) / _EXPONENTIAL_MEDIAN
+    return np.maximum(floors, np.finfo(float).tiny)
+
+
+def shape_on(channels: Sequence[StreamChannel], mode: Mode) -> FloatArray:
+    """A known mode on the channels; NaN where its shape says nothing, 0 in the other plane."""
+    found = np.full(len(channels), np.nan)
+    for row, channel in enumerate(channels):
+        inside = channel.plane == mode.plane
+        found[row] = math.nan if inside else 0.0
+        for point in mode.shape:
+            if abs(point.x_m - channel.x_m) < _SAME_PLACE_M:
+                found[row] = point.value if inside else np.nan_to_num(point.cross)
+    return found
+
+
+def known_shapes(
+    channels: Sequence[StreamChannel], known: Sequence[Mode], stretches: Sequence[Stretch]
+) -> FloatArray:
+    """Shapes (channels, modes) of known modes, the largest value 1 (0: no sensor in its plane).
+
+    Where the known mode does not say it, the strongest motion of the sensors of its plane does.
+    """
+    shapes = np.array([shape_on(channels, mode) for mode in known]).T.reshape(-1, len(known))
+    for column, mode in enumerate(known):
+        missing = np.isnan(shapes[:, column])
+        if np.any(np.abs(shapes[~missing, column]) > 0):
+            shapes[missing, column] = 0.0
+        elif missing.any():
+            shapes[missing, column] = strongest(stretches, mode.frequency_hz)[missing]
+        largest = shapes[np.argmax(np.abs(shapes[:, column])), column]
+        shapes[:, column] /= largest or 1.0
+    return shapes
+
+
+def strongest(
+    stretches: Sequence[Stretch], frequency_hz: float, within: float = 0.01
+) -> FloatArray:
+    """The real shape (channels,) that carries most of the power near a frequency."""
+    band = frequency_hz * (1 - within), frequency_hz * (1 + within)
+    near = [each.values[:, each.between(*band)] for each in stretches]
+    power = sum(np.real(lines @ lines.conj().T) for lines in near)
+    vector: FloatArray = np.linalg.eigh(power)[1][:, -1]
+    return vector
+
+
+@dataclass(frozen=True, eq=False)
+class Peaks:
+    """Where the known modes' peaks are; arrays (modes,), `shapes` (channels, modes).
+
+    `height_db` is over the floor; `damping` as it was known. A mode that no sensor sees has a shape
+    of zeros.
+    """
+
+    frequency_hz: FloatArray
+    height_db: FloatArray
+    shapes: FloatArray
+    damping: FloatArray
+
+    @property
+    def seen(self) -> list[int]:
+        """The modes that sensors can see."""
+        found: list[int] = np.flatnonzero(np.any(self.shapes != 0, axis=0)).tolist()
+        return found
+
+
+def found_peaks(
+    stretches: Sequence[Stretch], channels: Sequence[StreamChannel], known: Sequence[Mode]
+) -> Peaks:
+    """The peaks of known modes near the change of frequency that suits all of them best.
+
+    A change of tension moves all modes alike: the product of the modes' spectra, each seen by its
+    own shape, has its highest peak there.
+    """
+    shapes = known_shapes(channels, known, stretches)
+    damping = np.array([m.damping_ratio if m.damping_ratio > 0 else _DAMPING for m in known])
+    shift = np.arange(-REACH, REACH + _STEP / 2, _STEP)
+    rows = [
+        _raised(stretches, mode, row, z, shift)
+        for mode, row, z in zip(known, _seen_by(stretches, known, shapes), damping, strict=True)
+    ]
+    height = np.array(rows).reshape(len(known), len(shift))
+    common = shift[int(np.argmax(height.sum(axis=0)))]
+    near = np.abs(shift - common) <= _ALONE + _ALONE_SHARE * abs(common)
+    best = np.argmax(np.where(near, height, -np.inf), axis=1)
+    hz = np.array([mode.frequency_hz for mode in known]) * (1 + shift[best])
+    top = height[np.arange(len(known)), best]
+    return Peaks(hz, 10 / math.log(10) * top, shapes, damping)
+
+
+def _seen_by(
+    stretches: Sequence[Stretch], known: Sequence[Mode], shapes: FloatArray
+) -> list[FloatArray]:
+    """Weights (channels,) of each mode that see it and not its neighbours within reach."""
+    hz = np.array([mode.frequency_hz for mode in known])
+    rows = []
+    for index in range(len(known)):
+        near = np.flatnonzero(np.abs(hz / hz[index] - 1) < REACH)
+        floors = channel_floors(stretches, (1 - REACH) * hz[index], (1 + REACH) * hz[index])
+        root = np.sqrt(floors)[:, np.newaxis]
+        # Two shapes that these sensors can hardly tell apart are not pulled apart for it.
+        inverse = np.linalg.pinv(shapes[:, near] / root, rcond=0.1) / root.T
+        rows.append(inverse[int(np.flatnonzero(near == index)[0])])
+    return rows
+
+
+def _raised(
+    stretches: Sequence[Stretch], mode: Mode, row: FloatArray, damping: float, shift: FloatArray
+) -> FloatArray:
+    """Log power over the median at each shift, averaged over a peak's width; at least 0."""
+    at_hz = mode.frequency_hz * (1 + shift)
+    power = np.zeros(len(shift))
+    for each in stretches:
+        half = max(damping * mode.frequency_hz, 1.5 / each.seconds)
+        lines = each.between(at_hz[0] - 2 * half, at_hz[-1] + 2 * half)
+        seen = np.abs(row @ each.values[:, lines]) ** 2
+        total = np.concatenate(([0.0], np.cumsum(seen)))
+        edge_hz = (np.arange(lines.start, lines.start + len(total)) - 0.5) / each.seconds
+        high, low = (np.interp(at_hz + side * half, edge_hz, total) for side in (1, -1))
+        power += (high - low) / (2 * half)
+    floor = float(np.median(power))
+    if not floor > 0:
+        return np.zeros(len(shift))
+    raised: FloatArray = np.log(np.maximum(power / floor, 1.0))
+    return raised

@@ -1,0 +1,281 @@
+"""From pieces of a stream to a window: what moved the hanger, and which part of it is used.
+
+Where a train or a knock takes a small part of it, that part is set apart and the rest is used.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy
+
+from shm.identify.measuring.ambient import LOUDER
+from shm.monitor.sensor_health import broken_channels
+from shm.monitor.spectrum import Peaks, Stretch, found_peaks, stretch
+from shm.values import NAN, BoolArray, FloatArray, Mode
+from shm.values.stream import Piece, Stream, StreamChannel, Window, WindowKind
+
+LEAST_S = 120.0
+"""judgement: a fifth of a window of ten minutes, whose frequencies are known 2.2 times worse."""
+_LEAST_STRETCH_S = 20.0  # technical: 60 periods of 3 Hz; shorter ones hardly resolve a peak
+_BLOCK_S = 0.25
+_STRETCH_S = 5.0  # as `unrest` of an ambient record, shm/identify/quality/of_ambient.py
+_BEFORE_S, _AFTER_S = 2.0, 3.0  # judgement: a train comes and goes without a block's edge
+_KNOCK_RISE_S = 0.5  # judgement: an impulse is at its highest in two blocks, a train in seconds
+_KNOCK_S = 20.0  # judgement: a knock's ring-down falls by a factor of five in less
+_QUIET_DB = 5.0
+"""As the prominence of a peak in shm/identify/quality/of_ambient.py."""
+_STRONG_DB, _STRONG_PEAKS = 10.0, 3
+"""judgement: peaks that no known mode explains and that a search from scratch may understand."""
+_PASSED = 0.4  # of the sampling rate: what anti-aliasing filters pass
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A window with all that identification needs: the parts that are used, and their spectra.
+
+    `parts` (channels, samples) each, of `channels`; `peaks` are of the known modes.
+    `reason`: why it is unusable, or what was set apart.
+    """
+
+    window: Window
+    channels: tuple[StreamChannel, ...] = ()
+    parts: tuple[FloatArray, ...] = ()
+    stretches: tuple[Stretch, ...] = ()
+    peaks: Peaks | None = None
+    reason: str = ""
+
+
+def cut(pieces: Sequence[Piece], stream: Stream, known: Sequence[Mode]) -> Window:
+    """The window of all `pieces`, which may have gaps between them."""
+    return judged(pieces, stream, known).window
+
+
+def judged(pieces: Sequence[Piece], stream: Stream, known: Sequence[Mode]) -> Judged:
+    """The window of `pieces` and what of it is used."""
+    if not pieces:
+        raise ValueError("a window of no pieces")
+    broken = broken_channels(pieces, stream)
+    rows = [row for row, each in enumerate(stream.channels) if each.name not in broken]
+    channels = tuple(stream.channels[row] for row in rows)
+    reason = "; ".join(f"{name}: {why}" for name, why in broken.items())
+    if not rows:
+        return _unusable(pieces, stream, f"no channel can be used ({reason})")
+    values = [part for piece in pieces for part in _known_parts(piece, channels)]
+    rate = stream.sampling_rate_hz
+    if sum(part.shape[1] for part in values) < LEAST_S * rate:
+        return _unusable(pieces, stream, f"less than {LEAST_S:g} s without a gap")
+    band = _band_hz(known, rate)
+    events = _Events.of(values, rate, band)
+    parts = tuple(events.undisturbed(values))
+    if sum(part.shape[1] for part in parts) < LEAST_S * rate:
+        why = f"{events.kind}: less than {LEAST_S:g} s are undisturbed"
+        return _unusable(pieces, stream, why, events)
+    return _used(pieces, stream, known, channels, parts, events, band, reason)
+
+
+def _used(
+    pieces: Sequence[Piece],
+    stream: Stream,
+    known: Sequence[Mode],
+    channels: tuple[StreamChannel, ...],
+    parts: tuple[FloatArray, ...],
+    events: _Events,
+    band_hz: tuple[float, float],
+    reason: str,
+) -> Judged:
+    stretches = tuple(stretch(part, stream.sampling_rate_hz) for part in parts)
+    peaks = found_peaks(stretches, channels, known)
+    height = float(np.median(peaks.height_db[peaks.seen])) if peaks.seen else NAN
+    kind: WindowKind = events.kind
+    if kind == "wind" and height < _QUIET_DB and not _has_strong_peaks(stretches, band_hz):
+        kind = "quiet"
+    window = _window(pieces, stream, kind, _level(stretches, band_hz), events.unrest, height)
+    apart = f"{events.seconds:.0f} s are set apart: {events.kind}" if events.seconds else ""
+    reason = "; ".join(each for each in (reason, apart) if each)
+    return Judged(window, channels, parts, stretches, peaks, reason)
+
+
+def _window(
+    pieces: Sequence[Piece],
+    stream: Stream,
+    kind: WindowKind,
+    level: float,
+    unrest: float = NAN,
+    height_db: float = NAN,
+) -> Window:
+    start = min(piece.start for piece in pieces)
+    last = max(pieces, key=lambda piece: piece.start)
+    seconds = (last.start - start).total_seconds()
+    return Window(
+        stream=stream.name,
+        hanger=stream.hanger,
+        start=start,
+        duration_s=seconds + last.values.shape[1] / last.sampling_rate_hz,
+        kind=kind,
+        level_m_s2=level,
+        unrest=unrest,
+        signal_to_noise_db=height_db,
+        temperature_c=_mean([piece.temperature_c for piece in pieces], pieces),
+        wind_m_s=_mean([piece.wind_m_s for piece in pieces], pieces),
+    )
+
+
+def _unusable(
+    pieces: Sequence[Piece], stream: Stream, reason: str, events: _Events | None = None
+) -> Judged:
+    unrest = events.unrest if events else NAN
+    return Judged(_window(pieces, stream, "unusable", NAN, unrest), reason=reason)
+
+
+def _mean(values: Sequence[float], pieces: Sequence[Piece]) -> float:
+    """Mean over the pieces that know it, by their length."""
+    known = [
+        (value, piece.values.shape[1])
+        for value, piece in zip(values, pieces, strict=True)
+        if math.isfinite(value)
+    ]
+    total = sum(samples for _, samples in known)
+    return sum(value * samples for value, samples in known) / total if total else NAN
+
+
+def _band_hz(known: Sequence[Mode], rate: float) -> tuple[float, float]:
+    """Of the known modes with what a search reaches, else all that a hanger's may be in."""
+    hz = [mode.frequency_hz for mode in known]
+    if not hz:
+        return 2.0, _PASSED * rate
+    return 0.8 * min(hz), min(1.2 * max(hz), 0.49 * rate)
+
+
+def _known_parts(piece: Piece, channels: Sequence[StreamChannel]) -> list[FloatArray]:
+    """Parts (channels, samples) of a piece in which every channel is known."""
+    rows = [piece.channels.index(channel.name) for channel in channels]
+    values = np.asarray(piece.values, dtype=float)[rows]
+    good = np.all(np.isfinite(values), axis=0)
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], good, [False]))))
+    parts = [values[:, begin:end] for begin, end in edges.reshape(-1, 2)]
+    return [part for part in parts if part.shape[1] >= _LEAST_STRETCH_S * piece.sampling_rate_hz]
+
+
+def _level(stretches: Sequence[Stretch], band_hz: tuple[float, float]) -> float:
+    """Root mean square acceleration in a band, mean over the channels."""
+    total = sum(each.seconds for each in stretches)
+    power = sum(
+        2 * float(np.mean(np.sum(np.abs(each.values[:, each.between(*band_hz)]) ** 2, axis=1)))
+        for each in stretches
+    )
+    return math.sqrt(power / total)
+
+
+def _has_strong_peaks(stretches: Sequence[Stretch], band_hz: tuple[float, float]) -> bool:
+    """Whether several peaks of the spectrum stand out, at whatever frequency."""
+    longest = max(stretches, key=lambda each: each.seconds)
+    power = np.sum(np.abs(longest.values[:, longest.between(*band_hz)]) ** 2, axis=0)
+    many = 8  # technical: lines averaged, whose sum by chance is 10 dB up once in 1e14
+    mean = power[: len(power) // many * many].reshape(-1, many).mean(axis=1)
+    around = scipy.ndimage.median_filter(mean, size=max(9, len(mean) // 20), mode="nearest")
+    raised = mean > 10 ** (_STRONG_DB / 10) * around
+    return int(np.sum(np.diff(raised.astype(int)) == 1)) >= _STRONG_PEAKS
+
+
+@dataclass(frozen=True, eq=False)
+class _Events:
+    """What disturbs a window: `loud` marks blocks of `block` samples, part after part."""
+
+    kind: Literal["wind", "traffic", "knock"]
+    unrest: float
+    block: int
+    loud: tuple[BoolArray, ...]
+
+    @classmethod
+    def of(cls, parts: Sequence[FloatArray], rate: float, band_hz: tuple[float, float]) -> _Events:
+        block = max(1, round(_BLOCK_S * rate))
+        sections = scipy.signal.butter(2, band_hz, "bandpass", fs=rate, output="sos")
+        inside, slow = [], []
+        for part in parts:
+            centred = part - np.median(part, axis=1, keepdims=True)
+            inside.append(_block_rms(scipy.signal.sosfilt(sections, centred), block))
+            # Means of blocks are what a train does below the modes: it bends the deck.
+            slow.append(np.abs(_blocks(centred, 2 * block).mean(axis=2)).max(axis=0).repeat(2))
+        loud, kinds = [], set()
+        level, sway = _median(inside), _median(slow)
+        for own, below in zip(inside, slow, strict=True):
+            below = np.pad(below, (0, len(own) - len(below)), "edge")
+            marked = (own > LOUDER * level) | (below > 2 * LOUDER * sway)
+            loud.append(_with_edges(marked))
+            kinds |= {_kind_of(own[first:end]) for first, end in _runs(marked, _AFTER_S)}
+        kind: Literal["wind", "traffic", "knock"] = "wind"
+        kind = "traffic" if "traffic" in kinds else "knock" if kinds else kind
+        return cls(kind, _unrest(inside), block, tuple(loud))
+
+    @property
+    def seconds(self) -> float:
+        """How long the disturbed parts are."""
+        return _BLOCK_S * float(sum(np.sum(each) for each in self.loud))
+
+    def undisturbed(self, parts: Sequence[FloatArray]) -> list[FloatArray]:
+        """What lies between the events and is long enough."""
+        least = int(_LEAST_STRETCH_S / _BLOCK_S)
+        return [
+            part[:, first * self.block : (end * self.block if end < len(loud) else None)]
+            for part, loud in zip(parts, self.loud, strict=True)
+            for first, end in _runs(~loud, 0.0)
+            if end - first >= least
+        ]
+
+
+def _blocks(values: FloatArray, block: int) -> FloatArray:
+    """(channels, blocks, samples)."""
+    count = values.shape[1] // block
+    return values[:, : count * block].reshape(len(values), count, block)
+
+
+def _block_rms(values: FloatArray, block: int) -> FloatArray:
+    """Root mean square (blocks,) over the channels, each by its own median."""
+    rms = np.sqrt(np.mean(_blocks(values, block) ** 2, axis=2))
+    usual = np.median(rms, axis=1, keepdims=True)
+    found: FloatArray = np.sqrt(np.mean((rms / np.where(usual > 0, usual, 1.0)) ** 2, axis=0))
+    return found
+
+
+def _median(parts: Sequence[FloatArray]) -> float:
+    return float(np.median(np.concatenate(parts)))
+
+
+def _unrest(parts: Sequence[FloatArray]) -> float:
+    """The loudest five seconds over the median five seconds."""
+    many = int(_STRETCH_S / _BLOCK_S)
+    level = np.sqrt(
+        np.concatenate([np.mean(_blocks(p[np.newaxis] ** 2, many), axis=2)[0] for p in parts])
+    )
+    return float(np.max(level) / np.median(level))
+
+
+def _runs(marked: BoolArray, gap_s: float) -> list[tuple[int, int]]:
+    """First and end of each run of marked blocks; those nearer than `gap_s` are one."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], marked, [False])))).reshape(-1, 2)
+    runs: list[tuple[int, int]] = []
+    for first, end in edges.tolist():
+        if runs and (first - runs[-1][1]) * _BLOCK_S < gap_s:
+            runs[-1] = runs[-1][0], end
+        else:
+            runs.append((first, end))
+    return runs
+
+
+def _kind_of(level: FloatArray) -> Literal["traffic", "knock"]:
+    """A knock is at its highest at once, and rings down."""
+    rise_s = int(np.argmax(level)) * _BLOCK_S
+    return "knock" if rise_s <= _KNOCK_RISE_S and len(level) * _BLOCK_S < _KNOCK_S else "traffic"
+
+
+def _with_edges(marked: BoolArray) -> BoolArray:
+    """The loud blocks with what comes just before and after."""
+    wide = marked.copy()
+    for first, end in _runs(marked, 0.0):
+        wide[max(0, first - int(_BEFORE_S / _BLOCK_S)) : end + int(_AFTER_S / _BLOCK_S)] = True
+    return wide
