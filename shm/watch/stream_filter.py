@@ -73,14 +73,13 @@ class Bank:
         variance[:, LEVEL] = _FIRST_SD**2
         variance[:, SLOW], variance[:, FAST] = _SLOW_SD**2, _FAST_SD**2
         variance[:, FEATURES:] = coefficient_sd**2
-        bank = cls(
+        return cls(
             day,
             np.zeros((m, p)),
             variance[:, :, None] * np.eye(p),
             np.zeros(m),
             *_no_beginnings(m, p),
         )
-        return bank
 
     @property
     def weight(self) -> FloatArray:
@@ -110,14 +109,14 @@ class Bank:
         noise[:, FAST] = _FAST_SD**2 * (1 - stays[FAST] ** 2)
         noise[:, FEATURES:] = (_WITHIN_A_YEAR * coefficient_sd) ** 2 * days / DAYS_PER_YEAR
         covariance = step @ self.covariance @ step.T
-        covariance[:, np.arange(p), np.arange(p)] += noise
+        covariance.reshape(len(covariance), -1)[:, :: p + 1] += noise
         return replace(
             self,
             day=day,
             mean=self.mean @ step.T,
             covariance=covariance,
             log_weight=self.log_weight * math.exp(-days / _MEMORY_DAYS),
-            effect=(self.effect @ step.T).astype(np.float32),
+            effect=self.effect @ step.T.astype(np.float32),
         )
 
     def with_beginning(self, after_day: float) -> Bank:
@@ -174,14 +173,14 @@ class Bank:
         step = corrected(self.mean, self.covariance, design[None], np.array([value]), noise)
         # The loss is bounded as the gain of a change is: else a large wander would explain it.
         fit = -np.log(spread) / 2 - np.minimum(missed**2 / spread, CLIP**2) / 2
-        foreseen = self.effect @ design
-        gain = step.gain[:, None, None, :, 0]
+        foreseen = self.effect @ design.astype(np.float32)
+        gain = step.gain[:, None, None, :, 0].astype(np.float32)
         return replace(
             self,
             mean=step.mean_after,
             covariance=step.covariance_after,
             log_weight=self.log_weight + fit - fit.max(),
-            effect=(self.effect - foreseen[..., None] * gain).astype(np.float32),
+            effect=self.effect - foreseen[..., None] * gain,
             score=self.score + foreseen * (missed / clipped)[:, None, None],
             information=self.information + foreseen**2 / clipped[:, None, None],
         )
@@ -198,10 +197,11 @@ class Bank:
         precision = self.information + prior
         size = self.score / precision
         log_ratio = (self.score * size + np.log(prior / precision)) / 2
-        shares = np.log(self.weight)[:, None, None] + np.log(self.span_days / 2)[:, None]
-        log_each = log_ratio + shares
-        total = float(scipy.special.logsumexp(log_each))
-        chance = np.exp(log_each - total)
+        shares = self.weight[:, None, None] * (self.span_days / 2)[:, None]
+        largest = float(log_ratio.max())
+        chance = shares * np.exp(log_ratio - largest)
+        total = largest + math.log(float(chance.sum()))
+        chance /= chance.sum()
         reach = np.stack([np.ones_like(self.by_day), self.day - self.after_day], axis=1)
         shift, sd = size * reach, reach / np.sqrt(precision)
         beyond = scipy.special.ndtr((np.abs(shift) - least_shift) / sd)

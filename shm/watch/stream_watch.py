@@ -13,9 +13,8 @@ the winter's temperatures in the first summer, is unknown to the filters, and ma
 from __future__ import annotations
 
 import hashlib
-import io
+import json
 import math
-import zipfile
 from dataclasses import dataclass, field, fields, replace
 from datetime import datetime, timedelta
 from itertools import pairwise
@@ -141,58 +140,55 @@ class StreamState:
         )
 
     def to_bytes(self) -> bytes:
-        """The state as a file of numpy arrays, without any pickled object."""
-        plain = _plain(self) | _plain(self.table, "table.") | _plain(self.bank, "bank.")
-        plain["table.modes"] = np.array([f"{plane} {order}" for plane, order in self.table.modes])
-        plain["told"] = np.asarray(self.told.to_text())
-        kept = io.BytesIO()
-        np.savez(kept, **plain)
-        return kept.getvalue()
+        """The state as a line of JSON, and the bytes of all arrays after it."""
+        arrays = {
+            f"{name}.{each.name}": value
+            for name, part in (("state", self), ("table", self.table), ("bank", self.bank))
+            for each in fields(part)
+            if isinstance(value := getattr(part, each.name), np.ndarray)
+        }
+        head = {name: getattr(self, name) for name in _SCALARS} | {
+            "start": self.start.isoformat(),
+            "day": self.bank.day,
+            "tension_n": self.table.tension_n,
+            "modes": self.table.modes,
+            "told": self.told.to_text(),
+            "arrays": [(name, each.dtype.str, each.shape) for name, each in arrays.items()],
+        }
+        return b"\n".join([json.dumps(head).encode(), b"".join(map(np.ndarray.tobytes, arrays.values()))])
 
     @classmethod
     def from_bytes(cls, content: bytes) -> StreamState:
         """The state back; raises BadInput where the content is no such state."""
         try:
-            with np.load(io.BytesIO(content), allow_pickle=False) as file:
-                kept = dict(file)
-            modes = [str(each).rpartition(" ") for each in kept.pop("table.modes")]
-            keys = tuple((plane, int(order)) for plane, _, order in modes)
-            table = ModeTable(modes=keys, **_part(kept, "table."))
-            found = {name: each for name, each in kept.items() if "." not in name}
-            told = AlertState.from_text(str(found.pop("told")))
-            scalars = {name: found.pop(name).item() for name in _SCALARS}
-            scalars["start"] = datetime.fromisoformat(scalars["start"])
-            standing = tuple(str(each) for each in found.pop("standing"))
-            bank = Bank(**_part(kept, "bank."))
-            return cls(table=table, bank=bank, told=told, standing=standing, **scalars, **found)
-        except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile) as error:
+            line, _, rest = content.partition(b"\n")
+            head = json.loads(line)
+            parts: dict[str, dict[str, FloatArray]] = {"state": {}, "table": {}, "bank": {}}
+            at = 0
+            for name, kind, shape in head["arrays"]:
+                part, _, own = name.partition(".")
+                count = math.prod(shape)
+                parts[part][own] = np.frombuffer(rest, kind, count, at).reshape(shape)
+                at += parts[part][own].nbytes
+            modes = tuple((plane, order) for plane, order in head["modes"])
+            return cls(
+                start=datetime.fromisoformat(head["start"]),
+                table=ModeTable(modes=modes, tension_n=head["tension_n"], **parts["table"]),
+                bank=Bank(day=head["day"], **parts["bank"]),
+                told=AlertState.from_text(head["told"]),
+                **{name: head[name] for name in _SCALARS},
+                **parts["state"],
+            )
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise BadInput(
-                f"A kept state of a stream's watch cannot be read: {error}.",
+                f"A kept state of a stream's watch cannot be read: {error!r}.",
                 remedy="Drop it: the watch then learns the stream's baseline anew.",
             ) from error
 
 
 _SCALARS = (
-    "key", "start", "zero", "compensated_zero", "readings", "is_learning", "called_shift",
+    "key", "zero", "compensated_zero", "readings", "is_learning", "called_shift", "standing",
 )  # fmt: skip
-
-
-def _plain(part: object, prefix: str = "") -> dict[str, FloatArray]:
-    found = {each.name: getattr(part, each.name) for each in fields(part)}  # type: ignore[arg-type]
-    apart = ("table", "bank", "told", "modes")
-    return {
-        prefix + name: np.asarray(value.isoformat() if isinstance(value, datetime) else value)
-        for name, value in found.items()
-        if name not in apart
-    }
-
-
-def _part(kept: dict[str, FloatArray], prefix: str) -> dict[str, FloatArray | float]:
-    return {
-        name.removeprefix(prefix): each.item() if each.ndim == 0 else each
-        for name, each in kept.items()
-        if name.startswith(prefix)
-    }
 
 
 # ---------------------------------------------------------------- one reading
@@ -228,7 +224,8 @@ def _key(baseline: Posterior | None, hanger: Hanger, stream: str) -> str:
     """What the state rests on; thresholds may change without a new beginning."""
     of = baseline and (baseline.model, baseline.seed, baseline.tests)
     described = (hanger.length_m, hanger.bending_stiffness_n_m2, hanger.mass_per_length_kg_m)
-    return f"{_VERSION} {hashlib.sha256(repr((hanger.id, described, stream, of)).encode()).hexdigest()}"
+    rests_on = repr((hanger.id, described, stream, of))
+    return f"{_VERSION} {hashlib.sha256(rests_on.encode()).hexdigest()}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,7 +299,7 @@ class StreamWatch:
         before = state.told
         told, alert = after(before, test, self.hanger)
         told = replace(told, called=told.called[-_CALLS_KEPT:])
-        standing = state.standing + ((alert.key,) if alert else ())
+        standing = (*state.standing, alert.key) if alert else state.standing
         ended = standing if alert is None and not told.beyond and not told.called else ()
         state = replace(state, told=told, standing=() if ended else standing)
         shift, sd = test.drifts[0].shift_mean, test.drifts[0].shift_sd
@@ -379,6 +376,15 @@ def _shift(state: StreamState) -> tuple[float, float]:
     """Since the baseline, under its conditions: a fraction of the tension."""
     mean, sd = state.bank.along(_compensated(state.bank))
     return _fraction(mean - state.compensated_zero, sd, state.table)
+
+
+def daily_shift(state: StreamState, reading: PooledReading) -> tuple[float, float]:
+    """Of the tension since the stream's baseline, by a day's reading as it is, with its sd."""
+    known = [mode for mode in usable(reading) if (mode.plane, mode.order) in state.table.modes]
+    if not known:
+        return NAN, NAN
+    kelvin = reading.temperature_c - state.reference[0]
+    return shift_of_reading(state, state.table.seen(known, kelvin if math.isfinite(kelvin) else 0.0))
 
 
 def shift_of_reading(state: StreamState, seen: SeenReading) -> tuple[float, float]:
