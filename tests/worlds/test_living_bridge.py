@@ -1,0 +1,154 @@
+"""The living bridge against closed forms, and its records against its own truth."""
+
+from collections import Counter
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+from scipy.signal import welch
+
+from tests.worlds.living_bridge import (
+    PLANES,
+    RATE_HZ,
+    Beam,
+    Change,
+    Flags,
+    HourlyFlags,
+    bound,
+    describe,
+    hourly,
+    hourly_arrays,
+    raw,
+    true_tension,
+    truth,
+)
+
+START = datetime(2026, 5, 4, 9, tzinfo=UTC)
+QUIET = HourlyFlags(**{n: False for n in HourlyFlags.__dataclass_fields__ if n != "scatter"})
+
+
+def test_pinned_bar_is_the_closed_form() -> None:
+    length, mass, bending, tension = 12.0, 48.0, 4.2e5, 5e5
+    hz, shape = Beam(length, mass, bending, tension).modes(8)
+    k = np.arange(1, 9) * np.pi / length
+    closed = np.sqrt((tension * k**2 + bending * k**4) / mass) / (2 * np.pi)
+    np.testing.assert_allclose(hz, closed, rtol=1e-7)
+    x = np.linspace(0, length, 201)
+    np.testing.assert_allclose(np.abs(shape[:, 0]), np.sin(k[0] * x), atol=1e-6)
+
+
+def test_clamped_bar_without_tension_is_the_closed_form() -> None:
+    hz, _ = Beam(5.0, 50.0, 1e6, 1e-3, springs_nm=(1e11, 1e11)).modes(3)
+    roots = np.array([4.730040745, 7.853204624, 10.99560784])
+    closed = (roots / 5.0) ** 2 * np.sqrt(1e6 / 50.0) / (2 * np.pi)
+    np.testing.assert_allclose(hz, closed, rtol=1e-4)
+
+
+def test_pinned_timoshenko_bar_under_tension() -> None:
+    """One sine of w and one cosine of theta: two equations."""
+    length, mass, bending, tension, shear, rotary = 4.0, 80.0, 1.5e6, 6e5, 7e8, 0.06
+    hz, _ = Beam(length, mass, bending, tension, shear_n=shear, rotary_kg_m=rotary).modes(3)
+    for n in (1, 2, 3):
+        k = n * np.pi / length
+        stiff = np.array(
+            [[(tension + shear) * k**2, -shear * k], [-shear * k, shear + bending * k**2]]
+        )
+        lowest = np.linalg.eigvals(np.diag([1 / mass, 1 / rotary]) @ stiff).real.min()
+        assert hz[n - 1] == pytest.approx(np.sqrt(lowest) / (2 * np.pi), rel=1e-7)
+
+
+def test_spectrum_peaks_at_the_truth() -> None:
+    chunks = list(raw(3, [6], START, 0.25, flags=Flags.none()))
+    assert [c["sequence"] for c in chunks] == list(range(15))
+    values = np.concatenate([c["values"] for c in chunks], axis=1)
+    assert values.dtype == np.float32
+    f, psd = welch(values, RATE_HZ, nperseg=2**14)
+    known = truth(3, [6], [START + timedelta(minutes=7)])[6]
+    for row, plane in enumerate(PLANES):
+        for hz in known["frequency_hz"][plane][0, :4]:
+            near = np.abs(f / hz - 1) < 0.02
+            spectrum = psd[row] + psd[row + 2]
+            peak = f[near][np.argmax(spectrum[near])]
+            assert peak == pytest.approx(hz, abs=max(2.5 * f[1], 2e-3 * hz))
+
+
+def test_a_loss_lowers_the_frequencies_and_loads_the_next() -> None:
+    lost = [Change("tension_loss", 5, START, 0.04)]
+    times = [START - timedelta(hours=1), START + timedelta(hours=1)]
+    before, after = truth(2, [4, 5, 6, 9], times), truth(2, [4, 5, 6, 9], times, lost)
+    ratio = {h: after[h]["tension_n"] / before[h]["tension_n"] for h in before}
+    given = 0.01 * before[5]["tension_n"][1]
+    assert all(r[0] == 1 for r in ratio.values())
+    assert ratio[5][1] == pytest.approx(0.96, abs=2e-3)
+    assert ratio[4][1] == pytest.approx(1 + given / before[4]["tension_n"][1], abs=1e-3)
+    assert ratio[9][1] == 1
+    hz = after[5]["frequency_hz"]["transverse"] / before[5]["frequency_hz"]["transverse"]
+    # Of a string sqrt(0.96); bending and the ends hold on to the higher ones.
+    assert 0.9795 < hz[1, 0] < 0.992
+    assert np.all(np.diff(hz[1, :5]) > 0)
+    assert np.all(hz[0] == 1)
+
+
+def test_ramp_ice_and_loosened_end() -> None:
+    times = [START + timedelta(days=d) for d in (0, 5, 20)]
+    slow = Change("tension_loss", 5, START, 0.1, over_days=10)
+    found = true_tension(2, 5, times, [slow]) / true_tension(2, 5, times)
+    np.testing.assert_allclose(1 - found, [0, 0.05, 0.1], atol=3e-3)
+    plain = truth(2, [5], times)[5]["frequency_hz"]
+    ice = Change("ice", 5, times[1], 6.0, until=times[2] - timedelta(hours=1))
+    iced = truth(2, [5], times, [ice])[5]["frequency_hz"]["transverse"] / plain["transverse"]
+    assert np.all(iced[[0, 2]] == 1)
+    assert iced[1, 0] < 0.999
+    loose = Change("end_loosened", 5, times[1], 0.7, planes=("transverse",))
+    softer = truth(2, [5], times, [loose])[5]["frequency_hz"]
+    assert np.all(softer["transverse"][1] < plain["transverse"][1])
+    assert np.all(softer["longitudinal"] == plain["longitudinal"])
+    moved = Change("sensor_remounted", 5, times[1], 0.1)
+    assert np.all(
+        truth(2, [5], times, [moved])[5]["frequency_hz"]["transverse"] == plain["transverse"]
+    )
+
+
+def test_same_seed_same_bridge() -> None:
+    for one, other in zip(raw(5, [1, 2], START, 0.05), raw(5, [1, 2], START, 0.05), strict=True):
+        np.testing.assert_array_equal(one.pop("values"), other.pop("values"))
+        assert one == other
+    assert hourly(5, 1, 0.01) == hourly(5, 1, 0.01)
+    assert describe(5) == describe(5) != describe(6)
+    # Stretches of one world agree where they overlap.
+    day = [START + timedelta(hours=h) for h in range(48)]
+    np.testing.assert_allclose(
+        true_tension(5, 3, day)[30], true_tension(5, 3, day[30])[0], rtol=1e-5
+    )
+
+
+def test_nuisances_leave_the_plan() -> None:
+    flags = Flags(rate=90.0, outages=False)
+    chunks = list(raw(7, [1, 2], START, 0.1, flags=flags, chunk_s=5.0))
+    seen = Counter((c["stream"], c["time"], c["sequence"]) for c in chunks)
+    assert len(chunks) < 2 * 72 + sum(n - 1 for n in seen.values())  # some are lost
+    assert max(seen.values()) == 2  # and some come twice
+    order = [c["sequence"] for c in chunks if c["hanger"] == 1]
+    assert order != sorted(order)
+
+
+def test_bound_is_the_known_law() -> None:
+    """Nearly all of the band, without noise: sqrt(zeta / (2 pi n_c))."""
+    got = bound(np.array([5.0]), np.array([0.002]), np.array([1e-7]))[0]
+    assert got == pytest.approx(np.sqrt(0.002 / (2 * np.pi * 3000)), rel=0.06)
+    noisy = bound(np.array([5.0]), np.array([0.002]), np.array([1e-1]))[0]
+    assert noisy > 1.1 * got
+
+
+def test_readings_scatter_as_they_say_and_lie_where_the_truth_is() -> None:
+    plain = hourly_arrays(4, 8, 0.5, flags=QUIET)
+    z = (plain.frequency_hz - plain.true_hz) / plain.true_sd_hz
+    assert np.nanstd(z) == pytest.approx(1, abs=0.03)
+    field = hourly_arrays(4, 8, 0.5)
+    relative = field.frequency_sd_hz / field.frequency_hz
+    assert 2e-5 < np.nanmedian(relative) < 4e-4
+    assert 0.02 < np.isnan(field.frequency_hz).all(axis=(1, 2)).mean() < 0.5
+    assert np.nanmedian(np.abs(field.frequency_hz / field.true_hz - 1)) < 6e-4
+    first = field.readings()[0]
+    assert first["modes"][0]["frequency_sd_hz"] > 0
+    assert first["time"].tzinfo is not None
