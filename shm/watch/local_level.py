@@ -157,23 +157,13 @@ class LocalLevels:
         mean = np.zeros((len(z), len(first)))
         covariance = np.broadcast_to(np.diag(first), (len(z), len(first), len(first)))
         log_likelihood, levels = np.zeros(len(z)), np.arange(rate.shape[1])
-        identity = np.eye(len(first))
         steps = []
         for test, design in enumerate(self._design):
-            missed = self._seen[test] - mean @ design.T
-            towards = design @ covariance
-            spread = towards @ design.T + noise[:, test]
-            inverse = np.linalg.inv(spread)
-            gain = np.swapaxes(towards, 1, 2) @ inverse
-            log_likelihood -= np.linalg.slogdet(spread)[1] / 2
-            log_likelihood -= np.einsum("mi,mij,mj->m", missed, inverse, missed) / 2
-            mean_after = mean + np.einsum("mij,mj->mi", gain, missed)
-            kept = identity - gain @ design
-            # Joseph's form: a plain difference loses what little a precise test leaves.
-            after = kept @ covariance @ np.swapaxes(kept, 1, 2)
-            after += gain @ noise[:, test] @ np.swapaxes(gain, 1, 2)
-            steps.append(_Step(mean, covariance, missed, inverse, gain, mean_after, after))
-            mean, covariance = mean_after, after.copy()
+            step = corrected(mean, covariance, design, self._seen[test], noise[:, test])
+            log_likelihood += np.linalg.slogdet(step.inverse)[1] / 2
+            log_likelihood -= np.einsum("mi,mij,mj->m", step.missed, step.inverse, step.missed) / 2
+            steps.append(step)
+            mean, covariance = step.mean_after, step.covariance_after.copy()
             covariance[:, levels, levels] += wandering[:, test]
         return _Filtered(log_likelihood, steps)
 
@@ -214,7 +204,7 @@ def _inside(z: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class _Step:
+class Step:
     """One test: the state before and after it (m, ...), what it missed (m, q), its gain."""
 
     mean: FloatArray
@@ -226,12 +216,32 @@ class _Step:
     covariance_after: FloatArray
 
 
+def corrected(
+    mean: FloatArray,
+    covariance: FloatArray,
+    design: FloatArray,
+    seen: FloatArray,
+    noise: FloatArray,
+) -> Step:
+    """States (m, p) and covariances (m, p, p) once `seen` (q,) is, by `design` (q, p), with `noise`
+    (m, q, q). Joseph's form: a plain difference loses what little a precise test leaves."""
+    missed = seen - mean @ design.T
+    towards = design @ covariance
+    inverse = np.linalg.inv(towards @ design.T + noise)
+    gain = np.swapaxes(towards, 1, 2) @ inverse
+    mean_after = mean + np.einsum("mij,mj->mi", gain, missed)
+    kept = np.eye(mean.shape[1]) - gain @ design
+    after = kept @ covariance @ np.swapaxes(kept, 1, 2)
+    after += gain @ noise @ np.swapaxes(gain, 1, 2)
+    return Step(mean, covariance, missed, inverse, gain, mean_after, after)
+
+
 @dataclass(frozen=True, eq=False)
 class _Filtered:
     """`log_likelihood` (m,), but for a constant, and the steps."""
 
     log_likelihood: FloatArray
-    steps: list[_Step]
+    steps: list[Step]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from shm.values import FloatArray, Hanger
 from shm.watch.quantities import MeasuredMode, log_frequencies
 
 # Of steel's modulus: Ledbetter and Reed (1973), Elastic properties of metals and alloys, I.
-_MODULUS_PER_KELVIN = -3e-4
+MODULUS_PER_KELVIN = -3e-4
 _STIFFER = 0.01
 _CLAMPED = "beam1"
 
@@ -40,4 +40,4 @@ def softening(
     stiff = described(model.name, stiffer, model.priors)
     change = log_frequencies(stiff, base[None], modes)
     change = change - log_frequencies(model, base[None], modes)
-    return np.asarray(_MODULUS_PER_KELVIN * change[0] / _STIFFER)
+    return np.asarray(MODULUS_PER_KELVIN * change[0] / _STIFFER)

@@ -1,0 +1,279 @@
+"""The watch over hourly readings of permanent sensors, on a bridge that its author did not make.
+
+python tests/benchmarks/stream_trial.py --scenario quiet --hangers 100 --years 1 --seed 1000
+python tests/benchmarks/stream_trial.py --scenario loss1,loss2,ramp --hangers 40 --seed 1000
+
+The world is `tests/worlds/living_bridge.py`: seasons, sun, wind, traffic, joints that slip, planes
+exchanged, gaps. Each hanger is of a bridge of its own and begins on a day of its own. Of the quiet
+scenario all alerts are false. Elsewhere something comes after 15 to 29 days and is followed for ten
+days, a ramp for 40. Faults of sensors and clock are made here, on the readings. Nothing was tuned
+on seeds from 1000 on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from shm.values import Hanger, Mode  # noqa: E402
+from shm.values.rounding import NINETY_PERCENT  # noqa: E402
+from shm.values.stream import PooledReading  # noqa: E402
+from shm.watch.stream_watch import (  # noqa: E402
+    StreamOptions,
+    StreamState,
+    StreamWatch,
+    daily_shift,
+)
+from tests.worlds.living_bridge import Change, describe, hourly, true_tension  # noqa: E402
+
+DAYS_A_YEAR = 365.25
+OPPOSITE = {"transverse": "longitudinal", "longitudinal": "transverse"}
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What comes: a change of the plant, or a fault of the readings."""
+
+    plant: Callable[[int, datetime], Change] | None = None
+    fault: Callable[[Mode, float], Mode | None] | None = None
+    days_after: float = 10.0
+    is_fault: bool = False
+
+
+def loss(size: float, over_days: float = 0.0) -> Callable[[int, datetime], Change]:
+    return lambda hanger, at: Change("tension_loss", hanger, at, size, over_days)
+
+
+def off_by(mode: Mode, fraction: float) -> Mode:
+    return replace(mode, frequency_hz=mode.frequency_hz * (1 + fraction))
+
+
+SCENARIOS = {
+    "quiet": Scenario(),
+    "loss1": Scenario(loss(0.01)),
+    "loss2": Scenario(loss(0.02)),
+    "loss6": Scenario(loss(0.06)),
+    "ramp": Scenario(loss(0.02, 20.0), days_after=40.0),
+    "ramp5": Scenario(loss(0.05, 30.0), days_after=40.0),
+    "end": Scenario(lambda hanger, at: Change("end_loosened", hanger, at, 0.6)),
+    "ice": Scenario(lambda hanger, at: Change("ice", hanger, at, 8.0, 0.5)),
+    "remounted": Scenario(
+        lambda hanger, at: Change("sensor_remounted", hanger, at, 0.3), is_fault=True
+    ),
+    "clock": Scenario(fault=lambda mode, size: off_by(mode, 0.005 * size), is_fault=True),
+    "swapped": Scenario(
+        fault=lambda mode, _: replace(mode, plane=OPPOSITE[mode.plane]), is_fault=True
+    ),
+    "dead": Scenario(fault=lambda mode, _: None if mode.plane == "transverse" else mode,
+                     is_fault=True),
+}  # fmt: skip
+
+
+def described(seed: int, number: int) -> Hanger:
+    own = describe(seed, [number])[0]
+    return Hanger(
+        id=number,
+        length_m=own["length_m"],
+        elastic_modulus_pa=own["elastic_modulus_pa"],
+        area_m2=own["area_m2"],
+        second_moment_m4=own["second_moment_m4"],
+        mass_per_length_kg_m=own["mass_kg_m"],
+        nominal_tension_n=own["nominal_tension_n"],
+        diameter_m=own["diameter_m"],
+        kind=own["kind"],
+    )
+
+
+def as_reading(own: dict[str, Any]) -> PooledReading:
+    modes = tuple(
+        Mode(m["plane"], m["order"], m["frequency_hz"], m["frequency_sd_hz"], m["damping_ratio"])
+        for m in own["modes"]
+    )
+    nan = float("nan")
+    warm, wind = (nan if own[key] is None else own[key] for key in ("temperature_c", "wind_m_s"))
+    level = float(np.median([m["level_m_s2"] for m in own["modes"]]))
+    return PooledReading("a", own["hanger"], own["time"], "hour", modes, 6, 0, level, warm, wind)
+
+
+def with_fault(
+    readings: Sequence[PooledReading], scenario: Scenario, at: datetime, size: float
+) -> Iterator[PooledReading]:
+    for each in readings:
+        if scenario.fault is None or each.start < at:
+            yield each
+        else:
+            found = [scenario.fault(mode, size) for mode in each.modes]
+            yield replace(each, modes=tuple(mode for mode in found if mode))
+
+
+def solved(name: str, seed: int, years: float) -> dict[str, Any]:
+    """One hanger through one scenario."""
+    scenario, draw = SCENARIOS[name], np.random.default_rng([seed, 77])
+    number = int(draw.integers(1, 21))
+    start = datetime(2024, 1, 1, tzinfo=UTC) + timedelta(days=float(draw.integers(0, 365)))
+    at = start + timedelta(days=float(draw.uniform(15, 29)))
+    size = float(draw.choice([-1, 1]) * draw.uniform(0.6, 1.5))
+    changes = [scenario.plant(number, at)] if scenario.plant else []
+    if name != "quiet":
+        years = ((at - start).total_seconds() / 86400 + scenario.days_after) / DAYS_A_YEAR
+    plain = hourly(seed, number, years, changes, start=start)
+    readings = list(with_fault(list(map(as_reading, plain)), scenario, at, size))
+    watch = StreamWatch(None, described(seed, number), StreamOptions())
+    alerts, events, worst, state = [], [], 0.0, None
+    daily: list[tuple[datetime, float, float]] = []
+    began = time.process_time()
+    for day, group in groupby(readings, key=lambda each: each.start.date()):
+        hours = list(group)
+        for each in hours:
+            if not each.modes:
+                continue
+            found, state = watch.after(state, each)
+            if found.test:
+                worst = max(worst, found.test.change.evidence_years)
+            if found.alert:
+                alerts.append(found.alert)
+            events += found.events
+        if state and not state.is_learning and len(hours) > 12:
+            daily.append((hours[0].start, *daily_shift(state, of_day(hours))))
+    seconds = time.process_time() - began
+    return {
+        "scenario": name, "seed": seed, "hanger": number, "readings": len(readings),
+        "years": years, "worst_years": worst, "ms": 1e3 * seconds / len(readings),
+        "alerts": [
+            {"hours": (a.time - at).total_seconds() / 3600, "kinds": a.kinds,
+             "time": f"{a.time:%Y-%m-%dT%H}", "message": a.message,
+             "quantity": a.change.moved[0].quantity if a.change and a.change.moved else ""}
+            for a in alerts
+        ],
+        "events": [{"hours": (e.end - at).total_seconds() / 3600, "kind": e.kind,
+                    "detail": e.detail} for e in events],
+        **daily_figures(seed, number, changes, start, daily, state),
+        "state_bytes": len(state.to_bytes()) if state else 0,
+    }  # fmt: skip
+
+
+def of_day(hours: Sequence[PooledReading]) -> PooledReading:
+    """A day's readings as one: each mode's median, its sd by what the hours scatter."""
+    found: dict[tuple[str, int], list[Mode]] = {}
+    for mode in (mode for each in hours for mode in each.modes):
+        found.setdefault((mode.plane, mode.order), []).append(mode)
+    modes = []
+    for own in found.values():
+        hz = np.array([mode.frequency_hz for mode in own])
+        spread = 1.4826 * np.median(np.abs(hz - np.median(hz)))
+        stated = np.median([mode.frequency_sd_hz for mode in own])
+        sd = max(spread, stated) * np.sqrt(np.pi / 2 / len(own))
+        modes.append(replace(own[0], frequency_hz=float(np.median(hz)), frequency_sd_hz=float(sd)))
+    warm = [each.temperature_c for each in hours if np.isfinite(each.temperature_c)]
+    return replace(
+        hours[0],
+        period="day",
+        modes=tuple(modes),
+        temperature_c=float(np.mean(warm)) if warm else float("nan"),
+    )
+
+
+def daily_figures(
+    seed: int,
+    number: int,
+    changes: Sequence[Change],
+    start: datetime,
+    daily: Sequence[tuple[datetime, float, float]],
+    state: StreamState | None,
+) -> dict[str, Any]:
+    """Coverage of the days' shifts of the tension, and how far they scatter about the truth."""
+    if len(daily) < 3 or state is None:
+        return {"covered": 0, "days": 0}
+    hours = [timedelta(hours=h + 0.5) for h in range(24)]
+    first = [start + each + timedelta(days=d) for d in range(3) for each in hours]
+    base = true_tension(seed, number, first, changes).mean()
+    true = np.array(
+        [true_tension(seed, number, [day + h for h in hours], changes).mean() for day, *_ in daily]
+    )
+    shift, sd = np.array([each[1:] for each in daily]).T
+    off = shift - (true / base - 1)
+    return {
+        "covered": int((np.abs(off) < NINETY_PERCENT * sd).sum()),
+        "days": len(daily),
+        "repeatability": float(np.std(np.diff(off)) / np.sqrt(2)),
+        "bias": float(off.mean()),
+        "off_sd": float(off.std()),
+        "stated_sd": float(np.median(sd)),
+        "truth_sd": float(np.std(true / base)),
+    }
+
+
+def summary(name: str, found: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    scenario, n = SCENARIOS[name], len(found)
+    after = [[a for a in each["alerts"] if name == "quiet" or a["hours"] >= 0] for each in found]
+    told = [min((a["hours"] for a in own), default=float("inf")) for own in after]
+    figures: dict[str, Any] = {
+        "scenario": name,
+        "hangers": n,
+        "hanger_years": sum(each["years"] for each in found),
+        "alerts": sum(map(len, after)),
+        "false_before": sum(len(each["alerts"]) for each in found) - sum(map(len, after)),
+        "events": sum(len(each["events"]) for each in found),
+        "days_covered": sum(e["covered"] for e in found) / max(sum(e["days"] for e in found), 1),
+        "repeatability": float(np.median([e.get("repeatability", np.nan) for e in found])),
+        "repeatability_worst": float(np.max([e.get("repeatability", np.nan) for e in found])),
+        "ms_a_reading": float(np.mean([each["ms"] for each in found])),
+        "state_bytes": max(each["state_bytes"] for each in found),
+    }
+    if scenario.is_fault:
+        figures["told_as_tension"] = sum(
+            any(a["quantity"] == "tension" for a in own) for own in after
+        )
+        figures["named"] = sum(any(e["hours"] >= 0 for e in each["events"]) for each in found)
+    elif name != "quiet":
+        for hours in (6, 12, 24, 72, 240, 960):
+            figures[f"within_{hours}_h"] = sum(t <= hours for t in told) / n
+        figures["as_tension"] = sum(bool(own) and own[0]["quantity"] == "tension" for own in after) / n
+    return figures
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--scenario", default="quiet", help=", ".join(SCENARIOS))
+    parser.add_argument("--hangers", type=int, default=20)
+    parser.add_argument("--years", type=float, default=1.0, help="of the quiet scenario")
+    parser.add_argument("--seed", type=int, default=0, help="of the first hanger's bridge")
+    parser.add_argument("--json", type=Path, help="all that was found")
+    asked = parser.parse_args()
+    every = []
+    for name in asked.scenario.split(","):
+        found = []
+        for seed in range(asked.seed, asked.seed + asked.hangers):
+            found.append(solved(name, seed, asked.years))
+            each = found[-1]
+            print(
+                name, seed, f"{each['worst_years']:.2g} years", f"bias {each.get('bias', 0):.1e}",
+                *(f"{a['hours']:.0f} h {a['message'][:70]}" for a in each["alerts"]),
+                *(f"[{e['hours']:.0f} h {e['detail'][:50]}]" for e in each["events"]),
+                file=sys.stderr, flush=True,
+            )  # fmt: skip
+        every += found
+        print(json.dumps(summary(name, found), indent=1), flush=True)
+    if asked.json:
+        asked.json.write_text(json.dumps(every, default=str))
+
+
+if __name__ == "__main__":
+    main()
