@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 import rich_click as click
-from shm.read.chunk_document import chunk_document
 
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
+from shm.read.chunk_document import chunk_document
 from shm.simulate.monitored import Loss, MonitoringPlan, streamed
 from shm.store import Workspace
+from shm.store.ring import ring_of
 from shm.values import Hanger
 from shm.values.stream import Chunk, Stream
 from shm_cli.common import advancing_bar, show
@@ -51,7 +52,7 @@ def simulate_streams(workspace: Workspace, chosen: Live, *, as_json: bool) -> No
     with advancing_bar() as bar:
         sent = send(
             arriving(list(zip(hangers, streams, strict=True)), plan, first, seconds, chosen.seed),
-            workspace.ring.append,
+            ring_of(workspace).append,
             chosen.speed,
             told=lambda at: bar("simulating", (at - first).total_seconds() / seconds),
         )

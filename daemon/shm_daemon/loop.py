@@ -19,6 +19,7 @@ from shm.errors import (
     TooLarge,
 )
 from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
+from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
 from shm.store import Workspace
 from shm.store.active import ActiveLock
@@ -130,9 +131,13 @@ def _begin(
         meanwhile=(pulse := Pulse(workspace)),
     )
     stack.callback(flow.close)
+    streaming = Streaming(
+        workspace, store, executor, clock=clock, lanes=settings.workers, wake=wakeup.ring
+    )
+    stack.callback(streaming.close)
     stack.enter_context(rung_by_changes(wakeup, workspace.spool))
     stack.enter_context(messages(workspace))
-    daemon = Daemon(flow, wakeup, lock, pulse, lambda: make_executor(settings))
+    daemon = Daemon(flow, streaming, wakeup, lock, pulse, lambda: make_executor(settings))
     stack.callback(daemon.close)
     log.info("watching %s", workspace.spool)
     return daemon
@@ -144,12 +149,14 @@ class Daemon:
     def __init__(
         self,
         flow: Flow,
+        streaming: Streaming,
         wakeup: Wakeup,
         lock: ActiveLock,
         pulse: Pulse,
         make_executor: Callable[[], Executor],
     ):
-        self._flow, self._wakeup, self._lock, self._pulse = flow, wakeup, lock, pulse
+        self._flow, self._streaming = flow, streaming
+        self._wakeup, self._lock, self._pulse = wakeup, lock, pulse
         self._make_executor = make_executor
         settings = flow.workspace.settings
         self._tracker = FileStabilityTracker(settings.spool_stable_seconds, time.monotonic)
@@ -202,7 +209,8 @@ class Daemon:
         try:
             if is_whole:
                 self._scan()
-            left = self._flow.advance() or self._flow.suspects_due_s() is not None
+            left = self._streaming.advance()
+            left = self._flow.advance() or self._flow.suspects_due_s() is not None or left
             if self._once and not left and not self._tracker.watching:
                 left = self._flow.advance(hurry=True)
             if is_whole:
@@ -210,7 +218,7 @@ class Daemon:
             return left
         except BrokenExecutor:
             log.warning("a worker process died; beginning new ones")
-            self._flow.executor = self._make_executor()
+            self._flow.executor = self._streaming.executor = self._make_executor()
         except ShmError as error:
             if self._is_fatal(error):
                 raise
@@ -296,6 +304,7 @@ class Daemon:
         self._described_at = modified
         try:
             self._flow.use(self._flow.workspace.reopened())
+            self._streaming.use(self._flow.workspace)
         except ShmError as error:
             log.error("bridge.toml is not taken over: %s", error)
         else:

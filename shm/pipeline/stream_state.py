@@ -6,7 +6,11 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Literal
 
-from shm.store import Ring, Store, Workspace
+from shm.documents import parse_time
+from shm.store import Store, Workspace
+from shm.store.ring import Ring
+from shm.store.ring_files import PERIOD
+from shm.values import NAN
 from shm.values.stream import PooledReading, Stream, StreamEvent, WindowReading
 
 State = Literal["live", "late", "silent", "never heard", "sensor at fault"]
@@ -19,7 +23,7 @@ _FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends i
 
 
 @dataclass(frozen=True, eq=False)
-class StreamState:
+class StreamCondition:
     """`lost_share` is of the samples of the last 24 hours up to the last one, NaN without any.
 
     `behind` is how much has come and is not read yet; `events` are those of the last 24 hours.
@@ -39,7 +43,7 @@ class StreamState:
 
 def stream_states(
     workspace: Workspace, ring: Ring, store: Store, now: datetime
-) -> tuple[StreamState, ...]:
+) -> tuple[StreamCondition, ...]:
     """One for each stream that `bridge.toml` describes, in its order."""
     latest = ring.latest()
     return tuple(
@@ -50,22 +54,34 @@ def stream_states(
 
 def _state(
     stream: Stream, last: datetime | None, ring: Ring, store: Store, now: datetime
-) -> StreamState:
+) -> StreamCondition:
     events = store.streams.list_events(stream.name, now - _LATELY)
     progress = store.streams.progress(stream.name)
     window = store.streams.last_window(stream.name)
-    return StreamState(
+    return StreamCondition(
         stream=stream,
         state=_word(last, events, now),
         last_sample=last,
         lag=None if last is None else max(timedelta(0), now - last),
         behind=None if last is None or progress is None else max(timedelta(0), last - progress),
-        lost_share=ring.lost_share(stream.name, _LATELY),
+        lost_share=_lost_share(ring, stream.name, last),
         ring_bytes=ring.size_bytes(stream.name),
         window=window,
         hour=store.streams.last_hour(stream.name),
         events=events,
     )
+
+
+def _lost_share(ring: Ring, name: str, last: datetime | None) -> float:
+    """Of the sealed ten minutes of the last day, up to the last; since the first, where later."""
+    received_s = ring.state(name).received_s
+    if last is None or not received_s:
+        return NAN
+    came = {parse_time(key): seconds for key, seconds in received_s.items()}
+    ends = max(came) + PERIOD
+    since = max(min(came), ends - _LATELY)
+    came_s = sum(seconds for start, seconds in came.items() if start >= since)
+    return max(0.0, 1 - came_s / (ends - since).total_seconds())
 
 
 def _word(last: datetime | None, events: tuple[StreamEvent, ...], now: datetime) -> State:

@@ -59,7 +59,7 @@ def spectrum_db(pieces: Sequence[Piece]) -> tuple[int, ...]:
 
 
 def _is_whole(piece: Piece) -> bool:
-    return piece.values.shape[1] >= _LINES_S * piece.sampling_rate_hz
+    return bool(piece.values.shape[1] >= _LINES_S * piece.sampling_rate_hz)
 
 
 def _power(piece: Piece) -> np.ndarray:
@@ -98,7 +98,7 @@ def pool_stream(
     if period != "hour" or not hanger.is_modelled:
         return Pooled(reading)
     own = hanger.thresholds.false_call_years
-    options = StreamOptions(false_call_years=false_call_years if own is None else own)
+    options = StreamOptions(limit_years=false_call_years if own is None else own)
     found = watch_reading(baseline, reading, hanger, kept, options)
     told = replace(
         reading,

@@ -8,6 +8,7 @@ watch's state after it and its alert: this may be killed at any instant and simp
 
 from __future__ import annotations
 
+import bisect
 import logging
 from collections import defaultdict, deque
 from collections.abc import Callable, Mapping
@@ -17,12 +18,13 @@ from datetime import UTC, datetime, timedelta
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from shm.documents import dump
+from shm.documents import dump, format_time
 from shm.modes_document import modes_document
 from shm.pipeline.clock import Clock, utc_now
 from shm.read.atomic import replace_text
-from shm.store import Ring, Store, Workspace
+from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX, nothing
+from shm.store.ring import ring_of
 from shm.values import ModalTest, Posterior
 from shm.values.stream import Period, PooledReading, Stream, Window, WindowReading
 
@@ -40,7 +42,10 @@ _KEPT_BEFORE_ALERT = timedelta(hours=24)
 """Of raw samples, for good: what changed within a day is told within a day."""
 _AGAIN = timedelta(minutes=1)  # judgement: a machine without memory or disk is given a minute
 _OFFSETS = 144  # windows of a day, with which a sensor's offset is compared
-_UPKEEP = timedelta(minutes=1)  # technical: how often chunks are put together and old ones go
+_SEAL = timedelta(seconds=10)  # technical: how often chunks are put together
+_SWEEP = timedelta(hours=1)  # technical: how often old ones go
+_WHOLE = 0.98  # judgement: of ten minutes; a chunk that lacks seconds is not waited for
+_PATIENCE = timedelta(minutes=20)  # judgement: a logger that sends each quarter of an hour
 
 _EVER = datetime.min.replace(tzinfo=UTC)
 
@@ -63,7 +68,6 @@ class Streaming:
     def __init__(
         self,
         workspace: Workspace,
-        ring: Ring,
         store: Store,
         executor: Executor,
         *,
@@ -71,8 +75,8 @@ class Streaming:
         lanes: int = 1,
         wake: Callable[[], object] = nothing,
     ):
-        self.workspace, self.ring, self.store = workspace, ring, store
-        self.executor, self.clock, self.lanes, self.wake = executor, clock, lanes, wake
+        self.store, self.executor, self.clock = store, executor, clock
+        self.lanes, self.wake = lanes, wake
         self._running: dict[str, _Running] = {}
         self._done: dict[str, datetime] = {}
         self._pooled: dict[tuple[str, Period], datetime] = {}
@@ -80,11 +84,16 @@ class Streaming:
         self._offsets: defaultdict[str, deque[Mapping[str, float]]] = defaultdict(
             lambda: deque(maxlen=_OFFSETS)
         )
-        self._first, self._upkeep_at = 0, _EVER
+        self._known: set[str] = set()
+        self._sealed: defaultdict[str, list[datetime]] = defaultdict(list)
+        self._late: defaultdict[str, list[datetime]] = defaultdict(list)
+        self._first, self._seal_at, self._sweep_at = 0, _EVER, _EVER
+        self.use(workspace)
 
     def use(self, workspace: Workspace) -> None:
         """Goes on with another description of the bridge."""
         self.workspace = workspace
+        self.ring = ring_of(workspace, self.clock, self.store.streams.save_event)
 
     def close(self) -> None:
         """Abandons what is under way: the store still says that it waits."""
@@ -112,14 +121,24 @@ class Streaming:
         return bool(self._running)
 
     def _keep_house(self) -> None:
-        """Now and then: whole stretches become one file each, what is old enough goes."""
-        now = self.clock()
-        if not self.workspace.bridge.streams or now < self._upkeep_at:
+        """Now and then: what has come becomes ten minutes to read, what is old enough goes."""
+        now, settings = self.clock(), self.workspace.settings
+        if not self.workspace.bridge.streams or now < self._seal_at:
             return
-        self._upkeep_at = now + _UPKEEP
-        for event in (*self.ring.seal(now), *self.ring.sweep(now)):
-            self.store.streams.save_event(event)
-        self.store.streams.sweep(now, self.workspace.settings.window_days)
+        self._seal_at = now + _SEAL
+        for name, start in self.ring.seal(now):
+            self._note_sealed(name, start)
+        if now >= self._sweep_at:
+            self._sweep_at = now + _SWEEP
+            self.ring.sweep(now, settings.ring_days, settings.ring_bytes)
+            self.store.streams.sweep(now, settings.window_days)
+
+    def _note_sealed(self, name: str, start: datetime) -> None:
+        """Of ten minutes that were read before, there is more now: they are read anew."""
+        done = self._done.get(name)
+        waiting = self._late if done is not None and start < done else self._sealed
+        if start not in waiting[name]:
+            bisect.insort(waiting[name], start)
 
     def _may_begin(self, name: str) -> bool:
         return self.clock() >= self._not_before.get(name, _EVER)
@@ -128,36 +147,40 @@ class Streaming:
 
     def _begin(self, stream: Stream) -> None:
         """The next step of a stream, if there is one: pools come before further windows."""
-        done = self._done_until(stream.name)
-        if done is None:
-            return
-        for period, length in PERIODS.items():
-            start = self._next_pool(stream, period, length, done)
-            if start is not None:
-                self._begin_pool(stream, period, start)
-                return
-        start = self._next_window(stream, done)
+        if stream.name not in self._known:
+            self._recall(stream.name)
+        done = self._done.get(stream.name)
+        if done is not None:
+            for period, length in PERIODS.items():
+                start = self._next_pool(stream, period, length, done)
+                if start is not None:
+                    self._begin_pool(stream, period, start)
+                    return
+        start = self._next_window(stream.name)
         if start is not None:
             self._begin_window(stream, start)
 
-    def _done_until(self, name: str) -> datetime | None:
-        """Up to when the windows are done; where none is, the beginning of the first."""
-        if name not in self._done:
-            done = self.store.streams.progress(name)
-            if done is None:
-                first = self.ring.first_after(name, _EVER)
-                return None if first is None else _floor(first, WINDOW)
+    def _recall(self, name: str) -> None:
+        """How far the stream had come, and what was sealed since."""
+        self._known.add(name)
+        done = self.store.streams.progress(name)
+        if done is not None:
             self._done[name] = done
-        return self._done[name]
+        for start in self.ring.periods(name, done or _EVER):
+            self._note_sealed(name, start)
 
-    def _next_window(self, stream: Stream, done: datetime) -> datetime | None:
-        """The next ten minutes that hold samples, once all of them have come or are given up."""
-        first = self.ring.first_after(stream.name, done)
-        if first is None:
-            return None
-        start = max(done, _floor(first, WINDOW))
-        whole = self.ring.watermark(stream.name, self.clock()) >= start + WINDOW
-        return start if whole else None
+    def _next_window(self, name: str) -> datetime | None:
+        """The next ten minutes that are whole, or that nobody waits for any more; late ones last."""
+        sealed, late = self._sealed[name], self._late[name]
+        if sealed and (len(sealed) > 1 or self._is_whole(name, sealed[0])):
+            return sealed.pop(0)
+        return late.pop(0) if late else None
+
+    def _is_whole(self, name: str, start: datetime) -> bool:
+        if self.clock() >= start + WINDOW + _PATIENCE:
+            return True
+        received_s = self.ring.state(name).received_s.get(format_time(start) or "", 0.0)
+        return received_s >= _WHOLE * WINDOW.total_seconds()
 
     def _begin_window(self, stream: Stream, start: datetime) -> None:
         from shm.pipeline.steps import identify_options
@@ -267,7 +290,8 @@ class Streaming:
     def _save(self, reading: WindowReading) -> None:
         window = reading.window
         self.store.streams.save_window(reading)
-        self._done[window.stream] = window.start + WINDOW
+        done = self._done.get(window.stream, _EVER)
+        self._done[window.stream] = max(done, window.start + WINDOW)
 
     def _give_up_window(self, stream: Stream, start: datetime, error: BaseException) -> None:
         """Said in the window's own row: what one window holds must not stop its stream."""

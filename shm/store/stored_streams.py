@@ -76,13 +76,27 @@ class Streams(Repository):
                 found.setdefault((mode.plane, mode.order), mode)
         return tuple(sorted(found.values(), key=lambda mode: mode.frequency_hz))
 
+    def last_window(self, stream: str) -> WindowReading | None:
+        """The latest window of a stream."""
+        query = sa.select(stream_windows).where(stream_windows.c.stream == stream)
+        latest = query.order_by(stream_windows.c.start.desc()).limit(1)
+        return next(iter(self._values(stream_windows, latest, WindowReading)), None)
+
+    def last_hour(self, stream: str) -> PooledReading | None:
+        """The latest reading of an hour of a stream."""
+        table = pooled_readings
+        query = sa.select(table).where(table.c.stream == stream, table.c.period == "hour")
+        latest = query.order_by(table.c.start.desc()).limit(1)
+        return next(iter(self._values(table, latest, PooledReading)), None)
+
     def first_window(self, stream: str) -> datetime | None:
         """When the first window of a stream began; None where there is none."""
         query = sa.select(sa.func.min(stream_windows.c.start)).where(
             stream_windows.c.stream == stream
         )
         with self.reading() as connection:
-            return connection.scalar(query)
+            first: datetime | None = connection.scalar(query)
+        return first
 
     def last_pooled(self, stream: str, period: Period) -> datetime | None:
         """When the latest reading of a period began; None where there is none."""
@@ -91,7 +105,8 @@ class Streams(Repository):
             table.c.stream == stream, table.c.period == period
         )
         with self.reading() as connection:
-            return connection.scalar(query)
+            last: datetime | None = connection.scalar(query)
+        return last
 
     def save_pooled(
         self,

@@ -155,7 +155,9 @@ class StreamState:
             "told": self.told.to_text(),
             "arrays": [(name, each.dtype.str, each.shape) for name, each in arrays.items()],
         }
-        return b"\n".join([json.dumps(head).encode(), b"".join(map(np.ndarray.tobytes, arrays.values()))])
+        return b"\n".join(
+            [json.dumps(head).encode(), b"".join(map(np.ndarray.tobytes, arrays.values()))]
+        )
 
     @classmethod
     def from_bytes(cls, content: bytes) -> StreamState:
@@ -384,7 +386,9 @@ def daily_shift(state: StreamState, reading: PooledReading) -> tuple[float, floa
     if not known:
         return NAN, NAN
     kelvin = reading.temperature_c - state.reference[0]
-    return shift_of_reading(state, state.table.seen(known, kelvin if math.isfinite(kelvin) else 0.0))
+    return shift_of_reading(
+        state, state.table.seen(known, kelvin if math.isfinite(kelvin) else 0.0)
+    )
 
 
 def shift_of_reading(state: StreamState, seen: SeenReading) -> tuple[float, float]:

@@ -245,7 +245,9 @@ def summary(name: str, found: Sequence[dict[str, Any]]) -> dict[str, Any]:
     elif name != "quiet":
         for hours in (6, 12, 24, 72, 240, 960):
             figures[f"within_{hours}_h"] = sum(t <= hours for t in told) / n
-        figures["as_tension"] = sum(bool(own) and own[0]["quantity"] == "tension" for own in after) / n
+        figures["as_tension"] = (
+            sum(bool(own) and own[0]["quantity"] == "tension" for own in after) / n
+        )
     return figures
 
 

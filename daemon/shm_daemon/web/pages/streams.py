@@ -14,10 +14,11 @@ from shm.bridge.streams import stream_named
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.stream_course import stream_course
-from shm.pipeline.stream_state import StreamState, stream_states
+from shm.pipeline.stream_state import StreamCondition, stream_states
 from shm.report import formatting
 from shm.report.figures import stream_course as figure
 from shm.report.paper import Table
+from shm.store.ring import ring_of
 from shm.values.stream import PooledReading, Stream, StreamEvent
 from shm_daemon.heartbeat import told
 from shm_daemon.web import with_plotly
@@ -96,8 +97,8 @@ def streams(site: AtSite, _: Reader) -> Any:
 )
 def stream_figure(site: AtSite, _: Reader, name: Name, days: Days = 7.0) -> JSONResponse:
     """A plotly document: spectra, tracked frequencies, tension, sensors at fault."""
-    stream, ring = _stream(site, name), site.ring
-    until = ring.latest().get(name, utc_now())
+    stream = _stream(site, name)
+    until = ring_of(site.workspace).latest().get(name, utc_now())
     course = stream_course(site.store, stream, until - timedelta(days=days), until)
     if course is None:
         raise NothingThere(
@@ -108,8 +109,8 @@ def stream_figure(site: AtSite, _: Reader, name: Name, days: Days = 7.0) -> JSON
     return answer({**with_plotly.document(figure.specify(course)), **words})
 
 
-def _states(site: Site) -> tuple[StreamState, ...]:
-    return stream_states(site.workspace, site.ring, site.store, utc_now())
+def _states(site: Site) -> tuple[StreamCondition, ...]:
+    return stream_states(site.workspace, ring_of(site.workspace), site.store, utc_now())
 
 
 def _stream(site: Site, name: str) -> Stream:
@@ -120,7 +121,7 @@ def _stream(site: Site, name: str) -> Stream:
     return stream_named(site.workspace.bridge.streams, name)
 
 
-def _row(state: StreamState) -> Row:
+def _row(state: StreamCondition) -> Row:
     window = state.window.window if state.window else None
     modes = len(state.window.modes) if state.window else 0
     cells = (
@@ -144,7 +145,7 @@ def _tension(hour: PooledReading | None) -> str:
     return f"{100 * hour.compensated_shift:+.2f} ± {100 * _Z_90 * hour.compensated_sd:.2f} %"
 
 
-def _facts(state: StreamState) -> list[tuple[str, str, str]]:
+def _facts(state: StreamCondition) -> list[tuple[str, str, str]]:
     stream, window = state.stream, state.window
     behind = told(state.behind) if state.behind is not None else "unknown"
     found = [
@@ -177,7 +178,7 @@ def _events(events: tuple[StreamEvent, ...]) -> Table:
     )
 
 
-def _document(state: StreamState) -> dict[str, Any]:
+def _document(state: StreamCondition) -> dict[str, Any]:
     window, hour = state.window, state.hour
     return {
         "stream": state.stream.name,
