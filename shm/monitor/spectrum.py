@@ -81,7 +81,8 @@ def known_shapes(
 
     Where the known mode does not say it, the strongest motion of the sensors of its plane does.
     """
-    shapes = np.array([shape_on(channels, mode) for mode in known]).T.reshape(-1, len(known))
+    rows = [shape_on(channels, mode) for mode in known]
+    shapes = np.array(rows).reshape(len(known), len(channels)).T
     for column, mode in enumerate(known):
         missing = np.isnan(shapes[:, column])
         if np.any(np.abs(shapes[~missing, column]) > 0):

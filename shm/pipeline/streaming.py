@@ -170,7 +170,7 @@ class Streaming:
             self._note_sealed(name, start)
 
     def _next_window(self, name: str) -> datetime | None:
-        """The next ten minutes that are whole, or that nobody waits for any more; late ones last."""
+        """The next ten minutes that are whole, or not waited for any more; late ones last."""
         sealed, late = self._sealed[name], self._late[name]
         if sealed and (len(sealed) > 1 or self._is_whole(name, sealed[0])):
             return sealed.pop(0)
