@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from itertools import islice
 
 import rich_click as click
 
@@ -21,6 +22,7 @@ from shm.values.stream import Chunk, Stream
 from shm_cli.common import advancing_bar, show
 
 _DAY_S = 86400.0
+_AT_ONCE = 60  # technical: 20 MB of memory, and folders are synchronised once for all
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ def simulate_streams(workspace: Workspace, chosen: Live, *, as_json: bool) -> No
     with advancing_bar() as bar:
         sent = send(
             arriving(list(zip(hangers, streams, strict=True)), plan, first, seconds, chosen.seed),
-            ring_of(workspace).append,
+            ring_of(workspace).append_all,
             chosen.speed,
             told=lambda at: bar("simulating", (at - first).total_seconds() / seconds),
         )
@@ -77,20 +79,20 @@ def arriving(
 
 def send(
     chunks: Iterator[Chunk],
-    take: Callable[[bytes], object],
+    take: Callable[[Sequence[bytes]], object],
     speed: float,
     told: Callable[[datetime], None],
 ) -> int:
     """How many were taken; with a `speed`, each once the bridge's clock has come to its end."""
     begun, start, count = time.monotonic(), None, 0
-    for chunk in chunks:
-        count += 1
-        start = start or chunk.start
+    while batch := list(islice(chunks, 1 if speed > 0 else _AT_ONCE)):
+        start, end = start or batch[0].start, batch[-1].end
         if speed > 0:
-            due = (chunk.end - start).total_seconds() / speed
+            due = (end - start).total_seconds() / speed
             time.sleep(max(0.0, begun + due - time.monotonic()))
-        take(chunk_document(chunk))
-        told(chunk.end)
+        take([chunk_document(chunk) for chunk in batch])
+        count += len(batch)
+        told(end)
     return count
 
 
