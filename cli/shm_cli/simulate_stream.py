@@ -22,7 +22,9 @@ from shm.values.stream import Chunk, Stream
 from shm_cli.common import advancing_bar, show
 
 _DAY_S = 86400.0
-_AT_ONCE = 60  # technical: 20 MB of memory, and folders are synchronised once for all
+_LIVE_S, _FAST_S = 60.0, 600.0
+"""Technical: of a chunk; loggers send each minute, and each file costs a disk some 10 ms."""
+_AT_ONCE = 6  # technical: 20 MB of memory, and folders are synchronised once for all
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,8 @@ def simulate_streams(workspace: Workspace, chosen: Live, *, as_json: bool) -> No
             remedy="Add a [[stream]] table with its channels: see `shm stream --help`.",
         )
     first = chosen.first or _whole_hour(utc_now() - timedelta(days=chosen.days))
-    plan = MonitoringPlan(losses=tuple(_loss(text, first) for text in chosen.losses))
+    losses = tuple(_loss(text, first) for text in chosen.losses)
+    plan = MonitoringPlan(losses=losses, chunk_s=_LIVE_S if chosen.speed > 0 else _FAST_S)
     hangers = [workspace.bridge.hanger(stream.hanger) for stream in streams]
     seconds = chosen.days * _DAY_S
     with advancing_bar() as bar:

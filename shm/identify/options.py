@@ -13,7 +13,7 @@ from shm.errors import UsageError
 from shm.values import NAN, Recording
 
 NO_CROSS_CHECK = "none"
-_PASSED = 0.4
+PASSED = 0.4
 """Of the sampling rate: what anti-aliasing filters pass."""
 
 
@@ -112,7 +112,7 @@ def campaign_options(
     What hits repeat to 1e-4 of a shape, sensors clamped on again do not: half a percent is allowed.
     """
     return IdentifyOptions(
-        band_high_hz=_PASSED * min(record.sampling_rate_hz for record in records),
+        band_high_hz=PASSED * min(record.sampling_rate_hz for record in records),
         reference_force_n=reference_force_n,
         frequency_allowance=frequency_allowance,
         shape_allowance=shape_allowance,

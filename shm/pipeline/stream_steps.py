@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from shm.identify import IdentifyOptions
+from shm.identify.options import PASSED
 from shm.monitor import as_modal_test, offsets, pooled, read_window, sensor_faults
 from shm.values import Alert, Hanger, ModalTest, Mode, Posterior
 from shm.values.stream import Period, Piece, PooledReading, Stream, StreamEvent, WindowReading
@@ -38,6 +39,9 @@ def read_stream_window(
     earlier: Sequence[Mapping[str, float]],
 ) -> WindowFound:
     """The modes of ten minutes by the last `known` ones; `earlier` are the offsets before."""
+    passed_hz = PASSED * stream.sampling_rate_hz
+    if options.band_low_hz < passed_hz < options.band_high_hz:
+        options = replace(options, band_high_hz=passed_hz)
     reading = read_window(pieces, stream, known, hanger, options)
     return WindowFound(
         replace(reading, spectrum_db=spectrum_db(pieces)),

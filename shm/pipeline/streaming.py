@@ -100,6 +100,11 @@ class Streaming:
         for running in self._running.values():
             running.future.cancel()
 
+    @property
+    def under_way(self) -> tuple[Future[Any], ...]:
+        """What is being computed now."""
+        return tuple(running.future for running in self._running.values())
+
     def advance(self) -> bool:
         """Keeps what is finished, begins what has come; whether anything is under way.
 
