@@ -32,6 +32,10 @@ class PassedChunk:
     sampling_rate_hz: float
     arrived: datetime
 
+    @property
+    def length_s(self) -> float:
+        return (self.end - self.start).total_seconds()
+
 
 @dataclass(frozen=True)
 class StreamState:
@@ -89,7 +93,7 @@ def _between(stream: str, before: PassedChunk | None, chunk: PassedChunk) -> Ite
         return
     off_s = (chunk.start - before.end).total_seconds()
     is_next = chunk.sequence == before.sequence + 1
-    if abs(off_s) <= slack_s(is_next, chunk.sampling_rate_hz):
+    if abs(off_s) <= slack_s(is_next, chunk.sampling_rate_hz, before.length_s):
         return
     samples = round(abs(off_s) * chunk.sampling_rate_hz)
     if is_next:
@@ -118,11 +122,11 @@ def _counted(
     stream: str, state: StreamState, chunk: PassedChunk
 ) -> tuple[StreamState, list[StreamEvent]]:
     """The stamps beside the count of the samples, as long as chunks follow each other."""
-    before, length_s = state.last, (chunk.end - chunk.start).total_seconds()
+    before, length_s = state.last, chunk.length_s
     follows = before is not None and chunk.sequence == before.sequence + 1
     if before is not None and follows:
         off_s = abs((chunk.start - before.end).total_seconds())
-        follows = off_s <= slack_s(True, chunk.sampling_rate_hz)
+        follows = off_s <= slack_s(True, chunk.sampling_rate_hz, before.length_s)
     since = state.counted_since
     if not follows or since is None:
         return replace(state, last=chunk, counted_since=chunk.start, counted_s=length_s), []

@@ -13,16 +13,19 @@ from shm.values import NAN
 from shm.values.stream import Chunk, Piece
 
 _JITTER_S = 0.05  # judgement: of a logger's stamps; a radio clock or NTP is within 10 ms
+_DRIFT = 1e-3  # judgement: no crystal is further off; a long chunk differs by that from its stamps
 _OF_A_SAMPLE = 0.5  # derived: less than half a sample is the same sample
 
 
-def slack_s(is_next: bool, sampling_rate_hz: float) -> float:
+def slack_s(is_next: bool, sampling_rate_hz: float, length_s: float) -> float:
     """How far a chunk may begin from where the one before ended and follow without a gap.
 
     Where their numbers follow, no sample is missing between them: then it is a matter of stamps.
     """
     sample_s = 1 / sampling_rate_hz
-    return max(_JITTER_S, 1.5 * sample_s) if is_next else _OF_A_SAMPLE * sample_s
+    if is_next:
+        return max(_JITTER_S, 1.5 * sample_s) + _DRIFT * length_s
+    return _OF_A_SAMPLE * sample_s
 
 
 def joined(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Piece, ...]:
@@ -37,7 +40,8 @@ def joined(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Pie
         rest = chunk
         if last is not None and until is not None:
             off_s = (chunk.start - until).total_seconds()
-            slack = slack_s(chunk.sequence == last.sequence + 1, chunk.sampling_rate_hz)
+            is_next, length_s = chunk.sequence == last.sequence + 1, _seconds(last)
+            slack = slack_s(is_next, chunk.sampling_rate_hz, length_s)
             if off_s < -slack:
                 rest = _without(chunk, round(-off_s * chunk.sampling_rate_hz))
                 if not rest.values.shape[1]:
@@ -50,6 +54,10 @@ def joined(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Pie
         until = rest.end
     pieces = (_cut(_piece(run), start, end) for run in runs)
     return tuple(piece for piece in pieces if piece.values.shape[1])
+
+
+def _seconds(chunk: Chunk) -> float:
+    return (chunk.end - chunk.start).total_seconds()
 
 
 def _is_alike(one: Chunk, other: Chunk) -> bool:
