@@ -9,6 +9,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
+from shm.read.chunk_document import BY_TIME
 from shm.values import NAN
 from shm.values.stream import Chunk, Piece
 
@@ -17,13 +18,14 @@ _DRIFT = 1e-3  # judgement: no crystal is further off; a long chunk differs by t
 _OF_A_SAMPLE = 0.5  # derived: less than half a sample is the same sample
 
 
-def slack_s(is_next: bool, sampling_rate_hz: float, length_s: float) -> float:
-    """How far a chunk may begin from where the one before ended and follow without a gap.
+def slack_s(before: int, sequence: int, sampling_rate_hz: float, length_s: float) -> float:
+    """How far a chunk may begin from where the one before, so long, ended and follow without a gap.
 
     Where their numbers follow, no sample is missing between them: then it is a matter of stamps.
+    Numbers that were made of the time cannot tell; there as much as jitter may be missing unseen.
     """
     sample_s = 1 / sampling_rate_hz
-    if is_next:
+    if sequence == before + 1 or min(before, sequence) >= BY_TIME:
         return max(_JITTER_S, 1.5 * sample_s) + _DRIFT * length_s
     return _OF_A_SAMPLE * sample_s
 
@@ -40,8 +42,8 @@ def joined(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Pie
         rest = chunk
         if last is not None and until is not None:
             off_s = (chunk.start - until).total_seconds()
-            is_next, length_s = chunk.sequence == last.sequence + 1, _seconds(last)
-            slack = slack_s(is_next, chunk.sampling_rate_hz, length_s)
+            numbers = last.sequence, chunk.sequence
+            slack = slack_s(*numbers, chunk.sampling_rate_hz, _seconds(last))
             if off_s < -slack:
                 rest = _without(chunk, round(-off_s * chunk.sampling_rate_hz))
                 if not rest.values.shape[1]:
