@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 
 from shm.errors import (
@@ -29,6 +30,7 @@ from shm_daemon.hooks import HookNotifier
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.mqtt import messages
 from shm_daemon.spool import FileStabilityTracker, scan
+from shm_daemon.streams import StreamKeeper, streams_kept
 from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
 
 # Technical: how soon it looks again, against the work of looking; hints come in bursts.
@@ -63,7 +65,8 @@ def run(
         while not wakeup.stopped:
             try:
                 with workspace.lock(patience) as lock, ExitStack() as stack:
-                    daemon = _begin(stack, workspace, lock, wakeup, clock, make_executor, notifier)
+                    begin = partial(_begin, stack, workspace, lock, wakeup, clock, make_executor)
+                    daemon = begin(notifier, once)
                     if daemon.serve(once):
                         return
             except StoreError as error:
@@ -111,6 +114,7 @@ def _begin(
     clock: Clock,
     make_executor: Callable[[Settings], Executor],
     notifier: Notifier | None,
+    once: bool,
 ) -> Daemon:
     """A daemon at work, all of which ends with the stack."""
     settings = workspace.settings
@@ -137,7 +141,10 @@ def _begin(
     stack.callback(streaming.close)
     stack.enter_context(rung_by_changes(wakeup, workspace.spool))
     stack.enter_context(messages(workspace))
-    daemon = Daemon(flow, streaming, wakeup, lock, pulse, lambda: make_executor(settings))
+    keeper = stack.enter_context(
+        streams_kept(workspace, clock, until_done=once, sealed=streaming.note_sealed)
+    )
+    daemon = Daemon(flow, streaming, keeper, wakeup, lock, pulse, lambda: make_executor(settings))
     stack.callback(daemon.close)
     log.info("watching %s", workspace.spool)
     return daemon
@@ -150,12 +157,13 @@ class Daemon:
         self,
         flow: Flow,
         streaming: Streaming,
+        keeper: StreamKeeper,
         wakeup: Wakeup,
         lock: ActiveLock,
         pulse: Pulse,
         make_executor: Callable[[], Executor],
     ):
-        self._flow, self._streaming = flow, streaming
+        self._flow, self._streaming, self._keeper = flow, streaming, keeper
         self._wakeup, self._lock, self._pulse = wakeup, lock, pulse
         self._make_executor = make_executor
         settings = flow.workspace.settings
@@ -305,6 +313,7 @@ class Daemon:
         try:
             self._flow.use(self._flow.workspace.reopened())
             self._streaming.use(self._flow.workspace)
+            self._keeper.use(self._flow.workspace)
         except ShmError as error:
             log.error("bridge.toml is not taken over: %s", error)
         else:

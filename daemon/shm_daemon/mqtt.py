@@ -1,5 +1,7 @@
 """Recordings by MQTT: topic `shm/<bridge>/<hanger>[/<file name>]`, the payload is the file.
 
+Topic `shm/<bridge>/stream/<name>` is for chunks of permanent sensors: acknowledged once on disk.
+
 A message lands in the spool as an upload does, and is acknowledged only once the store says that
 its file was received: a daemon or a broker killed before that has it sent again. Protocol 3.1.1,
 which every broker speaks, with a session that the broker keeps while the daemon is down.
@@ -13,7 +15,7 @@ import queue
 import re
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlsplit
@@ -24,6 +26,8 @@ from shm.read import FORMATS, sidecar_path
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX, refuse_oversize
 from shm_daemon.landing import Incoming, Landed, incoming, landing_name
+from shm_daemon.stream_intake import take_chunks
+from shm_daemon.web.site import Description
 
 if TYPE_CHECKING:
     from paho.mqtt.client import Client, MQTTMessage
@@ -34,6 +38,7 @@ _LOOK_S = 0.2
 _RETRY_S = 5.0
 _LONGEST_RETRY_S = 120
 _HEAD_BYTES = 4096
+_STREAM = "stream"  # no hanger: the level of the topics of chunks
 
 log = logging.getLogger(__name__)
 
@@ -106,6 +111,7 @@ class Listener:
 
     def __init__(self, workspace: Workspace, broker: Broker):
         self._workspace, self._broker = workspace, broker
+        self._description = Description(workspace)  # streams may be added while we run
         self._topic = topic_of(workspace.bridge.name)
         self._queue: queue.SimpleQueue[_Message | None] = queue.SimpleQueue()
         self._pending: list[tuple[_Message, Landed]] = []
@@ -220,6 +226,9 @@ class Listener:
         if message.connection != self._connection:
             return
         level, _, given = message.topic.removeprefix(f"{self._topic}/").partition("/")
+        if level == _STREAM and given:
+            self._take_chunk(message, given)
+            return
         with incoming(self._workspace.spool, len(message.payload)) as file:
             file.write(message.payload)
             name = _name(given, level, message.payload, file.sha256)
@@ -235,6 +244,14 @@ class Listener:
             hanger = int(level) if re.fullmatch(r"\d{1,9}", level) else level
             landed = file.land(name, {"hanger": hanger})
             self._pending.append((replace(message, payload=b""), landed))
+
+    def _take_chunk(self, message: _Message, stream: str) -> None:
+        """One that cannot be used is acknowledged too: the broker would send it again for ever."""
+        with suppress(BadInput):  # which is noted and logged
+            take_chunks(
+                self._description.now()[0], self._opened(), stream, [message.payload], utc_now()
+            )
+        self._acknowledge(message)
 
     def _refuse_oversize(self, file: Incoming) -> None:
         settings = self._workspace.settings
@@ -272,9 +289,12 @@ class Listener:
             self._client.ack(message.mid, qos=1)
 
     def _is_received(self, sha256: str) -> bool:
+        return self._opened().recordings.with_checksum(sha256) is not None
+
+    def _opened(self) -> Store:
         if self._store is None:
             self._store = self._workspace.store()
-        return self._store.recordings.with_checksum(sha256) is not None
+        return self._store
 
 
 def _name(given: str, level: str, payload: bytes, sha256: str) -> str:

@@ -1,6 +1,7 @@
 """What lies in the spool, and which of it is whole.
 
-The spool is looked through with all its subfolders. Left alone are names that begin with a dot,
+The spool is looked through with all its subfolders but `streams/`, where loggers roll their files:
+see `rolling_files`. Left alone are names that begin with a dot,
 uploads under way (`.part`, `.tmp`, `.filepart`), sidecars, which wait for their file, and what is
 no file or cannot be looked at: links, pipes, devices, folders of another user.
 A file is whole once neither it nor its sidecar has changed for some seconds; an empty one, which
@@ -18,6 +19,8 @@ from pathlib import Path
 from shm.read import sidecar_path
 from shm.read.sidecar import SIDECAR_SUFFIX
 
+STREAMS = "streams"
+"""The folder of the spool with the rolling files of permanent sensors."""
 _UNDER_WAY = (".part", ".tmp", ".filepart")
 LEFT_ALONE = (*_UNDER_WAY, SIDECAR_SUFFIX)
 """Endings of names that are not taken by themselves."""
@@ -80,7 +83,8 @@ def _entries(
     are entries, and are not gone into.
     """
     for folder, subfolders, names in os.walk(spool, onerror=note):
-        subfolders[:] = [name for name in subfolders if not name.startswith(".")]
+        others = {STREAMS} if Path(folder) == spool else set()
+        subfolders[:] = [n for n in subfolders if not n.startswith(".") and n not in others]
         links = [name for name in subfolders if Path(folder, name).is_symlink()]
         for name in (*links, *names):
             if not name.startswith("."):

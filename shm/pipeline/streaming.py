@@ -11,11 +11,12 @@ from __future__ import annotations
 import bisect
 import logging
 from collections import defaultdict, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import partial
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from shm.documents import dump, format_time
@@ -42,8 +43,6 @@ _KEPT_BEFORE_ALERT = timedelta(hours=24)
 """Of raw samples, for good: what changed within a day is told within a day."""
 _AGAIN = timedelta(minutes=1)  # judgement: a machine without memory or disk is given a minute
 _OFFSETS = 144  # windows of a day, with which a sensor's offset is compared
-_SEAL = timedelta(seconds=10)  # technical: how often chunks are put together
-_SWEEP = timedelta(hours=1)  # technical: how often old ones go
 _WHOLE = 0.98  # judgement: of ten minutes; a chunk that lacks seconds is not waited for
 _PATIENCE = timedelta(minutes=20)  # judgement: a logger that sends each quarter of an hour
 
@@ -87,13 +86,20 @@ class Streaming:
         self._known: set[str] = set()
         self._sealed: defaultdict[str, list[datetime]] = defaultdict(list)
         self._late: defaultdict[str, list[datetime]] = defaultdict(list)
-        self._first, self._seal_at, self._sweep_at = 0, _EVER, _EVER
+        self._news: SimpleQueue[tuple[str, datetime]] = SimpleQueue()
+        self._first = 0
         self.use(workspace)
 
     def use(self, workspace: Workspace) -> None:
         """Goes on with another description of the bridge."""
         self.workspace = workspace
         self.ring = ring_of(workspace, self.clock, self.store.streams.save_event)
+
+    def note_sealed(self, sealed: Sequence[tuple[str, datetime]]) -> None:
+        """There are new samples of these streams and ten minutes; from any thread."""
+        for each in sealed:
+            self._news.put(each)
+        self.wake()
 
     def close(self) -> None:
         """Abandons what is under way: the store still says that it waits."""
@@ -114,7 +120,8 @@ class Streaming:
             if running.future.done():
                 del self._running[name]
                 self._finish(name, running)
-        self._keep_house()
+        while not self._news.empty():
+            self._note(*self._news.get())
         streams = self.workspace.bridge.streams
         # Each turn begins with another, or the first would keep all lanes while they catch up.
         for stream in (*streams[self._first :], *streams[: self._first]):
@@ -125,20 +132,7 @@ class Streaming:
         self._first = (self._first + 1) % max(1, len(streams))
         return bool(self._running)
 
-    def _keep_house(self) -> None:
-        """Now and then: what has come becomes ten minutes to read, what is old enough goes."""
-        now, settings = self.clock(), self.workspace.settings
-        if not self.workspace.bridge.streams or now < self._seal_at:
-            return
-        self._seal_at = now + _SEAL
-        for name, start in self.ring.seal(now):
-            self._note_sealed(name, start)
-        if now >= self._sweep_at:
-            self._sweep_at = now + _SWEEP
-            self.ring.sweep(now, settings.ring_days, settings.ring_bytes)
-            self.store.streams.sweep(now, settings.window_days)
-
-    def _note_sealed(self, name: str, start: datetime) -> None:
+    def _note(self, name: str, start: datetime) -> None:
         """Of ten minutes that were read before, there is more now: they are read anew."""
         done = self._done.get(name)
         waiting = self._late if done is not None and start < done else self._sealed
@@ -172,7 +166,7 @@ class Streaming:
         if done is not None:
             self._done[name] = done
         for start in self.ring.periods(name, done or _EVER):
-            self._note_sealed(name, start)
+            self._note(name, start)
 
     def _next_window(self, name: str) -> datetime | None:
         """The next ten minutes that are whole, or not waited for any more; late ones last."""

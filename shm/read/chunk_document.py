@@ -30,6 +30,9 @@ LONGEST = timedelta(minutes=10)
 LARGEST_BYTES = 32 << 20
 """Judgement: ten minutes of 16 channels at 800 Hz; one is held in memory a few times over."""
 
+BY_TIME = 2**61
+"""Numbers from here on were made of the time, as of files that have none: they count nothing."""
+
 _FASTEST_HZ = 1e5  # judgement: far beyond any mode of a hanger
 _LARGEST_SEQUENCE = 2**62  # technical: kept as a number of 64 bits
 _FIRST_YEAR, _LAST_YEAR = 2000, 2200  # judgement: a clock before was never set

@@ -76,15 +76,18 @@ class Ring:
         """
         return self.append_all([content])[0]
 
-    def append_all(self, contents: Sequence[bytes]) -> list[Kept]:
-        """Several at once, which is quicker; where one cannot be used, none is kept."""
-        chunks = [self._fitting(parse_chunk(content)) for content in contents]
+    def append_all(self, contents: Sequence[bytes], stream: str = "") -> list[Kept]:
+        """Several at once, which is quicker; where one cannot be used, none is kept.
+
+        `stream` is whose they must be, where that is known.
+        """
+        chunks = [self._fitting(parse_chunk(content), stream) for content in contents]
         found = []
         try:
             for chunk, content in zip(chunks, contents, strict=True):
                 found.append(self._place(chunk, content))
-            for stream in {chunk.stream for chunk in chunks}:
-                sync(self._folder(stream).incoming)
+            for name in {chunk.stream for chunk in chunks}:
+                sync(self._folder(name).incoming)
         except OSError as error:
             raise disk_error(error, self.folder) from error
         return found
@@ -181,7 +184,12 @@ class Ring:
         paths += [each.path for each in folder.waiting()]
         return sum(path.stat().st_size for path in paths if path.exists())
 
-    def _fitting(self, chunk: Chunk) -> Chunk:
+    def _fitting(self, chunk: Chunk, stream: str) -> Chunk:
+        if stream not in ("", chunk.stream):
+            raise BadInput(
+                f"a chunk of stream {chunk.stream} was sent as one of stream {stream[:64]!r}.",
+                remedy="Name the same stream in the chunk and in the address.",
+            )
         if self._streams is not None:
             _refuse_other(chunk, stream_named(tuple(self._streams), chunk.stream))
         if self._clock is not None:

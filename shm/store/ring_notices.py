@@ -11,6 +11,7 @@ from pathlib import Path
 
 from shm.documents import Misfit, dump, value_of
 from shm.read.atomic import replace_text
+from shm.read.chunk_document import BY_TIME
 from shm.store.ring_files import PERIOD
 from shm.store.ring_pieces import slack_s
 from shm.values.stream import StreamEvent, StreamEventKind
@@ -31,6 +32,10 @@ class PassedChunk:
     end: datetime
     sampling_rate_hz: float
     arrived: datetime
+
+    @property
+    def length_s(self) -> float:
+        return (self.end - self.start).total_seconds()
 
 
 @dataclass(frozen=True)
@@ -74,7 +79,7 @@ def notice(
             events.extend(_between(stream, state.last, chunk))
             state, drift = _counted(stream, state, chunk)
             events.extend(drift)
-        elif chunk.sequence == state.last.sequence + 1:
+        elif _is_next(state.last, chunk):
             events.append(_stepped(stream, state.last, chunk))
     if late:
         delay_h = max((each.arrived - each.end).total_seconds() for each in late) / 3600
@@ -84,15 +89,23 @@ def notice(
     return state, events
 
 
+def _is_next(before: PassedChunk, chunk: PassedChunk) -> bool:
+    return chunk.sequence == before.sequence + 1 and chunk.sequence < BY_TIME
+
+
+def _slack_s(before: PassedChunk, chunk: PassedChunk) -> float:
+    numbers = before.sequence, chunk.sequence
+    return slack_s(*numbers, chunk.sampling_rate_hz, before.length_s)
+
+
 def _between(stream: str, before: PassedChunk | None, chunk: PassedChunk) -> Iterator[StreamEvent]:
     if before is None:
         return
     off_s = (chunk.start - before.end).total_seconds()
-    is_next = chunk.sequence == before.sequence + 1
-    if abs(off_s) <= slack_s(is_next, chunk.sampling_rate_hz):
+    if abs(off_s) <= _slack_s(before, chunk):
         return
     samples = round(abs(off_s) * chunk.sampling_rate_hz)
-    if is_next:
+    if _is_next(before, chunk):
         yield _stepped(stream, before, chunk)
     elif off_s > 0:
         said = f"{samples} samples are missing before chunk {chunk.sequence}"
@@ -118,11 +131,10 @@ def _counted(
     stream: str, state: StreamState, chunk: PassedChunk
 ) -> tuple[StreamState, list[StreamEvent]]:
     """The stamps beside the count of the samples, as long as chunks follow each other."""
-    before, length_s = state.last, (chunk.end - chunk.start).total_seconds()
-    follows = before is not None and chunk.sequence == before.sequence + 1
-    if before is not None and follows:
+    before, length_s, follows = state.last, chunk.length_s, False
+    if before is not None and (_is_next(before, chunk) or chunk.sequence >= BY_TIME):
         off_s = abs((chunk.start - before.end).total_seconds())
-        follows = off_s <= slack_s(True, chunk.sampling_rate_hz)
+        follows = off_s <= _slack_s(before, chunk)
     since = state.counted_since
     if not follows or since is None:
         return replace(state, last=chunk, counted_since=chunk.start, counted_s=length_s), []

@@ -9,20 +9,25 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
+from shm.read.chunk_document import BY_TIME
 from shm.values import NAN
 from shm.values.stream import Chunk, Piece
 
 _JITTER_S = 0.05  # judgement: of a logger's stamps; a radio clock or NTP is within 10 ms
+_DRIFT = 1e-3  # judgement: no crystal is further off; a long chunk differs by that from its stamps
 _OF_A_SAMPLE = 0.5  # derived: less than half a sample is the same sample
 
 
-def slack_s(is_next: bool, sampling_rate_hz: float) -> float:
-    """How far a chunk may begin from where the one before ended and follow without a gap.
+def slack_s(before: int, sequence: int, sampling_rate_hz: float, length_s: float) -> float:
+    """How far a chunk may begin from where the one before, so long, ended and follow without a gap.
 
     Where their numbers follow, no sample is missing between them: then it is a matter of stamps.
+    Numbers that were made of the time cannot tell; there as much as jitter may be missing unseen.
     """
     sample_s = 1 / sampling_rate_hz
-    return max(_JITTER_S, 1.5 * sample_s) if is_next else _OF_A_SAMPLE * sample_s
+    if sequence == before + 1 or min(before, sequence) >= BY_TIME:
+        return max(_JITTER_S, 1.5 * sample_s) + _DRIFT * length_s
+    return _OF_A_SAMPLE * sample_s
 
 
 def joined(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Piece, ...]:
@@ -37,7 +42,8 @@ def joined(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Pie
         rest = chunk
         if last is not None and until is not None:
             off_s = (chunk.start - until).total_seconds()
-            slack = slack_s(chunk.sequence == last.sequence + 1, chunk.sampling_rate_hz)
+            numbers = last.sequence, chunk.sequence
+            slack = slack_s(*numbers, chunk.sampling_rate_hz, _seconds(last))
             if off_s < -slack:
                 rest = _without(chunk, round(-off_s * chunk.sampling_rate_hz))
                 if not rest.values.shape[1]:
@@ -50,6 +56,10 @@ def joined(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Pie
         until = rest.end
     pieces = (_cut(_piece(run), start, end) for run in runs)
     return tuple(piece for piece in pieces if piece.values.shape[1])
+
+
+def _seconds(chunk: Chunk) -> float:
+    return (chunk.end - chunk.start).total_seconds()
 
 
 def _is_alike(one: Chunk, other: Chunk) -> bool:

@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from shm.store import Store
+from shm.store import Store, Workspace
 from shm.values import ShapePoint
 from shm.values.modes import Mode
 from shm.values.stream import (
@@ -78,3 +78,27 @@ def a_chunk(
         **changes,
     }
     return Chunk(**values_of)  # type: ignore[arg-type]
+
+
+TABLES = """
+[[stream]]
+name = "h3"
+hanger = 3
+sampling_rate_hz = 100
+[[stream.channel]]
+name = "acc_1"
+plane = "transverse"
+x_m = 3.0
+[[stream.channel]]
+name = "acc_2"
+plane = "longitudinal"
+x_m = 3.0
+full_scale = 20.0
+"""
+
+
+def with_stream(workspace: Workspace) -> Workspace:
+    """The workspace with the stream `h3`."""
+    path = workspace.folder / "bridge.toml"
+    path.write_text(path.read_text() + TABLES)
+    return workspace.reopened()

@@ -67,6 +67,7 @@ def drain(streaming: Streaming) -> None:
     assert isinstance(clock, Clock)
     idle = 0
     while idle < 3:
+        streaming.note_sealed(streaming.ring.seal(clock()))
         idle = 0 if streaming.advance() else idle + 1
         for running in streaming.under_way:
             running.exception(timeout=60)

@@ -20,6 +20,7 @@ from shm_daemon.web import (
     imports,
     recordings,
     signing_in,
+    streams,
     tests,
     watching,
 )
@@ -58,6 +59,7 @@ def load_pages(site: Site) -> Pages:
     handle_faults(app)
     for part in (
         recordings,
+        streams,
         imports,
         hangers,
         alerts,

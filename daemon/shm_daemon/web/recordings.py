@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import re
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol
 
 from fastapi import APIRouter, Depends, Header, Path, Query, Request
 from starlette.concurrency import run_in_threadpool
@@ -157,14 +157,21 @@ def recordings(
     return {"recordings": [_row(site.store, found)] if found else []}
 
 
-async def receive_body(request: Request, file: Incoming, max_bytes: int) -> None:
+class Sink(Protocol):
+    """What a body is written to."""
+
+    def write(self, piece: bytes | bytearray) -> None:
+        """Raises TooLarge before more is kept than is taken."""
+
+
+async def receive_body(request: Request, file: Sink, max_bytes: int) -> None:
     """Writes the body of a request to a file; refuses a form, and one that says it is too large."""
     _refuse_form(request)
     _refuse_large(request, max_bytes)
     await _stream(request, file)
 
 
-async def _stream(request: Request, file: Incoming) -> None:
+async def _stream(request: Request, file: Sink) -> None:
     """Writes what comes, a piece at a time, beside the loop that serves the others."""
     pieces, waiting = request.stream(), bytearray()
     try:

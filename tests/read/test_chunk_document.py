@@ -1,0 +1,77 @@
+"""A chunk as bytes: what comes back, and what is refused in words."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.errors import BadInput, TooLarge
+from shm.read.chunk_document import LARGEST_BYTES, chunk_document, parse_chunk
+from tests.helpers.nouns import NOW
+from tests.helpers.streams import a_chunk
+
+
+def test_a_chunk_comes_back_to_the_bit() -> None:
+    chunk = a_chunk(3)
+    found = parse_chunk(chunk_document(chunk))
+    assert np.array_equal(found.values, chunk.values)
+    assert repr(replace(found, values=None)) == repr(replace(chunk, values=None))  # type: ignore[arg-type]
+
+
+def test_samples_may_be_json() -> None:
+    header = {
+        "schema": "shm.chunk/1", "stream": "h3", "sequence": 0, "time": NOW.isoformat(),
+        "sampling_rate_hz": 100, "values": {"acc_1": [1, None, 3.5], "acc_2": [4, 5, 1e99]},
+    }  # fmt: skip
+    for text in (json.dumps(header), json.dumps(header, indent=1)):
+        found = parse_chunk(text.encode())
+        assert found.channels == ("acc_1", "acc_2")
+        expected = [[1, np.nan, 3.5], [4, 5, np.nan]]
+        assert np.array_equal(found.values, expected, equal_nan=True)
+
+
+def changed(**changes: object) -> bytes:
+    head, _, body = chunk_document(a_chunk(3)).partition(b"\n")
+    return json.dumps({**json.loads(head), **changes}).encode() + b"\n" + body
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "no header"),
+        (b"\x00\xff" * 40, "no header"),
+        (b"[" * 100_000, "no header"),
+        (chunk_document(a_chunk(3))[:-3], "no whole samples of 2 channels"),
+        (changed(schema="shm.chunk/2"), "is not shm.chunk/1"),
+        (changed(stream="../../etc"), "no name of a stream"),
+        (changed(sequence=-1), "is no count"),
+        (changed(sequence=1.5), "not a whole number"),
+        (changed(sampling_rate_hz=0), "is no sampling rate"),
+        (changed(sampling_rate_hz=None), "is no sampling rate"),
+        (changed(time="1999-12-31T00:00:00Z"), "clock is not set"),
+        (changed(time="soon"), "not an ISO 8601 time"),
+        (changed(channels=["a", "a"]), "named twice"),
+        (changed(channels=[]), "channels are missing"),
+        (changed(encoding="int16"), "neither"),
+        (changed(sampling_rate_hz=0.5), "over ten minutes"),
+        (changed(encoding="", values={"acc_1": [1], "acc_2": [1]}), "neither"),
+    ],
+)
+def test_what_is_wrong_is_said(content: bytes, said: str) -> None:
+    with pytest.raises(BadInput, match=said):
+        parse_chunk(content)
+
+
+def test_values_that_are_no_numbers_are_refused() -> None:
+    for values in ({"acc_1": [1], "acc_2": [1, 2]}, {"acc_1": ["x"], "acc_2": [1]}):
+        head = json.loads(changed(encoding="", values=values).partition(b"\n")[0])
+        with pytest.raises(BadInput, match="its values are not numbers"):
+            parse_chunk(json.dumps(head).encode())
+
+
+def test_a_chunk_without_end_is_not_parsed() -> None:
+    with pytest.raises(TooLarge):
+        parse_chunk(b" " * (LARGEST_BYTES + 1))

@@ -1,0 +1,384 @@
+"""The raw ring: what was acknowledged is there, once, in its place, whatever came in between."""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import datetime, timedelta
+from itertools import pairwise
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from shm.errors import BadInput, StoreBusy, StoreError
+from shm.read import read
+from shm.read.chunk_document import chunk_document
+from shm.store import ring as ring_module
+from shm.store.ring import Ring
+from shm.values import Recording
+from shm.values.stream import Chunk, Stream, StreamChannel, StreamEvent
+from tests.helpers.nouns import NOW
+from tests.helpers.stream_killing import assert_none_lost_none_doubled, killed_again_and_again
+from tests.helpers.streams import STREAM, a_chunk
+
+HOUR = timedelta(hours=1)
+FOR_EVER = timedelta(days=3650)
+
+
+class Logger:
+    """A ring, its clock, and what was noticed."""
+
+    def __init__(self, folder: Path):
+        self.now = NOW
+        self.events: list[StreamEvent] = []
+        self.ring = Ring(folder, [STREAM], lambda: self.now, note=self.events.append)
+
+    def send(self, *chunks: Chunk, seals: bool = True) -> None:
+        """As they are recorded, or at once where the clock is ahead of them."""
+        for chunk in chunks:
+            self.now = max(self.now, chunk.end)
+            self.ring.append(chunk_document(chunk))
+        if seals:
+            self.seal()
+
+    def seal(self) -> list[tuple[str, datetime]]:
+        return self.ring.seal(self.now + timedelta(minutes=11))
+
+    @property
+    def kinds(self) -> list[str]:
+        return [event.kind for event in self.events]
+
+
+@pytest.fixture
+def logger(tmp_path: Path) -> Logger:
+    return Logger(tmp_path / "ring")
+
+
+def minutes(*numbers: int) -> list[Chunk]:
+    """Chunks of a minute each."""
+    return [a_chunk(number, samples=6000) for number in numbers]
+
+
+def samples(chunks: Sequence[Chunk]) -> np.ndarray:
+    return np.concatenate([chunk.values for chunk in chunks], axis=1)
+
+
+def test_chunks_are_joined_whether_they_are_sealed_or_not(logger: Logger) -> None:
+    chunks = minutes(*range(25))
+    logger.send(*chunks, seals=False)
+    before = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert logger.ring.seal(NOW + timedelta(minutes=25)) == [
+        ("h3", NOW), ("h3", NOW + timedelta(minutes=10))
+    ]  # fmt: skip
+    assert len(list(logger.ring.folder.glob("h3/incoming/*"))) == 5
+    for (piece,) in (before, logger.ring.read("h3", NOW, NOW + HOUR)):
+        assert np.array_equal(piece.values, samples(chunks))
+        assert (piece.start, piece.channels) == (NOW, ("acc_1", "acc_2"))
+        assert piece.temperature_c == pytest.approx(11.5)
+        assert np.isnan(piece.wind_m_s)
+    assert logger.ring.latest() == {"h3": NOW + timedelta(minutes=25)}
+    assert logger.ring.watermark("h3") == NOW + timedelta(minutes=25)
+    assert logger.ring.periods("h3", NOW + timedelta(minutes=5)) == (NOW + timedelta(minutes=10),)
+    assert logger.events == []
+
+
+def test_a_part_of_it_is_cut_to_the_sample(logger: Logger) -> None:
+    logger.send(*minutes(*range(12)))
+    start = NOW + timedelta(minutes=9, seconds=59.985)
+    (piece,) = logger.ring.read("h3", start, start + timedelta(seconds=1))
+    begin = 10 * 6000 - 1
+    assert np.array_equal(piece.values, samples(minutes(*range(12)))[:, begin : begin + 100])
+    assert piece.start == start + timedelta(seconds=0.005)
+    assert logger.ring.read("h3", NOW - HOUR, NOW) == ()
+    assert logger.ring.read("h4", NOW, NOW + HOUR) == ()
+
+
+def test_a_segment_is_read_by_others_and_by_us(logger: Logger) -> None:
+    chunks = minutes(*range(10))
+    logger.send(*chunks)
+    (path,) = logger.ring.folder.glob("h3/*/*.h5")
+    with h5py.File(path) as file:
+        assert file["acc_1"].attrs["unit"] == "m/s2"
+        assert file.attrs["sampling_rate_hz"] == 100.0
+        assert list(file["_chunks"]["sequence"]) == list(range(10))
+        assert np.array_equal(file["acc_2"][()], samples(chunks)[1])
+    found = read(path)
+    assert isinstance(found, Recording)
+    assert (found.time, found.samples) == (NOW, 60_000)
+
+
+def test_a_chunk_that_comes_again_is_kept_once(logger: Logger) -> None:
+    (chunk,) = minutes(0)
+    content = chunk_document(chunk)
+    assert [logger.ring.append(content).is_new for _ in range(2)] == [True, False]
+    logger.now += timedelta(minutes=1)
+    logger.seal()
+    assert not logger.ring.append(content).is_new
+    assert not Ring(logger.ring.folder).append(content).is_new
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert piece.values.shape == (2, 6000)
+
+
+@pytest.mark.parametrize("is_sealed", [False, True])
+def test_another_chunk_of_the_same_number_and_time_is_set_aside(
+    logger: Logger, is_sealed: bool
+) -> None:
+    first, second = a_chunk(0), replace(a_chunk(0), values=a_chunk(1).values)
+    logger.send(first, seals=is_sealed)
+    logger.send(second)
+    assert logger.kinds == ["doubled"]
+    assert len(list(logger.ring.folder.glob("h3/aside/*.chunk"))) == 1
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert piece.values.shape == (2, 500)
+    if is_sealed:
+        assert np.array_equal(piece.values, first.values)
+
+
+def test_a_new_session_may_count_from_nought(logger: Logger) -> None:
+    again = [replace(each, sequence=number) for number, each in enumerate(minutes(3, 4))]
+    logger.send(*minutes(0, 1, 2), *again)
+    assert logger.kinds == []  # no time is missing
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert piece.values.shape == (2, 5 * 6000)
+
+
+def test_a_gap_is_noted_and_filled_by_what_comes_late(logger: Logger) -> None:
+    logger.send(*minutes(0, 1, *range(5, 30)))
+    assert logger.kinds == ["gap"]
+    gap = logger.events[0]
+    assert (gap.start, gap.end) == (NOW + timedelta(minutes=2), NOW + timedelta(minutes=5))
+    assert "18000 samples" in gap.detail
+    assert len(logger.ring.read("h3", NOW, NOW + HOUR)) == 2
+    for chunk in minutes(2, 3, 4):
+        logger.ring.append(chunk_document(chunk))
+    assert logger.seal() == [("h3", NOW)]
+    assert logger.kinds == ["gap", "late"]
+    assert logger.events[1].start == gap.start
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert np.array_equal(piece.values, samples(minutes(*range(30))))
+
+
+def test_a_gap_is_waited_for_until_ten_minutes_more_have_come(logger: Logger) -> None:
+    logger.send(*minutes(0, 1, *range(3, 12)), seals=False)
+    assert logger.ring.watermark("h3") == NOW + timedelta(minutes=2)
+    logger.send(*minutes(*range(12, 15)))
+    assert logger.ring.watermark("h3") == NOW + timedelta(minutes=15)
+    assert logger.ring.watermark("h4") is None
+
+
+def test_three_days_offline_are_caught_up_in_any_order(logger: Logger) -> None:
+    before, offline = minutes(0, 1, 2), minutes(*range(3, 3 * 1440, 40))
+    after = minutes(3 * 1440)
+    logger.send(*before)
+    logger.send(*after)
+    random.Random(1).shuffle(offline)
+    for some in (offline[:50], offline[50:]):
+        logger.send(*some)
+    found = logger.ring.read("h3", NOW, NOW + timedelta(days=4))
+    sent = sorted([*before, *offline, *after], key=lambda chunk: chunk.start)
+    assert np.array_equal(np.concatenate([p.values for p in found], axis=1), samples(sent))
+    assert logger.kinds.count("late") >= 1
+
+
+def test_what_is_there_twice_counts_once(logger: Logger) -> None:
+    first, second = minutes(0, 1)
+    shifted = replace(second, sequence=9, start=second.start - timedelta(seconds=10))
+    logger.send(first, shifted)
+    assert logger.kinds == ["overlap"]
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert np.array_equal(piece.values[:, :6000], first.values)
+    assert np.array_equal(piece.values[:, 6000:], shifted.values[:, 1000:])
+
+
+def test_a_clock_that_jumps_is_noted_and_jitter_is_not(logger: Logger) -> None:
+    shifts_s = (0.0, 0.02, -0.02, 7.0, 7.02)
+    chunks = [
+        replace(chunk, start=chunk.start + timedelta(seconds=shift))
+        for chunk, shift in zip(minutes(*range(5)), shifts_s, strict=True)
+    ]
+    logger.send(*chunks)
+    assert logger.kinds == ["clock step"]
+    assert "+7.020 s before chunk 3" in logger.events[0].detail
+    lengths = [piece.values.shape[1] for piece in logger.ring.read("h3", NOW, NOW + HOUR)]
+    assert lengths == [18_000, 12_000]
+
+
+def test_a_clock_that_drifts_is_noted(logger: Logger) -> None:
+    """250 ppm more samples than the stamps say."""
+    start = NOW
+    for number in range(8 * 12):
+        logger.send(a_chunk(number, start, samples=30_000), seals=False)
+        start += timedelta(seconds=300 / (1 + 250e-6))
+    logger.seal()
+    assert logger.kinds == ["clock drift"]
+    assert logger.events[0].detail.startswith("250 ppm more")
+    assert len(logger.ring.read("h3", NOW, NOW + 8 * HOUR)) == 1
+
+
+def test_torn_files_are_set_aside_and_others_go_on(logger: Logger) -> None:
+    logger.send(*minutes(*range(20)))
+    logger.send(*minutes(20, 21, 22), seals=False)
+    folder = logger.ring.folder / "h3"
+    torn = sorted(folder.glob("incoming/*.chunk"))[1]
+    torn.write_bytes(torn.read_bytes()[:-1000])
+    first = min(folder.glob("*/*.h5"))
+    content = bytearray(first.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    first.write_bytes(content)
+    lengths = [piece.values.shape[1] for piece in logger.ring.read("h3", NOW, NOW + HOUR)]
+    assert lengths == [11 * 6000, 6000]
+    reasons = sorted(path.name for path in folder.glob("aside/*.reason.json"))
+    assert reasons == [f"{torn.name}.reason.json", f"{first.name}.reason.json"]
+    logger.seal()
+    assert not list(folder.glob("incoming/*"))
+
+
+def test_what_a_crash_left_after_sealing_goes(
+    logger: Logger, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chunks = minutes(*range(10))
+    logger.send(*chunks, seals=False)
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", _crash)
+        with pytest.raises(KeyboardInterrupt):
+            logger.seal()
+    assert len(list(logger.ring.folder.glob("h3/incoming/*.chunk"))) == 10
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert piece.values.shape == (2, 60_000)
+    assert logger.seal() == []
+    assert not list(logger.ring.folder.glob("h3/incoming/*.chunk"))
+
+
+def _crash(path: Path, missing_ok: bool = False) -> None:
+    if path.suffix == ".chunk":
+        raise KeyboardInterrupt
+
+
+def test_eight_kills_lose_and_double_nothing(tmp_path: Path) -> None:
+    acknowledged = killed_again_and_again(tmp_path / "ring", 8, random.Random(3))
+    assert acknowledged > 8
+    assert_none_lost_none_doubled(tmp_path / "ring", acknowledged)
+
+
+@pytest.mark.parametrize("call", ["fsync", "rename"])
+def test_a_full_disk_acknowledges_nothing(
+    logger: Logger, monkeypatch: pytest.MonkeyPatch, call: str
+) -> None:
+    (first, second) = minutes(0, 1)
+    logger.send(first, seals=False)
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os if call == "fsync" else Path, call, full)
+        with pytest.raises(StoreError, match="disk is full") as caught:
+            logger.ring.append(chunk_document(second))
+    assert caught.value.retry_after_s == 60.0
+    assert len(list(logger.ring.folder.glob("h3/incoming/*"))) == 1
+    logger.send(second)
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert piece.values.shape == (2, 12_000)
+
+
+def test_a_full_disk_while_sealing_leaves_the_chunks(
+    logger: Logger, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    logger.send(*minutes(0, 1), seals=False)
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr("shm.store.ring_sealing.write_segment", full)
+        with pytest.raises(StoreError, match="disk is full"):
+            logger.seal()
+    assert logger.seal() == [("h3", NOW)]
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert piece.values.shape == (2, 12_000)
+
+
+def test_senders_are_held_up_where_too_many_wait(
+    logger: Logger, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ring_module, "MOST_WAITING", 2)
+    logger.send(*minutes(0, 1), seals=False)
+    with pytest.raises(StoreBusy, match="wait to be sealed"):
+        logger.send(*minutes(2))
+    logger.seal()
+    logger.send(*minutes(2))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"stream": replace(STREAM, name="h9")}, "is not described"),
+        ({"channels": ("acc_1", "acc_9")}, r"not the channels of bridge.toml: acc_2, acc_9"),
+        ({"sampling_rate_hz": 128.0}, "128 Hz where bridge.toml says 100"),
+        ({"start": NOW - timedelta(hours=97)}, "the 96 hours of late_hours"),
+        ({"start": NOW + timedelta(hours=25)}, "is to come"),
+    ],
+)
+def test_what_does_not_fit_is_refused(
+    logger: Logger, changes: dict[str, object], said: str
+) -> None:
+    with pytest.raises(BadInput, match=said):
+        logger.ring.append(chunk_document(a_chunk(0, **changes)))  # type: ignore[arg-type]
+    assert not logger.ring.folder.exists()
+
+
+def test_channels_come_in_the_order_of_the_description(logger: Logger) -> None:
+    chunk = a_chunk(0)
+    turned = replace(chunk, channels=chunk.channels[::-1], values=chunk.values[::-1])
+    logger.send(turned)
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert piece.channels == ("acc_1", "acc_2")
+    assert np.array_equal(piece.values, chunk.values)
+
+
+def test_old_samples_go_but_for_those_that_are_kept(logger: Logger) -> None:
+    logger.send(*minutes(*range(60)))
+    logger.ring.keep("h3", NOW + timedelta(minutes=32), NOW + timedelta(minutes=33), "a train")
+    swept = logger.ring.sweep(NOW + timedelta(days=30, minutes=51), 30)
+    assert (swept.segments, swept.left_bytes) == (3, logger.ring.size_bytes("h3"))
+    starts = logger.ring.periods("h3", NOW)
+    assert starts == tuple(NOW + timedelta(minutes=m) for m in (20, 30, 50))
+
+
+def test_the_oldest_samples_go_where_the_ring_is_too_large(logger: Logger) -> None:
+    logger.send(*minutes(*range(60)))
+    most = logger.ring.size_bytes("h3") // 2
+    swept = logger.ring.sweep(logger.now, 30, most)
+    assert 3 <= swept.segments <= 4
+    assert logger.ring.size_bytes("h3") <= most
+    assert logger.ring.periods("h3", NOW)[-1] == NOW + timedelta(minutes=50)
+    logger.ring.sweep(logger.now + FOR_EVER, 30)
+    assert not list(logger.ring.folder.glob("h3/2*"))
+
+
+def test_a_real_recording_in_chunks_is_the_same_recording(
+    shared_data: Path, tmp_path: Path
+) -> None:
+    whole = read(shared_data / "pyuff_uff58" / "MPSTD_Set001_2024_10_08_10_27_07.uff")
+    assert isinstance(whole, Recording)
+    assert whole.time is not None
+    rate, names = whole.sampling_rate_hz, tuple(c.name for c in whole.accelerations)
+    stream = Stream("real", 3, rate, tuple(StreamChannel(n, "transverse", 1.0) for n in names))
+    values = np.array([c.values for c in whole.accelerations])
+    ring, rng = Ring(tmp_path / "ring", [stream]), random.Random(1)
+    edges = [0, *sorted(rng.sample(range(1, values.shape[1]), 30)), values.shape[1]]
+    contents = []
+    for number, (begin, end) in enumerate(pairwise(edges)):
+        start = whole.time + timedelta(seconds=begin / rate)
+        part = values[:, begin:end].astype(np.float32)
+        contents.append(chunk_document(Chunk("real", number, start, rate, names, part)))
+    rng.shuffle(contents)
+    ring.append_all(contents)
+    ring.seal(whole.time + FOR_EVER)
+    (piece,) = ring.read("real", whole.time, whole.time + HOUR)
+    assert np.array_equal(piece.values, values.astype(np.float32))
