@@ -90,7 +90,8 @@ def exchanged(
     Each known mode moves the sensors as it always did. Where most modes do so with two channels
     exchanged, or with the sign of one reversed, and else do not, that is what happened.
     """
-    shapes = np.array([shape_on(channels, mode) for mode in known]).reshape(len(known), -1)
+    rows = [shape_on(channels, mode) for mode in known]
+    shapes = np.array(rows).reshape(len(known), len(channels))
     told = np.all(np.isfinite(shapes), axis=1) & np.any(shapes != 0, axis=1)
     if told.sum() < _LEAST_MODES or not stretches:
         return None
