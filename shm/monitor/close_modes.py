@@ -8,9 +8,9 @@ is that of a finite record, whose ends widen the peaks (Sykulski et al., Biometr
 With the poles `c_k = a_k + i (w - w_k)` at the angular frequency w, of modes that decay by `a_k`,
 and `P` the covariance of their complex amplitudes, the modes' covariance in a record of T seconds
 is `Q = G P + P G*`, G diagonal with `1/c - (1 - exp(-c T)) / (c^2 T)`. Two directions see `E = B Q
-B^T + n`. Of Hermitian 2 x 2 matrices `X = x0 + x3 on the diagonal, x0 - x3, x1 - i x2 beside it`
-the product `[X, Y] = 2 (x0 y0 - x1 y1 - x2 y2 - x3 y3)` gives `tr X Y^-1 = [X, Y] / det Y` and
-`tr E^-1 X E^-1 Y = tr(E^-1 X) tr(E^-1 Y) - [X, Y] / det E`: all that a likelihood needs, in reals.
+B^T + n`, n diagonal. A Hermitian 2 x 2 matrix X has x0 + x3 and x0 - x3 on its diagonal, x1 - i x2
+beside it. With `[X, Y] = 2 (x0 y0 - x1 y1 - x2 y2 - x3 y3)`, `tr X Y^-1 = [X, Y] / det Y` and `tr
+E^-1 X E^-1 Y = tr(E^-1 X) tr(E^-1 Y) - [X, Y] / det E`: all that a likelihood needs, in reals.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -27,12 +27,13 @@ from shm.values import ComplexArray, FloatArray
 
 _BIN = 0.25
 """technical: lines are averaged over so much of a mode's half bandwidth, where T gives more."""
-_DAMPING_SD, _SLOPE_SD, _COHERENCE_SD, _FLOOR_SD = 0.7, 5.0, 0.5, 2.0
+_DAMPING_SD, _SLOPE_SD, _COHERENCE_SD, _FLOOR_SD = 0.7, 10.0, 0.5, 2.0
 """judgement: weak knowledge of the logarithms of damping and floor from before, of the correlation
 of two modes, and of the slope of the force and of what other modes, moved by the same wind, add to
-a mode's tails (their acceleration, 3 to 5 times the force's, is as much of a slope)."""
+a mode's tails: R times what its own stiffness would, R of 3 to 5, is a slope of 2 R."""
 _ENOUGH = 0.02  # technical: of log likelihood in a step; the next one gains its square
 _MOST_COHERENT = 0.9
+_SAME_DIRECTION = 0.1  # judgement: modes of nearer shapes differ by frequency alone
 _MOST_STEP = 1.0  # technical: a half bandwidth, and a factor of e
 _SIGNS = np.array([1.0, -1.0, -1.0, -1.0])[:, np.newaxis]
 
@@ -52,14 +53,17 @@ class Lines:
 
 
 def lines_of(
-    stretches: Sequence[Stretch], band_hz: tuple[float, float], half_hz: float, unit: FloatArray
+    stretches: Sequence[Stretch],
+    bands_hz: Sequence[tuple[float, float]],
+    half_hz: float,
+    unit: FloatArray,
 ) -> Lines:
-    """The lines of a band, averaged where a peak of that half width is finely resolved.
+    """The lines of bands, averaged where a peak of that half width is finely resolved.
 
     Channels are in units of `unit` (channels,).
     """
     parts = []
-    for each in stretches:
+    for each, band_hz in product(stretches, bands_hz):
         inside = each.between(*band_hz)
         values = each.values[:, inside] / unit[:, np.newaxis]
         many = max(1, int(_BIN * half_hz * each.seconds))
@@ -79,7 +83,7 @@ class CloseModes:
     `radians_s`, `decay_1_s`: angular frequency, and damping times it. `power`: half the mean
     square acceleration where the mode moves most; `slope`: exponent of frequency by which its
     spectrum differs from that under white force; `coherence` (modes, modes) the correlation of the
-    complex amplitudes, its diagonal 1. `floor`: power density of the noise along a direction.
+    complex amplitudes, its diagonal 1. `floor` (2,): power density of the noise along a direction.
     """
 
     radians_s: FloatArray
@@ -87,7 +91,7 @@ class CloseModes:
     power: FloatArray
     slope: FloatArray
     coherence: ComplexArray
-    floor: float
+    floor: FloatArray
 
     def only(self, kept: Sequence[int]) -> CloseModes:
         """Some of them."""
@@ -110,7 +114,7 @@ class CloseModes:
 
     def moved(self, step: FloatArray) -> CloseModes:
         """After a step in frequencies (half bandwidths), log decay rates, log powers, slopes,
-        correlations (real, imaginary) and log floor."""
+        correlations (real, imaginary) and log floors."""
         count = len(self.power)
         own = step[: 4 * count].reshape(4, count)
         decay = self.decay_1_s * np.exp(own[1])
@@ -130,7 +134,7 @@ class CloseModes:
             self.power * np.exp(own[2]),
             self.slope + own[3],
             coherence,
-            self.floor * math.exp(step[-1]),
+            self.floor * np.exp(step[-2:]),
         )
 
 
@@ -220,16 +224,18 @@ class Band:
             left.append(np.array([seen[one], seen[one]]))
             right.append(np.array([both, 1j * both]))
         u, v = np.concatenate(left), np.concatenate(right)
-        changes = np.zeros((len(u) + 1, 4, seen.shape[2]))
-        changes[:-1] = _components(
+        changes = np.zeros((len(u) + 2, 4, seen.shape[2]))
+        changes[:-2] = _components(
             2 * u[:, 0] * v[:, 0].real,
             2 * u[:, 1] * v[:, 1].real,
             u[:, 0] * v[:, 1] + u[:, 1] * v[:, 0].conj(),
         ).transpose(1, 0, 2)
-        changes[-1, 0] = modes.floor / (2 if self.alone else 1)
-        changes[-1, 3] = modes.floor / 2 if self.alone else 0.0
+        noise = modes.floor / 2 * ([1.0, 0.0] if self.alone else [1.0, 1.0])
+        changes[-2:, 0] = noise[:, np.newaxis]
+        changes[-2:, 3] = (noise * [1.0, -1.0])[:, np.newaxis]
         number = len(seen)
-        expected: FloatArray = changes[2 * number : 3 * number].sum(axis=0) + changes[-1]
+        expected: FloatArray = changes[2 * number : 3 * number].sum(axis=0)
+        expected += changes[-2:].sum(axis=0)
         if self.alone:
             expected[0] += 0.5
             expected[3] -= 0.5
@@ -254,32 +260,25 @@ class Band:
         pairs = [modes.coherence[pair] for pair in combinations(range(number), 2)]
         offset = [zero, np.log(modes.decay_1_s / self.known.decay_1_s), zero, modes.slope]
         offset += [np.array([[p.real, p.imag] for p in pairs]).ravel()]
-        offset += [np.array([math.log(modes.floor / self.known.floor)])]
+        offset += [np.log(modes.floor / self.known.floor)]
         sds = (math.inf, _DAMPING_SD, math.inf, _SLOPE_SD, _COHERENCE_SD, _FLOOR_SD)
         precision = [np.full(len(each), sd**-2) for each, sd in zip(offset, sds, strict=True)]
         return np.concatenate(offset), np.concatenate(precision)
 
-    def reshaped(self, modes: CloseModes, known_sd: float) -> tuple[FloatArray, FloatArray]:
-        """Shapes (channels, modes) that suit what all channels see, and their sd (modes,).
 
-        One step of expectation and maximisation (Dempster, Laird and Rubin 1977) from the shapes
-        as known, to `known_sd`; each channel's noise is the floor.
-        """
-        seen, response, _ = self._responses(modes)
-        seen = seen[:, : self.directions.shape[1]].transpose(2, 1, 0)
-        half = response.T[:, :, np.newaxis] * modes.covariance
-        own = half + half.conj().transpose(0, 2, 1)
-        noise = modes.floor * np.eye(seen.shape[1])
-        gain = own @ seen.transpose(0, 2, 1)
-        gain = gain @ np.linalg.inv(seen @ gain + noise) @ self.directions.T
-        back = gain.conj().transpose(0, 2, 1)
-        product = own - gain @ self.directions @ seen @ own + gain @ self.lines.power @ back
-        weight = 2 * self.lines.count / modes.floor
-        moved = np.real(np.tensordot(weight, self.lines.power @ back, axes=1))
-        before = np.eye(len(modes.power)) / known_sd**2
-        covariance = np.linalg.inv(np.real(np.tensordot(weight, product, axes=1)) + before)
-        found: FloatArray = (moved + self.shapes / known_sd**2) @ covariance
-        return found, np.asarray(np.sqrt(np.diag(covariance)), dtype=np.float64)
+def directions(shapes: FloatArray) -> FloatArray:
+    """One or two orthonormal columns (channels, 1 or 2) in which the modes of `shapes` move most.
+
+    The first is that of the first mode: with sensors in two planes they are nearly the planes.
+    """
+    unit = shapes / np.linalg.norm(shapes, axis=0)
+    first = unit[:, :1]
+    rest = unit - first @ (first.T @ unit)
+    size = np.linalg.norm(rest, axis=0)
+    most = int(np.argmax(size))
+    if size[most] < _SAME_DIRECTION:
+        return np.asarray(first)
+    return np.hstack((first, rest[:, [most]] / size[most]))
 
 
 def _components(first: FloatArray, second: FloatArray, beside: ComplexArray) -> FloatArray:

@@ -22,8 +22,8 @@ _DAMPING = 0.003
 """judgement: of a mode whose damping is not known; bars have 0.001, strands 0.005."""
 _SAME_PLACE_M = 0.01
 """technical: positions are read off a tape."""
-_EXPONENTIAL_MEDIAN = math.log(2)
-"""Median over mean of the lines of a spectrum of noise, whose powers are exponential."""
+_SMOOTHED = 16  # technical: lines averaged, a quarter of which is their scatter
+_ALIKE = 9.0  # judgement: a factor of three between the noise of sensors of one logger
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +53,25 @@ def stretch(values: FloatArray, sampling_rate_hz: float) -> Stretch:
     return Stretch(samples / sampling_rate_hz, np.asarray(lines, dtype=np.complex128))
 
 
-def channel_floors(stretches: Sequence[Stretch], low_hz: float, high_hz: float) -> FloatArray:
-    """Power density (channels,) of what is no peak in a band: the median of its lines."""
-    lines = np.concatenate(
-        [each.values[:, each.between(low_hz, high_hz)] for each in stretches], axis=1
+def channel_noise(stretches: Sequence[Stretch], low_hz: float, high_hz: float) -> FloatArray:
+    """Noise (channels,) of the sensors, in m/s^2/sqrt(Hz): the quiet tenth of a band's spectrum.
+
+    Sensors of one logger are alike; what moves one plane more is not taken for its noise.
+    """
+    quiet = np.median(
+        [_quiet(each.values[:, each.between(low_hz, high_hz)]) for each in stretches], 0
     )
-    floors: FloatArray = np.median(np.abs(lines) ** 2, axis=1) / _EXPONENTIAL_MEDIAN
-    return np.maximum(floors, np.finfo(float).tiny)
+    usual = float(np.median(quiet))
+    noise: FloatArray = np.sqrt(np.clip(quiet, usual / _ALIKE, usual * _ALIKE))
+    return np.maximum(noise, np.finfo(float).tiny)
+
+
+def _quiet(lines: ComplexArray) -> FloatArray:
+    count = lines.shape[1] // _SMOOTHED * _SMOOTHED
+    power = np.abs(lines[:, :count]) ** 2
+    smooth = power.reshape(len(lines), -1, _SMOOTHED).mean(axis=2)
+    found: FloatArray = np.quantile(smooth, 0.1, axis=1)
+    return found
 
 
 def shape_on(channels: Sequence[StreamChannel], mode: Mode) -> FloatArray:
@@ -74,34 +86,46 @@ def shape_on(channels: Sequence[StreamChannel], mode: Mode) -> FloatArray:
     return found
 
 
-def known_shapes(
+def _known_shapes(
     channels: Sequence[StreamChannel], known: Sequence[Mode], stretches: Sequence[Stretch]
-) -> FloatArray:
-    """Shapes (channels, modes) of known modes, the largest value 1 (0: no sensor in its plane).
+) -> tuple[FloatArray, list[int]]:
+    """Shapes (channels, modes), and of which modes they are only guessed.
 
-    Where the known mode does not say it, the strongest motion of the sensors of its plane does.
+    Where the known mode does not say it, the strongest motion of the sensors of its plane does. A
+    mode without a sensor in its plane has a shape of zeros.
     """
     rows = [shape_on(channels, mode) for mode in known]
     shapes = np.array(rows).reshape(len(known), len(channels)).T
+    guessed = []
     for column, mode in enumerate(known):
         missing = np.isnan(shapes[:, column])
-        if np.any(np.abs(shapes[~missing, column]) > 0):
-            shapes[missing, column] = 0.0
-        elif missing.any():
-            shapes[missing, column] = strongest(stretches, mode.frequency_hz)[missing]
-        largest = shapes[np.argmax(np.abs(shapes[:, column])), column]
-        shapes[:, column] /= largest or 1.0
-    return shapes
+        if missing.any() and not np.any(np.abs(shapes[~missing, column]) > 0):
+            inside = np.array([channel.plane == mode.plane for channel in channels])
+            shapes[:, column] = inside * strongest(stretches, mode.frequency_hz, inside)
+            guessed.append(column)
+        shapes[:, column] = _to_largest(np.nan_to_num(shapes[:, column]))
+    return shapes, guessed
+
+
+def _to_largest(shape: FloatArray) -> FloatArray:
+    largest = float(shape[np.argmax(np.abs(shape))])
+    scaled: FloatArray = shape / (largest or 1.0)
+    return scaled
 
 
 def strongest(
-    stretches: Sequence[Stretch], frequency_hz: float, within: float = 0.01
+    stretches: Sequence[Stretch],
+    frequency_hz: float,
+    weight: FloatArray | float = 1.0,
+    within: float = 0.01,
 ) -> FloatArray:
     """The real shape (channels,) that carries most of the power near a frequency."""
-    band = frequency_hz * (1 - within), frequency_hz * (1 + within)
-    near = [each.values[:, each.between(*band)] for each in stretches]
-    power = sum(np.real(lines @ lines.conj().T) for lines in near)
-    vector: FloatArray = np.linalg.eigh(power)[1][:, -1]
+    power = np.zeros((len(stretches[0].values),) * 2)
+    for each in stretches:
+        half = max(within * frequency_hz, 1.5 / each.seconds)
+        lines = each.values[:, each.between(frequency_hz - half, frequency_hz + half)]
+        power += np.real(lines @ lines.conj().T)
+    vector: FloatArray = np.linalg.eigh(power * np.outer(weight, weight))[1][:, -1]
     return vector
 
 
@@ -109,14 +133,16 @@ def strongest(
 class Peaks:
     """Where the known modes' peaks are; arrays (modes,), `shapes` (channels, modes).
 
-    `height_db` is over the floor; `damping` as it was known. A mode that no sensor sees has a shape
-    of zeros.
+    `height_db` is over the floor; `damping` as it was known; `noise` (channels,) in m/s^2/sqrt(Hz).
+    A mode that no sensor sees has a shape of zeros; of `guessed` modes the shape is a guess.
     """
 
     frequency_hz: FloatArray
     height_db: FloatArray
     shapes: FloatArray
     damping: FloatArray
+    noise: FloatArray
+    guessed: int
 
     @property
     def seen(self) -> list[int]:
@@ -126,19 +152,22 @@ class Peaks:
 
 
 def found_peaks(
-    stretches: Sequence[Stretch], channels: Sequence[StreamChannel], known: Sequence[Mode]
+    stretches: Sequence[Stretch],
+    channels: Sequence[StreamChannel],
+    known: Sequence[Mode],
+    noise: FloatArray,
 ) -> Peaks:
     """The peaks of known modes near the change of frequency that suits all of them best.
 
     A change of tension moves all modes alike: the product of the modes' spectra, each seen by its
     own shape, has its highest peak there.
     """
-    shapes = known_shapes(channels, known, stretches)
+    shapes, guessed = _known_shapes(channels, known, stretches)
     damping = np.array([m.damping_ratio if m.damping_ratio > 0 else _DAMPING for m in known])
     shift = np.arange(-REACH, REACH + _STEP / 2, _STEP)
     rows = [
         _raised(stretches, mode, row, z, shift)
-        for mode, row, z in zip(known, _seen_by(stretches, known, shapes), damping, strict=True)
+        for mode, row, z in zip(known, _seen_by(known, shapes, noise), damping, strict=True)
     ]
     height = np.array(rows).reshape(len(known), len(shift))
     common = shift[int(np.argmax(height.sum(axis=0)))]
@@ -146,21 +175,20 @@ def found_peaks(
     best = np.argmax(np.where(near, height, -np.inf), axis=1)
     hz = np.array([mode.frequency_hz for mode in known]) * (1 + shift[best])
     top = height[np.arange(len(known)), best]
-    return Peaks(hz, 10 / math.log(10) * top, shapes, damping)
+    for column in guessed:
+        near = strongest(stretches, hz[column], within=damping[column])
+        shapes[:, column] = _to_largest(near)
+    return Peaks(hz, 10 / math.log(10) * top, shapes, damping, noise, len(guessed))
 
 
-def _seen_by(
-    stretches: Sequence[Stretch], known: Sequence[Mode], shapes: FloatArray
-) -> list[FloatArray]:
+def _seen_by(known: Sequence[Mode], shapes: FloatArray, noise: FloatArray) -> list[FloatArray]:
     """Weights (channels,) of each mode that see it and not its neighbours within reach."""
     hz = np.array([mode.frequency_hz for mode in known])
     rows = []
     for index in range(len(known)):
-        near = np.flatnonzero(np.abs(hz / hz[index] - 1) < REACH)
-        floors = channel_floors(stretches, (1 - REACH) * hz[index], (1 + REACH) * hz[index])
-        root = np.sqrt(floors)[:, np.newaxis]
+        near = np.flatnonzero(np.abs(hz / hz[index] - 1) < 2 * REACH)
         # Two shapes that these sensors can hardly tell apart are not pulled apart for it.
-        inverse = np.linalg.pinv(shapes[:, near] / root, rcond=0.1) / root.T
+        inverse = np.linalg.pinv(shapes[:, near] / noise[:, np.newaxis], rcond=0.1) / noise
         rows.append(inverse[int(np.flatnonzero(near == index)[0])])
     return rows
 

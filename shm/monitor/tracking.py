@@ -12,11 +12,20 @@ from shm.errors import NotIdentifiable, ShmError
 from shm.identify import IdentifyOptions, identify
 from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.planes import shape_points
-from shm.monitor.close_modes import Band, BandFit, CloseModes, lines_of
+from shm.monitor.close_modes import Band, BandFit, CloseModes, directions, lines_of
 from shm.monitor.sensor_health import exchanged
-from shm.monitor.spectrum import REACH, Peaks, Stretch, channel_floors
+from shm.monitor.spectrum import REACH, Peaks, Stretch
 from shm.monitor.windows import Judged, judged
-from shm.values import Channel, FloatArray, Hanger, Mode, Recording, ResponsePoint
+from shm.values import (
+    NAN,
+    Channel,
+    FloatArray,
+    Hanger,
+    Mode,
+    Recording,
+    ResponsePoint,
+    ShapePoint,
+)
 from shm.values.rounding import listed
 from shm.values.stream import Piece, Stream, WindowReading
 
@@ -25,13 +34,13 @@ _HALF_WIDTHS = 10.0
 motion's spectrum moves a frequency by 0.6 n z^2 of it, n half widths to a side at a damping z."""
 _LEAST_LINES = 12  # judgement: to either side: a floor is known to a fifth by 24 lines
 _WIDEST = 0.03  # technical: of the frequency; a band's floor is taken as flat
+_OTHER_PLANE = 0.08
+"""judgement: of the frequency; sensors that are a few degrees off see the other plane, too."""
 _LEAST_GAIN = 15.0
 """judgement: of log likelihood by which a mode is proven: its five parameters and some two hundred
 places to look make 10 by chance."""
+_FLOOR = 0.2  # quantile of the lines of a band, as shm/identify/quality/of_ambient.py
 _STEPS_WITHOUT = 6  # technical: from the fit with the mode; what is gained later is small
-_SHAPE_SD = 0.05  # judgement: a shape before and now; sensors stay where they are
-_LEAST_LIKENESS = 0.8  # judgement: of a mode's shape with the known one; a neighbour's is below 0.5
-_SAME_DIRECTION = 0.1  # judgement: modes of nearer shapes differ by frequency alone
 _SAME = 3.0  # standard deviations
 
 
@@ -52,18 +61,16 @@ def read_window(
     lost = [f"{m.plane} {m.order}" for m in known if not _has(modes, m)]
     why = [found.reason] if found.reason else []
     why += [f"not found: {listed(lost)}"] if lost else []
-    if 2 * len(modes) > len(known):
-        return WindowReading(found.window, modes, "tracked", "; ".join(why))
-    if found.window.kind == "quiet":
-        why.append("the modes are hidden by the noise of the sensors")
-    else:
-        try:
-            return WindowReading(
-                found.window, _from_scratch(found, stream, hanger, options), "from scratch",
-                "; ".join(why),
-            )  # fmt: skip
-        except ShmError as error:
-            why.append(str(error))
+    guessed = 2 * (found.peaks.guessed if found.peaks else 0) > len(known)
+    if 2 * len(modes) <= len(known) or guessed:
+        if found.window.kind == "quiet":
+            why.append("the modes are hidden by the noise of the sensors")
+        else:
+            try:
+                fresh = _from_scratch(found, stream, hanger, options)
+                return WindowReading(found.window, fresh, "from scratch", "; ".join(why))
+            except ShmError as error:
+                why.append(str(error))
     return WindowReading(found.window, modes, "tracked" if modes else "none", "; ".join(why))
 
 
@@ -104,7 +111,7 @@ def tracked(found: Judged, known: Sequence[Mode], options: IdentifyOptions) -> t
     seen = [index for index in peaks.seen if peaks.height_db[index] > 0]
     half_hz = _half_hz(peaks, found.stretches)
     modes: dict[int, Mode] = {}
-    for group in _groups(seen, peaks.frequency_hz, half_hz):
+    for group in _groups(seen, known, peaks.frequency_hz, half_hz):
         modes |= _Group(found, peaks, half_hz, known, group, options).modes()
     return tuple(modes[index] for index in sorted(modes))
 
@@ -118,13 +125,19 @@ def _half_hz(peaks: Peaks, stretches: Sequence[Stretch]) -> FloatArray:
     return half
 
 
-def _groups(seen: Sequence[int], hz: FloatArray, half_hz: FloatArray) -> Iterator[list[int]]:
-    """Modes of which one lies in another's band are fitted together."""
+def _groups(
+    seen: Sequence[int], known: Sequence[Mode], hz: FloatArray, half_hz: FloatArray
+) -> Iterator[list[int]]:
+    """Modes of which one lies in another's band, or near it in the other plane, fitted together."""
     group: list[int] = []
     for index in sorted(seen, key=lambda each: float(hz[each])):
-        if group and hz[index] - hz[group[-1]] > max(half_hz[index], half_hz[group[-1]]):
-            yield group
-            group = []
+        if group:
+            away = hz[index] - hz[group[-1]]
+            other = all(known[index].plane != known[each].plane for each in group)
+            near = _OTHER_PLANE * hz[index] if other else 0.0
+            if away > max(near, half_hz[index], half_hz[group[-1]]):
+                yield group
+                group = []
         group.append(index)
     if group:
         yield group
@@ -143,18 +156,12 @@ class _Group:
         options: IdentifyOptions,
     ) -> None:
         hz = peaks.frequency_hz
-        others = np.delete(hz, group)
-        low = min(hz[index] - half_hz[index] for index in group)
-        high = max(hz[index] + half_hz[index] for index in group)
-        # A neighbour's own peak is no floor: the band ends half way to it.
-        below, above = others[others < hz[group[0]]], others[others > hz[group[-1]]]
-        self.low_hz = max([low, *((hz[group[0]] + below) / 2)])
-        self.high_hz = min([high, *((hz[group[-1]] + above) / 2)])
-        self.found, self.known, self.group, self.options = found, known, group, options
-        band_hz = self.low_hz, self.high_hz
-        self.unit = np.sqrt(channel_floors(found.stretches, *band_hz))
+        self.bands_hz = _bands(hz, half_hz, group)
+        self.unit = peaks.noise
+        self.found, self.peaks, self.known, self.group = found, peaks, known, group
+        self.options = options
         width_hz = float(min(peaks.damping[index] * hz[index] for index in group))
-        self.lines = lines_of(found.stretches, band_hz, width_hz, self.unit)
+        self.lines = lines_of(found.stretches, self.bands_hz, width_hz, self.unit)
         self.shapes = peaks.shapes[:, group] / self.unit[:, np.newaxis]
         self.start = self._start(hz[group], peaks.damping[group])
 
@@ -164,18 +171,15 @@ class _Group:
         if proven is None:
             return {}
         fit, kept = proven
-        band = self._band(self.shapes[:, kept], self.start.only(kept))
-        shapes, shape_sd = band.reshaped(fit.modes, _SHAPE_SD * float(np.max(np.abs(band.shapes))))
-        fit = self._band(shapes, band.known).fitted(fit.modes)
         made = {}
         for place, index in enumerate(kept):
-            mode = self._mode(fit, place, self.group[index], shapes[:, place], shape_sd[place])
+            mode = self._mode(fit, place, self.group[index])
             if mode is not None:
                 made[self.group[index]] = mode
         return made if self._in_order(made) else {}
 
     def _band(self, shapes: FloatArray, known: CloseModes) -> Band:
-        return Band(self.lines, _directions(shapes), shapes, known)
+        return Band(self.lines, directions(shapes), shapes, known)
 
     def _proven(self) -> tuple[BandFit, list[int]] | None:
         """The fit of the modes without each of which the lines are far less likely."""
@@ -207,63 +211,58 @@ class _Group:
             seen = np.real(inverse[place] @ self.lines.power[near] @ inverse[place])
             power[place] = float(np.mean(seen)) * decay[place] * 0.75
         power = np.maximum(power, 1e-6 / np.max(self.shapes**2))
-        return CloseModes(radians, decay, power, np.zeros(count), np.eye(count, dtype=complex), 1.0)
+        seen = directions(self.shapes)
+        along = np.real(np.einsum("xij,ik,jk->kx", self.lines.power, seen, seen))
+        floor = np.quantile(along, _FLOOR, axis=1)[[0, -1]]
+        return CloseModes(
+            radians, decay, power, np.zeros(count), np.eye(count, dtype=complex), floor
+        )
 
-    def _mode(
-        self,
-        fit: BandFit,
-        place: int,
-        index: int,
-        shape: FloatArray,
-        shape_sd: float,
-    ) -> Mode | None:
+    def _mode(self, fit: BandFit, place: int, index: int) -> Mode | None:
         """The mode as it is now; None where it is not the known one, or hardly known."""
         known, modes = self.known[index], fit.modes
         radians, decay = float(modes.radians_s[place]), float(modes.decay_1_s[place])
         hz, damping = radians / (2 * math.pi), decay / radians
-        unsteady = self._unsteadiness(shape)
+        if not any(low < hz < high for low, high in self.bands_hz):
+            return None
+        unsteady = self._unsteadiness(self.shapes[:, self.group.index(index)], hz)
         sd_hz = math.sqrt(fit.covariance[place, place] * unsteady) * decay / (2 * math.pi)
         row = len(modes.power) + place
         damping_sd = damping * math.sqrt(fit.covariance[row, row] * unsteady)
-        whitened = self.shapes[:, self.group.index(index)]
-        alike = abs(shape @ whitened) / math.sqrt(shape @ shape * (whitened @ whitened))
         options = replace(self.options, ambient_s=sum(s.seconds for s in self.found.stretches))
         best = options.ambient_width * options.at_best(hz, damping)[0]
         if (
-            alike**2 < _LEAST_LIKENESS
-            or damping > self.options.max_damping_ratio
+            damping > self.options.max_damping_ratio
             or sd_hz > hz * max(2 * self.options.max_frequency_sd, best)
-            or not self.low_hz < hz < self.high_hz
             or abs(hz / known.frequency_hz - 1) > REACH
         ):
             return None
-        own = shape * self.unit
-        largest = float(np.max(np.abs(own)))
-        found = FoundMode(
-            hz, sd_hz, damping, damping_sd, own / largest, shape_sd * self.unit / largest
-        )
-        points = [ResponsePoint(c.name, c.plane, c.x_m) for c in self.found.channels]
         return replace(
             known,
             frequency_hz=hz,
             frequency_sd_hz=sd_hz,
             damping_ratio=damping,
             damping_sd=damping_sd,
-            shape=shape_points(found, known.plane, points) or known.shape,
-            acceleration_m_s2=math.sqrt(2 * float(modes.power[place])) * largest,
+            shape=known.shape or self._shape(index),
+            acceleration_m_s2=math.sqrt(2 * float(modes.power[place])),
         )
 
-    def _unsteadiness(self, shape: FloatArray) -> float:
+    def _shape(self, index: int) -> tuple[ShapePoint, ...]:
+        """The shape by which a mode was seen that had none."""
+        row = self.peaks.shapes[:, index]
+        points = [ResponsePoint(c.name, c.plane, c.x_m) for c in self.found.channels]
+        seen = FoundMode(NAN, NAN, NAN, NAN, row, np.full(len(row), NAN))
+        return shape_points(seen, self.known[index].plane, points)
+
+    def _unsteadiness(self, shape: FloatArray, hz: float) -> float:
         """By how much gusts raise the variance: half the kurtosis of the mode's motion in the band.
 
         That of steady noise is 1; where a slow change of its strength makes it more, that loud
         part of the window counts for more, and chance in it, than the length of it tells.
         """
         weight = shape / self.unit
-        seen = [
-            weight @ each.values[:, each.between(self.low_hz, self.high_hz)]
-            for each in self.found.stretches
-        ]
+        band = next((low, high) for low, high in self.bands_hz if low < hz < high)
+        seen = [weight @ each.values[:, each.between(*band)] for each in self.found.stretches]
         strength = np.concatenate([np.abs(np.fft.ifft(each)) ** 2 * len(each) for each in seen])
         return max(1.0, float(np.mean(strength**2) / np.mean(strength) ** 2) / 2)
 
@@ -279,8 +278,17 @@ class _Group:
         return True
 
 
-def _directions(shapes: FloatArray) -> FloatArray:
-    """Orthonormal columns (channels, directions) that span the shapes which sensors tell apart."""
-    left, size, _ = np.linalg.svd(shapes / np.linalg.norm(shapes, axis=0), full_matrices=False)
-    # Two directions see two planes; nearer shapes than at 6 degrees are one.
-    return np.asarray(left[:, :2][:, size[:2] > _SAME_DIRECTION])
+def _bands(hz: FloatArray, half_hz: FloatArray, group: list[int]) -> list[tuple[float, float]]:
+    """Around each mode of a group; those that overlap are one.
+
+    A neighbour's own peak is no floor: a band ends half way to a mode outside the group.
+    """
+    others = np.delete(hz, group)
+    bands: list[tuple[float, float]] = []
+    for index in group:
+        low = max([hz[index] - half_hz[index], *((hz[index] + others) / 2)[others < hz[index]]])
+        high = min([hz[index] + half_hz[index], *((hz[index] + others) / 2)[others > hz[index]]])
+        if bands and low < bands[-1][1]:
+            low, high = bands[-1][0], max(high, bands.pop()[1])
+        bands.append((float(low), float(high)))
+    return bands

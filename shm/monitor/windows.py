@@ -15,7 +15,7 @@ import scipy
 
 from shm.identify.measuring.ambient import LOUDER
 from shm.monitor.sensor_health import broken_channels
-from shm.monitor.spectrum import Peaks, Stretch, found_peaks, stretch
+from shm.monitor.spectrum import Peaks, Stretch, channel_noise, found_peaks, stretch
 from shm.values import NAN, BoolArray, FloatArray, Mode
 from shm.values.stream import Piece, Stream, StreamChannel, Window, WindowKind
 
@@ -89,7 +89,7 @@ def _used(
     reason: str,
 ) -> Judged:
     stretches = tuple(stretch(part, stream.sampling_rate_hz) for part in parts)
-    peaks = found_peaks(stretches, channels, known)
+    peaks = found_peaks(stretches, channels, known, channel_noise(stretches, *band_hz))
     height = float(np.median(peaks.height_db[peaks.seen])) if peaks.seen else NAN
     kind: WindowKind = events.kind
     if kind == "wind" and height < _QUIET_DB and not _has_strong_peaks(stretches, band_hz):
