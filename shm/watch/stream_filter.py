@@ -27,15 +27,16 @@ from shm.watch.local_level import corrected
 
 CLIP = 3.0
 """Sds: a reading then adds 4.5 to a log likelihood ratio, of the 13.7 that 100 years take."""
-LEVEL, SLOPE, SLOW, FAST, FEATURES = range(5)
+LEVEL, SLOPE, SLOW, FAST, _RATE, FEATURES = range(6)
 """Where the state has what; the coefficients of the conditions begin at FEATURES."""
 # The tension's wander is a fraction of it. Season: a deck's bearings and joints, relaxation of
 # 0.2 % a year (`WatchOptions.creep_per_year_sd`) and as much again. Days: weather, moisture, loads
 # that stay. Hours: sun on one side, traffic. Judgement, after the worlds of `tests/worlds`.
 _SEASON_PER_ROOT_YEAR = 3e-3
-_SLOW_DAYS, _FAST_DAYS = 10.0, 4.0 / 24
-_SLOW_SD = np.array([5e-4, 2e-3, 5e-4, 2e-3, 5e-4, 2e-3])
-_FAST_SD = np.array([2e-4, 2e-4, 6e-4, 6e-4, 2e-3, 2e-3])
+_SLOW_DAYS, _SLOW_SD = 10.0, 1e-3
+_FAST_DAYS = np.repeat([1.0, 4.0], 4) / 24
+_FAST_SD = np.tile([2e-4, 7e-4, 2e-3, 4e-3], 2)
+_UNSTEADY = 0.2  # judgement: of the hours' wander, by what each reading is off on its own: live load
 _SLOPE_DAYS = 60.0  # judgement: how long a loss goes on at one rate
 _WITHIN_A_YEAR = 0.3  # judgement: of a coefficient's prior sd, by what it wanders in a year
 _FIRST_SD = 0.01  # of the level at the first reading, against the table made of that very reading
@@ -68,10 +69,11 @@ class Bank:
 
     @classmethod
     def begun(cls, day: float, coefficient_sd: FloatArray) -> Bank:
-        m, p = len(_SLOW_SD), FEATURES + len(coefficient_sd)
+        m, p = len(_FAST_SD), FEATURES + len(coefficient_sd)
         variance = np.zeros((m, p))
         variance[:, LEVEL] = _FIRST_SD**2
-        variance[:, SLOW], variance[:, FAST] = _SLOW_SD**2, _FAST_SD**2
+        variance[:, SLOW] = _SLOW_SD**2
+        variance[:, FAST] = variance[:, _RATE] = _FAST_SD**2
         variance[:, FEATURES:] = coefficient_sd**2
         return cls(
             day,
@@ -97,26 +99,29 @@ class Bank:
     def advanced(self, day: float, coefficient_sd: FloatArray) -> Bank:
         """To another day, without a reading."""
         days = day - self.day
-        p = self.mean.shape[1]
-        stays = np.ones(p)
-        stays[SLOPE] = math.exp(-days / _SLOPE_DAYS)
-        stays[SLOW], stays[FAST] = math.exp(-days / _SLOW_DAYS), math.exp(-days / _FAST_DAYS)
-        step = np.diag(stays)
-        step[LEVEL, SLOPE] = days
-        noise = np.zeros_like(self.mean)
+        m, p = self.mean.shape
+        slope, slow = math.exp(-days / _SLOPE_DAYS), math.exp(-days / _SLOW_DAYS)
+        step = np.tile(np.eye(p), (m, 1, 1))
+        step[:, LEVEL, SLOPE], step[:, SLOPE, SLOPE], step[:, SLOW, SLOW] = days, slope, slow
+        # A Matern process of order 3/2: what the weather does comes smoothly.
+        past = days / _FAST_DAYS
+        fast = np.exp(-past) * np.array([[1 + past, past], [-past, 1 - past]])
+        step[:, FAST:FEATURES, FAST:FEATURES] = np.moveaxis(fast, 2, 0)
+        noise = np.zeros((m, p))
         noise[:, LEVEL] = _SEASON_PER_ROOT_YEAR**2 * days / DAYS_PER_YEAR
-        noise[:, SLOW] = _SLOW_SD**2 * (1 - stays[SLOW] ** 2)
-        noise[:, FAST] = _FAST_SD**2 * (1 - stays[FAST] ** 2)
+        noise[:, SLOW] = _SLOW_SD**2 * (1 - slow**2)
         noise[:, FEATURES:] = (_WITHIN_A_YEAR * coefficient_sd) ** 2 * days / DAYS_PER_YEAR
-        covariance = step @ self.covariance @ step.T
-        covariance.reshape(len(covariance), -1)[:, :: p + 1] += noise
+        back = np.swapaxes(step, 1, 2)
+        covariance = step @ self.covariance @ back + noise[:, :, None] * np.eye(p)
+        lost = np.eye(2) - np.einsum("ijm,kjm->mik", fast, fast)
+        covariance[:, FAST:FEATURES, FAST:FEATURES] += _FAST_SD[:, None, None] ** 2 * lost
         return replace(
             self,
             day=day,
-            mean=self.mean @ step.T,
+            mean=np.einsum("mij,mj->mi", step, self.mean),
             covariance=covariance,
             log_weight=self.log_weight * math.exp(-days / _MEMORY_DAYS),
-            effect=self.effect @ step.T.astype(np.float32),
+            effect=self.effect @ back[:, None].astype(np.float32),
         )
 
     def with_beginning(self, after_day: float) -> Bank:
@@ -167,9 +172,10 @@ class Bank:
         """After a reading `value` of ln T's shift under `conditions` (p - FEATURES,)."""
         design = self.design(conditions)
         missed = value - self.mean @ design
-        spread = np.einsum("i,mij,j->m", design, self.covariance, design) + variance
+        own = variance + (_UNSTEADY * _FAST_SD) ** 2
+        spread = np.einsum("i,mij,j->m", design, self.covariance, design) + own
         clipped = np.maximum(spread, missed**2 / CLIP**2)
-        noise = (variance + clipped - spread)[:, None, None]
+        noise = (own + clipped - spread)[:, None, None]
         step = corrected(self.mean, self.covariance, design[None], np.array([value]), noise)
         # The loss is bounded as the gain of a change is: else a large wander would explain it.
         fit = -np.log(spread) / 2 - np.minimum(missed**2 / spread, CLIP**2) / 2
@@ -187,7 +193,7 @@ class Bank:
 
     def design(self, conditions: FloatArray) -> FloatArray:
         """What a reading sees of the state (p,)."""
-        return np.concatenate([[1.0, 0.0, 1.0, 1.0], conditions])
+        return np.concatenate([[1.0, 0.0, 1.0, 1.0, 0.0], conditions])
 
     def evidence(self, least_shift: float) -> Evidence:
         """What all readings say of a change; material is one by more than `least_shift`."""

@@ -56,8 +56,8 @@ _HOURS_A_DAY = 24.0
 # ten days' (1e-3 each: `WatchOptions.tension_per_kelvin_sd`), that of its square (judgement: 0.2 %
 # at 10 K), an e-fold of the excitation (`tension_per_amplitude_sd`), a m/s of wind (judgement: a
 # storm of 20 m/s moves a deck's loads by 0.4 %), and the sun's round (judgement).
-_LAGS_DAYS = np.array([3.0, 24.0, 240.0]) / _HOURS_A_DAY
-_CONDITION_SD = np.array([1e-3, 1e-3, 1e-3, 1e-3, 2e-5, 2e-3, 2e-4, 1e-3, 1e-3])
+_LAGS_DAYS = np.array([2.0, 14.0, 240.0]) / _HOURS_A_DAY
+_CONDITION_SD = np.array([1e-3] * 4 + [2e-5, 2e-3, 2e-4] + [1e-3] * 6)
 _UNKNOWN_K = 3.0  # judgement: by what an hour's temperature differs from that of those before it
 _RING = 24  # readings: a change is told within a day or is slow
 _OLD_READINGS = 120.0  # judgement: five days, as what a mode differs by is learnt over
@@ -295,7 +295,13 @@ class StreamWatch:
                 events = (_event(cause, state, evidence, reading, end),)
                 state, evidence = _absorbed(state, cause), NOTHING
             else:
-                moved = cause.moved
+                # The size is that of all readings since; the pattern's rests on a day of them.
+                moved = tuple(
+                    replace(each, shift_mean=evidence.shift, shift_sd=evidence.shift_sd)
+                    if each.quantity == TENSION
+                    else each
+                    for each in cause.moved
+                )
                 state = _changed(state, evidence)
         test = self._watched_test(state, evidence, moved, reading, end)
         before = state.told
@@ -429,7 +435,8 @@ def _with_conditions(
     hour = 2 * math.pi * ((state.start.hour + state.start.minute / 60) / _HOURS_A_DAY + day)
     others = np.nan_to_num(now[1:] - reference[1:])
     warm = kelvin[2] - kelvin[4]
-    conditions = np.array([*steps, warm**2, *others, math.sin(hour), math.cos(hour)])
+    rounds = hour * np.arange(1, 4)
+    conditions = np.array([*steps, warm**2, *others, *np.sin(rounds), *np.cos(rounds)])
     extra = (
         0.0 if is_known or not math.isfinite(lagged[0]) else (_CONDITION_SD[0] * _UNKNOWN_K) ** 2
     )
