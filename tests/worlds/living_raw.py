@@ -114,6 +114,7 @@ class _Passing:
     weight: Array  # (seconds,) cars and lorries, mean that of the level
     rumble: Array  # (samples,) level of broad motion by trains
     forced: Array  # (samples,) axle passing, about 1 for a medium train
+    flats: Array  # (samples,) m/s2, blows of flat wheels
     deck: Array  # (DECK_MODES, samples) m/s2
     trains: list[tuple[float, float, float, float]]
 
@@ -144,7 +145,7 @@ class _Deck:
         smooth, self.cars = lfilter([0.25], [1, -0.75], came, zi=self.cars)
         weight = smooth / 0.35
         x = t + np.arange(n) / RATE_HZ
-        rumble, forced = np.zeros(n), np.zeros(n)
+        rumble, forced, flats = np.zeros(n), np.zeros(n), np.zeros(n)
         trains = b.trains(t - 120, t + n / RATE_HZ) if self.flags.trains else []
         for when, speed, length, size in trains:
             lasts = (length + 130) / speed
@@ -161,6 +162,11 @@ class _Deck:
             axle = speed / 2.5
             forced += 0.5 * ramp * size * np.sin(2 * np.pi * axle * x + 6.28 * q.random())
             rumble += ramp * size * q.uniform(6, 18)
+            if q.random() < (0.5 if size > 1.5 else 0.12):  # a flat wheel, a blow each turn
+                size_of = q.lognormal(math.log(2.0), 1.0)
+                turns = np.floor(x * speed / 2.9)
+                blow = np.flatnonzero(np.diff(turns, prepend=turns[0]))
+                flats[blow] += size_of * ramp[blow] * np.where(turns[blow] % 2 > 0, 1.0, -0.7)
         drive = 0.012 * np.repeat(np.sqrt(0.02 + weight + 0.3 * level), BLOCK)[:n]
         drive = drive + 0.02 * rumble + 3e-4
         drive = drive + 2e-4 * float(b.weather(t, t + 60).of("wind", t)) ** 1.5
@@ -169,9 +175,8 @@ class _Deck:
             push = drive * r.standard_normal(n) + 0.02 * forced
             gain = self.scale[k] * self.size[k]
             deck[k], self.zi[k] = lfilter([gain, -gain], self.a[k], push, zi=self.zi[k])
-        return _Passing(
-            np.sqrt(level * (0.5 * level + 0.5 * weight)), weight, rumble, forced, deck, trains
-        )
+        level = np.sqrt(level * (0.5 * level + 0.5 * weight))
+        return _Passing(level, weight, rumble, forced, flats, deck, trains)
 
 
 # --------------------------------------------------------------------------------------- hanger
@@ -277,7 +282,9 @@ class _Moving:
             white *= h.road[p] * level + h.tremor[p]
             base[p, :n], self.low[p] = lfilter(self.soft_b, self.soft_a, white, zi=self.low[p])
             base[p, :n] += h.train[p] * passing.forced
-            base[p, :n] += self.deck_part[p] @ passing.deck
+            if on.leaks:
+                base[p, :n] += self.deck_part[p] @ passing.deck
+            base[p, :n] += h.train[p] / 0.04 * passing.flats
         force = self.r.standard_normal((count, padded), dtype=np.float32) * (
             calm * np.sqrt(push * RATE_HZ / 2)[:, None]
         ).astype(np.float32)
@@ -325,8 +332,9 @@ class _Moving:
         for k in (0, 1):
             mix = (axes[:, :, None] * shape[k]).reshape(2, count)
             low = 1 - h.sensors_m[k] / h.length_m
-            held = low * np.eye(2) if on.leaks else np.zeros((2, 2))
-            swing = mix.astype(np.float32) @ out[:, :n] + (mix @ driven + held) @ base[:, :n]
+            swing = (
+                mix.astype(np.float32) @ out[:, :n] + (mix @ driven + low * np.eye(2)) @ base[:, :n]
+            )
             ca, sa = math.cos(angle[k]), math.sin(angle[k])
             seen[2 * k : 2 * k + 2] = np.array([[ca, sa], [-sa, ca]]) @ (swing + guests)
         return np.asarray(seen * gain[:, None])
