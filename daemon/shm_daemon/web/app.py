@@ -31,7 +31,7 @@ from shm_daemon.web.faults import handle_faults
 from shm_daemon.web.frame import prepare_templates
 from shm_daemon.web.front import Pages
 from shm_daemon.web.metrics import Exposition
-from shm_daemon.web.pages import alerts, bridge, hanger, health, one_test, static, streams, upload
+from shm_daemon.web.pages import alerts, bridge, hanger, health, one_test, sensors, static, upload
 from shm_daemon.web.site import Site
 
 _described = APIRouter(include_in_schema=False)
@@ -69,7 +69,7 @@ def load_pages(site: Site) -> Pages:
         bridge,
         upload,
         health,
-        streams,
+        sensors,
         tests,
         one_test,
         hanger_numbers,
