@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from typing import Literal
 
@@ -68,8 +69,26 @@ def _state(
         ring_bytes=ring.size_bytes(stream.name),
         window=window,
         hour=store.streams.last_hour(stream.name),
-        events=events,
+        events=joined(events),
     )
+
+
+def joined(events: Sequence[StreamEvent]) -> tuple[StreamEvent, ...]:
+    """Events of one kind and channel that follow each other, as one that tells the last of them."""
+    found: dict[tuple[str, str], list[list[StreamEvent]]] = {}
+    for event in events:
+        runs = found.setdefault((event.kind, event.channel), [])
+        if runs and event.start - runs[-1][-1].end <= PERIOD:
+            runs[-1].append(event)
+        else:
+            runs.append([event])
+    whole = (_as_one(run) for runs in found.values() for run in runs)
+    return tuple(sorted(whole, key=lambda event: event.start))
+
+
+def _as_one(run: Sequence[StreamEvent]) -> StreamEvent:
+    times = "" if len(run) == 1 else f" ({len(run)} times in a row)"
+    return replace(run[-1], start=run[0].start, detail=run[-1].detail + times)
 
 
 def _lost_share(ring: Ring, name: str, last: datetime | None) -> float:

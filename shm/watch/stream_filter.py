@@ -36,7 +36,9 @@ _SEASON_PER_ROOT_YEAR = 3e-3
 _SLOW_DAYS, _SLOW_SD = 10.0, 1e-3
 _FAST_DAYS = np.repeat([1.0, 4.0], 4) / 24
 _FAST_SD = np.tile([2e-4, 7e-4, 2e-3, 4e-3], 2)
-_UNSTEADY = 0.2  # judgement: of the hours' wander, by what each reading is off on its own: live load
+_UNSTEADY = (
+    0.2  # judgement: of the hours' wander, by what each reading is off on its own: live load
+)
 _SLOPE_DAYS = 60.0  # judgement: how long a loss goes on at one rate
 _WITHIN_A_YEAR = 0.3  # judgement: of a coefficient's prior sd, by what it wanders in a year
 _FIRST_SD = 0.01  # of the level at the first reading, against the table made of that very reading

@@ -7,6 +7,7 @@ the others answer, so that one odd row or folder never blinds those who watch.
 from __future__ import annotations
 
 import logging
+import math
 import shutil
 import time
 from collections import Counter
@@ -20,7 +21,9 @@ from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4 as CONTENT_TYP
 from prometheus_client.registry import Collector
 
 from shm.pipeline import utc_now
+from shm.pipeline.stream_state import StreamCondition, stream_states
 from shm.store.recording_rows import ON_THE_WAY
+from shm.store.ring import ring_of
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.hangers import quarantined
@@ -156,6 +159,38 @@ def _stages(site: Site) -> Iterator[Metric]:
                     "stage", reached)  # fmt: skip
 
 
+def _streams(site: Site) -> Iterator[Metric]:
+    ring, now = ring_of(site.workspace), utc_now()
+    states = stream_states(site.workspace, ring, site.store, now)
+    told: tuple[tuple[str, str, Callable[[StreamCondition], float]], ...] = (
+        ("lag_seconds", "How long ago the last sample of a stream was measured.", _lag_s),
+        ("behind_seconds", "How much of a stream has come and is not read yet.", _behind_s),
+        ("lost_share", "What did not come of the samples of the last day.", _lost),
+        ("ring_bytes", "Room that the raw samples of a stream take.", _size),
+    )
+    for name, text, value in told:
+        family = GaugeMetricFamily(f"shm_stream_{name}", text, labels=["stream"])
+        for state in states:
+            family.add_metric([state.stream.name], value(state))
+        yield family
+
+
+def _lag_s(state: StreamCondition) -> float:
+    return state.lag.total_seconds() if state.lag is not None else math.nan
+
+
+def _behind_s(state: StreamCondition) -> float:
+    return state.behind.total_seconds() if state.behind is not None else math.nan
+
+
+def _lost(state: StreamCondition) -> float:
+    return state.lost_share
+
+
+def _size(state: StreamCondition) -> float:
+    return float(state.ring_bytes)
+
+
 _Part = Callable[[Site], Iterator[Metric]]
 _PARTS: Mapping[str, _Part] = {
     "spool": _spool,
@@ -169,6 +204,7 @@ _OF_STORE: Mapping[str, _Part] = {
     "alerts": _alerts,
     "deliveries": _deliveries,
     "stages": _stages,
+    "streams": _streams,
 }
 
 

@@ -22,7 +22,6 @@ from shm.report.figures.specification import (
     limits,
     stacked,
 )
-from shm.report.figures.time_axes import thinned_words
 from shm.values import FloatArray
 from shm.values.stream import StreamEvent
 from shm.watch.history import Band as Bounds
@@ -53,8 +52,13 @@ class Course:
     events: Sequence[StreamEvent] = ()
 
     @property
+    def has_tension(self) -> bool:
+        """Whether the watch has learnt enough to say a tension of any hour."""
+        return bool(np.isfinite(self.tension.middle).any())
+
+    @property
     def followed(self) -> dict[str, tuple[FloatArray, FloatArray]]:
-        """The modes that were followed longest."""
+        """The modes that were followed longest, the lowest of these."""
         seen = {name: int(np.isfinite(hz).sum()) for name, (hz, _) in self.modes.items()}
         names = sorted(sorted(seen, key=lambda name: -seen[name])[:_SHOWN_MODES])
         return {name: self.modes[name] for name in names if seen[name]}
@@ -65,7 +69,8 @@ def specify(course: Course) -> Specification:
     when = [*course.window_times, *course.hours]
     time = Axis(label="time (UTC)", scale="date", range=(min(when), max(when)))
     panels = [_spectrogram(course)] if course.spectrum_db.size else []
-    panels += [_frequencies(course), _tension(course)]
+    panels += [_frequencies(course)]
+    panels += [_tension(course)] if course.has_tension else []
     panels[-1] = Panel(**{**vars(panels[-1]), "x": time})
     return stacked(panels, 6.4)
 
@@ -104,8 +109,8 @@ def _tension(course: Course) -> Panel:
     texts = [f"{each:+.2f} %" for each in middle]
     marks: list[Mark] = [
         Rule(at=0.0, colour="quiet", dash="dash"),
-        Band(x=times, low=middle - reach, high=middle + reach, colour="blue", opacity=0.2),
-        Line(x=times, y=middle, colour="blue", width=1.3, name="tension", texts=texts),
+        Band(x=times, low=middle - reach, high=middle + reach, colour="ink", opacity=0.15),
+        Line(x=times, y=middle, colour="ink", width=1.3, name="tension", texts=texts),
         *_health(course.events),
     ]
     return Panel(
@@ -136,11 +141,14 @@ def _broken(
 
 
 def caption(course: Course) -> str:
+    below = (
+        "Below: the change of tension that they mean, and when a sensor or the clock was at fault."
+        if course.has_tension
+        else "No tension yet: the watch learns first how the hanger moves with the weather."
+    )
     return (
-        "Above: the power of all channels, dark where it is strong. Middle: the frequencies "
-        "followed from hour to hour, as changes of their medians, with 90 % intervals. Below: the "
-        "change of tension that they mean, and when a sensor or the clock was at fault."
-        f"{thinned_words(len(course.hours))}"
+        "Above: the power of all channels, dark where it is strong. Then the frequencies followed "
+        f"from hour to hour, as changes of their medians, with 90 % intervals. {below}"
     )
 
 
