@@ -203,9 +203,7 @@ def followed(
     return found
 
 
-def pool(
-    seed: int, readings: dict[int, list[WindowReading]], score: Score, hours: float
-) -> None:
+def pool(seed: int, readings: dict[int, list[WindowReading]], score: Score, hours: float) -> None:
     for h, own in readings.items():
         for period, length in LENGTHS.items():
             for step in range(int(timedelta(hours=hours) / length)):
