@@ -51,6 +51,15 @@ def hangers(
     return _beginning(incomplete, ((str(each.id), each.name) for each in described))
 
 
+def streams(
+    ctx: click.Context, parameter: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Names of the bridge's streams, with their hangers."""
+    bridge = _bridge(ctx)
+    described = bridge.streams if bridge else ()
+    return _beginning(incomplete, ((each.name, f"hanger {each.hanger}") for each in described))
+
+
 def hooks(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Names of the bridge's hooks, with their kinds."""
     bridge = _bridge(ctx)

@@ -13,8 +13,7 @@ from typing import Any
 
 import rich_click as click
 
-from shm.documents import parse_time
-from shm.errors import BadInput, StoreBusy, UsageError
+from shm.errors import StoreBusy, UsageError
 from shm.pipeline import utc_now
 from shm.plausibility import FIRST_DAY
 from shm.store import Decision, Hold, Stage, Store, StoredAlert, Withdrawal, Workspace
@@ -200,19 +199,3 @@ def hold_document(hold: Hold) -> dict[str, Any]:
         "decided_at": hold.decided_at,
         "time": hold.time,
     }
-
-
-class Time(click.ParamType[datetime]):
-    """An ISO 8601 time; one without zone is taken as UTC."""
-
-    name = "time"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> datetime:
-        try:
-            return parse_time(str(value))
-        except (ValueError, OverflowError):
-            raise BadInput(
-                f"--time {value} is not an ISO 8601 time.", remedy="Write 2026-05-01T10:00:00Z."
-            ) from None

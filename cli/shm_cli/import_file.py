@@ -36,8 +36,8 @@ from shm.read.profiles import Profile
 from shm.read.sandbox import foreign_modes
 from shm.store import Workspace
 from shm_cli.common import json_option, open_workspace, show, show_table, table
-from shm_cli.held import Time
 from shm_cli.import_modes import import_modes
+from shm_cli.parameter_types import Time
 from shm_daemon.landing import Landed, incoming
 
 _BARS = " ▁▂▃▄▅▆▇█"

@@ -35,14 +35,13 @@ from shm.store.archive import refuse_oversize
 from shm.values import Alert
 from shm_cli.common import json_option, open_workspace, show, show_table, table
 from shm_cli.held import (
-    Time,
     decide,
     decided_words,
     discarded_words,
     hold_document,
     show_held,
 )
-from shm_cli.parameter_types import Words
+from shm_cli.parameter_types import Time, Words
 from shm_cli.reprocess import rerun_document, send_back
 from shm_cli.working import finish, working
 

@@ -43,6 +43,7 @@ VERBS: dict[str, Verb] = {
         "shm_cli.ingest",
         "Take recordings in, look into them with --peek, or do one again with --again.",
     ),
+    "stream": Verb("shm_cli.stream", "Permanent sensors: what is live, and what was lost."),
     "daemon": Verb("shm_cli.daemon", "Watch the spool and do the whole job, unattended."),
     "web": Verb(
         "shm_cli.web",

@@ -6,11 +6,13 @@ Whether a file can be written is checked before the work, not after it.
 from __future__ import annotations
 
 import os
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import rich_click as click
 
+from shm.documents import parse_time
 from shm.errors import BadInput
 
 
@@ -24,6 +26,22 @@ class Words(click.ParamType[str]):
         if not value.strip():
             self.fail("it is empty. Say it in a few words.", param, ctx)
         return value.strip()
+
+
+class Time(click.ParamType[datetime]):
+    """An ISO 8601 time; one without zone is taken as UTC."""
+
+    name = "time"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> datetime:
+        try:
+            return parse_time(str(value))
+        except (ValueError, OverflowError):
+            raise BadInput(
+                f"{value} is not an ISO 8601 time.", remedy="Write 2026-05-01T10:00:00Z."
+            ) from None
 
 
 class NewFile(click.Path):

@@ -18,8 +18,7 @@ from shm_cli.common import (
     table,
     who_option,
 )
-from shm_cli.held import Time
-from shm_cli.parameter_types import Words
+from shm_cli.parameter_types import Time, Words
 
 
 @click.command()

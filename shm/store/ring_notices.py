@@ -19,6 +19,7 @@ from shm.values.stream import StreamEvent, StreamEventKind
 log = logging.getLogger(__name__)
 
 GRACE = timedelta(seconds=30)  # judgement: how long what is sent at once may be on its way
+_FILE_LATE = timedelta(hours=25)  # judgement: a logger may roll its files once a day
 _DRIFT_OVER_S = 6 * 3600.0  # derived: a jitter of 50 ms at both ends is then 5 ppm
 _DRIFT_PPM = 100.0  # as the setting frequency_allowance: every frequency is wrong by as much
 
@@ -73,7 +74,8 @@ def notice(
     events: list[StreamEvent] = []
     late: list[PassedChunk] = []
     for chunk in chunks:
-        if chunk.arrived > chunk.end + PERIOD + GRACE:
+        due = _FILE_LATE if chunk.sequence >= BY_TIME else PERIOD + GRACE
+        if chunk.arrived > chunk.end + due:
             late.append(chunk)
         if state.last is None or chunk.start >= state.last.start:
             events.extend(_between(stream, state.last, chunk))

@@ -62,6 +62,12 @@ class Streams(Repository):
         query = sa.select(table).where(*within).order_by(table.c.start, table.c.id)
         return self._values(table, query, WindowReading)
 
+    def last_window(self, stream: str) -> WindowReading | None:
+        """What the latest window of a stream said; None where there is none."""
+        table = stream_windows
+        query = sa.select(table).where(table.c.stream == stream).order_by(table.c.start.desc())
+        return next(iter(self._values(table, query.limit(1), WindowReading)), None)
+
     def last_modes(self, stream: str) -> tuple[Mode, ...]:
         """The modes of the latest windows of a stream that have any, each as it was seen last.
 

@@ -20,21 +20,7 @@ from shm.store.columns import (
     unique_where,
 )
 from shm.store.columns import metadata as metadata
-from shm.store.stream_tables import (
-    pooled_readings as pooled_readings,
-)
-from shm.store.stream_tables import (
-    stream_events as stream_events,
-)
-from shm.store.stream_tables import (
-    stream_progress as stream_progress,
-)
-from shm.store.stream_tables import (
-    stream_watch as stream_watch,
-)
-from shm.store.stream_tables import (
-    stream_windows as stream_windows,
-)
+from shm.store.stream_tables import stream_windows as _of_streams  # noqa: F401 - all are there
 
 SCHEMA = "0010"
 

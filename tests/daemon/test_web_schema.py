@@ -37,6 +37,7 @@ ROUTES = (
     "POST /api/imports",
     "GET /api/recordings",
     "GET /api/recordings/{key}",
+    "POST /api/streams/{name}/chunks",
     "GET /api/status",
     "GET /api/hangers",
     "GET /api/hangers/{hanger_id}",

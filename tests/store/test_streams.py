@@ -40,6 +40,8 @@ def test_the_last_modes_are_those_of_the_latest_window_that_has_any(store: Store
     store.streams.save_window(a_window(20, ()))
     store.streams.save_window(a_window(0))
     assert repr(store.streams.last_modes("h3")) == repr(MODES[:1])
+    assert repr(store.streams.last_window("h3")) == repr(a_window(20, ()))
+    assert store.streams.last_window("h4") is None
 
 
 def test_modes_are_kept_without_what_is_not_known(store: Store) -> None:

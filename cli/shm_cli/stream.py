@@ -1,0 +1,239 @@
+"""`shm stream`: what permanent sensors send, what was noticed, what is kept or taken out."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import rich_click as click
+
+from shm.documents import format_time, parse_time
+from shm.errors import NothingThere
+from shm.pipeline import utc_now
+from shm.read import write
+from shm.store import Store, Workspace
+from shm.store.ring import Ring, ring_of
+from shm.store.ring_files import PERIOD
+from shm.store.ring_recording import recording_of
+from shm.values import NAN
+from shm.values.stream import Stream
+from shm_cli import completion
+from shm_cli.common import (
+    json_option,
+    open_workspace,
+    opened_store,
+    show,
+    show_table,
+    table,
+    why_option,
+)
+from shm_cli.parameter_types import NewFile, Time
+
+_LIVE = timedelta(minutes=2)  # judgement: twice the longest chunk that a logger should send
+_DAY = timedelta(days=1)
+
+
+@dataclass(frozen=True)
+class StreamRow:
+    """A line of the table, and an entry of `--json`; unknown numbers are NaN."""
+
+    name: str
+    hanger: int
+    state: str
+    last_sample: datetime | None
+    lag_s: float
+    sampling_rate_hz: float
+    received_hz: float
+    lost_share_24h: float
+    ring_bytes: int
+    last_window: datetime | None
+    last_window_kind: str
+    last_window_how: str
+
+
+_from = click.argument("start", type=Time(), metavar="FROM")
+_to = click.argument("end", type=Time(), metavar="TO")
+_name = click.argument("name", metavar="NAME", shell_complete=completion.streams)
+
+
+@click.group(invoke_without_command=True)
+@click.option("--events", is_flag=True, help="What was noticed instead: gaps, clocks, sensors.")
+@click.option(
+    "--days",
+    type=click.FloatRange(0, min_open=True),
+    default=7.0,
+    show_default=True,
+    help="How far back --events looks.",
+)
+@json_option
+@click.pass_context
+def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> None:
+    """Permanent sensors: what is live, and what was lost.
+
+    A stream is live while its last sample is at most 2 minutes old. The share that was lost is of
+    the last 24 hours, up to the last sample; what comes late takes it back.
+
+    \b
+    Example: shm stream --json
+    Example: shm stream --events --days 1
+    """
+    if ctx.invoked_subcommand is not None:
+        return
+    with opened_store(ctx) as (workspace, store):
+        if not workspace.bridge.streams:
+            raise NothingThere(
+                "bridge.toml describes no stream.",
+                remedy="Add a [[stream]] table: docs/permanent_sensors.md shows one.",
+            )
+        if events:
+            _show_events(store, utc_now() - timedelta(days=days), as_json)
+        else:
+            _show_streams(workspace, store, utc_now(), as_json)
+
+
+@click.command()
+@_name
+@_from
+@_to
+@why_option
+@json_option
+@click.pass_context
+def keep(
+    ctx: click.Context, name: str, start: datetime, end: datetime, why: str, as_json: bool
+) -> None:
+    """Keep the samples of a time for good.
+
+    The ring takes out what is older than the setting `ring_days`, but for what is kept.
+
+    \b
+    Example: shm stream keep h3 2026-05-01T10:00Z 2026-05-01T10:20Z --why "heavy transport"
+    """
+    workspace = open_workspace(ctx)
+    stream, ring = workspace.bridge.stream(name), ring_of(workspace)
+    recording_of(ring, stream, start, end, workspace.settings.max_samples)
+    ring.keep(name, start, end, why)
+    if as_json:
+        show({"stream": name, "start": start, "end": end, "why": why})
+        return
+    click.echo(f"The samples of {name} from {format_time(start)} to {format_time(end)} are kept.")
+
+
+@click.command()
+@_name
+@_from
+@_to
+@click.argument("file", type=NewFile(), metavar="FILE")
+@json_option
+@click.pass_context
+def export(
+    ctx: click.Context, name: str, start: datetime, end: datetime, file: Path, as_json: bool
+) -> None:
+    """Write the samples of a time as a recording, which `shm identify` takes.
+
+    FILE ends with .csv, .npz or .uff. What is missing is an empty value.
+
+    \b
+    Example: shm stream export h3 2026-05-01T10:00Z 2026-05-01T10:10Z h3.csv
+    """
+    workspace = open_workspace(ctx)
+    stream = workspace.bridge.stream(name)
+    found = recording_of(ring_of(workspace), stream, start, end, workspace.settings.max_samples)
+    write(found, file)
+    if as_json:
+        told = {"file": str(file), "start": found.time, "samples": found.samples}
+        show({"stream": name, "hanger": found.hanger, **told})
+        return
+    click.echo(f"{file}: {found.samples} samples of {len(found.channels)} channels.")
+
+
+command.add_command(keep)
+command.add_command(export)
+
+
+def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bool) -> None:
+    ring = ring_of(workspace)
+    latest = ring.latest()
+    rows = [
+        _row(ring, store, each, latest.get(each.name), now) for each in workspace.bridge.streams
+    ]
+    if as_json:
+        show({"streams": [asdict(row) for row in rows]})
+        return
+    columns = ("stream", "hanger", "state", "last sample", "lag", "rate", "lost", "ring", "window")
+    made = table("Streams", *columns)
+    for row in rows:
+        made.add_row(
+            row.name,
+            str(row.hanger),
+            row.state,
+            _time(row.last_sample),
+            _lag(row.lag_s),
+            f"{row.received_hz:.4g} Hz" if row.received_hz == row.received_hz else "",
+            f"{row.lost_share_24h:.2%}" if row.lost_share_24h == row.lost_share_24h else "",
+            f"{row.ring_bytes / 1e6:.1f} MB",
+            f"{_time(row.last_window)} {row.last_window_kind}, {row.last_window_how}".strip(" ,"),
+        )
+    show_table(made)
+
+
+def _row(
+    ring: Ring, store: Store, stream: Stream, last: datetime | None, now: datetime
+) -> StreamRow:
+    window = store.streams.last_window(stream.name)
+    received, lost = _received(ring.state(stream.name).received_s, now)
+    state = "never sent" if last is None else "live" if now - last <= _LIVE else "silent"
+    return StreamRow(
+        name=stream.name,
+        hanger=stream.hanger,
+        state=state,
+        last_sample=last,
+        lag_s=NAN if last is None else max((now - last).total_seconds(), 0.0),
+        sampling_rate_hz=stream.sampling_rate_hz,
+        received_hz=received * stream.sampling_rate_hz,
+        lost_share_24h=lost,
+        ring_bytes=ring.size_bytes(stream.name),
+        last_window=window.window.start if window else None,
+        last_window_kind=window.window.kind if window else "",
+        last_window_how=window.how if window else "",
+    )
+
+
+def _received(received_s: dict[str, float], now: datetime) -> tuple[float, float]:
+    """Which share of the last ten minutes that are sealed came, and which share of a day did not.
+
+    The first ten minutes of all may have begun before the stream, and do not count.
+    """
+    known = {parse_time(start): seconds for start, seconds in received_s.items()}
+    first, last = min(known, default=now), max(known, default=now)
+    begin = max(first + PERIOD, now - _DAY)
+    if last < begin:
+        return NAN, NAN
+    expected_s = (last + PERIOD - begin).total_seconds()
+    came_s = sum(seconds for start, seconds in known.items() if start >= begin)
+    return known[last] / PERIOD.total_seconds(), min(max(1 - came_s / expected_s, 0.0), 1.0)
+
+
+def _show_events(store: Store, since: datetime, as_json: bool) -> None:
+    found = store.streams.list_events(None, since)
+    if as_json:
+        show({"events": [asdict(event) for event in found]})
+        return
+    made = table("Events of streams", "stream", "what", "from", "to", "channel", "details")
+    for event in found:
+        times = _time(event.start), _time(event.end)
+        made.add_row(event.stream, event.kind, *times, event.channel, event.detail)
+    show_table(made)
+
+
+def _time(time: datetime | None) -> str:
+    return "" if time is None else f"{time:%Y-%m-%d %H:%M:%S}"
+
+
+def _lag(seconds: float) -> str:
+    if seconds != seconds:
+        return ""
+    for unit, length_s in (("d", 86400), ("h", 3600), ("min", 60)):
+        if seconds >= 2 * length_s:
+            return f"{seconds / length_s:.0f} {unit}"
+    return f"{seconds:.0f} s"

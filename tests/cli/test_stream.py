@@ -1,0 +1,143 @@
+"""`shm stream`: what is live, what was lost, what was noticed; keeping and exporting samples."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shm.documents import format_time
+from shm.pipeline import utc_now
+from shm.read import read
+from shm.read.chunk_document import chunk_document
+from shm.read.ring_segment import microseconds
+from shm.store import Workspace
+from shm.store.ring import Ring, ring_of
+from shm.store.ring_files import PERIOD, period_of
+from shm.values import Recording
+from tests.cli.conftest import Shm
+from tests.helpers.streams import a_chunk, a_window, an_event, with_stream
+from tests.helpers.workspaces import make_workspace
+
+
+@pytest.fixture
+def start() -> datetime:
+    """The full ten minutes half an hour ago."""
+    return period_of(microseconds(utc_now() - 4 * PERIOD))
+
+
+@pytest.fixture
+def bridge(tmp_path: Path, start: datetime) -> Workspace:
+    """Half an hour, of which the twelfth minute is missing; what is over is sealed."""
+    workspace = with_stream(make_workspace(tmp_path / "bridge"))
+    with workspace.store() as store:
+        now = [start]
+        ring = ring_of(workspace, lambda: now[0], store.streams.save_event)
+        for minute in range(30):
+            now[0] = start + timedelta(minutes=minute)
+            if minute != 12:
+                ring.append(chunk_document(a_chunk(minute, now[0], samples=6000)))
+        ring.seal(utc_now() + timedelta(minutes=1))
+    return workspace
+
+
+def test_the_table_says_what_is_live_and_what_was_lost(
+    shm: Shm, bridge: Workspace, start: datetime
+) -> None:
+    with bridge.store() as store:
+        store.streams.save_window(a_window())
+    ended = shm("--workspace", bridge.folder, "stream", "--json")
+    assert ended.code == 0
+    (row,) = ended.document["streams"]
+    assert (row["name"], row["hanger"], row["state"]) == ("h3", 3, "silent")
+    assert row["last_sample"] == format_time(start + timedelta(minutes=30))
+    assert row["lag_s"] > 0
+    assert row["received_hz"] == 100.0
+    assert row["lost_share_24h"] == pytest.approx(0.05)  # the first ten minutes do not count
+    assert row["ring_bytes"] > 100_000
+    assert (row["last_window_kind"], row["last_window_how"]) == ("wind", "tracked")
+    said = shm("--workspace", bridge.folder, "stream").out
+    assert "5.00%" in said
+    assert "silent" in said
+
+
+def test_a_stream_that_never_sent_or_sends_now(shm: Shm, tmp_path: Path) -> None:
+    workspace = with_stream(make_workspace(tmp_path / "other"))
+    (row,) = shm("--workspace", workspace.folder, "stream", "--json").document["streams"]
+    assert (row["state"], row["last_sample"], row["lag_s"]) == ("never sent", None, None)
+    assert row["lost_share_24h"] is None
+    Ring(workspace.folder / "ring").append(chunk_document(a_chunk(0, utc_now())))
+    assert "live" in shm("--workspace", workspace.folder, "stream").out
+
+
+def test_events_are_listed_with_their_times(shm: Shm, bridge: Workspace, start: datetime) -> None:
+    with bridge.store() as store:
+        store.streams.save_event(an_event())  # of months ago
+    ended = shm("--workspace", bridge.folder, "stream", "--events", "--json")
+    (event,) = ended.document["events"]
+    assert (event["kind"], event["start"]) == ("gap", format_time(start + timedelta(minutes=12)))
+    assert "6000 samples" in shm("--workspace", bridge.folder, "stream", "--events").out
+
+
+def test_an_export_is_a_recording_with_what_is_missing_empty(
+    shm: Shm, bridge: Workspace, start: datetime, tmp_path: Path
+) -> None:
+    file = tmp_path / "h3.csv"
+    times = [format_time(start + timedelta(minutes=minute)) for minute in (11, 14)]
+    ended = shm("--workspace", bridge.folder, "stream", "export", "h3", *times, file)
+    assert ended.code == 0
+    assert "18000 samples of 2 channels" in ended.out
+    found = read(file)
+    assert isinstance(found, Recording)
+    assert (found.hanger, found.time, found.temperature_c) == (
+        3,
+        start + timedelta(minutes=11),
+        11.5,
+    )
+    assert [(c.plane, c.x_m) for c in found.channels] == [
+        ("transverse", 3.0),
+        ("longitudinal", 3.0),
+    ]
+    assert found.channels[1].full_scale == 20.0
+    values = found.channels[0].values
+    assert np.allclose(values[:6000], a_chunk(11, samples=6000).values[0], rtol=1e-5)
+    assert np.isnan(values[6000:12_000]).all()
+    assert np.allclose(values[12_000:], a_chunk(13, samples=6000).values[0], rtol=1e-5)
+
+
+def test_what_is_kept_stays_when_the_rest_goes(
+    shm: Shm, bridge: Workspace, start: datetime
+) -> None:
+    times = [format_time(start + timedelta(minutes=minute)) for minute in (21, 22)]
+    arguments = ("stream", "keep", "h3", *times, "--why", "a train")
+    assert shm("--workspace", bridge.folder, *arguments).code == 0
+    ring = Ring(bridge.folder / "ring")
+    ring.sweep(utc_now() + timedelta(days=400), 30)
+    assert ring.periods("h3", start) == (start + PERIOD, start + 2 * PERIOD)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("export", "h9", "2026-05-01", "2026-05-02", "x.csv"), 3, "is not described"),
+        (("export", "h3", "yesterday", "2026-05-02", "x.csv"), 3, "not an ISO 8601 time"),
+        (("export", "h3", "2026-05-01T10:00", "2026-05-01T11:00", "x.csv"), 4, "has no sample"),
+        (("export", "h3", "2026-05-01", "2027-05-01", "x.csv"), 2, "more than the 10000000"),
+        (("keep", "h3", "2026-05-01T10:00", "2026-05-01T11:00"), 2, "--why"),
+    ],
+)
+def test_what_cannot_be_done_is_said(
+    shm: Shm, bridge: Workspace, arguments: tuple[str, ...], code: int, said: str
+) -> None:
+    ended = shm("--workspace", bridge.folder, "stream", *arguments)
+    assert ended.code == code
+    assert said in ended.err
+
+
+def test_a_bridge_without_streams_has_nothing_to_show(shm: Shm, tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path / "plain")
+    ended = shm("--workspace", workspace.folder, "stream")
+    assert (ended.code, ended.out) == (4, "")
+    assert "[[stream]]" in ended.err
