@@ -8,16 +8,15 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm.documents import format_time, parse_time
+from shm.documents import format_time
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
+from shm.pipeline.stream_state import StreamCondition, stream_states, tension_words
 from shm.read import write
 from shm.store import Store, Workspace
-from shm.store.ring import Ring, ring_of
-from shm.store.ring_files import PERIOD
+from shm.store.ring import ring_of
 from shm.store.ring_recording import recording_of
 from shm.values import NAN
-from shm.values.stream import Stream
 from shm_cli import completion
 from shm_cli.common import (
     json_option,
@@ -30,9 +29,6 @@ from shm_cli.common import (
 )
 from shm_cli.parameter_types import NewFile, Time
 
-_LIVE = timedelta(minutes=2)  # judgement: twice the longest chunk that a logger should send
-_DAY = timedelta(days=1)
-
 
 @dataclass(frozen=True)
 class StreamRow:
@@ -43,6 +39,7 @@ class StreamRow:
     state: str
     last_sample: datetime | None
     lag_s: float
+    behind_s: float
     sampling_rate_hz: float
     received_hz: float
     lost_share_24h: float
@@ -50,6 +47,10 @@ class StreamRow:
     last_window: datetime | None
     last_window_kind: str
     last_window_how: str
+    last_window_modes: int
+    tension_shift: float
+    tension_shift_sd: float
+    learning: str
 
 
 _from = click.argument("start", type=Time(), metavar="FROM")
@@ -71,8 +72,9 @@ _name = click.argument("name", metavar="NAME", shell_complete=completion.streams
 def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> None:
     """Permanent sensors: what is live, and what was lost.
 
-    A stream is live while its last sample is at most 2 minutes old. The share that was lost is of
-    the last 24 hours, up to the last sample; what comes late takes it back.
+    A stream is late once its last sample is 5 minutes old, silent after an hour. The share that was
+    lost is of the last 24 hours, up to the last sample; what comes late takes it back. Tension is
+    the change since the stream began, the weather taken off, with its 90 % interval.
 
     \b
     Example: shm stream --json
@@ -152,17 +154,15 @@ command.add_command(export)
 
 
 def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bool) -> None:
-    ring = ring_of(workspace)
-    latest = ring.latest()
-    rows = [
-        _row(ring, store, each, latest.get(each.name), now) for each in workspace.bridge.streams
-    ]
+    states = stream_states(workspace, ring_of(workspace), store, now)
+    rows = [_row(each) for each in states]
     if as_json:
         show({"streams": [asdict(row) for row in rows]})
         return
-    columns = ("stream", "hanger", "state", "last sample", "lag", "rate", "lost", "ring", "window")
+    columns = ("stream", "hanger", "state", "last sample", "lag", "rate", "lost", "ring", "window",
+               "tension")  # fmt: skip
     made = table("Streams", *columns)
-    for row in rows:
+    for row, state in zip(rows, states, strict=True):
         made.add_row(
             row.name,
             str(row.hanger),
@@ -173,45 +173,32 @@ def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bo
             f"{row.lost_share_24h:.2%}" if row.lost_share_24h == row.lost_share_24h else "",
             f"{row.ring_bytes / 1e6:.1f} MB",
             f"{_time(row.last_window)} {row.last_window_kind}, {row.last_window_how}".strip(" ,"),
+            tension_words(state.hour),
         )
     show_table(made)
 
 
-def _row(
-    ring: Ring, store: Store, stream: Stream, last: datetime | None, now: datetime
-) -> StreamRow:
-    window = store.streams.last_window(stream.name)
-    received, lost = _received(ring.state(stream.name).received_s, now)
-    state = "never sent" if last is None else "live" if now - last <= _LIVE else "silent"
+def _row(state: StreamCondition) -> StreamRow:
+    window, hour = state.window, state.hour
     return StreamRow(
-        name=stream.name,
-        hanger=stream.hanger,
-        state=state,
-        last_sample=last,
-        lag_s=NAN if last is None else max((now - last).total_seconds(), 0.0),
-        sampling_rate_hz=stream.sampling_rate_hz,
-        received_hz=received * stream.sampling_rate_hz,
-        lost_share_24h=lost,
-        ring_bytes=ring.size_bytes(stream.name),
+        name=state.stream.name,
+        hanger=state.stream.hanger,
+        state=state.state,
+        last_sample=state.last_sample,
+        lag_s=NAN if state.lag is None else state.lag.total_seconds(),
+        behind_s=NAN if state.behind is None else state.behind.total_seconds(),
+        sampling_rate_hz=state.stream.sampling_rate_hz,
+        received_hz=state.received_hz,
+        lost_share_24h=state.lost_share,
+        ring_bytes=state.ring_bytes,
         last_window=window.window.start if window else None,
         last_window_kind=window.window.kind if window else "",
         last_window_how=window.how if window else "",
+        last_window_modes=len(window.modes) if window else 0,
+        tension_shift=hour.compensated_shift if hour else NAN,
+        tension_shift_sd=hour.compensated_sd if hour else NAN,
+        learning=hour.learning if hour else "",
     )
-
-
-def _received(received_s: dict[str, float], now: datetime) -> tuple[float, float]:
-    """Which share of the last ten minutes that are sealed came, and which share of a day did not.
-
-    The first ten minutes of all may have begun before the stream, and do not count.
-    """
-    known = {parse_time(start): seconds for start, seconds in received_s.items()}
-    first, last = min(known, default=now), max(known, default=now)
-    begin = max(first + PERIOD, now - _DAY)
-    if last < begin:
-        return NAN, NAN
-    expected_s = (last + PERIOD - begin).total_seconds()
-    came_s = sum(seconds for start, seconds in known.items() if start >= begin)
-    return known[last] / PERIOD.total_seconds(), min(max(1 - came_s / expected_s, 0.0), 1.0)
 
 
 def _show_events(store: Store, since: datetime, as_json: bool) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from typing import Literal
@@ -14,11 +15,12 @@ from shm.store.ring_files import PERIOD
 from shm.values import NAN
 from shm.values.stream import PooledReading, Stream, StreamEvent, WindowReading
 
-State = Literal["live", "late", "silent", "never heard", "sensor at fault"]
+State = Literal["live", "late", "silent", "never sent", "sensor at fault"]
 
 _LATE, _SILENT = timedelta(minutes=5), timedelta(hours=1)
 """judgement: loggers send each minute; a router begins anew within five minutes."""
 _LATELY = timedelta(days=1)
+_Z_90 = 1.645
 _AT_FAULT = ("dead", "drifting", "swapped", "saturated")
 _FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends it
 
@@ -35,6 +37,7 @@ class StreamCondition:
     last_sample: datetime | None
     lag: timedelta | None
     behind: timedelta | None
+    received_hz: float
     lost_share: float
     ring_bytes: int
     window: WindowReading | None
@@ -59,13 +62,15 @@ def _state(
     events = store.streams.list_events(stream.name, now - _LATELY)
     progress = store.streams.progress(stream.name)
     window = store.streams.last_window(stream.name)
+    received, lost = _received(ring.state(stream.name).received_s, now)
     return StreamCondition(
         stream=stream,
         state=_word(last, events, now),
         last_sample=last,
         lag=None if last is None else max(timedelta(0), now - last),
         behind=None if last is None or progress is None else max(timedelta(0), last - progress),
-        lost_share=_lost_share(ring, stream.name, last),
+        received_hz=received * stream.sampling_rate_hz,
+        lost_share=lost,
         ring_bytes=ring.size_bytes(stream.name),
         window=window,
         hour=store.streams.last_hour(stream.name),
@@ -91,24 +96,38 @@ def _as_one(run: Sequence[StreamEvent]) -> StreamEvent:
     return replace(run[-1], start=run[0].start, detail=run[-1].detail + times)
 
 
-def _lost_share(ring: Ring, name: str, last: datetime | None) -> float:
-    """Of the sealed ten minutes of the last day, up to the last; since the first, where later."""
-    received_s = ring.state(name).received_s
-    if last is None or not received_s:
-        return NAN
-    came = {parse_time(key): seconds for key, seconds in received_s.items()}
-    ends = max(came) + PERIOD
-    since = max(min(came), ends - _LATELY)
-    came_s = sum(seconds for start, seconds in came.items() if start >= since)
-    return max(0.0, 1 - came_s / (ends - since).total_seconds())
+def _received(received_s: Mapping[str, float], now: datetime) -> tuple[float, float]:
+    """Which share of the last ten minutes that are sealed came, and which share of a day did not.
+
+    The first ten minutes of all may have begun before the stream, and do not count.
+    """
+    known = {parse_time(start): seconds for start, seconds in received_s.items()}
+    first, last = min(known, default=now), max(known, default=now)
+    begin = max(first + PERIOD, now - _LATELY)
+    if last < begin:
+        return NAN, NAN
+    expected_s = (last + PERIOD - begin).total_seconds()
+    came_s = sum(seconds for start, seconds in known.items() if start >= begin)
+    return known[last] / PERIOD.total_seconds(), min(max(1 - came_s / expected_s, 0.0), 1.0)
 
 
 def _word(last: datetime | None, events: tuple[StreamEvent, ...], now: datetime) -> State:
     if last is None:
-        return "never heard"
+        return "never sent"
     if now - last > _SILENT:
         return "silent"
     if now - last > _LATE:
         return "late"
     faults = (each for each in events if each.kind in _AT_FAULT)
     return "sensor at fault" if any(last - each.end < _FAULT_STANDS for each in faults) else "live"
+
+
+def tension_words(hour: PooledReading | None) -> str:
+    """The change of tension with the weather taken off, rounded to its 90 % interval."""
+    if hour is None:
+        return "no reading yet"
+    if hour.learning or not math.isfinite(hour.compensated_shift):
+        return hour.learning or "not known"
+    reach = 100 * _Z_90 * hour.compensated_sd
+    digits = min(3, max(0, 1 - math.floor(math.log10(reach)))) if reach > 0 else 3
+    return f"{100 * hour.compensated_shift:+.{digits}f} ± {reach:.{digits}f} %"

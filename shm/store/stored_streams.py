@@ -82,12 +82,6 @@ class Streams(Repository):
                 found.setdefault((mode.plane, mode.order), mode)
         return tuple(sorted(found.values(), key=lambda mode: mode.frequency_hz))
 
-    def last_window(self, stream: str) -> WindowReading | None:
-        """The latest window of a stream."""
-        query = sa.select(stream_windows).where(stream_windows.c.stream == stream)
-        latest = query.order_by(stream_windows.c.start.desc()).limit(1)
-        return next(iter(self._values(stream_windows, latest, WindowReading)), None)
-
     def last_hour(self, stream: str) -> PooledReading | None:
         """The latest reading of an hour of a stream."""
         table = pooled_readings

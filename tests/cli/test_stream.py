@@ -51,7 +51,7 @@ def test_the_table_says_what_is_live_and_what_was_lost(
     ended = shm("--workspace", bridge.folder, "stream", "--json")
     assert ended.code == 0
     (row,) = ended.document["streams"]
-    assert (row["name"], row["hanger"], row["state"]) == ("h3", 3, "silent")
+    assert (row["name"], row["hanger"], row["state"]) == ("h3", 3, "late")
     assert row["last_sample"] == format_time(start + timedelta(minutes=30))
     assert row["lag_s"] > 0
     assert row["received_hz"] == 100.0

@@ -10,16 +10,15 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import JSONResponse
 
-from shm.bridge.streams import stream_named
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.stream_course import stream_course
-from shm.pipeline.stream_state import StreamCondition, stream_states
+from shm.pipeline.stream_state import StreamCondition, stream_states, tension_words
 from shm.report import formatting
 from shm.report.figures import stream_course as figure
 from shm.report.paper import Table
 from shm.store.ring import ring_of
-from shm.values.stream import PooledReading, Stream, StreamEvent
+from shm.values.stream import Stream, StreamEvent
 from shm_daemon.heartbeat import told
 from shm_daemon.web import with_plotly
 from shm_daemon.web.access import AtSite, Reader
@@ -35,11 +34,10 @@ _STYLES = {
     "live": "steady",
     "late": "watch",
     "silent": "alert",
-    "never heard": "first",
+    "never sent": "first",
     "sensor at fault": "alert",
 }
 _EVENTS_SHOWN = 40  # technical: what is read at a glance
-_Z_90 = 1.645
 
 Name = Annotated[str, Path(max_length=64)]
 Days = Annotated[float, Query(gt=0, le=800, description="How far the figure reaches back.")]
@@ -114,11 +112,10 @@ def _states(site: Site) -> tuple[StreamCondition, ...]:
 
 
 def _stream(site: Site, name: str) -> Stream:
-    if name not in [each.name for each in site.workspace.bridge.streams]:
-        raise NothingThere(
-            f"there is no stream {name}.", remedy="See /streams for those there are."
-        )
-    return stream_named(site.workspace.bridge.streams, name)
+    for stream in site.workspace.bridge.streams:
+        if stream.name == name:
+            return stream
+    raise NothingThere(f"there is no stream {name}.", remedy="See /streams for those there are.")
 
 
 def _row(state: StreamCondition) -> Row:
@@ -129,20 +126,9 @@ def _row(state: StreamCondition) -> Row:
         told(state.lag) if state.lag is not None else "",
         f"{state.lost_share:.1%}" if math.isfinite(state.lost_share) else "",
         f"{window.kind}, {formatting.counted(modes, 'mode')}" if window else "none yet",
-        _tension(state.hour),
+        tension_words(state.hour),
     )
     return Row(state.stream.name, state.stream.hanger, state.state, _STYLES[state.state], cells)
-
-
-def _tension(hour: PooledReading | None) -> str:
-    """The change of tension under the conditions of the beginning, rounded to its interval."""
-    if hour is None:
-        return "no reading yet"
-    if hour.learning:
-        return hour.learning
-    if not math.isfinite(hour.compensated_shift):
-        return "not known"
-    return f"{100 * hour.compensated_shift:+.2f} ± {100 * _Z_90 * hour.compensated_sd:.2f} %"
 
 
 def _facts(state: StreamCondition) -> list[tuple[str, str, str]]:
@@ -153,7 +139,7 @@ def _facts(state: StreamCondition) -> list[tuple[str, str, str]]:
         ("Last sample", formatting.moment(state.last_sample) if state.last_sample else "none yet",
          f"{behind} of it not read yet"),
         ("Kept raw", f"{state.ring_bytes / 1e6:.0f} MB", ""),
-        ("Tension", _tension(state.hour), "since the beginning, as of the last hour"),
+        ("Tension", tension_words(state.hour), "since the beginning, as of the last hour"),
     ]  # fmt: skip
     if window is not None:
         how = {"tracked": "followed from the last window", "none": "no mode"}.get(
