@@ -11,10 +11,14 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Who has it set lets each process compile all that it imports anew: the tests begin hundreds.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-arithmetic without-avx512 without-avx2 lint bench bench-peers docs tables lock clean
+.PHONY: demo demo-live test test-arithmetic without-avx512 without-avx2 lint bench bench-peers docs tables lock clean
 
 demo: .venv/runtime
 	$(BIN)/shm demo
+
+# A bridge that lives: permanent sensors instead of a hammer.
+demo-live: .venv/runtime
+	$(BIN)/shm demo --live --folder shm-demo-live
 
 # What takes one processor goes side by side: the types, and the numerics twice. Then a third process,
 # because many tests wait for a daemon, a server or a browser; files go out in the order of their

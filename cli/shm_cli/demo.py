@@ -34,6 +34,7 @@ from shm.store import Stage, Store, StoredAlert, Workspace
 from shm.values import Hanger, Posterior
 from shm_cli import thesis
 from shm_cli.common import counting_bar
+from shm_cli.demo_live import await_windows, conclude_live, live_description, send_days
 
 # A story: the thesis's hanger among twenty, another that loses as much as nobody overlooks. Tests
 # take place on a Monday morning, short enough that the demo takes a minute or two.
@@ -176,7 +177,8 @@ _POLL_S = 0.3  # technical: a bar that moves
     show_default=True,
     help="Where to make the workspace; an older demo is replaced.",
 )
-def command(folder: Path) -> None:
+@click.option("--live", is_flag=True, help="A bridge with permanent sensors instead of a hammer.")
+def command(folder: Path, live: bool) -> None:
     """See the whole job on a simulated bridge of 20 hangers.
 
     Hanger 3 starts from the real frequencies of the thesis. A season of hammer tests is dropped
@@ -186,7 +188,10 @@ def command(folder: Path) -> None:
     \b
     Example: shm demo --folder /tmp/demo
     """
-    workspace = _fresh_workspace(folder)
+    if live:
+        _live(folder)
+        return
+    workspace = _fresh_workspace(folder, bridge_description())
     click.echo(f"Workspace {workspace.folder}: 20 hangers, their daemon is starting.", err=True)
     with workspace.store() as store, _daemon(workspace) as daemon, counting_bar() as bar:
         drop_measured_baseline(workspace)
@@ -199,10 +204,20 @@ def command(folder: Path) -> None:
     _conclude(workspace, alerts)
 
 
+def _live(folder: Path) -> None:
+    """Four days of permanent sensors; then the alert of a loss of 2 %."""
+    workspace = _fresh_workspace(folder, live_description())
+    click.echo(f"Workspace {workspace.folder}: 3 hangers with permanent sensors.", err=True)
+    with workspace.store() as store, _daemon(workspace) as daemon:
+        ends = send_days(workspace)
+        await_windows(workspace, store, _watched(store, daemon), ends)
+        conclude_live(workspace, store, tuple(_await_alert(store, daemon)))
+
+
 _DROPPING = f"a season of hammer tests into the spool; hanger {LOSING} loses 8 %"
 
 
-def _fresh_workspace(folder: Path) -> Workspace:
+def _fresh_workspace(folder: Path, text: str) -> Workspace:
     if folder.exists() and any(folder.iterdir()):
         if not (folder / _MARK).is_file():
             raise UsageError(f"{folder} is not empty.", remedy="Name another one with --folder.")
@@ -210,7 +225,7 @@ def _fresh_workspace(folder: Path) -> Workspace:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / _MARK).touch()
     description = folder / "described.toml"
-    description.write_text(bridge_description(), encoding="utf-8")
+    description.write_text(text, encoding="utf-8")
     workspace = Workspace.initialise(folder, description)
     description.unlink()
     return workspace

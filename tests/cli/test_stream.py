@@ -60,7 +60,7 @@ def test_the_table_says_what_is_live_and_what_was_lost(
     assert (row["last_window_kind"], row["last_window_how"]) == ("wind", "tracked")
     said = shm("--workspace", bridge.folder, "stream").out
     assert "5.00%" in said
-    assert "silent" in said
+    assert "late" in said
 
 
 def test_a_stream_that_never_sent_or_sends_now(shm: Shm, tmp_path: Path) -> None:
