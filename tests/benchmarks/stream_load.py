@@ -23,33 +23,16 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.read.chunk_document import chunk_document
-from shm.simulate.monitored import MonitoringPlan, described_stream, streamed
+from shm.simulate.monitored import MonitoringPlan, streamed
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
 from tests.helpers.daemons import real_daemon
 from tests.helpers.footprint import descendants, resident_mb
+from tests.helpers.live_streams import with_live_streams
 from tests.helpers.workspaces import make_workspace
 
 CORES = 2
 TICKS_A_S = os.sysconf("SC_CLK_TCK")
-
-
-def with_streams(folder: Path, hangers: int) -> Workspace:
-    """A workspace with a stream of four channels for each hanger."""
-    made = make_workspace(folder, hangers=range(1, hangers + 1), settings={"workers": CORES})
-    with (made.folder / "bridge.toml").open("a") as file:
-        for hanger in made.bridge.hangers:
-            stream = described_stream(hanger)
-            file.write(
-                f'\n[[stream]]\nname = "{stream.name}"\nhanger = {hanger.id}\n'
-                "sampling_rate_hz = 200\n"
-            )
-            for channel in stream.channels:
-                file.write(
-                    f'[[stream.channel]]\nname = "{channel.name}"\nplane = "{channel.plane}"\n'
-                    f"x_m = {channel.x_m}\n"
-                )
-    return made.reopened()
 
 
 def send(workspace: Workspace, first: datetime, hours: float, live: float) -> None:
@@ -99,7 +82,9 @@ def main() -> None:
     first -= timedelta(hours=1 + int(asked.hours))
     ends = first + timedelta(hours=asked.hours)
     with tempfile.TemporaryDirectory() as folder:
-        workspace = with_streams(Path(folder) / "bridge", asked.hangers)
+        hangers, settings = range(1, asked.hangers + 1), {"workers": CORES}
+        made = make_workspace(Path(folder) / "bridge", hangers=hangers, settings=settings)
+        workspace = with_live_streams(made, 200.0)
         with real_daemon(workspace.folder) as daemon, workspace.store() as store:
             sender = threading.Thread(
                 target=send, args=(workspace, first, asked.hours, asked.live), daemon=True

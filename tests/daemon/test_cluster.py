@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 import shm
 from shm.errors import BadInput, ShmError
+from shm.pipeline.streaming import Streaming
 from shm.store import Stage, Workspace
 from shm_daemon import run
 from shm_daemon.cluster import Cluster, run_if_alike, traits
 from shm_daemon.execution import executor_of
 from tests.helpers import clusters
 from tests.helpers.canonical import canonical
+from tests.helpers.flows import Clock
+from tests.helpers.live_streams import FIRST, HOUR, drain, send, with_live_streams
 from tests.helpers.workspaces import make_workspace, put, write_test
 
 FILES = 1
@@ -101,3 +104,18 @@ def test_without_a_scheduler_steps_run_in_processes_of_our_own(workspace: Worksp
 
 def _refuse() -> None:
     raise BadInput("odd.", line=3, remedy="Mend it.")
+
+
+def test_windows_of_a_stream_are_read_on_a_cluster_to_the_bit(
+    tmp_path: Path, pool: Cluster
+) -> None:
+    found = []
+    for number, executor in enumerate((pool, ThreadPoolExecutor(1))):
+        workspace = with_live_streams(make_workspace(tmp_path / f"bridge{number}"))
+        send(workspace, hours=1 / 3)
+        with workspace.store() as store:
+            clock = Clock(FIRST + HOUR)
+            drain(Streaming(workspace, store, executor, clock=clock, lanes=2), clock)
+            found.append(store.streams.list_windows(3, FIRST, FIRST + HOUR))
+    assert len(found[0]) == 2
+    assert found[0] == found[1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -15,40 +15,19 @@ from shm.pipeline import stream_steps
 from shm.pipeline.stream_state import stream_states
 from shm.pipeline.streaming import Streaming
 from shm.read.chunk_document import chunk_document
-from shm.simulate.monitored import MonitoringPlan, described_stream, streamed
+from shm.simulate.monitored import streamed
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
 from shm.values.stream import PooledReading
 from shm.watch.stream_watch import StreamWatched
 from tests.helpers.flows import Clock
+from tests.helpers.live_streams import CALM, FIRST, HOUR, drain, send, with_live_streams
 from tests.helpers.workspaces import make_workspace
-
-FIRST = datetime(2026, 6, 1, 22, tzinfo=UTC)
-PLAN = MonitoringPlan(chunk_s=600.0, trains_a_day=0.0, knocks_a_day=0.0)
-HOUR = timedelta(hours=1)
-RATE_HZ = 64.0  # few modes, so that a window takes a tenth of a second
 
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Workspace:
-    made = make_workspace(tmp_path / "bridge")
-    stream = described_stream(made.bridge.hangers[0], RATE_HZ)
-    channels = "".join(
-        f'[[stream.channel]]\nname = "{c.name}"\nplane = "{c.plane}"\nx_m = {c.x_m}\n'
-        for c in stream.channels
-    )
-    with (made.folder / "bridge.toml").open("a") as file:
-        file.write(
-            f'\n[[stream]]\nname = "{stream.name}"\nhanger = 3\n'
-            f"sampling_rate_hz = {RATE_HZ}\n{channels}"
-        )
-    return made.reopened()
-
-
-def send(workspace: Workspace, hours: float, *, first: datetime = FIRST, seed: int = 3) -> None:
-    (stream,), (hanger,) = workspace.bridge.streams, workspace.bridge.hangers
-    for chunk in streamed(hanger, stream, PLAN, first, hours * 3600, seed):
-        ring_of(workspace).append(chunk_document(chunk))
+    return with_live_streams(make_workspace(tmp_path / "bridge"))
 
 
 @contextmanager
@@ -61,19 +40,6 @@ def at_work(workspace: Workspace, clock: Clock) -> Iterator[tuple[Streaming, Sto
             streaming.close()
 
 
-def drain(streaming: Streaming) -> None:
-    """Works until nothing is left, each turn at a later time so that chunks are sealed."""
-    clock = streaming.clock
-    assert isinstance(clock, Clock)
-    idle = 0
-    while idle < 3:
-        streaming.note_sealed(streaming.ring.seal(clock()))
-        idle = 0 if streaming.advance() else idle + 1
-        for running in streaming.under_way:
-            running.exception(timeout=60)
-        clock.pass_by(30)
-
-
 def hours_of(store: Store, period: str = "hour") -> tuple[PooledReading, ...]:
     return store.streams.list_pooled(
         3, period, FIRST - timedelta(days=2), FIRST + timedelta(days=9)
@@ -82,8 +48,9 @@ def hours_of(store: Store, period: str = "hour") -> tuple[PooledReading, ...]:
 
 def test_chunks_become_windows_hours_and_a_day_in_the_spool(workspace: Workspace) -> None:
     send(workspace, 2)
-    with at_work(workspace, Clock(FIRST + timedelta(days=1))) as (streaming, store):
-        drain(streaming)
+    clock = Clock(FIRST + timedelta(days=1))
+    with at_work(workspace, clock) as (streaming, store):
+        drain(streaming, clock)
         windows = store.streams.list_windows(3, FIRST, FIRST + 2 * HOUR)
         assert [each.window.start for each in windows] == [
             FIRST + n * timedelta(minutes=10) for n in range(12)
@@ -105,18 +72,19 @@ def test_a_day_gives_the_frequency_that_was_planted(workspace: Workspace) -> Non
     from shm.simulate.monitored import Weather
 
     send(workspace, 2)
-    with at_work(workspace, Clock(FIRST + timedelta(days=1))) as (streaming, store):
-        drain(streaming)
+    clock = Clock(FIRST + timedelta(days=1))
+    with at_work(workspace, clock) as (streaming, store):
+        drain(streaming, clock)
         (day,) = hours_of(store, "day")
     hanger = workspace.bridge.hangers[0]
     mode = next(m for m in day.modes if (m.plane, m.order) == ("transverse", 3))
     cold, warm = (
-        natural_frequencies(hanger, HangerState(711e3 * (1 + 3 * sign * PLAN.per_kelvin * 10)), 3)
+        natural_frequencies(hanger, HangerState(711e3 * (1 + 3 * sign * CALM.per_kelvin * 10)), 3)
         for sign in (-1, 1)
     )
     assert cold[0, 2] < mode.frequency_hz < warm[0, 2]
     assert 0 < mode.frequency_sd_hz < 3e-4 * mode.frequency_hz
-    assert day.temperature_c == pytest.approx(Weather(3, PLAN).temperature_c(FIRST + HOUR), abs=2)
+    assert day.temperature_c == pytest.approx(Weather(3, CALM).temperature_c(FIRST + HOUR), abs=2)
 
 
 def test_what_was_begun_and_not_kept_is_done_by_whoever_comes_next(workspace: Workspace) -> None:
@@ -125,7 +93,7 @@ def test_what_was_begun_and_not_kept_is_done_by_whoever_comes_next(workspace: Wo
     with at_work(workspace, clock) as (streaming, _):
         streaming.advance()  # begins the first window, and is gone
     with at_work(workspace, clock) as (streaming, store):
-        drain(streaming)
+        drain(streaming, clock)
         assert len(store.streams.list_windows(3, FIRST, FIRST + HOUR)) == 6
         assert len(hours_of(store)) == 1
 
@@ -136,12 +104,12 @@ def test_three_days_offline_are_caught_up_and_nothing_between_is_made_up(
     clock = Clock(FIRST + 2 * HOUR)
     send(workspace, 1)
     with at_work(workspace, clock) as (streaming, store):
-        drain(streaming)
+        drain(streaming, clock)
         assert len(hours_of(store)) == 1
     clock.now = FIRST + timedelta(days=3)
     send(workspace, 1, first=FIRST + timedelta(days=2, hours=22), seed=4)
     with at_work(workspace, clock) as (streaming, store):
-        drain(streaming)
+        drain(streaming, clock)
         assert [each.start for each in hours_of(store)] == [
             FIRST,
             FIRST + timedelta(days=2, hours=22),
@@ -150,15 +118,15 @@ def test_three_days_offline_are_caught_up_and_nothing_between_is_made_up(
 
 def test_ten_minutes_of_which_more_comes_later_are_read_anew(workspace: Workspace) -> None:
     (stream,), (hanger,) = workspace.bridge.streams, workspace.bridge.hangers
-    chunks = list(streamed(hanger, stream, PLAN, FIRST, 3600, 3))
+    chunks = list(streamed(hanger, stream, CALM, FIRST, 3600, 3))
     clock, ring = Clock(FIRST + timedelta(days=1)), ring_of(workspace)
     for chunk in chunks[:2] + chunks[3:]:
         ring.append(chunk_document(chunk))
     with at_work(workspace, clock) as (streaming, store):
-        drain(streaming)
+        drain(streaming, clock)
         assert len(store.streams.list_windows(3, FIRST, FIRST + HOUR)) == 5
         ring.append(chunk_document(chunks[2]))
-        drain(streaming)
+        drain(streaming, clock)
         assert len(store.streams.list_windows(3, FIRST, FIRST + HOUR)) == 6
 
 
@@ -174,8 +142,9 @@ def test_a_step_that_fails_is_said_in_its_window_and_the_stream_goes_on(
 
     monkeypatch.setattr(stream_steps, "read_window", read_window)
     send(workspace, 1)
-    with at_work(workspace, Clock(FIRST + timedelta(days=1))) as (streaming, store):
-        drain(streaming)
+    clock = Clock(FIRST + timedelta(days=1))
+    with at_work(workspace, clock) as (streaming, store):
+        drain(streaming, clock)
         windows = store.streams.list_windows(3, FIRST, FIRST + HOUR)
     assert [each.window.kind == "unusable" for each in windows] == [False] * 2 + [True] + [
         False
@@ -195,8 +164,9 @@ def test_an_alert_is_owed_to_the_hooks_and_the_raw_samples_before_it_stay(
 
     monkeypatch.setattr(stream_steps, "watch_reading", alarmed)
     send(workspace, 2)
-    with at_work(workspace, Clock(FIRST + timedelta(days=1))) as (streaming, store):
-        drain(streaming)
+    clock = Clock(FIRST + timedelta(days=1))
+    with at_work(workspace, clock) as (streaming, store):
+        drain(streaming, clock)
         assert [each.alert.key for each in store.alerts.list_all()] == ["hanger-3:sudden-change:x"]
         assert hours_of(store)[0].tension_shift == -0.03
         assert store.streams.watch_state(3) == b"state"
@@ -209,7 +179,7 @@ def test_streams_tell_how_they_are(workspace: Workspace) -> None:
     with at_work(workspace, clock) as (streaming, store):
         (before,) = stream_states(workspace, streaming.ring, store, FIRST + HOUR)
         assert (before.state, before.window) == ("live", None)
-        drain(streaming)
+        drain(streaming, clock)
         (state,) = stream_states(workspace, streaming.ring, store, FIRST + HOUR)
         assert state.behind == timedelta(0)
         assert state.lost_share == 0
