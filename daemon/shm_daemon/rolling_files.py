@@ -34,7 +34,7 @@ from shm_daemon.stream_intake import note_refused, take_chunks
 log = logging.getLogger(__name__)
 
 _PATIENCE_WITH_NEWEST = 30.0  # judgement: a minute by default; loggers write at least that often
-_RETRY_S = 60.0
+_RETRY_S = 60.0  # technical: how soon a file that could not be read or kept is tried again
 _STAMP = re.compile(r"(20\d\d)-?(\d\d)-?(\d\d)[T_ -]?(\d\d)[-_.]?(\d\d)[-_.]?(\d\d)(?!\d)")
 _MINUTE_S = 60
 
@@ -60,6 +60,8 @@ class RollingFiles:
                 try:
                     self._take(workspace, path)
                     left -= 1
+                    if path.exists():  # it was refused, and cannot be moved away
+                        tracker.leave(path)
                 except (ShmError, OSError) as error:
                     log.warning("%s is left for now: %s", path.name, error)
                     tracker.put_off(path, getattr(error, "retry_after_s", None) or _RETRY_S)

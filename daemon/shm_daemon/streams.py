@@ -17,12 +17,13 @@ from shm.errors import ShmError
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
 from shm_daemon.rolling_files import RollingFiles
+from shm_daemon.spool import STREAMS
 
 log = logging.getLogger(__name__)
 
 _LOOK_S = 2.0  # technical: chunks are sealed within seconds, of ten minutes
 _SWEEP_S = 3600.0  # technical: a thirtieth of a day of samples is no matter
-_RETRY_S = 60.0
+_RETRY_S = 60.0  # technical: a full disk is not mended sooner
 
 Sealed = Callable[[Sequence[tuple[str, datetime]]], object]
 """Is told each stream and beginning of ten minutes that has new samples."""
@@ -48,10 +49,10 @@ class StreamKeeper:
     def turn(self) -> int:
         """Files in, segments sealed and, once an hour, what is old out; how many files are left.
 
-        Nothing where the bridge has no streams.
+        Nothing where nobody has thought of streams.
         """
         workspace = self._workspace
-        if not workspace.bridge.streams:
+        if not workspace.bridge.streams and not (workspace.spool / STREAMS).is_dir():
             return 0
         if self._store is None:
             self._store = workspace.store()

@@ -34,7 +34,7 @@ has ended, or cannot: senders, which keep what is not acknowledged, are held up.
 _NO_GAP = timedelta(seconds=1)  # technical: stamps jitter; no window is lost for a second
 _TRIES = 5  # technical: a reader meets a sealing once in a while, and not again at once
 _RATE_OFF = 0.01  # judgement: of the described rate; a clock is not off by 1 %
-_UNLINKED = timedelta(hours=1)  # of what a killed process left half written
+_UNFINISHED = timedelta(hours=1)  # technical: no file takes so long; a killed process left it
 
 
 @dataclass(frozen=True)
@@ -132,18 +132,17 @@ class Ring:
         kept = self._folder(stream).folder / "kept"
         kept.mkdir(parents=True, exist_ok=True)
         told = {"stream": stream, "start": start, "end": end, "why": why}
-        replace_text(
-            kept / f"{microseconds(start):017d}-{microseconds(end):017d}.json", dump(told) + "\n"
-        )
+        path = kept / f"{microseconds(start):017d}-{microseconds(end):017d}.json"
+        replace_text(path, dump(told) + "\n")
+        for each in (path, kept, kept.parent):
+            sync(each)
 
     def sweep(self, now: datetime, ring_days: float = 30, ring_bytes: int = 200 * 10**9) -> Swept:
         """Takes out what is older than so many days, and the oldest beyond so many bytes, but for
         what is kept for good.
         """
         for folder in self._folders():
-            for left in folder.folder.glob("*/.*.part"):
-                if left.stat().st_mtime < (now - _UNLINKED).timestamp():
-                    left.unlink(missing_ok=True)
+            folder.remove_unfinished(now - _UNFINISHED)
         return sweep(list(self._folders()), now - timedelta(days=ring_days), ring_bytes)
 
     def latest(self) -> dict[str, datetime]:

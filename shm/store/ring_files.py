@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import logging
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
@@ -27,7 +28,7 @@ from shm.values.stream import Chunk
 
 log = logging.getLogger(__name__)
 
-PERIOD = timedelta(minutes=10)
+PERIOD = timedelta(minutes=10)  # that of a window
 _PERIOD_US = PERIOD // timedelta(microseconds=1)
 _NAME = "%Y%m%dT%H%MZ"
 _SPANS_HELD = 512  # technical: the last segments of 100 streams, some 20 kB each
@@ -136,6 +137,13 @@ class StreamFolder:
         except BadInput as error:
             self._refuse(path, error)
             return {}
+
+    def remove_unfinished(self, before: datetime) -> None:
+        """What a killed process left half written before a time."""
+        for left in self.folder.glob("*/.*.part"):
+            with suppress(FileNotFoundError):  # it has its name by now
+                if left.stat().st_mtime < before.timestamp():
+                    left.unlink()
 
     def _refuse(self, path: Path, error: BadInput) -> None:
         """Sets a segment aside, unless it is the machine that cannot read it."""

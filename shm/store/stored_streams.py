@@ -30,11 +30,7 @@ from shm.values.stream import Period, PooledReading, StreamEvent, WindowReading
 HOURS_KEPT = timedelta(days=800)
 """Readings of an hour and of six: two summers and two winters, and a month to look at them."""
 
-_LASTS: dict[Period, timedelta] = {
-    "hour": timedelta(hours=1),
-    "six hours": timedelta(hours=6),
-    "day": timedelta(days=1),
-}
+_HOURS: dict[Period, int] = {"hour": 1, "six hours": 6, "day": 24}  # as their names say
 _LATEST = 36
 """Windows of a train-free night: a mode that traffic hides for some hours is not forgotten."""
 _EVENT = tuple(field.name for field in fields(StreamEvent))
@@ -121,7 +117,7 @@ class Streams(Repository):
         `kept` is what the watch of the hanger goes on from. The alert, where it is a new one, is
         owed to `hooks` from `at` on (the reading's end where nothing is said), and given back.
         """
-        end = reading.start + _LASTS[reading.period]
+        end = reading.start + timedelta(hours=_HOURS[reading.period])
         row = {name: getattr(reading, name) for name in ("stream", "hanger", "period", "start")}
         row["document"] = _document(reading)
         with self.writing() as connection:

@@ -382,3 +382,15 @@ def test_a_real_recording_in_chunks_is_the_same_recording(
     ring.seal(whole.time + FOR_EVER)
     (piece,) = ring.read("real", whole.time, whole.time + HOUR)
     assert np.array_equal(piece.values, values.astype(np.float32))
+
+
+def test_what_a_killed_process_left_half_written_goes(logger: Logger) -> None:
+    logger.send(*minutes(0), seals=False)
+    left = logger.ring.folder / "h3" / "incoming" / ".0-0-0-0.chunk.1.2.part"
+    left.write_bytes(b"half")
+    os.utime(left, (NOW.timestamp(), NOW.timestamp()))
+    logger.ring.sweep(NOW + timedelta(minutes=30))
+    assert left.exists()
+    logger.ring.sweep(NOW + timedelta(minutes=90))
+    assert not left.exists()
+    assert len(list(logger.ring.folder.glob("h3/incoming/*"))) == 1
