@@ -99,8 +99,6 @@ def values(motion: Motion, rng: np.random.Generator, seconds: float = 600.0) -> 
     return found
 
 
-def piece(
-    samples: FloatArray, start: datetime = START, temperature_c: float = 10.0
-) -> Piece:
+def piece(samples: FloatArray, start: datetime = START, temperature_c: float = 10.0) -> Piece:
     names = tuple(channel.name for channel in stream().channels)
     return Piece("h3", start, RATE_HZ, names, samples, temperature_c)
