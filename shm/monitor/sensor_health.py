@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from shm.monitor.spectrum import Stretch, shape_on, stretch, strongest
+from shm.monitor.spectrum import Stretch, power_near, shape_on, stretch
 from shm.values import FloatArray, Mode
 from shm.values.stream import Piece, Stream, StreamChannel, StreamEvent, StreamEventKind
 
@@ -21,7 +21,8 @@ takes 8 normal ones: no chance of noise, and more than a day's temperature moves
 _USUAL_SD = 1.4826  # of the median absolute deviation of normal numbers
 _LEAST_MODES = 3  # judgement: one mode or two agree with an exchange by chance
 _AS_KNOWN, _GAIN = 0.9, 0.15
-"""judgement: modal assurance with the exchange, and by how much it must be better without."""
+"""judgement: share of the motion that is explained with the exchange, and how much less without."""
+_WITHIN = 0.02  # of a frequency: what temperature moves, and the other plane's mode
 
 
 def broken_channels(pieces: Sequence[Piece], stream: Stream) -> dict[str, str]:
@@ -67,6 +68,7 @@ def sensor_faults(
     stretches = [
         stretch(part, piece.sampling_rate_hz)
         for piece in pieces
+        if all(channel.name in piece.channels for channel in usable)
         for part in [_rows(piece, usable)]
         if part.shape[1] > piece.sampling_rate_hz and np.isfinite(part).all()
     ]
@@ -95,23 +97,17 @@ def exchanged(
     told = np.all(np.isfinite(shapes), axis=1) & np.any(shapes != 0, axis=1)
     if told.sum() < _LEAST_MODES or not stretches:
         return None
-    seen = np.array([
-        strongest(stretches, mode.frequency_hz, within=0.02)
-        for mode, use in zip(known, told, strict=True)
-        if use
-    ])  # fmt: skip
+    hz = np.array([mode.frequency_hz for mode in known])[told]
+    seen = [power_near(stretches, each, within=_WITHIN) for each in hz]
     shapes = shapes[told]
-    straight = _likeness(seen, shapes)
-    best = max(
-        (
-            (_likeness(seen, changed), name, detail)
-            for changed, name, detail in _changes(shapes, channels)
-        ),
-        default=(0.0, "", ""),
-    )
+    straight = _likeness(seen, hz, shapes)
+    changes = [
+        (_likeness(seen, hz, changed), *words) for changed, *words in _changes(shapes, channels)
+    ]
+    best = max(changes, default=(0.0, "", ""))
     if best[0] < _AS_KNOWN or best[0] < straight + _GAIN:
         return None
-    return best[1], f"{best[2]} (the modes' shapes agree to {best[0]:.2f}, else to {straight:.2f})"
+    return best[1], f"{best[2]} (it explains {best[0]:.2f} of the motion, else {straight:.2f})"
 
 
 def _changes(
@@ -128,10 +124,15 @@ def _changes(
         yield shapes * sign, channel.name, f"{channel.name} measures with the opposite sign"
 
 
-def _likeness(seen: FloatArray, shapes: FloatArray) -> float:
-    """Median modal assurance; seen shapes are of length 1."""
-    product = np.sum(seen * shapes, axis=1) ** 2
-    return float(np.median(product / np.sum(shapes**2, axis=1)))
+def _likeness(seen: Sequence[FloatArray], hz: FloatArray, shapes: FloatArray) -> float:
+    """Median share of the motion near the modes' frequencies in the shapes of those near by."""
+    shares = []
+    for power, at_hz in zip(seen, hz, strict=True):
+        near = shapes[np.abs(hz / at_hz - 1) < 2 * _WITHIN]
+        left, size, _ = np.linalg.svd(near.T, full_matrices=False)
+        axes = left[:, size > 0.1 * size[0]]
+        shares.append(np.trace(axes.T @ power @ axes) / np.trace(power))
+    return float(np.median(shares))
 
 
 def _fault(channel: StreamChannel, values: FloatArray) -> tuple[StreamEventKind, str] | None:

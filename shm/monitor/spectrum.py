@@ -120,13 +120,19 @@ def strongest(
     within: float = 0.01,
 ) -> FloatArray:
     """The real shape (channels,) that carries most of the power near a frequency."""
+    power = power_near(stretches, frequency_hz, within) * np.outer(weight, weight)
+    vector: FloatArray = np.linalg.eigh(power)[1][:, -1]
+    return vector
+
+
+def power_near(stretches: Sequence[Stretch], frequency_hz: float, within: float) -> FloatArray:
+    """Products of the channels (channels, channels), summed over a share of the frequency."""
     power = np.zeros((len(stretches[0].values),) * 2)
     for each in stretches:
         half = max(within * frequency_hz, 1.5 / each.seconds)
         lines = each.values[:, each.between(frequency_hz - half, frequency_hz + half)]
         power += np.real(lines @ lines.conj().T)
-    vector: FloatArray = np.linalg.eigh(power * np.outer(weight, weight))[1][:, -1]
-    return vector
+    return power
 
 
 @dataclass(frozen=True, eq=False)

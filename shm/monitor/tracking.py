@@ -39,6 +39,7 @@ _OTHER_PLANE = 0.08
 _LEAST_GAIN = 15.0
 """judgement: of log likelihood by which a mode is proven: its five parameters and some two hundred
 places to look make 10 by chance."""
+_LEAK = 0.01  # judgement: of the power; sensors that are 6 degrees off
 _FLOOR = 0.2  # quantile of the lines of a band, as shm/identify/quality/of_ambient.py
 _STEPS_WITHOUT = 6  # technical: from the fit with the mode; what is gained later is small
 _SAME = 3.0  # standard deviations
@@ -178,15 +179,13 @@ class _Group:
                 made[self.group[index]] = mode
         return made if self._in_order(made) else {}
 
-    def _band(self, shapes: FloatArray, known: CloseModes) -> Band:
-        return Band(self.lines, directions(shapes), shapes, known)
-
     def _proven(self) -> tuple[BandFit, list[int]] | None:
         """The fit of the modes without each of which the lines are far less likely."""
         kept = list(range(len(self.group)))
         start = self.start
         while kept:
-            band = self._band(self.shapes[:, kept], self.start.only(kept))
+            shapes = self.shapes[:, kept]
+            band = Band(self.lines, directions(shapes), shapes, self.start.only(kept))
             fit = band.fitted(start)
             gains = []
             for place in range(len(kept)):
@@ -232,7 +231,8 @@ class _Group:
         options = replace(self.options, ambient_s=sum(s.seconds for s in self.found.stretches))
         best = options.ambient_width * options.at_best(hz, damping)[0]
         if (
-            damping > self.options.max_damping_ratio
+            _is_leak(modes, place)
+            or damping > self.options.max_damping_ratio
             or sd_hz > hz * max(2 * self.options.max_frequency_sd, best)
             or abs(hz / known.frequency_hz - 1) > REACH
         ):
@@ -276,6 +276,13 @@ class _Group:
                 if before > _SAME * sd and now < -_SAME * sd and abs(before + now) < _SAME * sd:
                     return False
         return True
+
+
+def _is_leak(modes: CloseModes, place: int) -> bool:
+    """Whether a mode is what sensors that are not quite straight see of a stronger one."""
+    away = np.abs(modes.radians_s - modes.radians_s[place])
+    near = away < 2 * (modes.decay_1_s + modes.decay_1_s[place])
+    return bool(np.any(near & (modes.power[place] < _LEAK * modes.power)))
 
 
 def _bands(hz: FloatArray, half_hz: FloatArray, group: list[int]) -> list[tuple[float, float]]:

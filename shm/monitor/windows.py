@@ -153,6 +153,8 @@ def _band_hz(known: Sequence[Mode], rate: float) -> tuple[float, float]:
 
 def _known_parts(piece: Piece, channels: Sequence[StreamChannel]) -> list[FloatArray]:
     """Parts (channels, samples) of a piece in which every channel is known."""
+    if any(channel.name not in piece.channels for channel in channels):
+        return []
     rows = [piece.channels.index(channel.name) for channel in channels]
     values = np.asarray(piece.values, dtype=float)[rows]
     good = np.all(np.isfinite(values), axis=0)

@@ -108,6 +108,7 @@ ROOMS = (
     "simulate",
     "pipeline",
     "plausibility",
+    "monitor",
 )
 
 
