@@ -227,8 +227,8 @@ def corrected(
     (m, q, q). Joseph's form: a plain difference loses what little a precise test leaves."""
     missed = seen - mean @ design.T
     towards = design @ covariance
-    inverse = np.linalg.inv(towards @ design.T + noise)
-    gain = np.swapaxes(towards, 1, 2) @ inverse
+    inverse = np.asarray(np.linalg.inv(towards @ design.T + noise), np.float64)
+    gain: FloatArray = np.swapaxes(towards, 1, 2) @ inverse
     mean_after = mean + np.einsum("mij,mj->mi", gain, missed)
     kept = np.eye(mean.shape[1]) - gain @ design
     after = kept @ covariance @ np.swapaxes(kept, 1, 2)

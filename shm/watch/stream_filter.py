@@ -16,7 +16,8 @@ reading, however wild, calls a change.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy
@@ -25,7 +26,7 @@ from shm.values import FloatArray, IntArray
 from shm.watch.conditions import DAYS_PER_YEAR
 from shm.watch.local_level import corrected
 
-CLIP = 3.0
+CLIP = 3.5
 """Sds: a reading then adds 4.5 to a log likelihood ratio, of the 13.7 that 100 years take."""
 LEVEL, SLOPE, SLOW, FAST, _RATE, FEATURES = range(6)
 """Where the state has what; the coefficients of the conditions begin at FEATURES."""
@@ -33,9 +34,9 @@ LEVEL, SLOPE, SLOW, FAST, _RATE, FEATURES = range(6)
 # 0.2 % a year (`WatchOptions.creep_per_year_sd`) and as much again. Days: weather, moisture, loads
 # that stay. Hours: sun on one side, traffic. Judgement, after the worlds of `tests/worlds`.
 _SEASON_PER_ROOT_YEAR = 3e-3
-_SLOW_DAYS, _SLOW_SD = 10.0, 1e-3
-_FAST_DAYS = np.repeat([1.0, 4.0], 4) / 24
-_FAST_SD = np.tile([2e-4, 7e-4, 2e-3, 4e-3], 2)
+_FAST_DAYS, _SLOW_DAYS = 1.3 / 24, 1.5
+_FAST_SD = np.repeat([3e-4, 1e-3, 3e-3, 8e-3], 2)
+_SLOW_SD = _FAST_SD * np.tile([0.15, 0.7], 4)
 _UNSTEADY = (
     0.2  # judgement: of the hours' wander, by what each reading is off on its own: live load
 )
@@ -45,6 +46,10 @@ _FIRST_SD = 0.01  # of the level at the first reading, against the table made of
 _MEMORY_DAYS = 60.0  # judgement: over which the bank forgets which of its filters held
 # Judgement: a change of 2 % a step, or of 0.15 % a day; ten times more or less costs it log 10.
 _STEP_SD, _SLOPE_SD = 0.02, 1.5e-3
+# No model of the wander is right at all ages: what the scores of changes that never came have
+# been is learnt beside it. Ages (technical), memory, weight of the model itself, and a bound, that
+# a change may not make itself incredible: judgement.
+_AGES_DAYS, _EXCESS_READINGS, _MODEL_READINGS, _LARGEST_SQUARE = (0.25, 1.0, 4.0), 1440, 120, 12.0
 _MOST, _RECENT = 32, 10  # technical: beginnings kept, the newest all, older ones ever farther apart
 _OLDEST_DAYS = 180.0  # judgement: what is slower is the season's
 
@@ -68,6 +73,8 @@ class Bank:
     after_day: FloatArray
     by_day: FloatArray
     span_days: FloatArray
+    excess: FloatArray = field(default_factory=lambda: np.ones(len(_AGES_DAYS)))
+    watched: float = 0.0
 
     @classmethod
     def begun(cls, day: float, coefficient_sd: FloatArray) -> Bank:
@@ -85,7 +92,7 @@ class Bank:
             *_no_beginnings(m, p),
         )
 
-    @property
+    @cached_property
     def weight(self) -> FloatArray:
         """Of each filter (m,), by how it has held; they add up to 1."""
         weight = np.exp(self.log_weight - self.log_weight.max())
@@ -100,30 +107,18 @@ class Bank:
 
     def advanced(self, day: float, coefficient_sd: FloatArray) -> Bank:
         """To another day, without a reading."""
-        days = day - self.day
-        m, p = self.mean.shape
-        slope, slow = math.exp(-days / _SLOPE_DAYS), math.exp(-days / _SLOW_DAYS)
-        step = np.tile(np.eye(p), (m, 1, 1))
-        step[:, LEVEL, SLOPE], step[:, SLOPE, SLOPE], step[:, SLOW, SLOW] = days, slope, slow
-        # A Matern process of order 3/2: what the weather does comes smoothly.
-        past = days / _FAST_DAYS
-        fast = np.exp(-past) * np.array([[1 + past, past], [-past, 1 - past]])
-        step[:, FAST:FEATURES, FAST:FEATURES] = np.moveaxis(fast, 2, 0)
-        noise = np.zeros((m, p))
-        noise[:, LEVEL] = _SEASON_PER_ROOT_YEAR**2 * days / DAYS_PER_YEAR
-        noise[:, SLOW] = _SLOW_SD**2 * (1 - slow**2)
-        noise[:, FEATURES:] = (_WITHIN_A_YEAR * coefficient_sd) ** 2 * days / DAYS_PER_YEAR
-        back = np.swapaxes(step, 1, 2)
-        covariance = step @ self.covariance @ back + noise[:, :, None] * np.eye(p)
-        lost = np.eye(2) - np.einsum("ijm,kjm->mik", fast, fast)
-        covariance[:, FAST:FEATURES, FAST:FEATURES] += _FAST_SD[:, None, None] ** 2 * lost
+        days = round(day - self.day, 9)
+        step, back, noise = _transition(days, self.mean.shape[1])
+        covariance = step @ self.covariance @ np.swapaxes(step, 1, 2) + noise
+        wandered = (_WITHIN_A_YEAR * coefficient_sd) ** 2 * days / DAYS_PER_YEAR
+        covariance[:, range(FEATURES, len(step[0])), range(FEATURES, len(step[0]))] += wandered
         return replace(
             self,
             day=day,
             mean=np.einsum("mij,mj->mi", step, self.mean),
             covariance=covariance,
             log_weight=self.log_weight * math.exp(-days / _MEMORY_DAYS),
-            effect=self.effect @ back[:, None].astype(np.float32),
+            effect=self.effect @ back,
         )
 
     def with_beginning(self, after_day: float) -> Bank:
@@ -183,7 +178,7 @@ class Bank:
         fit = -np.log(spread) / 2 - np.minimum(missed**2 / spread, CLIP**2) / 2
         foreseen = self.effect @ design.astype(np.float32)
         gain = step.gain[:, None, None, :, 0].astype(np.float32)
-        return replace(
+        bank = replace(
             self,
             mean=step.mean_after,
             covariance=step.covariance_after,
@@ -192,19 +187,36 @@ class Bank:
             score=self.score + foreseen * (missed / clipped)[:, None, None],
             information=self.information + foreseen**2 / clipped[:, None, None],
         )
+        return bank._with_excess() if len(self.by_day) > _RECENT else bank
+
+    def _with_excess(self) -> Bank:
+        """Having learnt from the scores of steps that may have begun a quarter, one, four days ago.
+        A wander that the model lacks shows in them as if there were changes all the time."""
+        age = self.day - self.by_day
+        at = [int(np.abs(np.log(age[:-1] / each)).argmin()) for each in _AGES_DAYS]
+        square = self.weight @ (self.score[:, at, 0] ** 2 / self.information[:, at, 0])
+        share = 1 / min(self.watched + _MODEL_READINGS, _EXCESS_READINGS)
+        excess = self.excess + share * (np.minimum(square, _LARGEST_SQUARE) - self.excess)
+        return replace(self, excess=excess, watched=self.watched + 1)
 
     def design(self, conditions: FloatArray) -> FloatArray:
         """What a reading sees of the state (p,)."""
         return np.concatenate([[1.0, 0.0, 1.0, 1.0, 0.0], conditions])
+
+    @property
+    def _tempered(self) -> FloatArray:
+        """By what the evidence of each beginning is divided (c, 1)."""
+        age = np.log(np.maximum(self.day - self.by_day, _AGES_DAYS[0]))
+        return np.maximum(np.interp(age, np.log(_AGES_DAYS), self.excess), 1.0)[:, None]
 
     def evidence(self, least_shift: float) -> Evidence:
         """What all readings say of a change; material is one by more than `least_shift`."""
         if not len(self.by_day):
             return NOTHING
         prior = 1 / np.array([_STEP_SD, _SLOPE_SD]) ** 2
-        precision = self.information + prior
-        size = self.score / precision
-        log_ratio = (self.score * size + np.log(prior / precision)) / 2
+        score, precision = self.score / self._tempered, self.information / self._tempered + prior
+        size = score / precision
+        log_ratio = (score * size + np.log(prior / precision)) / 2
         shares = self.weight[:, None, None] * (self.span_days / 2)[:, None]
         largest = float(log_ratio.max())
         chance = shares * np.exp(log_ratio - largest)
@@ -213,14 +225,17 @@ class Bank:
         reach = np.stack([np.ones_like(self.by_day), self.day - self.after_day], axis=1)
         shift, sd = size * reach, reach / np.sqrt(precision)
         beyond = scipy.special.ndtr((np.abs(shift) - least_shift) / sd)
-        mean = float((chance * shift).sum())
         began = np.cumsum(chance.sum(axis=(0, 2)))
         first, last = np.searchsorted(began, [0.05, 0.95 * began[-1]])
         at, kind = np.unravel_index(int(chance.sum(axis=0).argmax()), chance.shape[1:])
+        # Sizes of the likeliest beginning: those of others are of other days.
+        share, each, own_sd = (part[:, at, kind] for part in (chance, shift, sd))
+        share = share / share.sum()
+        mean = float(share @ each)
         return Evidence(
             years=math.exp(min(total, 100.0)) / DAYS_PER_YEAR,
             shift=mean,
-            shift_sd=math.sqrt(float((chance * (sd**2 + (shift - mean) ** 2)).sum())),
+            shift_sd=math.sqrt(float(share @ (own_sd**2 + (each - mean) ** 2))),
             material=float((chance * beyond).sum()),
             sudden=float(chance[:, :, 0].sum()),
             after_day=float(self.after_day[first]),
@@ -233,12 +248,13 @@ class Bank:
         """With the likeliest change taken into the state, and none that began before now."""
         at = (slice(None), evidence.beginning, evidence.kind)
         prior = 1 / (_STEP_SD, _SLOPE_SD)[evidence.kind] ** 2
-        precision = self.information[at] + prior
+        tempered = self._tempered[evidence.beginning, 0]
+        precision = self.information[at] / tempered + prior
         effect = self.effect[at].astype(np.float64)
         more = effect[:, :, None] * effect[:, None, :] / precision[:, None, None]
         bank = replace(
             self,
-            mean=self.mean + effect * (self.score[at] / precision)[:, None],
+            mean=self.mean + effect * (self.score[at] / tempered / precision)[:, None],
             covariance=self.covariance + more,
         )
         return bank.without_beginnings()
@@ -255,6 +271,25 @@ class Bank:
             by_day=days[1],
             span_days=days[2],
         )
+
+
+@lru_cache(maxsize=64)
+def _transition(days: float, p: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Of states (m, p, p) over some days; transposed, for effects; and the noise that they add."""
+    m, slow = len(_FAST_SD), math.exp(-days / _SLOW_DAYS)
+    step = np.tile(np.eye(p), (m, 1, 1))
+    step[:, LEVEL, SLOPE], step[:, SLOPE, SLOPE] = days, math.exp(-days / _SLOPE_DAYS)
+    step[:, SLOW, SLOW] = slow
+    # A Matern process of order 3/2: what the weather does comes smoothly.
+    past = days / _FAST_DAYS
+    fast = math.exp(-past) * np.array([[1 + past, past], [-past, 1 - past]])
+    step[:, FAST:FEATURES, FAST:FEATURES] = fast
+    noise = np.zeros((m, p, p))
+    noise[:, LEVEL, LEVEL] = _SEASON_PER_ROOT_YEAR**2 * days / DAYS_PER_YEAR
+    noise[:, SLOW, SLOW] = _SLOW_SD**2 * (1 - slow**2)
+    lost = np.eye(2) - fast @ fast.T
+    noise[:, FAST:FEATURES, FAST:FEATURES] = _FAST_SD[:, None, None] ** 2 * lost
+    return step, np.swapaxes(step, 1, 2)[:, None].astype(np.float32), noise
 
 
 def _no_beginnings(m: int, p: int) -> tuple[FloatArray, ...]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -82,7 +83,7 @@ def _of_beam(hanger: Hanger, keys: Sequence[MeasuredMode], log_hz: FloatArray) -
     little. The nominal tension tells a slack bar on stiff springs from a taut one on soft ones."""
     order = np.array([each for _, each in keys]) - 1
     shares = _STRAND_SHARES if hanger.kind == "strand" else np.ones(1)
-    length_m, mass = np.float64(hanger.length_m), np.float64(hanger.mass_per_length_kg_m)
+    length_m, mass = np.asarray(hanger.length_m), np.asarray(hanger.mass_per_length_kg_m)
 
     def log_f(xi: FloatArray, k: FloatArray, share: FloatArray) -> FloatArray:
         bending = hanger.bending_stiffness_n_m2 * share
@@ -145,7 +146,7 @@ class ModeTable:
         if not new:
             return self
         more = ModeTable.of(baseline, hanger, new)
-        parts = {
+        parts: dict[str, Any] = {
             name: np.append(getattr(self, name), getattr(more, name))
             for name in ("tension", "ends", "spread", "readings")
         }
@@ -230,7 +231,7 @@ def _read(off: FloatArray, variance: FloatArray, slope: FloatArray) -> SeenReadi
 
 
 def _weighted_median(values: FloatArray, weight: FloatArray) -> float:
-    order: FloatArray = np.argsort(values)
+    order = np.argsort(values)
     share = np.cumsum(weight[order])
     return float(values[order][np.searchsorted(share, share[-1] / 2)])
 
@@ -269,7 +270,7 @@ class _Pattern:
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """What moved the modes most likely: its name, all that may have `moved`, and how each mode did."""
+    """What moved the modes most likely, all that may have `moved`, and how each mode did."""
 
     name: str
     moved: tuple[Moved, ...]
@@ -317,7 +318,10 @@ def cause_of(moved: FloatArray, table: ModeTable, readings: FloatArray) -> Cause
     chance = chance / chance.sum()
     best = int(chance.argmax())
     total = _moved_quantities(patterns, fits, chance)
-    size = float(np.median(y)) if patterns[best].name == TIME_BASE else fits[best][1]
+    size = fits[best][1]
+    if patterns[best].name == TIME_BASE:  # of all modes, those too that sleep at night
+        size = float(np.median(y))
+        moved = np.full(len(known), size)
     return Cause(patterns[best].name, total, moved, size, patterns[best].plane)
 
 
@@ -325,10 +329,10 @@ def _patterns(table: ModeTable, shift: float) -> list[_Pattern]:
     s, e = table.tension, table.ends
     n = len(s)
     left = _LEFT_SD * s[:, None]
-    off = MODEL_OFF * np.abs(shift) * np.abs(0.5 - s)
+    off: FloatArray = MODEL_OFF * abs(shift) * np.abs(0.5 - s)
     planes = planes_of(table.modes)
     none = np.zeros(n)
-    ends_off = MODEL_OFF * _DECADES_SD * np.abs(e)
+    ends_off: FloatArray = MODEL_OFF * _DECADES_SD * np.abs(e)
     found = [
         _Pattern("tension", _TENSION_SD * s[:, None], off),
         _Pattern("ends", np.hstack([_DECADES_SD * e[:, None], left]), ends_off),
@@ -340,7 +344,7 @@ def _patterns(table: ModeTable, shift: float) -> list[_Pattern]:
             _Pattern(
                 "end", np.hstack([(_DECADES_SD * e * own)[:, None], left]), ends_off * own, plane
             ),
-            _Pattern(_SENSOR, left, _MODE_SD * own, plane),
+            _Pattern(_SENSOR, left, np.where(own, _MODE_SD, 0.0), plane),
         ]
     return found
 
@@ -348,7 +352,7 @@ def _patterns(table: ModeTable, shift: float) -> list[_Pattern]:
 def _fit(y: FloatArray, variance: FloatArray, pattern: _Pattern) -> tuple[float, float, float]:
     """Log evidence, size along the first column with its sd; a mode may have gone astray."""
     n = len(y)
-    astray = [none := np.zeros(n), *(_ASTRAY_SD**2 * np.eye(n) if n > 2 else ())]
+    astray = [np.zeros(n), *(_ASTRAY_SD**2 * np.eye(n) if n > 2 else ())]
     both = [_normal(y, variance + pattern.sd**2 + more, pattern.columns) for more in astray]
     log_each = np.array([each[0] for each in both]) + np.where(
         np.arange(len(both)) > 0, math.log(_ASTRAY), 0.0
@@ -365,7 +369,7 @@ def _normal(y: FloatArray, variance: FloatArray, columns: FloatArray) -> tuple[f
     return (
         log,
         float(columns[:, 0] @ solved[:, 0]),
-        math.sqrt(max(1 - columns[:, 0] @ solved[:, 1], 0)),
+        math.sqrt(max(1 - float(columns[:, 0] @ solved[:, 1]), 0.0)),
     )
 
 

@@ -15,9 +15,11 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import datetime, timedelta
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import scipy
@@ -37,7 +39,7 @@ from shm.values import (
 )
 from shm.values.stream import PooledReading, StreamEvent
 from shm.watch.alert_state import AlertState
-from shm.watch.stream_filter import FAST, LEVEL, NOTHING, SLOW, Bank, Evidence
+from shm.watch.stream_filter import FAST, FEATURES, LEVEL, NOTHING, SLOW, Bank, Evidence
 from shm.watch.stream_reading import (
     MODEL_OFF,
     TIME_BASE,
@@ -58,7 +60,10 @@ _HOURS_A_DAY = 24.0
 # storm of 20 m/s moves a deck's loads by 0.4 %), and the sun's round (judgement).
 _LAGS_DAYS = np.array([2.0, 14.0, 240.0]) / _HOURS_A_DAY
 _CONDITION_SD = np.array([1e-3] * 4 + [2e-5, 2e-3, 2e-4] + [1e-3] * 6)
-_UNKNOWN_K = 3.0  # judgement: by what an hour's temperature differs from that of those before it
+# Judgement: by what an hour's temperature differs from ten days' mean, and that the errors of some
+# ten hours without a thermometer are one error: an hour counts for a third of what it would.
+_UNKNOWN_K, _TOGETHER = 4.0, 3.0
+_DAY_SD = 1e-4  # of ln f: what a mode keeps for a day, by joints that seat anew. Judgement
 _RING = 24  # readings: a change is told within a day or is slow
 _OLD_READINGS = 120.0  # judgement: five days, as what a mode differs by is learnt over
 _CALLS_KEPT = 8  # technical: of changes that were told, so that what is kept stays bounded
@@ -103,7 +108,8 @@ class StreamState:
     """What goes from reading to reading. Days count from `start`.
 
     `lagged_c` are the temperature's exponential means, `reference` its first value, that of the
-    log level and of the wind; `ring` (24, n) are the newest readings' modes with the conditions
+    log level and of the wind; `known_day` the last with a
+    temperature; `ring` (24, n) are the newest readings' modes with the conditions
     taken off, `ring_day` their days, `old` (n,) the mean of those before.
     """
 
@@ -116,10 +122,12 @@ class StreamState:
     ring: FloatArray
     ring_day: FloatArray
     old: FloatArray
+    known_day: float = 0.0
     zero: float = 0.0
     compensated_zero: float = 0.0
     readings: int = 0
     is_learning: bool = True
+    called_from: float = 0.0
     called_shift: float = 0.0
     told: AlertState = field(default_factory=AlertState)
     standing: tuple[str, ...] = ()
@@ -150,6 +158,7 @@ class StreamState:
         head = {name: getattr(self, name) for name in _SCALARS} | {
             "start": self.start.isoformat(),
             "day": self.bank.day,
+            "watched": self.bank.watched,
             "tension_n": self.table.tension_n,
             "modes": self.table.modes,
             "told": self.told.to_text(),
@@ -165,7 +174,7 @@ class StreamState:
         try:
             line, _, rest = content.partition(b"\n")
             head = json.loads(line)
-            parts: dict[str, dict[str, FloatArray]] = {"state": {}, "table": {}, "bank": {}}
+            parts: dict[str, dict[str, Any]] = {"state": {}, "table": {}, "bank": {}}
             at = 0
             for name, kind, shape in head["arrays"]:
                 part, _, own = name.partition(".")
@@ -176,7 +185,7 @@ class StreamState:
             return cls(
                 start=datetime.fromisoformat(head["start"]),
                 table=ModeTable(modes=modes, tension_n=head["tension_n"], **parts["table"]),
-                bank=Bank(day=head["day"], **parts["bank"]),
+                bank=Bank(day=head["day"], watched=head["watched"], **parts["bank"]),
                 told=AlertState.from_text(head["told"]),
                 **{name: head[name] for name in _SCALARS},
                 **parts["state"],
@@ -189,7 +198,8 @@ class StreamState:
 
 
 _SCALARS = (
-    "key", "zero", "compensated_zero", "readings", "is_learning", "called_shift", "standing",
+    "key", "known_day", "zero", "compensated_zero", "readings", "is_learning", "called_from",
+    "called_shift", "standing",
 )  # fmt: skip
 
 
@@ -304,12 +314,13 @@ class StreamWatch:
                 )
                 state = _changed(state, evidence)
         test = self._watched_test(state, evidence, moved, reading, end)
-        before = state.told
-        told, alert = after(before, test, self.hanger)
+        told, alert = after(state.told, test, self.hanger)
         told = replace(told, called=told.called[-_CALLS_KEPT:])
         standing = (*state.standing, alert.key) if alert else state.standing
         ended = standing if alert is None and not told.beyond and not told.called else ()
         state = replace(state, told=told, standing=() if ended else standing)
+        if ended:
+            state = replace(state, called_shift=0.0)
         shift, sd = test.drifts[0].shift_mean, test.drifts[0].shift_sd
         own, own_sd = shift_of_reading(state, seen)
         return StreamWatched(b"", own, own_sd, shift, sd, test, alert, events, ended, ""), state
@@ -336,11 +347,11 @@ class StreamWatch:
         limits, table = self.hanger.thresholds, state.table
         chance = rate / (1 + rate)
         if state.called_shift:
-            towards = math.copysign(1.0, state.called_shift) * mean
-            left = _beyond(towards - abs(state.called_shift) / 2, sd)
-            chance = left if evidence is NOTHING or not moved else max(left, chance)
-            if left < limits.end_probability:  # it came back: the end of an alert, not another
-                evidence, moved = NOTHING, ()
+            gone = (mean - state.called_from) / state.called_shift
+            left = _beyond(gone - 0.5, sd / abs(state.called_shift))
+            chance = max(left, chance) if moved else left
+            if moved and gone < 0.5:  # it came back: the end of an alert, not another
+                chance, evidence, moved = left, NOTHING, ()
         threshold = limits.tension_shift_fraction
         beyond = _beyond(mean - threshold, sd) + _beyond(-mean - threshold, sd)
         test = f"{reading.stream} {reading.start:%Y-%m-%dT%H:%M}"
@@ -386,15 +397,29 @@ def _shift(state: StreamState) -> tuple[float, float]:
     return _fraction(mean - state.compensated_zero, sd, state.table)
 
 
-def daily_shift(state: StreamState, reading: PooledReading) -> tuple[float, float]:
-    """Of the tension since the stream's baseline, by a day's reading as it is, with its sd."""
-    known = [mode for mode in usable(reading) if (mode.plane, mode.order) in state.table.modes]
-    if not known:
+def daily_shift(kept: bytes, hours: Sequence[PooledReading]) -> tuple[float, float]:
+    """Of the tension over a day since the stream's baseline, with its sd: by the day's `hours`.
+
+    The mean of what each hour says: the tension goes through the day by more than its mean is
+    known to, and not all hours have all modes. Without thermometer's or watch's corrections.
+    """
+    state = StreamState.from_bytes(kept)
+    seen = []
+    for reading in hours:
+        known = [mode for mode in usable(reading) if (mode.plane, mode.order) in state.table.modes]
+        if known:
+            kelvin = reading.temperature_c - state.reference[0]
+            seen.append(state.table.seen(known, kelvin if math.isfinite(kelvin) else 0.0))
+    if not seen:
         return NAN, NAN
-    kelvin = reading.temperature_c - state.reference[0]
-    return shift_of_reading(
-        state, state.table.seen(known, kelvin if math.isfinite(kelvin) else 0.0)
-    )
+    shifts, n = np.array([each.shift for each in seen]), len(seen)
+    by_hour = float(np.mean([each.variance for each in seen])) / n
+    # Hours that lack are as the others; some of them follow each other, and are as one.
+    lacking = max(1 - n / _HOURS_A_DAY, 0.0) * float(np.var(shifts)) * _TOGETHER / n
+    # Joints and clocks are the day's, mode by mode, and that of the baseline's days.
+    day = 2 * _DAY_SD**2 / float(state.table.tension @ state.table.tension)
+    sd = math.sqrt(by_hour + lacking + day)
+    return _fraction(float(shifts.mean()) - state.zero, sd, state.table)
 
 
 def shift_of_reading(state: StreamState, seen: SeenReading) -> tuple[float, float]:
@@ -424,23 +449,28 @@ def _with_conditions(
     level = math.log(reading.level_m_s2) if reading.level_m_s2 > 0 else NAN
     now = np.array([reading.temperature_c, level, reading.wind_m_s])
     reference = np.where(np.isfinite(state.reference), state.reference, now)
-    lagged, days = state.lagged_c, day - state.bank.day
-    is_known = math.isfinite(reading.temperature_c)
-    if is_known:
-        share = -np.expm1(-days / _LAGS_DAYS)
+    lagged, known_day, extra = state.lagged_c, state.known_day, 0.0
+    if math.isfinite(reading.temperature_c):
+        share = -np.expm1((known_day - day) / _LAGS_DAYS)
         lagged = np.where(np.isfinite(lagged), lagged + share * (now[0] - lagged), reference[0])
-    now = np.where(np.isfinite(now), now, np.append(lagged[:1], reference[1:]))
-    kelvin = np.nan_to_num(np.array([now[0], *lagged, reference[0]]))
+        kelvin, known_day = np.array([now[0], *lagged, reference[0]]), day
+    else:  # as warm as it was in the last ten days, give or take what a day brings
+        kelvin = np.nan_to_num(np.append(np.full(4, lagged[-1]), reference[0]))
+        of_kelvin = range(FEATURES, FEATURES + len(_LAGS_DAYS))
+        square = sum(
+            sum(part**2 for part in state.bank.along(unit))
+            for unit in np.eye(state.bank.mean.shape[1])[of_kelvin]
+        )
+        extra = _TOGETHER * square * _UNKNOWN_K**2 if math.isfinite(lagged[-1]) else 0.0
+    now = np.where(np.isfinite(now), now, reference)
     steps = [before - behind for before, behind in pairwise(kelvin)]
     hour = 2 * math.pi * ((state.start.hour + state.start.minute / 60) / _HOURS_A_DAY + day)
     others = np.nan_to_num(now[1:] - reference[1:])
     warm = kelvin[2] - kelvin[4]
     rounds = hour * np.arange(1, 4)
     conditions = np.array([*steps, warm**2, *others, *np.sin(rounds), *np.cos(rounds)])
-    extra = (
-        0.0 if is_known or not math.isfinite(lagged[0]) else (_CONDITION_SD[0] * _UNKNOWN_K) ** 2
-    )
-    return replace(state, lagged_c=lagged, reference=reference), conditions, extra
+    state = replace(state, lagged_c=lagged, reference=reference, known_day=known_day)
+    return state, conditions, extra
 
 
 # ---------------------------------------------------------------- what changed
@@ -480,12 +510,13 @@ def _cause_of(state: StreamState, evidence: Evidence) -> Cause:
 
 
 def _changed(state: StreamState, evidence: Evidence) -> StreamState:
-    """With a change of the hanger in the filters; the shift that it left counts from now on."""
+    """With a change of the hanger in the filters. What was told stands until half of it is back."""
     state = replace(state, bank=state.bank.changed(evidence))
-    return replace(
-        state,
-        called_shift=evidence.shift if not state.called_shift else state.called_shift,
-    )
+    now = _shift(state)[0]
+    since = state.called_from if state.called_shift else now - evidence.shift
+    if state.called_shift and (now - since) / state.called_shift < 0.5:
+        return state
+    return replace(state, called_from=since, called_shift=now - since)
 
 
 def _absorbed(state: StreamState, cause: Cause) -> StreamState:

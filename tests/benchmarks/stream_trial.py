@@ -139,7 +139,7 @@ def solved(name: str, seed: int, years: float) -> dict[str, Any]:
     alerts, events, worst, state = [], [], 0.0, None
     daily: list[tuple[datetime, float, float]] = []
     began = time.process_time()
-    for day, group in groupby(readings, key=lambda each: each.start.date()):
+    for _, group in groupby(readings, key=lambda each: each.start.date()):
         hours = list(group)
         for each in hours:
             if not each.modes:
@@ -151,7 +151,7 @@ def solved(name: str, seed: int, years: float) -> dict[str, Any]:
                 alerts.append(found.alert)
             events += found.events
         if state and not state.is_learning and len(hours) > 12:
-            daily.append((hours[0].start, *daily_shift(state, of_day(hours))))
+            daily.append((hours[0].start, *daily_shift(state.to_bytes(), hours)))
     seconds = time.process_time() - began
     return {
         "scenario": name, "seed": seed, "hanger": number, "readings": len(readings),
@@ -167,27 +167,6 @@ def solved(name: str, seed: int, years: float) -> dict[str, Any]:
         **daily_figures(seed, number, changes, start, daily, state),
         "state_bytes": len(state.to_bytes()) if state else 0,
     }  # fmt: skip
-
-
-def of_day(hours: Sequence[PooledReading]) -> PooledReading:
-    """A day's readings as one: each mode's median, its sd by what the hours scatter."""
-    found: dict[tuple[str, int], list[Mode]] = {}
-    for mode in (mode for each in hours for mode in each.modes):
-        found.setdefault((mode.plane, mode.order), []).append(mode)
-    modes = []
-    for own in found.values():
-        hz = np.array([mode.frequency_hz for mode in own])
-        spread = 1.4826 * np.median(np.abs(hz - np.median(hz)))
-        stated = np.median([mode.frequency_sd_hz for mode in own])
-        sd = max(spread, stated) * np.sqrt(np.pi / 2 / len(own))
-        modes.append(replace(own[0], frequency_hz=float(np.median(hz)), frequency_sd_hz=float(sd)))
-    warm = [each.temperature_c for each in hours if np.isfinite(each.temperature_c)]
-    return replace(
-        hours[0],
-        period="day",
-        modes=tuple(modes),
-        temperature_c=float(np.mean(warm)) if warm else float("nan"),
-    )
 
 
 def daily_figures(
