@@ -67,16 +67,25 @@ def _some(
     documents = alert_documents(shown, site)
     older = shown[-1].id if len(rows) > _SHOWN else None
     return [
-        {**document, "address": _address(each)}
+        {**document, "address": _address(each, site), "stream": _stream_of(each, site)}
         for each, document in zip(shown, documents, strict=True)
     ], older
 
 
-def _address(alert: AlertRow) -> str | None:
+def _address(alert: AlertRow, site: Site) -> str | None:
     """An alert that only tries a hook is of no test."""
+    if stream := _stream_of(alert, site):
+        return f"/streams/{stream}"
     if "held" in alert.kinds:  # what is held has no page of its own
         return "/operation#held"
     return None if "test" in alert.kinds else test_page(alert.hanger, alert.test)
+
+
+def _stream_of(alert: AlertRow, site: Site) -> str | None:
+    """The stream whose hourly reading raised an alert; None of a hammer test."""
+    name, _, hour = alert.test.rpartition(" ")
+    known = (each.name for each in site.workspace.bridge.streams)
+    return name if hour and name in known else None
 
 
 @router.get(
