@@ -53,6 +53,8 @@ ROUTES = (
     "GET /api/bridge/moved",
     "GET /api/operation",
     "GET /api/operation/examination",
+    "GET /api/streams",
+    "GET /api/streams/{name}/figure",
     "GET /health",
     "GET /metrics",
 )

@@ -15,7 +15,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.stream_course import stream_course
 from shm.pipeline.stream_state import StreamCondition, stream_states, tension_words
 from shm.report import formatting
-from shm.report.figures import stream_course as figure
+from shm.report.figures.stream_course import alt, caption, specify
 from shm.report.paper import Table
 from shm.store.ring import ring_of
 from shm.values.stream import Stream, StreamEvent
@@ -103,8 +103,8 @@ def stream_figure(site: AtSite, _: Reader, name: Name, days: Days = 7.0) -> JSON
             f"stream {name} has shown nothing in the last {days:g} days.",
             remedy="See `shm stream` for when it was heard last.",
         )
-    words = {"caption": figure.caption(course), "alt": figure.alt(course)}
-    return answer({**with_plotly.document(figure.specify(course)), **words})
+    words = {"caption": caption(course), "alt": alt(course)}
+    return answer({**with_plotly.document(specify(course)), **words})
 
 
 def _states(site: Site) -> tuple[StreamCondition, ...]:
