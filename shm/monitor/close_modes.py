@@ -35,6 +35,7 @@ identified from one window, three degrees."""
 _ENOUGH = 0.02  # technical: of log likelihood in a step; the next one gains its square
 _MOST_COHERENT = 0.9
 _SAME_DIRECTION = 0.1  # judgement: modes of nearer shapes differ by frequency alone
+_RIDGE = 1e-9  # technical: what nothing is known of, a mode without power, still has an inverse
 _MOST_STEP = 1.0  # technical: a half bandwidth, and a factor of e
 _SIGNS = np.array([1.0, -1.0, -1.0, -1.0])[:, np.newaxis]
 
@@ -214,7 +215,7 @@ class Band:
         information = (trace * count) @ trace.T - crossed @ changes.reshape(len(changes), -1).T
         offset, precision = self._from_before(modes)
         value -= float(precision @ offset**2) / 2
-        return value, gradient - precision * offset, information + np.diag(precision)
+        return value, gradient - precision * offset, information + np.diag(precision + _RIDGE)
 
     def _covariances(self, modes: CloseModes) -> tuple[FloatArray, FloatArray]:
         """E (4, lines), and its change by each parameter (parameters, 4, lines)."""
