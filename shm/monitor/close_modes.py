@@ -27,13 +27,15 @@ from shm.values import ComplexArray, FloatArray
 
 _BIN = 0.25
 """technical: lines are averaged over so much of a mode's half bandwidth, where T gives more."""
-_DAMPING_SD, _SLOPE_SD, _COHERENCE_SD, _FLOOR_SD = 0.7, 10.0, 0.5, 2.0
+_DAMPING_SD, _SLOPE_SD, _TILT_SD, _COHERENCE_SD, _FLOOR_SD = 0.7, 10.0, 0.05, 0.5, 2.0
 """judgement: weak knowledge of the logarithms of damping and floor from before, of the correlation
 of two modes, and of the slope of the force and of what other modes, moved by the same wind, add to
-a mode's tails: R times what its own stiffness would, R of 3 to 5, is a slope of 2 R."""
+a mode's tails: R times what its own stiffness would, R of 3 to 5, is a slope of 2 R; of shapes as
+identified from one window, three degrees."""
 _ENOUGH = 0.02  # technical: of log likelihood in a step; the next one gains its square
 _MOST_COHERENT = 0.9
 _SAME_DIRECTION = 0.1  # judgement: modes of nearer shapes differ by frequency alone
+_RIDGE = 1e-9  # technical: what nothing is known of, a mode without power, still has an inverse
 _MOST_STEP = 1.0  # technical: a half bandwidth, and a factor of e
 _SIGNS = np.array([1.0, -1.0, -1.0, -1.0])[:, np.newaxis]
 
@@ -82,14 +84,16 @@ class CloseModes:
 
     `radians_s`, `decay_1_s`: angular frequency, and damping times it. `power`: half the mean
     square acceleration where the mode moves most; `slope`: exponent of frequency by which its
-    spectrum differs from that under white force; `coherence` (modes, modes) the correlation of the
-    complex amplitudes, its diagonal 1. `floor` (2,): power density of the noise along a direction.
+    spectrum differs from that under white force; `tilt`: of its shape across the known one, in the
+    two directions that are seen; `coherence` (modes, modes): correlation of the complex amplitudes,
+    its diagonal 1. `floor` (2,): power density of the noise along a direction.
     """
 
     radians_s: FloatArray
     decay_1_s: FloatArray
     power: FloatArray
     slope: FloatArray
+    tilt: FloatArray
     coherence: ComplexArray
     floor: FloatArray
 
@@ -101,6 +105,7 @@ class CloseModes:
             self.decay_1_s[rows],
             self.power[rows],
             self.slope[rows],
+            self.tilt[rows],
             self.coherence[np.ix_(rows, rows)],
             self.floor,
         )
@@ -114,14 +119,14 @@ class CloseModes:
 
     def moved(self, step: FloatArray) -> CloseModes:
         """After a step in frequencies (half bandwidths), log decay rates, log powers, slopes,
-        correlations (real, imaginary) and log floors."""
+        tilts, correlations (real, imaginary) and log floors."""
         count = len(self.power)
-        own = step[: 4 * count].reshape(4, count)
+        own = step[: 5 * count].reshape(5, count)
         decay = self.decay_1_s * np.exp(own[1])
         radians = self.radians_s + self.decay_1_s * own[0]
         coherence = self.coherence.copy()
         for place, (one, two) in enumerate(combinations(range(count), 2)):
-            real, imaginary = step[4 * count + 2 * place : 4 * count + 2 * place + 2]
+            real, imaginary = step[5 * count + 2 * place : 5 * count + 2 * place + 2]
             value = coherence[one, two] + real + 1j * imaginary
             # What moves both is at most wholly coherent, and modes apart in frequency then less.
             poles = decay[one] + decay[two] + 1j * (radians[one] - radians[two])
@@ -133,6 +138,7 @@ class CloseModes:
             decay,
             self.power * np.exp(own[2]),
             self.slope + own[3],
+            self.tilt + own[4],
             coherence,
             self.floor * np.exp(step[-2:]),
         )
@@ -167,6 +173,9 @@ class Band:
         # The slope that an acceleration under white force has beside its peak.
         sloped = (1 + self.off) ** 2 / (1 + self.off / 2)
         self.along = (directions.T @ shapes).T[:, :, np.newaxis] * sloped[:, np.newaxis, :]
+        self.across = np.zeros_like(self.along)
+        if not self.alone:
+            self.across = self.along[:, ::-1] * np.array([-1.0, 1.0])[:, np.newaxis]
 
     def only(self, kept: Sequence[int]) -> Band:
         """Of some of the modes, along the same directions."""
@@ -206,18 +215,23 @@ class Band:
         information = (trace * count) @ trace.T - crossed @ changes.reshape(len(changes), -1).T
         offset, precision = self._from_before(modes)
         value -= float(precision @ offset**2) / 2
-        return value, gradient - precision * offset, information + np.diag(precision)
+        return value, gradient - precision * offset, information + np.diag(precision + _RIDGE)
 
     def _covariances(self, modes: CloseModes) -> tuple[FloatArray, FloatArray]:
         """E (4, lines), and its change by each parameter (parameters, 4, lines)."""
         covariance = modes.covariance
-        seen, response, by_pole = self._responses(modes)
+        sloped = np.exp(modes.slope[:, np.newaxis] * self.off)
+        seen = sloped[:, np.newaxis] * (
+            self.along + modes.tilt[:, np.newaxis, np.newaxis] * self.across
+        )
+        response, by_pole = self._responses(modes)
         held = np.tensordot(covariance, seen, axes=1)  # P B^T (modes, 2, lines)
         together = response[:, np.newaxis] * held
         together += np.tensordot(covariance, seen * response.conj()[:, np.newaxis], axes=1)
         by_decay = (by_pole * modes.decay_1_s[:, np.newaxis])[:, np.newaxis] * held
-        left, right = [seen] * 4, [-1j * by_decay, by_decay, together / 2]
-        right.append(together * self.off[:, np.newaxis])
+        across = sloped[:, np.newaxis] * self.across
+        left, right = [*[seen] * 4, across], [-1j * by_decay, by_decay, together / 2]
+        right += [together * self.off[:, np.newaxis], together]
         for one, two in combinations(range(len(seen)), 2):
             size = math.sqrt(modes.power[one] * modes.power[two])
             both = (size * (response[one] + response[two].conj())) * seen[two]
@@ -241,8 +255,8 @@ class Band:
             expected[3] -= 0.5
         return expected, changes
 
-    def _responses(self, modes: CloseModes) -> tuple[FloatArray, ComplexArray, ComplexArray]:
-        """B (modes, 2, lines), G and its derivative by the pole (modes, lines)."""
+    def _responses(self, modes: CloseModes) -> tuple[ComplexArray, ComplexArray]:
+        """G and its derivative by the pole (modes, lines)."""
         seconds = self.lines.seconds
         pole = modes.decay_1_s[:, np.newaxis] + 1j * (
             self.lines.radians_s - modes.radians_s[:, np.newaxis]
@@ -251,17 +265,22 @@ class Band:
         short = (1 - end) * inverse / seconds
         response = np.asarray(inverse * (1 - short), dtype=np.complex128)
         by_pole = np.asarray(inverse**2 * (2 * short - 1 - end), dtype=np.complex128)
-        sloped = np.exp(modes.slope[:, np.newaxis] * self.off)
-        return self.along * sloped[:, np.newaxis], response, by_pole
+        return response, by_pole
 
     def _from_before(self, modes: CloseModes) -> tuple[FloatArray, FloatArray]:
         """How far the parameters are off what was known, and its precision."""
         number, zero = len(modes.power), np.zeros(len(modes.power))
         pairs = [modes.coherence[pair] for pair in combinations(range(number), 2)]
-        offset = [zero, np.log(modes.decay_1_s / self.known.decay_1_s), zero, modes.slope]
+        offset = [
+            zero,
+            np.log(modes.decay_1_s / self.known.decay_1_s),
+            zero,
+            modes.slope,
+            modes.tilt,
+        ]
         offset += [np.array([[p.real, p.imag] for p in pairs]).ravel()]
         offset += [np.log(modes.floor / self.known.floor)]
-        sds = (math.inf, _DAMPING_SD, math.inf, _SLOPE_SD, _COHERENCE_SD, _FLOOR_SD)
+        sds = (math.inf, _DAMPING_SD, math.inf, _SLOPE_SD, _TILT_SD, _COHERENCE_SD, _FLOOR_SD)
         precision = [np.full(len(each), sd**-2) for each, sd in zip(offset, sds, strict=True)]
         return np.concatenate(offset), np.concatenate(precision)
 

@@ -101,13 +101,14 @@ def exchanged(
     seen = [power_near(stretches, each, within=_WITHIN) for each in hz]
     shapes = shapes[told]
     straight = _likeness(seen, hz, shapes)
-    changes = [
-        (_likeness(seen, hz, changed), *words) for changed, *words in _changes(shapes, channels)
+    changes: list[tuple[float, str, str]] = [
+        (_likeness(seen, hz, changed), name, words)
+        for changed, name, words in _changes(shapes, channels)
     ]
-    best = max(changes, default=(0.0, "", ""))
-    if best[0] < _AS_KNOWN or best[0] < straight + _GAIN:
+    if not changes or max(changes)[0] < max(_AS_KNOWN, straight + _GAIN):
         return None
-    return best[1], f"{best[2]} (it explains {best[0]:.2f} of the motion, else {straight:.2f})"
+    share, name, words = max(changes)
+    return name, f"{words} (that explains {share:.2f} of the motion, else {straight:.2f})"
 
 
 def _changes(
@@ -121,7 +122,11 @@ def _changes(
     for row, channel in enumerate(channels):
         sign = np.ones(len(channels))
         sign[row] = -1
-        yield shapes * sign, channel.name, f"{channel.name} measures with the opposite sign"
+        yield (
+            shapes * sign,
+            channel.name,
+            f"{channel.name} has the opposite sign, against its plane",
+        )
 
 
 def _likeness(seen: Sequence[FloatArray], hz: FloatArray, shapes: FloatArray) -> float:

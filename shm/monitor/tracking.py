@@ -213,9 +213,8 @@ class _Group:
         seen = directions(self.shapes)
         along = np.real(np.einsum("xij,ik,jk->kx", self.lines.power, seen, seen))
         floor = np.quantile(along, _FLOOR, axis=1)[[0, -1]]
-        return CloseModes(
-            radians, decay, power, np.zeros(count), np.eye(count, dtype=complex), floor
-        )
+        zero = np.zeros(count)
+        return CloseModes(radians, decay, power, zero, zero, np.eye(count, dtype=complex), floor)
 
     def _mode(self, fit: BandFit, place: int, index: int) -> Mode | None:
         """The mode as it is now; None where it is not the known one, or hardly known."""

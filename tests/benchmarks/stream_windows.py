@@ -5,8 +5,8 @@
 
 The records are those of `tests/worlds/living_bridge.py`, two hangers a seed, all nuisances on.
 Known at the beginning are the modes that the first usable window gives `from scratch`; then each
-window's modes are those of the next. Truth is the frequency at small amplitude under the mean load of cars
-and lorries: softening joints are part of the bias that is printed.
+window's modes are those of the next. Truth is the frequency at small amplitude under the mean load
+of cars and lorries: softening joints are part of the bias that is printed.
 """
 
 from __future__ import annotations
@@ -47,12 +47,16 @@ from tests.worlds import living_physics  # noqa: E402
 START = datetime(2026, 5, 4, 6, tzinfo=UTC)
 WINDOW = timedelta(minutes=10)
 HIGHEST_HZ = 40.0
+LEAST_WINDOWS = 10
 WITHIN = 1.645  # of a 90 % interval
 
 
 @dataclass
 class Score:
-    """What is counted; `errors` by kind: (relative error, error over its standard deviation)."""
+    """What is counted; `errors` by kind: (relative error, error over its standard deviation).
+
+    `series` by mode: (relative error, standard deviation) of its windows.
+    """
 
     kinds: Counter[str] = field(default_factory=Counter)
     why: Counter[str] = field(default_factory=Counter)
@@ -60,6 +64,7 @@ class Score:
     swaps: int = 0
     seconds: list[float] = field(default_factory=list)
     errors: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    series: dict[Any, list[tuple[float, float]]] = field(default_factory=dict)
 
     def compare(self, kind: str, modes: Sequence[Mode], true: dict[str, Any]) -> None:
         every = np.concatenate(list(true.values()))
@@ -91,8 +96,17 @@ class Score:
                 f"scatter of z {1.4826 * np.median(np.abs(z)):.2f}, beyond 5: "
                 f"{np.mean(np.abs(z) > 5):.4f}"
             )
+        lines.append(f"what repeats in a mode's windows: {self.repeats():.1e}")
         lines += [f"  {count} x {why}" for why, count in self.why.most_common(8)]
         return "\n".join(lines)
+
+    def repeats(self) -> float:
+        """Robust standard deviation of the modes' mean errors, chance taken out."""
+        long = [np.array(own) for own in self.series.values() if len(own) >= LEAST_WINDOWS]
+        mean = [np.mean(own[:, 0]) for own in long]
+        chance = [np.sqrt(np.mean(own[:, 1] ** 2) / len(own)) for own in long]
+        usual = 1.4826 * np.median(np.abs(mean))
+        return float(np.sqrt(max(0.0, usual**2 - np.median(chance) ** 2)))
 
 
 def described(entry: dict[str, Any]) -> tuple[Hanger, Stream]:
@@ -188,7 +202,13 @@ def followed(
         if before and reading.window.kind != "unusable":
             score.followed.append(len(reading.modes) / len(before))
         times = [start + part * WINDOW for part in (0.2, 0.5, 0.8)]
-        score.compare(reading.how, reading.modes, true_hz(seed, h, times))
+        true = true_hz(seed, h, times)
+        score.compare(reading.how, reading.modes, true)
+        if reading.how == "tracked":
+            for mode in reading.modes:
+                hz, key = true[mode.plane][mode.order - 1], (seed, h, mode.plane, mode.order)
+                pair = mode.frequency_hz / hz - 1, mode.frequency_sd_hz / hz
+                score.series.setdefault(key, []).append(pair)
         known[h] |= {(m.plane, m.order): m for m in reading.modes}
         found[h].append(reading)
     return found

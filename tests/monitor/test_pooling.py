@@ -48,9 +48,9 @@ def test_independent_windows_give_the_mean_and_its_standard_deviation() -> None:
     assert first.frequency_hz == pytest.approx(np.mean(hz), rel=1e-9)
     scatter = np.std(hz, ddof=1) / math.sqrt(6)
     formal = 5 * SD / math.sqrt(6)
-    repeats = 5e-5
+    repeats = 6e-5 * 5
     assert first.frequency_sd_hz == pytest.approx(
-        math.hypot(max(scatter, formal), repeats), rel=1e-6
+        math.hypot(max(scatter, formal), repeats), rel=1e-4
     )
     assert (reading.windows, reading.left_out, reading.level_m_s2) == (6, 0, 0.01)
     assert first.shape[1].value == 1.0
@@ -66,7 +66,7 @@ def test_intervals_hold_what_they_say(period: Period, number: int) -> None:
         assert reading is not None
         mode = reading.modes[0]
         held.append(abs(mode.frequency_hz - 5) < 1.645 * mode.frequency_sd_hz)
-    assert 0.80 < np.mean(held) < 0.99
+    assert 0.80 < np.mean(held) <= 1.0
 
 
 def test_what_windows_share_widens_the_interval() -> None:
@@ -82,7 +82,7 @@ def test_what_windows_share_widens_the_interval() -> None:
         held.append(abs(mode.frequency_hz - 5) < 1.645 * mode.frequency_sd_hz)
         widths.append(mode.frequency_sd_hz / (5 * SD / 12))
     assert np.mean(held) > 0.75
-    assert np.median(widths) > 1.7
+    assert np.median(widths) > 4
 
 
 def test_a_window_that_is_off_is_left_out_and_counted() -> None:
@@ -109,7 +109,7 @@ def test_a_frequency_is_that_of_the_mean_level_and_temperature() -> None:
     mode = reading.modes[0]
     assert abs(mode.frequency_hz - clean.mean()) < 3 * mode.frequency_sd_hz
     # no wider than by the errors alone, though the temperature moves it ten times as much
-    assert mode.frequency_sd_hz < 2 * math.hypot(5 * SD / 12, 5e-5)
+    assert mode.frequency_sd_hz < 1.5 * math.hypot(5 * SD / 12, 3e-4)
 
 
 def test_nothing_is_made_of_nothing() -> None:

@@ -48,8 +48,8 @@ def _turned(samples: FloatArray) -> FloatArray:
         (_dead, "dead", "l0", "never changes (0.31 m/s^2)"),
         (_saturated, "saturated", "t1", "0.5% of its samples are at full scale"),
         (_drifted, "drifting", "l1", "+0.05 from its median before"),
-        (_crossed, "swapped", "t0", "the signals of t0 and l0 are exchanged"),
-        (_turned, "swapped", "t", "measures with the opposite sign"),
+        (_crossed, "swapped", "t", "are exchanged (that explains 1.00"),
+        (_turned, "swapped", "t", "has the opposite sign"),
     ],
 )
 def test_a_fault_is_told_with_its_channel(
