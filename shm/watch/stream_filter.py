@@ -35,8 +35,8 @@ LEVEL, SLOPE, SLOW, FAST, _RATE, FEATURES = range(6)
 # that stay. Hours: sun on one side, traffic. Judgement, after the worlds of `tests/worlds`.
 _SEASON_PER_ROOT_YEAR = 3e-3
 _FAST_DAYS, _SLOW_DAYS = 1.3 / 24, 1.5
-_FAST_SD = np.repeat([3e-4, 1e-3, 3e-3, 8e-3], 2)
-_SLOW_SD = _FAST_SD * np.tile([0.15, 0.7], 4)
+_FAST_SD = np.geomspace(2e-4, 1e-2, 8)
+_SLOW_SD = 0.25 * _FAST_SD
 _UNSTEADY = (
     0.2  # judgement: of the hours' wander, by what each reading is off on its own: live load
 )
@@ -246,18 +246,18 @@ class Bank:
 
     def changed(self, evidence: Evidence) -> Bank:
         """With the likeliest change taken into the state, and none that began before now."""
-        at = (slice(None), evidence.beginning, evidence.kind)
-        prior = 1 / (_STEP_SD, _SLOPE_SD)[evidence.kind] ** 2
-        tempered = self._tempered[evidence.beginning, 0]
-        precision = self.information[at] / tempered + prior
-        effect = self.effect[at].astype(np.float64)
-        more = effect[:, :, None] * effect[:, None, :] / precision[:, None, None]
+        reach = (1.0, self.day - self.after_day[evidence.beginning])[evidence.kind]
+        effect = self.effect[:, evidence.beginning, evidence.kind].astype(np.float64) / reach
+        more = effect[:, :, None] * effect[:, None, :] * evidence.shift_sd**2
         bank = replace(
-            self,
-            mean=self.mean + effect * (self.score[at] / tempered / precision)[:, None],
-            covariance=self.covariance + more,
+            self, mean=self.mean + effect * evidence.shift, covariance=self.covariance + more
         )
         return bank.without_beginnings()
+
+    @property
+    def wander_sd(self) -> float:
+        """By what ln T wanders within a day or two."""
+        return math.sqrt(float(self.weight @ (_FAST_SD**2 + _SLOW_SD**2)))
 
     def without_beginnings(self) -> Bank:
         """From here on only what begins later is a change."""

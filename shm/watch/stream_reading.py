@@ -252,6 +252,7 @@ _TENSION_SD, _DECADES_SD, _BASE_SD, _MODE_SD = 0.03, 0.3, 0.01, 0.01
 _ALIKE = 20.0  # a log Bayes factor of 3, as `Moved.alike` has it
 _HOURS_TOGETHER = 3.0  # judgement: of that many readings the errors are one
 MODEL_OFF = 0.2  # judgement: of bending's share in a sensitivity, and of springs'
+_EACH_OFF = 0.05  # judgement: likewise, of each mode by itself
 _LEFT_SD = 1e-3  # of ln T: what the conditions leave while something else changes
 _ASTRAY_SD, _ASTRAY = 0.03, 0.02  # judgement: how far and how often a single mode goes astray
 # Judgement: tensions, ends in both planes, ends in one, a time base, one plane's sensors, others.
@@ -311,7 +312,7 @@ def cause_of(moved: FloatArray, table: ModeTable, readings: FloatArray) -> Cause
     )
     y, count = moved[known], np.maximum(readings[known] / _HOURS_TOGETHER, 1)
     variance = sub.spread / count + LEAST_SD**2
-    patterns = _patterns(sub, _read(y, variance, sub.tension).shift)
+    patterns = _patterns(sub, y)
     fits = [_fit(y, variance, each) for each in patterns]
     log_each = np.array([fit[0] for fit in fits])
     chance = np.exp(log_each - log_each.max())
@@ -325,25 +326,26 @@ def cause_of(moved: FloatArray, table: ModeTable, readings: FloatArray) -> Cause
     return Cause(patterns[best].name, total, moved, size, patterns[best].plane)
 
 
-def _patterns(table: ModeTable, shift: float) -> list[_Pattern]:
-    s, e = table.tension, table.ends
-    n = len(s)
-    left = _LEFT_SD * s[:, None]
-    off: FloatArray = MODEL_OFF * abs(shift) * np.abs(0.5 - s)
-    planes = planes_of(table.modes)
-    none = np.zeros(n)
-    ends_off: FloatArray = MODEL_OFF * _DECADES_SD * np.abs(e)
+def _patterns(table: ModeTable, y: FloatArray) -> list[_Pattern]:
+    """All hypotheses; the larger a change, the more it is off by what the patterns are off."""
+    s, e, n = table.tension, table.ends, len(table.tension)
+    left, none = _LEFT_SD * s[:, None], np.zeros(n)
+    bent = (0.5 - s) * abs(float(s @ y) / float(s @ s))
+    loose = e * abs(float(e @ y) / float(e @ e))
+    order = np.array([each for _, each in table.modes])
+    tilt = (order - order.mean()) / max(order.max() - 1, 1)
+    of_ends = np.column_stack([_DECADES_SD * e, MODEL_OFF * loose * tilt, left])
     found = [
-        _Pattern("tension", _TENSION_SD * s[:, None], off),
-        _Pattern("ends", np.hstack([_DECADES_SD * e[:, None], left]), ends_off),
-        _Pattern(TIME_BASE, np.hstack([np.full((n, 1), _BASE_SD), left]), none),
+        _Pattern("tension", np.column_stack([_TENSION_SD * s, MODEL_OFF * bent]), _EACH_OFF * bent),
+        _Pattern("ends", of_ends, _EACH_OFF * loose),
+        _Pattern(TIME_BASE, np.column_stack([np.full(n, _BASE_SD), left]), none),
         _Pattern(_UNEXPLAINED, left, np.full(n, _MODE_SD)),
     ]
+    planes = planes_of(table.modes)
     for plane, own in planes.items() if len(planes) > 1 else ():
+        of_end = of_ends * np.column_stack([own, own, np.ones(n)])
         found += [
-            _Pattern(
-                "end", np.hstack([(_DECADES_SD * e * own)[:, None], left]), ends_off * own, plane
-            ),
+            _Pattern("end", of_end, _EACH_OFF * loose * own, plane),
             _Pattern(_SENSOR, left, np.where(own, _MODE_SD, 0.0), plane),
         ]
     return found

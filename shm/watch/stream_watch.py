@@ -305,7 +305,7 @@ class StreamWatch:
                 events = (_event(cause, state, evidence, reading, end),)
                 state, evidence = _absorbed(state, cause), NOTHING
             else:
-                # The size is that of all readings since; the pattern's rests on a day of them.
+                evidence = _sized(evidence, cause, state)
                 moved = tuple(
                     replace(each, shift_mean=evidence.shift, shift_sd=evidence.shift_sd)
                     if each.quantity == TENSION
@@ -507,6 +507,17 @@ def _cause_of(state: StreamState, evidence: Evidence) -> Cause:
         count = np.isfinite(state.ring[later]).sum(axis=0)
         last = np.nansum(state.ring[later], axis=0) / count
     return cause_of(last - first, state.table, count)
+
+
+def _sized(evidence: Evidence, cause: Cause, state: StreamState) -> Evidence:
+    """A step of the tension by the readings' means before and after it: that no reading adds more
+    to the evidence than it may makes the evidence's own size too small."""
+    if cause.name != TENSION or evidence.kind:
+        return evidence
+    later = max(int((state.ring_day >= evidence.by_day).sum()) / _TOGETHER, 1.0)
+    own = cause.moved[0]
+    sd = math.hypot(own.shift_sd, state.bank.wander_sd / math.sqrt(later))
+    return replace(evidence, shift=own.shift_mean, shift_sd=sd)
 
 
 def _changed(state: StreamState, evidence: Evidence) -> StreamState:
