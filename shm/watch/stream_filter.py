@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 import scipy
@@ -89,7 +90,7 @@ class Bank:
             np.zeros((m, p)),
             variance[:, :, None] * np.eye(p),
             np.zeros(m),
-            *_no_beginnings(m, p),
+            **_no_beginnings(m, p),
         )
 
     @cached_property
@@ -261,16 +262,7 @@ class Bank:
 
     def without_beginnings(self) -> Bank:
         """From here on only what begins later is a change."""
-        effect, score, information, *days = _no_beginnings(*self.mean.shape)
-        return replace(
-            self,
-            effect=effect,
-            score=score,
-            information=information,
-            after_day=days[0],
-            by_day=days[1],
-            span_days=days[2],
-        )
+        return replace(self, **_no_beginnings(*self.mean.shape))
 
 
 @lru_cache(maxsize=64)
@@ -292,9 +284,10 @@ def _transition(days: float, p: int) -> tuple[FloatArray, FloatArray, FloatArray
     return step, np.swapaxes(step, 1, 2)[:, None].astype(np.float32), noise
 
 
-def _no_beginnings(m: int, p: int) -> tuple[FloatArray, ...]:
-    none = np.zeros((m, 0, 2))
-    return np.zeros((m, 0, 2, p), np.float32), none, none, np.zeros(0), np.zeros(0), np.zeros(0)
+def _no_beginnings(m: int, p: int) -> dict[str, Any]:
+    days = dict.fromkeys(("after_day", "by_day", "span_days"), np.zeros(0))
+    sums = dict.fromkeys(("score", "information"), np.zeros((m, 0, 2)))
+    return {"effect": np.zeros((m, 0, 2, p), np.float32), **sums, **days}
 
 
 @dataclass(frozen=True)
