@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 import scipy
@@ -35,8 +36,8 @@ LEVEL, SLOPE, SLOW, FAST, _RATE, FEATURES = range(6)
 # that stay. Hours: sun on one side, traffic. Judgement, after the worlds of `tests/worlds`.
 _SEASON_PER_ROOT_YEAR = 3e-3
 _FAST_DAYS, _SLOW_DAYS = 1.3 / 24, 1.5
-_FAST_SD = np.repeat([3e-4, 1e-3, 3e-3, 8e-3], 2)
-_SLOW_SD = _FAST_SD * np.tile([0.15, 0.7], 4)
+_FAST_SD = np.geomspace(2e-4, 1e-2, 8)
+_SLOW_SD = 0.25 * _FAST_SD
 _UNSTEADY = (
     0.2  # judgement: of the hours' wander, by what each reading is off on its own: live load
 )
@@ -89,7 +90,7 @@ class Bank:
             np.zeros((m, p)),
             variance[:, :, None] * np.eye(p),
             np.zeros(m),
-            *_no_beginnings(m, p),
+            **_no_beginnings(m, p),
         )
 
     @cached_property
@@ -246,31 +247,22 @@ class Bank:
 
     def changed(self, evidence: Evidence) -> Bank:
         """With the likeliest change taken into the state, and none that began before now."""
-        at = (slice(None), evidence.beginning, evidence.kind)
-        prior = 1 / (_STEP_SD, _SLOPE_SD)[evidence.kind] ** 2
-        tempered = self._tempered[evidence.beginning, 0]
-        precision = self.information[at] / tempered + prior
-        effect = self.effect[at].astype(np.float64)
-        more = effect[:, :, None] * effect[:, None, :] / precision[:, None, None]
+        reach = (1.0, self.day - self.after_day[evidence.beginning])[evidence.kind]
+        effect = self.effect[:, evidence.beginning, evidence.kind].astype(np.float64) / reach
+        more = effect[:, :, None] * effect[:, None, :] * evidence.shift_sd**2
         bank = replace(
-            self,
-            mean=self.mean + effect * (self.score[at] / tempered / precision)[:, None],
-            covariance=self.covariance + more,
+            self, mean=self.mean + effect * evidence.shift, covariance=self.covariance + more
         )
         return bank.without_beginnings()
 
+    @property
+    def wander_sd(self) -> float:
+        """By what ln T wanders within a day or two."""
+        return math.sqrt(float(self.weight @ (_FAST_SD**2 + _SLOW_SD**2)))
+
     def without_beginnings(self) -> Bank:
         """From here on only what begins later is a change."""
-        effect, score, information, *days = _no_beginnings(*self.mean.shape)
-        return replace(
-            self,
-            effect=effect,
-            score=score,
-            information=information,
-            after_day=days[0],
-            by_day=days[1],
-            span_days=days[2],
-        )
+        return replace(self, **_no_beginnings(*self.mean.shape))
 
 
 @lru_cache(maxsize=64)
@@ -292,9 +284,10 @@ def _transition(days: float, p: int) -> tuple[FloatArray, FloatArray, FloatArray
     return step, np.swapaxes(step, 1, 2)[:, None].astype(np.float32), noise
 
 
-def _no_beginnings(m: int, p: int) -> tuple[FloatArray, ...]:
-    none = np.zeros((m, 0, 2))
-    return np.zeros((m, 0, 2, p), np.float32), none, none, np.zeros(0), np.zeros(0), np.zeros(0)
+def _no_beginnings(m: int, p: int) -> dict[str, Any]:
+    days = dict.fromkeys(("after_day", "by_day", "span_days"), np.zeros(0))
+    sums = dict.fromkeys(("score", "information"), np.zeros((m, 0, 2)))
+    return {"effect": np.zeros((m, 0, 2, p), np.float32), **sums, **days}
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,179 @@
+"""What moved the modes of a stream, by the pattern of it: the hanger, a sensor or a clock.
+
+A tension moves each mode by its sensitivity, springs the lower ones of a stiff bar more, a time
+base all alike, a sensor those of its plane, each as it likes. The hypotheses are compared by their
+evidence; each leaves room for one mode that goes astray by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shm.values import PLANES, FloatArray, Moved
+from shm.watch.stream_reading import LEAST_SD, ModeTable, planes_of
+
+TIME_BASE = "timebase"
+_SENSOR, _UNEXPLAINED = "sensor_mass", "unexplained"
+_MEASUREMENT = (TIME_BASE, _SENSOR, _UNEXPLAINED)
+# Prior sds: 3 % of ln T, 0.3 decades (`quantities`), 1 % of a time base and of single modes.
+_TENSION_SD, _DECADES_SD, _BASE_SD, _MODE_SD = 0.03, 0.3, 0.01, 0.01
+_ALIKE = 20.0  # a log Bayes factor of 3, as `Moved.alike` has it
+_HOURS_TOGETHER = 3.0  # judgement: of that many readings the errors are one
+MODEL_OFF = 0.2  # judgement: of bending's share in a sensitivity, and of springs'
+_EACH_OFF = 0.05  # judgement: likewise, of each mode by itself
+_LEFT_SD = 1e-3  # of ln T: what the conditions leave while something else changes
+_ASTRAY_SD, _ASTRAY = 0.03, 0.02  # judgement: how far and how often a single mode goes astray
+# Judgement: tensions, ends in both planes, ends in one, a time base, one plane's sensors, others.
+_PRIORS = {"tension": 0.5, "ends": 0.1, "end": 0.1, TIME_BASE: 0.1, _SENSOR: 0.1, _UNEXPLAINED: 0.1}
+
+
+@dataclass(frozen=True, eq=False)
+class _Pattern:
+    """A hypothesis of what moved n modes: along columns (n, k) of prior sd 1, modes off by `sd`."""
+
+    name: str
+    columns: FloatArray
+    sd: FloatArray
+    plane: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """What moved the modes most likely, all that may have `moved`, and how each mode did."""
+
+    name: str
+    moved: tuple[Moved, ...]
+    by_mode: FloatArray
+    size: float
+    plane: str = ""
+
+    @property
+    def is_measurement(self) -> bool:
+        """Whether it is none of the hanger, so that nobody need go there today."""
+        return self.name in _MEASUREMENT
+
+    @property
+    def words(self) -> str:
+        if self.name == TIME_BASE:
+            return (
+                f"All frequencies moved by one same fraction, {100 * self.size:+.2f} %: "
+                "the time base, not the tension. Check the logger's clock and sampling rate."
+            )
+        if self.name == _SENSOR:
+            return (
+                f"Only the modes of the {self.plane} plane moved, each by its own fraction: the "
+                "sensors, not the tension. Check which sensors are mounted, and where."
+            )
+        return (
+            "The modes moved, each by its own fraction, as no tension moves them. "
+            "Check sensors, channels and the orders of modes."
+        )
+
+
+def cause_of(moved: FloatArray, table: ModeTable, readings: FloatArray) -> Cause:
+    """Of mean log frequencies that moved (n,), NaN where unknown, over so many `readings` each."""
+    known = np.isfinite(moved) & (readings > 0)
+    sub = replace(
+        table,
+        modes=tuple(mode for mode, own in zip(table.modes, known, strict=True) if own),
+        **{name: getattr(table, name)[known] for name in ("tension", "ends", "spread")},
+    )
+    y, count = moved[known], np.maximum(readings[known] / _HOURS_TOGETHER, 1)
+    variance = sub.spread / count + LEAST_SD**2
+    patterns = _patterns(sub, y)
+    fits = [_fit(y, variance, each) for each in patterns]
+    log_each = np.array([fit[0] for fit in fits])
+    chance = np.exp(log_each - log_each.max())
+    chance = chance / chance.sum()
+    best = int(chance.argmax())
+    total = _moved_quantities(patterns, fits, chance)
+    size = fits[best][1]
+    if patterns[best].name == TIME_BASE:  # of all modes, those too that sleep at night
+        size = float(np.median(y))
+        moved = np.full(len(known), size)
+    return Cause(patterns[best].name, total, moved, size, patterns[best].plane)
+
+
+def _patterns(table: ModeTable, y: FloatArray) -> list[_Pattern]:
+    """All hypotheses; the larger a change, the more it is off by what the patterns are off."""
+    s, e, n = table.tension, table.ends, len(table.tension)
+    left, none = _LEFT_SD * s[:, None], np.zeros(n)
+    bent = (0.5 - s) * abs(float(s @ y) / float(s @ s))
+    loose = e * abs(float(e @ y) / float(e @ e))
+    order = np.array([each for _, each in table.modes])
+    tilt = (order - order.mean()) / max(order.max() - 1, 1)
+    of_ends = np.column_stack([_DECADES_SD * e, MODEL_OFF * loose * tilt, left])
+    found = [
+        _Pattern("tension", np.column_stack([_TENSION_SD * s, MODEL_OFF * bent]), _EACH_OFF * bent),
+        _Pattern("ends", of_ends, _EACH_OFF * loose),
+        _Pattern(TIME_BASE, np.column_stack([np.full(n, _BASE_SD), left]), none),
+        _Pattern(_UNEXPLAINED, left, np.full(n, _MODE_SD)),
+    ]
+    planes = planes_of(table.modes)
+    for plane, own in planes.items() if len(planes) > 1 else ():
+        of_end = of_ends * np.column_stack([own, own, np.ones(n)])
+        found += [
+            _Pattern("end", of_end, _EACH_OFF * loose * own, plane),
+            _Pattern(_SENSOR, left, np.where(own, _MODE_SD, 0.0), plane),
+        ]
+    return found
+
+
+def _fit(y: FloatArray, variance: FloatArray, pattern: _Pattern) -> tuple[float, float, float]:
+    """Log evidence, size along the first column with its sd; a mode may have gone astray."""
+    n = len(y)
+    astray = [np.zeros(n), *(_ASTRAY_SD**2 * np.eye(n) if n > 2 else ())]
+    both = [_normal(y, variance + pattern.sd**2 + more, pattern.columns) for more in astray]
+    log_each = np.array([each[0] for each in both]) + np.where(
+        np.arange(len(both)) > 0, math.log(_ASTRAY), 0.0
+    )
+    best = int(log_each.argmax())
+    prior = _PRIORS[pattern.name] / (2 if pattern.plane else 1)
+    return float(np.logaddexp.reduce(log_each)) + math.log(prior), both[best][1], both[best][2]
+
+
+def _normal(y: FloatArray, variance: FloatArray, columns: FloatArray) -> tuple[float, float, float]:
+    covariance = columns @ columns.T + np.diag(variance)
+    solved = np.linalg.solve(covariance, np.column_stack([y, columns[:, 0]]))
+    log = -(np.linalg.slogdet(covariance)[1] + float(y @ solved[:, 0])) / 2
+    return (
+        log,
+        float(columns[:, 0] @ solved[:, 0]),
+        math.sqrt(max(1 - float(columns[:, 0] @ solved[:, 1]), 0.0)),
+    )
+
+
+def _moved_quantities(
+    patterns: Sequence[_Pattern], fits: Sequence[tuple[float, float, float]], chance: FloatArray
+) -> tuple[Moved, ...]:
+    """What may have moved, in the words that alerts have for it; the likeliest first."""
+    order = np.argsort(-chance)
+    alike = tuple(
+        name
+        for i in order[1:]
+        if chance[i] > chance[order[0]] / _ALIKE
+        for name in _names(patterns[i])[:1]
+    )
+    found: dict[str, Moved] = {}
+    for rank, i in enumerate(order):
+        names = _names(patterns[i])
+        unit = {"tension": _TENSION_SD, TIME_BASE: _BASE_SD}.get(patterns[i].name, _DECADES_SD)
+        for name in names:
+            together = tuple(each for each in names if each != name)
+            plane = next((each for each in PLANES if name.startswith(each)), None)
+            size, sd = (unit * each for each in fits[i][1:])
+            each = Moved(
+                name, float(chance[i]), size, sd, None, plane, () if rank else alike, together
+            )
+            found.setdefault(name, each)
+    return tuple(found.values())
+
+
+def _names(pattern: _Pattern) -> tuple[str, ...]:
+    if pattern.name == "ends":
+        return ("transverse_end_stiffness", "longitudinal_end_stiffness")
+    return (f"{pattern.plane}_end_stiffness",) if pattern.name == "end" else (pattern.name,)

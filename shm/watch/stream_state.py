@@ -1,0 +1,193 @@
+"""What goes from one reading of a stream to the next: kept as bytes of a bounded size.
+
+Beside modes and filters it is the conditions: temperatures as they lag, the level and the wind at
+first, and the modes of the last day, by which a change is told apart.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field, fields, replace
+from datetime import datetime
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from shm.errors import BadInput
+from shm.values import NAN, FloatArray
+from shm.values.stream import PooledReading
+from shm.watch.alert_state import AlertState
+from shm.watch.stream_filter import FEATURES, Bank
+from shm.watch.stream_reading import ModeTable, SeenReading
+
+HOURS_A_DAY = 24.0
+# Prior sds of what the conditions do to ln T: a kelvin now, over 3 hours' mean, over a day's, over
+# ten days' (1e-3 each: `WatchOptions.tension_per_kelvin_sd`), that of its square (judgement: 0.2 %
+# at 10 K), an e-fold of the excitation (`tension_per_amplitude_sd`), a m/s of wind (judgement: a
+# storm of 20 m/s moves a deck's loads by 0.4 %), and the sun's round (judgement).
+_LAGS_DAYS = np.array([2.0, 14.0, 240.0]) / HOURS_A_DAY
+CONDITION_SD = np.array([1e-3] * 4 + [2e-5, 2e-3, 2e-4] + [1e-3] * 6)
+# Judgement: by what an hour's temperature differs from ten days' mean, and that the errors of some
+# ten hours without a thermometer are one error: an hour counts for a third of what it would.
+_UNKNOWN_K, TOGETHER = 4.0, 3.0
+_RING = 24  # readings: a change is told within a day or is slow
+OLD_READINGS = 120.0  # judgement: five days, as what a mode differs by is learnt over
+
+
+@dataclass(frozen=True, eq=False)
+class StreamState:
+    """What goes from reading to reading. Days count from `start`.
+
+    `lagged_c` are the temperature's exponential means, `reference` its first value, that of the
+    log level and of the wind; `known_day` is the last with a temperature. `ring` (24, n) are the
+    newest readings' modes with the conditions taken off, `ring_day` their days, `old` (n,) the mean
+    of those before. Shifts count from `zero`, compensated ones from `compensated_zero`; a change
+    that was told moved the tension by `called_shift` from `called_from` on, 0 where none stands.
+    """
+
+    key: str
+    start: datetime
+    table: ModeTable
+    bank: Bank
+    lagged_c: FloatArray
+    reference: FloatArray
+    ring: FloatArray
+    ring_day: FloatArray
+    old: FloatArray
+    known_day: float = 0.0
+    zero: float = 0.0
+    compensated_zero: float = 0.0
+    readings: int = 0
+    is_learning: bool = True
+    called_from: float = 0.0
+    called_shift: float = 0.0
+    told: AlertState = field(default_factory=AlertState)
+    standing: tuple[str, ...] = ()
+
+    @classmethod
+    def begun(cls, key: str, start: datetime, table: ModeTable) -> StreamState:
+        n = len(table.modes)
+        return cls(
+            key,
+            start,
+            table,
+            Bank.begun(0.0, CONDITION_SD),
+            lagged_c=np.full(3, NAN),
+            reference=np.full(3, NAN),
+            ring=np.zeros((0, n)),
+            ring_day=np.zeros(0),
+            old=np.full(n, NAN),
+        )
+
+    def to_bytes(self) -> bytes:
+        """The state as a line of JSON, and the bytes of all arrays after it."""
+        arrays = {
+            f"{name}.{each.name}": value
+            for name, part in (("state", self), ("table", self.table), ("bank", self.bank))
+            for each in fields(part)
+            if isinstance(value := getattr(part, each.name), np.ndarray)
+        }
+        head = {name: getattr(self, name) for name in _SCALARS} | {
+            "start": self.start.isoformat(),
+            "day": self.bank.day,
+            "watched": self.bank.watched,
+            "tension_n": self.table.tension_n,
+            "modes": self.table.modes,
+            "told": self.told.to_text(),
+            "arrays": [(name, each.dtype.str, each.shape) for name, each in arrays.items()],
+        }
+        return b"\n".join(
+            [json.dumps(head).encode(), b"".join(map(np.ndarray.tobytes, arrays.values()))]
+        )
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> StreamState:
+        """The state back; raises BadInput where the content is no such state."""
+        try:
+            line, _, rest = content.partition(b"\n")
+            head = json.loads(line)
+            parts: dict[str, dict[str, Any]] = {"state": {}, "table": {}, "bank": {}}
+            at = 0
+            for name, kind, shape in head["arrays"]:
+                part, _, own = name.partition(".")
+                count = math.prod(shape)
+                parts[part][own] = np.frombuffer(rest, kind, count, at).reshape(shape)
+                at += parts[part][own].nbytes
+            modes = tuple((plane, order) for plane, order in head["modes"])
+            return cls(
+                start=datetime.fromisoformat(head["start"]),
+                table=ModeTable(modes=modes, tension_n=head["tension_n"], **parts["table"]),
+                bank=Bank(day=head["day"], watched=head["watched"], **parts["bank"]),
+                told=AlertState.from_text(head["told"]),
+                **{name: head[name] for name in _SCALARS},
+                **parts["state"],
+            )
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise BadInput(
+                f"A kept state of a stream's watch cannot be read: {error!r}.",
+                remedy="Drop it: the watch then learns the stream's baseline anew.",
+            ) from error
+
+
+_SCALARS = (
+    "key", "known_day", "zero", "compensated_zero", "readings", "is_learning", "called_from",
+    "called_shift", "standing",
+)  # fmt: skip
+
+
+def warmth(state: StreamState) -> float:
+    """Of the steel: an hour or three behind the air's."""
+    warmth = float(state.lagged_c[0] - state.reference[0])
+    return warmth if math.isfinite(warmth) else 0.0
+
+
+def with_conditions(
+    state: StreamState, reading: PooledReading, day: float
+) -> tuple[StreamState, FloatArray, float]:
+    """The conditions of a reading, and the variance that unknown ones add to it."""
+    level = math.log(reading.level_m_s2) if reading.level_m_s2 > 0 else NAN
+    now = np.array([reading.temperature_c, level, reading.wind_m_s])
+    reference = np.where(np.isfinite(state.reference), state.reference, now)
+    lagged, known_day, extra = state.lagged_c, state.known_day, 0.0
+    if math.isfinite(reading.temperature_c):
+        share = -np.expm1((known_day - day) / _LAGS_DAYS)
+        lagged = np.where(np.isfinite(lagged), lagged + share * (now[0] - lagged), reference[0])
+        kelvin, known_day = np.array([now[0], *lagged, reference[0]]), day
+    else:  # as warm as it was in the last ten days, give or take what a day brings
+        kelvin = np.nan_to_num(np.append(np.full(4, lagged[-1]), reference[0]))
+        of_kelvin = range(FEATURES, FEATURES + len(_LAGS_DAYS))
+        square = sum(
+            sum(part**2 for part in state.bank.along(unit))
+            for unit in np.eye(state.bank.mean.shape[1])[of_kelvin]
+        )
+        extra = TOGETHER * square * _UNKNOWN_K**2 if math.isfinite(lagged[-1]) else 0.0
+    now = np.where(np.isfinite(now), now, reference)
+    steps = [before - behind for before, behind in pairwise(kelvin)]
+    hour = 2 * math.pi * ((state.start.hour + state.start.minute / 60) / HOURS_A_DAY + day)
+    others = np.nan_to_num(now[1:] - reference[1:])
+    warm = kelvin[2] - kelvin[4]
+    rounds = hour * np.arange(1, 4)
+    conditions = np.array([*steps, warm**2, *others, *np.sin(rounds), *np.cos(rounds)])
+    state = replace(state, lagged_c=lagged, reference=reference, known_day=known_day)
+    return state, conditions, extra
+
+
+def with_ring(
+    state: StreamState, seen: SeenReading, conditions: FloatArray, day: float
+) -> StreamState:
+    """With the modes of one more reading, what the conditions do taken off."""
+    bank, n = state.bank, len(state.table.modes)
+    of_conditions = np.concatenate([np.zeros(len(bank.mean[0]) - len(conditions)), conditions])
+    now = seen.off - state.table.tension * bank.along(of_conditions)[0]
+    grown = np.full((len(state.ring), n), NAN)
+    grown[:, : state.ring.shape[1]] = state.ring
+    old = np.append(state.old, np.full(n - len(state.old), NAN))
+    ring, days = np.vstack([grown, now]), np.append(state.ring_day, day)
+    if len(ring) > _RING:
+        left, ring, days = ring[0], ring[1:], days[1:]
+        share = 1 / min(max(state.readings - _RING, 1), OLD_READINGS)
+        mixed = np.where(np.isfinite(left), old + share * (left - old), old)
+        old = np.where(np.isfinite(old), mixed, left)
+    return replace(state, ring=ring, ring_day=days, old=old)
