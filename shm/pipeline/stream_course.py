@@ -10,10 +10,10 @@ import numpy as np
 from shm.report.figures.stream_course import Course
 from shm.store import Store
 from shm.values import FloatArray
+from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PooledReading, Stream
 from shm.watch.history import Band
 
-_Z_90 = 1.645
 _LONGEST_SPECTRA = timedelta(days=7)  # technical: a thousand windows of 200 lines
 
 
@@ -61,5 +61,5 @@ def _modes(hours: Sequence[PooledReading]) -> dict[str, tuple[FloatArray, FloatA
 def _tension(hours: Sequence[PooledReading]) -> Band:
     """The change under the conditions of the beginning, in per cent, with its 90 % interval."""
     shift = 100 * np.array([each.compensated_shift for each in hours], dtype=float)
-    reach = 100 * _Z_90 * np.array([each.compensated_sd for each in hours], dtype=float)
+    reach = 100 * NINETY_PERCENT * np.array([each.compensated_sd for each in hours], dtype=float)
     return Band(shift - reach, shift, shift + reach)

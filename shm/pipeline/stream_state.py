@@ -13,6 +13,7 @@ from shm.store import Store, Workspace
 from shm.store.ring import Ring
 from shm.store.ring_files import PERIOD
 from shm.values import NAN
+from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PooledReading, Stream, StreamEvent, WindowReading
 
 State = Literal["live", "late", "silent", "never sent", "sensor at fault"]
@@ -20,7 +21,6 @@ State = Literal["live", "late", "silent", "never sent", "sensor at fault"]
 _LATE, _SILENT = timedelta(minutes=5), timedelta(hours=1)
 """judgement: loggers send each minute; a router begins anew within five minutes."""
 _LATELY = timedelta(days=1)
-_Z_90 = 1.645
 _AT_FAULT = ("dead", "drifting", "swapped", "saturated")
 _FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends it
 
@@ -128,6 +128,6 @@ def tension_words(hour: PooledReading | None) -> str:
         return "no reading yet"
     if hour.learning or not math.isfinite(hour.compensated_shift):
         return hour.learning or "not known"
-    reach = 100 * _Z_90 * hour.compensated_sd
+    reach = 100 * NINETY_PERCENT * hour.compensated_sd
     digits = min(3, max(0, 1 - math.floor(math.log10(reach)))) if reach > 0 else 3
     return f"{100 * hour.compensated_shift:+.{digits}f} ± {reach:.{digits}f} %"

@@ -22,7 +22,7 @@ from shm.watch.alert_state import AlertState
 from shm.watch.stream_filter import FEATURES, Bank
 from shm.watch.stream_reading import ModeTable, SeenReading
 
-HOURS_A_DAY = 24.0
+HOURS_A_DAY = 24.0  # by definition
 # Prior sds of what the conditions do to ln T: a kelvin now, over 3 hours' mean, over a day's, over
 # ten days' (1e-3 each: `WatchOptions.tension_per_kelvin_sd`), that of its square (judgement: 0.2 %
 # at 10 K), an e-fold of the excitation (`tension_per_amplitude_sd`), a m/s of wind (judgement: a

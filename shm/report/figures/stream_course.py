@@ -23,12 +23,12 @@ from shm.report.figures.specification import (
     stacked,
 )
 from shm.values import FloatArray
+from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import StreamEvent
 from shm.watch.history import Band as Bounds
 
 _HUES = ("blue", "orange", "green", "purple")
 _SHOWN_MODES = len(_HUES)
-_Z_90 = 1.645
 _MOST_COLUMNS = 600  # technical: a spectrogram of more columns than a screen shows
 _BREAK = timedelta(hours=3)  # judgement: after three missing hours a line would be a guess
 _OF_HEALTH = ("dead", "drifting", "swapped", "saturated", "clock step", "lost modes")
@@ -92,7 +92,7 @@ def _frequencies(course: Course) -> Panel:
     marks: list[Mark] = []
     for (name, (hz, sd)), hue in zip(course.followed.items(), _HUES, strict=False):
         middle = float(np.nanmedian(hz))
-        shift, reach = 100 * (hz / middle - 1), 100 * _Z_90 * sd / middle
+        shift, reach = 100 * (hz / middle - 1), 100 * NINETY_PERCENT * sd / middle
         times, shift, reach = _broken(course.hours, shift, reach)
         marks.append(Band(x=times, low=shift - reach, high=shift + reach, colour=hue, opacity=0.2))
         texts = [f"{name}: {middle * (1 + each / 100):.4f} Hz" for each in shift]

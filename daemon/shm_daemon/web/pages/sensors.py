@@ -39,6 +39,7 @@ _STYLES = {
 }
 _EVENTS_SHOWN = 40  # technical: what is read at a glance
 
+# As long as the store keeps of a name, and as far back as it keeps hours.
 Name = Annotated[str, Path(max_length=64)]
 Days = Annotated[float, Query(gt=0, le=800, description="How far the figure reaches back.")]
 
