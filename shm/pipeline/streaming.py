@@ -42,6 +42,7 @@ PERIODS: Mapping[Period, timedelta] = {
 _KEPT_BEFORE_ALERT = timedelta(hours=24)
 """Of raw samples, for good: what changed within a day is told within a day."""
 _AGAIN = timedelta(minutes=1)  # judgement: a machine without memory or disk is given a minute
+_OWN_DAYS = 7  # judgement: by then every class has been selected and the watch has learnt
 _OFFSETS = 144  # windows of a day, with which a sensor's offset is compared
 _WHOLE = 0.98  # judgement: of ten minutes; a chunk that lacks seconds is not waited for
 _PATIENCE = timedelta(minutes=20)  # judgement: a logger that sends each quarter of an hour
@@ -242,7 +243,7 @@ class Streaming:
                 period,
                 start,
                 hanger,
-                self._baseline(stream.hanger),
+                self._baseline(stream),
                 self.store.streams.watch_state(stream.hanger) if period == "hour" else None,
                 self.workspace.settings.false_call_years,
             ),
@@ -250,9 +251,18 @@ class Streaming:
             partial(self._give_up_pool, stream, period, start),
         )
 
-    def _baseline(self, hanger: int) -> Posterior | None:
-        found = self.store.watch.baseline(hanger)
-        return found.posterior if found is not None else None
+    def _baseline(self, stream: Stream) -> Posterior | None:
+        """The baseline of the hanger, unless it is of the stream's own first days: another model
+        would let the watch learn anew what it has half learnt.
+        """
+        found, first = self.store.watch.baseline(stream.hanger), None
+        if found is not None:
+            first = self.store.streams.first_day(stream.name)
+        if found is None or first is None:
+            return found and found.posterior
+        days = (first + n * PERIODS["day"] for n in range(_OWN_DAYS))
+        own = {f"{stream.name}-{day:%Y-%m-%d}" for day in days}
+        return None if own.issuperset(found.posterior.tests) else found.posterior
 
     def _submit(
         self,

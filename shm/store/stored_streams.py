@@ -94,6 +94,16 @@ class Streams(Repository):
             first: datetime | None = connection.scalar(query)
         return first
 
+    def first_day(self, stream: str) -> datetime | None:
+        """When the first reading of a day of a stream began; None where there is none."""
+        table = pooled_readings
+        query = sa.select(sa.func.min(table.c.start)).where(
+            table.c.stream == stream, table.c.period == "day"
+        )
+        with self.reading() as connection:
+            first: datetime | None = connection.scalar(query)
+        return first
+
     def last_pooled(self, stream: str, period: Period) -> datetime | None:
         """When the latest reading of a period began; None where there is none."""
         table = pooled_readings
