@@ -255,11 +255,12 @@ class Streaming:
         """The baseline of the hanger, unless it is of the stream's own first days: another model
         would let the watch learn anew what it has half learnt.
         """
-        found, first = self.store.watch.baseline(stream.hanger), None
-        if found is not None:
-            first = self.store.streams.first_day(stream.name)
-        if found is None or first is None:
-            return found and found.posterior
+        found = self.store.watch.baseline(stream.hanger)
+        if found is None:
+            return None
+        first = self.store.streams.first_day(stream.name)
+        if first is None:
+            return found.posterior
         days = (first + n * PERIODS["day"] for n in range(_OWN_DAYS))
         own = {f"{stream.name}-{day:%Y-%m-%d}" for day in days}
         return None if own.issuperset(found.posterior.tests) else found.posterior
