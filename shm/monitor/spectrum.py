@@ -139,10 +139,12 @@ def power_near(stretches: Sequence[Stretch], frequency_hz: float, within: float)
 class Peaks:
     """Where the known modes' peaks are; arrays (modes,), `shapes` (channels, modes).
 
-    `height_db` is over the floor; `damping` as it was known; `noise` (channels,) in m/s^2/sqrt(Hz).
-    A mode that no sensor sees has a shape of zeros; of `guessed` modes the shape is a guess.
+    `expected_hz` is where a change common to all puts them; `height_db` is over the floor;
+    `damping` as it was known; `noise` (channels,) in m/s^2/sqrt(Hz). A mode that no sensor sees has
+    a shape of zeros; of `guessed` modes the shape is a guess.
     """
 
+    expected_hz: FloatArray
     frequency_hz: FloatArray
     height_db: FloatArray
     shapes: FloatArray
@@ -177,14 +179,19 @@ def found_peaks(
     ]
     height = np.array(rows).reshape(len(known), len(shift))
     common = shift[int(np.argmax(height.sum(axis=0)))]
-    near = np.abs(shift - common) <= _ALONE + _ALONE_SHARE * abs(common)
-    best = np.argmax(np.where(near, height, -np.inf), axis=1)
-    hz = np.array([mode.frequency_hz for mode in known]) * (1 + shift[best])
+    reach = _ALONE + _ALONE_SHARE * abs(common)
+    alone = (shift - common) / reach
+    # To the reach there are two standard deviations: a higher peak farther off is another mode's.
+    best = np.argmax(np.where(np.abs(alone) <= 1, height - 2 * alone**2, -np.inf), axis=1)
+    before = np.array([mode.frequency_hz for mode in known])
+    hz = before * (1 + shift[best])
     top = height[np.arange(len(known)), best]
     for column in guessed:
         near = strongest(stretches, hz[column], within=damping[column])
         shapes[:, column] = _to_largest(near)
-    return Peaks(hz, 10 / math.log(10) * top, shapes, damping, noise, len(guessed))
+    return Peaks(
+        before * (1 + common), hz, 10 / math.log(10) * top, shapes, damping, noise, len(guessed)
+    )
 
 
 def _seen_by(known: Sequence[Mode], shapes: FloatArray, noise: FloatArray) -> list[FloatArray]:

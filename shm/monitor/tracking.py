@@ -39,6 +39,9 @@ _OTHER_PLANE = 0.08
 _LEAST_GAIN = 15.0
 """judgement: of log likelihood by which a mode is proven: its five parameters and some two hundred
 places to look make 10 by chance."""
+_NARROWER = 4.0
+"""judgement: than the mode as it was known, or than a line: a tone, of trains or machines, near it;
+the damping of a window is known to a fifth, and joints that rub double it."""
 _LEAK = 0.01  # judgement: of the power; sensors that are 6 degrees off
 _FLOOR = 0.2  # quantile of the lines of a band, as shm/identify/quality/of_ambient.py
 _STEPS_WITHOUT = 6  # technical: from the fit with the mode; what is gained later is small
@@ -177,7 +180,7 @@ class _Group:
             mode = self._mode(fit, place, self.group[index])
             if mode is not None:
                 made[self.group[index]] = mode
-        return made if self._in_order(made) else {}
+        return self._at_home(made)
 
     def _proven(self) -> tuple[BandFit, list[int]] | None:
         """The fit of the modes without each of which the lines are far less likely."""
@@ -231,6 +234,8 @@ class _Group:
         best = options.ambient_width * options.at_best(hz, damping)[0]
         if (
             _is_leak(modes, place)
+            or damping < self.peaks.damping[index] / _NARROWER
+            or decay * max(each.seconds for each in self.found.stretches) < 1.0
             or damping > self.options.max_damping_ratio
             or sd_hz > hz * max(2 * self.options.max_frequency_sd, best)
             or abs(hz / known.frequency_hz - 1) > REACH
@@ -265,16 +270,25 @@ class _Group:
         strength = np.concatenate([np.abs(np.fft.ifft(each)) ** 2 * len(each) for each in seen])
         return max(1.0, float(np.mean(strength**2) / np.mean(strength) ** 2) / 2)
 
-    def _in_order(self, made: dict[int, Mode]) -> bool:
-        """Whether no two modes have exchanged their places since they were last known."""
-        for one in made:
-            for two in made:
-                before = self.known[one].frequency_hz - self.known[two].frequency_hz
-                now = made[one].frequency_hz - made[two].frequency_hz
-                sd = math.hypot(made[one].frequency_sd_hz, made[two].frequency_sd_hz)
-                if before > _SAME * sd and now < -_SAME * sd and abs(before + now) < _SAME * sd:
-                    return False
-        return True
+    def _at_home(self, made: dict[int, Mode]) -> dict[int, Mode]:
+        """Those that are not in the place of another mode, unless that one is there, too.
+
+        Planes do not exchange their modes between two windows; sensors that see both planes let
+        one pass for the other where that one is faint.
+        """
+        expected = self.peaks.expected_hz
+        kept = {}
+        for index, mode in made.items():
+            hz = mode.frequency_hz
+            place = int(np.argmin(np.abs(expected - hz)))
+            stayed = abs(hz - expected[index]) < _SAME * mode.frequency_sd_hz
+            there = place in made and place != index
+            if there:
+                away = abs(made[place].frequency_hz - expected[place])
+                there = bool(away < abs(hz - expected[place]))
+            if place == index or stayed or there:
+                kept[index] = mode
+        return kept
 
 
 def _is_leak(modes: CloseModes, place: int) -> bool:

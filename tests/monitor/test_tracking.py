@@ -199,8 +199,12 @@ def test_a_real_recording_in_chunks_gives_the_modes_of_the_whole() -> None:
     ]
     reading = read_window(pieces, places, slow, Hanger.without_model(1), OPTIONS)
     found = _by_name(reading.modes)
-    assert len(found) >= len(whole) / 2
     for mode in slow:
         if (mode.plane, mode.order) in found:
             own = found[mode.plane, mode.order]
             assert own.frequency_hz == pytest.approx(mode.frequency_hz, rel=2e-3)
+    hz = 100 * np.array([mode.frequency_hz for mode in reading.modes])
+    # The peaks that the folder's NOTE.md names
+    named = [810, 851, 900, 2640, 3008, 3669]
+    near = [each for each in named if np.min(np.abs(hz / each - 1)) < 3e-3]
+    assert len(near) >= 5
