@@ -44,6 +44,7 @@ from shm.watch.stream_watch import (  # noqa: E402
 from tests.worlds.living_bridge import Change, describe, hourly, true_tension  # noqa: E402
 
 DAYS_A_YEAR = 365.25
+HOUR = timedelta(hours=1)
 OPPOSITE = {"transverse": "longitudinal", "longitudinal": "transverse"}
 
 
@@ -158,6 +159,7 @@ def solved(name: str, seed: int, years: float) -> dict[str, Any]:
         "years": years, "worst_years": worst, "ms": 1e3 * seconds / len(readings),
         "alerts": [
             {"hours": (a.time - at).total_seconds() / 3600, "kinds": a.kinds,
+             "readings": sum(at - HOUR < each.start < a.time for each in readings),
              "time": f"{a.time:%Y-%m-%dT%H}", "message": a.message,
              "quantity": a.change.moved[0].quantity if a.change and a.change.moved else ""}
             for a in alerts
@@ -224,6 +226,9 @@ def summary(name: str, found: Sequence[dict[str, Any]]) -> dict[str, Any]:
     elif name != "quiet":
         for hours in (6, 12, 24, 72, 240, 960):
             figures[f"within_{hours}_h"] = sum(t <= hours for t in told) / n
+        read = [min((a["readings"] for a in own), default=n * 10**6) for own in after]
+        for count in (6, 24):
+            figures[f"within_{count}_readings"] = sum(r <= count for r in read) / n
         figures["as_tension"] = (
             sum(bool(own) and own[0]["quantity"] == "tension" for own in after) / n
         )
