@@ -38,7 +38,6 @@ class ForeignModalMode:
     the largest; none where the file places no node. `damping_ratio` is NaN where it is not said.
     """
 
-    number: int
     frequency_hz: float
     damping_ratio: float
     axis: str
@@ -121,8 +120,7 @@ def _mode(
     if not (0 < frequency < 1e5):
         raise _refusal("gives no frequency of a mode", index + 1, path)
     axis, points = _shape(found, places)
-    number = int(found.get("mode_n") or 0)
-    return ForeignModalMode(number, frequency, damping, axis, points)
+    return ForeignModalMode(frequency, damping, axis, points)
 
 
 def _frequency(found: dict[str, Any]) -> tuple[float, float]:

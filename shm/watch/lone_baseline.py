@@ -66,16 +66,7 @@ def alert_of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
     message = message_of_baseline(test, hanger)
     if lead is not None and hanger.is_modelled:
         message = _message(hanger, lead, test.change.against_baseline)
-    is_alert = lead is not None and _is_no_load(lead)
-    return Alert(
-        key=f"hanger-{hanger.id}:{_KIND.replace(' ', '-')}:{short_name(test.test)}",
-        hanger=hanger.id,
-        test=test.test,
-        time=test.time,
-        message=message,
-        drifts=(lead,) if lead is not None and is_alert else (),
-        kinds=("beyond threshold",) if is_alert else (_KIND,),
-    )
+    return _alert(hanger, "check-the-baseline", (test.test, test.time), lead, message)
 
 
 def first_tests_against(
@@ -103,15 +94,23 @@ def first_tests_against(
     lead = _common(reader.quantities[j], shown, newest, hanger, options)
     if lead is None:
         return None
-    test, time = newest
+    message, test = _message(hanger, lead, len(tests)), (newest[0].id, newest[1])
+    return _alert(hanger, "first-tests-against-baseline", test, lead, message)
+
+
+def _alert(
+    hanger: Hanger, key: str, test: tuple[str, datetime], lead: Drift | None, message: str
+) -> Alert:
+    """The alert where the tension moved further than by any load; else a notice."""
+    is_alert = lead is not None and _is_no_load(lead)
     return Alert(
-        key=f"hanger-{hanger.id}:first-tests-against-baseline:{short_name(test.id)}",
+        key=f"hanger-{hanger.id}:{key}:{short_name(test[0])}",
         hanger=hanger.id,
-        test=test.id,
-        time=time,
-        message=_message(hanger, lead, len(tests)),
-        drifts=(lead,) if _is_no_load(lead) else (),
-        kinds=("beyond threshold",) if _is_no_load(lead) else (_KIND,),
+        test=test[0],
+        time=test[1],
+        message=message,
+        drifts=(lead,) if lead is not None and is_alert else (),
+        kinds=("beyond threshold",) if is_alert else (_KIND,),
     )
 
 

@@ -52,7 +52,7 @@ from shm.watch.stream_state import (
 from shm.watch.watching import after
 
 _VERSION = "stream-watch-1"
-_LENGTH = {"hour": 1.0, "six hours": 6.0, "day": 24.0}
+_LENGTH = {"hour": 1.0, "six hours": 6.0, "day": 24.0}  # hours, as their names say
 _DAY_SD = 1.25e-4  # of ln f: what a mode keeps for a day, by joints that seat anew. Judgement
 _HOURS_OF_A_FAULT = 8  # judgement: of which a mistaken mode spoils one or two
 _CALLS_KEPT = 8  # technical: of changes that were told, so that what is kept stays bounded

@@ -11,6 +11,7 @@ first ten or of one. Two processes. Nothing was tuned on the seeds that docs/tri
 from __future__ import annotations
 
 import argparse
+import csv
 import hashlib
 import importlib
 import json
@@ -33,7 +34,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from docs.filling import fill_in  # noqa: E402
+from docs.filling import fill_in, write_csv  # noqa: E402
 from shm.bridge import load_hanger  # noqa: E402
 from shm.inference import UpdateOptions, update  # noqa: E402
 from shm.models import build  # noqa: E402
@@ -45,7 +46,7 @@ from shm.watch.baseline_check import check_baseline  # noqa: E402
 from shm.watch.lone_baseline import FEW_TESTS, FIRST_TESTS, first_tests_against  # noqa: E402
 from shm.watch.watching import alerts_of  # noqa: E402
 from tests.benchmarks.watch_trial.outcomes import BEGINS  # noqa: E402
-from tests.benchmarks.watch_trial.report import save_figure, tables  # noqa: E402
+from tests.benchmarks.watch_trial.report import HEADS, events, save_figure, tables  # noqa: E402
 from tests.benchmarks.watch_trial.rivals import rivals  # noqa: E402
 
 WORLDS = ("tied_arch", "network")
@@ -252,10 +253,12 @@ def main() -> int:
             if given.answers:
                 with given.answers.open("a") as file:
                     file.writelines(json.dumps(row) + "\n" for row in found)
-    told = tables(rows)
+    told, each = tables(rows), [HEADS, *events(rows)]
     print(told)
+    csv.writer(sys.stdout).writerows(each)
     if given.write_docs:
         fill_in(PAGE, "trial", told)
+        write_csv(PAGE.with_suffix("") / "events.csv", each)
         save_figure(rows, PAGE.parent / "figures" / "watch_delays.png")
     return 0
 

@@ -10,6 +10,7 @@ import sys
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -449,3 +450,15 @@ def test_looking_changes_nothing(workspace: Workspace) -> None:
     before = state()
     examine(workspace.folder, datetime.now(UTC))
     assert state() == before
+
+
+@pytest.mark.parametrize(("since", "said"), [(3, "3 h"), (-1, "0 s")])
+def test_what_is_held_is_counted_with_how_long_it_waits(since: int, said: str) -> None:
+    """No time is negative where the clock was set back."""
+    examined = Mock(now=NOW)
+    hold = Mock(held_at=NOW - timedelta(hours=since), file_name="a.csv")
+    examined.store.recordings.list_holds.return_value = [hold]
+    (finding,) = checks.check_held(examined)
+    assert finding.level is Level.WARNING
+    assert finding.found == f"1 recording, the first for {said}: a.csv"
+    assert "--held" in finding.remedy

@@ -13,6 +13,7 @@ import pytest
 
 from shm.models import build
 from shm.models.base import Conditions
+from shm.plausibility.bar_evidence import _by_mass
 from shm.plausibility.bars import Known, Origin, OtherOrigin, _candidates, _said, doubt_of
 from shm.values import PLANES, AddedMass, Hanger, ModalTest, Mode, Supports
 from tests.helpers.hangers import HANGER_3
@@ -163,6 +164,12 @@ def test_one_mistaken_mode_and_missing_ones_are_no_other_hanger() -> None:
     wrong = replace(test.modes[3], frequency_hz=test.modes[4].frequency_hz * 0.97)
     left = (*test.modes[1:3], wrong, *test.modes[5:])
     assert doubted(replace(test, modes=left), NINE, 3) is None
+
+
+def test_a_mass_at_midspan_lowers_odd_orders_alike_and_no_even_one() -> None:
+    """Where a mode shape sin(n pi x / L) is 1 the mass counts twice, where it is 0 not at all."""
+    shift = _by_mass(np.array(0.02), np.array(0.5))[:4]
+    assert shift == pytest.approx(-0.5 * np.log(1.04) * np.array([1, 0, 1, 0]))
 
 
 def test_a_known_mass_clamped_on_is_allowed_for() -> None:

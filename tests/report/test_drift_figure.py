@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -11,9 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shm.report.figures.hanger_states import STATES
-from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
-from shm.values import FloatArray
-from shm.watch.history import Band
+from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime, _over_time
+from shm.values import TENSION, FloatArray, WatchedQuantity
+from shm.watch.history import Band, StateHistory
+from tests.helpers.hangers import HANGER_3
 
 TESTS = 60
 STEP = 40
@@ -162,3 +165,18 @@ def test_caption_and_alternative_text_say_what_is_seen(data: StatesOverTime) -> 
     unknown = replace(data, reference_temperature_c=float("nan"), changes=())
     assert "nan" not in STATES.caption(unknown) + STATES.alt(unknown)
     assert STATES.alt(unknown).endswith("Changes called: none.")
+
+
+@pytest.mark.parametrize(
+    ("name", "baseline", "reach"), [(TENSION, 700e3, 0.08 * 700e3), ("log10_k1", 7.0, 0.3)]
+)
+def test_thresholds_are_a_share_of_the_tension_and_decades_of_a_stiffness(
+    name: str, baseline: float, reach: float
+) -> None:
+    thresholds = replace(HANGER_3.thresholds, tension_shift_fraction=0.08)
+    thresholds = replace(thresholds, stiffness_shift_decades=0.3)
+    watched = WatchedQuantity(name, baseline, np.zeros(2), np.zeros(2), 0.1)
+    history: Any = Mock(spec=StateHistory)
+    found = _over_time(watched, history, replace(HANGER_3, thresholds=thresholds))
+    assert found.lower_threshold == pytest.approx(baseline - reach)
+    assert found.upper_threshold == pytest.approx(baseline + reach)

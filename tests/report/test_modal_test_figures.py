@@ -161,6 +161,12 @@ def test_records_of_one_hit_each_stand_one_after_the_other(drawn: Drawn) -> None
     assert gaps[0] > 12.0
 
 
+def test_the_time_axis_is_that_of_the_records_with_a_little_room_before(drawn: Drawn) -> None:
+    low_s, high_s = drawn["one sensor"]["time_history"].figure.axes[0].get_xlim()
+    assert -0.05 * high_s < low_s < 0
+    assert high_s > 5 * 12.0
+
+
 def test_a_channel_that_was_left_out_is_drawn_with_the_reason() -> None:
     sheet = make_sheet(places_m=EIGHT_M)
     fault = replace(

@@ -12,7 +12,7 @@ from scipy.signal import find_peaks, hilbert
 from shm.errors import UsageError
 from shm.simulate import HammerPlan, HangerState, hammer_test, natural_frequencies
 from shm.simulate.elements import plane_modes
-from shm.values import ComplexArray, FloatArray, Hanger, Recording
+from shm.values import ComplexArray, FloatArray, Hanger, Recording, Turnbuckle
 
 STATE = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
 QUIET = HammerPlan(
@@ -207,3 +207,9 @@ def test_a_state_or_plan_that_cannot_be_is_refused(
 ) -> None:
     with pytest.raises(UsageError, match=words):
         simulate(hanger, state, plan)
+
+
+def test_an_effective_length_that_the_turnbuckles_fill_is_refused(hanger: Hanger) -> None:
+    filled = replace(hanger, turnbuckles=(Turnbuckle(1.5, 3.0, 60.0, 4e6),))
+    with pytest.raises(UsageError, match="exceed that of the turnbuckles, 3 m"):
+        simulate(filled, replace(STATE, length_m=3.0), HammerPlan())

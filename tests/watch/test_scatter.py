@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shm.values import FloatArray
-from shm.watch.scatter import differences, learnt
+from shm.watch.state_sums import differences, learnt
 
 MODES, NOISE = 8, 1e-4
 FACTORS = np.random.default_rng(2).standard_normal((MODES, 3))
