@@ -23,13 +23,10 @@ from scipy.special import ndtri, stdtrit
 
 from shm.identify.contract import Finding, FoundMode, Measurement
 from shm.values import NAN, ComplexArray, FloatArray
+from shm.values.modes import MOST_SLOPE, SURE_SDS
 
-SURE = 2.5
-"""Standard deviations from which a dependence is taken for one (judgement): by chance one in 80."""
-LEAST_SLOPE = 2e-5
+_LEAST_SLOPE = 2e-5
 """Relative. A phase is known so well that a clock's shaking would show; no one needs less."""
-_MOST_SLOPE = 0.01
-"""Relative: what joints and stretching do is tenths of a percent; more is another line's phase."""
 _TO_ZERO = 0.01
 """Of a slope: by how much the frequency of small amplitude is off by the law's form at most."""
 _SLOPE_ERROR = 0.05
@@ -79,7 +76,7 @@ class _Fit:
 
 def is_sure(slope: float, sd: float) -> bool:
     """Whether a frequency depends on amplitude by more than chance and less than nonsense."""
-    return max(SURE * sd, LEAST_SLOPE) < abs(slope) < _MOST_SLOPE
+    return max(SURE_SDS * sd, _LEAST_SLOPE) < abs(slope) < MOST_SLOPE
 
 
 def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Finding:
@@ -111,7 +108,7 @@ def _with_slope(mode: FoundMode, fit: _Fit | None, usual: float) -> FoundMode:
     slope = (fit.slope, fit.slope_sd) if fit is not None else (NAN, NAN)
     known = replace(mode, amplitude_slope=slope[0], amplitude_slope_sd=slope[1])
     prior_hz = usual * mode.frequency_hz
-    if fit is None or abs(fit.slope) > _MOST_SLOPE:
+    if fit is None or abs(fit.slope) > MOST_SLOPE:
         return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, _UNSEEN * prior_hz))
     # Beside what the other modes shift, a shift that is not sure by itself counts by its share.
     vague = 0.0 if fit.is_sure else fit.shift_sd_hz**2
