@@ -17,9 +17,9 @@ from shm.values import FloatArray, IntArray, ModalTest, Mode
 from shm.watch.quantities import MeasuredMode
 
 # A frequency that is not of small amplitude has nothing of the slope where the ring-down was
-# followed to its end (0.01 to 0.07 in tests/identify/test_amplitude_dependence.py), and 2/3 where it
-# is the mean weighted with the energy while the amplitude falls as exp(-t): the integral of exp(-3t)
-# over that of exp(-2t). Uniform between the two.
+# followed to its end (0.01 to 0.07 in tests/identify/test_amplitude_dependence.py), and 2/3 where
+# it is the mean weighted with the energy while the amplitude falls as exp(-t): the integral of
+# exp(-3t) over that of exp(-2t). Uniform between the two.
 SHARE, SHARE_SD = 1 / 3, 2 / 3 / math.sqrt(12)
 
 
@@ -55,8 +55,8 @@ class AmplitudeSlopes:
     def at(
         self, test: ModalTest, modes: Sequence[Mode], own: IntArray
     ) -> tuple[FloatArray, FloatArray]:
-        """How far the log frequencies (n,) of a test's `modes` are off those of small amplitude, and
-        the sds; `own` (n,) are their columns. An amplitude not known is the baseline's."""
+        """How far the log frequencies (n,) of a test's `modes` are off those of small amplitude,
+        and the sds; `own` (n,) are their columns. An amplitude not known is the baseline's."""
         level = test.amplitude if test.amplitude > 0 else self.usual[own]
         level = np.where([mode.depends_on_amplitude for mode in modes], 0.0, level)
         slope, sd = level * self.slope[own], level * self.sd[own]

@@ -36,9 +36,7 @@ def _test(frequency_hz: FloatArray, amplitude: float, slope: float = NAN) -> Mod
 
 @pytest.fixture(scope="module")
 def reader() -> Reader:
-    return Reader(
-        posterior(THETA, "beam1", STRING), [_test(AT_REST, REFERENCE, SLOPE)], STRING
-    )
+    return Reader(posterior(THETA, "beam1", STRING), [_test(AT_REST, REFERENCE, SLOPE)], STRING)
 
 
 def test_of_a_string_the_slope_is_taken_off_in_closed_form(reader: Reader) -> None:
