@@ -99,7 +99,7 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, as_json: bool, **s
         while found.questions:  # a column with a unit may be a sensor, whose place is asked next
             answers = asked(found.questions, answers, workspace, partial(_answer, found))
             found = understand(found.survey, workspace, answers)
-        answers = asked_if_it_stays(answers, is_known=found.profile is not None)
+        answers = asked_if_it_stays(answers, is_known=found.profile is not None or dry_run)
     landed, profile = None, found.profile
     if found.is_ready and not dry_run:
         profile = keep_profile(found, workspace, each_time=answers.each_time)

@@ -33,7 +33,7 @@ def import_modes(
         answers = asked(
             found.questions, answers, workspace, lambda _, text: {"plane": plane_named(text)}
         )
-        answers = asked_if_it_stays(answers, is_known=found.is_known)
+        answers = asked_if_it_stays(answers, is_known=found.is_known or dry_run)
         found = understand_modes(modes, workspace, answers)
     landed = None
     if found.test is not None and not dry_run:
