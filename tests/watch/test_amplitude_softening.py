@@ -40,8 +40,8 @@ def reader() -> Reader:
 
 
 def test_of_a_string_the_slope_is_taken_off_in_closed_form(reader: Reader) -> None:
-    """A slope of c at amplitude 1/2 is 3 c at 3/2; a third of it is taken off, and T goes as f^2:
-    ln(T/T0) = 2 (ln(f/f0) - c). Its error counts in every mode: N/4 over the variance."""
+    """A slope of c at amplitude 1/2 is 3 c at 3/2; `SHARE` of it is taken off, and T goes as f^2:
+    ln(T/T0) = 2 (ln(f/f0) - 3 c SHARE). Its error counts in every mode: N/4 over the variance."""
     fallen = AT_REST * np.exp(SHARE * HARD / REFERENCE * SLOPE)
     reading = reader.reading(_test(fallen, HARD), WHEN)
     assert reading.mean == pytest.approx([0.0], abs=1e-6)

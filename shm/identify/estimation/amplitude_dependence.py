@@ -28,23 +28,30 @@ from shm.values.modes import MOST_SLOPE, SURE_SDS
 _LEAST_SLOPE = 2e-5
 """Relative. A phase is known so well that a clock's shaking would show; no one needs less."""
 _TO_ZERO = 0.01
-"""Of a slope: by how much the frequency of small amplitude is off by the law's form at most."""
+"""Of a slope: by how much the frequency of small amplitude is off by the law's form at most. In
+tests/identify/test_amplitude_dependence.py 1 % of a slope of 1e-3 is four standard deviations of
+all else; in the trial below nothing hangs on it."""
 _SLOPE_ERROR = 0.05
-"""Of a slope: how the law looks in the first instants is carried back from later ones."""
+"""Of a slope: how the law looks in the first instants is carried back from later ones (judgement).
+It is in the slope's standard deviation alone."""
+
+# What follows is tried by tests/benchmarks/identify_ablation.py on 182 modes of hangers that soften
+# or harden (tests/worlds, seeds 3 to 10): 90 % intervals of the frequencies cover 89 %, 73 % where
+# frequencies stay as they were found, whose errors are then twice as large.
 _UNSEEN = 2.0
-"""Times what others shift: one that is not seen in the phases may shift more."""
+"""Times what others shift: one that is not seen in the phases may shift more. 86 % without."""
 _LAW_ERROR = 0.15
-"""Of a shift: friction and stretching differ by so much where both fit."""
+"""Of a shift: friction and stretching differ by so much where both fit. 82 % without."""
 _SOME = 0.2
+"""Share of the modes that must be sure, for others to be corrected, too. 82 % if they never are."""
 _OVERLAP = 2.0
-"""Stretches overlap by half: so much less is known than they seem to say."""
+"""Stretches overlap by half: so much less is known than they seem to say. 78 % without."""
 _STRETCH_SECONDS = 0.5  # judgement: some periods of most modes; phases turn by little in it
 _MOST_STRETCHES = 40  # technical: time
 _LEAST_RATIO = 2.0
-"""Of an amplitude to its standard deviation: its phase is then known to 0.2 rad."""
-_MOST_TURN = 1.5
-"""Radians from one stretch to the next: more may be another turn."""
-_RIDGE = 1e-9
+"""Of an amplitude to its standard deviation: its phase is known to half a radian. With 4 intervals
+are half as wide again and cover no more."""
+_RIDGE = 1e-9  # technical: keeps the normal equations solvable
 _TINY = np.finfo(float).tiny
 
 
@@ -201,8 +208,6 @@ def _phases(course: _Course, index: int) -> _Row | None:
     if last < 4:
         return None
     phase = np.unwrap(np.angle(motion[:last]))
-    if np.max(np.abs(np.diff(phase))) > _MOST_TURN:
-        return None
     size = np.abs(motion[:last])
     return course.middle_s[:last], phase, sd[:last] / np.maximum(size, _TINY), float(size[0])
 

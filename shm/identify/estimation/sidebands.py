@@ -18,11 +18,11 @@ from shm.identify.contract import Dropped, Finding, FoundMode
 from shm.identify.estimation.poles import modal_assurance
 
 _FARTHEST_HZ = 5.0  # judgement: what machines and traffic do to a hanger's motion is slower
-_SAME_SHAPE = 0.98
+_SAME_SHAPE = 0.98  # judgement: 17 dB above the noise, a line has so much of its mode's shape
 _SAME_RATE = 0.3
 """Of the mode's own rate of decay: a line of a tenth of its amplitude is known to about that."""
 _MOST_SHARE = 0.4  # of the mode's amplitude: half of what makes it fall to a fifth and rise
-_ALIKE = 1.6  # factor between the two lines' amplitudes
+_ALIKE = 1.6  # judgement: factor between the two lines' amplitudes, which modulation makes alike
 _LEAST_TOLERANCE = 0.1
 """Of the rate of decay, in rad/s: by so much of a line's width its middle may be off."""
 
