@@ -83,7 +83,8 @@ def nearest(hz: float, modes: Sequence[Any]) -> Any:
 def put(errors: Errors, variant: str, truths_hz: Sequence[float], modes: Sequence[Any]) -> None:
     for hz in truths_hz:
         mode = nearest(hz, modes)
-        if mode is not None:
+        own = mode and min(truths_hz, key=lambda true, at=mode: abs(at.frequency_hz - true))
+        if own == hz:  # else it is a neighbour's, and this one was missed
             off_hz = abs(mode.frequency_hz - hz)
             errors[variant].append((off_hz / hz, off_hz / mode.frequency_sd_hz))
 
