@@ -165,6 +165,8 @@ def _faults(test: ModalTest) -> Iterator[tuple[bool, str, str]]:
         yield not 1 <= mode.order <= _HIGHEST_ORDER, f"{at} order must be {_ORDERS}", "Correct it."
         yield not mode.frequency_hz > 0, f"{at} frequency_hz must be positive", "Correct it."
         yield mode.frequency_sd_hz < 0, f"{at} frequency_sd_hz is negative", _LEAVE_OUT
+        slope_is_wrong = mode.amplitude_slope_sd < 0 or abs(mode.amplitude_slope) >= 1
+        yield slope_is_wrong, f"{at} amplitude_slope is no fraction with a deviation", _LEAVE_OUT
         twice = places.count(places[i]) > 1
         yield twice, f": {mode.plane} mode {mode.order} is given twice", "Keep one."
     mass = test.added_mass

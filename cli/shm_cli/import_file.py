@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,7 @@ from shm.read.sandbox import foreign_modes
 from shm.store import Workspace
 from shm_cli.common import json_option, open_workspace, show, show_table, table
 from shm_cli.import_modes import import_modes
+from shm_cli.import_prompts import asked, asked_if_it_stays
 from shm_cli.parameter_types import Time
 from shm_daemon.landing import Landed, incoming
 
@@ -47,6 +49,9 @@ UFF_SUFFIXES = (".uff", ".unv", ".uf")
 @click.command()
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option("--hanger", type=click.IntRange(min=0), metavar="N", help="The hanger tested.")
+@click.option(
+    "--each-time", is_flag=True, help="The logger goes from hanger to hanger: ask each time."
+)
 @click.option(
     "--place", multiple=True, metavar="[NAME=]M", help="Metres of a sensor from the deck end."
 )
@@ -69,7 +74,8 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, as_json: bool, **s
 
     Shows each column, what it is taken for, its range, hits and clipping. What you answer (hanger,
     place and plane of the sensors) is kept in the workspace, in loggers/; later files of the same
-    logger need nothing and may go into the spool as they are.
+    logger need nothing and may go into the spool as they are. With --each-time the hanger is not
+    kept: each file says it, or you do.
 
     Without a terminal nothing is asked: exit code 3, and the options to add.
 
@@ -90,11 +96,13 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, as_json: bool, **s
     found = understand(first.survey, workspace, answers) if answers != _whole_file(said) else first
     if found.questions and asks:
         _show(found)
-        answers = _asked(found.questions, answers, found)
-        found = understand(found.survey, workspace, answers)
+        while found.questions:  # a column with a unit may be a sensor, whose place is asked next
+            answers = asked(found.questions, answers, workspace, partial(_answer, found))
+            found = understand(found.survey, workspace, answers)
+        answers = asked_if_it_stays(answers, is_known=found.profile is not None or dry_run)
     landed, profile = None, found.profile
     if found.is_ready and not dry_run:
-        profile = keep_profile(found, workspace)
+        profile = keep_profile(found, workspace, each_time=answers.each_time)
         landed = _land(file, workspace, found)
     if as_json:
         show(_document(found, profile, landed))
@@ -126,6 +134,7 @@ def _whole_file(said: dict[str, Any]) -> Answers:
         math.nan if rate is None else rate,
         time,
         math.nan if temperature is None else temperature,
+        each_time=said["each_time"],
     )
 
 
@@ -185,30 +194,8 @@ def _column(name: str, names: Sequence[str]) -> str:
     raise UsageError(f"the file has no column {name!r}.", remedy=f"It has {', '.join(names)}.")
 
 
-def _asked(questions: Sequence[Question], answers: Answers, found: Import) -> Answers:
-    """The answers of the person at the terminal; what follows from them is asked again."""
-    tables = {name: dict(given) for name, given in answers.channels.items()}
-    for question in questions:
-        if question.about == "hanger":
-            answers = replace(answers, hanger=click.prompt(question.text, type=int))
-        elif question.about == "rate":
-            answers = replace(answers, sampling_rate_hz=click.prompt(question.text, type=float))
-        else:
-            prompt = _taking(question, found)
-            tables.setdefault(question.channel, {}).update(
-                click.prompt(question.text, value_proc=prompt)
-            )
-    return replace(answers, channels=tables)
-
-
-def _taking(question: Question, found: Import) -> Callable[[str], dict[str, object]]:
-    def take(text: str) -> dict[str, object]:
-        try:
-            return answer_to(question, text, found)
-        except UsageError as error:
-            raise click.UsageError(str(error)) from error
-
-    return take
+def _answer(found: Import, question: Question, text: str) -> dict[str, object]:
+    return answer_to(question, text, found)
 
 
 # ---------------------------------------------------------------- what is shown and kept
@@ -282,7 +269,7 @@ def _say_next(
         return
     if profile is not None:
         where = profile.path.relative_to(workspace.folder)
-        roams = " It was at several hangers: each file must say its own." * profile.roams
+        roams = " It goes from hanger to hanger: each file must say its own." * profile.roams
         click.echo(f"Kept for all files of this logger: {where}.{roams}")
     running = workspace.holder() is not None
     then = "the daemon takes it" if running else "no daemon runs; `shm daemon --once` takes it"

@@ -18,6 +18,7 @@ from shm.pipeline.importing_modes import ImportedModes, keep_modes_profile, unde
 from shm.read.modal_sets import ForeignModes, axes_of
 from shm.store import Workspace
 from shm_cli.common import show, show_table, table
+from shm_cli.import_prompts import asked, asked_if_it_stays
 from shm_daemon.landing import Landed, incoming
 
 
@@ -29,7 +30,10 @@ def import_modes(
     answers = replace(answers, channels=_planes(planes, axes_of(modes.modes)))
     found = understand_modes(modes, workspace, answers)
     if found.questions and asks:
-        answers = _asked(found, answers)
+        answers = asked(
+            found.questions, answers, workspace, lambda _, text: {"plane": plane_named(text)}
+        )
+        answers = asked_if_it_stays(answers, is_known=found.is_known or dry_run)
         found = understand_modes(modes, workspace, answers)
     landed = None
     if found.test is not None and not dry_run:
@@ -53,16 +57,6 @@ def _planes(given: Sequence[str], axes: Sequence[str]) -> dict[str, dict[str, ob
             )
         found[axis.strip()] = {"plane": plane_named(plane.strip())}
     return found
-
-
-def _asked(found: ImportedModes, answers: Answers) -> Answers:
-    tables = dict(answers.channels)
-    for question in found.questions:
-        if question.about == "hanger":
-            answers = replace(answers, hanger=click.prompt(question.text, type=int))
-        else:
-            tables[question.channel] = {"plane": plane_named(click.prompt(question.text))}
-    return replace(answers, channels=tables)
 
 
 def _land(found: ImportedModes, workspace: Workspace) -> Landed:

@@ -107,6 +107,7 @@ def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
         _without_sd(tests),
         _without_temperature(tests),
         _without_shape_sd(tests),
+        _amplitude(tests),
     ]
     return [remark for remark in remarks if remark] + _contradictions(tests)
 
@@ -196,6 +197,19 @@ def _without_shape_sd(tests: Sequence[ModalTest]) -> str:
     return (
         f"{missing} of {len(points)} points of mode shapes have no standard deviation: their "
         f"shapes are not used, and what only shapes show stays hidden."
+    )
+
+
+def _amplitude(tests: Sequence[ModalTest]) -> str:
+    changing = [m for test in tests for m in test.modes if m.depends_on_amplitude]
+    if not changing:
+        return ""
+    most = max((mode.amplitude_slope for mode in changing), key=abs)
+    side = "lower" if most < 0 else "higher"
+    which = f"{len(changing)} frequencies depend" if len(changing) > 1 else "One frequency depends"
+    return (
+        f"{which} on amplitude, at that of a hit up to {100 * abs(most):.2g} % {side}: those of "
+        "small amplitude are compared, and the change counts as a test at another amplitude."
     )
 
 

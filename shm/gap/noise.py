@@ -3,10 +3,11 @@
 The frequencies err by their identification, by a small model error that belongs to a mode and so
 repeats in every test, and by what repeats in any case (`shm.gap.repeated_errors`): cov = factor^2
 diag(sd) R diag(sd) + sigma^2 [same plane and order] + repeated. Identification errs independently,
-but for peaks of both planes that overlap in a test: R correlates those by an unknown part. sigma is
-as likely half-normal of 2e-5, as the general model agrees with independent finite elements, as it
-is log-uniform from there to 3e-3: sound hangers of others had errors of up to 5e-4 that repeat in
-every test, and whoever takes none of it for scatter finds a cause in each. Stated standard
+but for peaks of both planes that overlap in a test: R correlates those by an unknown part, and a
+frequency of small amplitude with the same one at that of the hit. sigma is as likely half-normal of
+2e-5, as the general model agrees with independent finite elements, as it is log-uniform from there
+to 3e-3: sound hangers of others had errors of up to 5e-4 that repeat in every test, and whoever
+takes none of it for scatter finds a cause in each. Stated standard
 deviations rest on a few hits and are themselves uncertain: those of one mode in several tests are
 drawn together as far as they differ by chance, and `factor`, what is left and common to all, has a
 log-normal prior of 20 %. That of the shapes is taken from their own scatter between tests. Where no
@@ -59,6 +60,7 @@ _HERMITE = ((-1.732, 1 / 6), (0.0, 2 / 3), (1.732, 1 / 6))
 def nodes(observations: Observations, repeated: Repeated | None = None) -> tuple[NoiseNode, ...]:
     """The possibilities for `observations`; their weights add to 1."""
     repeated = repeated or Repeated.none(observations.design)
+    correlations = _correlations(observations)
     observations = replace(observations, sd=drawn_together(observations))
     stated = observations.sd[observations.design.frequencies :] ** 2
     return tuple(
@@ -67,12 +69,14 @@ def nodes(observations: Observations, repeated: Repeated | None = None) -> tuple
             float(np.log(weight * share)),
             error,
         )
-        for frequency, weight, error in _of_frequencies(observations)
+        for frequency, weight, error in _of_frequencies(observations, correlations)
         for factor, share in _factors_of_shapes(observations)
     )
 
 
-def _of_frequencies(observations: Observations) -> list[tuple[FloatArray, float, float]]:
+def _of_frequencies(
+    observations: Observations, correlations: list[tuple[FloatArray, float]]
+) -> list[tuple[FloatArray, float, float]]:
     """Covariances (F, F) of what does not repeat in any case, weights, and the errors they mean."""
     sd = observations.sd[: observations.design.frequencies]
     known, same = np.isfinite(sd), same_mode(observations.design)
@@ -82,7 +86,7 @@ def _of_frequencies(observations: Observations) -> list[tuple[FloatArray, float,
             float(of_common * of_factor * of_sigma * of_errors),
             float(sigma if known.any() else common),
         )
-        for errors, of_errors in _correlations(observations)
+        for errors, of_errors in correlations
         for common, of_common in zip(*_unknown_sds(known), strict=True)
         for factor, of_factor in zip(*_factors(known), strict=True)
         for sigma, of_sigma in zip(*_model_errors(known), strict=True)
@@ -95,17 +99,25 @@ def _correlations(observations: Observations) -> list[tuple[FloatArray, float]]:
 
     None where a standard deviation is unknown: that outweighs it.
     """
-    design = observations.design
-    log_frequency, alone = observations.value[: design.frequencies], np.eye(design.frequencies)
+    design, sd = observations.design, observations.sd[: observations.design.frequencies]
+    names = np.array([each.test for each in design.conditions])[design.frequency_test]
+    same_test = np.equal.outer(names, names)
+    same_mode_of_test = same_test * same_mode(design)
+    first = np.argmax(same_mode_of_test, axis=1)
+    # At the amplitude of the hit a frequency has its own error and, independently, its slope's.
+    shared = np.where(np.isfinite(sd), sd[first] / sd, 1.0)
+    alone = np.diag(1 - shared**2) + np.outer(shared, shared) * same_mode_of_test
+    log_frequency = observations.value[first]
     overlap = (
         (np.abs(np.subtract.outer(log_frequency, log_frequency)) < OVERLAP)
-        & np.equal.outer(design.frequency_test, design.frequency_test)
+        & same_test
         & np.equal.outer(design.frequency_order, design.frequency_order)
         & np.not_equal.outer(design.frequency_plane, design.frequency_plane)
     )
-    if not overlap.any() or np.isnan(observations.sd[: design.frequencies]).any():
+    if not overlap.any() or np.isnan(sd).any():
         return [(alone, 1.0)]
-    return [(alone + each * overlap, 1 / len(CORRELATIONS)) for each in CORRELATIONS]
+    both = np.outer(shared, shared) * overlap
+    return [(alone + each * both, 1 / len(CORRELATIONS)) for each in CORRELATIONS]
 
 
 def drawn_together(observations: Observations) -> FloatArray:

@@ -4,6 +4,9 @@ A shape is scaled to unit length over its own components. Where they are not equ
 length is the one weighted by 1/sd^2 (to a mean weight of 1), lest the error of an uncertain
 component spread over the certain ones.
 
+Where a test says how its frequencies depend on amplitude, it counts as two: its frequencies of
+small amplitude at amplitude 0, and at that of its hits those that change, each by its own slope.
+
 How much of a shape's standard deviations is that of its direction about the hanger's axis.
 
 Where two planes' frequencies are all but equal, noise turns both shapes at will: every component
@@ -14,7 +17,8 @@ by `own` alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,8 +52,9 @@ def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
     Raises BadInput where there are no tests, fewer than two frequencies, a frequency or a sensor's
     place that cannot be, or one mode twice in a test.
     """
-    modes = [(t, mode) for t, test in enumerate(tests) for mode in test.modes]
     _refuse_nonsense(tests, hanger)
+    tests = [level for test in tests for level in _by_level(test)]
+    modes = [(t, mode) for t, test in enumerate(tests) for mode in test.modes]
     frequency = np.array([mode.frequency_hz for _, mode in modes])
     sd = np.array([mode.frequency_sd_hz for _, mode in modes]) / frequency
     least = _least_sd(tests)
@@ -85,7 +90,7 @@ def survey_of(tests: Sequence[ModalTest]) -> Survey:
     axes = {(PLANES.index(mode.plane), c.axis) for mode in modes for c in _components(0, mode)}
     masses = {test.added_mass for test in tests if test.added_mass is not None}
     return Survey(
-        tests=tuple(test.id for test in tests),
+        tests=tuple(dict.fromkeys(test.id for test in tests)),
         planes=tuple(plane for plane in PLANES if any(mode.plane == plane for mode in modes)),
         sensor_places_m=_merged([each.x_m for each in components]),
         biaxial=any(plane != axis for plane, axis in axes),
@@ -93,6 +98,25 @@ def survey_of(tests: Sequence[ModalTest]) -> Survey:
         amplitudes=_distinct([test.amplitude for test in tests]),
         added_masses=tuple(sorted(masses, key=lambda mass: (mass.x_m, mass.mass_kg))),
     )
+
+
+def _by_level(test: ModalTest) -> Iterator[ModalTest]:
+    """A test at small amplitude and at that of its hits, as far as it is sure of the difference."""
+    changing = [
+        replace(
+            mode,
+            frequency_hz=mode.frequency_hz * (1 + mode.amplitude_slope),
+            frequency_sd_hz=(1 + mode.amplitude_slope)
+            * math.hypot(mode.frequency_sd_hz, mode.frequency_hz * mode.amplitude_slope_sd),
+            shape=(),
+        )
+        for mode in test.modes
+        if mode.depends_on_amplitude and mode.frequency_sd_hz > 0
+    ]
+    yield replace(test, amplitude=test.frequencies_amplitude)
+    if changing:
+        level = test.amplitude if math.isfinite(test.amplitude) else 1.0
+        yield replace(test, modes=tuple(changing), amplitude=level)
 
 
 def _conditions(tests: Sequence[ModalTest]) -> tuple[Conditions, ...]:

@@ -261,7 +261,8 @@ def reading_loads(design: Design, predict: Predict) -> FloatArray:
 
     All modes of a test move together, those of other tests do not.
     """
-    read = [t for t, each in enumerate(design.conditions) if each.tension_shift_sd_n > 0]
+    names = np.array([each.test for each in design.conditions])
+    read = list(dict.fromkeys(c.test for c in design.conditions if c.tension_shift_sd_n > 0))
     if not read:
         return np.zeros((design.frequencies, 0))
     moved = replace(
@@ -272,4 +273,4 @@ def reading_loads(design: Design, predict: Predict) -> FloatArray:
         ),
     )
     change = (predict(moved) - predict(design)) / _STEP_SD
-    return np.where(design.frequency_test[:, None] == read, change[:, None], 0.0)
+    return np.where(names[design.frequency_test, None] == read, change[:, None], 0.0)

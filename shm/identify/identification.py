@@ -270,7 +270,7 @@ _SIDEBAND_SHAPE = 0.98
 _SIDEBAND_RATE = 0.3
 """Of the mode's own rate of decay: a line of a tenth of its amplitude is known to about that."""
 _SIDEBAND_SHARE = 0.4  # of the mode's amplitude: half of what makes it fall to a fifth and rise
-_SIDEBANDS_ALIKE = 1.6  # factor between the two lines' amplitudes
+_SIDEBANDS_ALIKE = 1.6  # judgement: of the amplitudes of two lines that modulation makes alike
 _SIDEBAND_TOLERANCE = 0.1
 """Of the rate of decay, in rad/s: by so much of a line's width its middle may be off."""
 

@@ -87,9 +87,10 @@ class Adopted(Model):
         """Its added mass, and its temperature and level where an effect follows them."""
         followed = {each for name, _ in self._effects for each in EFFECTS[name].follows}
         warm, hard = "temperature" in followed, "amplitude" in followed
+        amplitude = test.frequencies_amplitude
         return Conditions(
             temperature_shift_k=test.temperature_c - self._reference_c if warm else 0.0,
-            amplitude=test.amplitude if hard and math.isfinite(test.amplitude) else 1.0,
+            amplitude=amplitude if hard and math.isfinite(amplitude) else 1.0,
             added_mass=test.added_mass,
         )
 

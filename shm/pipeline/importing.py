@@ -39,7 +39,8 @@ _ASKED_UNITS = ("", "full scale", "1", "-", "counts", "digits", "lsb")
 class Answers:
     """What a person says of a file; NaN and None where nothing.
 
-    `channels` are keys of a sidecar's table of a channel, by its name.
+    `channels` are keys of a sidecar's table of a channel, by its name. `each_time`: the logger
+    goes from hanger to hanger, and its profile is to name none.
     """
 
     hanger: int | None = None
@@ -47,6 +48,7 @@ class Answers:
     time: datetime | None = None
     temperature_c: float = NAN
     channels: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    each_time: bool = False
 
     @property
     def said(self) -> dict[str, Any]:
@@ -129,7 +131,7 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     own = _joined(document_beside(path), answers.said)
     _refuse_unknown(own, found, path)
     known = profile.described if profile is not None else {}
-    described = _with_times(completed(known, found.layout, own), found)
+    described = _with_times(completed(known, found.layout, own, path.name), found)
     hanger = described.get("hanger", found.hanger)
     rate = float(described.get("sampling_rate_hz", found.sampling_rate_hz))
     questions = _questions(found, described, hanger, rate)
@@ -147,12 +149,13 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     )
 
 
-def keep_profile(found: Import, workspace: Workspace) -> Profile | None:
-    """Keeps what was said for the next file of this logger; None where nothing had to be."""
+def keep_profile(found: Import, workspace: Workspace, *, each_time: bool = False) -> Profile | None:
+    """Keeps what was said for the next file of this logger, but no hanger where that is asked
+    `each_time`; None where nothing had to be."""
     before = found.profile.described if found.profile is not None else {}
-    if not found.kept or found.kept == before:
+    if not each_time and (not found.kept or found.kept == before):
         return found.profile
-    return save_profile(found.kept, found.survey.layout, workspace.folder)
+    return save_profile(found.kept, found.survey.layout, workspace.folder, roams=each_time)
 
 
 def _joined(first: Described, then: Described) -> dict[str, Any]:

@@ -39,6 +39,7 @@ class ImportedModes:
     questions: tuple[Question, ...]
     notes: tuple[str, ...]
     layout: Layout
+    is_known: bool
 
     @property
     def document(self) -> str:
@@ -60,7 +61,8 @@ def understand_modes(found: ForeignModes, workspace: Workspace, answers: Answers
         )
     layout = _layout(found, axes)
     profile = profile_for(layout, workspace.folder)
-    said = completed(profile.described if profile else {}, layout, answers.said)
+    known = profile.described if profile else {}
+    said = completed(known, layout, answers.said, Path(found.source).name)
     planes: dict[str, Plane] = {
         axis: table["plane"] for axis, table in said.get("channel", {}).items() if "plane" in table
     }
@@ -78,7 +80,9 @@ def understand_modes(found: ForeignModes, workspace: Workspace, answers: Answers
             answers.time,
             answers.temperature_c,
         )
-    return ImportedModes(found, test, hanger, planes, orders, questions, notes, layout)
+    return ImportedModes(
+        found, test, hanger, planes, orders, questions, notes, layout, profile is not None
+    )
 
 
 def keep_modes_profile(
@@ -90,7 +94,7 @@ def keep_modes_profile(
         return profile_for(found.layout, workspace.folder)
     before = profile_for(found.layout, workspace.folder)
     whole = completed(before.described if before else {}, found.layout, kept)
-    return save_profile(whole, found.layout, workspace.folder)
+    return save_profile(whole, found.layout, workspace.folder, roams=answers.each_time)
 
 
 def _layout(found: ForeignModes, axes: Sequence[str]) -> Layout:

@@ -144,7 +144,7 @@ def _by_profile(path: Path, workspace: Workspace, follow: bool) -> str | None:
     profile = profile_for(layout, workspace.folder)
     if profile is None:
         return None
-    whole = completed(profile.described, layout, own)
+    whole = completed(profile.described, layout, own, path.name)
     return sidecar_text(whole) if whole != own else None
 
 

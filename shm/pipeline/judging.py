@@ -8,8 +8,11 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from shm.errors import DamagedRow
+from shm.errors import BadInput, DamagedRow
+from shm.pipeline.lineage import read_limits
 from shm.plausibility import FIRST_DAY, Candidate, doubts_about, implied_shift, notice_of
+from shm.read.profiles import any_profile, profile_for
+from shm.read.sandbox import layout_of
 from shm.store import (
     HeldTest,
     Hold,
@@ -22,7 +25,7 @@ from shm.store import (
     Workspace,
 )
 from shm.store.holding import time_note
-from shm.values import Alert, Hanger
+from shm.values import Alert, Doubt, Hanger
 
 _LATEST = 10  # of a hanger's tests: what it does from test to test, without reading years of them
 _LATEST_OF_OTHERS = 2  # of every other hanger's: where its modes lie now
@@ -55,6 +58,7 @@ def judge(
         candidate = _candidate(workspace, store, recording, item, found)
         doubts = doubts_about(candidate)
         if doubts:
+            doubts = _with_profile(doubts, workspace, recording)
             shift = implied_shift(candidate.test, candidate.reference, candidate.hanger)
             held.append(HeldTest(item.position, item.test.id, doubts, shift))
             candidates[item.position] = candidate
@@ -63,6 +67,29 @@ def judge(
     hooks = [hook.name for hook in workspace.bridge.hooks]
     notice = _notice(store, recording, held, candidates)
     return tuple(found), replace(judged, held=tuple(held), notice=notice, hooks=hooks)
+
+
+def _with_profile(
+    doubts: tuple[Doubt, ...], workspace: Workspace, recording: StoredRecording
+) -> tuple[Doubt, ...]:
+    """The doubts; one about the hanger says so where its logger's profile names the hanger."""
+    at = next((n for n, doubt in enumerate(doubts) if doubt.check == "right hanger"), None)
+    if at is None or not any_profile(workspace.folder):
+        return doubts
+    try:
+        with workspace.archive.opened(recording.file) as path:
+            layout = layout_of(path, read_limits(workspace.settings))
+        profile = profile_for(layout, workspace.folder)
+    except BadInput:
+        return doubts  # no logger's file
+    if profile is None or layout.hanger is not None or "hanger" not in profile.described:
+        return doubts
+    where = profile.path.relative_to(workspace.folder)
+    why = (
+        f"The file names no hanger; {where} books all files of its logger to hanger "
+        f"{profile.described['hanger']}: if the logger was carried, write `roams = true` there."
+    )
+    return (*doubts[:at], replace(doubts[at], why=f"{doubts[at].why} {why}"), *doubts[at + 1 :])
 
 
 def _candidate(

@@ -42,7 +42,7 @@ from shm.plausibility.bar_evidence import (
     seen_in,
 )
 from shm.plausibility.candidate import Candidate
-from shm.values import NAN, Doubt, FloatArray, Hanger, ModalTest
+from shm.values import NAN, PLANES, Doubt, FloatArray, Hanger, ModalTest
 
 SWAP, UNKNOWN_BAR, TIME_BASE, PLANES_EXCHANGED = 0.015, 0.003, 0.004, 0.003
 """Prior probabilities that a test is not what it is filed as. Of numbers keyed in once and not
@@ -54,6 +54,10 @@ DOUBTED_FROM = 0.5
 
 FACTORS = (2.0, 0.5, 10.0, 0.1, 1.024, 1 / 1.024)
 """Of a wrong time base: the rate of every second sample, a decade, 1000 for 1024."""
+
+_CLEARLY_NATS = 3.0
+"""20 to 1 (judgement): where a described hanger is that near to a bar that nobody described, the
+person who looks is better served with its number."""
 
 COARSE_FACTORS = tuple(factor for factor in FACTORS if abs(math.log(factor)) > 0.1)
 """Those that a description can show: area, modulus and tape leave ln f open by some percent."""
@@ -92,6 +96,15 @@ def doubt_of(test: ModalTest, own: Known, others: Sequence[Known]) -> OtherOrigi
     where nothing can be said: fewer than three modes, or a description that is no hanger's (free or
     pinned ends, no tension).
     """
+    found = _leading(test, own, others)
+    if found is None or found.kind != "unknown bar":
+        return found
+    # Its modes may have been numbered by the description of the named hanger, which it is not.
+    again = _leading(_by_rank(test), own, others)
+    return again if again is not None and again.kind == "hanger" else found
+
+
+def _leading(test: ModalTest, own: Known, others: Sequence[Known]) -> OtherOrigin | None:
     odds = origins(test, own, others)
     if not odds:
         return None
@@ -99,7 +112,23 @@ def doubt_of(test: ModalTest, own: Known, others: Sequence[Known]) -> OtherOrigi
     probability = -math.expm1(odds.pop(OWN) - total)
     if probability < DOUBTED_FROM:
         return None
-    return _said(max(odds, key=lambda each: odds[each]), probability, own.hanger)
+    leading = max(odds, key=lambda each: odds[each])
+    if leading.kind == "unknown bar":
+        nearly = odds[leading] - _CLEARLY_NATS
+        described = [each for each in odds if each.kind == "hanger" and odds[each] > nearly]
+        leading = max(described, key=lambda each: odds[each], default=leading)
+    return _said(leading, probability, own.hanger)
+
+
+def _by_rank(test: ModalTest) -> ModalTest:
+    """The test with its modes numbered by their frequencies in each plane."""
+    modes = sorted(test.modes, key=lambda mode: mode.frequency_hz)
+    ranks = dict.fromkeys(PLANES, 0)
+    numbered = []
+    for mode in modes:
+        ranks[mode.plane] += 1
+        numbered.append(replace(mode, order=ranks[mode.plane]))
+    return replace(test, modes=tuple(numbered))
 
 
 def origins(test: ModalTest, own: Known, others: Sequence[Known]) -> dict[Origin, float]:

@@ -11,8 +11,9 @@ A profile is a sidecar for all files of one layout: `loggers/NAME.toml`, written
     plane = "transverse"
     x_m = 2.52
 
-A sidecar of its own goes before it, and so does a hanger or a rate that the file itself says. Where
-a logger has been at two hangers, `hanger` is left out: each file must say its own.
+A sidecar of its own goes before it, and so does a hanger or a rate that the file itself says. With
+`roams = true`, which a logger that has been at two hangers gets by itself, a profile names no
+hanger: each file must say its own.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from shm.errors import BadInput
 from shm.read.atomic import replace_text
 from shm.read.content import unreadable
 from shm.read.header import CHANNEL_KEYS
+from shm.read.logger_words import hanger_numbered
 from shm.read.survey import Layout
 
 FOLDER = "loggers"
@@ -68,9 +70,14 @@ def any_profile(workspace: Path) -> bool:
     return bool(_files(workspace))
 
 
-def completed(profile: Described, layout: Layout, own: Described) -> dict[str, Any]:
-    """The sidecar of one file: what its own says, and what the profile adds to that."""
+def completed(
+    profile: Described, layout: Layout, own: Described, file_name: str = ""
+) -> dict[str, Any]:
+    """The sidecar of one file: what its own says, and what its name and the profile add to that."""
     added = {key: profile[key] for key in _OF_PROFILE if key in profile}
+    named = hanger_numbered(file_name)
+    if named is not None:
+        added["hanger"] = named
     if layout.hanger is not None:
         added.pop("hanger", None)
     if layout.says_rate:
@@ -88,11 +95,13 @@ def completed(profile: Described, layout: Layout, own: Described) -> dict[str, A
     return {**whole, "channel": channels} if channels else whole
 
 
-def save_profile(described: Described, layout: Layout, workspace: Path) -> Profile:
+def save_profile(
+    described: Described, layout: Layout, workspace: Path, *, roams: bool = False
+) -> Profile:
     """Keeps what was said of the files of a layout, in the place of what was kept before."""
     before = profile_for(layout, workspace)
     kept = {key: described[key] for key in _OF_PROFILE if key in described}
-    moved = before is not None and _moved(before, kept)
+    moved = roams or (before is not None and _moved(before, kept))
     if moved:
         kept.pop("hanger", None)
     path = before.path if before is not None else _free_path(layout, workspace)
@@ -144,7 +153,10 @@ def _load(path: Path) -> Profile:
                 remedy=f"The keys are {', '.join(CHANNEL_KEYS)}.",
             )
     known = {key: document[key] for key in _OF_PROFILE if key in document}
-    return Profile(path, document["fingerprint"], known, document.get("roams") is True)
+    roams = document.get("roams") is True
+    if roams:
+        known.pop("hanger", None)
+    return Profile(path, document["fingerprint"], known, roams)
 
 
 # ---------------------------------------------------------------- writing

@@ -44,6 +44,20 @@ class Mode:
     amplitude_slope: float = NAN
     amplitude_slope_sd: float = NAN
 
+    @property
+    def depends_on_amplitude(self) -> bool:
+        """Whether its slope is sure and of note: `frequency_hz` is then that of small amplitude."""
+        slope = abs(self.amplitude_slope)
+        return SLOPE_OF_NOTE <= slope < MOST_SLOPE and slope > SURE_SDS * self.amplitude_slope_sd
+
+
+SURE_SDS = 2.5
+"""Standard deviations from which a slope is taken for one (judgement): by chance one in 80."""
+SLOPE_OF_NOTE = 1e-4
+"""Relative: a logger's clock and a tenth of a kelvin do as much from test to test (judgement)."""
+MOST_SLOPE = 0.01
+"""Relative: what joints and stretching do is tenths of a percent; more is another line's phase."""
+
 
 @dataclass(frozen=True)
 class ForeignMode:
@@ -123,3 +137,8 @@ class ModalTest:
     def regular_modes(self) -> tuple[Mode, ...]:
         """Those from which a tension is inferred; see `Mode.irregular`."""
         return tuple(mode for mode in self.modes if not mode.irregular)
+
+    @property
+    def frequencies_amplitude(self) -> float:
+        """The amplitude that its frequencies belong to: 0 where a slope led to small amplitude."""
+        return 0.0 if any(mode.depends_on_amplitude for mode in self.modes) else self.amplitude

@@ -46,6 +46,7 @@ from shm.values import (
     Reading,
     WatchedQuantity,
 )
+from shm.watch.amplitude_softening import AmplitudeSlopes
 from shm.watch.causes import columns_of
 from shm.watch.linear_reading import SELDOM, LinearReading, SeenModes, credible_share
 from shm.watch.loosening import loosening_of
@@ -130,6 +131,7 @@ class Reader:
         self._highest = np.array([each.coordinates[-1] for each in self.quantities])
         self.reference_temperature_c = mean_temperature_c(usable)
         self._per_kelvin = softening(self._model, self._base, hanger, self.modes)
+        self._per_amplitude = AmplitudeSlopes.of(usable, self.modes)
         mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
         self._scatter = math.hypot(_MODE_SCATTER, _SENSOR_KG / mass_kg / math.sqrt(8))
         self._loosening = np.vstack(self.columns.loosening).T
@@ -262,13 +264,14 @@ class Reader:
             if self._is_warmth_known(test)
             else 0.0
         )
+        slip, slip_sd = self._per_amplitude.at(test, modes, own)
         return SeenModes(
             conditions=self._model.conditions(test),
             plane=np.array([PLANES.index(mode.plane) for mode in modes], dtype=int),
             order=np.array([mode.order - 1 for mode in modes], dtype=int),
             own=own,
-            log_frequency=np.log(frequency_hz) - self._residual[own] - swing,
-            variance=sd**2 + self._allowance**2,
+            log_frequency=np.log(frequency_hz) - self._residual[own] - swing - slip,
+            variance=sd**2 + slip_sd**2 + self._allowance**2,
         )
 
     def _far_start(self, seen: SeenModes) -> FloatArray:

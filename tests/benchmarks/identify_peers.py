@@ -34,7 +34,13 @@ from peers import environment  # noqa: E402
 
 from shm_cli.common import markdown  # noqa: E402
 
-ENVIRONMENTS = {"shm": "", "pyoma2": "", "sdypy_told": "sdypy_ema", "sdypy_peaks": "sdypy_ema"}
+ENVIRONMENTS = {
+    "shm": "",
+    "pyoma2": "",
+    "h1_peaks": "",
+    "sdypy_told": "sdypy_ema",
+    "sdypy_peaks": "sdypy_ema",
+}
 """Environment of each; an empty one is ours."""
 
 

@@ -28,6 +28,7 @@ FULL = ModalTest(
     modes=(
         Mode("transverse", 1, 5.82, 0.006, 0.004, math.nan, (ShapePoint(1.2, 0.31, 0.01, 0.01),)),
         Mode("longitudinal", 1, 6.09, irregular=True),
+        Mode("longitudinal", 2, 12.7, amplitude_slope=-4e-4, amplitude_slope_sd=2e-5),
     ),
 )
 

@@ -90,7 +90,8 @@ async def import_file(
         Query(
             max_length=_MOST_ANSWERS,
             description='Answers, as JSON: {"hanger": 3, "columns": {"A1": {"plane": "transverse",'
-            ' "place": "2.5"}}}. Without it the file is only looked into.',
+            ' "place": "2.5"}}}; with "each_time": true the hanger is not kept. Without answers the'
+            " file is only looked into.",
         ),
     ] = None,
 ) -> Any:
@@ -118,9 +119,10 @@ def _looked(file: Incoming, name: str, workspace: Workspace, said: str | None) -
         found = look_into(path, workspace, Answers())
     landed: Landed | None = None
     if said is not None:
-        found = understand(found.survey, workspace, _answers(said, found))
+        answers = _answers(said, found)
+        found = understand(found.survey, workspace, answers)
         if found.is_ready:
-            keep_profile(found, workspace)
+            keep_profile(found, workspace, each_time=answers.each_time)
             landed = file.land(name, found.described)
     document = import_document(found)
     return ImportLook(**_plain(document), sha256=landed.sha256 if landed else None)
@@ -163,6 +165,7 @@ def _answers(said: str, found: Import) -> Answers:
         None,
         _number(document, "temperature_c", least=-300.0),
         tables,
+        each_time=document.get("each_time") is True,
     )
 
 

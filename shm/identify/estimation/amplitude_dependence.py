@@ -23,31 +23,35 @@ from scipy.special import ndtri, stdtrit
 
 from shm.identify.contract import Finding, FoundMode, Measurement
 from shm.values import NAN, ComplexArray, FloatArray
+from shm.values.modes import MOST_SLOPE, SURE_SDS
 
-SURE = 2.5
-"""Standard deviations from which a dependence is taken for one (judgement): by chance one in 80."""
-LEAST_SLOPE = 2e-5
+_LEAST_SLOPE = 2e-5
 """Relative. A phase is known so well that a clock's shaking would show; no one needs less."""
-_MOST_SLOPE = 0.01
-"""Relative: what joints and stretching do is tenths of a percent; more is another line's phase."""
 _TO_ZERO = 0.01
-"""Of a slope: by how much the frequency of small amplitude is off by the law's form at most."""
+"""Of a slope: by how much the frequency of small amplitude is off by the law's form at most. In
+tests/identify/test_amplitude_dependence.py 1 % of a slope of 1e-3 is four standard deviations of
+all else; in the trial below nothing hangs on it."""
 _SLOPE_ERROR = 0.05
-"""Of a slope: how the law looks in the first instants is carried back from later ones."""
+"""Of a slope: how the law looks in the first instants is carried back from later ones (judgement).
+It is in the slope's standard deviation alone."""
+
+# What follows is tried by tests/benchmarks/identify_ablation.py on 176 modes of hangers that soften
+# or harden: 90 % intervals of the frequencies cover 92 %, and 74 % where frequencies stay as they
+# were found, whose errors are then twice as large.
 _UNSEEN = 2.0
-"""Times what others shift: one that is not seen in the phases may shift more."""
+"""Times what others shift: one that is not seen in the phases may shift more. 89 % without."""
 _LAW_ERROR = 0.15
-"""Of a shift: friction and stretching differ by so much where both fit."""
+"""Of a shift: friction and stretching differ by so much where both fit. 85 % without."""
 _SOME = 0.2
+"""Share of the modes that must be sure, for others to be corrected, too. 85 % if they never are."""
 _OVERLAP = 2.0
-"""Stretches overlap by half: so much less is known than they seem to say."""
+"""Stretches overlap by half: so much less is known than they seem to say. 81 % without."""
 _STRETCH_SECONDS = 0.5  # judgement: some periods of most modes; phases turn by little in it
 _MOST_STRETCHES = 40  # technical: time
 _LEAST_RATIO = 2.0
-"""Of an amplitude to its standard deviation: its phase is then known to 0.2 rad."""
-_MOST_TURN = 1.5
-"""Radians from one stretch to the next: more may be another turn."""
-_RIDGE = 1e-9
+"""Of an amplitude to its standard deviation: its phase is known to half a radian. With 4 the
+median error is a fifth larger."""
+_RIDGE = 1e-9  # technical: keeps the normal equations solvable
 _TINY = np.finfo(float).tiny
 
 
@@ -79,7 +83,7 @@ class _Fit:
 
 def is_sure(slope: float, sd: float) -> bool:
     """Whether a frequency depends on amplitude by more than chance and less than nonsense."""
-    return max(SURE * sd, LEAST_SLOPE) < abs(slope) < _MOST_SLOPE
+    return max(SURE_SDS * sd, _LEAST_SLOPE) < abs(slope) < MOST_SLOPE
 
 
 def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Finding:
@@ -111,7 +115,7 @@ def _with_slope(mode: FoundMode, fit: _Fit | None, usual: float) -> FoundMode:
     slope = (fit.slope, fit.slope_sd) if fit is not None else (NAN, NAN)
     known = replace(mode, amplitude_slope=slope[0], amplitude_slope_sd=slope[1])
     prior_hz = usual * mode.frequency_hz
-    if fit is None or abs(fit.slope) > _MOST_SLOPE:
+    if fit is None or abs(fit.slope) > MOST_SLOPE:
         return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, _UNSEEN * prior_hz))
     # Beside what the other modes shift, a shift that is not sure by itself counts by its share.
     vague = 0.0 if fit.is_sure else fit.shift_sd_hz**2
@@ -204,8 +208,6 @@ def _phases(course: _Course, index: int) -> _Row | None:
     if last < 4:
         return None
     phase = np.unwrap(np.angle(motion[:last]))
-    if np.max(np.abs(np.diff(phase))) > _MOST_TURN:
-        return None
     size = np.abs(motion[:last])
     return course.middle_s[:last], phase, sd[:last] / np.maximum(size, _TINY), float(size[0])
 

@@ -11,9 +11,10 @@ from shm.identify.contract import FoundMode
 from shm.values import PLANES, FloatArray, Plane, ResponsePoint, ShapePoint
 
 CLOSE = 0.02
-"""Two modes nearer than this fraction cannot be neighbours in one plane of a hanger."""
+"""Two modes nearer than this fraction cannot be neighbours in one plane of a hanger: orders of the
+longest lie 1/30 apart (judgement)."""
 LEAST_SHARE = 0.2
-"""Of the energy that a mode must have in a plane to be moved there."""
+"""Of the energy that a mode must have in a plane to be moved there (judgement)."""
 # Directions of n modes by chance agree so far with probability exp(-0.49 n): 14 % of 4, 0.7 % of 10
 # (Rayleigh). judgement: a quarter in a plane is one mode of four
 _LEAST_MODES = 4

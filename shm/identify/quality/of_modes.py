@@ -10,11 +10,10 @@ from shm.identify.contract import Measurement
 from shm.identify.estimation.amplitude_dependence import is_sure
 from shm.identify.quality.inspection import Inspection
 from shm.values import NAN, BoolArray, FloatArray, QualityCheck, Verdict
+from shm.values.modes import SLOPE_OF_NOTE
 from shm.values.rounding import listed
 
 # judgement: 0.2 of the response unexplained; sound tests have 0.92 and more: identify_limits.py
-_SLOPE = 1e-4
-"""What differs between tests unseen (`frequency_allowance`): less does not matter."""
 _WARNING = 0.8
 _LINES_AROUND = 2  # judgement: within the half-power width of most modes
 _STRONGEST = 0.05  # judgement: a twentieth of the lines holds the peaks of a dozen modes
@@ -99,13 +98,13 @@ def amplitude_dependence(inspection: Inspection) -> QualityCheck | None:
         return None
     sure = [mode for mode in known if is_sure(mode.amplitude_slope, mode.amplitude_slope_sd)]
     worst = max(sure, key=lambda mode: abs(mode.amplitude_slope), default=None)
-    if worst is None or abs(worst.amplitude_slope) < _SLOPE:
+    if worst is None or abs(worst.amplitude_slope) < SLOPE_OF_NOTE:
         value = abs(worst.amplitude_slope) if worst else 0.0
         told = "frequencies do not depend on amplitude"
-        return QualityCheck("amplitude", "good", value, _SLOPE, "", told)
+        return QualityCheck("amplitude", "good", value, SLOPE_OF_NOTE, "", told)
     side = "lower" if worst.amplitude_slope < 0 else "higher"
     return QualityCheck(
-        "amplitude", "warning", abs(worst.amplitude_slope), _SLOPE, "",
+        "amplitude", "warning", abs(worst.amplitude_slope), SLOPE_OF_NOTE, "",
         f"{len(sure)} frequencies change with amplitude; right after a hit that of "
         f"{worst.frequency_hz:.2f} Hz is {side} by {abs(worst.amplitude_slope):.2%}: "
         "those of small amplitude are given",

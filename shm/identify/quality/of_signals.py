@@ -38,7 +38,7 @@ _REFUSED_DB = 6.0
 """Two half-second stretches of one noise differ by 1.2 dB (a band of 100 Hz has 50 independent
 values in each); the best of 16 channels, over the quietest of several stretches, by up to 4."""
 _WARNING_DB = 20.0  # from there the benchmark counts a mode as one to be found
-_STILL_DB = 1.0
+_STILL_DB = 1.0  # judgement: where the noise is not seen before a hit, so little is none at all
 _MOST_DB = 200.0
 """More than any converter resolves: what stands higher is computed, not measured."""
 # judgement: lines of 2 Hz, so that the lowest mode is seen; a fifth still tells loud from quiet

@@ -18,6 +18,7 @@ _LEFT_OF_DECAY = 0.01
 TITLES = {
     "shm": "**shm**",
     "pyoma2": "pyOMA2, SSI and its clustering",
+    "h1_peaks": "peaks of the averaged H1",
     "sdypy_told": "sdypy-EMA, told the frequencies within 1 %",
     "sdypy_peaks": "sdypy-EMA, told the peaks of the FRFs",
 }

@@ -126,6 +126,13 @@
         box.append(line);
         return [question, input];
       });
+      const carried = made("input", { id: `carried-${row.number}`, type: "checkbox" });
+      if (found.questions.some(({ about }) => about === "hanger")) {
+        const line = made("div");
+        const textContent = "This logger goes from hanger to hanger: ask each time";
+        line.append(carried, made("label", { htmlFor: carried.id, textContent }));
+        box.append(line);
+      }
       const plain = made("button", { type: "button", textContent: "Send as it is" });
       box.append(made("button", { textContent: "Keep for this logger, and send" }), plain);
       part.append(tableOf(found), box);
@@ -134,7 +141,7 @@
       plain.addEventListener("click", () => ended(null));
       box.addEventListener("submit", (event) => {
         event.preventDefault();
-        const answers = { columns: {} };
+        const answers = { columns: {}, ...(carried.checked && { each_time: true }) };
         for (const [{ about, channel }, { value }] of fields) {
           if (about === "hanger") answers.hanger = Number(value);
           else if (about === "rate") answers.sampling_rate_hz = Number(value);

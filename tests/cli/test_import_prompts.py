@@ -1,0 +1,199 @@
+"""`shm import` at a terminal: what it asks, wrong answers, and a person who leaves in between.
+
+The command runs at a pseudo-terminal, as a person would have it.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pty
+import re
+import select
+import subprocess
+import sys
+import termios
+import time
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import wavfile
+
+from shm.store import Workspace
+from tests.cli.test_import import export, modes_file
+from tests.helpers.workspaces import make_workspace
+
+PROGRAM = [sys.executable, "-c", "from shm_cli.main import main; main()"]
+PATIENCE_S = 60.0
+_STYLE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
+
+
+class Terminal:
+    """A command at a terminal, and a person at its keys."""
+
+    def __init__(self, process: subprocess.Popen[bytes], keys: int):
+        self._process, self._keys = process, keys
+        self.shown, self._seen = "", 0
+
+    def answer(self, question: str, *answers: str) -> None:
+        """Waits for a question, and again for each further answer."""
+        for answer in answers:
+            self.wait_for(question)
+            self.press(f"{answer}\n")
+
+    def press(self, keys: str) -> None:
+        os.write(self._keys, keys.encode())
+
+    def wait_for(self, text: str) -> None:
+        """Until a text is shown after what was waited for before."""
+        deadline = time.monotonic() + PATIENCE_S
+        while text not in self.shown[self._seen :]:
+            assert time.monotonic() < deadline, f"no {text!r} in:\n{self.shown}"
+            assert self._more(), f"ended without {text!r}:\n{self.shown}"
+        self._seen = self.shown.index(text, self._seen) + len(text)
+
+    def end(self) -> int:
+        """Its exit code."""
+        while self._more():
+            pass
+        return self._process.wait(PATIENCE_S)
+
+    def _more(self) -> bool:
+        ready, _, _ = select.select([self._keys], [], [], PATIENCE_S)
+        try:
+            piece = os.read(self._keys, 65536) if ready else b""
+        except OSError:  # the other end of the terminal is closed
+            piece = b""
+        self.shown += _STYLE.sub("", piece.decode(errors="replace"))
+        return bool(piece)
+
+
+@contextmanager
+def terminal(workspace: Workspace, *arguments: object) -> Iterator[Terminal]:
+    keys, screen = pty.openpty()
+    command = [*PROGRAM, "--workspace", str(workspace.folder), "import", *map(str, arguments)]
+    process = subprocess.Popen(
+        command, stdin=screen, stdout=screen, stderr=screen, start_new_session=True,
+        preexec_fn=_take_terminal, env={**os.environ, "COLUMNS": "200", "TERM": "dumb"},
+    )  # fmt: skip
+    os.close(screen)
+    try:
+        yield Terminal(process, keys)
+    finally:
+        process.kill()
+        process.wait()
+        os.close(keys)
+
+
+def _take_terminal() -> None:
+    """Ctrl-C reaches only whom the terminal belongs to."""
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    return make_workspace(tmp_path / "bridge", hangers=(3, 4))
+
+
+def kept(workspace: Workspace) -> list[str]:
+    """All files that an import leaves."""
+    places = (workspace.folder / "loggers", workspace.spool)
+    return sorted(
+        str(path.relative_to(workspace.folder))
+        for place in places
+        for path in place.rglob("*")
+        if path.is_file()
+    )
+
+
+def test_a_wrong_answer_is_asked_for_again_and_the_right_ones_are_kept(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    with terminal(workspace, export(tmp_path / "a.csv")) as person:
+        person.answer("Which hanger", "three", "9", "3")
+        person.answer("Where is A1", "high up", "2,52")
+        person.answer("which plane does A1", "sideways", "quer")
+        person.answer("Where is A2", "unknown")
+        person.answer("which plane does A2", "l")
+        person.answer("of hanger 3, too?", "y")
+        assert person.end() == 0
+    for wrong in ("'three' is no number", "hanger 9 is not described", "'high up' is no place"):
+        assert wrong in person.shown
+    (profile,) = (workspace.folder / "loggers").iterdir()
+    said = tomllib.loads(profile.read_text())
+    assert said["hanger"] == 3
+    assert said["channel"] == {
+        "A1": {"x_m": 2.52, "plane": "transverse"},
+        "A2": {"x_m": "", "plane": "longitudinal"},
+    }
+    assert kept(workspace) == [f"loggers/{profile.name}", "spool/a.csv", "spool/a.toml"]
+
+
+def test_a_logger_that_is_carried_is_asked_for_its_hanger_each_time(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    said = ("--place", "2.52", "--plane", "transverse,longitudinal")
+    with terminal(workspace, export(tmp_path / "a.csv"), *said) as person:
+        person.answer("Which hanger", "3")
+        person.answer("of hanger 3, too?", "")
+        assert person.end() == 0
+    with terminal(workspace, export(tmp_path / "b.csv", 2)) as person:
+        person.answer("Which hanger", "4")
+        assert person.end() == 0
+    assert tomllib.loads((workspace.spool / "b.toml").read_text())["hanger"] == 4
+    (profile,) = (workspace.folder / "loggers").iterdir()
+    assert "hanger" not in tomllib.loads(profile.read_text())
+
+
+def test_what_follows_from_an_answer_is_asked_next(workspace: Workspace, tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    path = tmp_path / "tape.wav"
+    wavfile.write(path, 1000, (rng.normal(0, 0.1, (3000, 2)) * 32767).astype(np.int16))
+    with terminal(workspace, path, "--hanger", 3) as person:
+        person.answer("full scale of channel_1", "loud", "2000 N")
+        person.answer("full scale of channel_2", "50 g")
+        person.answer("Where is channel_2", "2.52")
+        person.answer("which plane does channel_2", "transverse")
+        person.answer("of hanger 3, too?", "y")
+        assert person.end() == 0
+    assert "spool/tape.wav" in kept(workspace)
+
+
+@pytest.mark.parametrize(
+    ("key", "at"),
+    [("\x03", "Which hanger"), ("\x04", "which plane does A2"), ("\x03", "of hanger 3, too?")],
+    ids=["Ctrl-C at first", "Ctrl-D", "Ctrl-C at last"],
+)
+def test_who_leaves_in_between_leaves_nothing(
+    workspace: Workspace, tmp_path: Path, key: str, at: str
+) -> None:
+    answers = {"Which hanger": "3", "Where is A1": "2", "which plane does A1": "t"}
+    answers |= {"Where is A2": "2", "which plane does A2": "l", "of hanger 3, too?": "y"}
+    with terminal(workspace, export(tmp_path / "a.csv")) as person:
+        for question, answer in answers.items():
+            if question == at:
+                break
+            person.answer(question, answer)
+        person.wait_for(at)
+        person.press(key)
+        assert person.end() != 0
+    assert "Traceback" not in person.shown
+    assert kept(workspace) == []
+
+
+def test_the_planes_of_foreign_modes_are_asked_for_until_they_are_planes(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    with terminal(workspace, modes_file(tmp_path / "m.uff")) as person:
+        person.answer("Which hanger", "-3", "3")
+        person.answer("axis x", "up", "transverse")
+        person.answer("axis y", "longitudinal")
+        person.answer("of hanger 3, too?", "n")
+        assert person.end() == 0
+    assert "'up' is no plane" in person.shown
+    (profile,) = (workspace.folder / "loggers").iterdir()
+    assert tomllib.loads(profile.read_text())["roams"] is True

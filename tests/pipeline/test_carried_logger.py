@@ -1,0 +1,86 @@
+"""A logger whose profile names one hanger is carried to another without a word."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from datetime import timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shm.pipeline.importing import Answers, keep_profile, look_into
+from shm.read import write
+from shm.simulate import HammerPlan, HangerState, hammer_test
+from shm.store import Stage, Workspace
+from tests.helpers.flows import ingest
+from tests.helpers.workspaces import START, make_workspace
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    """Hanger 4 is 9 m long, hanger 3 has 12 m."""
+    made = make_workspace(tmp_path / "bridge", hangers=(3, 4))
+    path = made.folder / "bridge.toml"
+    head, own = path.read_text().split("id = 4")
+    path.write_text(f"{head}id = 4{own.replace('length_m = 12.0', 'length_m = 9.0')}")
+    return made.reopened()
+
+
+def record(path: Path, workspace: Workspace, hanger: int, day: float = 0.0) -> Path:
+    """A hammer test of a hanger, in a file that names none."""
+    plan = HammerPlan(hits=3, seconds_per_hit=8.0)
+    state, rng = HangerState(tension_n=700e3), np.random.default_rng(hanger)
+    time = START + timedelta(days=day)
+    made = hammer_test(workspace.bridge.hanger(hanger), state, plan, rng, time=time)
+    write(replace(made, hanger=None), path)
+    return path
+
+
+def imported(workspace: Workspace, path: Path, *, each_time: bool = False) -> None:
+    found = look_into(path, workspace, Answers(hanger=3))
+    assert found.is_ready
+    keep_profile(found, workspace, each_time=each_time)
+
+
+def test_modes_of_another_hanger_are_held_and_the_profile_is_named(workspace: Workspace) -> None:
+    imported(workspace, record(workspace.folder / "first.csv", workspace, 3))
+    record(workspace.spool / "second.csv", workspace, 3)
+    record(workspace.spool / "third.csv", workspace, 4, day=1.0)
+    ingest(workspace)
+    with workspace.store() as store:
+        own, carried = store.recordings.list_all()
+        assert (own.stage, own.hanger) == (Stage.DONE, 3)
+        assert carried.stage is Stage.HELD
+        (hold,) = store.recordings.list_holds(3)
+    (doubt,) = [each for test in hold.tests for each in test.doubts]
+    assert doubt.check == "right hanger"
+    assert "fit hanger 4 rather than hanger 3" in doubt.state
+    (profile,) = (workspace.folder / "loggers").iterdir()
+    assert f"loggers/{profile.name} books all files of its logger to hanger 3" in doubt.why
+
+
+def test_a_profile_that_asks_each_time_books_no_file_by_itself(workspace: Workspace) -> None:
+    imported(workspace, record(workspace.folder / "first.csv", workspace, 3), each_time=True)
+    (profile,) = (workspace.folder / "loggers").iterdir()
+    kept = tomllib.loads(profile.read_text())
+    assert kept["roams"] is True
+    assert "hanger" not in kept
+    record(workspace.spool / "second.csv", workspace, 3)
+    record(workspace.spool / "hanger_04_third.csv", workspace, 4)
+    ingest(workspace)
+    with workspace.store() as store:
+        named, silent = sorted(store.recordings.list_all(), key=lambda each: each.file.file_name)
+    assert (named.hanger, named.stage) == (4, Stage.DONE)
+    assert silent.stage is Stage.REFUSED
+    assert silent.reason is not None
+    assert "hanger" in f"{silent.reason['message']} {silent.reason['remedy']}"
+
+
+def test_who_writes_roams_into_a_profile_is_asked_from_then_on(workspace: Workspace) -> None:
+    imported(workspace, record(workspace.folder / "first.csv", workspace, 3))
+    (profile,) = (workspace.folder / "loggers").iterdir()
+    profile.write_text(f"roams = true\n{profile.read_text()}")
+    later = look_into(record(workspace.folder / "b.csv", workspace, 4), workspace, Answers())
+    assert [question.about for question in later.questions] == ["hanger"]
