@@ -24,6 +24,7 @@ _NAMED_DAYS = (
     "%d-%b-%Y %H:%M:%S", "%d %b %Y %H:%M:%S", "%d. %B %Y %H:%M:%S", "%B %d, %Y %H:%M:%S",
     "%b %d, %Y %H:%M:%S", "%d-%b-%Y", "%d %B %Y", "%B %d, %Y", "%a %b %d %H:%M:%S %Y",
 )  # fmt: skip
+_MONTH = re.compile("jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec", re.IGNORECASE)
 _DAY_S = 86400.0
 _CLOCK_ONLY = datetime(1, 1, 1, tzinfo=UTC)
 
@@ -81,6 +82,8 @@ def _clocked(day: datetime, found: re.Match[str]) -> datetime:
 
 def _named(text: str) -> tuple[datetime, bool] | None:
     """A time whose month is a word, in English."""
+    if _MONTH.search(text) is None:
+        return None  # each form below is compiled anew for each text: strptime keeps five
     half = text.upper().endswith(("AM", "PM"))
     plain = re.sub(r"(\d)[.,]\d+( [AP]M)?$", r"\1\2", " ".join(text.split()))
     for form in _NAMED_DAYS:

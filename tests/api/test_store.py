@@ -9,17 +9,13 @@ import pytest
 import shm
 from shm.errors import BadInput, NothingThere
 from shm.store import Workspace
-from tests.helpers.flows import ingest
-from tests.helpers.workspaces import make_workspace, write_loss
+from tests.helpers.taken_in import with_a_loss
 
 
 @pytest.fixture(scope="module")
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """Hanger 3 has three tests, the last two with a fifth less tension; hanger 4 has none."""
-    workspace = make_workspace(tmp_path_factory.mktemp("api") / "bridge", hangers=(3, 4))
-    write_loss(workspace.spool, workspace)
-    ingest(workspace)
-    return workspace
+    return with_a_loss(tmp_path_factory.mktemp("api") / "bridge")
 
 
 def test_it_gives_the_nouns_of_a_hanger(bridge: Workspace) -> None:

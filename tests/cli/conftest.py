@@ -12,8 +12,8 @@ import pytest
 
 from shm.store import Workspace
 from shm_cli.main import run
-from tests.helpers.flows import ingest
-from tests.helpers.workspaces import make_workspace, write_loss, write_test
+from tests.helpers.taken_in import with_a_loss
+from tests.helpers.workspaces import make_workspace, write_test
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,7 @@ def shm(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.fixture(scope="session")
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """Hanger 3 has three tests, the last two with a fifth less tension; hanger 4 has none."""
-    workspace = make_workspace(tmp_path_factory.mktemp("cli") / "bridge", hangers=(3, 4))
-    write_loss(workspace.spool, workspace)
-    ingest(workspace)
-    return workspace
+    return with_a_loss(tmp_path_factory.mktemp("cli") / "bridge")
 
 
 @pytest.fixture

@@ -14,18 +14,22 @@ from shm.pipeline.redescribed import discarded_of
 from shm.store import Stage, Workspace
 from tests.cli.conftest import Shm
 from tests.helpers.flows import ingest
+from tests.helpers.taken_in import copied
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put, write_test
 
 
 @pytest.fixture
 def held(tmp_path: Path) -> Workspace:
     """Hanger 3 has a baseline and a test of 1970 with a tenth less tension, recording 2."""
-    made = make_workspace(tmp_path / "bridge")
+    return copied("held", tmp_path / "bridge", _make_held)
+
+
+def _make_held(folder: Path) -> None:
+    made = make_workspace(folder)
     write_test(made.spool / "good.modes.json", made)
     ingest(made)
     put(made.spool / "lost.modes.json", epoch(made))
     ingest(made)
-    return made
 
 
 def epoch(workspace: Workspace) -> str:

@@ -14,8 +14,8 @@ import xarray
 
 from shm.store import Workspace
 from tests.cli.conftest import Shm
-from tests.helpers.flows import ingest
-from tests.helpers.workspaces import SLOW_LOSS, write_slow_loss
+from tests.helpers.taken_in import with_a_slow_loss
+from tests.helpers.workspaces import SLOW_LOSS
 
 
 def test_init_makes_a_workspace_that_status_can_read(shm: Shm, tmp_path: Path) -> None:
@@ -114,10 +114,9 @@ def test_a_hanger_without_tests_has_nothing_yet(
     assert shm("--workspace", bridge.folder, verb, "--hanger", 4, *out).code == 4
 
 
-def test_drift_shows_the_latest_shift_or_all(shm: Shm, empty: Workspace) -> None:
-    write_slow_loss(empty.spool, empty)
-    ingest(empty)
-    call = ("--workspace", empty.folder, "drift", "--hanger", 3)
+def test_drift_shows_the_latest_shift_or_all(shm: Shm, tmp_path: Path) -> None:
+    bridge = with_a_slow_loss(tmp_path / "bridge")
+    call = ("--workspace", bridge.folder, "drift", "--hanger", 3)
     (latest,) = shm(*call, "--json").document["drifts"]
     assert (latest["test"], latest["quantity"]) == ("t6", "tension")
     assert latest["shift_mean"] == pytest.approx(SLOW_LOSS[-1] - 1, abs=0.02)

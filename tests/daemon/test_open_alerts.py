@@ -12,9 +12,9 @@ import pytest
 from shm.store import Workspace
 from shm.store.outbox import resolve
 from shm_cli.main import run
-from tests.helpers.flows import ingest
+from tests.helpers.taken_in import with_a_loss
 from tests.helpers.web_servers import served
-from tests.helpers.workspaces import START, make_workspace, write_loss
+from tests.helpers.workspaces import START
 
 AT_FIRST = 2
 """Alerts of the loss: the notice that asks to repeat a test, and that two tests agree."""
@@ -22,10 +22,7 @@ AT_FIRST = 2
 
 @pytest.fixture(scope="module")
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    workspace = make_workspace(tmp_path_factory.mktemp("open") / "bridge", hangers=(3, 4))
-    write_loss(workspace.spool, workspace)
-    ingest(workspace)
-    return workspace
+    return with_a_loss(tmp_path_factory.mktemp("open") / "bridge")
 
 
 @pytest.fixture(scope="module")

@@ -19,11 +19,9 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from shm.store import Workspace
 from shm_daemon.heartbeat import HEARTBEAT
-from tests.helpers.flows import ingest
+from tests.helpers.taken_in import with_a_loss
 from tests.helpers.web_servers import Served, served
-from tests.helpers.workspaces import make_workspace, write_loss
 
 EXAMPLES = int(os.environ.get("SHM_SCHEMA_EXAMPLES", "10"))
 CHECKS = [
@@ -63,9 +61,7 @@ ROUTES = (
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     """A bridge with a history and an alert, whose daemon has just been seen."""
-    workspace: Workspace = make_workspace(tmp_path_factory.mktemp("schema") / "bridge")
-    write_loss(workspace.spool, workspace)
-    ingest(workspace)
+    workspace = with_a_loss(tmp_path_factory.mktemp("schema") / "bridge")
     with served(workspace) as site:
         heartbeat = workspace.folder / HEARTBEAT
         heartbeat.touch()

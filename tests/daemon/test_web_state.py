@@ -12,18 +12,15 @@ import pytest
 
 from shm.store import Workspace
 from shm_daemon.heartbeat import HEARTBEAT
-from tests.helpers.flows import ingest
+from tests.helpers.taken_in import with_a_slow_loss
 from tests.helpers.web_servers import Served, served
-from tests.helpers.workspaces import SLOW_LOSS, make_workspace, put, write_slow_loss
+from tests.helpers.workspaces import SLOW_LOSS, make_workspace, put
 
 
 @pytest.fixture(scope="module")
 def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """Hanger 3 has lost a twelfth of its tension, as its last test shows; 4 has no tests."""
-    workspace = make_workspace(tmp_path_factory.mktemp("web") / "bridge", hangers=(3, 4))
-    write_slow_loss(workspace.spool, workspace)
-    ingest(workspace)
-    return workspace
+    return with_a_slow_loss(tmp_path_factory.mktemp("web") / "bridge")
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +20,8 @@ from tests.helpers.any_bar import take_any_bar
 from tests.helpers.contents import quiet
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.workspaces import START, modelled_test, put, write_test
+from tests.helpers.taken_in import copied
+from tests.helpers.workspaces import START, make_workspace, modelled_test, put, write_test
 from tests.helpers.written import write
 
 EPOCH = datetime(1970, 1, 1, 0, 3, tzinfo=UTC)
@@ -45,13 +47,17 @@ def day(number: float) -> datetime:
 
 
 @pytest.fixture
-def held(workspace: Workspace) -> Workspace:
+def held(tmp_path: Path) -> Workspace:
     """A good test, then one of 1970 with a tenth less tension."""
+    return copied("held without sampling", tmp_path / "bridge", _make_held)
+
+
+def _make_held(folder: Path) -> None:
+    workspace = make_workspace(folder, hooks={"mail": ["true"]})
     spool(workspace, "good", day(0))
     ingest(workspace)
     spool(workspace, "lost", EPOCH, tension=0.9)
     ingest(workspace)
-    return workspace
 
 
 def counted(store: Store) -> list[str]:

@@ -204,12 +204,12 @@ def test_what_nobody_acknowledged_is_escalated_once_within_a_minute_of_its_time(
     bridge: Workspace, clock: Clock, inbox: Inbox
 ) -> None:
     raise_on(bridge, clock, [7])
-    live(bridge, clock, inbox, HOUR - 120.0, 60.0)
-    live(bridge, clock, inbox, 110.0, 10.0)
+    live(bridge, clock, inbox, HOUR - 600.0, 300.0)
+    live(bridge, clock, inbox, 590.0, 59.0)
     assert inbox.of("boss") == []
     live(bridge, clock, inbox, 70.0, 10.0)
     assert [each.key for each in inbox.of("boss")] == ["hanger-7:h7-1"]
-    live(bridge, clock, inbox, 2 * HOUR, 60.0)
+    live(bridge, clock, inbox, 2 * HOUR, 600.0)
     assert len(inbox.of("boss")) == len(inbox.of("mail")) == 1
 
 
@@ -220,7 +220,7 @@ def test_what_was_acknowledged_in_time_is_never_escalated(
     live(bridge, clock, inbox, 600.0, 60.0)
     with bridge.store() as store:
         store.alerts.acknowledge(1, "Ann", "on my way", clock())
-    live(bridge, clock, inbox, 2 * HOUR, 120.0)
+    live(bridge, clock, inbox, 2 * HOUR, 600.0)
     assert inbox.of("boss") == []
     assert states(bridge, "boss") == {"not needed"}
 
@@ -230,7 +230,8 @@ def test_escalation_counts_from_the_end_of_a_silence(
 ) -> None:
     _silence(bridge, clock, 7, 0.0, 2 * HOUR)
     raise_on(bridge, clock, [7])
-    live(bridge, clock, inbox, 3 * HOUR - 60.0, 60.0)
+    live(bridge, clock, inbox, 3 * HOUR - 600.0, 600.0)
+    live(bridge, clock, inbox, 540.0, 60.0)
     assert len(inbox.of("mail")) == 1
     assert inbox.of("boss") == []
     live(bridge, clock, inbox, 120.0, 30.0)

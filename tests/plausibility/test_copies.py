@@ -214,25 +214,24 @@ def test_what_counts_is_named_before_what_is_held_and_what_has_most_before_the_r
 @pytest.mark.parametrize("noise_m_s2", [0.002, 2e-5])
 @pytest.mark.parametrize("hits", [1, 3])
 def test_other_impacts_on_the_same_hanger_are_no_copies(hits: int, noise_m_s2: float) -> None:
-    prints = [print_of(seed, hits, noise_m_s2) for seed in range(8)]
+    prints = [print_of(seed, hits, noise_m_s2) for seed in range(6)]
     pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i]]
-    assert len(pairs) == 28
+    assert len(pairs) == 15
     assert not any(is_copy(*pair) for pair in pairs)
 
 
-@pytest.mark.parametrize("bits", [12, 16, 24])
-@pytest.mark.parametrize("hits", [1, 3])
+@pytest.mark.parametrize(("hits", "bits"), [(1, 12), (1, 16), (1, 24), (3, 16)])
 def test_hits_of_a_machine_are_no_copies(hits: int, bits: int) -> None:
     """One force at one sample: what differs is the background alone, or not even that where the
     converter does not show it."""
     plan = HammerPlan(hits=hits, adc_bits=bits, peak_force_scatter=0.0, hit_time_scatter_s=0.0)
     machine = (
         hammer_test(HANGER_3, STATE, plan, np.random.default_rng(n), time=START, source="s")
-        for n in range(6)
+        for n in range(5)
     )
     prints = [fingerprint_of([each]) for each in machine]
     pairs = [(a, b) for i, a in enumerate(prints) for b in prints[:i] if a and b]
-    assert len(pairs) == 15
+    assert len(pairs) == 10
     assert not any(is_copy(*pair) for pair in pairs)
 
 

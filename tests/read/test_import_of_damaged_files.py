@@ -26,7 +26,7 @@ DAMAGES: dict[str, Callable[[random.Random, bytes], bytes]] = {
         rng.choice([-1, 5, 500]),
     ),
 }
-TRIALS = 25
+TRIALS = 10
 
 
 def _flipped(rng: random.Random, whole: bytes) -> bytes:
