@@ -43,6 +43,7 @@ from shm.identify.estimation.stabilise import (
     nothing_moves,
     stabilised,
 )
+from shm.identify.estimation.zoom import windows
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray
 
@@ -66,6 +67,9 @@ _MAX_ORDER = 120  # judgement: two each of the 30 modes a plane that a long hang
 _FEW_ORDERS = 40
 """Where nobody hit, models that are far larger than what moves follow the chance in it: a structure
 of five modes loses one in ten at orders up to 120, none at 28 to 40 (tests/worlds/recordings.py)"""
+_CROWDED = 12
+_MOST_WINDOW_PARTS = 10
+_MAX_ORDER_WINDOW, _ROWS_WINDOW = 60, 60
 _COARSE_FROM = 60  # judgement: thirty orders or so tell what stays, and more only cost
 _LEAST_ORDER = 2  # one mode
 _RANK_TOLERANCE = 1e-17
@@ -75,20 +79,28 @@ _MATPLOTLIB_LEVEL = logging.getLogger("matplotlib").level
 
 def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Finding:
     """Modes of a measurement by multi-hit SSI (see the module's text)."""
-    mixed = references(measurement.decays)
-    rows = block_rows(measurement, options)
-    matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
-    if measurement.frequency_response is None and not measurement.hits:
+    nobody_hit = measurement.frequency_response is None and not measurement.hits
+    if nobody_hit:
         samples = sum(part.shape[1] for part in measurement.decays)
         options = replace(
             options,
             max_frequency_sd=_NOBODY_HIT * options.max_frequency_sd,
             ambient_s=samples / measurement.sampling_rate_hz,
         )
-        few = replace(options, max_order=min(options.max_order or _MAX_ORDER, _FEW_ORDERS))
-        every = modes_of_hankel(matrices, rows, measurement, options)
-        return completed(every, modes_of_hankel(matrices, rows, measurement, few))
-    return modes_of_hankel(matrices, rows, measurement, options)
+    most = _FEW_ORDERS if nobody_hit else _MAX_ORDER
+    mixed = references(measurement.decays)
+    rows = block_rows(measurement, options)
+    matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
+    whole = replace(options, max_order=min(options.max_order or most, most))
+    found = modes_of_hankel(matrices, rows, measurement, whole)
+    if _repeated(measurement) and _seen(found) < _CROWDED:
+        return found
+    return completed(found, through_windows(measurement, options))
+
+
+def _seen(found: Finding) -> int:
+    """How many modes there are, whether trusted or not."""
+    return len(found.modes) + sum(np.isfinite(entry.frequency_hz) for entry in found.dropped)
 
 
 def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOptions) -> Finding:
@@ -111,6 +123,33 @@ def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOpti
     return modes_of_hankel(matrices, rows, measurement, options)
 
 
+def through_windows(measurement: Measurement, options: IdentifyOptions) -> Finding:
+    """The modes that each window of the band shows by itself."""
+    found = None
+    for window in windows(measurement.sampling_rate_hz, options):
+        low_hz, high_hz = window.widened()
+        inside = replace(
+            options, band_low_hz=low_hz, band_high_hz=high_hz, max_order=_MAX_ORDER_WINDOW
+        )
+        rate = measurement.sampling_rate_hz
+        slow = replace(
+            measurement,
+            decays=tuple(window.through(decay, rate) for decay in measurement.decays),
+            sampling_rate_hz=window.rate_hz(rate),
+        )
+        mixed = references(slow.decays)
+        rows = min(_ROWS_WINDOW, min(decay.shape[1] for decay in slow.decays) // 3)
+        matrices = [hankel(decay, mixed @ decay, rows) for decay in slow.decays]
+        if len(matrices) > _MOST_WINDOW_PARTS:
+            matrices = [
+                np.sum(matrices[i::_MOST_WINDOW_PARTS], axis=0) for i in range(_MOST_WINDOW_PARTS)
+            ]
+        own = modes_of_hankel(matrices, rows, slow, inside, window.shift_hz)
+        found = completed(found, own) if found else own
+    assert found is not None
+    return found
+
+
 @dataclass(frozen=True)
 class _Size:
     """Size of the models, and the model orders that are looked at."""
@@ -118,6 +157,7 @@ class _Size:
     block_rows: int
     max_order: int
     sampling_rate_hz: float
+    shift_hz: float = 0.0
 
     @property
     def orders(self) -> list[int]:
@@ -152,14 +192,21 @@ def block_rows(measurement: Measurement, options: IdentifyOptions) -> int:
 
 
 def modes_of_hankel(
-    matrices: Sequence[FloatArray], rows: int, measurement: Measurement, options: IdentifyOptions
+    matrices: Sequence[FloatArray],
+    rows: int,
+    measurement: Measurement,
+    options: IdentifyOptions,
+    shift_hz: float = 0.0,
 ) -> Finding:
-    """Modes from the Hankel matrices of the hits, each of `rows` blocks of rows."""
+    """Modes from the Hankel matrices of the hits, each of `rows` blocks of rows.
+
+    `shift_hz` is what their frequencies lie below the true ones.
+    """
     total = np.sum(matrices, axis=0)
     max_order = _max_order(total, rows, options.max_order or _MAX_ORDER)
     if max_order < _LEAST_ORDER:
         return nothing_moves(len(matrices))
-    size = _Size(rows, max_order, measurement.sampling_rate_hz)
+    size = _Size(rows, max_order, measurement.sampling_rate_hz, shift_hz)
     observability, sets = _models(total, size, size.orders)
     without_each = _models_without_each_hit(matrices, _right_basis(total, observability), size)
     seconds = max(decay.shape[1] for decay in measurement.decays) / size.sampling_rate_hz
@@ -180,8 +227,10 @@ def _models(
 ) -> tuple[FloatArray, list[PoleSet]]:
     """Observability matrix, and the poles of each of `orders`."""
     observability, states, outputs = realise(matrix, size.block_rows, size.max_order)
-    rate = size.sampling_rate_hz
-    return observability, [poles_of(states[n // 2], outputs[n // 2], rate) for n in orders]
+    rate, shift_hz = size.sampling_rate_hz, size.shift_hz
+    return observability, [
+        poles_of(states[n // 2], outputs[n // 2], rate, shift_hz) for n in orders
+    ]
 
 
 def _right_basis(matrix: FloatArray, observability: FloatArray) -> FloatArray:
