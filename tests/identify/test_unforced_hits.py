@@ -57,4 +57,4 @@ def test_hits_of_unknown_force_give_the_modes_and_say_that_it_is_unknown() -> No
         assert mode.frequency_hz == pytest.approx(other.frequency_hz, rel=1e-4)
         assert mode.damping_ratio == pytest.approx(other.damping_ratio, rel=0.05)
     hits = next(check for check in found.quality if check.name == "hits")
-    assert "no force was recorded" in hits.found
+    assert "no force is known" in hits.found

@@ -29,6 +29,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ from shm.identify.estimation.stabilise import (
     nothing_moves,
     stabilised,
 )
-from shm.identify.estimation.zoom import windows
+from shm.identify.estimation.zoom import STOPPED, Window, windows
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray
 
@@ -67,9 +68,8 @@ _MAX_ORDER = 120  # judgement: two each of the 30 modes a plane that a long hang
 _FEW_ORDERS = 40
 """Where nobody hit, models that are far larger than what moves follow the chance in it: a structure
 of five modes loses one in ten at orders up to 120, none at 28 to 40 (tests/worlds/recordings.py)"""
-_CROWDED = 12
-_MOST_WINDOW_PARTS = 10
-_MAX_ORDER_WINDOW, _ROWS_WINDOW = 60, 60
+_ROWS_WINDOW = 60  # judgement: two seconds of lags, at four times the reach of a window
+_MOST_SUMS = 10  # judgement: parts of ambient motion by twos; Student's quantile is 6 % above
 _COARSE_FROM = 60  # judgement: thirty orders or so tell what stays, and more only cost
 _LEAST_ORDER = 2  # one mode
 _RANK_TOLERANCE = 1e-17
@@ -93,14 +93,9 @@ def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Fin
     matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
     whole = replace(options, max_order=min(options.max_order or most, most))
     found = modes_of_hankel(matrices, rows, measurement, whole)
-    if _repeated(measurement) and _seen(found) < _CROWDED:
+    if _repeated(measurement) or not (measurement.hits or nobody_hit):
         return found
     return completed(found, through_windows(measurement, options))
-
-
-def _seen(found: Finding) -> int:
-    """How many modes there are, whether trusted or not."""
-    return len(found.modes) + sum(np.isfinite(entry.frequency_hz) for entry in found.dropped)
 
 
 def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOptions) -> Finding:
@@ -125,29 +120,25 @@ def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOpti
 
 def through_windows(measurement: Measurement, options: IdentifyOptions) -> Finding:
     """The modes that each window of the band shows by itself."""
-    found = None
-    for window in windows(measurement.sampling_rate_hz, options):
-        low_hz, high_hz = window.widened()
-        inside = replace(
-            options, band_low_hz=low_hz, band_high_hz=high_hz, max_order=_MAX_ORDER_WINDOW
-        )
-        rate = measurement.sampling_rate_hz
-        slow = replace(
-            measurement,
-            decays=tuple(window.through(decay, rate) for decay in measurement.decays),
-            sampling_rate_hz=window.rate_hz(rate),
-        )
-        mixed = references(slow.decays)
-        rows = min(_ROWS_WINDOW, min(decay.shape[1] for decay in slow.decays) // 3)
-        matrices = [hankel(decay, mixed @ decay, rows) for decay in slow.decays]
-        if len(matrices) > _MOST_WINDOW_PARTS:
-            matrices = [
-                np.sum(matrices[i::_MOST_WINDOW_PARTS], axis=0) for i in range(_MOST_WINDOW_PARTS)
-            ]
-        own = modes_of_hankel(matrices, rows, slow, inside, window.shift_hz)
-        found = completed(found, own) if found else own
-    assert found is not None
-    return found
+    every = windows(measurement.sampling_rate_hz, options)
+    return reduce(completed, (_in_window(window, measurement, options) for window in every))
+
+
+def _in_window(window: Window, measurement: Measurement, options: IdentifyOptions) -> Finding:
+    rate, rate_slow = measurement.sampling_rate_hz, window.rate_hz(measurement.sampling_rate_hz)
+    decays = tuple(window.through(decay, rate) for decay in measurement.decays)
+    if _size(decays) < STOPPED * _size(measurement.decays):
+        return nothing_moves(len(decays))
+    mixed = references(decays)
+    rows = min(_ROWS_WINDOW, min(decay.shape[1] for decay in decays) // 3)
+    matrices = [hankel(decay, mixed @ decay, rows) for decay in decays]
+    sums = [np.sum(matrices[n::_MOST_SUMS], axis=0) for n in range(min(len(decays), _MOST_SUMS))]
+    slow = replace(measurement, decays=decays, sampling_rate_hz=rate_slow)
+    return modes_of_hankel(sums, rows, slow, window.options(options), window.shift_hz)
+
+
+def _size(decays: Sequence[FloatArray]) -> float:
+    return max(float(np.std(decay)) for decay in decays)
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,15 @@
 
 A model of the whole band spends its lags on its highest frequency: of a long hanger it sees a
 second, while two planes beat for ten. Shifted down and sampled slowly, a part of the band is seen
-for longer by a smaller model, and what rings outside of it does not mask it (P. Stoica and R. Moses,
-Spectral Analysis of Signals, 2005, sec. 5.7, on band-wise estimation).
+for longer by a smaller model, and what rings outside of it does not mask it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import scipy
@@ -24,7 +24,13 @@ tests/worlds/recordings.py windows of 12 Hz gave 68 %, of 5 Hz 54 %, the whole b
 _GUARD = 0.2  # of the width, on either side: there the filter falls
 _FILTER_ORDER, _STOP_DB = 12, 90.0
 """Hits ring 60 to 90 dB above the noise: with 50 dB, modes of other windows are found as images."""
+STOPPED = 1e-4
+"""Share of the whole motion, -80 dB, below which a window holds but what its filter lets by."""
 _SETTLING = 1.5  # in 1 / guard: of the filter, to -60 dB
+_MAX_ORDER = 40
+_SURE_BELOW_HZ = 30.0
+"""Of 221 modes in 16 records with few hits or none (tests/worlds/recordings.py, seeds 5000, 5001)
+windows find 186 and 13 others; 177 and 23 with order 60 and without `_SURE_BELOW_HZ`."""
 _OVERLAP = 0.05  # of the width: a mode at the edge of two windows is found in either
 
 
@@ -69,18 +75,28 @@ class Window:
         back = np.exp(2j * np.pi * self._reach_hz / rate * np.arange(slow.shape[1]))
         return np.asarray((slow * back).real)
 
-    def widened(self) -> tuple[float, float]:
-        """Where modes are kept, so that none falls between two windows."""
+    def options(self, options: IdentifyOptions) -> IdentifyOptions:
+        """Those of the band for this window; windows overlap, so that no mode falls between two.
+
+        Poles of noise lie as dense in one window as in another, so what a frequency may differ by
+        from model to model grows with it no further than `_SURE_BELOW_HZ`.
+        """
         more = _OVERLAP * (self.high_hz - self.low_hz)
-        return self.low_hz - more, self.high_hz + more
+        strict = min(1.0, 2 * _SURE_BELOW_HZ / (self.low_hz + self.high_hz))
+        return replace(
+            options,
+            band_low_hz=self.low_hz - more,
+            band_high_hz=self.high_hz + more,
+            max_order=min(options.max_order or _MAX_ORDER, _MAX_ORDER),
+            max_frequency_sd=strict * options.max_frequency_sd,
+            max_frequency_spread=strict * options.max_frequency_spread,
+        )
 
 
 @lru_cache(maxsize=16)
 def _low_pass(edge: float) -> FloatArray:
     """Sections of a Chebyshev filter that stops from a share of half the sampling rate on."""
-    return np.asarray(
-        scipy.signal.cheby2(_FILTER_ORDER, _STOP_DB, min(edge, 0.99), output="sos")
-    )
+    return np.asarray(scipy.signal.cheby2(_FILTER_ORDER, _STOP_DB, min(edge, 0.99), output="sos"))
 
 
 def windows(sampling_rate_hz: float, options: IdentifyOptions) -> Iterator[Window]:
@@ -89,5 +105,5 @@ def windows(sampling_rate_hz: float, options: IdentifyOptions) -> Iterator[Windo
     high_hz = min(options.band_high_hz, sampling_rate_hz / 2)
     count = max(1, round((high_hz - low_hz) / WIDTH_HZ))
     edges = np.linspace(low_hz, high_hz, count + 1)
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
-        yield Window(float(low), float(high))
+    for low, high in pairwise(edges.tolist()):
+        yield Window(low, high)
