@@ -109,9 +109,7 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
     return replace(found, modes=modes)
 
 
-def _with_slope(
-    mode: FoundMode, fit: _Fit | None, expected: float, usual: float
-) -> FoundMode:
+def _with_slope(mode: FoundMode, fit: _Fit | None, expected: float, usual: float) -> FoundMode:
     """The mode with its slope and shift; by `expected` +- `usual`, relative, it is shifted where
     its own phase says nothing."""
     slope = (fit.slope, fit.slope_sd) if fit is not None else (NAN, NAN)

@@ -68,6 +68,10 @@ _MAX_ORDER = 120  # judgement: two each of the 30 modes a plane that a long hang
 _FEW_ORDERS = 40
 """Where nobody hit, models that are far larger than what moves follow the chance in it: a structure
 of five modes loses one in ten at orders up to 120, none at 28 to 40 (tests/worlds/recordings.py)"""
+_LEAST_POINTS = 3
+"""Of one hit, shapes alone tell a mode from noise in a window, and those of two channels agree by
+chance: case1 of tests/identify/test_real_records.py, one channel, would have seven modes too many.
+"""
 _ROWS_WINDOW = 60  # judgement: two seconds of lags, at four times the reach of a window
 _MOST_SUMS = 10  # judgement: parts of ambient motion by twos; Student's quantile is 6 % above
 _COARSE_FROM = 60  # judgement: thirty orders or so tell what stays, and more only cost
@@ -87,13 +91,16 @@ def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Fin
             max_frequency_sd=_NOBODY_HIT * options.max_frequency_sd,
             ambient_s=samples / measurement.sampling_rate_hz,
         )
-    most = _FEW_ORDERS if nobody_hit else _MAX_ORDER
     mixed = references(measurement.decays)
     rows = block_rows(measurement, options)
     matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
-    whole = replace(options, max_order=min(options.max_order or most, most))
-    found = modes_of_hankel(matrices, rows, measurement, whole)
-    if _repeated(measurement) or not (measurement.hits or nobody_hit):
+    found = modes_of_hankel(matrices, rows, measurement, options)
+    if nobody_hit:
+        few = replace(options, max_order=min(options.max_order or _FEW_ORDERS, _FEW_ORDERS))
+        found = completed(found, modes_of_hankel(matrices, rows, measurement, few))
+    checked = len(measurement.decays) > 1 or len(measurement.points) >= _LEAST_POINTS
+    timed = bool(measurement.hits) or nobody_hit
+    if _repeated(measurement) or not (timed and checked):
         return found
     return completed(found, through_windows(measurement, options))
 
