@@ -48,8 +48,8 @@ def poles_of(
     values, vectors = np.linalg.eig(state)
     above = values.imag > 0
     real = len(values) - 2 * int(np.sum(above))
-    rates = np.log(values[above].astype(np.complex128)) * sampling_rate_hz
-    rates += 2j * np.pi * shift_hz
+    lowered = np.log(values[above].astype(np.complex128)) * sampling_rate_hz
+    rates = lowered + 2j * np.pi * shift_hz
     return PoleSet(
         order=len(state),
         frequency_hz=np.abs(rates) / (2 * np.pi),

@@ -86,8 +86,8 @@ class Window:
         strict = min(1.0, 2 * _SURE_BELOW_HZ / (self.low_hz + self.high_hz))
         return replace(
             options,
-            band_low_hz=self.low_hz - more,
-            band_high_hz=self.high_hz + more,
+            band_low_hz=max(self.low_hz - more, options.band_low_hz),
+            band_high_hz=min(self.high_hz + more, options.band_high_hz),
             max_order=min(options.max_order or _MAX_ORDER, _MAX_ORDER),
             max_frequency_sd=strict * options.max_frequency_sd,
             max_frequency_spread=strict * options.max_frequency_spread,
