@@ -18,7 +18,7 @@ from shm.identify.estimation.amplitude_dependence import with_amplitude_dependen
 from shm.identify.estimation.poles import modal_assurance
 from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
-from shm.identify.measuring.setups import measured
+from shm.identify.measuring.setups import measured, without_unused_force
 from shm.identify.mode_ordering.placement import Placement, placed
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
@@ -81,6 +81,7 @@ def identify(
     """
     recordings = [record for record in records if isinstance(record, Recording)]
     measurements = measured(records, options)
+    recordings = without_unused_force(recordings, measurements)
     found = _found(measurements, options.identifier, options)
     second = _cross_check(measurements, options)
     steady = tones(measurements, recordings, options)
@@ -211,7 +212,7 @@ def _no_force(measurements: Sequence[Measurement]) -> tuple[str, ...]:
     if not any(m.hits and m.frequency_response is None for m in measurements):
         return ()
     return (
-        "no force was recorded: hits are known by the motion after them, amplitudes and frequency "
+        "no force is known: hits are known by the motion after them, amplitudes and frequency "
         "responses are not",
     )
 

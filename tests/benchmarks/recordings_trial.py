@@ -11,6 +11,7 @@ Frequencies are judged by those of small amplitude, as the file's own clock show
 be found where it is 20 dB above the rest at its best sensor, in the band, and in a plane that the
 channels are said to measure; those of refused tests count as missed. A wrong name is a mode of the
 structure under another plane or order; where no bar is (kinds `any_...`) names mean nothing.
+Of the modes to be found, those that anybody could identify (`recordings_limit`) are counted apart.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from shm.errors import ShmError
 from shm.identify import Identification, IdentifyOptions, identify
 from shm.report.quality_table import overall
 from shm.values import PLANES, Channel, Hanger, Mode, Recording
+from tests.benchmarks.recordings_limit import bounds
 from tests.worlds import recordings as world
 from tests.worlds.recorded_kinds import KINDS
 from tests.worlds.recorded_structures import POISSON, STEEL_KG_M3, STEEL_PA
@@ -47,8 +49,8 @@ SAME_MODE = 0.005
 NOMINAL_OFF = 0.1
 NINETY = 1.645
 COLUMNS = (
-    "kind", "tests", "refused", "found", "%", "wrong names", "of them Good", "false", "of modes",
-    "frequency covered", "damping covered", "CPU s",
+    "kind", "tests", "refused", "found", "%", "of identifiable", "%", "wrong names", "of them Good",
+    "false", "of modes", "frequency covered", "damping covered", "CPU s",
 )  # fmt: skip
 
 
@@ -63,6 +65,8 @@ class Answer:
     seconds: float = 0.0
     expected: int = 0
     found: int = 0
+    identifiable: int = 0
+    identified: int = 0
     reported: int = 0
     wrong: int = 0
     false: int = 0
@@ -143,15 +147,20 @@ def _judge(answer: Answer, case: world.Recording, modes: list[Mode]) -> None:
     planes = {channel.plane for channel in case.channels if channel.quantity == "acceleration"}
     options = IdentifyOptions()
     answer.reported = len(modes)
+    limits = {id(mode): limit for mode, limit in zip(case.truth.modes, bounds(case), strict=True)}
     for truth in sorted(case.truth.modes, key=lambda mode: -mode.snr_db):
         shown_hz = truth.frequency_hz / clock
         own = _own(modes, truth, shown_hz, named=bool(case.truth.description))
         heard = truth.snr_db >= LEAST_SNR_DB and truth.plane in planes
         if heard and options.band_low_hz <= shown_hz <= options.band_high_hz:
+            limit = limits[id(truth)]
             answer.expected += 1
             answer.found += own is not None
-            if own is None and not answer.refused:
-                answer.remarks.append(f"missed {_words(truth, shown_hz)}")
+            answer.identifiable += limit.identifiable
+            answer.identified += limit.identifiable and own is not None
+            if own is None:
+                why = "" if limit.identifiable else ", as anybody would"
+                answer.remarks.append(f"missed {_words(truth, shown_hz)}{why}")
         if own is not None:
             modes.remove(own)
             _errors(answer, truth, shown_hz, own)
@@ -214,12 +223,16 @@ def rows(answers: Sequence[Answer]) -> Iterator[tuple[str, ...]]:
 
 def _row(name: str, answers: Sequence[Answer]) -> tuple[str, ...]:
     expected, found = sum(a.expected for a in answers), sum(a.found for a in answers)
+    identifiable = sum(a.identifiable for a in answers)
+    identified = sum(a.identified for a in answers)
     return (
         name,
         str(len(answers)),
         str(sum(bool(a.refused) for a in answers)),
         f"{found}/{expected}",
         f"{100 * found / expected:.1f}" if expected else "-",
+        f"{identified}/{identifiable}",
+        f"{100 * identified / identifiable:.1f}" if identifiable else "-",
         str(sum(a.wrong for a in answers)),
         str(sum(a.wrong for a in answers if a.verdict == "good")),
         str(sum(a.false for a in answers)),
@@ -254,7 +267,7 @@ def main() -> None:
     grid = Table(*COLUMNS)
     for row in rows(answers):
         grid.add_row(*row)
-    Console(width=170, highlight=False).print(grid)
+    Console(width=200, highlight=False).print(grid)
 
 
 if __name__ == "__main__":

@@ -57,4 +57,15 @@ def test_hits_of_unknown_force_give_the_modes_and_say_that_it_is_unknown() -> No
         assert mode.frequency_hz == pytest.approx(other.frequency_hz, rel=1e-4)
         assert mode.damping_ratio == pytest.approx(other.damping_ratio, rel=0.05)
     hits = next(check for check in found.quality if check.name == "hits")
-    assert "no force was recorded" in hits.found
+    assert "no force is known" in hits.found
+
+
+def test_where_the_force_shows_no_hits_those_of_the_motion_are_used_with_a_warning() -> None:
+    """A slow logger without a filter misses pulses between two samples: here all of them."""
+    silent = replace(FORCED.channels[0], values=0.01 * np.sin(np.arange(FORCED.samples)))
+    missed = replace(FORCED, channels=(silent, *FORCED.accelerations))
+    found = identify([missed], OPTIONS, test_id="t")
+    assert len(found.test.modes) == len(identify([TAPS], OPTIONS, test_id="t").test.modes)
+    cable = next(check for check in found.quality if check.name == "cable")
+    assert cable.verdict == "warning"
+    assert silent.name in cable.found

@@ -146,6 +146,11 @@ class Ringing:
         pole = complex(self.modes.poles[k])
         return np.asarray((pole**2 * self.eta(k, start_s, step_s, count)).imag / pole.imag)
 
+    def accelerations_after(self, k: int) -> tuple[complex, ...]:
+        """q'' of mode `k` as a phasor, at the end of each push."""
+        pole = complex(self.modes.poles[k])
+        return tuple(pole**2 * eta / pole.imag for _, _, eta in self._stretches(k, np.inf))
+
     def mean_frequency_hz(self, k: int, until_s: float) -> float:
         """The undamped frequency, averaged over the ring-downs with the squared amplitude."""
         pole, p = complex(self.modes.poles[k]), self.law.power

@@ -92,6 +92,8 @@ class ModeTruth:
     damping_ratio: float
     snr_db: float
     shape: tuple[float, ...]  # at each acceleration channel, 1/sqrt(kg), as the sensor is turned
+    noise: tuple[float, ...]  # of each such channel: density of all else there, (m/s2)^2/Hz
+    rings: tuple[complex, ...]  # acceleration after each contact of `hits`, as a turning phasor
 
 
 @dataclass(frozen=True)
@@ -357,6 +359,7 @@ class _Motion:
     mean_hz: Array
     change: Array  # of the frequency at the largest amplitude
     lines: list[Line]
+    rings: list[tuple[complex, ...]]  # a mode each
 
 
 def _ring(
@@ -369,6 +372,7 @@ def _ring(
     ringing = Ringing(modes, pushes, Law(change, power=1 if plan.change < 0 else 2))
     motion = _still(scene, grid)
     motion.change = change
+    motion.rings = [ringing.accelerations_after(k) for k in range(len(scene.orders))]
     kept = [k for k, hz in enumerate(modes.frequency_hz) if hz < 0.45 / step]
     for k in kept:
         own = ringing.acceleration(k, grid.start_s, step, count)
@@ -402,7 +406,13 @@ def _still(scene: _Scene, grid: _Grid) -> _Motion:
     shape = (len(scene.places_m), 2, grid.size)
     hz = scene.modes.frequency_hz
     return _Motion(
-        np.zeros(shape), np.zeros(shape), np.zeros(len(hz)), hz.copy(), np.zeros(len(hz)), []
+        ringing=np.zeros(shape),
+        background=np.zeros(shape),
+        energy=np.zeros(len(hz)),
+        mean_hz=hz.copy(),
+        change=np.zeros(len(hz)),
+        lines=[],
+        rings=[()] * len(hz),
     )
 
 
@@ -558,7 +568,7 @@ def _mode_truths(
             continue
         passed = float(abs(chain.filter_gain(logger, np.array([hz]))[0]))
         width = float(2 * scene.modes.damping[k] * hz)
-        shape, ratios = [], [1e-30]
+        shape, noise, ratios = [], [], [1e-30]
         for c, wire in enumerate(wires):
             heard = float(np.dot(wire.mixing, scene.direction[k]))
             shape.append(heard * float(scene.at_sensors[k, c // per_place]))
@@ -566,6 +576,7 @@ def _mode_truths(
             density += chain.lsb(logger, wire) ** 2 / 6 / logger.true_rate_hz
             energy = (shape[-1] * wire.gain * passed) ** 2 * motion.energy[k] * (c != dead)
             ratios.append(energy / max(density * width * grid.seconds, 1e-300))
+            noise.append(np.inf if c == dead else density / (wire.gain * passed) ** 2)
         truths.append(
             ModeTruth(
                 plane=scene.planes[k],
@@ -577,6 +588,8 @@ def _mode_truths(
                 damping_ratio=float(scene.modes.damping[k]),
                 snr_db=float(10 * np.log10(max(ratios))),
                 shape=tuple(shape),
+                noise=tuple(noise),
+                rings=motion.rings[k],
             )
         )
     return tuple(truths)

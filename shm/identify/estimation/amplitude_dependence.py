@@ -105,13 +105,17 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
     # Where several depend on amplitude, the others will too, by about as much.
     several = len(sure) > _SOME * len(known)
     usual = float(np.sqrt(np.mean(np.square(sure)))) if several else 0.0
+    # A joint that slips lowers all frequencies, stretching raises all.
+    expected = float(np.median(sure)) if several else 0.0
     modes = tuple(
-        _with_slope(mode, fit, usual) for mode, fit in zip(found.modes, fits, strict=True)
+        _with_slope(mode, fit, expected, usual) for mode, fit in zip(found.modes, fits, strict=True)
     )
     return replace(found, modes=modes)
 
 
-def _with_slope(mode: FoundMode, fit: _Fit | None, usual: float) -> FoundMode:
+def _with_slope(mode: FoundMode, fit: _Fit | None, expected: float, usual: float) -> FoundMode:
+    """The mode with its slope and shift; by `expected` +- `usual`, relative, it is shifted where
+    its own phase says nothing."""
     slope = (fit.slope, fit.slope_sd) if fit is not None else (NAN, NAN)
     known = replace(mode, amplitude_slope=slope[0], amplitude_slope_sd=slope[1])
     prior_hz = usual * mode.frequency_hz
@@ -120,16 +124,17 @@ def _with_slope(mode: FoundMode, fit: _Fit | None, usual: float) -> FoundMode:
     # Beside what the other modes shift, a shift that is not sure by itself counts by its share.
     vague = 0.0 if fit.is_sure else fit.shift_sd_hz**2
     share = 1.0 if fit.is_sure else prior_hz**2 / (prior_hz**2 + vague + _TINY)
+    shift_hz = share * fit.shift_hz + (1 - share) * expected * mode.frequency_hz
     by_phase = math.hypot(
         math.sqrt(share) * fit.shift_sd_hz,
-        _LAW_ERROR * share * fit.shift_hz,
+        _LAW_ERROR * shift_hz,
         _TO_ZERO * fit.slope * mode.frequency_hz,
     )
     as_found = mode.frequency_sd_hz if math.isnan(mode.damping_sd) else 0.0
     kept = (1 - share) * mode.frequency_sd_hz
     return replace(
         known,
-        frequency_hz=mode.frequency_hz + share * fit.shift_hz,
+        frequency_hz=mode.frequency_hz + shift_hz,
         frequency_sd_hz=max(as_found, math.hypot(by_phase, kept)),
     )
 

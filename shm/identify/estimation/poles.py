@@ -41,12 +41,15 @@ class PoleSet:
         )
 
 
-def poles_of(state: FloatArray, output: FloatArray, sampling_rate_hz: float) -> PoleSet:
-    """The poles above the real axis of x[k+1] = state x[k], y = output x."""
+def poles_of(
+    state: FloatArray, output: FloatArray, sampling_rate_hz: float, shift_hz: float = 0.0
+) -> PoleSet:
+    """The poles above the real axis of x[k+1] = state x[k], y = output x, raised by `shift_hz`."""
     values, vectors = np.linalg.eig(state)
     above = values.imag > 0
     real = len(values) - 2 * int(np.sum(above))
-    rates = np.log(values[above].astype(np.complex128)) * sampling_rate_hz
+    lowered = np.log(values[above].astype(np.complex128)) * sampling_rate_hz
+    rates = lowered + 2j * np.pi * shift_hz
     return PoleSet(
         order=len(state),
         frequency_hz=np.abs(rates) / (2 * np.pi),

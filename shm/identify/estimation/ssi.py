@@ -29,6 +29,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,7 @@ from shm.identify.estimation.stabilise import (
     nothing_moves,
     stabilised,
 )
+from shm.identify.estimation.zoom import STOPPED, Window, windows
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray
 
@@ -66,6 +68,12 @@ _MAX_ORDER = 120  # judgement: two each of the 30 modes a plane that a long hang
 _FEW_ORDERS = 40
 """Where nobody hit, models that are far larger than what moves follow the chance in it: a structure
 of five modes loses one in ten at orders up to 120, none at 28 to 40 (tests/worlds/recordings.py)"""
+_LEAST_POINTS = 3
+"""Of one hit, shapes alone tell a mode from noise in a window, and those of two channels agree by
+chance: case1 of tests/identify/test_real_records.py, one channel, would have seven modes too many.
+"""
+_ROWS_WINDOW = 60  # judgement: two seconds of lags, at four times the reach of a window
+_MOST_SUMS = 10  # judgement: parts of ambient motion by twos; Student's quantile is 6 % above
 _COARSE_FROM = 60  # judgement: thirty orders or so tell what stays, and more only cost
 _LEAST_ORDER = 2  # one mode
 _RANK_TOLERANCE = 1e-17
@@ -75,20 +83,26 @@ _MATPLOTLIB_LEVEL = logging.getLogger("matplotlib").level
 
 def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Finding:
     """Modes of a measurement by multi-hit SSI (see the module's text)."""
-    mixed = references(measurement.decays)
-    rows = block_rows(measurement, options)
-    matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
-    if measurement.frequency_response is None and not measurement.hits:
+    nobody_hit = measurement.frequency_response is None and not measurement.hits
+    if nobody_hit:
         samples = sum(part.shape[1] for part in measurement.decays)
         options = replace(
             options,
             max_frequency_sd=_NOBODY_HIT * options.max_frequency_sd,
             ambient_s=samples / measurement.sampling_rate_hz,
         )
-        few = replace(options, max_order=min(options.max_order or _MAX_ORDER, _FEW_ORDERS))
-        every = modes_of_hankel(matrices, rows, measurement, options)
-        return completed(every, modes_of_hankel(matrices, rows, measurement, few))
-    return modes_of_hankel(matrices, rows, measurement, options)
+    mixed = references(measurement.decays)
+    rows = block_rows(measurement, options)
+    matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
+    found = modes_of_hankel(matrices, rows, measurement, options)
+    if nobody_hit:
+        few = replace(options, max_order=min(options.max_order or _FEW_ORDERS, _FEW_ORDERS))
+        found = completed(found, modes_of_hankel(matrices, rows, measurement, few))
+    checked = len(measurement.decays) > 1 or len(measurement.points) >= _LEAST_POINTS
+    timed = bool(measurement.hits) or nobody_hit
+    if _repeated(measurement) or not (timed and checked):
+        return found
+    return completed(found, through_windows(measurement, options))
 
 
 def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOptions) -> Finding:
@@ -111,6 +125,29 @@ def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOpti
     return modes_of_hankel(matrices, rows, measurement, options)
 
 
+def through_windows(measurement: Measurement, options: IdentifyOptions) -> Finding:
+    """The modes that each window of the band shows by itself."""
+    every = windows(measurement.sampling_rate_hz, options)
+    return reduce(completed, (_in_window(window, measurement, options) for window in every))
+
+
+def _in_window(window: Window, measurement: Measurement, options: IdentifyOptions) -> Finding:
+    rate, rate_slow = measurement.sampling_rate_hz, window.rate_hz(measurement.sampling_rate_hz)
+    decays = tuple(window.through(decay, rate) for decay in measurement.decays)
+    if _size(decays) < STOPPED * _size(measurement.decays):
+        return nothing_moves(len(decays))
+    mixed = references(decays)
+    rows = min(_ROWS_WINDOW, min(decay.shape[1] for decay in decays) // 3)
+    matrices = [hankel(decay, mixed @ decay, rows) for decay in decays]
+    sums = [np.sum(matrices[n::_MOST_SUMS], axis=0) for n in range(min(len(decays), _MOST_SUMS))]
+    slow = replace(measurement, decays=decays, sampling_rate_hz=rate_slow)
+    return modes_of_hankel(sums, rows, slow, window.options(options), window.shift_hz)
+
+
+def _size(decays: Sequence[FloatArray]) -> float:
+    return max(float(np.std(decay)) for decay in decays)
+
+
 @dataclass(frozen=True)
 class _Size:
     """Size of the models, and the model orders that are looked at."""
@@ -118,6 +155,7 @@ class _Size:
     block_rows: int
     max_order: int
     sampling_rate_hz: float
+    shift_hz: float = 0.0
 
     @property
     def orders(self) -> list[int]:
@@ -152,14 +190,21 @@ def block_rows(measurement: Measurement, options: IdentifyOptions) -> int:
 
 
 def modes_of_hankel(
-    matrices: Sequence[FloatArray], rows: int, measurement: Measurement, options: IdentifyOptions
+    matrices: Sequence[FloatArray],
+    rows: int,
+    measurement: Measurement,
+    options: IdentifyOptions,
+    shift_hz: float = 0.0,
 ) -> Finding:
-    """Modes from the Hankel matrices of the hits, each of `rows` blocks of rows."""
+    """Modes from the Hankel matrices of the hits, each of `rows` blocks of rows.
+
+    `shift_hz` is what their frequencies lie below the true ones.
+    """
     total = np.sum(matrices, axis=0)
     max_order = _max_order(total, rows, options.max_order or _MAX_ORDER)
     if max_order < _LEAST_ORDER:
         return nothing_moves(len(matrices))
-    size = _Size(rows, max_order, measurement.sampling_rate_hz)
+    size = _Size(rows, max_order, measurement.sampling_rate_hz, shift_hz)
     observability, sets = _models(total, size, size.orders)
     without_each = _models_without_each_hit(matrices, _right_basis(total, observability), size)
     seconds = max(decay.shape[1] for decay in measurement.decays) / size.sampling_rate_hz
@@ -180,8 +225,10 @@ def _models(
 ) -> tuple[FloatArray, list[PoleSet]]:
     """Observability matrix, and the poles of each of `orders`."""
     observability, states, outputs = realise(matrix, size.block_rows, size.max_order)
-    rate = size.sampling_rate_hz
-    return observability, [poles_of(states[n // 2], outputs[n // 2], rate) for n in orders]
+    rate, shift_hz = size.sampling_rate_hz, size.shift_hz
+    return observability, [
+        poles_of(states[n // 2], outputs[n // 2], rate, shift_hz) for n in orders
+    ]
 
 
 def _right_basis(matrix: FloatArray, observability: FloatArray) -> FloatArray:

@@ -29,6 +29,7 @@ from shm.identify.measuring.frf import (
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
 from shm.identify.measuring.responses import measurement_of_responses, point_of
 from shm.identify.measuring.screening import Screening, pulses_of, screened
+from shm.identify.measuring.signal_faults import HITS_NOT_SHOWN
 from shm.identify.options import IdentifyOptions
 from shm.values import Channel, ComplexArray, FloatArray, FrequencyResponse, Recording
 
@@ -77,9 +78,39 @@ def measured_recordings(
     set_ups = _grouped(records)
     if not hammered and not all(_struck(record, options) for record in records):
         return tuple(ambient_measurement(set_up.records, options) for set_up in set_ups)
-    if len(set_ups) == 1:
-        return (measurement_of_recordings(records, options),)
-    return _measured_apart(set_ups, options)
+    try:
+        if len(set_ups) == 1:
+            return (measurement_of_recordings(records, options),)
+        return _measured_apart(set_ups, options)
+    except NotIdentifiable as refused:
+        return _by_motion_alone(records, refused, options)
+
+
+def without_unused_force(
+    records: Sequence[Recording], measurements: Sequence[Measurement]
+) -> list[Recording]:
+    """The records as they were measured: without a force that does not show the hits."""
+    if all(m.frequency_response is not None for m in measurements):
+        return list(records)
+    return [replace(record, channels=record.accelerations) for record in records]
+
+
+def _by_motion_alone(
+    records: Sequence[Recording], refused: NotIdentifiable, options: IdentifyOptions
+) -> tuple[Measurement, ...]:
+    """The measurements by the hits that the accelerations show, the force left aside.
+
+    A logger that samples slowly and without a filter misses a pulse between two samples, and noise
+    hides a weak one; what rings after it is recorded all the same. Raises `refused` where the
+    motion shows no hits either.
+    """
+    forces = [record.force for record in records if record.force is not None]
+    rest = [replace(record, channels=record.accelerations) for record in records]
+    if not forces or not all(_struck(record, options) for record in rest):
+        raise refused
+    first, *others = measured_recordings(rest, options)
+    lost = Dropped(f"channel {forces[0].name}", 1, HITS_NOT_SHOWN)
+    return (replace(first, dropped=(lost, *first.dropped)), *others)
 
 
 def _struck(record: Recording, options: IdentifyOptions) -> bool:

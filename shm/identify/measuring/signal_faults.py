@@ -33,6 +33,7 @@ WANDERS = "cable fault: the offset wanders more than the hanger moves"
 COPY = "cable fault: a copy of another channel"
 DEAD = "its value never changes: dead sensor or cable"
 SILENT = "cable fault: less than a thousandth of the other channels"
+HITS_NOT_SHOWN = "cable fault: without the hits that the motion shows"
 KNOCK = "disturbed: something other than the hammer struck"
 OUTLIER = "outlier: its response is unlike that of the other hits"
 

@@ -44,7 +44,7 @@ def without_tones(
     """The modes that are none of the `tones`, and those that are.
 
     A mode is a tone where it lies at one and hardly decays beside the other modes; where no order
-    could tell that it is one (`unordered`), its place is enough.
+    could tell that it is one (`unordered`), either is enough.
     """
     rest, aside = [], []
     for mode in found:
@@ -54,6 +54,8 @@ def without_tones(
             decay = " and hardly decays" if steady else ""
             reason = f"It lies at {tone.frequency_hz:.4g} Hz ({tone.name}){decay}."
             aside.append(ForeignMode("tone", mode.frequency_hz, mode.damping_ratio, reason))
+        elif steady and unordered:
+            aside.append(_driven(mode))
         else:
             rest.append(mode)
     return rest, aside
@@ -76,8 +78,7 @@ def explained(
     """A mode that fits no order, as what it is; `modes` are all, `hanger_modes` those that do."""
     frequency_hz, damping = mode.frequency_hz, mode.damping_ratio
     if _is_steady(mode, modes):
-        reason = f"It hardly decays (damping {damping:.4%}): something that runs drives it."
-        return ForeignMode("tone", frequency_hz, damping, reason)
+        return _driven(mode)
     base = base_of(mode, hanger_modes)
     if base:
         fold, of = base
@@ -87,6 +88,11 @@ def explained(
         )
         return ForeignMode("harmonic", frequency_hz, damping, reason)
     return ForeignMode("deck", frequency_hz, damping, _fits_nothing(mode, hanger_modes))
+
+
+def _driven(mode: FoundMode) -> ForeignMode:
+    reason = f"It hardly decays (damping {mode.damping_ratio:.4%}): something that runs drives it."
+    return ForeignMode("tone", mode.frequency_hz, mode.damping_ratio, reason)
 
 
 def askew_mode(mode: FoundMode, order: int) -> ForeignMode:

@@ -41,7 +41,7 @@ def hits_used(inspection: Inspection) -> QualityCheck | None:
     fewest = min(sum(h.used for h in m.hits) for m in inspection.measurements)
     found = f"{len(used)} of {len(hits)} hits are used{_reasons([h.reason for h in hits])}"
     if _unforced(inspection):
-        found += "; no force was recorded, so they are known by what they set in motion"
+        found += "; no force is known, so they are known by what they set in motion"
     remedy = "Hit at least three times, better five, with time to ring down."
     if len(used) == 1 and used[0].start < RINGING_SAMPLES and not _dies_away(inspection):
         found = "one hit that begins with its record: nothing tells its vibration from noise"

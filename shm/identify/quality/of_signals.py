@@ -15,6 +15,7 @@ from shm.identify.measuring.signal_faults import (
     COPY,
     DEAD,
     FROZEN,
+    HITS_NOT_SHOWN,
     NOT_A_NUMBER,
     SILENT,
     WANDERS,
@@ -116,7 +117,7 @@ def cable(inspection: Inspection) -> QualityCheck | None:
     return fault_count(
         inspection,
         "cable",
-        (CABLE, COPY, DEAD, SILENT, WANDERS),
+        (CABLE, COPY, DEAD, SILENT, WANDERS, HITS_NOT_SHOWN),
         "no channel jumps, wanders or is silent",
         "Reseat the connectors of these channels, tie the cables down, exchange a cable that stays "
         "bad, and repeat these hits.",
