@@ -141,6 +141,7 @@ def _broken(
 
 
 def caption(course: Course) -> str:
+    """What is seen, panel by panel."""
     below = (
         "Below: the change of tension that they mean, and when a sensor or the clock was at fault."
         if course.has_tension
@@ -153,6 +154,7 @@ def caption(course: Course) -> str:
 
 
 def alt(course: Course) -> str:
+    """What a blind reader needs: how many modes are followed, and the tension at last."""
     known = np.flatnonzero(np.isfinite(course.tension.middle))
     modes = formatting.counted(len(course.followed), "mode")
     if not len(known):
