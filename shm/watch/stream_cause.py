@@ -14,21 +14,32 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.values import PLANES, FloatArray, Moved
-from shm.watch.stream_reading import LEAST_SD, ModeTable, planes_of
+from shm.watch.stream_reading import ModeTable, planes_of
 
 TIME_BASE = "timebase"
+SWAPPED = "swapped"
 _SENSOR, _UNEXPLAINED = "sensor_mass", "unexplained"
-_MEASUREMENT = (TIME_BASE, _SENSOR, _UNEXPLAINED)
+_MEASUREMENT = (TIME_BASE, SWAPPED, _SENSOR)
 # Prior sds: 3 % of ln T, 0.3 decades (`quantities`), 1 % of a time base and of single modes.
 _TENSION_SD, _DECADES_SD, _BASE_SD, _MODE_SD = 0.03, 0.3, 0.01, 0.01
+# Of ln f: a sensor of 0.3 kg on or off a hanger of 300 kg. What is larger is no sensor's.
+_SENSOR_SD = 1e-3
 _ALIKE = 20.0  # a log Bayes factor of 3, as `Moved.alike` has it
-_HOURS_TOGETHER = 3.0  # judgement: of that many readings the errors are one
+_DAY_SD = 3e-4  # of ln f: joints that slip by another level, each mode by its own. Judgement
 MODEL_OFF = 0.2  # judgement: of bending's share in a sensitivity, and of springs'
 _EACH_OFF = 0.05  # judgement: likewise, of each mode by itself
 _LEFT_SD = 1e-3  # of ln T: what the conditions leave while something else changes
 _ASTRAY_SD, _ASTRAY = 0.03, 0.02  # judgement: how far and how often a single mode goes astray
 # Judgement: tensions, ends in both planes, ends in one, a time base, one plane's sensors, others.
-_PRIORS = {"tension": 0.5, "ends": 0.1, "end": 0.1, TIME_BASE: 0.1, _SENSOR: 0.1, _UNEXPLAINED: 0.1}
+_PRIORS = {
+    "tension": 0.5,
+    "ends": 0.1,
+    "end": 0.1,
+    TIME_BASE: 0.1,
+    _SENSOR: 0.1,
+    SWAPPED: 0.1,
+    _UNEXPLAINED: 0.1,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +50,7 @@ class _Pattern:
     columns: FloatArray
     sd: FloatArray
     plane: str = ""
+    mean: FloatArray | float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +69,11 @@ class Cause:
         return self.name in _MEASUREMENT
 
     @property
+    def takes_hours(self) -> bool:
+        """Whether two mistaken modes in a few hours look like it."""
+        return self.name in (SWAPPED, _SENSOR, _UNEXPLAINED)
+
+    @property
     def words(self) -> str:
         if self.name == TIME_BASE:
             return (
@@ -69,8 +86,8 @@ class Cause:
                 "sensors, not the tension. Check which sensors are mounted, and where."
             )
         return (
-            "The modes moved, each by its own fraction, as no tension moves them. "
-            "Check sensors, channels and the orders of modes."
+            "The modes of each plane lie where those of the other did: the planes are exchanged, "
+            "not the tension. Check the cables of the sensors."
         )
 
 
@@ -80,17 +97,27 @@ def cause_of(moved: FloatArray, table: ModeTable, readings: FloatArray) -> Cause
     sub = replace(
         table,
         modes=tuple(mode for mode, own in zip(table.modes, known, strict=True) if own),
-        **{name: getattr(table, name)[known] for name in ("tension", "ends", "spread")},
+        **{name: getattr(table, name)[known] for name in ("tension", "ends", "spread", "level")},
     )
-    y, count = moved[known], np.maximum(readings[known] / _HOURS_TOGETHER, 1)
-    variance = sub.spread / count + LEAST_SD**2
+    # Hours do not average out what a mode keeps for a day.
+    y, variance = moved[known], sub.spread + _DAY_SD**2
     patterns = _patterns(sub, y)
     fits = [_fit(y, variance, each) for each in patterns]
     log_each = np.array([fit[0] for fit in fits])
     chance = np.exp(log_each - log_each.max())
     chance = chance / chance.sum()
     best = int(chance.argmax())
-    total = _moved_quantities(patterns, fits, chance)
+    mean, sd = float(y.mean()), float(y.std()) / math.sqrt(len(y))
+    each_own = (mean / _DECADES_SD, sd / _DECADES_SD)  # of frequencies that no pattern ties
+    sized = [
+        fit if _names(pattern)[0] not in (_UNEXPLAINED, _SENSOR) else (fit[0], *each_own)
+        for pattern, fit in zip(patterns, fits, strict=True)
+    ]
+    total = _moved_quantities(
+        [each for each in patterns if each.name != SWAPPED],
+        [fit for each, fit in zip(patterns, sized, strict=True) if each.name != SWAPPED],
+        np.array([c for each, c in zip(patterns, chance, strict=True) if each.name != SWAPPED]),
+    )
     size = fits[best][1]
     if patterns[best].name == TIME_BASE:  # of all modes, those too that sleep at night
         size = float(np.median(y))
@@ -114,11 +141,15 @@ def _patterns(table: ModeTable, y: FloatArray) -> list[_Pattern]:
         _Pattern(_UNEXPLAINED, left, np.full(n, _MODE_SD)),
     ]
     planes = planes_of(table.modes)
+    other = [(PLANES[PLANES[0] == plane], each) for plane, each in table.modes]
+    if len(planes) > 1 and set(other) <= set(table.modes):
+        swapped = table.level[[table.modes.index(each) for each in other]] - table.level
+        found.append(_Pattern(SWAPPED, left, none, mean=swapped))
     for plane, own in planes.items() if len(planes) > 1 else ():
         of_end = of_ends * np.column_stack([own, own, np.ones(n)])
         found += [
             _Pattern("end", of_end, _EACH_OFF * loose * own, plane),
-            _Pattern(_SENSOR, left, np.where(own, _MODE_SD, 0.0), plane),
+            _Pattern(_SENSOR, left, np.where(own, _SENSOR_SD, 0.0), plane),
         ]
     return found
 
@@ -127,7 +158,10 @@ def _fit(y: FloatArray, variance: FloatArray, pattern: _Pattern) -> tuple[float,
     """Log evidence, size along the first column with its sd; a mode may have gone astray."""
     n = len(y)
     astray = [np.zeros(n), *(_ASTRAY_SD**2 * np.eye(n) if n > 2 else ())]
-    both = [_normal(y, variance + pattern.sd**2 + more, pattern.columns) for more in astray]
+    both = [
+        _normal(y - pattern.mean, variance + pattern.sd**2 + more, pattern.columns)
+        for more in astray
+    ]
     log_each = np.array([each[0] for each in both]) + np.where(
         np.arange(len(both)) > 0, math.log(_ASTRAY), 0.0
     )

@@ -35,8 +35,8 @@ from shm.values import (
     Posterior,
     WatchedTest,
 )
-from shm.values.stream import PooledReading, StreamEvent
-from shm.watch.stream_cause import MODEL_OFF, TIME_BASE, Cause, cause_of
+from shm.values.stream import PooledReading, StreamEvent, StreamEventKind
+from shm.watch.stream_cause import MODEL_OFF, SWAPPED, TIME_BASE, Cause, cause_of
 from shm.watch.stream_filter import FAST, LEVEL, NOTHING, SLOW, Bank, Evidence
 from shm.watch.stream_reading import ModeTable, SeenReading, usable
 from shm.watch.stream_state import (
@@ -54,6 +54,7 @@ from shm.watch.watching import after
 _VERSION = "stream-watch-1"
 _LENGTH = {"hour": 1.0, "six hours": 6.0, "day": 24.0}  # hours, as their names say
 _DAY_SD = 1.25e-4  # of ln f: what a mode keeps for a day, by joints that seat anew. Judgement
+_EVENTS: dict[str, StreamEventKind] = {TIME_BASE: "clock drift", SWAPPED: "swapped"}
 _HOURS_OF_A_FAULT = 8  # judgement: of which a mistaken mode spoils one or two
 _CALLS_KEPT = 8  # technical: of changes that were told, so that what is kept stays bounded
 
@@ -190,7 +191,8 @@ class StreamWatch:
         moved: tuple[Moved, ...] = ()
         if self._is_called(evidence):
             cause = _cause_of(state, evidence)
-            if cause.is_measurement and not self._is_sure(cause, state, evidence):
+            since = int((state.ring_day >= evidence.by_day).sum())
+            if cause.takes_hours and since < _HOURS_OF_A_FAULT:
                 evidence = NOTHING
             elif cause.is_measurement:
                 events = (_event(cause, state, evidence, reading, end),)
@@ -218,11 +220,6 @@ class StreamWatch:
 
     def _is_called(self, evidence: Evidence) -> bool:
         return evidence.years > self._limit_years and evidence.material > 0.5
-
-    def _is_sure(self, cause: Cause, state: StreamState, evidence: Evidence) -> bool:
-        """Whether a fault of sensors is told: of few hours two mistaken modes look like one."""
-        since = int((state.ring_day >= evidence.by_day).sum())
-        return cause.name == TIME_BASE or since >= _HOURS_OF_A_FAULT
 
     @property
     def _limit_years(self) -> float:
@@ -387,7 +384,7 @@ def _event(
 ) -> StreamEvent:
     return StreamEvent(
         stream=reading.stream,
-        kind="clock drift" if cause.name == TIME_BASE else "drifting",
+        kind=_EVENTS.get(cause.name, "drifting"),
         start=_at(state, evidence.after_day),
         end=end,
         detail=cause.words,
