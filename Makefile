@@ -31,8 +31,8 @@ test: .venv/development
 # whether they round between multiplying and adding: another processor gives other last digits, and
 # a test that stands on them passes on one machine alone. So the quick ones of the numerics run
 # again as on a processor without AVX-512, and as on one without AVX2 and FMA either; those that
-# sample for long, with `make bench`. numpy warns, and a warning is an error here, of names that it
-# does not choose by; hence it is asked for them.
+# sample for long or watch whole histories, with `make bench`. numpy warns, and a warning is an error
+# here, of names that it does not choose by; hence it is asked for them.
 CHOSEN_BY = $(shell $(BIN)/python -c "from numpy._core import _multiarray_umath as m; print(*m.__cpu_dispatch__)")
 WITHOUT_AVX512 = OPENBLAS_CORETYPE=Haswell \
 	NPY_DISABLE_CPU_FEATURES="$(filter X86_V4 AVX512%,$(CHOSEN_BY))"
@@ -40,7 +40,10 @@ WITHOUT_AVX2 = OPENBLAS_CORETYPE=Sandybridge NPY_DISABLE_CPU_FEATURES="$(CHOSEN_
 	GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2
 SAMPLED := tests/gap/test_calibration.py tests/inference/test_described.py \
 	tests/inference/test_other_answers.py
-SLOW := $(SAMPLED) $(patsubst %,tests/models/test_%.py,models solid solid_basis) \
+WATCHED := $(patsubst %,tests/watch/test_%.py,agreement baseline_check frequencies lone_baseline \
+	persistence)
+WORDS := $(patsubst %,tests/watch/test_%.py,alert_language alert_text)
+SLOW := $(SAMPLED) $(WATCHED) $(WORDS) $(patsubst %,tests/models/test_%.py,models solid solid_basis) \
 	$(patsubst %,tests/gap/test_%.py,attribution diagnose discrepancy fit importance_sampling \
 		law_allowances law_error minor_cause numbering outliers places readings) \
 	$(patsubst %,tests/inference/test_%.py,conditions ensemble evidence sharp updating) \
@@ -65,8 +68,8 @@ lint: .venv/development
 
 bench: .venv/development
 	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile -m trial
-	$(WITHOUT_AVX512) $(BIN)/python -m pytest --quiet $(SAMPLED)
-	$(WITHOUT_AVX2) $(BIN)/python -m pytest --quiet $(SAMPLED)
+	$(WITHOUT_AVX512) $(BIN)/python -m pytest --quiet $(SAMPLED) $(WATCHED)
+	$(WITHOUT_AVX2) $(BIN)/python -m pytest --quiet $(SAMPLED) $(WATCHED)
 	for benchmark in $(filter-out %peers.py,$(wildcard tests/benchmarks/*.py)); do \
 		echo "== $$benchmark"; $(BIN)/python $$benchmark || exit 1; done
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -83,10 +83,28 @@ def columns_of(
 ) -> Columns:
     """Of the hanger at `base` (parameters,): its tension, on its end springs."""
     values = dict(zip(model.parameter_names, base.tolist(), strict=True))
+    deck, arch = model.springs_n_m_rad(base[None])
+    return _columns_on(
+        hanger,
+        values.get("theta_L", 1.0) * hanger.length_m,
+        values["theta_F"] * model.hanger.nominal_tension_n,
+        (*deck.ravel().tolist(), *arch.ravel().tolist()),
+        tuple(modes),
+    )
+
+
+@lru_cache(maxsize=128)  # of each hanger's baseline, which every later test is read against
+def _columns_on(
+    hanger: Hanger,
+    length: float,
+    tension: float,
+    springs: tuple[float, ...],
+    modes: tuple[MeasuredMode, ...],
+) -> Columns:
     one = np.ones(1)
-    length_m = values.get("theta_L", 1.0) * hanger.length_m * one
-    tension_n = values["theta_F"] * model.hanger.nominal_tension_n * one
-    bar = coupled_bar(hanger, length_m, tension_n).on_springs(model.springs_n_m_rad(base[None]))
+    length_m, tension_n = length * one, tension * one
+    ends = np.array(springs).reshape(2, 1, -1)
+    bar = coupled_bar(hanger, length_m, tension_n).on_springs((ends[0], ends[1]))
     planes, orders = np.array([(PLANES.index(plane), order - 1) for plane, order in modes]).T
 
     def log_hz(physical: object) -> FloatArray:
