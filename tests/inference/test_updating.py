@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.special import gammaincc, gammaln, logsumexp
 from shm.errors import BadInput, UsageError
 from shm.inference import UpdateOptions, select, update
 from shm.inference.likelihood import Likelihood
+from shm.inference.outcome import _at_bounds
 from shm.models import THESIS, Model, build
 from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, Plane
 from tests.helpers.hangers import HANGER_3
@@ -265,3 +267,13 @@ def test_the_model_error_is_integrated_out_exactly(sd_hz: float, repeat: int) ->
     mean = np.average(np.log(sigma), weights=weights)
     sd = np.sqrt(np.average((np.log(sigma) - mean) ** 2, weights=weights))
     assert np.log(drawn).mean() == pytest.approx(mean, abs=0.1 * sd + 0.01)
+
+
+@pytest.mark.parametrize("crowded", [0.005, 0.995])
+def test_a_parameter_that_crowds_at_either_end_of_its_prior_is_named(crowded: float) -> None:
+    """A tenth of the draws within 2 % of the range is five times the share of a flat posterior."""
+    flat = np.linspace(0, 1, 1000)
+    crowding = np.where(np.arange(1000) % 8 == 0, crowded, flat)
+    prior = Mock(lower=np.array([2.0, 5.0]), upper=np.array([4.0, 12.0]), names=("theta_F", "k"))
+    samples = np.column_stack([2 + 2 * flat, 5 + 7 * crowding, flat])
+    assert _at_bounds(Mock(prior=prior), samples) == ("k",)

@@ -163,7 +163,7 @@ def test_records_of_one_hit_each_stand_one_after_the_other(drawn: Drawn) -> None
 
 def test_the_time_axis_is_that_of_the_records_with_a_little_room_before(drawn: Drawn) -> None:
     low_s, high_s = drawn["one sensor"]["time_history"].figure.axes[0].get_xlim()
-    assert -0.05 * high_s < low_s < 0
+    assert -0.05 * high_s < low_s < -0.005 * high_s
     assert high_s > 5 * 12.0
 
 
