@@ -102,11 +102,12 @@ def _by_motion_alone(
 
     A logger that samples slowly and without a filter misses a pulse between two samples, and noise
     hides a weak one; what rings after it is recorded all the same. Raises `refused` where the
-    motion shows no hits either.
+    motion shows no hits either, and where the force is dead: somebody has to look at its cable.
     """
     forces = [record.force for record in records if record.force is not None]
     rest = [replace(record, channels=record.accelerations) for record in records]
-    if not forces or not all(_struck(record, options) for record in rest):
+    alive = all(np.ptp(np.nan_to_num(force.values)) > 0 for force in forces)
+    if not (forces and alive and all(_struck(record, options) for record in rest)):
         raise refused
     first, *others = measured_recordings(rest, options)
     lost = Dropped(f"channel {forces[0].name}", 1, HITS_NOT_SHOWN)
