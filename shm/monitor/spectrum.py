@@ -22,6 +22,7 @@ _DAMPING = 0.003
 """judgement: of a mode whose damping is not known; bars have 0.001, strands 0.005."""
 _SAME_PLACE_M = 0.01
 """technical: positions are read off a tape."""
+_MIXED = 0.4  # judgement: of the motion in its own plane; sensors turned by 22 degrees
 _SMOOTHED = 16  # technical: lines averaged, a quarter of which is their scatter
 _ALIKE = 9.0  # judgement: a factor of three between the noise of sensors of one logger
 
@@ -75,14 +76,23 @@ def _quiet(lines: ComplexArray) -> FloatArray:
 
 
 def shape_on(channels: Sequence[StreamChannel], mode: Mode) -> FloatArray:
-    """A known mode on the channels; NaN where its shape says nothing, 0 in the other plane."""
+    """A known mode on the channels; NaN where its shape says nothing, 0 in the other plane.
+
+    What moves both planes is no shape but the mix of two modes that were not told apart: then each
+    is taken to move its own plane alone.
+    """
+    value, cross = (
+        np.nan_to_num([getattr(point, name) for point in mode.shape]) for name in ("value", "cross")
+    )
+    mixed = np.sum(cross**2) > _MIXED**2 * np.sum(value**2)
     found = np.full(len(channels), np.nan)
     for row, channel in enumerate(channels):
         inside = channel.plane == mode.plane
         found[row] = math.nan if inside else 0.0
         for point in mode.shape:
             if abs(point.x_m - channel.x_m) < _SAME_PLACE_M:
-                found[row] = point.value if inside else np.nan_to_num(point.cross)
+                across = 0.0 if mixed else float(np.nan_to_num(point.cross))
+                found[row] = point.value if inside else across
     return found
 
 

@@ -39,9 +39,9 @@ _OTHER_PLANE = 0.08
 _LEAST_GAIN = 15.0
 """judgement: of log likelihood by which a mode is proven: its five parameters and some two hundred
 places to look make 10 by chance."""
-_NARROWER = 4.0
-"""judgement: than the mode as it was known, or than a line: a tone, of trains or machines, near it;
-the damping of a window is known to a fifth, and joints that rub double it."""
+_NARROWER = 10.0
+"""judgement: than the mode as it was known, or than a line: a tone, of trains or machines, near it.
+Two close modes that were taken for one had up to seven times the damping of each."""
 _LEAK = 0.01  # judgement: of the power; sensors that are 6 degrees off
 _FLOOR = 0.2  # quantile of the lines of a band, as shm/identify/quality/of_ambient.py
 _STEPS_WITHOUT = 6  # technical: from the fit with the mode; what is gained later is small
@@ -279,14 +279,14 @@ class _Group:
         expected = self.peaks.expected_hz
         kept = {}
         for index, mode in made.items():
-            hz = mode.frequency_hz
-            place = int(np.argmin(np.abs(expected - hz)))
-            stayed = abs(hz - expected[index]) < _SAME * mode.frequency_sd_hz
-            there = place in made and place != index
-            if there:
-                away = abs(made[place].frequency_hz - expected[place])
-                there = bool(away < abs(hz - expected[place]))
-            if place == index or stayed or there:
+            away = np.abs(expected - mode.frequency_hz)
+            place = int(np.argmin(away))
+            nearest = away[index] <= away[place]
+            stayed = away[index] < _SAME * mode.frequency_sd_hz
+            there = place in made and bool(
+                abs(made[place].frequency_hz - expected[place]) < away[place]
+            )
+            if nearest or stayed or there:
                 kept[index] = mode
         return kept
 

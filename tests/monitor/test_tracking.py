@@ -97,6 +97,30 @@ def test_the_planes_do_not_exchange_modes_when_one_passes_by_the_other() -> None
     assert len(reading.modes) >= 5
 
 
+def test_two_modes_that_were_taken_for_one_are_told_apart_by_their_planes() -> None:
+    """From scratch, two modes 0.8 % apart may come out as one that moves both planes alike."""
+    rng = np.random.default_rng(22)
+    motion = drawn(rng, orders=2)
+    hz = motion.frequency_hz["transverse", 1]
+    true = {**motion.frequency_hz, ("longitudinal", 1): 1.008 * hz}
+    mixed = [
+        replace(
+            mode,
+            frequency_hz=1.005 * hz,
+            damping_ratio=0.008,
+            shape=tuple(replace(point, cross=0.9 * point.value) for point in mode.shape),
+        )
+        if mode.order == 1
+        else mode
+        for mode in motion.known()
+    ]
+    reading = _read(replace(motion, frequency_hz=true), rng, tuple(mixed))
+    found = _by_name(reading.modes)
+    assert len(found) == 4
+    for key, mode in found.items():
+        assert abs(mode.frequency_hz - true[key]) < 4 * mode.frequency_sd_hz
+
+
 def test_noise_proves_no_mode() -> None:
     rng = np.random.default_rng(6)
     motion = drawn(rng)
