@@ -220,7 +220,7 @@ def summary(name: str, found: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
     if scenario.is_fault:
         figures["told_as_tension"] = sum(
-            any(a["quantity"] == "tension" for a in own) for own in after
+            any("tension" in a["message"].partition(". ")[0] for a in own) for own in after
         )
         figures["named"] = sum(any(e["hours"] >= 0 for e in each["events"]) for each in found)
     elif name != "quiet":
