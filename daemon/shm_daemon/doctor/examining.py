@@ -34,6 +34,7 @@ from shm.store import Workspace
 from shm.store.rows import Delivery, DeliveryState, Silence
 from shm.store.stored_silences import silenced_until
 from shm.store.workspace import FOLDERS
+from shm_daemon.doctor.check_streams import check_streams
 from shm_daemon.doctor.checks import (
     WAITS_LONG,
     Check,
@@ -153,6 +154,7 @@ _CHECKS: Sequence[tuple[str, Check]] = (
     ("clock", check_clock),
     ("deliveries", check_deliveries),
     ("hangers", check_hangers),
+    ("streams", check_streams),
 )
 _REPORT = "This is a fault of shm; please report it."
 
