@@ -209,8 +209,8 @@ def command(
     gap diagnosis can be planted, in recordings or in a whole campaign of modal tests.
 
     \b
-    Examples: shm simulate --hanger-file H.toml --k1 1e7 --k3 1e7 --out tests
-              shm simulate --stream --days 3 --loss 7:2:2.5
+    Example: shm simulate --hanger-file H.toml --k1 1e7 --k3 1e7 --out tests
+    Example: shm simulate --stream --days 3 --loss 7:2:2.5
     """
     start = first.replace(tzinfo=UTC) if first else None
     if as_stream:

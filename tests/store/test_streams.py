@@ -34,12 +34,15 @@ def test_progress_never_goes_back(store: Store) -> None:
         assert store.streams.progress("h3") == NOW + timedelta(minutes=20)
 
 
-def test_the_last_modes_are_those_of_the_latest_window_that_has_any(store: Store) -> None:
+def test_the_last_modes_are_those_of_the_latest_windows_each_as_it_was_seen_last(
+    store: Store,
+) -> None:
     assert store.streams.last_modes("h3") == ()
-    store.streams.save_window(a_window(10, MODES[:1]))
+    moved = replace(MODES[0], frequency_hz=MODES[0].frequency_hz * 1.01)
+    store.streams.save_window(a_window(10, (moved,)))
     store.streams.save_window(a_window(20, ()))
     store.streams.save_window(a_window(0))
-    assert repr(store.streams.last_modes("h3")) == repr(MODES[:1])
+    assert repr(store.streams.last_modes("h3")) == repr((moved, *MODES[1:]))
     assert repr(store.streams.last_window("h3")) == repr(a_window(20, ()))
     assert store.streams.last_window("h4") is None
 

@@ -20,6 +20,7 @@ from shm.errors import BadInput, NotIdentifiable
 from shm.identify.contract import Dropped, Hit, Measurement
 from shm.identify.measuring.ambient import ambient_measurement
 from shm.identify.measuring.frf import (
+    LEAST_SAMPLES,
     Window,
     averaged_response,
     band_limited,
@@ -107,6 +108,7 @@ def _by_motion_alone(
     forces = [record.force for record in records if record.force is not None]
     rest = [replace(record, channels=record.accelerations) for record in records]
     alive = all(np.ptp(np.nan_to_num(force.values)) > 0 for force in forces)
+    alive = alive and all(record.samples >= LEAST_SAMPLES for record in rest)
     if not (forces and alive and all(_struck(record, options) for record in rest)):
         raise refused
     first, *others = measured_recordings(rest, options)
