@@ -47,7 +47,7 @@ def simulate_streams(workspace: Workspace, chosen: Live, *, as_json: bool) -> No
     if not streams:
         raise NothingThere(
             "bridge.toml describes no stream.",
-            remedy="Add a [[stream]] table with its channels: see `shm stream --help`.",
+            remedy="Describe one there: docs/permanent_sensors.md shows how.",
         )
     first = chosen.first or _whole_hour(utc_now() - timedelta(days=chosen.days))
     losses = tuple(_loss(text, first) for text in chosen.losses)

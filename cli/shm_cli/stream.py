@@ -86,7 +86,7 @@ def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> Non
         if not workspace.bridge.streams:
             raise NothingThere(
                 "bridge.toml describes no stream.",
-                remedy="Add a [[stream]] table: docs/permanent_sensors.md shows one.",
+                remedy="Describe one there: docs/permanent_sensors.md shows how.",
             )
         if events:
             _show_events(store, utc_now() - timedelta(days=days), as_json)

@@ -16,10 +16,11 @@ from shm.values import NAN
 from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PooledReading, Stream, StreamEvent, WindowReading
 
-State = Literal["live", "late", "silent", "never sent", "sensor at fault"]
+State = Literal["live", "late", "silent", "never sent", "sensor at fault", "clock ahead"]
 
 _LATE, _SILENT = timedelta(minutes=5), timedelta(hours=1)
 """judgement: loggers send each minute; a router begins anew within five minutes."""
+_AHEAD = timedelta(minutes=2)  # judgement: clocks without GPS or NTP are seconds off
 _LATELY = timedelta(days=1)
 _AT_FAULT = ("dead", "drifting", "swapped", "saturated")
 _FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends it
@@ -62,7 +63,7 @@ def _state(
     events = store.streams.list_events(stream.name, now - _LATELY)
     progress = store.streams.progress(stream.name)
     window = store.streams.last_window(stream.name)
-    received, lost = _received(ring.state(stream.name).received_s, now)
+    received, lost = _received(ring.state(stream.name).received_s, last, now)
     return StreamCondition(
         stream=stream,
         state=_word(last, events, now),
@@ -96,8 +97,11 @@ def _as_one(run: Sequence[StreamEvent]) -> StreamEvent:
     return replace(run[-1], start=run[0].start, detail=run[-1].detail + times)
 
 
-def _received(received_s: Mapping[str, float], now: datetime) -> tuple[float, float]:
-    """Which share of the last ten minutes that are sealed came, and which share of a day did not.
+def _received(
+    received_s: Mapping[str, float], last_sample: datetime | None, now: datetime
+) -> tuple[float, float]:
+    """Which share of the last ten minutes that are sealed came, and which share of a day did not,
+    up to the last sample.
 
     The first ten minutes of all may have begun before the stream, and do not count.
     """
@@ -106,14 +110,18 @@ def _received(received_s: Mapping[str, float], now: datetime) -> tuple[float, fl
     begin = max(first + PERIOD, now - _LATELY)
     if last < begin:
         return NAN, NAN
-    expected_s = (last + PERIOD - begin).total_seconds()
+    end = last + PERIOD if last_sample is None else min(last + PERIOD, last_sample)
+    expected_s = max((end - begin).total_seconds(), 1.0)
     came_s = sum(seconds for start, seconds in known.items() if start >= begin)
-    return known[last] / PERIOD.total_seconds(), min(max(1 - came_s / expected_s, 0.0), 1.0)
+    of_last_s = max((end - last).total_seconds(), 1.0)
+    return min(known[last] / of_last_s, 1.0), min(max(1 - came_s / expected_s, 0.0), 1.0)
 
 
 def _word(last: datetime | None, events: tuple[StreamEvent, ...], now: datetime) -> State:
     if last is None:
         return "never sent"
+    if last - now > _AHEAD:  # whether it still sends cannot be told by its stamps
+        return "clock ahead"
     if now - last > _SILENT:
         return "silent"
     if now - last > _LATE:

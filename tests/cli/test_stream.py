@@ -140,4 +140,4 @@ def test_a_bridge_without_streams_has_nothing_to_show(shm: Shm, tmp_path: Path) 
     workspace = make_workspace(tmp_path / "plain")
     ended = shm("--workspace", workspace.folder, "stream")
     assert (ended.code, ended.out) == (4, "")
-    assert "[[stream]]" in ended.err
+    assert "permanent_sensors.md" in ended.err

@@ -121,6 +121,13 @@ def test_a_sender_is_told_when_to_come_again(
     assert samples_of(bridge) == 0
 
 
+def test_minutes_of_samples_are_one_chunk(client: httpx.Client, bridge: Workspace) -> None:
+    content = chunk_document(recent(samples=20_000))
+    assert len(content) > 1 << 16  # more than other requests may have
+    assert client.post(URL, content=content).status_code == 202
+    assert samples_of(bridge) == 20_000
+
+
 def test_too_large_a_body_is_not_held(client: httpx.Client) -> None:
     assert client.post(URL, content=bytes(33 << 20)).status_code == 413
 

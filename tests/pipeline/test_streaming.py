@@ -186,3 +186,5 @@ def test_streams_tell_how_they_are(workspace: Workspace) -> None:
         assert state.hour is not None
         (silent,) = stream_states(workspace, streaming.ring, store, FIRST + 3 * HOUR)
         assert silent.state == "silent"
+        (ahead,) = stream_states(workspace, streaming.ring, store, FIRST - HOUR)
+        assert ahead.state == "clock ahead"

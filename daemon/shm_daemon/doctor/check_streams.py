@@ -13,6 +13,7 @@ from shm_daemon.heartbeat import told
 _REMEDIES = {
     "never sent": "Connect its logger: docs/permanent_sensors.md.",
     "silent": "Look at its logger, power and connection; it sends what it stored once it is back.",
+    "clock ahead": "Set its clock, to UTC: whether it still sends cannot be told by its stamps.",
     "sensor at fault": "See `shm stream --events`, and its page on the dashboard.",
 }
 

@@ -36,6 +36,7 @@ _STYLES = {
     "silent": "alert",
     "never sent": "first",
     "sensor at fault": "alert",
+    "clock ahead": "alert",
 }
 _EVENTS_SHOWN = 40  # technical: what is read at a glance
 
