@@ -28,6 +28,7 @@ from shm_cli.common import (
     why_option,
 )
 from shm_cli.parameter_types import NewFile, Time
+from shm_daemon.heartbeat import told
 
 
 @dataclass(frozen=True)
@@ -143,8 +144,8 @@ def export(
     found = recording_of(ring_of(workspace), stream, start, end, workspace.settings.max_samples)
     write(found, file)
     if as_json:
-        told = {"file": str(file), "start": found.time, "samples": found.samples}
-        show({"stream": name, "hanger": found.hanger, **told})
+        about = {"file": str(file), "start": found.time, "samples": found.samples}
+        show({"stream": name, "hanger": found.hanger, **about})
         return
     click.echo(f"{file}: {found.samples} samples of {len(found.channels)} channels.")
 
@@ -168,7 +169,7 @@ def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bo
             str(row.hanger),
             row.state,
             _time(row.last_sample),
-            _lag(row.lag_s),
+            "" if state.lag is None else told(state.lag),
             f"{row.received_hz:.4g} Hz" if row.received_hz == row.received_hz else "",
             f"{row.lost_share_24h:.2%}" if row.lost_share_24h == row.lost_share_24h else "",
             f"{row.ring_bytes / 1e6:.1f} MB",
@@ -215,12 +216,3 @@ def _show_events(store: Store, since: datetime, as_json: bool) -> None:
 
 def _time(time: datetime | None) -> str:
     return "" if time is None else f"{time:%Y-%m-%d %H:%M:%S}"
-
-
-def _lag(seconds: float) -> str:
-    if seconds != seconds:
-        return ""
-    for unit, length_s in (("d", 86400), ("h", 3600), ("min", 60)):
-        if seconds >= 2 * length_s:
-            return f"{seconds / length_s:.0f} {unit}"
-    return f"{seconds:.0f} s"

@@ -5,18 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
+from datetime import datetime
 
 import numpy as np
 
 from shm.values import NAN, BoolArray, FloatArray, ModalTest, Mode, Plane, ShapePoint, as_test_id
-from shm.values.stream import Period, PooledReading, WindowReading
+from shm.values.stream import PERIODS, Period, PooledReading, WindowReading
 
-LENGTHS: dict[Period, timedelta] = {
-    "hour": timedelta(hours=1),
-    "six hours": timedelta(hours=6),
-    "day": timedelta(days=1),
-}
 _OUTLYING = 4.0
 """judgement: usual deviations; of 144 windows of a day one in a hundred days by chance."""
 _USUAL_SD = 1.4826  # of the median absolute deviation of normal numbers
@@ -42,7 +37,7 @@ def pooled(
 
     Frequencies are at the mean level and temperature of the pooled windows.
     """
-    end = start + LENGTHS[period]
+    end = start + PERIODS[period]
     inside = sorted(
         (each for each in readings if start <= each.window.start < end),
         key=lambda each: each.window.start,
@@ -74,7 +69,7 @@ def as_modal_test(reading: PooledReading, reference_level_m_s2: float = NAN) -> 
 
     Its amplitude is the level over the reference level, unknown unless that is given.
     """
-    length = LENGTHS[reading.period]
+    length = PERIODS[reading.period]
     name = f"{reading.stream}-{reading.start:%Y-%m-%d}"
     if reading.period != "day":
         name += f"T{reading.start:%H}" + ("" if reading.period == "hour" else "-6h")

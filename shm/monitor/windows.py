@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 
 from shm.identify.measuring.ambient import LOUDER
+from shm.identify.options import PASSED
 from shm.monitor.sensor_health import broken_channels
 from shm.monitor.spectrum import Peaks, Stretch, channel_noise, found_peaks, stretch
 from shm.values import NAN, BoolArray, FloatArray, Mode
@@ -31,7 +32,6 @@ _QUIET_DB = 5.0
 """As the prominence of a peak in shm/identify/quality/of_ambient.py."""
 _STRONG_DB, _STRONG_PEAKS = 10.0, 3
 """judgement: peaks that no known mode explains and that a search from scratch may understand."""
-_PASSED = 0.4  # of the sampling rate: what anti-aliasing filters pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,7 @@ def _band_hz(known: Sequence[Mode], rate: float) -> tuple[float, float]:
     """Of the known modes with what a search reaches, else all that a hanger's may be in."""
     hz = [mode.frequency_hz for mode in known]
     if not hz:
-        return 2.0, _PASSED * rate
+        return 2.0, PASSED * rate
     return 0.8 * min(hz), min(1.2 * max(hz), 0.49 * rate)
 
 

@@ -26,19 +26,15 @@ from shm.read.atomic import replace_text
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX, nothing
 from shm.store.ring import ring_of
+from shm.store.ring_files import PERIOD
 from shm.values import ModalTest, Posterior
-from shm.values.stream import Period, PooledReading, Stream, Window, WindowReading
+from shm.values.stream import PERIODS, Period, PooledReading, Stream, Window, WindowReading
 
 if TYPE_CHECKING:
     from shm.pipeline.stream_steps import Pooled, WindowFound
 
-WINDOW = timedelta(minutes=10)
+WINDOW = PERIOD  # what is sealed as one is read as one
 """Long enough that a mode at 5 Hz of 0.1 % damping is known to 2e-4 (S. K. Au, 2014)."""
-PERIODS: Mapping[Period, timedelta] = {
-    "hour": timedelta(hours=1),
-    "six hours": timedelta(hours=6),
-    "day": timedelta(days=1),
-}
 _KEPT_BEFORE_ALERT = timedelta(hours=24)
 """Of raw samples, for good: what changed within a day is told within a day."""
 _AGAIN = timedelta(minutes=1)  # judgement: a machine without memory or disk is given a minute

@@ -25,12 +25,11 @@ from shm.store.stream_tables import (
 )
 from shm.values import Alert, Plane, ShapePoint
 from shm.values.modes import Mode
-from shm.values.stream import Period, PooledReading, StreamEvent, WindowReading
+from shm.values.stream import PERIODS, Period, PooledReading, StreamEvent, WindowReading
 
 HOURS_KEPT = timedelta(days=800)
 """Readings of an hour and of six: two summers and two winters, and a month to look at them."""
 
-_HOURS: dict[Period, int] = {"hour": 1, "six hours": 6, "day": 24}  # as their names say
 _LATEST = 36
 """Windows of a train-free night: a mode that traffic hides for some hours is not forgotten."""
 _EVENT = tuple(field.name for field in fields(StreamEvent))
@@ -90,9 +89,7 @@ class Streams(Repository):
         query = sa.select(sa.func.min(stream_windows.c.start)).where(
             stream_windows.c.stream == stream
         )
-        with self.reading() as connection:
-            first: datetime | None = connection.scalar(query)
-        return first
+        return self._moment(query)
 
     def first_day(self, stream: str) -> datetime | None:
         """When the first reading of a day of a stream began; None where there is none."""
@@ -100,9 +97,7 @@ class Streams(Repository):
         query = sa.select(sa.func.min(table.c.start)).where(
             table.c.stream == stream, table.c.period == "day"
         )
-        with self.reading() as connection:
-            first: datetime | None = connection.scalar(query)
-        return first
+        return self._moment(query)
 
     def last_pooled(self, stream: str, period: Period) -> datetime | None:
         """When the latest reading of a period began; None where there is none."""
@@ -110,9 +105,7 @@ class Streams(Repository):
         query = sa.select(sa.func.max(table.c.start)).where(
             table.c.stream == stream, table.c.period == period
         )
-        with self.reading() as connection:
-            last: datetime | None = connection.scalar(query)
-        return last
+        return self._moment(query)
 
     def save_pooled(
         self,
@@ -127,7 +120,7 @@ class Streams(Repository):
         `kept` is what the watch of the hanger goes on from. The alert, where it is a new one, is
         owed to `hooks` from `at` on (the reading's end where nothing is said), and given back.
         """
-        end = reading.start + timedelta(hours=_HOURS[reading.period])
+        end = reading.start + PERIODS[reading.period]
         row = {name: getattr(reading, name) for name in ("stream", "hanger", "period", "start")}
         row["document"] = _document(reading)
         with self.writing() as connection:
@@ -200,6 +193,11 @@ class Streams(Repository):
                 ),
             ):
                 connection.execute(chosen)
+
+    def _moment(self, query: sa.Select[Any]) -> datetime | None:
+        with self.reading() as connection:
+            found: datetime | None = connection.scalar(query)
+        return found
 
     def _values(self, table: sa.Table, query: sa.Select[Any], kind: type[_T]) -> tuple[_T, ...]:
         def value(row: Row[Any]) -> _T:

@@ -6,6 +6,7 @@ readings of an hour or a day; a day's reading is a modal test like any other.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Literal, TypeAlias
@@ -22,6 +23,11 @@ StreamEventKind: TypeAlias = Literal[
 ]  # fmt: skip
 WindowKind: TypeAlias = Literal["wind", "traffic", "knock", "quiet", "unusable"]
 Period: TypeAlias = Literal["hour", "six hours", "day"]
+PERIODS: Mapping[Period, timedelta] = {  # as their names say
+    "hour": timedelta(hours=1),
+    "six hours": timedelta(hours=6),
+    "day": timedelta(days=1),
+}
 
 
 @dataclass(frozen=True)

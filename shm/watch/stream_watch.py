@@ -35,7 +35,7 @@ from shm.values import (
     Posterior,
     WatchedTest,
 )
-from shm.values.stream import PooledReading, StreamEvent, StreamEventKind
+from shm.values.stream import PERIODS, PooledReading, StreamEvent, StreamEventKind
 from shm.watch.stream_cause import MODEL_OFF, SWAPPED, TIME_BASE, Cause, cause_of
 from shm.watch.stream_filter import FAST, LEVEL, NOTHING, SLOW, Bank, Evidence
 from shm.watch.stream_reading import ModeTable, SeenReading, usable
@@ -52,7 +52,6 @@ from shm.watch.stream_state import (
 from shm.watch.watching import after
 
 _VERSION = "stream-watch-1"
-_LENGTH = {"hour": 1.0, "six hours": 6.0, "day": 24.0}  # hours, as their names say
 _DAY_SD = 1.25e-4  # of ln f: what a mode keeps for a day, by joints that seat anew. Judgement
 _EVENTS: dict[str, StreamEventKind] = {TIME_BASE: "clock drift", SWAPPED: "swapped"}
 _HOURS_OF_A_FAULT = 8  # judgement: of which a mistaken mode spoils one or two
@@ -143,7 +142,7 @@ class StreamWatch:
     ) -> tuple[StreamWatched, StreamState | None]:
         """After one more reading; the same with its state to go on from."""
         modes = usable(reading)
-        end = reading.start + timedelta(hours=_LENGTH[reading.period])
+        end = reading.start + PERIODS[reading.period]
         if state is None and modes:
             table = ModeTable.of(self.baseline, self.hanger, modes)
             state = StreamState.begun(key, reading.start, table)
