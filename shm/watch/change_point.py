@@ -140,45 +140,60 @@ class Evidence:
 
         A ramp's is what has come of it by then.
         """
-        if index not in self._asked:
-            self._asked[index] = self._change_at(index)
-        return self._asked[index]
+        return self.changes_at([index])[0]
 
-    def _change_at(self, index: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
-        at, k, kind, d, size = index
-        information, pull, _ = self.seen
-        factor = SIZES[size] * self.directions[d].factor
-        inner = np.eye(factor.shape[1]) + factor.T @ information[kind, at, k] @ factor
-        root = np.linalg.cholesky(np.linalg.inv((inner + inner.T) / 2))
-        mean = factor @ (root @ (root.T @ (factor.T @ pull[kind, at, k])))
-        done = self.progress(at) if kind == RAMP else 1.0
-        return done * mean, done * factor @ root
+    def changes_at(self, indices: Sequence[tuple[int, ...]]) -> list[tuple[FloatArray, FloatArray]]:
+        """The same of each; factors of fewer columns than others have zeros there."""
+        new = [index for index in indices if index not in self._asked]
+        if new:
+            at, k, kind, d, size = np.array(new).T
+            information, pull, _ = self.seen
+            factor = SIZES[size][:, None, None] * self._factors[d]
+            crossed = factor.transpose(0, 2, 1)
+            inner = np.eye(factor.shape[2]) + crossed @ information[kind, at, k] @ factor
+            root = np.linalg.cholesky(np.linalg.inv((inner + inner.transpose(0, 2, 1)) / 2))
+            reach = factor @ root
+            pulled = reach.transpose(0, 2, 1) @ pull[kind, at, k][..., None]
+            done = np.where(kind == RAMP, self._progress(at), 1.0)[:, None]
+            means, factors = done * (reach @ pulled)[..., 0], done[..., None] * reach
+            self._asked.update(zip(new, zip(means, factors, strict=True), strict=True))
+        return [self._asked[index] for index in indices]
+
+    @cached_property
+    def _factors(self) -> FloatArray:
+        """Those of all directions (D, n + q, r), with zeros where one has fewer columns."""
+        columns = max(each.factor.shape[1] for each in self.directions)
+        return np.stack(
+            [
+                np.pad(each.factor, ((0, 0), (0, columns - each.factor.shape[1])))
+                for each in self.directions
+            ]
+        )
 
     def progress(self, at: int) -> float:
         """Years since a ramp began: half way between the two tests."""
-        return float(self.years[-1] - _ramp_from(self.years, self.beginnings)[at])
+        return float(self._progress(np.array(at)))
+
+    def _progress(self, at: IntArray) -> FloatArray:
+        return np.asarray(self.years[-1] - _ramp_from(self.years, self.beginnings)[at])
 
     def of_null(
-        self, index: tuple[int, ...], loadings: FloatArray
+        self, indices: Sequence[tuple[int, ...]], loadings: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """What `loadings` (rows, null) of the null's parameters are, given one change.
+        """What `loadings` (rows, null) of the null's parameters are, given each of some changes.
 
-        Mean (rows,) and covariance (rows, rows).
+        Means and variances, both (changes, rows).
         """
-        at, k, kind, d, size = index
+        at, k, kind, d, size = np.array(indices).T
         information, pull, response = self.seen
-        factor = SIZES[size] * self.directions[d].factor
-        inner = np.linalg.inv(
-            np.eye(factor.shape[1]) + factor.T @ information[kind, at, k] @ factor
-        )
-        mean = factor @ inner @ (factor.T @ pull[kind, at, k])
-        covariance, moved = self.null_covariance[k], response[kind, at, k]
-        reach = loadings @ covariance
+        factor = SIZES[size][:, None, None] * self._factors[d]
+        crossed = factor.transpose(0, 2, 1)
+        inner = np.linalg.inv(np.eye(factor.shape[2]) + crossed @ information[kind, at, k] @ factor)
+        mean = factor @ inner @ (crossed @ pull[kind, at, k][..., None])
+        reach, moved = loadings @ self.null_covariance[k], response[kind, at, k]
         of_change = reach @ moved @ factor
-        return (
-            np.asarray(loadings @ self.null_mean[k] - reach @ (moved @ mean)),
-            np.asarray(reach @ loadings.T + of_change @ inner @ of_change.T),
-        )
+        variance = (reach * loadings).sum(axis=2) + (of_change @ inner * of_change).sum(axis=2)
+        return self.null_mean[k] @ loadings.T - (reach @ (moved @ mean))[..., 0], variance
 
 
 def evidence_of(

@@ -123,18 +123,17 @@ def _materials(
     changes: Sequence[tuple[int, ...]],
 ) -> FloatArray:
     """The same (changes,) of each; of any mode, where no doubt is left that something changed."""
-    effects, least, found = subject.effects, subject.options.least_frequency_shift, []
+    effects, least = subject.effects, subject.options.least_frequency_shift
     if evidence.log_evidence > math.log(_BEYOND_DOUBT * subject.options.limit_years):
         effects = np.vstack([effects, subject.by_mode])
-    for each in changes:
-        mean, factor = evidence.change_at(each)
-        middle = effects @ mean
-        sd = np.maximum(np.sqrt(np.square(effects @ factor).sum(axis=1)), 1e-12)
-        tails = scipy.special.ndtr((-least - middle) / sd) + scipy.special.ndtr(
-            (middle - least) / sd
-        )
-        found.append(float(tails.max()))
-    return np.array(found)
+    if not changes:
+        return np.zeros(0)
+    found = evidence.changes_at(changes)
+    middle = np.array([mean for mean, _ in found]) @ effects.T
+    sd = np.sqrt(np.square(effects @ np.array([factor for _, factor in found])).sum(axis=2))
+    sd = np.maximum(sd, 1e-12)
+    tails = scipy.special.ndtr((-least - middle) / sd) + scipy.special.ndtr((middle - least) / sd)
+    return np.asarray(tails.max(axis=1))
 
 
 def _sudden(evidence: Evidence) -> float:
@@ -195,7 +194,7 @@ def _as_changed(
     Of a cause that is no quantity the shift is that of the frequencies' mean, a fraction.
     """
     weights, changes = _leading(evidence, part)
-    found = [evidence.change_at(each) for each in changes]
+    found = evidence.changes_at(changes)
     n = evidence.layout.n
     together, alike = _company(evidence, part, names, names[j])
     if j < len(subject.quantities):
@@ -360,15 +359,13 @@ def _shifts(
         kept = [n for n, each in enumerate(changes) if each[0] < len(evidence.beginnings) - 1]
         weights, changes = weights[kept], [changes[n] for n in kept]
         weights = weights / weights.sum() if len(kept) else weights
-    means, sds = [], []
-    for each in changes:
-        mean, factor = evidence.change_at(each)
-        before, spread = evidence.of_null(each, loadings)
-        means.append(mean[layout.n :] + before)
-        variance = np.square(factor[layout.n :]).sum(axis=1) + np.diag(spread)
-        sds.append(np.sqrt(np.maximum(variance, 0)))
-    shape = (-1, layout.q)
-    return weights, np.array(means).reshape(shape), np.array(sds).reshape(shape), changes
+    if not changes:
+        return weights, np.zeros((0, layout.q)), np.zeros((0, layout.q)), []
+    found = evidence.changes_at(changes)
+    before, spread = evidence.of_null(changes, loadings)
+    means = np.array([mean[layout.n :] for mean, _ in found]) + before
+    variance = np.array([np.square(each[layout.n :]).sum(axis=1) for _, each in found]) + spread
+    return weights, means, np.sqrt(np.maximum(variance, 0)), changes
 
 
 def _drift(

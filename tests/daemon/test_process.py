@@ -48,7 +48,7 @@ def test_sigterm_ends_it_cleanly_and_a_kill_leaves_no_process_behind(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SHM_TEST", str(workspace.folder))
-    for day in range(6):
+    for day in range(4):
         write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day)
     with real_daemon(workspace.folder) as daemon:
         until(lambda: "identify 1: done" in log_of(workspace))  # and the next one is under way
@@ -67,7 +67,7 @@ def test_sigterm_ends_it_cleanly_and_a_kill_leaves_no_process_behind(
     with quick_daemons(workspace.folder) as daemons:
         daemons.begin(once=True)
         assert daemons.ended() == 0
-    assert done(workspace) == 6
+    assert done(workspace) == 4
 
 
 @pytest.mark.parametrize(("arguments", "code"), [([], 2), (["/no/such/workspace"], 3)])

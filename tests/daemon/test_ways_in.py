@@ -141,7 +141,7 @@ def test_it_answers_within_seconds_of_work_and_sigterm_ends_it_without_a_word_of
     """At the moment that `/health` answers, while pages are loaded, and once one was shown."""
     shm = "from shm_cli.main import main; main()"
     environment = {**os.environ, "PYTHONPATH": ".:daemon:cli"}
-    for page in ("", "", "/static/shm.css"):
+    for page in ("", "/static/shm.css"):
         with socket.create_server(("127.0.0.1", 0)) as free:
             port = free.getsockname()[1]
         words = ["--workspace", str(workspace.folder), "daemon", "--web", "--port", str(port)]

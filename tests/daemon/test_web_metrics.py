@@ -7,6 +7,7 @@ import sqlite3
 from collections.abc import Iterator
 from datetime import UTC
 from enum import StrEnum
+from itertools import zip_longest
 from pathlib import Path
 
 import httpx
@@ -25,12 +26,19 @@ from tests.store.make_released_database import fill
 
 _SAYS_WHAT = frozenset({"stage", "state", "kind"})
 """Columns whose texts are names: of a stage, a state, a kind."""
-COLUMNS = [
-    column
+_MAY_BE_ODD = [
+    sorted(
+        (
+            each
+            for each in table.columns
+            if each.name in _SAYS_WHAT or isinstance(each.type, UtcTime | Number) or each.nullable
+        ),
+        key=lambda each: each.name not in _SAYS_WHAT,
+    )
     for table in metadata.sorted_tables
-    for column in table.columns
-    if column.name in _SAYS_WHAT or isinstance(column.type, UtcTime | Number) or column.nullable
 ]
+ROUNDS = [[each for each in one if each is not None] for one in zip_longest(*_MAY_BE_ODD)]
+"""A column of each table at a time: a scrape reads them all."""
 METRICS = {
     "shm_spool_files", "shm_quarantined_files", "shm_disk_free_bytes", "shm_daemon_seen_seconds",
     "shm_store_up", "shm_queue_length", "shm_queue_oldest_seconds", "shm_recordings", "shm_alerts",
@@ -98,37 +106,46 @@ def errors(client: httpx.Client) -> dict[str, float]:
             if key[0] == "shm_scrape_errors_total"}  # fmt: skip
 
 
-@pytest.mark.parametrize("column", COLUMNS, ids=str)
+@pytest.mark.parametrize("columns", ROUNDS, ids=lambda columns: " ".join(map(str, columns)))
 def test_no_state_of_any_row_breaks_a_scrape(
-    client: httpx.Client, bridge: Workspace, column: sa.Column[object]
+    client: httpx.Client, bridge: Workspace, columns: list[sa.Column[object]]
 ) -> None:
     """Each name, time, number and gap that any column may hold, in all its rows at once."""
-    table = column.table.name
+    odd = [list(odd_values(column)) for column in columns]
     before = errors(client)
     with sqlite3.connect(bridge.database, isolation_level=None) as connection:
         connection.execute("PRAGMA foreign_keys = OFF")
         (recordings,) = connection.execute("SELECT count(*) FROM recordings").fetchone()
-        kept = connection.execute(f"SELECT rowid, {column.name} FROM {table}").fetchall()
+        kept = [
+            connection.execute(f"SELECT {each.name}, rowid FROM {each.table.name}").fetchall()
+            for each in columns
+        ]
         try:
-            for value in odd_values(column):
-                connection.execute(f"UPDATE OR IGNORE {table} SET {column.name} = ?", (value,))
+            for number in range(max(map(len, odd))):
+                for column, values in zip(columns, odd, strict=True):
+                    connection.execute(
+                        f"UPDATE OR IGNORE {column.table.name} SET {column.name} = ?",
+                        (values[number % len(values)],),
+                    )
                 beat(bridge)
                 seen = said(client)
                 counted = sum(n for key, n in seen.items() if key[0] == "shm_recordings")
                 assert counted == recordings
                 assert {key[0] for key in seen} >= METRICS - {"shm_scrape_errors"} - (
-                    {"shm_stage_seconds", "shm_stage_reached"} if table == "steps" else set()
+                    {"shm_stage_seconds", "shm_stage_reached"}
+                    if "steps" in {each.table.name for each in columns}
+                    else set()
                 )
                 health = client.get("/health")
                 reasons = health.json()["reasons"]
-                assert not [each for each in reasons if "the log says more" in each], value
+                assert not [each for each in reasons if "the log says more" in each], number
                 damaged = [each for each in reasons if "damaged" in each]
                 assert health.status_code == (503 if damaged else 200), reasons
         finally:
-            connection.executemany(
-                f"UPDATE {table} SET {column.name} = ? WHERE rowid = ?",
-                [(value, row) for row, value in kept],
-            )
+            for column, values in zip(columns, kept, strict=True):
+                connection.executemany(
+                    f"UPDATE {column.table.name} SET {column.name} = ? WHERE rowid = ?", values
+                )
     connection.close()
     assert errors(client) == before
 

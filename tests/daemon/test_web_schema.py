@@ -23,7 +23,7 @@ from shm_daemon.heartbeat import HEARTBEAT
 from tests.helpers.taken_in import with_a_loss
 from tests.helpers.web_servers import Served, served
 
-EXAMPLES = int(os.environ.get("SHM_SCHEMA_EXAMPLES", "10"))
+EXAMPLES = int(os.environ.get("SHM_SCHEMA_EXAMPLES", "5"))
 CHECKS = [
     not_a_server_error,
     status_code_conformance,

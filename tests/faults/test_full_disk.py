@@ -16,5 +16,5 @@ from tests.helpers.power import compiler
 def test_a_disk_that_fills_at_any_call_costs_nothing(tmp_path: Path) -> None:
     if compiler() is None:
         pytest.skip("A FULL DISK IS NOT TESTED HERE: no C compiler (apt-get install gcc)")
-    said = fill_at_calls(tmp_path, files=4, every=40)
+    said = fill_at_calls(tmp_path, files=4, every=120)
     assert "0 lost, 0 half written" in said

@@ -23,7 +23,7 @@ from tests.helpers.full_server_disks import (
 from tests.helpers.postgres import Databases
 from tests.helpers.workspaces import make_workspace
 
-FILES, MOMENTS, SEED = 4, 10, 20261125
+FILES, MOMENTS, SEED = 3, 4, 20261125
 
 
 def test_a_disk_that_fills_at_any_write_or_commit_costs_nothing(

@@ -19,7 +19,7 @@ from tests.helpers.killing import (
 from tests.helpers.postgres import Databases
 from tests.helpers.workspaces import make_workspace
 
-KILLS, FILES, SEED = 10, 16, 20260501
+KILLS, FILES, SEED = 4, 8, 20260501
 
 
 @pytest.fixture(scope="module")

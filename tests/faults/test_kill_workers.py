@@ -20,7 +20,7 @@ def test_healthy_files_outlive_the_kills_of_their_workers(
 ) -> None:
     monkeypatch.setattr(flow, "_FIRST_PAUSE_S", 0.1)  # the pauses before each next try
     workspace = make_workspace(tmp_path / "bridge", settings={"workers": 2})
-    struck = kill_workers(workspace, files=5, kills=20, rng=random.Random(1), most_s=300)
-    assert struck == 20
-    assert stage_counts(workspace) == {Stage.DONE: 5}
+    struck = kill_workers(workspace, files=3, kills=6, rng=random.Random(1), most_s=300)
+    assert struck == 6
+    assert stage_counts(workspace) == {Stage.DONE: 3}
     assert list(workspace.quarantine.folder.iterdir()) == []

@@ -17,7 +17,7 @@ from shm.read import sandbox
 from shm.read.sandbox import reading_process
 from tests.helpers.mutations import Sample, damaged, harmful_samples, light, whole_samples
 
-FILES = 280
+FILES = 140
 SMALL = sandbox.Limits(parse_memory_bytes=2**26)
 
 

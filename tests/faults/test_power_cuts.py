@@ -13,7 +13,7 @@ import pytest
 from tests.helpers.power import compiler
 from tests.helpers.power_cuts import cut_at, record
 
-CUTS, FILES, SEED = 60, 6, 20260501
+CUTS, FILES, SEED = 30, 4, 20260501
 
 
 def test_cuts_at_random_moments_lose_nothing_and_leave_nothing_half_written(

@@ -14,7 +14,7 @@ from tests.helpers.feeds import Feed, assert_all_done_once
 from tests.helpers.postgres import crashing_server
 from tests.helpers.workspaces import make_workspace
 
-CRASHES, FILES, SEED = 5, 16, 20260501
+CRASHES, FILES, SEED = 3, 8, 20260501
 
 
 def test_a_server_that_crashes_again_and_again_loses_nothing(tmp_path: Path) -> None:

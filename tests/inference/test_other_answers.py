@@ -15,7 +15,7 @@ from shm.values import PLANES, Hanger, ModalTest, Mode, Posterior
 STEEL = {"elastic_modulus_pa": 200e9, "density_kg_m3": 7850.0, "nominal_tension_n": 180e3}
 BAR = shm.round_bar(3, diameter_m=0.05, length_m=9.0, **STEEL)
 TENSION_N = 171e3
-OPTIONS = UpdateOptions(samples=1000)
+OPTIONS = UpdateOptions(samples=500)
 
 
 def a_test(orders: range, hanger: Hanger = BAR, **about: float) -> ModalTest:

@@ -88,7 +88,7 @@ def test_the_reduced_basis_is_within_two_hundredths_of_a_percent(
 ) -> None:
     model = model_class(HANGER_3)
     rng, prior = np.random.default_rng(42), model.prior
-    inside = rng.uniform(prior.lower, prior.upper, (4, len(prior.names)))
+    inside = rng.uniform(prior.lower, prior.upper, (2, len(prior.names)))
     corners = np.where(rng.random(inside.shape) < 0.5, prior.lower, prior.upper)
     theta = np.vstack([inside, corners])
     reference = model.reference_frequencies_hz(theta, 6)

@@ -11,6 +11,6 @@ from tests.helpers.clock_faults import FAULTS, one_case
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_loss_is_told_of_by_its_second_test(fault: str, tmp_path: Path) -> None:
-    found = [one_case(fault, seed, tmp_path) for seed in range(1000, 1004)]
-    assert all(each.told for each in found)
-    assert not any(each.good_held for each in found)
+    found = one_case(fault, 1000, tmp_path)
+    assert found.told
+    assert not found.good_held

@@ -203,8 +203,7 @@ def test_one_disturbed_visit_does_not_end_the_alert_of_a_loss_that_stands(
     assert ("mail", f"{raised}:resolved") not in postman.told
 
 
-@pytest.mark.parametrize("who", [SHM, "Ann"])
-@pytest.mark.parametrize("tension", [0.92, 0.96])
+@pytest.mark.parametrize(("tension", "who"), [(0.92, SHM), (0.96, "Ann")])
 def test_a_resolved_alert_whose_change_two_visits_show_again_rings_anew(
     bridge: Workspace, tension: float, who: str
 ) -> None:

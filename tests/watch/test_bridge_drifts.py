@@ -41,9 +41,8 @@ def bridge(seed: int, shifts: dict[int, float]) -> BridgePattern:
     return bridge_pattern(shifts_of(found, tuple(HANGERS)))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_the_shifts_of_neighbours_that_took_up_half_a_percent_each_are_found(seed: int) -> None:
-    pattern = bridge(seed, {LOSER: LOSS, **dict.fromkeys(NEIGHBOURS, GAIN)})
+def test_the_shifts_of_neighbours_that_took_up_half_a_percent_each_are_found() -> None:
+    pattern = bridge(1, {LOSER: LOSS, **dict.fromkeys(NEIGHBOURS, GAIN)})
     rows = {row.hanger: row for row in pattern.rows}
 
     assert rows[LOSER].way == "lost"
@@ -53,8 +52,7 @@ def test_the_shifts_of_neighbours_that_took_up_half_a_percent_each_are_found(see
 
 
 def test_a_bridge_on_which_nothing_moved_is_not_accused() -> None:
-    for seed in (3, 4):
-        pattern = bridge(seed, {})
+    pattern = bridge(3, {})
 
-        assert pattern.explanations[0].name == "nothing moved"
-        assert all(row.way == "unchanged" for row in pattern.rows)
+    assert pattern.explanations[0].name == "nothing moved"
+    assert all(row.way == "unchanged" for row in pattern.rows)
