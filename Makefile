@@ -20,7 +20,7 @@ demo: .venv/runtime
 demo-live: .venv/runtime
 	$(BIN)/shm demo --live --folder shm-demo-live
 
-# What takes one processor goes side by side: the types, and the numerics twice. Then a third process,
+# What takes one processor goes side by side: the types, and the numerics again. Then a third process,
 # because many tests wait for a daemon, a server or a browser; files go out in the order of their
 # names, because by their number of tests one with a single long test would come last, alone.
 test: .venv/development
@@ -30,9 +30,9 @@ test: .venv/development
 # numpy, OpenBLAS and the C library choose by the processor how many numbers they add at once and
 # whether they round between multiplying and adding: another processor gives other last digits, and
 # a test that stands on them passes on one machine alone. So the quick ones of the numerics run
-# again as on a processor without AVX-512, and as on one without AVX2 and FMA either; those that
-# sample for long or watch whole histories, with `make bench`. numpy warns, and a warning is an error
-# here, of names that it does not choose by; hence it is asked for them.
+# again as on a processor without AVX2 and FMA, which differs most; as on one without AVX-512 alone,
+# and those that sample for long or watch whole histories, with `make bench`. numpy warns, and a
+# warning is an error here, of names that it does not choose by; hence it is asked for them.
 CHOSEN_BY = $(shell $(BIN)/python -c "from numpy._core import _multiarray_umath as m; print(*m.__cpu_dispatch__)")
 WITHOUT_AVX512 = OPENBLAS_CORETYPE=Haswell \
 	NPY_DISABLE_CPU_FEATURES="$(filter X86_V4 AVX512%,$(CHOSEN_BY))"
@@ -52,7 +52,7 @@ SLOW := $(SAMPLED) $(WATCHED) $(WORDS) $(patsubst %,tests/models/test_%.py,model
 NUMERICS := $(BIN)/python -m pytest --quiet \
 	tests/models tests/gap tests/inference tests/watch $(SLOW:%=--ignore=%)
 
-test-arithmetic: without-avx512 without-avx2
+test-arithmetic: without-avx2
 
 without-avx512: .venv/development
 	$(WITHOUT_AVX512) $(NUMERICS)
@@ -68,6 +68,7 @@ lint: .venv/development
 
 bench: .venv/development
 	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile -m trial
+	$(MAKE) without-avx512
 	$(WITHOUT_AVX512) $(BIN)/python -m pytest --quiet $(SAMPLED) $(WATCHED)
 	$(WITHOUT_AVX2) $(BIN)/python -m pytest --quiet $(SAMPLED) $(WATCHED)
 	for benchmark in $(filter-out %peers.py,$(wildcard tests/benchmarks/*.py)); do \

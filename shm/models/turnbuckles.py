@@ -42,6 +42,8 @@ def coupled_bar(hanger: Hanger, length_m: FloatArray, tension_n: FloatArray) -> 
 
 def alike_from_both_ends(hanger: Hanger) -> bool:
     """Whether the turnbuckles look the same from the arch end as from the deck end."""
+    if not hanger.turnbuckles:
+        return True
     rows = np.array(
         [(t.x_m, t.length_m, t.mass_kg, t.bending_stiffness_n_m2) for t in hanger.turnbuckles]
     ).reshape(-1, 4)

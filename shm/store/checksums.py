@@ -40,13 +40,22 @@ def seal(connection: Connection) -> None:
     """
     damage = connection.info.pop(_DAMAGE, set())
     for name in connection.scalars(_unsealed()).all():
-        table, plain = metadata.tables[name], plain_table(name)
-        empty = sa.select(plain).where(plain.c.checksum.is_(None)).limit(_ROWS_AT_ONCE)
-        while rows := connection.execute(empty).mappings().all():
+        table, are_more = metadata.tables[name], True
+        while are_more:
+            rows = connection.execute(_empty(name)).mappings().all()
             sums = [_sums(table, row) for row in rows]
             for row, found in zip(rows, sums, strict=True):
                 found["sum"] ^= (name, key_of(table, row)) in damage
-            connection.execute(_setting(name), sums)
+            if sums:
+                connection.execute(_setting(name), sums)
+            are_more = len(rows) == _ROWS_AT_ONCE
+
+
+@cache
+def _empty(name: str) -> sa.Select[Any]:
+    """Some of the rows of a table that have no checksum yet."""
+    plain = plain_table(name)
+    return sa.select(plain).where(plain.c.checksum.is_(None)).limit(_ROWS_AT_ONCE)
 
 
 def look_before_update(connection: Connection, statement: Any, *_: Any) -> None:
