@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
 from pathlib import Path
@@ -41,6 +41,10 @@ class WaitingChunk:
     key: ChunkKey
     end_us: int
     path: Path
+
+    @property
+    def arrived(self) -> datetime:
+        return datetime.fromtimestamp(self.path.stat().st_mtime, UTC)
 
 
 @dataclass(frozen=True, order=True)
@@ -86,10 +90,10 @@ class StreamFolder:
         name = f"{start:{_NAME}}-{layout.hexdigest()[:8]}.h5"
         return self.folder / f"{start:%Y%m%d}" / name
 
-    def waiting(self) -> list[WaitingChunk]:
+    def waiting(self, pattern: str = "[0-9]*") -> list[WaitingChunk]:
         """The chunks that are not sealed, by time."""
         found = []
-        for path in self.incoming.glob("[0-9]*.chunk"):
+        for path in self.incoming.glob(f"{pattern}.chunk"):
             start_us, end_us, sequence, checksum = path.stem.split("-")
             key = ChunkKey(int(start_us), int(sequence), checksum)
             found.append(WaitingChunk(key, int(end_us), path))
@@ -103,6 +107,45 @@ class StreamFolder:
                 for path in sorted(day.glob("[0-9]*.h5")):
                     if path.name >= least:
                         yield Segment(datetime.strptime(path.stem[:14], f"{_NAME[:-1]}%z"), path)
+
+    def segments_at(self, start: datetime) -> list[Path]:
+        """Those of the ten minutes from `start` on: one for each way to sample."""
+        return sorted(self.folder.glob(f"{start:%Y%m%d}/{start:{_NAME}}-*.h5"))
+
+    def between(
+        self, start: datetime, end: datetime, waiting: Sequence[WaitingChunk]
+    ) -> dict[ChunkKey, Chunk]:
+        """The chunks that have samples within a time, sealed or among those that wait.
+
+        `waiting` must have been looked up first: what is sealed meanwhile is in a segment then.
+        """
+        since_us, until_us = microseconds(start), microseconds(end)
+        found: dict[ChunkKey, Chunk] = {}
+        for segment in self.segments(start - 2 * PERIOD):
+            if segment.start >= end:
+                break
+            spans = self.spans(segment.path)
+            if any(key.start_us < until_us and since_us < e for key, e in spans.items()):
+                found |= self.chunks(segment.path)
+        for each in waiting:
+            is_within = each.key.start_us < until_us and since_us < each.end_us
+            if is_within and each.key not in found:
+                key = replace(each.key, arrived_us=microseconds(each.arrived))
+                if (chunk := self.load(each)) is not None:
+                    found[key] = chunk
+        return found
+
+    def alike(self, key: ChunkKey) -> Iterator[Chunk]:
+        """Chunks of the same number and beginning, sealed or not."""
+        for each in self.waiting(f"{key.start_us:017d}-*-{key.sequence}-*"):
+            with suppress(FileNotFoundError):  # it has been sealed
+                if (chunk := self.load(each)) is not None:
+                    yield chunk
+        same = key.start_us, key.sequence
+        for path in self.segments_at(period_of(key.start_us)):
+            if any((k.start_us, k.sequence) == same for k in self.spans(path)):
+                found = self.chunks(path)
+                yield from (c for k, c in found.items() if (k.start_us, k.sequence) == same)
 
     def last_segments(self) -> Iterator[Segment]:
         """Those of the last two days that have any."""

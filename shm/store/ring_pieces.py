@@ -1,21 +1,39 @@
-"""Chunks joined to pieces without a gap, whatever their stamps say to the millisecond."""
+"""Chunks laid out in time and joined to pieces without a gap, whatever their stamps say to the
+millisecond.
+
+Where two chunks are of one time, the samples of the one that came first count: what comes later
+never takes their place, nor is it mixed with them.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import replace
+from bisect import bisect_left, insort
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shm.read.chunk_document import BY_TIME
+from shm.read.ring_segment import ChunkKey
 from shm.values import NAN
 from shm.values.stream import Chunk, Piece
 
 _JITTER_S = 0.05  # judgement: of a logger's stamps; a radio clock or NTP is within 10 ms
 _DRIFT = 1e-3  # judgement: no crystal is further off; a long chunk differs by that from its stamps
-_OF_A_SAMPLE = 0.5  # derived: less than half a sample is the same sample
+_OF_A_SAMPLE = 0.501  # derived: up to half a sample, and a stamp's microsecond, is the same sample
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """`parts` are the samples that count, by time, each with the chunk that it is of; `covered` is
+    how many samples of a chunk do not count, for those that have any.
+    """
+
+    parts: tuple[tuple[ChunkKey, Chunk], ...]
+    covered: Mapping[ChunkKey, int]
 
 
 def slack_s(before: int, sequence: int, sampling_rate_hz: float, length_s: float) -> float:
@@ -30,32 +48,91 @@ def slack_s(before: int, sequence: int, sampling_rate_hz: float, length_s: float
     return _OF_A_SAMPLE * sample_s
 
 
-def joined(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Piece, ...]:
-    """The samples from `start` on and before `end`, of chunks of one stream that are in order.
+def lay_out(found: Mapping[ChunkKey, Chunk]) -> Layout:
+    """Chunks of one stream, each without what came before it."""
+    parts: list[tuple[ChunkKey, Chunk]] = []
+    covered: dict[ChunkKey, int] = {}
+    earlier: list[tuple[datetime, int, Chunk]] = []
+    longest = timedelta(0)
+    for number, (key, chunk) in enumerate(sorted(found.items(), key=_rank)):
+        free = np.ones(chunk.values.shape[1], bool)
+        low = bisect_left(earlier, (chunk.start - longest,))
+        high = bisect_left(earlier, (chunk.end,))
+        for _, _, before in earlier[low:high]:
+            free[_taken(before, chunk)] = False
+        if free.all():
+            parts.append((key, chunk))
+        else:
+            covered[key] = int((~free).sum())
+            parts.extend((key, part) for part in _parts(chunk, free))
+        insort(earlier, (chunk.start, number, chunk))
+        longest = max(longest, chunk.end - chunk.start)
+    by_time = sorted(parts, key=lambda part: (part[1].start, part[1].sequence))
+    return Layout(tuple(by_time), covered)
 
-    What is there twice is taken from the chunk that began first.
-    """
+
+def joined(found: Mapping[ChunkKey, Chunk], start: datetime, end: datetime) -> tuple[Piece, ...]:
+    """The samples from `start` on and before `end` that count, of chunks of one stream."""
     runs: list[list[Chunk]] = []
-    until: datetime | None = None
-    for chunk in chunks:
+    for _, chunk in lay_out(found).parts:
         last = runs[-1][-1] if runs else None
-        rest = chunk
-        if last is not None and until is not None:
-            off_s = (chunk.start - until).total_seconds()
+        if last is not None and _is_alike(last, chunk):
             numbers = last.sequence, chunk.sequence
             slack = slack_s(*numbers, chunk.sampling_rate_hz, _seconds(last))
-            if off_s < -slack:
-                rest = _without(chunk, round(-off_s * chunk.sampling_rate_hz))
-                if not rest.values.shape[1]:
-                    continue
-            if off_s <= slack and _is_alike(last, chunk):
-                runs[-1].append(rest)
-                until = rest.end
+            if (chunk.start - last.end).total_seconds() <= slack:
+                runs[-1].append(chunk)
                 continue
-        runs.append([rest])
-        until = rest.end
+        runs.append([chunk])
     pieces = (_cut(_piece(run), start, end) for run in runs)
     return tuple(piece for piece in pieces if piece.values.shape[1])
+
+
+def agree(one: Chunk, other: Chunk) -> bool:
+    """Whether two chunks have the same samples, as far as both have any."""
+    samples = min(one.values.shape[1], other.values.shape[1])
+    first, second = one.values[:, :samples], other.values[:, :samples]
+    return _is_alike(one, other) and np.array_equal(first, second, equal_nan=True)
+
+
+def _rank(item: tuple[ChunkKey, Chunk]) -> tuple[int, int, int, str]:
+    """By when they came; what came at once, by number."""
+    key = item[0]
+    return key.arrived_us, key.sequence, key.start_us, key.checksum
+
+
+def _taken(before: Chunk, chunk: Chunk) -> slice:
+    """Which samples of a chunk are of the time of one that came before it."""
+    rate = chunk.sampling_rate_hz
+    begin, end = max(before.start, chunk.start), min(before.end, chunk.end)
+    common_s = (end - begin).total_seconds()
+    first, second = (before, chunk) if before.start <= chunk.start else (chunk, before)
+    slack = slack_s(first.sequence, second.sequence, rate, _seconds(first))
+    is_jitter = common_s <= slack and not _ends_as_begins(first, second, round(common_s * rate))
+    if common_s <= 0 or is_jitter:
+        return slice(0)
+    return slice(*(round((time - chunk.start).total_seconds() * rate) for time in (begin, end)))
+
+
+def _ends_as_begins(first: Chunk, second: Chunk, samples: int) -> bool:
+    """Whether so many samples at a seam are there twice, to the bit; of a sensor that shows the
+    same value all the time, nobody can tell.
+    """
+    if samples < 1 or not _is_alike(first, second):
+        return False
+    tail, head = first.values[:, -samples:], second.values[:, :samples]
+    is_telling = len(np.unique(tail)) > tail.size / 2
+    return is_telling and np.array_equal(tail, head, equal_nan=True)
+
+
+def _parts(chunk: Chunk, free: NDArray[np.bool_]) -> list[Chunk]:
+    """The stretches of a chunk that are free."""
+    edges = np.flatnonzero(np.diff(free, prepend=False, append=False))
+    return [_part(chunk, *pair) for pair in edges.reshape(-1, 2).tolist()]
+
+
+def _part(chunk: Chunk, first: int, last: int) -> Chunk:
+    later = chunk.start + timedelta(seconds=first / chunk.sampling_rate_hz)
+    return replace(chunk, start=later, values=chunk.values[:, first:last])
 
 
 def _seconds(chunk: Chunk) -> float:
@@ -65,11 +142,6 @@ def _seconds(chunk: Chunk) -> float:
 def _is_alike(one: Chunk, other: Chunk) -> bool:
     rates = one.sampling_rate_hz, other.sampling_rate_hz
     return one.channels == other.channels and rates[0] == rates[1]
-
-
-def _without(chunk: Chunk, samples: int) -> Chunk:
-    later = chunk.start + timedelta(seconds=samples / chunk.sampling_rate_hz)
-    return replace(chunk, start=later, values=chunk.values[:, samples:])
 
 
 def _piece(run: list[Chunk]) -> Piece:
