@@ -230,7 +230,7 @@ def keeper(bridge: Workspace) -> Iterator[StreamKeeper]:
     keeper.close()
 
 
-@pytest.mark.parametrize("name", ["a.csv", "a.h5", "a.tdms", "a.npz", "a.uff"])
+@pytest.mark.parametrize("name", ["a.csv", "a.h5", "a.tdms", "a.npz", "a.uff", "a.mseed"])
 def test_a_rolling_file_becomes_chunks(bridge: Workspace, keeper: StreamKeeper, name: str) -> None:
     folder, start = bridge.spool / "streams" / "h3", now() - HOUR
     values = a_file(folder, name, start)
