@@ -300,6 +300,24 @@ def test_three_days_offline_are_caught_up_in_any_order(logger: Logger) -> None:
     assert logger.kinds.count("late") >= 1
 
 
+def test_an_hour_that_comes_days_late_is_kept_counted_and_read(logger: Logger) -> None:
+    """A logger kept it while it was offline; its windows were sealed and left long ago."""
+    before, offline, after = minutes(0, 1), minutes(*range(2, 62)), minutes(*range(62, 75))
+    logger.send(*before, *after)
+    logger.now += timedelta(days=3)
+    assert all(logger.ring.append(chunk_document(each)).is_new for each in offline)
+    assert [start for _, start in logger.seal()] == [
+        NOW + n * timedelta(minutes=10) for n in range(7)
+    ]
+    late = [event for event in logger.events if event.kind == "late"]
+    assert sum(int(event.detail.split()[0]) for event in late) == 60
+    assert "72.2 hours late" in late[-1].detail
+    (piece,) = logger.ring.read("h3", NOW, NOW + 2 * HOUR)
+    assert np.array_equal(piece.values, samples([*before, *offline, *after]))
+    with pytest.raises(BadInput, match="late_hours"):
+        logger.ring.append(chunk_document(a_chunk(99, NOW - timedelta(days=2))))
+
+
 def test_what_is_there_twice_counts_once(logger: Logger) -> None:
     first, second = minutes(0, 1)
     shifted = replace(second, sequence=9, start=second.start - timedelta(seconds=10))
