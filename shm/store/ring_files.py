@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
+from itertools import takewhile
 from pathlib import Path
 
 from shm.documents import dump
@@ -31,7 +32,8 @@ log = logging.getLogger(__name__)
 PERIOD = timedelta(minutes=10)  # that of a window
 _PERIOD_US = PERIOD // timedelta(microseconds=1)
 _NAME = "%Y%m%dT%H%MZ"
-_SPANS_HELD = 512  # technical: the last segments of 100 streams, some 20 kB each
+_ROUNDING_US = 2  # technical: of two stamps
+_SPANS_HELD = 1024  # technical: those around the last one of 100 streams, some 20 kB each
 
 
 @dataclass(frozen=True, order=True)
@@ -115,17 +117,21 @@ class StreamFolder:
     def between(
         self, start: datetime, end: datetime, waiting: Sequence[WaitingChunk]
     ) -> dict[ChunkKey, Chunk]:
-        """The chunks that have samples within a time, sealed or among those that wait.
+        """The chunks that have samples within a time, sealed or among those that wait; where some
+        are of one time, those of ten minutes around too, which tell what counts.
 
         `waiting` must have been looked up first: what is sealed meanwhile is in a segment then.
         """
+        since, until = start - 3 * PERIOD, end + 2 * PERIOD
+        near = list(takewhile(lambda segment: segment.start < until, self.segments(since)))
+        spans = {s.path: [(k.start_us, e) for k, e in self.spans(s.path).items()] for s in near}
+        spans[self.incoming] = [(each.key.start_us, each.end_us) for each in waiting]
         since_us, until_us = microseconds(start), microseconds(end)
+        if _is_tangled(pair for some in spans.values() for pair in some):
+            since_us, until_us = since_us - _PERIOD_US, until_us + _PERIOD_US
         found: dict[ChunkKey, Chunk] = {}
-        for segment in self.segments(start - 2 * PERIOD):
-            if segment.start >= end:
-                break
-            spans = self.spans(segment.path)
-            if any(key.start_us < until_us and since_us < e for key, e in spans.items()):
+        for segment in near:
+            if any(s < until_us and since_us < e for s, e in spans[segment.path]):
                 found |= self.chunks(segment.path)
         for each in waiting:
             is_within = each.key.start_us < until_us and since_us < each.end_us
@@ -205,6 +211,16 @@ class StreamFolder:
         log.error("%s is set aside: %s", path, error.message)
         replace_text(aside / f"{path.name}.reason.json", dump({"message": error.message}) + "\n")
         path.replace(aside / path.name)
+
+
+def _is_tangled(spans: Iterable[tuple[int, int]]) -> bool:
+    """Whether two of them, in microseconds, have more in common than rounding."""
+    until_us = 0
+    for start_us, end_us in sorted(set(spans)):
+        if start_us < until_us - _ROUNDING_US:
+            return True
+        until_us = max(until_us, end_us)
+    return False
 
 
 @lru_cache(_SPANS_HELD)

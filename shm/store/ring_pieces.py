@@ -2,14 +2,15 @@
 millisecond.
 
 Where two chunks are of one time, the samples of the one that came first count: what comes later
-never takes their place, nor is it mixed with them.
+never takes their place. Where it contradicts them, its clock is wrong, and none of it is mixed with
+them, nor fills gaps between them, unless it is the next chunk and runs on behind them.
 """
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_left, insort
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
@@ -49,23 +50,24 @@ def slack_s(before: int, sequence: int, sampling_rate_hz: float, length_s: float
 
 
 def lay_out(found: Mapping[ChunkKey, Chunk]) -> Layout:
-    """Chunks of one stream, each without what came before it."""
+    """Chunks of one stream, each without what came before it.
+
+    Whether a chunk counts depends on those of its time, and these on those of theirs: take some
+    more than you look at.
+    """
     parts: list[tuple[ChunkKey, Chunk]] = []
     covered: dict[ChunkKey, int] = {}
     earlier: list[tuple[datetime, int, Chunk]] = []
     longest = timedelta(0)
-    for number, (key, chunk) in enumerate(sorted(found.items(), key=_rank)):
-        free = np.ones(chunk.values.shape[1], bool)
+    for key, chunk in sorted(found.items(), key=_rank):
         low = bisect_left(earlier, (chunk.start - longest,))
         high = bisect_left(earlier, (chunk.end,))
-        for _, _, before in earlier[low:high]:
-            free[_taken(before, chunk)] = False
-        if free.all():
-            parts.append((key, chunk))
-        else:
+        free = _free(chunk, [before for _, _, before in earlier[low:high]])
+        if not free.all():
             covered[key] = int((~free).sum())
-            parts.extend((key, part) for part in _parts(chunk, free))
-        insort(earlier, (chunk.start, number, chunk))
+        for part in _parts(chunk, free):
+            parts.append((key, part))
+            insort(earlier, (part.start, len(parts), part))
         longest = max(longest, chunk.end - chunk.start)
     by_time = sorted(parts, key=lambda part: (part[1].start, part[1].sequence))
     return Layout(tuple(by_time), covered)
@@ -100,6 +102,35 @@ def _rank(item: tuple[ChunkKey, Chunk]) -> tuple[int, int, int, str]:
     return key.arrived_us, key.sequence, key.start_us, key.checksum
 
 
+def _free(chunk: Chunk, earlier: Sequence[Chunk]) -> NDArray[np.bool_]:
+    """Which samples of a chunk are of a time that nothing counts for yet; none where it
+    contradicts what does.
+    """
+    free = np.ones(chunk.values.shape[1], bool)
+    for before in earlier:
+        taken = _taken(before, chunk)
+        free[taken] = False
+        if taken.stop and not (_runs_on(before, chunk) or _repeats(before, chunk, taken)):
+            return np.zeros(len(free), bool)
+    return free
+
+
+def _runs_on(before: Chunk, chunk: Chunk) -> bool:
+    """Whether it is the next one, of a clock that was set back a little; files are not counted."""
+    numbers = before.sequence, chunk.sequence
+    is_next = numbers[1] == numbers[0] + 1 or min(numbers) >= BY_TIME
+    return is_next and before.start <= chunk.start
+
+
+def _repeats(before: Chunk, chunk: Chunk, taken: slice) -> bool:
+    """Whether what is there twice is the same, as of a logger that sends again in other chunks."""
+    first = round((chunk.start - before.start).total_seconds() * chunk.sampling_rate_hz)
+    there = before.values[:, first + taken.start : first + taken.stop]
+    return _is_alike(before, chunk) and np.array_equal(
+        there, chunk.values[:, taken], equal_nan=True
+    )
+
+
 def _taken(before: Chunk, chunk: Chunk) -> slice:
     """Which samples of a chunk are of the time of one that came before it."""
     rate = chunk.sampling_rate_hz
@@ -125,7 +156,9 @@ def _ends_as_begins(first: Chunk, second: Chunk, samples: int) -> bool:
 
 
 def _parts(chunk: Chunk, free: NDArray[np.bool_]) -> list[Chunk]:
-    """The stretches of a chunk that are free."""
+    """The stretches of a chunk that are free, the whole of it where all is."""
+    if free.all():
+        return [chunk]
     edges = np.flatnonzero(np.diff(free, prepend=False, append=False))
     return [_part(chunk, *pair) for pair in edges.reshape(-1, 2).tolist()]
 

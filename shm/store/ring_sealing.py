@@ -67,10 +67,10 @@ def seal_stream(folder: StreamFolder, now: datetime, note: Note) -> list[datetim
 
 
 def _near(waiting: Sequence[WaitingChunk], start: datetime) -> Sequence[WaitingChunk]:
-    """Those that may have samples of the time of what began in ten minutes: none is longer."""
+    """Those by which it is told which samples count of what began in ten minutes."""
     low, high = (
         bisect_left(waiting, microseconds(time), key=lambda each: each.key.start_us)
-        for time in (start - PERIOD, start + 2 * PERIOD)
+        for time in (start - 3 * PERIOD, start + 4 * PERIOD)
     )
     return waiting[low:high]
 
