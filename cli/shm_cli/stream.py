@@ -44,6 +44,7 @@ class StreamRow:
     sampling_rate_hz: float
     received_hz: float
     lost_share_24h: float
+    apart_s_24h: float
     ring_bytes: int
     last_window: datetime | None
     last_window_kind: str
@@ -74,8 +75,10 @@ def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> Non
     """Permanent sensors: what is live, and what was lost.
 
     A stream is late once its last sample is 5 minutes old, silent after an hour. The share that was
-    lost is of the last 24 hours, up to the last sample; what comes late takes it back. Tension is
-    the change since the stream began, the weather taken off, with its 90 % interval.
+    lost is of the last 24 hours, up to the last sample; what comes late takes it back. Apart are
+    samples of a time that was there already, as of a clock that was set back: the first to come
+    count. Tension is the change since the stream began, the weather taken off, with its 90 %
+    interval.
 
     \b
     Example: shm stream --json
@@ -160,8 +163,8 @@ def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bo
     if as_json:
         show({"streams": [asdict(row) for row in rows]})
         return
-    columns = ("stream", "hanger", "state", "last sample", "lag", "rate", "lost", "ring", "window",
-               "tension")  # fmt: skip
+    columns = ("stream", "hanger", "state", "last sample", "lag", "rate", "lost", "apart", "ring",
+               "window", "tension")  # fmt: skip
     made = table("Streams", *columns)
     for row, state in zip(rows, states, strict=True):
         made.add_row(
@@ -172,6 +175,7 @@ def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bo
             "" if state.lag is None else told(state.lag),
             f"{row.received_hz:.4g} Hz" if row.received_hz == row.received_hz else "",
             f"{row.lost_share_24h:.2%}" if row.lost_share_24h == row.lost_share_24h else "",
+            f"{row.apart_s_24h:.0f} s" if row.apart_s_24h else "",
             f"{row.ring_bytes / 1e6:.1f} MB",
             f"{_time(row.last_window)} {row.last_window_kind}, {row.last_window_how}".strip(" ,"),
             tension_words(state.hour),
@@ -191,6 +195,7 @@ def _row(state: StreamCondition) -> StreamRow:
         sampling_rate_hz=state.stream.sampling_rate_hz,
         received_hz=state.received_hz,
         lost_share_24h=state.lost_share,
+        apart_s_24h=state.apart_s,
         ring_bytes=state.ring_bytes,
         last_window=window.window.start if window else None,
         last_window_kind=window.window.kind if window else "",

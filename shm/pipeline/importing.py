@@ -32,6 +32,11 @@ from shm.values import NAN, Channel, FloatArray, Plane, Quantity, Recording
 
 OUTLINE_BINS = 32
 """Into how many parts of equal length the picture of a channel divides it."""
+WORTHS = {
+    "full scale": ("the full scale", ("50 g", "2000 N")),
+    "counts": ("one count", ("2.4e-6 m/s2", "0.001 N")),
+}
+"""Units of which only the sensor's owner knows what one is worth."""
 _ASKED_UNITS = ("", "full scale", "1", "-", "counts", "digits", "lsb")
 
 
@@ -276,15 +281,16 @@ def _open(columns: Sequence[SurveyedColumn]) -> list[SurveyedColumn]:
 
 def _of_unit(column: SurveyedColumn) -> Question:
     quoted = shlex.quote(column.name)
-    if words.volts_of(column.unit) is None and column.unit != "full scale":
+    if words.volts_of(column.unit) is None and column.unit not in WORTHS:
         text = f"In what unit is {column.name} recorded (N, kN, m/s2, g)?"
         option = f"--unit {quoted}=UNIT or --leave-out {quoted}"
     else:
         text = f"What does the sensor of {column.name} give (such as 100 mV/g, 2.25 mV/N)?"
         option = f"--sensitivity {quoted}='100 mV/g' or --leave-out {quoted}"
-        if column.unit == "full scale":
-            text = f"What is the full scale of {column.name} worth (such as 50 g, 2000 N)?"
-            option = f"--sensitivity {quoted}='50 g' or --leave-out {quoted}"
+        if column.unit in WORTHS:
+            one, examples = WORTHS[column.unit]
+            text = f"What is {one} of {column.name} worth (such as {', '.join(examples)})?"
+            option = f"--sensitivity {quoted}='{examples[0]}' or --leave-out {quoted}"
     return Question("unit", column.name, text, option)
 
 

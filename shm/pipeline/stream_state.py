@@ -30,6 +30,8 @@ _FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends i
 class StreamCondition:
     """`lost_share` is of the samples of the last 24 hours up to the last one, NaN without any.
 
+    `apart_s` is how many seconds of samples came for a time that was there already, in 24 hours:
+    they do not count, and are kept beside those that came first.
     `behind` is how much has come and is not read yet; `events` are those of the last 24 hours.
     """
 
@@ -40,6 +42,7 @@ class StreamCondition:
     behind: timedelta | None
     received_hz: float
     lost_share: float
+    apart_s: float
     ring_bytes: int
     window: WindowReading | None
     hour: PooledReading | None
@@ -63,7 +66,8 @@ def _state(
     events = store.streams.list_events(stream.name, now - _LATELY)
     progress = store.streams.progress(stream.name)
     window = store.streams.last_window(stream.name)
-    received, lost = _received(ring.state(stream.name).received_s, last, now)
+    state = ring.state(stream.name)
+    received, lost = _received(state.received_s, last, now)
     return StreamCondition(
         stream=stream,
         state=_word(last, events, now),
@@ -72,6 +76,7 @@ def _state(
         behind=None if last is None or progress is None else max(timedelta(0), last - progress),
         received_hz=received * stream.sampling_rate_hz,
         lost_share=lost,
+        apart_s=_lately_s(state.apart_s, now),
         ring_bytes=ring.size_bytes(stream.name),
         window=window,
         hour=store.streams.last_hour(stream.name),
@@ -115,6 +120,11 @@ def _received(
     came_s = sum(seconds for start, seconds in known.items() if start >= begin)
     of_last_s = max((end - last).total_seconds(), 1.0)
     return min(known[last] / of_last_s, 1.0), min(max(1 - came_s / expected_s, 0.0), 1.0)
+
+
+def _lately_s(seconds: Mapping[str, float], now: datetime) -> float:
+    since = now - _LATELY
+    return sum(each for start, each in seconds.items() if parse_time(start) >= since)
 
 
 def _word(last: datetime | None, events: tuple[StreamEvent, ...], now: datetime) -> State:

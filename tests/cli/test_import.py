@@ -15,10 +15,12 @@ from shm.modes_document import load_modes
 from shm.read import read, sidecar_path
 from shm.read.modal_sets import _frequency
 from shm.store import Stage, Workspace
-from shm.values import Recording
+from shm.values import Channel, Recording
 from tests.cli.conftest import Shm
 from tests.helpers.flows import ingest
+from tests.helpers.nouns import NOW
 from tests.helpers.workspaces import make_workspace
+from tests.helpers.written import write_counts
 
 HEAD = "catman\nMessung;quer\nAbtastrate;{rate:.0f} Hz\n\nZeit [s];Kraft [N];A1 [m/s²];A2 [g]\n"
 SAID = ("--hanger", 3, "--place", "2.52", "--plane", "transverse,longitudinal")
@@ -182,6 +184,27 @@ def test_volts_and_shares_of_a_full_scale_are_asked_for_what_they_are_worth(
     assert isinstance(found, Recording)
     assert [c.quantity for c in found.channels] == ["force", "acceleration"]
     assert np.std(found.channels[0].values) == pytest.approx(200, rel=0.05)
+
+
+def test_counts_of_a_seismic_recorder_are_asked_for_what_they_are_worth(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    rows = np.random.default_rng(1).normal(0, 1e5, (2, 3000))
+    path = tmp_path / "night.mseed"
+    channels = (Channel("acc_1", "acceleration", rows[0]),)
+    write_counts(path, rows, Recording("", channels, 200.0, None, NOW))
+    asked = shm("--workspace", workspace.folder, "import", path, "--json").document
+    assert [q["about"] for q in asked["questions"]] == ["hanger", "unit", "unit"]
+    assert "What is one count of XX_HGR3_00_HN1 worth" in asked["questions"][1]["text"]
+    ended = shm(
+        "--workspace", workspace.folder, "import", path, "--hanger", 3,
+        "--sensitivity", "XX_HGR3_00_HN1=2e-6 m/s2", "--sensitivity", "XX_HGR3_00_HN2=1e-4 mg",
+        "--place", "2.52", "--plane", "transverse,longitudinal",
+    )  # fmt: skip
+    assert ended.code == 0
+    found = read(workspace.spool / "night.mseed")
+    assert isinstance(found, Recording)
+    assert np.allclose(found.channels[0].values, 2e-6 * np.round(rows[0]), rtol=1e-9)
 
 
 def test_modes_of_another_program_come_in_with_their_orders_and_no_made_up_uncertainty(

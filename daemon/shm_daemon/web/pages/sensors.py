@@ -140,6 +140,8 @@ def _facts(state: StreamCondition) -> list[tuple[str, str, str]]:
         ("Hanger", str(stream.hanger), f"{len(stream.channels)} channels"),
         ("Last sample", formatting.moment(state.last_sample) if state.last_sample else "none yet",
          f"{behind} of it not read yet"),
+        ("Kept apart", f"{state.apart_s:.0f} s" if state.apart_s else "nothing",
+         "in 24 hours, for a time that was there already"),
         ("Kept raw", f"{state.ring_bytes / 1e6:.0f} MB", ""),
         ("Tension", tension_words(state.hour), "since the beginning, as of the last hour"),
     ]  # fmt: skip
@@ -176,6 +178,7 @@ def _document(state: StreamCondition) -> dict[str, Any]:
         "lag_s": state.lag.total_seconds() if state.lag is not None else None,
         "behind_s": state.behind.total_seconds() if state.behind is not None else None,
         "lost_share": state.lost_share,
+        "apart_s": state.apart_s,
         "ring_bytes": state.ring_bytes,
         "window": window and {"start": window.window.start, "kind": window.window.kind,
                               "modes": len(window.modes), "how": window.how, "why": window.why},
