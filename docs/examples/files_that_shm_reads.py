@@ -20,6 +20,7 @@ named = {
     "acc_1": acceleration,
     "sampling_rate_hz": 512.0,
     "hanger": 3,
+    "force_unit": "N",
     "acc_1_unit": "g",
     "acc_1_plane": "transverse",
     "acc_1_x_m": 2.52,

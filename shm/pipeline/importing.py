@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput
+from shm.pipeline.import_times import rate_told, with_times
 from shm.pipeline.lineage import read_limits
 from shm.read import logger_words as words
 from shm.read.assemble import recording
@@ -136,12 +137,13 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     own = _joined(document_beside(path), answers.said)
     _refuse_unknown(own, found, path)
     known = profile.described if profile is not None else {}
-    described = _with_times(completed(known, found.layout, own, path.name), found)
+    described = with_times(completed(known, found.layout, own, path.name), found)
     hanger = described.get("hanger", found.hanger)
-    rate = float(described.get("sampling_rate_hz", found.sampling_rate_hz))
+    rate, uneven = rate_told(found, described)
     questions = _questions(found, described, hanger, rate)
     problems = _hanger_problem(hanger, workspace)
     record, fault = _recording(found, described, rate, path)
+    fault = uneven or fault
     if found.lines or any(question.about in ("unit", "rate") for question in questions):
         fault = ""  # the answers may mend it
     if _holds_nothing(found, described, questions):
@@ -182,17 +184,6 @@ def _refuse_unknown(own: Described, found: Survey, path: Path) -> None:
                 channel=name,
                 remedy=f"It has {', '.join(names)}.",
             )
-
-
-def _with_times(described: dict[str, Any], found: Survey) -> dict[str, Any]:
-    """A column that is named as times in s, which its format's reader does not take for such."""
-    if not math.isnan(found.sampling_rate_hz) or "sampling_rate_hz" in described:
-        return described
-    for column in found.columns:
-        if column.quantity is None and words.means_time(column.name) and not column.unit:
-            tables = {**described.get("channel", {}), column.name: {"unit": "s"}}
-            return {**described, "channel": tables}
-    return described
 
 
 def _to_keep(known: Described, said: Described, found: Survey) -> dict[str, Any]:
@@ -320,7 +311,7 @@ def _recording(
         columns = [_told(column, described) for column in found.columns]
         used = [c for c in columns if c.quantity is not None and c.values is not None]
         header = Header(path, {c.name: _entries(c, path) for c in used})
-        values = np.array([c.values for c in used]).reshape(len(used), found.samples)
+        values = np.array([c.values for c in used]).reshape(len(used), -1 if used else 0)
         return recording(header, values, path, rate), ""
     except BadInput as error:
         return None, str(error)

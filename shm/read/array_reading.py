@@ -24,7 +24,7 @@ from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples
 from shm.read.logger_table import LoggerColumn, LoggerTable
 from shm.read.sidecar import channels_described, with_sidecar
 from shm.read.table import REMEDY, evened, rate_of
-from shm.read.units import accelerance_si, unit_of
+from shm.read.units import UNSAID, accelerance_si, unit_of
 from shm.values import NAN, ComplexArray, FloatArray, FrequencyResponse, Recording
 
 Opener = Callable[[Path], AbstractContextManager[Arrays]]
@@ -90,7 +90,9 @@ class _Chosen:
 
     def _entries(self, variable: Variable) -> dict[str, Entry]:
         said = {key: variable.attributes[key] for key in CHANNEL_KEYS if key in variable.attributes}
-        return {k: Entry(v, self.path) for k, v in {**said, "unit": unit_in(variable)}.items()}
+        # A name such as force promises newtons in our own CSV alone.
+        unit = unit_in(variable) or ("" if variable.kind == "c" else UNSAID)
+        return {k: Entry(v, self.path) for k, v in {**said, "unit": unit}.items()}
 
     def vector(self, role: Role, length: int) -> Variable | None:
         """The times or frequencies that go with arrays of a length."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from shm.documents import parse_time
 from shm.errors import BadInput
-from shm.read.units import ACCELERANCE, KNOWN, SI, Unit, accelerance_si, unit_of
+from shm.read.units import ACCELERANCE, KNOWN, SI, UNSAID, Unit, accelerance_si, unit_of
 from shm.values import NAN, PLANES, AddedMass, Plane, Quantity
 
 KEYS = (
@@ -133,6 +133,8 @@ class Header:
                     remedy=f"Name it force or acc_1, or give its unit: {KNOWN}.",
                 )
             return named, Unit(named, 1.0)
+        if entry.text == UNSAID:
+            raise entry.refusal("nothing says its unit.", f"Give one of {KNOWN}.", name)
         unit = unit_of(entry.text)
         if unit is None or named not in (None, unit.quantity):
             what = f"the unit {entry.text!r} is not one of {named or 'force or acceleration'}."

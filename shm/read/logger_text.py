@@ -34,6 +34,7 @@ from shm.read.logger_table import LoggerColumn, LoggerTable
 from shm.read.logger_times import Clock, clock_of
 from shm.read.sidecar import channels_described, with_sidecar
 from shm.read.stamps import moment, parsed
+from shm.read.units import UNSAID
 from shm.values import NAN, FloatArray, Recording
 
 _PLAIN_NAME = set("abcdefghijklmnopqrstuvwxyz0123456789_")
@@ -263,7 +264,7 @@ def _entries(column: LoggerColumn, line: int, path: Path) -> dict[str, Entry]:
         said["unit"] = column.sensitivity.unit
         said["calibration"] = column.sensitivity.unit_per_volt * volts
     elif quantity_named(column.name) and not column.unit:
-        said["unit"] = "unknown"  # a name such as force promises newtons in our own files alone
+        said["unit"] = UNSAID  # a name such as force promises newtons in our own files alone
     plane = words.plane_meant(column.name)
     if plane is not None and (unit := words.measured_unit(str(said["unit"]))) is not None:
         said |= {"plane": plane} if unit.quantity == "acceleration" else {}

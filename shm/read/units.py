@@ -51,6 +51,8 @@ _UNITS: dict[str, Unit] = {
 }
 KNOWN = "N, daN, kN, lbf for forces; m/s2, mm/s2, um/s2, g, mg for accelerations"
 ACCELERANCE = "m/s2/N"
+UNSAID = "unknown"
+"""The unit of a channel whose file says none, where its name alone promises nothing."""
 SI: dict[Quantity, str] = {"force": "N", "acceleration": "m/s2"}
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import pyuff
-from scipy.io import wavfile
+from scipy.io import savemat, wavfile
 
 from shm.modes_document import load_modes
 from shm.read import read, sidecar_path
@@ -184,6 +184,26 @@ def test_volts_and_shares_of_a_full_scale_are_asked_for_what_they_are_worth(
     assert isinstance(found, Recording)
     assert [c.quantity for c in found.channels] == ["force", "acceleration"]
     assert np.std(found.channels[0].values) == pytest.approx(200, rel=0.05)
+
+
+def test_a_table_without_names_or_units_is_read_by_the_answers(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    rows = np.random.default_rng(1).normal(0, 1, (3000, 3))
+    rows[:, 0] = np.arange(3000) / 512
+    path = tmp_path / "table.mat"
+    savemat(str(path), {"data": rows})
+    told = (
+        "--workspace", workspace.folder, "import", path, "--hanger", 3, "--unit", "data_1=s",
+        "--unit", "data_2=N", "--unit", "data_3=g",
+    )  # fmt: skip
+    asked = shm(*told, "--json").document
+    assert [q["about"] for q in asked["questions"]] == ["place", "plane"]
+    assert asked["sampling_rate_hz"] == pytest.approx(512)
+    assert shm(*told, "--place", "2.52", "--plane", "transverse").code == 0
+    found = read(workspace.spool / "table.mat")
+    assert isinstance(found, Recording)
+    assert (found.samples, found.sampling_rate_hz) == (3000, pytest.approx(512))
 
 
 def test_counts_of_a_seismic_recorder_are_asked_for_what_they_are_worth(

@@ -115,7 +115,8 @@ def _packed_npz(rng: np.random.Generator) -> bytes:
 
 def _packed_mat(rng: np.random.Generator, path: Path) -> bytes:
     force, first = _rows(rng)
-    savemat(path, {"force": force, "acc_1": first, "fs": 512.0}, do_compression=True)
+    units = {"force_unit": "N", "acc_1_unit": "m/s2"}
+    savemat(path, {"force": force, "acc_1": first, "fs": 512.0, **units}, do_compression=True)
     return path.read_bytes()
 
 

@@ -21,6 +21,7 @@ from tests.helpers.written import write
 
 SAMPLES = 200
 FORCE, FIRST, SECOND = np.random.default_rng(7).standard_normal((3, SAMPLES))
+UNITS = {"force_unit": "N", "acc_1_unit": "m/s2"}
 savemat: Any = scipy.io.savemat
 
 
@@ -132,6 +133,7 @@ def test_attributes_of_an_hdf5_file_say_what_a_header_does(tmp_path: Path) -> No
 def test_a_matlab_file_of_version_7_3_is_read(tmp_path: Path) -> None:
     arrays = {
         "force": FORCE, "acc_1": FIRST, "sampling_rate_hz": 512.0, "acc_1_unit": "mm/s2",
+        "force_unit": "N",
         "time": "2026-05-01T10:00:00Z",
     }  # fmt: skip
     path = version_7_3(tmp_path, arrays)
@@ -153,11 +155,23 @@ def test_compressed_variables_of_version_5_are_read_and_structs_left_out(tmp_pat
     path = tmp_path / "test.mat"
     arrays = {
         "force": FORCE, "acc_1": FIRST[:, None], "fs": 512, "settings": {"gain": 2.0},
-        "cells": np.array(["a", "b"], dtype=object),
+        **UNITS, "cells": np.array(["a", "b"], dtype=object),
     }  # fmt: skip
     savemat(path, arrays, do_compression=True)
     assert peek(path).left_out == ("settings (struct)", "cells (cell)")
     np.testing.assert_array_equal(recorded(path).accelerations[0].values, FIRST)
+
+
+@pytest.mark.parametrize("ending", ["mat", "npz"])
+def test_a_name_alone_promises_no_unit(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"test.{ending}"
+    arrays: dict[str, Any] = {"force": FORCE, "acc_1": FIRST, "fs": 512.0, "acc_1_unit": "g"}
+    (savemat if ending == "mat" else lambda p, a: np.savez(p, **a))(path, arrays)
+    assert any("force: nothing says its unit" in problem for problem in peek(path).problems)
+    with pytest.raises(BadInput, match="force: nothing says its unit"):
+        read(path)
+    sidecar_path(path).write_text('[channel.force]\nunit = "kN"\n')
+    np.testing.assert_allclose(recorded(path).channels[0].values, 1e3 * FORCE)
 
 
 def test_a_table_is_named_column_by_column(tmp_path: Path) -> None:
@@ -191,6 +205,7 @@ def test_the_rows_of_a_npy_file_are_named_by_its_sidecar(tmp_path: Path) -> None
 def test_fortran_order_bytes_and_integers_are_read(tmp_path: Path) -> None:
     counts = np.asfortranarray(np.vstack([np.arange(SAMPLES), -np.arange(SAMPLES)]).astype(">i2"))
     path = npz(tmp_path, acc=counts, fs=np.float32(100), hanger=np.bytes_(b"3"))
+    sidecar_path(path).write_text('unit = ["m/s2", "m/s2"]')
     found = recorded(path)
     assert [c.name for c in found.channels] == ["acc_1", "acc_2"]
     np.testing.assert_array_equal(found.channels[1].values, -np.arange(SAMPLES))
@@ -199,7 +214,7 @@ def test_fortran_order_bytes_and_integers_are_read(tmp_path: Path) -> None:
 
 def test_times_give_the_rate_and_show_the_gaps(tmp_path: Path) -> None:
     kept = np.delete(np.arange(SAMPLES), [50, 51])
-    path = npz(tmp_path, time=kept / 512, force=FORCE[kept], acc_1=FIRST[kept])
+    path = npz(tmp_path, time=kept / 512, force=FORCE[kept], acc_1=FIRST[kept], **UNITS)
     found = recorded(path)
     assert (found.samples, found.sampling_rate_hz) == (SAMPLES, pytest.approx(512))
     assert np.flatnonzero(np.isnan(found.channels[0].values)).tolist() == [50, 51]
@@ -220,7 +235,9 @@ def test_uneven_times_are_refused_at_their_sample(tmp_path: Path, at: int, words
 
 
 def test_a_step_in_place_of_a_rate_will_do(tmp_path: Path) -> None:
-    assert recorded(npz(tmp_path, dt=1 / 512, acc_1=FIRST)).sampling_rate_hz == 512
+    assert (
+        recorded(npz(tmp_path, dt=1 / 512, acc_1=FIRST, acc_1_unit="m/s2")).sampling_rate_hz == 512
+    )
 
 
 def test_channels_of_different_length_or_rate_are_refused(tmp_path: Path) -> None:

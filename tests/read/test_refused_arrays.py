@@ -155,6 +155,7 @@ def test_a_group_that_holds_itself_ends(tmp_path: Path) -> None:
 def test_references_and_lists_of_hdf5_are_left_out_unread(tmp_path: Path) -> None:
     def make(file: h5py.File) -> None:
         file["acc_1"] = SERIES
+        file["acc_1"].attrs["unit"] = "m/s2"
         file.create_dataset("points", (30,), h5py.ref_dtype)
         file.create_dataset("lists", (30,), h5py.vlen_dtype("f8"))
         file.create_dataset("rows", (30,), [("a", "f8"), ("b", "i4")])
@@ -187,7 +188,7 @@ def mat(folder: Path, *, pack: bool = False, **arrays: Any) -> Path:
 def test_matlab_functions_and_objects_are_left_out_unread(tmp_path: Path) -> None:
     """An object as scipy writes it, from a structured array with a class name."""
     thing = scipy.io.matlab.MatlabObject(np.zeros((1, 1), [("a", "O")]), "handle")
-    path = mat(tmp_path, acc_1=SERIES, thing=thing)
+    path = mat(tmp_path, acc_1=SERIES, acc_1_unit="m/s2", thing=thing)
     assert peek(path).left_out == ("thing (object)",)
     assert len(read(path).channels) == 1  # type: ignore[union-attr]
 
