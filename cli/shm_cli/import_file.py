@@ -223,7 +223,7 @@ def _show(found: Import) -> None:
     for column in found.columns:
         made.add_row(*(told(column) for told in _COLUMNS.values()))
     show_table(made)
-    for remark in survey.remarks:
+    for remark in found.remarks:
         click.echo(f"note: {remark}")
 
 

@@ -98,7 +98,7 @@ def import_document(found: Import) -> dict[str, Any]:
         "columns": [_column(column) for column in found.columns],
         "questions": [question_document(question) for question in found.questions],
         "problems": list(found.problems),
-        "remarks": list(survey.remarks),
+        "remarks": list(found.remarks),
     }
 
 

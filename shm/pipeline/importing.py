@@ -38,6 +38,8 @@ WORTHS = {
     "counts": ("one count", ("2.4e-6 m/s2", "0.001 N")),
 }
 """Units of which only the sensor's owner knows what one is worth."""
+# judgement: 500 g, the range of usual accelerometers of 10 mV/g, whose signal goes to 5 V
+_WILD_M_S2 = 4903.0
 _ASKED_UNITS = ("", "full scale", "1", "-", "counts", "digits", "lsb")
 
 
@@ -116,6 +118,17 @@ class Import:
     hanger: int | None
     questions: tuple[Question, ...]
     problems: tuple[str, ...]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should look at, though nothing is refused for it."""
+        wild = [
+            f"{c.name} reaches {max(-c.least, c.largest):.3g} m/s2, beyond most accelerometers"
+            f" ({_WILD_M_S2:.0f}): is its unit right?"
+            for c in self.columns
+            if c.quantity == "acceleration" and max(-c.least, c.largest) > _WILD_M_S2
+        ]
+        return (*self.survey.remarks, *wild)
 
     @property
     def is_ready(self) -> bool:
@@ -263,17 +276,23 @@ def _open(columns: Sequence[SurveyedColumn]) -> list[SurveyedColumn]:
     has = {column.quantity for column in columns}
     unclear = [c for c in columns if c.quantity is None and c.unit != "(answered)"]
     in_volts = [c for c in unclear if words.volts_of(c.unit) is not None]
-    plain = [c for c in unclear if c.unit.lower() in _ASKED_UNITS]
+    plain = [c for c in unclear if c.unit.lower() in _ASKED_UNITS or _is_in_doubt(c)]
     named = [c for c in plain if c.meant is not None]
     if "acceleration" not in has and not named and not in_volts:
         named = plain
     return [c for c in columns if c in in_volts or c in named]
 
 
+def _is_in_doubt(column: SurveyedColumn) -> bool:
+    """Whether nobody knows the unit, or it is not one of what the name says."""
+    return not words.is_unit(column.unit) or words.measured_unit(column.unit) is not None
+
+
 def _of_unit(column: SurveyedColumn) -> Question:
     quoted = shlex.quote(column.name)
     if words.volts_of(column.unit) is None and column.unit not in WORTHS:
-        text = f"In what unit is {column.name} recorded (N, kN, m/s2, g)?"
+        said = f"; {column.unit!r} is unknown or unlike its name" if column.unit else ""
+        text = f"In what unit is {column.name} recorded (N, kN, m/s2, g{said})?"
         option = f"--unit {quoted}=UNIT or --leave-out {quoted}"
     else:
         text = f"What does the sensor of {column.name} give (such as 100 mV/g, 2.25 mV/N)?"

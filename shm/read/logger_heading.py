@@ -6,6 +6,7 @@ Names and units may stand in one row (`Kraft [N]`), in two, or in rows that begi
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ _RATE_IN_WORDS = re.compile(
 _HERTZ = re.compile(r"(k?)(hz|s/s|sps|1/s|samples?/s(ec(ond)?)?|samples? ?per ?second)?", re.I)
 _VALUE = re.compile(r"([+-]?\d[\d.,'eE+-]*)\s*(.*)")
 _WITH_UNIT = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
+_MOSTLY = 0.6  # judgement: of a row of units, of which one may be spelt as nobody else does
 _PLAIN_COUNTER = "column"
 
 
@@ -140,7 +142,8 @@ def _are_units(cells: Sequence[str], script: Script) -> bool:
     measured = [cell for cell in said if words.measured_unit(cell) or words.volts_of(cell)]
     if labelled:
         return bool(measured)
-    return bool(measured) and len(said) > 1 and all(map(words.is_unit, said))
+    known = sum(map(words.is_unit, said))
+    return bool(measured) and len(said) > 1 and (known == len(said) or _MOSTLY * len(said) <= known)
 
 
 def _sensitivities(
@@ -224,6 +227,22 @@ def rate_said(facts: Sequence[tuple[str, str]], decimal: str) -> float:
             number, _ = quantity_said(found[1], decimal)
             return number * (1e3 if found[2] else 1.0)
     return NAN
+
+
+def unrounded(
+    rate_hz: float, times_hz: float, facts: Sequence[tuple[str, str]], decimal: str
+) -> float:
+    """The rate that is said, or that of the times where a step as rounded as that means both."""
+    for key, value in facts:
+        number, unit = quantity_said(value, decimal)
+        seconds = (words.seconds_of(unit) if unit else 1.0) or math.nan
+        found = _VALUE.fullmatch(value.strip())
+        if words.means_interval(key) and found and abs(number * seconds * rate_hz - 1) < 1e-9:
+            mantissa, _, exponent = found[1].lower().partition("e")
+            decimals = len(re.split("[.,]", mantissa)[1]) if re.search("[.,]", mantissa) else 0
+            digit_s = 10.0 ** (int(exponent or 0) - decimals) * seconds
+            return times_hz if abs(1 / times_hz - 1 / rate_hz) <= digit_s else rate_hz
+    return rate_hz
 
 
 def quantity_said(text: str, decimal: str) -> tuple[float, str]:

@@ -28,8 +28,9 @@ _MOST_PREAMBLE = 2000  # judgement: lines; the longest heading of a logger has s
 _SHARE = 0.9  # judgement: of the sample; a heading in the midst is less than a tenth of it
 _MISSING = {
     "", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "nv", "#nv", "invalid", "bad",
-    "ungültig", "-nan", "1.#qnan", "-1.#ind", "nan.0", "#div/0!", "#value!", "#num!", "#ref!",
+    "ungültig", "nan.0", "#div/0!", "#value!", "#num!", "#ref!",
 }  # fmt: skip
+_NAN = re.compile(r"[+-]?(nan(\(\w*\))?|1\.#(ind|qnan|snan)0*)", re.IGNORECASE)  # of C libraries
 _OVER = re.compile(
     r"[+-]?(ov(e?r)?(l|ld|f|flow|range|load)?|over[ _-]?(range|load|flow|fl)?|ol|o\.l\.?|∞"
     r"|inf(inity)?"
@@ -119,7 +120,7 @@ def is_number(text: str, decimal: str) -> bool:
 
 def is_gap(text: str) -> bool:
     """Whether a cell says that there is no value."""
-    return text.lower() in _MISSING
+    return text.lower() in _MISSING or _NAN.fullmatch(text) is not None
 
 
 def is_over(text: str) -> bool:

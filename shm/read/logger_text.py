@@ -12,6 +12,7 @@ sidecar to describe (see `shm import`), times without a unit need a rate that ag
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -28,16 +29,25 @@ from shm.read.base import Peek
 from shm.read.comma_header import LINE_BREAK, cells_of, mark_between
 from shm.read.header import Entry, Header, quantity_named
 from shm.read.limits import refuse_long_header
-from shm.read.logger_heading import Heading, heading_of, quantity_said, rate_said, unlike
-from shm.read.logger_rows import Block, block_of, script_of, values_of
+from shm.read.logger_heading import Heading, heading_of, quantity_said, rate_said, unlike, unrounded
+from shm.read.logger_rows import (
+    Block,
+    block_of,
+    is_gap,
+    is_number,
+    is_over,
+    script_of,
+    values_of,
+)
 from shm.read.logger_table import LoggerColumn, LoggerTable
-from shm.read.logger_times import Clock, clock_of
+from shm.read.logger_times import Clock, clock_of, two_days
 from shm.read.sidecar import channels_described, with_sidecar
 from shm.read.stamps import moment, parsed
 from shm.read.units import UNSAID
 from shm.values import NAN, FloatArray, Recording
 
 _PLAIN_NAME = set("abcdefghijklmnopqrstuvwxyz0123456789_")
+_LISTED = re.compile(r"TIMESERIES .*?, *(\d+) samples,")  # SLIST and TSPAIR, of seismology
 _MOST_STACKED = 64  # judgement: four times the accelerations that are read
 _HEAD = 20_000  # characters in which a heading of our own says so
 
@@ -60,8 +70,12 @@ def _names_bare(line: str, below: str) -> bool:
     cells, values = (cells_of(each.lower(), mark) for each in (line, below))
     bare = all(cell and set(cell) <= _PLAIN_NAME for cell in cells)
     known = bare and any(quantity_named(cell) for cell in cells)
-    foreign = len(values) > len(cells) or (below != "" and all(map(words.is_unit, values)))
+    foreign = len(values) > len(cells) or (below != "" and not any(map(_may_be_value, values)))
     return known and not foreign
+
+
+def _may_be_value(cell: str) -> bool:
+    return is_over(cell) or is_gap(cell) or any(is_number(cell, mark) for mark in ".,")
 
 
 _OUR_KEYS = {
@@ -90,6 +104,7 @@ def parse(text: str, path: Path, preamble: Sequence[str] = ()) -> LoggerTable | 
     _refuse_split_decimals(heading, block, path)
     rate = rate_said(heading.facts, script.decimal)
     clock = clock_of(heading, block, rate, path)
+    _refuse_wrapped(block, path)
     columns = tuple(
         _column(heading, block, clock, place, path)
         for place, kind in enumerate(script.kinds)
@@ -97,7 +112,7 @@ def parse(text: str, path: Path, preamble: Sequence[str] = ()) -> LoggerTable | 
     )
     return LoggerTable(
         columns=columns,
-        said_rate_hz=rate,
+        said_rate_hz=unrounded(rate, clock.rate_hz, heading.facts, script.decimal),
         times_rate_hz=clock.rate_hz,
         hanger=_hanger(heading, path),
         time=clock.start or _time(heading),
@@ -160,6 +175,19 @@ def _refuse_split_decimals(heading: Heading, block: Block, path: Path) -> None:
         )
 
 
+def _refuse_wrapped(block: Block, path: Path) -> None:
+    """Raises BadInput where a list of a seismic archive says another number of samples."""
+    said = next((int(found[1]) for line in block.above if (found := _LISTED.match(line))), None)
+    if said is not None and said != len(block.rows):
+        raise BadInput(
+            f"its heading says {said} samples of one channel, where {len(block.rows)} rows of"
+            f" {len(block.script.kinds)} values follow.",
+            file=path,
+            line=block.lines[0],
+            remedy="Export one column for each channel, or as miniSEED.",
+        )
+
+
 # ---------------------------------------------------------------- facts of the whole
 
 
@@ -196,7 +224,7 @@ def _two_days(heading: Heading) -> tuple[str, ...]:
     for key, value in heading.facts:
         found = parsed(value) if words.means_date(key) or words.means_moment(key) else None
         if found is not None and not found[1] and found[0].year > 1:
-            return (f"{value} may be one day or another: the time of the test is left open.",)
+            return (two_days(value),)
     return ()
 
 
@@ -253,8 +281,15 @@ def header_of(table: LoggerTable, path: Path) -> tuple[Header, list[int], tuple[
 
 def is_measured(column: LoggerColumn) -> bool:
     """Whether a file itself says that a column is a force or an acceleration, and in what unit."""
-    measured = words.measured_unit(column.unit) is not None
+    measured = words.measured_unit(column.unit) is not None and not _is_doubtful(column)
     return measured or (words.volts_of(column.unit) is not None and column.sensitivity is not None)
+
+
+def _is_doubtful(column: LoggerColumn) -> bool:
+    """Whether a load cell, by its name, is in a unit of acceleration: g may be its grams."""
+    unit = words.measured_unit(column.unit)
+    in_g = unit is not None and unit.quantity == "acceleration"
+    return in_g and words.means_force_alone(column.name)
 
 
 def _entries(column: LoggerColumn, line: int, path: Path) -> dict[str, Entry]:
@@ -263,7 +298,7 @@ def _entries(column: LoggerColumn, line: int, path: Path) -> dict[str, Entry]:
     if volts is not None and column.sensitivity is not None:
         said["unit"] = column.sensitivity.unit
         said["calibration"] = column.sensitivity.unit_per_volt * volts
-    elif quantity_named(column.name) and not column.unit:
+    elif _is_doubtful(column) or (quantity_named(column.name) and not column.unit):
         said["unit"] = UNSAID  # a name such as force promises newtons in our own files alone
     plane = words.plane_meant(column.name)
     if plane is not None and (unit := words.measured_unit(str(said["unit"]))) is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -131,13 +131,15 @@ def _since_epoch(values: FloatArray) -> tuple[FloatArray, datetime] | None:
 
 
 def _factor(values: FloatArray, said_hz: float) -> float | None:
-    """The unit of times that have none, in s: by the rate that is said, else if only s can be."""
+    """The unit of times that have none, in s: by the rate that is said, else s where that can be."""
     span = float(values[-1] - values[0])
     if not span > 0:
         return None
     rate = (len(values) - 1) / span
-    if not math.isnan(said_hz):
-        return next((f for f in (1.0, 1e-3, 1e-6) if abs(rate / f / said_hz - 1) < 0.01), None)
+    for factor in (1.0, 1e-3, 1e-6):
+        if abs(rate / factor / said_hz - 1) < 0.01:
+            return factor
+    # In s, too, where that contradicts what is said: it is refused then.
     return 1.0 if _SLOWEST_HZ <= rate <= _FASTEST_HZ else None
 
 
@@ -155,7 +157,14 @@ def _of_stamps(
         wrong = next(place for place, text in enumerate(texts) if parsed(text) is None)
         raise _fault(block, name, path)(wrong, f"{texts[wrong][:40]!r} is no time")
     start = first[0] if first[1] else None
-    return _even(seconds, said_hz, start, used, name, block, path)
+    clock = _even(seconds, said_hz, start, used, name, block, path)
+    unsure = () if start or first[0].year == 1 else (two_days(texts[0]),)
+    return replace(clock, remarks=(*clock.remarks, *unsure))
+
+
+def two_days(text: str) -> str:
+    """The remark on a day such as 05/06/2026, from which no time is taken."""
+    return f"{text} may be one day or another: the time of the test is left open (--time)."
 
 
 def _even(

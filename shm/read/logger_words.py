@@ -128,6 +128,11 @@ def quantity_meant(name: str) -> Quantity | None:
     return "acceleration" if _ACCELERATION.search(name) else None
 
 
+def means_force_alone(name: str) -> bool:
+    """Whether a name is that of a force, and holds no word of acceleration."""
+    return _FORCE.search(name) is not None and _ACCELERATION.search(name) is None
+
+
 def plane_meant(name: str) -> Plane | None:
     """The plane that a name says in words; None where it says a letter of an axis or nothing."""
     if _TRANSVERSE.search(name):

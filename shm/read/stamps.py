@@ -58,8 +58,7 @@ def _day(found: re.Match[str], prefix: str) -> tuple[datetime, bool]:
     if len(a) == 4:
         return datetime(first, second, third, tzinfo=UTC), True
     year = third + 2000 if third < 100 else third
-    half = None if prefix else found["half"]
-    is_american = mark == "/" and (second > 12 or half is not None)
+    is_american = mark == "/" and second > 12  # AM and PM say nothing: they do not stay in America
     day, month = (second, first) if is_american else (first, second)
     certain = mark == "." or is_american or first > 12 or first == second
     return datetime(year, month, day, tzinfo=UTC), certain

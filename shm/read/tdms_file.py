@@ -63,6 +63,12 @@ def _refuse_cut_off(file: Any, path: Path) -> None:
 
 def _arrays(file: Any, path: Path) -> Arrays:
     channels = [channel for group in file.groups() for channel in group.channels()]
+    if not channels:
+        raise BadInput(
+            "its bytes are not those of a TDMS file: no channel is found in it.",
+            file=path,
+            remedy="Export or send it again.",
+        )
     if len(channels) > _MOST_CHANNELS:
         raise ValueError("more channels than a recording can have")
     names = named_apart([(channel.group_name, channel.name) for channel in channels])

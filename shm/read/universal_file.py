@@ -8,7 +8,7 @@ Time histories of a UFF file and recordings, each made from the other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,9 @@ from shm.read import assemble, universal_frf
 from shm.read.atomic import replace_file
 from shm.read.base import Format, Peek, PeekChannel
 from shm.read.header import Header
+from shm.read.logger_heading import unlike
 from shm.read.logger_table import LoggerColumn, LoggerTable
-from shm.read.sidecar import with_sidecar, write_sidecar
+from shm.read.sidecar import channels_described, with_sidecar, write_sidecar
 from shm.read.units import SI, unit_of
 from shm.read.universal_sets import TIME_RESPONSE, Content, FunctionSet, load, recognises, save
 from shm.values import NAN, FloatArray, FrequencyResponse, Quantity, Recording
@@ -72,17 +73,17 @@ def _write(described: Recording | FrequencyResponse, path: Path) -> None:
 def _table(path: Path) -> LoggerTable | None:
     """The time histories, with those that are neither a force nor an acceleration."""
     content = load(path, headers_only=False)
-    sets = time_sets(content)
+    every, sets = histories(content), time_sets(content) or histories(content)
     if _holds_responses(content) or not sets:
         return None
     _refuse_different(sets, path)
-    header = _header(sets, content, path)
     columns = tuple(
         LoggerColumn(name, found.unit, _real(found))
-        for name, found in zip(header.channels, sets, strict=True)
+        for name, found in zip(_names(every, path), every, strict=True)
+        if (found.points, found.step) == (sets[0].points, sets[0].step)
     )
     layout = ("UFF", *(f"{c.name} [{c.unit}]" for c in columns))
-    rate = _rate(sets)
+    rate, header = _rate(sets), _header(_used(content, path), content, path)
     return LoggerTable(columns, rate, NAN, header.hanger, None, NAN, 0, layout, (), False)
 
 
@@ -104,10 +105,21 @@ _CODES: dict[Quantity, int] = {"force": 13, "acceleration": 12}
 _TIME, _EVEN, _DOUBLE = 17, 1, 4
 
 
+def histories(content: Content) -> list[FunctionSet]:
+    """The sets over time, whatever they hold."""
+    return [found for found in content.functions if found.function == TIME_RESPONSE]
+
+
 def time_sets(content: Content) -> list[FunctionSet]:
     """The sets that hold a force or an acceleration over time."""
-    histories = [found for found in content.functions if found.function == TIME_RESPONSE]
-    return [found for found in histories if quantity(found) is not None]
+    return [found for found in histories(content) if quantity(found) is not None]
+
+
+def _used(content: Content, path: Path) -> dict[str, FunctionSet]:
+    """Those, and what the sidecar says to be one, by name."""
+    described, sets = channels_described(path), histories(content)
+    named = zip(_names(sets, path), sets, strict=True)
+    return {n: found for n, found in named if quantity(found) is not None or n in described}
 
 
 def quantity(found: FunctionSet) -> Quantity | None:
@@ -117,13 +129,15 @@ def quantity(found: FunctionSet) -> Quantity | None:
 
 
 def recording(content: Content, path: Path) -> Recording:
-    sets = time_sets(content)
+    _refuse_different(time_sets(content), path)
+    used = _used(content, path)
+    sets = list(used.values())
     if not sets:
         _refuse_modes(content, path)
         assemble.refuse_quantities([], path)
     _refuse_different(sets, path)
     values = np.array([universal_frf.sign(found.response[2]) * _real(found) for found in sets])
-    header = _header(sets, content, path)
+    header = _header(used, content, path)
     return assemble.recording(header, values, path, _rate(sets))
 
 
@@ -138,12 +152,14 @@ def _refuse_modes(content: Content, path: Path) -> None:
 
 
 def peek(content: Content, file_format: str, path: Path) -> Peek:
-    sets = time_sets(content)
+    used = _used(content, path)
+    sets = list(used.values())
     left_out = [found for found in content.functions if found not in sets]
     named = [f"{found.title} ({found.label or 'of another kind'})" for found in left_out]
-    samples = sets[0].points if sets else 0
-    header = _header(sets, content, path)
-    return assemble.peeked(header, file_format, samples, lambda: _rate(sets), path, left_out=named)
+    timed = sets or histories(content)
+    samples = timed[0].points if timed else 0
+    header = _header(used, content, path)
+    return assemble.peeked(header, file_format, samples, lambda: _rate(timed), path, left_out=named)
 
 
 def sets_of(recording: Recording) -> list[dict[str, Any]]:
@@ -180,17 +196,33 @@ def sets_of(recording: Recording) -> list[dict[str, Any]]:
     return sets
 
 
-def _header(sets: Sequence[FunctionSet], content: Content, path: Path) -> Header:
-    if not sets:
-        return with_sidecar(Header(path, {}), path)
+def _header(used: Mapping[str, FunctionSet], content: Content, path: Path) -> Header:
+    others = [name for name in _names(histories(content), path) if name not in used]
+    if not used:
+        return with_sidecar(Header(path, {}), path, others)
     channels = {
         name: universal_frf.channel_entries(found, *found.response[1:], content, path)
-        for name, found in zip(_names(sets, path), sets, strict=True)
+        for name, found in used.items()
     }
-    return with_sidecar(Header(path, channels, universal_frf.entries(sets[0], path)), path)
+    first = next(iter(used.values()))
+    return with_sidecar(Header(path, channels, universal_frf.entries(first, path)), path, others)
 
 
 def _names(sets: Sequence[FunctionSet], path: Path) -> list[str]:
+    """The names of forces and accelerations, and the titles of all else."""
+    measured = [found for found in sets if quantity(found) is not None]
+    known = iter(_names_of_measured(measured, path))
+    return list(
+        unlike(
+            [
+                next(known) if quantity(found) is not None else found.lines[0] or found.label
+                for found in sets
+            ]
+        )
+    )
+
+
+def _names_of_measured(sets: Sequence[FunctionSet], path: Path) -> list[str]:
     """The names that we wrote; else force, acc_1, acc_2, ... in the order of the file."""
     own = [found.lines[0] for found in sets if universal_frf.facts(found)]
     if len(own) == len(sets):
@@ -223,8 +255,8 @@ def _refuse_doubles(keys: Sequence[object], sets: Sequence[FunctionSet], path: P
 
 
 def _refuse_different(sets: Sequence[FunctionSet], path: Path) -> None:
-    first = sets[0]
     for found in sets[1:]:
+        first = sets[0]
         if (found.points, found.step) != (first.points, first.step):
             raise BadInput(
                 f"{found.title} has {found.points} samples every {found.step:g} s, {first.title}"

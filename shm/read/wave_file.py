@@ -6,8 +6,10 @@ accelerometer of 100 mV/g gives 100 g. Files of floating point may hold units al
 
 from __future__ import annotations
 
+import io
 import warnings
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -22,6 +24,7 @@ from shm.values import NAN, Recording
 _NAME = "WAV"
 FULL_SCALE = "full scale"
 _FORMS = (b"RIFF", b"RIFX", b"RF64")
+_OPEN_SIZES = (0, 0xFFFFFFFF)  # what recorders write before they know
 _MOST_CHANNELS = 64  # judgement: four times what is read of a recording
 
 
@@ -38,7 +41,7 @@ def table_of(path: Path) -> LoggerTable:
         raise too_large(path)
     with guarded(path):
         warnings.simplefilter("ignore", wavfile.WavFileWarning)  # of notes that recorders add
-        rate, data = wavfile.read(path)
+        rate, data = wavfile.read(io.BytesIO(_closed(path.read_bytes())))
     if data.ndim == 1:
         data = data[:, np.newaxis]
     if rate <= 0 or data.shape[1] > _MOST_CHANNELS or not len(data):
@@ -55,6 +58,22 @@ def table_of(path: Path) -> LoggerTable:
     layout = ("WAV", str(data.dtype), *names)
     hanger = hanger_numbered(path.stem)
     return LoggerTable(columns, float(rate), NAN, hanger, None, NAN, 0, layout, ())
+
+
+def _closed(content: bytes) -> bytes:
+    """A streamed file, whose recorder never wrote how long it is, with its sizes put in."""
+    order: Literal["little", "big"] = "big" if content.startswith(b"RIFX") else "little"
+    place = 12
+    while place + 8 <= len(content) and content[:4] != b"RF64":
+        size = int.from_bytes(content[place + 4 : place + 8], order)
+        if content[place : place + 4] == b"data" and size in _OPEN_SIZES:
+            left = len(content) - place - 8
+            whole = left - left % max(1, int.from_bytes(content[32:34], order))
+            sizes = [(len(content) - 8).to_bytes(4, order), whole.to_bytes(4, order)]
+            return b"".join([content[:4], sizes[0], content[8 : place + 4], sizes[1],
+                             content[place + 8 : place + 8 + whole]])  # fmt: skip
+        place += 8 + size + size % 2
+    return content
 
 
 def _shares(values: np.ndarray) -> np.ndarray:

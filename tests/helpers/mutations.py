@@ -109,7 +109,7 @@ def whole_samples(folder: Path) -> list[Sample]:
 def _packed_npz(rng: np.random.Generator) -> bytes:
     stream = io.BytesIO()
     arrays: dict[str, Any] = dict(zip(("force", "acc_1"), _rows(rng), strict=True))
-    np.savez_compressed(stream, sampling_rate_hz=512.0, **arrays)
+    np.savez_compressed(stream, sampling_rate_hz=512.0, force_unit="N", acc_1_unit="g", **arrays)
     return stream.getvalue()
 
 

@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import wavfile
 
 from shm.errors import BadInput
 from shm.read import peek, read
 from shm.read.logger_words import hanger_numbered, name_and_unit, sensitivity_of
 from shm.read.stamps import moment, parsed
+from shm.read.surveying import survey
 from shm.values import Recording
 
 ROWS, RATE = 400, 500.0
@@ -191,3 +193,74 @@ def test_words_of_sensors_hangers_and_days() -> None:
     assert ambiguous is not None
     assert not ambiguous[1]
     assert parsed("12.5") is None
+
+
+def test_what_c_libraries_write_for_no_number_are_missing_samples(tmp_path: Path) -> None:
+    tokens = ("-nan(ind)", "-1.#IND", "nan(ind)", "1.#QNAN", "-1.#IND00")
+    lines = PLAIN.splitlines()
+    for place, token in enumerate(tokens, start=50):
+        lines[place] = f"{place / RATE:.3f},{FORCE[place]:.3f},{token}"
+    path = tmp_path / "test.csv"
+    path.write_text("Time [s],Force [N],Acc [m/s2]\n" + "\n".join(lines) + "\n")
+    found = read(path)
+    assert isinstance(found, Recording)
+    assert np.flatnonzero(np.isnan(found.channels[1].values)).tolist() == [*range(50, 55)]
+
+
+@pytest.mark.parametrize("day", ["04/05/2026 9:41:12 PM", "04/05/2026 09:41:12"])
+def test_a_day_of_two_readings_is_left_open_with_a_remark(tmp_path: Path, day: str) -> None:
+    path = tmp_path / "test.csv"
+    body = rows(lambda i: f"{FORCE[i]:.3f},{ACC[i]:.4f}")
+    path.write_text(f"Start,{day}\nRate,500 Hz\nHammer (N),a1x (g)\n{body}")
+    found = survey(path)
+    assert found.time is None
+    assert f"{day} may be one day or another" in found.remarks[0]
+    path.write_text(f"Start,05/14/2026 9:41:12 PM\nRate,500 Hz\nHammer (N),a1x (g)\n{body}")
+    assert survey(path).time == datetime(2026, 5, 14, 21, 41, 12, tzinfo=UTC)
+
+
+def test_a_rounded_step_gives_way_to_the_times(tmp_path: Path) -> None:
+    path = tmp_path / "test.csv"
+    body = rows(lambda i: f"{i / 512:.6f},{FORCE[i]:.3f},{ACC[i]:.4f}")
+    path.write_text(f"Delta_X,0.001953\nX_Value,Force (N),Acc (g)\n{body}")
+    assert peek(path).sampling_rate_hz == pytest.approx(512, abs=1e-3)
+    path.write_text(f"Delta_X,0.00193\nX_Value,Force (N),Acc (g)\n{body}")
+    assert any("the times in the data give" in problem for problem in peek(path).problems)
+
+
+def test_a_unit_that_nobody_knows_is_left_with_its_column(tmp_path: Path) -> None:
+    path = tmp_path / "test.csv"
+    path.write_text(f"Time,Hammer,a1\ns,kp,milli-g\n{PLAIN}")
+    found = survey(path)
+    assert [(c.unit, c.quantity) for c in found.columns] == [("kp", "force"), ("milli-g", None)]
+
+
+def test_a_load_cell_in_g_is_no_accelerometer(tmp_path: Path) -> None:
+    path = tmp_path / "test.csv"
+    path.write_text(f"Time [s],Load cell [g],Acc [g]\n{PLAIN}")
+    assert [c.quantity for c in survey(path).columns] == [None, "acceleration"]
+
+
+def test_a_list_that_wraps_one_channel_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "test.txt"
+    head = "TIMESERIES AM_R1234_00_ENE_D, 1200 samples, 100 sps, 2026-05-14T09:41:12.0, SLIST\n"
+    path.write_text(head + PLAIN.replace(",", "\t"))
+    with pytest.raises(BadInput, match="1200 samples of one channel, where 400 rows of 3"):
+        read(path)
+
+
+def test_a_streamed_wav_is_read_to_its_end(tmp_path: Path) -> None:
+    path = tmp_path / "test.wav"
+    wavfile.write(path, 500, np.arange(400, dtype=np.int16).reshape(200, 2))
+    content = path.read_bytes()
+    place = content.index(b"data") + 4
+    for size in (bytes(4), b"\xff" * 4):
+        path.write_bytes(content[:4] + size + content[8:place] + size + content[place + 4 :])
+        assert survey(path).samples == 200
+
+
+def test_bytes_without_a_channel_are_no_tdms(tmp_path: Path) -> None:
+    path = tmp_path / "test.tdms"
+    path.write_bytes(b"TDSm" + bytes(24))
+    with pytest.raises(BadInput, match="not those of a TDMS file"):
+        survey(path)

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from shm.errors import BadInput, UsageError
 from shm.read import peek, read, sidecar_path, write
+from shm.read.surveying import survey
 from shm.values import FloatArray, FrequencyResponse, Recording
 
 POINTS = 64
@@ -29,6 +30,25 @@ def time_set(unit: str, code: int, node: int, direction: int, **more: Any) -> di
         "ordinate_spec_data_type": code, "ordinate_axis_units_lab": unit,
         "orddenom_spec_data_type": 0, "x": np.arange(POINTS) / 512, "data": values, **more,
     }  # fmt: skip
+
+
+def test_sets_without_a_unit_are_what_the_sidecar_says(tmp_path: Path) -> None:
+    path = tmp_path / "test.uff"
+    bare = [
+        time_set("NONE", 0, node, 3, func_type=0, id1=f"Ch{node}", ordinate_axis_lab="NONE")
+        for node in (1, 2, 3)
+    ]
+    pyuff.UFF(str(path)).write_sets(bare, mode="add")
+    look = peek(path)
+    assert (look.samples, look.sampling_rate_hz) == (POINTS, 512)
+    assert survey(path).columns[1].name == "Ch2"
+    sidecar_path(path).write_text('[channel.Ch1]\nunit = "kN"\n[channel.Ch3]\nunit = "g"\n')
+    found = read(path)
+    assert isinstance(found, Recording)
+    assert [(c.name, c.quantity) for c in found.channels] == [
+        ("Ch1", "force"), ("Ch3", "acceleration"),
+    ]  # fmt: skip
+    np.testing.assert_allclose(found.channels[0].values, 1e3 * bare[0]["data"], rtol=1e-5)
 
 
 def frf_set(node: int, hammer: int, **more: Any) -> dict[str, Any]:
