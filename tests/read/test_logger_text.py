@@ -261,6 +261,6 @@ def test_a_streamed_wav_is_read_to_its_end(tmp_path: Path) -> None:
 
 def test_bytes_without_a_channel_are_no_tdms(tmp_path: Path) -> None:
     path = tmp_path / "test.tdms"
-    path.write_bytes(b"TDSm" + bytes(24))
+    path.write_bytes(b"TDSm\x0e\0\0\0" + np.random.default_rng(1).bytes(3000))
     with pytest.raises(BadInput, match="not those of a TDMS file"):
         survey(path)
