@@ -71,7 +71,10 @@ def _number(text: str) -> float:
 
 def _calibrated(text: str, recorded_in: str) -> dict[str, object]:
     """Unit and calibration: by a sensitivity, or by what one recorded unit is worth."""
+    # A sensitivity of a column without unit says that it is in volts.
     found, volts = sensitivity_of(text), volts_of(recorded_in)
+    if found is not None and not recorded_in:
+        volts = 1.0
     if found is not None and volts is not None:
         return {"unit": found.unit, "calibration": found.unit_per_volt * volts}
     number, _, unit = text.strip().partition(" ")

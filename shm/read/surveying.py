@@ -38,7 +38,7 @@ def survey(path: Path) -> Survey:
         source=str(path),
         format=found.name,
         columns=tuple(columns),
-        samples=look.samples,
+        samples=look.samples or (table.samples if table is not None else 0),
         sampling_rate_hz=look.sampling_rate_hz,
         hanger=look.hanger,
         time=look.time,

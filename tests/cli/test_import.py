@@ -186,6 +186,26 @@ def test_volts_and_shares_of_a_full_scale_are_asked_for_what_they_are_worth(
     assert np.std(found.channels[0].values) == pytest.approx(200, rel=0.05)
 
 
+def test_a_sensitivity_says_that_a_column_without_unit_is_in_volts(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    path = tmp_path / "volts.mat"
+    force, acc = np.random.default_rng(1).normal(0, 1, (2, 3000))
+    savemat(str(path), {"force": force, "acc_1": acc, "fs": 512.0})
+    told = ("--workspace", workspace.folder, "import", path, "--hanger", 3)
+    asked = shm(*told, "--json").document
+    assert [q["about"] for q in asked["questions"]] == ["unit", "unit"]
+    ended = shm(
+        *told, "--sensitivity", "force=2.5 mV/N", "--sensitivity", "acc_1=100 uV/g",
+        "--place", "2.52", "--plane", "transverse",
+    )  # fmt: skip
+    assert ended.code == 0
+    assert "acc_1 reaches" in ended.out  # 10,000 g a volt
+    found = read(workspace.spool / "volts.mat")
+    assert isinstance(found, Recording)
+    np.testing.assert_allclose(found.channels[0].values, 400 * force)
+
+
 def test_a_table_without_names_or_units_is_read_by_the_answers(
     shm: Shm, workspace: Workspace, tmp_path: Path
 ) -> None:
