@@ -131,7 +131,7 @@ def _since_epoch(values: FloatArray) -> tuple[FloatArray, datetime] | None:
 
 
 def _factor(values: FloatArray, said_hz: float) -> float | None:
-    """The unit of times that have none, in s: by the rate that is said, else s where that can be."""
+    """The unit of times that have none, in s: by the rate that is said, else s if it can be."""
     span = float(values[-1] - values[0])
     if not span > 0:
         return None
