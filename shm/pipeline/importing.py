@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput
+from shm.identify.measuring.sensor_places import fault_of_place
 from shm.pipeline.lineage import read_limits
 from shm.read import logger_words as words
 from shm.read.assemble import recording
@@ -140,7 +141,10 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     hanger = described.get("hanger", found.hanger)
     rate = float(described.get("sampling_rate_hz", found.sampling_rate_hz))
     questions = _questions(found, described, hanger, rate)
-    problems = _hanger_problem(hanger, workspace)
+    problems = (
+        *_hanger_problem(hanger, workspace),
+        *_place_problems(found, described, hanger, workspace),
+    )
     record, fault = _recording(found, described, rate, path)
     if found.lines or any(question.about in ("unit", "rate") for question in questions):
         fault = ""  # the answers may mend it
@@ -211,6 +215,19 @@ def _hanger_problem(hanger: object, workspace: Workspace) -> tuple[str, ...]:
     except BadInput as error:
         return (str(error),)
     return ()
+
+
+def _place_problems(
+    found: Survey, described: Described, hanger: object, workspace: Workspace
+) -> list[str]:
+    """Sensors that are said to be off the hanger, where it is one of the bridge."""
+    tested = next((each for each in workspace.bridge.hangers if each.id == hanger), None)
+    if tested is None:
+        return []
+    columns = [_told(column, described) for column in found.columns]
+    of_sensors = [each for each in columns if each.quantity == "acceleration"]
+    faults = {each.name: fault_of_place(each.x_m, tested) for each in of_sensors}
+    return [f"{name}: {fault}" for name, fault in faults.items() if fault]
 
 
 # ---------------------------------------------------------------- what is open
