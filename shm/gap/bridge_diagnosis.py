@@ -61,7 +61,7 @@ def diagnose_bridge(
     hangers or two of one number, and whatever `diagnose` raises of a single one.
 
     Example:
-        >>> found = shm.diagnose_bridge([(hanger3, tests3), (hanger4, tests4)], baseline="beam1")
+        >>> found = diagnose_bridge([(hanger3, tests3), (hanger4, tests4)])
         >>> found.leading.named
         (3, 4)
     """
