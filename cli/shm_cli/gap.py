@@ -133,10 +133,9 @@ def diagnose(
     cause, which of them have it, and what it does to their tensions.
 
     \b
-    Examples:
-      shm gap diagnose hanger3.modes.json --hanger-file H.toml --html gap.html
-      shm --workspace arch gap diagnose --bridge --html bridge.html
-      shm gap diagnose h1.modes.json h1.toml h2.modes.json h2.toml
+    Example: shm gap diagnose hanger3.modes.json --hanger-file H.toml --html gap.html
+    Example: shm gap diagnose h1.modes.json h1.toml h2.modes.json h2.toml
+    Example: shm --workspace arch gap diagnose --bridge --html bridge.html
     """
     options = GapOptions(baseline, without, hold_out, seed=seed)
     shown: _Shown

@@ -222,8 +222,15 @@ def _size(one: Patient, best: _Weighed, row: int, index: int, common: Reach) -> 
     evidence = one.effects.get(best.place)
     if evidence is None:
         return _common_size(common, best)
-    weight = best.found.draw_weights(index, best.shared.weight[row])
-    return _estimate(evidence.reach, evidence.x, evidence.sign, weight)
+    weight = [
+        best.found.draw_weights(best.found.at[index], best.shared.weight[row]),
+        best.found.draw_weights(best.found.faint_at[index], best.shared.faint[row]),
+    ]
+    x, sign = (
+        np.concatenate([getattr(each, name) for each in (evidence, evidence.faint)])
+        for name in ("x", "sign")
+    )
+    return _estimate(evidence.reach, x, sign, np.concatenate(weight))
 
 
 def _common_size(reach: Reach, best: _Weighed) -> EffectEstimate:
@@ -276,10 +283,13 @@ def _tensions(
         draws, weights = [], []
         for cause, probability in likely:
             if index in cause.shared.kin.members and cause.place in each.effects:
-                by_size = cause.shared.weight[cause.shared.kin.members.index(index)]
-                own = cause.found.draw_weights(index, by_size)
-                draws.append(each.effects[cause.place].tension_n)
-                weights.append(probability * by_size.sum() * own / max(own.sum(), _TINY))
+                row, evidence = cause.shared.kin.members.index(index), each.effects[cause.place]
+                for points, at, by_size in (
+                    (evidence, cause.found.at[index], cause.shared.weight[row]),
+                    (evidence.faint, cause.found.faint_at[index], cause.shared.faint[row]),
+                ):
+                    draws.append(points.tension_n)
+                    weights.append(probability * cause.found.draw_weights(at, by_size))
         alone = max(0.0, 1 - sum(float(weight.sum()) for weight in weights))
         draws.append(each.tension_n)
         weights.append(np.full(len(each.tension_n), alone / len(each.tension_n)))

@@ -3,11 +3,12 @@
     P(data | e shared in F) = mean over pi, q, mu, tau of
         product over hangers i of  (1 - pi) own_i(q) + pi there_i(e, mu, tau, q),  two at least
     own_i(q) = q no_gap_i + (1 - q) gap_i
-    there_i  = B_i(e) integral L_i(x) N(x | mu, tau) dx / mean L_i + N(x invisible) own_i(q)
+    there_i  = B_i(e) integral L_i(x) N(x | mu, tau) dx / mean L_i           over visible x
+             + integral (q no_gap_i L_i(x) / L_i(0) + (1 - q) gap_i) N(x | mu, tau) dx   below
 
 pi is the share of the family F that has the effect e, q that of hangers with nothing of their own
 (both learnt from all hangers), x the size (`Reach`), which scatters by tau about the family's own,
-mu. All are summed over grids. A hanger whose size would be invisible says neither yes nor no.
+mu. All are summed over grids. A size far below what is visible says neither yes nor no.
 Hierarchies of this kind: Gelman et al., Bayesian Data Analysis, 2013, chapter 5.
 """
 
@@ -20,7 +21,7 @@ import numpy as np
 from scipy.special import logsumexp, ndtr
 
 from shm.gap.kin import LEAST, Kin
-from shm.gap.shared_evidence import Evidence, Patient, Place
+from shm.gap.shared_evidence import Evidence, Faint, Patient, Place
 from shm.values import FloatArray, IntArray
 
 # Technical: shares of a family, with prior 1 each; a twentieth is finer than 20 hangers can tell.
@@ -32,6 +33,9 @@ _NOTHING_OWN = np.array([0.1, 0.25, 0.5, 0.8, 0.95, 0.98])
 # are of a decade, or of the range where it has none, and less scatter is likelier (half normal).
 SCATTERS = np.array([0.03, 0.06, 0.12, 0.2])
 _LIKELY_SCATTER = 0.1
+_BELOW = 0.5
+"""Judgement, decades: what one hanger sees by half a standard deviation, ten see by 1.5."""
+_ABOUT = 0.15  # technical, decades: as far apart as points of a scan
 _STEP = 0.02  # technical: two thirds of the least scatter
 
 _TINY = 1e-300  # technical: what is divided by, and taken the logarithm of
@@ -39,15 +43,21 @@ _TINY = 1e-300  # technical: what is divided by, and taken the logarithm of
 
 @dataclass(frozen=True, eq=False)
 class Own:
-    """What speaks for each hanger having causes of its own or none: log (n, q)."""
+    """What speaks for each hanger having nothing of its own, and something: (n, q) both."""
 
-    log: FloatArray
+    nothing: FloatArray
+    something: FloatArray
 
     @classmethod
     def of(cls, patients: Sequence[Patient]) -> Own:
         none = np.array([[each.no_gap] for each in patients])
         gap = np.array([[each.gap] for each in patients])
-        return cls(_log(_NOTHING_OWN * none + (1 - _NOTHING_OWN) * gap))
+        return cls(_NOTHING_OWN * none, (1 - _NOTHING_OWN) * gap)
+
+    @property
+    def log(self) -> FloatArray:
+        """Of either, (n, q)."""
+        return _log(self.nothing + self.something)
 
     @property
     def log_evidence(self) -> float:
@@ -60,21 +70,24 @@ class Sizes:
 
     The grid's first axis (m) runs over the sizes `x` (m,) with their signs `sign` (m,). `seen`
     (n, m, tau) is the likelihood of a visible size, against own causes; `unseen` (n, m, tau) the
-    chance of an invisible one. `normal` (m, m, tau) is the density of a hanger's size, first axis,
-    by the family's. `at` says of each hanger's draws where on the grid they lie.
+    chance of an invisible one, `faint` (n, m, tau) that times its likelihood over that of no
+    effect. `normal` (m, m, tau) is the density of a hanger's size, first axis, by the family's.
+    `at` says of each hanger's draws where on the grid they lie, `faint_at` of its faint points.
     """
 
     x: FloatArray
     sign: FloatArray
     seen: FloatArray
     unseen: FloatArray
+    faint: FloatArray
     normal: FloatArray
     at: tuple[IntArray, ...]
+    faint_at: tuple[IntArray, ...]
 
-    def draw_weights(self, hanger: int, weight: FloatArray) -> FloatArray:
-        """Of a hanger's draws, by weights (m, tau) of the family's size and scatter."""
-        at = self.at[hanger]
-        mean = self.normal[at].mean(axis=0) if len(at) else np.ones_like(weight)
+    def draw_weights(self, at: IntArray, weight: FloatArray) -> FloatArray:
+        """Of draws `at` places of the grid, by weights (m, tau) of the family's size and scatter;
+        they add to that of all."""
+        mean = self.normal[at].sum(axis=0) if len(at) else np.ones_like(weight)
         return np.asarray((self.normal[at] * (weight / np.maximum(mean, _TINY))).sum(axis=(1, 2)))
 
 
@@ -84,40 +97,53 @@ def sizes(patients: Sequence[Patient], place: Place) -> Sizes | None:
     known = [each for each in found if each is not None]
     if len(known) < LEAST:
         return None
-    low = min(each.reach.lower for each in known)
+    low = min(each.reach.lower for each in known) - _BELOW
     line = np.arange(low, max(each.reach.upper for each in known) + _STEP, _STEP)
     signs = np.array([1.0, -1.0] if known[0].reach.parameter.signed else [1.0])
     x, sign = np.tile(line, len(signs)), np.repeat(signs, len(line))
     away = (x[:, None, None] - x[:, None]) / SCATTERS
     normal = np.exp(-(away**2) / 2) / (SCATTERS * np.sqrt(2 * np.pi))
     normal *= (sign[:, None] == sign)[..., None]
-    seen, unseen, at = [], [], []
-    for each in found:
-        index = _on_grid(each, low, len(line))
-        at.append(index)
-        likely, hidden = _said(each, x, normal[index], len(signs))
-        seen.append(likely)
-        unseen.append(hidden)
-    return Sizes(x, sign, np.array(seen), np.array(unseen), normal, tuple(at))
+    said = [_said(each, x, sign, normal) for each in found]
+    seen, unseen, faint = (np.array([each[k] for each in said]) for k in range(3))
+    at = tuple(_on_grid(each, low, len(line)) for each in found)
+    faint_at = tuple(_on_grid(each and each.faint, low, len(line)) for each in found)
+    return Sizes(x, sign, seen, unseen, faint, normal, at, faint_at)
 
 
-def _on_grid(evidence: Evidence | None, low: float, count: int) -> IntArray:
-    """Where the draws of a hanger lie on the grid."""
-    if evidence is None:
+def _on_grid(points: Evidence | Faint | None, low: float, count: int) -> IntArray:
+    """Where draws or points of a hanger lie on the grid."""
+    if points is None:
         return np.empty(0, dtype=np.int64)
-    index = np.rint((evidence.x - low) / _STEP).astype(np.int64).clip(0, count - 1)
-    return np.asarray(index + count * (evidence.sign < 0))
+    index = np.rint((points.x - low) / _STEP).astype(np.int64).clip(0, count - 1)
+    return np.asarray(index + count * (points.sign < 0))
 
 
 def _said(
-    evidence: Evidence | None, x: FloatArray, density: FloatArray, signs: int
-) -> tuple[FloatArray, FloatArray]:
-    """The likelihood of a visible size and the chance of an invisible one, (m, tau) both."""
+    evidence: Evidence | None, x: FloatArray, sign: FloatArray, normal: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The likelihood of a visible size, the chance of an invisible one, the same weighed by what
+    the data say to it; (m, tau) all."""
+    every = np.ones((len(x), len(SCATTERS)))
     if evidence is None:
-        return np.zeros((len(x), len(SCATTERS))), np.ones((len(x), len(SCATTERS)))
-    reach = evidence.reach
-    below = ndtr((reach.lower - x[:, None]) / SCATTERS)
-    return evidence.bayes_factor * reach.width * signs * density.mean(axis=0), below
+        return 0 * every, every, every
+    reach, signs, low = evidence.reach, len(np.unique(sign)), float(x.min())
+    count = len(x) // signs
+    density = normal[_on_grid(evidence, low, count)].mean(axis=0)
+    unseen = ndtr((reach.lower - x[:, None]) / SCATTERS)
+    ratio = _smooth(evidence.faint, x, sign)
+    below = np.tensordot((ratio - 1) * (x < reach.lower) * _STEP, normal, axes=1)
+    seen = evidence.bayes_factor * reach.width * signs * density
+    return seen, unseen, np.maximum(unseen + below, 0.0)
+
+
+def _smooth(faint: Faint, x: FloatArray, sign: FloatArray) -> FloatArray:
+    """The likelihood ratio of faint sizes along the grid: the mean of those about each place."""
+    if not len(faint.x):
+        return np.ones(len(x))
+    near = np.exp(-(((faint.x - x[:, None]) / _ABOUT) ** 2) / 2) * (faint.sign == sign[:, None])
+    # Far from all points it is that of no effect.
+    return np.asarray((near @ faint.ratio + _TINY) / (near.sum(axis=1) + _TINY))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,44 +151,48 @@ class Shared:
     """Something that some of a family share, weighed on the grid of mu, tau, pi and q.
 
     `log_evidence` is against each hanger having causes of its own. `member` (n,) is the probability
-    of each hanger of the family to have it; `weight` (n, m, tau) is that of each size, where the
-    hanger shows it; `size` (m, tau) that of the family's own.
+    of each hanger of the family to have it; `weight` (n, m, tau) is that of each size where the
+    hanger shows it, `faint` (n, m, tau) where it does not; `size` (m, tau) that of the common one.
     """
 
     kin: Kin
     log_evidence: float
     member: FloatArray
     weight: FloatArray
+    faint: FloatArray
     size: FloatArray
 
 
 def shared(found: Sizes, family: Kin, own: Own) -> Shared:
     """An effect at one place, shared by two hangers of a family at least."""
     rows = list(family.members)
-    seen, unseen = found.seen[rows, :, :, None], found.unseen[rows, :, :, None]
+    seen = found.seen[rows, :, :, None]
+    nothing, something = (each[rows][:, None, None, :] for each in (own.nothing, own.something))
+    faint = found.faint[rows, :, :, None] * nothing
     prior = np.exp(-((SCATTERS / _LIKELY_SCATTER) ** 2) / 2)
     log_prior = np.log(prior / prior.sum() / len(found.x))
     own_log = own.log[rows][:, None, None, :]
     others = own.log.sum(axis=0) - own.log[rows].sum(axis=0)
-    log_there = _log(seen + unseen * np.exp(own_log))
+    log_there = _log(seen + faint + found.unseen[rows, :, :, None] * something)
     log_all, member = [], []
     for part in _SHARES:
         absent = np.log1p(-part) + own_log
         present = np.log(part) + log_there
-        log_all.append(_two_at_least(absent, present) + others)
+        log_all.append(two_at_least(absent, present) + others)
         member.append(1 / (1 + np.exp((absent - present).clip(-_FAR, _FAR))))
     log = np.array(log_all) + log_prior[:, None]
     total = logsumexp(log)
     weight = np.exp(log - total)
-    alone = [_two_at_least(np.log1p(-p) * _ones(rows), np.log(p) * _ones(rows)) for p in _SHARES]
+    alone = [two_at_least(np.log1p(-p) * _ones(rows), np.log(p) * _ones(rows)) for p in _SHARES]
     log_evidence = total - np.log(len(_NOTHING_OWN)) - logsumexp(alone) - own.log_evidence
-    visible = seen / np.exp(log_there)
     there = np.array([(weight[k] * each) for k, each in enumerate(member)]).sum(axis=0)
+    there_with = there / np.exp(log_there)
     return Shared(
         family,
         float(log_evidence),
         there.sum(axis=(1, 2, 3)),
-        (there * visible).sum(axis=3),
+        (there_with * seen).sum(axis=3),
+        (there_with * faint).sum(axis=3),
         weight.sum(axis=(0, 3)),
     )
 
@@ -170,7 +200,7 @@ def shared(found: Sizes, family: Kin, own: Own) -> Shared:
 _FAR = 500.0
 
 
-def _two_at_least(absent: FloatArray, present: FloatArray) -> FloatArray:
+def two_at_least(absent: FloatArray, present: FloatArray) -> FloatArray:
     """Log of the sum over all choices of two hangers and more (axis 0) of products of either."""
     whole = np.logaddexp(absent, present).sum(axis=0)
     none = absent.sum(axis=0)
@@ -183,7 +213,8 @@ def unknown(patients: Sequence[Patient], family: Kin, own: Own) -> Shared:
     there = np.array([each.unknown for each in patients])[:, None, None]
     seen = np.repeat(there, len(SCATTERS), axis=2)
     nothing = np.empty((0, 0, 0))
-    found = Sizes(np.zeros(1), np.ones(1), seen, np.zeros_like(seen), nothing, ())
+    none = np.zeros_like(seen)
+    found = Sizes(np.zeros(1), np.ones(1), seen, none, none, nothing, (), ())
     return shared(found, family, own)
 
 

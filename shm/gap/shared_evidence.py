@@ -9,7 +9,7 @@ what several hangers say together, and its errors and laws stay in.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from shm.gap.contract import Fit, Hypothesis
 from shm.gap.coordinates import scale_free
 from shm.gap.detectability import Scan
 from shm.gap.law_error import mixed
+from shm.gap.marginal import marginal
 from shm.gap.model_probabilities import NO_GAP, PAIR, SINGLE, UNKNOWN, ScoredHypothesis
 from shm.gap.problem import GapProblem
 from shm.gap.search import Search
@@ -32,6 +33,8 @@ ALONE = SINGLE / (SINGLE + PAIR)
 """How often a shared cause is the only one: as often as one cause is in a single hanger."""
 
 _TINY = 1e-300  # technical: what a logarithm is taken of
+_MOST_GAIN = 3.0
+"""Judgement, log likelihood: what cannot be seen gains no more, unless the scan is not linear."""
 _DRAWS = 400  # technical: of each fit, a mean to 5 % of its standard deviation
 
 
@@ -80,6 +83,20 @@ class Reach:
 
 
 @dataclass(frozen=True, eq=False)
+class Faint:
+    """Sizes below those that one hanger could show, at points of a scan.
+
+    `ratio` (k,) is their likelihood over that of no effect, `tension_n` (k,) draws of the tension
+    that goes with each. What one hanger sees by half a standard deviation, twenty see by two.
+    """
+
+    x: FloatArray
+    sign: FloatArray
+    ratio: FloatArray
+    tension_n: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """Of one effect at one place in one hanger.
 
@@ -95,6 +112,7 @@ class Evidence:
     sign: FloatArray
     tension_n: FloatArray
     log_mimic_odds: float
+    faint: Faint
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,13 +221,14 @@ def _evidence(
         for each in held
         if (fit := each.scored.posterior) is not None and each.probability > 0
     ]
+    faint = _faint(search, search.scans[single], reach, rng)
     if not drawn:
         x, sign = _screened(search.scans[single], reach, rng)
-        return Evidence(factor, reach, x, sign, rng.choice(tension_n, _DRAWS), mimic)
+        return Evidence(factor, reach, x, sign, rng.choice(tension_n, _DRAWS), mimic, faint)
     weight = np.concatenate([np.full(len(x), share / len(x)) for share, x, *_ in drawn])
     rows = systematic(weight / weight.sum(), _DRAWS, rng)
     x, sign, tensions = (np.concatenate([each[k] for each in drawn])[rows] for k in (1, 2, 3))
-    return Evidence(factor, reach, x, sign, tensions, mimic)
+    return Evidence(factor, reach, x, sign, tensions, mimic, faint)
 
 
 def _screened(scan: Scan, reach: Reach, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
@@ -222,6 +241,22 @@ def _screened(scan: Scan, reach: Reach, rng: np.random.Generator) -> tuple[Float
     spacing = reach.width / len(np.unique(x[seen]))
     spread = x[rows] + spacing * (rng.random(_DRAWS) - 0.5)
     return spread, sign if reach.parameter.signed else np.ones(_DRAWS)
+
+
+def _faint(search: Search, scan: Scan, reach: Reach, rng: np.random.Generator) -> Faint:
+    """Of a scan: small effects are linear, so that it is as good as a fit."""
+    problem, baseline = search.problem, search.baseline
+    nothing = marginal(problem, Hypothesis(), baseline, np.zeros((1, len(baseline.predicted))))
+    x = reach.x(scan.effect[:, 0])
+    rows = np.flatnonzero((x < reach.lower) & (scan.weight > 0))
+    sign = np.where(scan.effect[rows, 0] < 0, -1.0, 1.0)
+    log = scan.marginal.log_likelihood[rows] - nothing.log_likelihood[0]
+    own = _tension_n(problem, replace(baseline, draws=baseline.z[None]))
+    moved = replace(baseline, draws=baseline.z + scan.marginal.follow[rows])
+    scatter = rng.choice(_tension_n(problem, baseline), len(rows)) / own
+    tension_n = _tension_n(problem, moved) * scatter
+    sign = sign if reach.parameter.signed else np.ones(len(rows))
+    return Faint(x[rows], sign, np.exp(log.clip(max=_MOST_GAIN)), tension_n)
 
 
 def _draws(

@@ -16,7 +16,7 @@ from shm.gap import GapOptions, diagnose_bridge
 from shm.gap.bridge_diagnosis import jointly
 from shm.gap.kin import kin
 from shm.gap.shared_causes import two_at_least
-from shm.gap.shared_evidence import Evidence, Patient, Place, Reach
+from shm.gap.shared_evidence import Evidence, Faint, Patient, Place, Reach
 from shm.models.effects import EFFECTS, Variant
 from shm.report.as_text import as_text
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_paper
@@ -37,7 +37,14 @@ ILL = {"no_gap": 0.1, "gap": 1.3, "unknown": 0.8}
 def evidence(bayes_factor: float, size: float, sd: float = 0.03) -> Evidence:
     """A size known to `sd` decades, and a tension that is known with it."""
     x = np.log10(size) + sd * np.random.default_rng(3).standard_normal(400)
-    return Evidence(bayes_factor, REACH, x, np.ones(400), 700e3 * (1 + 10**x), -0.5)
+    return Evidence(bayes_factor, REACH, x, np.ones(400), 700e3 * (1 + 10**x), -0.5, faint())
+
+
+def faint(log_gain: float = 0.0) -> Faint:
+    """Sizes from 0.2 % down, likelier than no effect by a log likelihood."""
+    x = REACH.lower - np.linspace(0.0, 0.5, 20)
+    ratio = np.full(20, np.exp(log_gain))
+    return Faint(x, np.ones(20), ratio, 700e3 * (1 + 10**x))
 
 
 def hanger(number: int, effects: dict[Place, Evidence], said: dict[str, float]) -> Patient:
@@ -93,6 +100,16 @@ def test_sound_hangers_share_nothing() -> None:
 def test_one_hanger_with_a_cause_of_its_own_shares_it_with_nobody() -> None:
     found = bridge([40.0, *[0.05] * 5], [0.05, *[0.02] * 5])
     assert found.leads == "each for itself"
+
+
+def test_what_none_can_see_adds_up() -> None:
+    def found(log_gain: float) -> BridgeDiagnosis:
+        little = replace(evidence(0.3, 0.003), faint=faint(log_gain))
+        return jointly([hanger(n, {MASS: little}, SOUND) for n in range(1, 11)], GapOptions())
+
+    assert found(0.0).leads == "each for itself"
+    assert found(1.2).leading is not None
+    assert found(-1.2).each_for_itself_probability > found(0.0).each_for_itself_probability
 
 
 def test_sizes_that_differ_speak_against_a_common_cause() -> None:
