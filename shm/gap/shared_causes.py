@@ -197,7 +197,7 @@ def shared(found: Sizes, family: Kin, own: Own) -> Shared:
     )
 
 
-_FAR = 500.0
+_FAR = 500.0  # technical: exponentials beyond it overflow
 
 
 def two_at_least(absent: FloatArray, present: FloatArray) -> FloatArray:

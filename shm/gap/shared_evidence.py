@@ -179,7 +179,7 @@ def _effects(
         for scored, probability in _by_variant(explanation):
             for index, (name, variant) in enumerate(scored.hypothesis.effects):
                 place = name, variant.at
-                variants.setdefault(place, variant)
+                variants.setdefault(place, replace(variant, law=0))
                 into.setdefault(place, []).append(_Held(scored, index, probability))
     for place, variant in variants.items():
         # One of so many effects, at one of so many places.

@@ -24,6 +24,8 @@ _STATES = {
     "shared unknown": ("Shared, not explained", "alert"),
 }
 _WORTH_A_ROW = 0.001  # of a probability: what the three decimals show
+_SENSOR_KG = 0.2
+"""Judgement: heavier than an accelerometer with its magnet and the end of its cable."""
 _MOST_ALIKE = 3  # what a sentence bears
 
 
@@ -102,6 +104,8 @@ def _consequences(diagnosis: BridgeDiagnosis) -> str:
     told += f", from hanger to hanger within some {100 * leading.scatter:.0f} %."
     if leading.also_at:
         told += f" About as likely: {formatting.listed(list(leading.also_at[:_MOST_ALIKE]))}."
+    if leading.effect == "point_mass" and leading.size.q05 < _SENSOR_KG:
+        told += " So small a mass may be that of the sensors: it is then no cause in the hangers."
     if others:
         told += f" Without it: {_hangers(others)}."
     moved = [

@@ -18,8 +18,8 @@ from shm.report.figures.specification import (
 )
 from shm.values import BridgeDiagnosis, effect_label
 
-_INCHES = 4.2
-_LIKELIER_THAN_NOT = 0.5
+_INCHES = 4.2  # technical: two panels of the height that others have
+_LIKELIER_THAN_NOT = 0.5  # even odds
 _MOST_TICKS = 24  # numbers of hangers that a page has room for
 
 
