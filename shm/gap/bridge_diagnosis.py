@@ -37,16 +37,16 @@ from shm.values import (
     SharedMember,
 )
 
-# Before any data, judgement: of bridges that are diagnosed as a whole every fourth has a cause that
-# hangers share; of these as many are unknown as in single hangers.
-SHARED = 0.25
+# Before any data, judgement: who asks for a bridge as a whole suspects a common cause as often as
+# not; of these as many are unknown as in single hangers.
+SHARED = 0.5
 _KNOWN = SINGLE / (SINGLE + UNKNOWN)
 
 _JOINTLY = 0.9  # technical: the part of the time that single hangers take
 _AS_LIKELY = 1.5
 """Places of one effect whose log evidences differ by less are not told apart."""
 _FAINT = 1e-4  # of a probability: what is less likely changes no number that is told
-_TINY = 1e-300  # technical: what is divided by
+_TINY = 1e-300  # technical: a sum that is none
 _DRAWS = 4000  # technical: a 95 % interval to 2 % of its width
 
 
@@ -222,15 +222,19 @@ def _size(one: Patient, best: _Weighed, row: int, index: int, common: Reach) -> 
     evidence = one.effects.get(best.place)
     if evidence is None:
         return _common_size(common, best)
-    weight = [
-        best.found.draw_weights(best.found.at[index], best.shared.weight[row]),
-        best.found.draw_weights(best.found.faint_at[index], best.shared.faint[row]),
-    ]
+    weight = np.concatenate(
+        [
+            best.found.draw_weights(best.found.at[index], best.shared.weight[row]),
+            best.found.draw_weights(best.found.faint_at[index], best.shared.faint[row]),
+        ]
+    )
+    if weight.sum() < _TINY:
+        return _common_size(common, best)
     x, sign = (
         np.concatenate([getattr(each, name) for each in (evidence, evidence.faint)])
         for name in ("x", "sign")
     )
-    return _estimate(evidence.reach, x, sign, np.concatenate(weight))
+    return _estimate(evidence.reach, x, sign, weight)
 
 
 def _common_size(reach: Reach, best: _Weighed) -> EffectEstimate:
