@@ -36,7 +36,7 @@ _LIKELY_SCATTER = 0.1
 _BELOW = 0.5
 """Judgement, decades: what one hanger sees by half a standard deviation, ten see by 1.5."""
 _ABOUT = 0.15  # technical, decades: as far apart as points of a scan
-_STEP = 0.02  # technical: two thirds of the least scatter
+_STEP = 0.03  # technical: the least scatter; normals so far apart add up evenly to 1e-8
 
 _TINY = 1e-300  # technical: what is divided by, and taken the logarithm of
 
@@ -173,20 +173,21 @@ def shared(found: Sizes, family: Kin, own: Own) -> Shared:
     log_prior = np.log(prior / prior.sum() / len(found.x))
     own_log = own.log[rows][:, None, None, :]
     others = own.log.sum(axis=0) - own.log[rows].sum(axis=0)
-    log_there = _log(seen + faint + found.unseen[rows, :, :, None] * something)
+    present = np.maximum(seen + faint + found.unseen[rows, :, :, None] * something, _TINY)
+    gain = present / np.exp(own_log)
     log_all, member = [], []
     for part in _SHARES:
-        absent = np.log1p(-part) + own_log
-        present = np.log(part) + log_there
-        log_all.append(two_at_least(absent, present) + others)
-        member.append(1 / (1 + np.exp((absent - present).clip(-_FAR, _FAR))))
+        odds = part / (1 - part) * gain
+        log_all.append(two_at_least(np.log1p(-part) + own_log, odds) + others)
+        member.append(odds / (1 + odds))
     log = np.array(log_all) + log_prior[:, None]
     total = logsumexp(log)
     weight = np.exp(log - total)
-    alone = [two_at_least(np.log1p(-p) * _ones(rows), np.log(p) * _ones(rows)) for p in _SHARES]
+    one = np.ones((len(rows), 1))
+    alone = [two_at_least(np.log1p(-p) * one, p / (1 - p) * one) for p in _SHARES]
     log_evidence = total - np.log(len(_NOTHING_OWN)) - logsumexp(alone) - own.log_evidence
     there = np.array([(weight[k] * each) for k, each in enumerate(member)]).sum(axis=0)
-    there_with = there / np.exp(log_there)
+    there_with = there / present
     return Shared(
         family,
         float(log_evidence),
@@ -197,15 +198,14 @@ def shared(found: Sizes, family: Kin, own: Own) -> Shared:
     )
 
 
-_FAR = 500.0  # technical: exponentials beyond it overflow
+def two_at_least(absent: FloatArray, odds: FloatArray) -> FloatArray:
+    """Log of the sum over all choices of two hangers and more (axis 0) of products of either.
 
-
-def two_at_least(absent: FloatArray, present: FloatArray) -> FloatArray:
-    """Log of the sum over all choices of two hangers and more (axis 0) of products of either."""
-    whole = np.logaddexp(absent, present).sum(axis=0)
-    none = absent.sum(axis=0)
-    few = none + np.logaddexp(0, logsumexp(present - absent, axis=0))
-    return np.asarray(whole + _log(-np.expm1((few - whole).clip(max=0))))
+    `absent` is the log of one factor of a hanger, `odds` the other over it.
+    """
+    whole = np.log1p(odds).sum(axis=0)
+    few = np.log1p(odds.sum(axis=0))
+    return np.asarray(absent.sum(axis=0) + whole + _log(-np.expm1((few - whole).clip(max=0))))
 
 
 def unknown(patients: Sequence[Patient], family: Kin, own: Own) -> Shared:
@@ -216,10 +216,6 @@ def unknown(patients: Sequence[Patient], family: Kin, own: Own) -> Shared:
     none = np.zeros_like(seen)
     found = Sizes(np.zeros(1), np.ones(1), seen, none, none, nothing, (), ())
     return shared(found, family, own)
-
-
-def _ones(rows: Sequence[int]) -> FloatArray:
-    return np.ones((len(rows), 1))
 
 
 def _log(value: FloatArray) -> FloatArray:
