@@ -73,7 +73,13 @@ def shared_verdict(diagnosis: BridgeDiagnosis) -> str:
         what = effect_label(leading.effect, leading.at)
         alike = _alike(diagnosis, leading)
         start = f"{what[0].upper()}{what[1:]}{alike}"
-        return f"{start} is shared by hangers {_hangers(leading.named)} ({claim})."
+        everyone = len(leading.named) == len(diagnosis.hangers)
+        who = (
+            f"all {len(leading.named)} hangers"
+            if everyone
+            else f"hangers {_hangers(leading.named)}"
+        )
+        return f"{start} is shared by {who} ({claim})."
     if diagnosis.leads == "shared unknown":
         chance = formatting.told_probability(diagnosis.unknown_probability)
         return f"Hangers share something that is not in the catalogue ({chance})."

@@ -62,7 +62,7 @@ def test_pairs_of_files_are_diagnosed_together(
     document = ended.document
     assert document["schema"] == "shm.bridge_diagnosis/1"
     assert document["answer"] == "shared cause"
-    assert "shared by hangers 1, 2, 3 and 4" in document["summary"]
+    assert "shared by all 4 hangers" in document["summary"]
     assert "<svg" in page.read_text()
     assert [path.name for path in figures.iterdir()] == ["shared.png"]
 
