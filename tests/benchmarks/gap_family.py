@@ -42,6 +42,7 @@ OWN_CAUSES = 0.2
 ALL_OF_THEM = 0.5
 SENSOR_KG = 0.08  # the heaviest of the world's: a shared mass no larger is the sensors', and true
 CLOCK = "timebase"  # of the logger that measured the whole bridge
+CLAMP = 1e6  # k L/EI: at 1000 a taut bar's boundary layer is 1.4 % softer, a stiffness 3 % lower
 DENSITY_KG_M3, MODULUS_PA = 7850.0, 205e9
 # Sizes: log-uniform, k L/EI, kg, lost part of EI, fractions, m over L, fraction of the clock.
 SIZES = {
@@ -114,7 +115,7 @@ def member(
     mass = DENSITY_KG_M3 * (1 + nuisances.density_sd * off[2]) * made
     tension_n = nominal_n * rng.uniform(0.7, 1.3)
     sensor = min(rng.uniform(1.0, 2.5), 0.45 * length_m), rng.uniform(*nuisances.sensor_mass_kg)
-    clamp = 1000 * bending / length_m
+    clamp = CLAMP * bending / length_m
     bar = world.Bar(
         length_m=length_m * (1 + nuisances.length_sd * off[3]), tension_n=tension_n,
         bending_stiffness_n_m2=bending, mass_per_length_kg_m=mass, spring_deck_n_m_rad=clamp,
