@@ -8,8 +8,9 @@ Truth comes from the finite elements of `tests/worlds`, which share nothing with
 their nuisances of the field: sections, moduli, densities and lengths as made, own weight, the
 sensors' mass, errors that repeat in all tests. All hangers of a bridge are rods of one diameter,
 clamped, without shear; each has a tension of its own, 0.7 to 1.3 times nominal. Half of the
-families share the cause in all hangers, as they do a clock, half in 40 to 80 %; a fifth of the others have a
-cause of their own. Sizes scatter by 15 % about the family's. Six to eight seconds a hanger.
+families share the cause in all hangers, as they do a clock, half in 40 to 80 %; a fifth of the
+others have a cause of their own. Sizes scatter by 15 % about the family's. Six to eight seconds a
+hanger.
 """
 
 from __future__ import annotations
