@@ -1,18 +1,21 @@
 """The JSON document of a gap diagnosis (`shm.diagnosis/1`), there and back.
 
+And that of a joint diagnosis of several hangers (`shm.bridge_diagnosis/1`), which holds theirs.
+
 As all documents it holds NaN until `shm.documents.dump` writes null; reading takes either.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any
 
 from shm.documents import value_of
-from shm.values import Cause, Diagnosis
+from shm.values import BridgeDiagnosis, Cause, Diagnosis
 
 DIAGNOSIS_SCHEMA = "shm.diagnosis/1"
+BRIDGE_DIAGNOSIS_SCHEMA = "shm.bridge_diagnosis/1"
 
 _PLAIN = (
     "hanger", "baseline", "no_gap_probability", "unexplained_probability", "fit_p_value",
@@ -41,6 +44,22 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "left_out": list(diagnosis.left_out),
         "remarks": list(diagnosis.remarks),
         "outliers": [asdict(outlier) for outlier in diagnosis.outliers],
+    }
+
+
+def bridge_diagnosis_document(found: BridgeDiagnosis) -> dict[str, Any]:
+    """The document of `shm gap diagnose --bridge --json`.
+
+    `causes` are those that hangers share, with `family` (the hangers tried) and `members` (each
+    with its probability and size); `tensions` are before, alone and jointly; `diagnoses` those of
+    each hanger alone.
+    """
+    return {
+        "schema": BRIDGE_DIAGNOSIS_SCHEMA,
+        **{each.name: getattr(found, each.name) for each in fields(found)},
+        "causes": [asdict(cause) for cause in found.causes],
+        "tensions": [asdict(tension) for tension in found.tensions],
+        "diagnoses": [diagnosis_document(each) for each in found.diagnoses],
     }
 
 

@@ -67,7 +67,13 @@ def diagnose(
         >>> diagnosis.leading.effect
         'point_mass'
     """
-    options = options or GapOptions()
+    return examined(tests, hanger, options or GapOptions(), progress)[0]
+
+
+def examined(
+    tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions, progress: Progress = silent
+) -> tuple[Diagnosis, Attribution]:
+    """The diagnosis with the evidence that it rests on, for a diagnosis of several hangers."""
     started = time.perf_counter()
     check_effect_priors(hanger)
     check_baseline(options.baseline, hanger)
@@ -87,7 +93,7 @@ def diagnose(
     following = ranked(problem, _contenders(attribution))
     progress("next measurement", 1.0)
     tensions = [_tension(problem, f, rng) for f in ([(1.0, before)], possible(attribution))]
-    return Diagnosis(
+    diagnosis = Diagnosis(
         hanger=hanger.id,
         baseline=options.baseline,
         tests=tuple(test.id for test in found.tests),
@@ -117,6 +123,7 @@ def diagnose(
         seconds=time.perf_counter() - started,
         outliers=aside,
     )
+    return diagnosis, attribution
 
 
 def _states(
@@ -200,7 +207,13 @@ def _tension(
         return TensionEstimate(NAN, NAN, NAN, NAN)
     weight = np.array([weight for weight, _ in fits])
     draws = [problem.tension_n(fit.hypothesis, fit.draws) for _, fit in fits]
-    samples = mixed(draws, weight, rng)
+    return tension_estimate(mixed(draws, weight, rng))
+
+
+def tension_estimate(samples: FloatArray) -> TensionEstimate:
+    """Of equal draws (n,) of a tension; NaN of a bar without any."""
+    if not np.isfinite(samples).all():
+        return TensionEstimate(NAN, NAN, NAN, NAN)
     low, high = (float(each) for each in np.quantile(samples, [0.025, 0.975]))
     return TensionEstimate(*_summary(samples), low, high)
 

@@ -8,6 +8,12 @@ end (0) to the arch end (its length).
 from __future__ import annotations
 
 from shm.values.baseline_check import BaselineCheck, MistakenMode, MistakenTest
+from shm.values.bridge_diagnosis import (
+    BridgeDiagnosis,
+    HangerTensions,
+    SharedCause,
+    SharedMember,
+)
 from shm.values.diagnosis import (
     Cause,
     Diagnosis,
@@ -135,6 +141,7 @@ __all__ = [
     "Beside",
     "Bin",
     "BoolArray",
+    "BridgeDiagnosis",
     "CaseScore",
     "Cause",
     "Change",
@@ -154,6 +161,7 @@ __all__ = [
     "FrequencyResponse",
     "GapPlace",
     "Hanger",
+    "HangerTensions",
     "IntArray",
     "Kind",
     "KnownSamples",
@@ -186,6 +194,8 @@ __all__ = [
     "Score",
     "Selection",
     "ShapePoint",
+    "SharedCause",
+    "SharedMember",
     "Shrinkage",
     "Summary",
     "Support",
