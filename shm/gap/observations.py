@@ -31,7 +31,7 @@ from shm.models.effects import Conditions, Survey
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
 
 _SAME_PLACE_M = 1e-3  # judgement: places are written in mm; no two sensors fit nearer
-_FEWEST_FREQUENCIES = _FEWEST_READINGS = 2  # of one there is no difference
+_FEWEST_FREQUENCIES, _FEWEST_READINGS = 1, 2  # of one there is no difference
 
 
 @dataclass(frozen=True)
