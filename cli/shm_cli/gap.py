@@ -8,7 +8,7 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm.errors import NothingThere
+from shm.errors import NothingThere, UsageError
 from shm.gap import GapOptions
 from shm.gap import diagnose as diagnosed
 from shm.pipeline import utc_now
@@ -17,6 +17,7 @@ from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
+from shm.report.effect_file import effect_file
 from shm.report.figures.every_figure import diagnosis_figures
 from shm.values import Diagnosis, Hanger, ModalTest
 from shm_cli import completion
@@ -95,6 +96,12 @@ def command() -> None:
     metavar="FILE",
     help="Write a page with all figures here.",
 )
+@click.option(
+    "--write-effect",
+    type=NewFile(),
+    metavar="FILE.py",
+    help="Write the law of something unknown here, as the module of a new effect.",
+)
 @figures_option
 @json_option
 @click.pass_context
@@ -109,6 +116,7 @@ def diagnose(
     count: int,
     seed: int,
     html: Path | None,
+    write_effect: Path | None,
     figures: Path | None,
     as_json: bool,
 ) -> None:
@@ -135,6 +143,8 @@ def diagnose(
         show(diagnosis_json(sheet))
     else:
         click.echo(as_text(diagnosis_paper(sheet), readable_width()).rstrip())
+    if write_effect is not None:
+        write_effect.write_text(_effect(sheet, write_effect), encoding="utf-8")
 
 
 command.add_command(adopt)
@@ -164,6 +174,16 @@ def _of_workspace(
 def _diagnosis(tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions) -> Diagnosis:
     with advancing_bar() as progress:
         return diagnosed(tests, hanger, options, progress)
+
+
+def _effect(sheet: DiagnosisSheet, file: Path) -> str:
+    name = file.stem.lower()
+    if not name.isidentifier():
+        raise UsageError(
+            f"{file.name} names no effect: the part before .py is its name.",
+            remedy="Take letters, digits and underscores, such as guide_play.py.",
+        )
+    return effect_file(sheet.diagnosis, sheet.hanger, name)
 
 
 def _write(sheet: DiagnosisSheet, html: Path | None, figures: Path | None) -> None:

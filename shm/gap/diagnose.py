@@ -88,6 +88,7 @@ def diagnose(
     progress("next measurement", (1 + _ATTRIBUTION) / 2)
     following = ranked(problem, _contenders(attribution))
     progress("next measurement", 1.0)
+    compatible = compatibility(problem, attribution)
     tensions = [_tension(problem, f, rng) for f in ([(1.0, before)], possible(attribution))]
     return Diagnosis(
         hanger=hanger.id,
@@ -118,8 +119,8 @@ def diagnose(
         seed=options.seed,
         seconds=time.perf_counter() - started,
         outliers=aside,
-        compatibility=compatibility(problem, attribution),
-        remainder=remainder_of(problem, attribution),
+        compatibility=compatible,
+        remainder=remainder_of(problem, attribution, compatible),
     )
 
 

@@ -23,7 +23,7 @@ from shm.gap.contract import Fit, Hypothesis
 from shm.gap.law_terms import Term, terms_of
 from shm.gap.noise import same_mode
 from shm.gap.problem import GapProblem
-from shm.values import NAN, FloatArray, Remainder
+from shm.values import NAN, Compatibility, FloatArray, Remainder
 
 DESCRIBED_FROM = 0.3
 """Judgement: something unknown that is less likely than this is not worth a law."""
@@ -38,10 +38,13 @@ _FACTORS, _FACTORS_OF_UNKNOWN = np.geomspace(1, 30, 5), np.geomspace(1, 300, 8)
 _STEP = 1e-3  # technical: of a standard deviation of the prior, over which tensions are linear
 
 
-def remainder_of(problem: GapProblem, attribution: Attribution) -> Remainder | None:
-    """None where something unknown neither leads nor has a probability of `DESCRIBED_FROM`."""
+def remainder_of(
+    problem: GapProblem, attribution: Attribution, compatible: Compatibility
+) -> Remainder | None:
+    """None where something unknown neither leads nor has a probability of `DESCRIBED_FROM`, and
+    the bounds of the errors keep some explanation."""
     possible = attribution.unexplained_probability >= DESCRIBED_FROM
-    if not (possible or attribution.leads == "unexplained"):
+    if not (possible or attribution.leads == "unexplained" or not compatible.not_falsified):
         return None
     fit = attribution.unexplained
     count = problem.design.frequencies
@@ -116,7 +119,7 @@ class _Evidence:
         white = np.linalg.solve(lower, np.column_stack([terms, left.value]))
         self._terms, self._value = white[..., :-1], white[..., -1]
         volume = np.log(np.einsum("kii->ki", lower)).sum(axis=1)
-        self._none = -volume - (self._value**2).sum(axis=1) / 2
+        self._none: FloatArray = np.asarray(-volume - (self._value**2).sum(axis=1) / 2)
 
     def by_node(self, chosen: Sequence[int]) -> FloatArray:
         """Log evidences (nodes,) of the law of some terms, but for a constant."""
