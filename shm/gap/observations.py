@@ -49,7 +49,8 @@ class _Component:
 def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
     """All usable data of `tests`; shapes without standard deviations are not usable.
 
-    Raises BadInput where there are no frequencies, a frequency or a sensor's place that cannot be, or one mode twice in a test.
+    Raises BadInput where there are no frequencies, a frequency or a sensor's place that cannot be,
+    or one mode twice in a test.
     """
     _refuse_nonsense(tests, hanger)
     tests = [level for test in tests for level in _by_level(test)]
