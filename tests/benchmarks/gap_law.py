@@ -5,9 +5,10 @@ python tests/benchmarks/gap_law.py --cases 40 --seed 7
 Rods without any cause of `tests/worlds/finite_elements.py`, their nuisances on, measured in four
 to six tests of both planes at two temperatures and two levels. Of three, two get an effect that
 the catalogue lacks, a law of the frequencies with a size of 32 to 320 standard deviations beyond
-what the baseline can follow, or what a tenth of a frequency makes of it; the third gets none. A law is right where its first
-term has the planted planes, dependence on order and on what the tests vary; with two levels the
-powers of the level and a threshold are one. One process; a minute of one core a case.
+what the baseline can follow, or what a tenth of a frequency makes of it; the third gets none. A law
+is right where its first term has the planted planes, dependence on order and on what the tests
+vary; with two levels the powers of the level and a threshold are one. One process; a minute of one
+core a case.
 """
 
 from __future__ import annotations
