@@ -11,6 +11,7 @@ import rich_click as click
 from shm.errors import NothingThere, UsageError
 from shm.gap import GapOptions
 from shm.gap import diagnose as diagnosed
+from shm.models.effects import EFFECTS
 from shm.pipeline import utc_now
 from shm.pipeline.lineage import diagnosis_lineage
 from shm.report.as_html import as_html
@@ -130,6 +131,7 @@ def diagnose(
     Example: shm gap diagnose hanger3.modes.json --hanger-file H.toml --html gap.html
     """
     options = GapOptions(baseline, without, hold_out, seed=seed)
+    effect = _effect_name(write_effect) if write_effect is not None else ""
     if modes_file is None:
         sheet = _of_workspace(ctx, one_hanger(ctx, hanger_file, hanger_id), count, options)
     else:
@@ -144,7 +146,8 @@ def diagnose(
     else:
         click.echo(as_text(diagnosis_paper(sheet), readable_width()).rstrip())
     if write_effect is not None:
-        write_effect.write_text(_effect(sheet, write_effect), encoding="utf-8")
+        text = effect_file(sheet.diagnosis, sheet.hanger, effect)
+        write_effect.write_text(text, encoding="utf-8")
 
 
 command.add_command(adopt)
@@ -176,14 +179,15 @@ def _diagnosis(tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions) 
         return diagnosed(tests, hanger, options, progress)
 
 
-def _effect(sheet: DiagnosisSheet, file: Path) -> str:
+def _effect_name(file: Path) -> str:
+    """The name of the effect that a file holds, which the catalogue must not have yet."""
     name = file.stem.lower()
-    if not name.isidentifier():
+    if not name.isidentifier() or name in EFFECTS:
         raise UsageError(
-            f"{file.name} names no effect: the part before .py is its name.",
-            remedy="Take letters, digits and underscores, such as guide_play.py.",
+            f"{file.name} names no new effect: the part before .py is its name.",
+            remedy="Take letters, digits and underscores, such as play_of_guide.py.",
         )
-    return effect_file(sheet.diagnosis, sheet.hanger, name)
+    return name
 
 
 def _write(sheet: DiagnosisSheet, html: Path | None, figures: Path | None) -> None:

@@ -23,7 +23,7 @@ from shm.gap.law_error import mixed
 from shm.gap.misfit import Misfit
 from shm.gap.next_measurement import ranked
 from shm.gap.observations import observed
-from shm.gap.outlier_removal import cleared, outliers, with_outliers
+from shm.gap.outlier_removal import Cleared, cleared, outliers, with_outliers
 from shm.gap.places import LocalCause, flexible_ends, local_causes, tried
 from shm.gap.problem import GapProblem
 from shm.gap.remainder import remainder_of
@@ -42,6 +42,7 @@ from shm.values import (
     GapPlace,
     Hanger,
     ModalTest,
+    Outlier,
     TensionEstimate,
 )
 
@@ -112,9 +113,7 @@ def diagnose(
         remarks=(
             *_states(problem, before, after, tensions[1]),
             *found.remarks,
-            *clear.misnumbered,
-            *set_aside(aside, clear.otherwise),
-            *doubtful(doubted),
+            *_of_outliers(clear, aside, doubted),
         ),
         seed=options.seed,
         seconds=time.perf_counter() - started,
@@ -122,6 +121,13 @@ def diagnose(
         compatibility=compatible,
         remainder=remainder_of(problem, attribution, compatible),
     )
+
+
+def _of_outliers(
+    clear: Cleared, aside: Sequence[Outlier], doubted: Sequence[Outlier]
+) -> tuple[str, ...]:
+    """What was found on the way to data without gross errors."""
+    return (*clear.misnumbered, *set_aside(aside, clear.otherwise), *doubtful(doubted))
 
 
 def _states(

@@ -130,7 +130,7 @@ def causes(sheet: DiagnosisSheet) -> Table:
         ("something not in the catalogue", diagnosis.unexplained_probability),
     )
     rows += [
-        (what, formatting.probability(share), "", _compatible(diagnosis, what), *("",) * 4)
+        (what, formatting.probability(share), "", *_compatible(diagnosis, what), *("",) * 4)
         for what, share in rest
     ]
     return Table(
@@ -139,7 +139,7 @@ def causes(sheet: DiagnosisSheet) -> Table:
             "cause",
             "probability",
             "alike",
-            "compatible",
+            *(("compatible",) if diagnosis.compatibility else ()),
             "log Bayes factor",
             "gain of fit",
             "Occam's factor",
@@ -164,10 +164,10 @@ def _marks(diagnosis: Diagnosis) -> tuple[str, ...]:
     return (*rows, *("claimed" if is_it else "left" for is_it in rest))
 
 
-def _compatible(diagnosis: Diagnosis, name: str) -> str:
-    """Whether the data contradict it at the bounds of their errors; empty where not judged."""
+def _compatible(diagnosis: Diagnosis, name: str) -> tuple[str, ...]:
+    """Whether the data contradict it; no column of a diagnosis from before that was judged."""
     found = diagnosis.compatibility
-    return {True: "yes", False: "no", None: ""}[None if found is None else found.of(name)]
+    return () if found is None else ({True: "yes", False: "no", None: ""}[found.of(name)],)
 
 
 def _cause_row(diagnosis: Diagnosis, cause: Cause) -> tuple[str, ...]:
@@ -175,7 +175,7 @@ def _cause_row(diagnosis: Diagnosis, cause: Cause) -> tuple[str, ...]:
         label(cause),
         formatting.probability(cause.probability),
         "" if cause.group is None else _LETTERS[cause.group % len(_LETTERS)],
-        _compatible(diagnosis, cause.effect),
+        *_compatible(diagnosis, cause.effect),
         formatting.number(cause.log_bayes_factor, "+z.1f"),
         formatting.number(cause.log_fit, "+z.1f"),
         formatting.number(cause.log_occam, "+z.1f"),
@@ -184,13 +184,14 @@ def _cause_row(diagnosis: Diagnosis, cause: Cause) -> tuple[str, ...]:
 
 
 def _cause_note(diagnosis: Diagnosis) -> str:
+    judged = diagnosis.compatibility is not None
     left_out = ", ".join(formatting.quantity(effect) for effect in diagnosis.left_out)
     return (
         f"Against the baseline {diagnosis.baseline}, in natural logarithms: the Bayes factor is "
         "what the better fit gains and what Occam's factor takes for free parameters. Causes alike "
-        "by the same letter cannot be told apart with these data. Compatible: every datum within "
-        "the bounds of its errors, whatever the priors. How far each was taken: screened by a "
-        "linear fit, or fitted in full with a normal or a sampled posterior."
+        "by the same letter cannot be told apart with these data. How far each was taken: screened "
+        "by a linear fit, or fitted in full with a normal or a sampled posterior."
+        + (" Compatible: all data within the bounds of their errors." if judged else "")
         + (f" Taken out of the catalogue: {left_out}." if left_out else "")
     )
 
