@@ -17,7 +17,7 @@ import numpy as np
 from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress, silent
 from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
-from shm.gap.data_checks import doubtful, set_aside, usable
+from shm.gap.data_checks import Usable, doubtful, set_aside, usable
 from shm.gap.falsification import compatibility
 from shm.gap.law_error import mixed
 from shm.gap.misfit import Misfit
@@ -112,8 +112,7 @@ def diagnose(
         next_measurements=following,
         remarks=(
             *_states(problem, before, after, tensions[1]),
-            *found.remarks,
-            *_of_outliers(clear, aside, doubted),
+            *_on_the_way(found, clear, aside, doubted),
         ),
         seed=options.seed,
         seconds=time.perf_counter() - started,
@@ -123,11 +122,12 @@ def diagnose(
     )
 
 
-def _of_outliers(
-    clear: Cleared, aside: Sequence[Outlier], doubted: Sequence[Outlier]
+def _on_the_way(
+    found: Usable, clear: Cleared, aside: Sequence[Outlier], doubted: Sequence[Outlier]
 ) -> tuple[str, ...]:
-    """What was found on the way to data without gross errors."""
-    return (*clear.misnumbered, *set_aside(aside, clear.otherwise), *doubtful(doubted))
+    """What was found on the way to data that can be used and hold no gross errors."""
+    gross = (*set_aside(aside, clear.otherwise), *doubtful(doubted))
+    return (*found.remarks, *clear.misnumbered, *gross)
 
 
 def _states(
