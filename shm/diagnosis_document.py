@@ -25,6 +25,7 @@ _PLAIN = (
 
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     """The document of `shm gap diagnose --json`."""
+    compatible = diagnosis.compatibility
     return {
         "schema": DIAGNOSIS_SCHEMA,
         **{name: getattr(diagnosis, name) for name in _PLAIN},
@@ -44,6 +45,9 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "left_out": list(diagnosis.left_out),
         "remarks": list(diagnosis.remarks),
         "outliers": [asdict(outlier) for outlier in diagnosis.outliers],
+        "not_falsified": list(compatible.not_falsified) if compatible else None,
+        "compatibility": asdict(compatible) if compatible else None,
+        "remainder": asdict(diagnosis.remainder) if diagnosis.remainder else None,
     }
 
 
@@ -74,7 +78,7 @@ def _cause_document(cause: Cause) -> dict[str, Any]:
 def diagnosis_of(document: Mapping[str, Any]) -> Diagnosis:
     """A diagnosis back from its document; raises KeyError, TypeError or ValueError.
 
-    One from before outliers and 95 % intervals were told has none of them.
+    One from before outliers, 95 % intervals, compatibility and remainders were told has none.
     """
     tension = document["tension_n"]
     renamed = {

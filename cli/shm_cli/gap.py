@@ -13,6 +13,7 @@ from shm.errors import NothingThere, UsageError
 from shm.gap import GapOptions, diagnose_bridge
 from shm.gap import diagnose as diagnosed
 from shm.gap.kin import LEAST
+from shm.models.effects import EFFECTS
 from shm.pipeline import utc_now
 from shm.pipeline.lineage import diagnosis_lineage
 from shm.report.as_html import as_html
@@ -20,6 +21,7 @@ from shm.report.as_text import as_text
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_json, bridge_diagnosis_paper
 from shm.report.contents import BridgeDiagnosisSheet, DiagnosisSheet
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
+from shm.report.effect_file import effect_file
 from shm.report.figures.every_figure import bridge_diagnosis_figures, diagnosis_figures
 from shm.report.figures.illustration import Illustration
 from shm.report.paper import Paper
@@ -105,6 +107,12 @@ def command() -> None:
     metavar="FILE",
     help="Write a page with all figures here.",
 )
+@click.option(
+    "--write-effect",
+    type=NewFile(),
+    metavar="FILE.py",
+    help="Write the law of something unknown here, as the module of a new effect.",
+)
 @figures_option
 @json_option
 @click.pass_context
@@ -120,6 +128,7 @@ def diagnose(
     count: int,
     seed: int,
     html: Path | None,
+    write_effect: Path | None,
     figures: Path | None,
     as_json: bool,
 ) -> None:
@@ -138,8 +147,13 @@ def diagnose(
     Example: shm --workspace arch gap diagnose --bridge --html bridge.html
     """
     options = GapOptions(baseline, without, hold_out, seed=seed)
+    effect = _effect_name(write_effect) if write_effect is not None else ""
     shown: _Shown
     if bridge or len(files) > 1:
+        if effect:
+            raise UsageError(
+                "--write-effect writes what one hanger leaves open.", remedy="Diagnose it alone."
+            )
         shown = _OfBridge(_jointly(ctx, files, bridge, (hanger_id, hanger_file), count, options))
     elif not files:
         hanger = one_hanger(ctx, hanger_file, hanger_id)
@@ -155,6 +169,9 @@ def diagnose(
         show(shown.document())
     else:
         click.echo(as_text(shown.paper(), readable_width()).rstrip())
+    if write_effect is not None and isinstance(shown, _OfHanger):
+        text = effect_file(shown.sheet.diagnosis, shown.sheet.hanger, effect)
+        write_effect.write_text(text, encoding="utf-8")
 
 
 command.add_command(adopt)
@@ -276,6 +293,17 @@ class _OfBridge:
 
 
 _Shown: TypeAlias = _OfHanger | _OfBridge
+
+
+def _effect_name(file: Path) -> str:
+    """The name of the effect that a file holds, which the catalogue must not have yet."""
+    name = file.stem.lower()
+    if not name.isidentifier() or name in EFFECTS:
+        raise UsageError(
+            f"{file.name} names no new effect: the part before .py is its name.",
+            remedy="Take letters, digits and underscores, such as play_of_guide.py.",
+        )
+    return name
 
 
 def _write(shown: _Shown, html: Path | None, figures: Path | None) -> None:
