@@ -33,7 +33,10 @@ _SAME_SHAPE, _SURE_SHAPE = 0.95, 2.0
 """A mode that has the same shape whichever hit is left out may have twice the limit of the
 frequency's standard deviation, to which Student's quantile for three hits adds 1.8, and any of
 damping. In 184 records with hits (tests/worlds/recordings.py, seeds 2000 to 2007) that finds 39
-modes and 6 tracks of noise more; of tracks lost with one hit alone it finds 24 and none."""
+modes and 6 tracks of noise more."""
+_MOST_TO_BE_ALONE = 3
+"""Hits of which one alone may excite a plane. In the same records that finds 124 modes of two hits
+and 1 track of noise, 16 and none of three, 7 and none of more, where it may be a disturbance."""
 _STEADY_SHAPE = 0.999
 """What is as steady as that from order to order need not stay closer together where hits are few:
 in the same records, 50 modes and 8 tracks of noise more; with 0.998, 63 and 12."""
@@ -172,7 +175,7 @@ def doubt(candidate: Candidate, repeat: Repeats, options: IdentifyOptions) -> st
         return "not found again when one hit is left out"
     if not by_hits:
         return ""
-    sure = _SURE_SHAPE if not options.ambient_s and _like(candidate, repeat) else 1.0
+    sure = _SURE_SHAPE if not options.ambient_s and _like(candidate, repeat.shape) else 1.0
     by_hits_hz = float(jackknife_sd(repeat.frequency_hz))
     frequency_sd = math.hypot(by_hits_hz, _within(candidate)) / candidate.frequency_hz
     damping_sd = jackknife_sd(repeat.damping_ratio) / candidate.damping_ratio
@@ -187,19 +190,20 @@ def doubt(candidate: Candidate, repeat: Repeats, options: IdentifyOptions) -> st
 def _of_one_hit(candidate: Candidate, repeat: Repeats, options: IdentifyOptions) -> bool:
     """Whether one hit alone made it ring: without that one nobody can find it again.
 
-    Each other hit left out must leave it; then it is trusted as a mode of a single hit is. Ambient
-    motion moves every mode in each of its parts.
+    So it is where a crew hits each plane once or twice. Each other hit left out must leave it; then
+    it is trusted as a mode of a single hit is. After one of many hits it is a disturbance, and
+    ambient motion moves every mode in each of its parts.
     """
     found = np.isfinite(repeat.frequency_hz)
-    if options.ambient_s or len(found) - np.sum(found) != 1:
+    if options.ambient_s or len(found) > _MOST_TO_BE_ALONE or len(found) - np.sum(found) != 1:
         return False
-    return len(found) < LEAST_HITS or _alike(candidate, repeat.shape[found]) > _SAME_SHAPE
+    return len(found) < LEAST_HITS or _like(candidate, repeat.shape[found])
 
 
-def _like(candidate: Candidate, repeat: Repeats) -> bool:
+def _like(candidate: Candidate, shapes: FloatArray) -> bool:
     """Whether its shape says that it is one mode whichever hit is left out."""
     enough = len(candidate.shape) >= _LEAST_POINTS
-    return enough and _alike(candidate, repeat.shape) > _SAME_SHAPE
+    return enough and _alike(candidate, shapes) > _SAME_SHAPE
 
 
 def _steady(candidate: Candidate) -> bool:
