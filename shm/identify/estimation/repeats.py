@@ -27,19 +27,23 @@ _FEW_HITS = 0.2
 """Where too few hits show whether a mode repeats, its poles must stay together this much closer."""
 _SHARP = 0.2
 """A frequency this much better than it must be is trusted even where the damping is not known."""
-_LEAST_POINTS = 3
-"""Shapes at two points agree by chance."""
+_LEAST_CHANNELS = 3
+"""The shapes of two channels agree by chance."""
+_LEAST_POINTS, _LEAST_POINTS_FEW = 1.5, 2.1
+"""Points that take part in a shape, (sum of v^2)^2 / sum of v^4: one channel's noise has one. What a
+biaxial sensor alone hears has two at most, or a few percent more with the noise of others: where
+hits are few, its shape proves nothing."""
 _SAME_SHAPE, _SURE_SHAPE = 0.95, 2.0
 """A mode that has the same shape whichever hit is left out may have twice the limit of the
 frequency's standard deviation, to which Student's quantile for three hits adds 1.8, and any of
-damping. In 184 records with hits (tests/worlds/recordings.py, seeds 2000 to 2007) that finds 39
-modes and 6 tracks of noise more."""
+damping. In 184 records with hits (tests/worlds/recordings.py, seeds 2000 to 2007) that finds 29
+modes and 3 tracks of noise more."""
 _MOST_TO_BE_ALONE = 3
 """Hits of which one alone may excite a plane. In the same records that finds 124 modes of two hits
 and 1 track of noise, 16 and none of three, 7 and none of more, where it may be a disturbance."""
-_STEADY_SHAPE = 0.999
+_STEADY_SHAPE = 0.998
 """What is as steady as that from order to order need not stay closer together where hits are few:
-in the same records, 50 modes and 8 tracks of noise more; with 0.998, 63 and 12."""
+in the same records, 35 modes and 2 tracks of noise more; with 0.99, 53 and 15."""
 # Student's 95 % quantile is 1.8 times the normal one with two degrees of freedom, 3.8 with one
 LEAST_HITS = 3
 # With it 90 % intervals cover 92 %: docs/trials/identification_benchmarks.md, identify_simulated.py
@@ -202,14 +206,23 @@ def _of_one_hit(candidate: Candidate, repeat: Repeats, options: IdentifyOptions)
 
 def _like(candidate: Candidate, shapes: FloatArray) -> bool:
     """Whether its shape says that it is one mode whichever hit is left out."""
-    enough = len(candidate.shape) >= _LEAST_POINTS
+    enough = _points(candidate) > _LEAST_POINTS
     return enough and _alike(candidate, shapes) > _SAME_SHAPE
 
 
 def _steady(candidate: Candidate) -> bool:
     """Whether its shape says that it is one mode in the models of all orders."""
     shapes = np.array([real_shape(pole.shape) for pole in candidate.poles])
-    return len(candidate.shape) >= _LEAST_POINTS and _alike(candidate, shapes) > _STEADY_SHAPE
+    enough = _points(candidate) > _LEAST_POINTS_FEW
+    return enough and _alike(candidate, shapes) > _STEADY_SHAPE
+
+
+def _points(candidate: Candidate) -> float:
+    """How many points take part in its shape; 0 where the channels are too few to tell."""
+    if len(candidate.shape) < _LEAST_CHANNELS:
+        return 0.0
+    squares = candidate.shape**2
+    return float(np.sum(squares) ** 2 / np.sum(squares**2))
 
 
 def _alike(candidate: Candidate, shapes: FloatArray) -> float:
