@@ -30,8 +30,8 @@ _SHARP = 0.2
 _LEAST_CHANNELS = 3
 """The shapes of two channels agree by chance."""
 _LEAST_POINTS, _LEAST_POINTS_FEW = 1.5, 2.1
-"""Points that take part in a shape, (sum of v^2)^2 / sum of v^4: one channel's noise has one. What a
-biaxial sensor alone hears has two at most, or a few percent more with the noise of others: where
+"""Points that take part in a shape, (sum of v^2)^2 / sum of v^4: one channel's noise has one. What
+a biaxial sensor alone hears has two at most, or a few percent more with the noise of others: where
 hits are few, its shape proves nothing."""
 _SAME_SHAPE, _SURE_SHAPE = 0.95, 2.0
 """A mode that has the same shape whichever hit is left out may have twice the limit of the

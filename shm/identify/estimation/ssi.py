@@ -149,9 +149,7 @@ def _in_window(window: Window, measurement: Measurement, options: IdentifyOption
 
 def _few_sums(matrices: Sequence[FloatArray]) -> list[FloatArray]:
     """The matrices as no more than ten sums, each to be left out in turn."""
-    return [
-        np.sum(matrices[n::_MOST_SUMS], axis=0) for n in range(min(len(matrices), _MOST_SUMS))
-    ]
+    return [np.sum(matrices[n::_MOST_SUMS], axis=0) for n in range(min(len(matrices), _MOST_SUMS))]
 
 
 def _size(decays: Sequence[FloatArray]) -> float:
