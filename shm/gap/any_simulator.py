@@ -14,14 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.groups import SAME_BELOW, grouped
 from shm.gap.model_probabilities import (
     ScoredHypothesis,
     families,
     probabilities,
-    undetected_share,
 )
 from shm.gap.simulator_fit import fitted, refitted
 from shm.gap.simulator_problem import Condition, Reading, Simulator, SimulatorProblem
@@ -30,6 +28,9 @@ from shm.values import FloatArray
 
 NO_GAP_BELOW = 0.05
 """As in the diagnosis of hangers: a gap is shown where no gap keeps less."""
+EXPLAINED = 0.5
+"""Judgement: an effect with something unknown beside it counts as the cause where it takes more of
+the squared gap than it leaves; else what is unknown is the answer."""
 _FLEXIBLE = 3  # technical: what leads is tried with something unknown beside; the others lose both
 _FOLDS = 5  # at most so many parts are held out in turn
 _SUPPORTED = 0.02  # judgement: a cause with less is in no group
@@ -171,16 +172,17 @@ def diagnose_simulator(
     fits = {e.hypothesis: e.fit for e in answers.scored if e.fit is not None}
     alone = fits[Hypothesis()]
     causes = sorted(
-        (_cause(problem, h, answers, fits[h]) for h in fits if h.effects and not h.flexible),
+        (_cause(problem, h, answers, fits[h], alone) for h in fits if h.effects and not h.flexible),
         key=lambda each: -each.probability,
     )
+    no_gap = answers.of(Hypothesis())
     leading = max(fits, key=lambda h: answers.of(h) if not h.flexible else -1.0)
     first = next((_single(e.name) for e in causes), Hypothesis())
     return SimulatorDiagnosis(
         causes=tuple(causes),
-        no_gap_probability=answers.of(Hypothesis()),
-        unexplained_probability=answers.unknown + answers.of(Hypothesis(flexible=True)),
-        groups=_groups(fits, causes, answers.of(Hypothesis())),
+        no_gap_probability=no_gap,
+        unexplained_probability=max(0.0, 1 - no_gap - sum(each.probability for each in causes)),
+        groups=_groups(fits, causes, no_gap),
         shrinkage=_shrinkage(problem, alone, fits[first if leading.effects else Hypothesis()]),
         gaps=tuple(
             (reading, float(gap))
@@ -223,7 +225,6 @@ def _answers(problem: SimulatorProblem, rng: np.random.Generator) -> _Answers:
         key=lambda each: each.log_evidence + each.log_prior,
     )
     chances, unknown = probabilities(tried, _p_value(problem, plain.best.fit or alone))
-    chances = undetected_share(tried, chances) if names else chances
     of = {each.best.hypothesis: float(p) for each, p in zip(tried, chances, strict=True)}
     return _Answers(scored, of, float(unknown))
 
@@ -239,14 +240,15 @@ def _p_value(problem: SimulatorProblem, fit: Fit) -> float:
 
 
 def _cause(
-    problem: SimulatorProblem, hypothesis: Hypothesis, answers: _Answers, fit: Fit
+    problem: SimulatorProblem, hypothesis: Hypothesis, answers: _Answers, fit: Fit, alone: Fit
 ) -> SimulatorCause:
     effect = problem.effect(hypothesis)
+    left, before = _rms(_in_sds(problem, fit)), _rms(_in_sds(problem, alone))
     beside = answers.of(_single(hypothesis.name, flexible=True))
     return SimulatorCause(
         hypothesis.name,
-        answers.of(hypothesis) + beside,
-        _rms(_in_sds(problem, fit)),
+        answers.of(hypothesis) + (beside if left**2 < EXPLAINED * before**2 else 0.0),
+        left,
         _moments(problem, fit, effect.parameters if effect else {}),
     )
 
@@ -350,5 +352,3 @@ def _planned(
     return tuple(
         NextReading(asked[i].condition, asked[i].observable, float(apart[i])) for i in ordered
     )
-
-

@@ -196,9 +196,7 @@ class SimulatorProblem:
             _node(np.diag(own**2), np.log(weight / len(shares)))
             for share in shares
             for away, weight in factors
-            for own in [
-                np.where(known, np.exp(FACTOR_SPREAD * away) * self.sd, share * self.scale)
-            ]
+            for own in [np.where(known, np.exp(FACTOR_SPREAD * away) * self.sd, share * self.scale)]
         )
 
     def flexible_nodes(self) -> tuple[NoiseNode, ...]:

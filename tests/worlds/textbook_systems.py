@@ -32,7 +32,9 @@ class Read(NamedTuple):
     sd: float
 
 
-def _noisy(exact: list[tuple[dict[str, float], str, float]], rng: np.random.Generator) -> list[Read]:
+def _noisy(
+    exact: list[tuple[dict[str, float], str, float]], rng: np.random.Generator
+) -> list[Read]:
     stated = np.exp(rng.uniform(-0.2, 0.2))
     gain = 1 + GAIN * rng.standard_normal()
     reads = []
