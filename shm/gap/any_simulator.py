@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.groups import SAME_BELOW, grouped
@@ -66,7 +66,7 @@ class Shrinkage:
 
 @dataclass(frozen=True)
 class NextReading:
-    """A condition and observable, and how many deviations the two likeliest answers differ there."""
+    """A condition and observable, and by how many deviations the likeliest answers differ."""
 
     condition: Condition
     observable: str
@@ -236,7 +236,7 @@ def _p_value(problem: SimulatorProblem, fit: Fit) -> float:
     nodes = problem.nodes()
     weight = np.exp([each.log_weight for each in nodes])
     squares = [float(np.sum(residual**2 / np.diag(n.covariance.frequency))) for n in nodes]
-    return float(weight @ chi2.sf(squares, freedom) / weight.sum())
+    return float(weight @ chdtrc(freedom, squares) / weight.sum())
 
 
 def _cause(
@@ -314,7 +314,7 @@ def _moments(
 def _averaged(
     problem: SimulatorProblem, answers: _Answers, fits: Mapping[Hypothesis, Fit]
 ) -> dict[str, tuple[float, float]]:
-    """Over all answers by their probabilities (Hoeting et al. 1999); the unknown as the remainder."""
+    """Over all answers by their probabilities (Hoeting et al. 1999)."""
     weight = dict(answers.chances)
     free = Hypothesis(flexible=True)
     weight[free] = weight.get(free, 0.0) + answers.unknown

@@ -19,7 +19,7 @@ from shm.gap.simulator_problem import SimulatorProblem
 from shm.inference.coordinates import log_normal
 from shm.inference.mixture import Normal, Pool, TMixture
 from shm.inference.tmcmc import effective, normalised, systematic
-from shm.values import FloatArray
+from shm.values import FloatArray, IntArray
 
 # Technical: effective draws against calls of the simulator. Weights correct whatever is drawn from.
 _SCOUTS, _STARTS, _STEPS = 150, 3, 20
@@ -69,9 +69,9 @@ class _Target:
         return mean[:-1, :-1] + np.eye(len(z)), mean[:-1, -1] - z
 
 
-def _part(node: NoiseNode, rows: FloatArray) -> NoiseNode:
+def _part(node: NoiseNode, rows: IntArray) -> NoiseNode:
     return NoiseNode(
-        node.covariance.part(rows.astype(int), np.empty(0, dtype=int)), node.log_weight, 0.0
+        node.covariance.part(rows, np.empty(0, dtype=np.int64)), node.log_weight, 0.0
     )
 
 
@@ -115,7 +115,7 @@ class _Summit:
 def _starts(
     target: _Target, rng: np.random.Generator, start: FloatArray | None
 ) -> Sequence[FloatArray]:
-    """The likeliest of points drawn from the priors, half of them about a fit without the effect."""
+    """The likeliest of points drawn from the priors, half of them near `start`."""
     z = rng.standard_normal((_SCOUTS, target.dimension))
     if start is not None:
         z[::2, : len(start)] = start
@@ -141,7 +141,8 @@ def _climbed(target: _Target, z: FloatArray) -> _Summit:
                 break
         elif (damping := damping * 6) > _MOST_DAMPING:
             break
-    return _Summit(z, here, np.linalg.inv(hessian + _LEAST_CURVATURE * np.eye(len(z))))
+    covariance = np.linalg.inv(hessian + _LEAST_CURVATURE * np.eye(len(z)))
+    return _Summit(z, here, np.asarray(covariance, dtype=np.float64))
 
 
 @dataclass(frozen=True, eq=False)

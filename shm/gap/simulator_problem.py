@@ -41,7 +41,7 @@ class Prior:
     """What is known of a parameter before the data, as one of four spreads.
 
     `uniform` and `logarithmic` lie between `a` and `b`; `normal` has the mean `a` and the standard
-    deviation `b`; `lognormal` has the median `a` and `b` as the standard deviation of its logarithm.
+    deviation `b`; `lognormal` has the median `a`, and its logarithm the standard deviation `b`.
     """
 
     spread: Literal["uniform", "logarithmic", "normal", "lognormal"]

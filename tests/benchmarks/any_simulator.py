@@ -1,4 +1,4 @@
-"""The diagnosis of any simulator on three textbook systems: `python tests/benchmarks/any_simulator.py`.
+"""The diagnosis of any simulator on three textbook systems that are no hangers.
 
 Of each system some cases with the effect planted, some sound ones, and the planted ones again with
 the true effect taken out of the catalogue. Marks: named first or in its group >= 0.9, false alarms

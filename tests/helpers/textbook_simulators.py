@@ -73,7 +73,7 @@ _PLACES = (np.arange(24) + 0.5) / 24
 
 
 def _flexibility(x: Any, a: Any, ei: Any, p: Values) -> Any:
-    """Deflection at x by 1 N at a of an Euler cantilever, with its support's and a crack's share."""
+    """Deflection at x by 1 N at a of an Euler cantilever, its support and a crack."""
     low, high = np.minimum(x, a), np.maximum(x, a)
     bent = low**2 * (3 * high - low) / (6 * ei)
     crack = p.get("crack_at_m", 2.0)

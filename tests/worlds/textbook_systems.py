@@ -6,8 +6,8 @@
 - Two masses with friction: the equations of motion integrated in time (Runge and Kutta), the
   friction a sign of the velocity; amplitudes by Fourier's sum over the last cycles.
 
-Every reading has noise of `NOISE` of itself, whose stated deviation is off by up to 20 %, the sensor
-a gain of 1 %, and the stiffnesses differ from what is assumed by some 5 %.
+Every reading has noise of `NOISE` of itself, whose stated deviation is off by up to 20 %, the
+sensor a gain of 1 %, and the stiffnesses differ from what is assumed by some 5 %.
 """
 
 from __future__ import annotations
