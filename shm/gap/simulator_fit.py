@@ -70,9 +70,7 @@ class _Target:
 
 
 def _part(node: NoiseNode, rows: IntArray) -> NoiseNode:
-    return NoiseNode(
-        node.covariance.part(rows, np.empty(0, dtype=np.int64)), node.log_weight, 0.0
-    )
+    return NoiseNode(node.covariance.part(rows, np.empty(0, dtype=np.int64)), node.log_weight, 0.0)
 
 
 def fitted(
