@@ -17,6 +17,8 @@ In a notebook, from a recording to the tension and what limits it::
 - The steps: `read`, `identify`, `update`, `select`, `diagnose`; `simulate` makes a recording whose
   truth is known (a `PlantedEffect` is part of it); `load_modes` takes modal tests that were
   identified before, or elsewhere.
+- `diagnose_simulator` asks the same of any simulator of your own: a `Simulator` with a `Prior` for
+  each parameter, a `SimulatorEffect` for each possible cause, and a `Reading` for each measurement.
 - `Store` reads what a workspace keeps of years of tests.
 - `plot` draws, `export` hands over to pandas, ArviZ, CSV, netCDF.
 - The nouns that flow between the steps are frozen dataclasses: `Recording`, `FrequencyResponse`,
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
     from shm import plot as plot
     from shm.api import Store as Store
     from shm.api import diagnose as diagnose
+    from shm.api import diagnose_simulator as diagnose_simulator
     from shm.api import identify as identify
     from shm.api import load_hanger as load_hanger
     from shm.api import load_modes as load_modes
@@ -51,6 +54,10 @@ if TYPE_CHECKING:
     from shm.api import simulate as simulate
     from shm.api import update as update
     from shm.errors import ShmError as ShmError
+    from shm.gap.simulator_problem import Prior as Prior
+    from shm.gap.simulator_problem import Reading as Reading
+    from shm.gap.simulator_problem import Simulator as Simulator
+    from shm.gap.simulator_problem import SimulatorEffect as SimulatorEffect
     from shm.identify import Identification as Identification
     from shm.simulate import PlantedEffect as PlantedEffect
     from shm.values import AddedMass as AddedMass
@@ -68,9 +75,11 @@ __version__ = "0.1.0"
 _STEPS_AND_PACKAGES = ("identify", "read", "simulate")
 _HOMES = {
     "shm.api": (
-        "Store", "diagnose", "load_hanger", "load_modes", "round_bar", "select", "update",
+        "Store", "diagnose", "diagnose_simulator", "load_hanger", "load_modes", "round_bar",
+        "select", "update",
     ),
     "shm.errors": ("ShmError",),
+    "shm.gap.simulator_problem": ("Prior", "Reading", "Simulator", "SimulatorEffect"),
     "shm.identify": ("Identification",),
     "shm.simulate": ("PlantedEffect",),
     "shm.values": (

@@ -11,12 +11,18 @@ import rich_click as click
 from shm.documents import format_time
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
-from shm.pipeline.stream_state import StreamCondition, stream_states, tension_words
+from shm.pipeline.stream_state import (
+    StreamCondition,
+    against_hammer,
+    stream_states,
+    tension_words,
+)
 from shm.read import write
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
 from shm.store.ring_recording import recording_of
 from shm.values import NAN
+from shm.watch.ambient_hammer import AmbientBias
 from shm_cli import completion
 from shm_cli.common import (
     json_option,
@@ -53,6 +59,9 @@ class StreamRow:
     tension_shift: float
     tension_shift_sd: float
     learning: str
+    ambient_bias: float
+    ambient_bias_sd: float
+    hammer_tests: int
 
 
 _from = click.argument("start", type=Time(), metavar="FROM")
@@ -78,7 +87,8 @@ def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> Non
     lost is of the last 24 hours, up to the last sample; what comes late takes it back. Apart are
     samples of a time that was there already, as of a clock that was set back: the first to come
     count. Tension is the change since the stream began, the weather taken off, with its 90 %
-    interval.
+    interval. Where hammer tests were made while the sensors ran, it says what their frequencies
+    differ by.
 
     \b
     Example: shm stream --json
@@ -159,7 +169,8 @@ command.add_command(export)
 
 def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bool) -> None:
     states = stream_states(workspace, ring_of(workspace), store, now)
-    rows = [_row(each) for each in states]
+    beside = [against_hammer(store, each.stream) for each in states]
+    rows = [_row(*each) for each in zip(states, beside, strict=True)]
     if as_json:
         show({"streams": [asdict(row) for row in rows]})
         return
@@ -181,9 +192,12 @@ def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bo
             tension_words(state.hour),
         )
     show_table(made)
+    for each in beside:
+        if each.is_known:
+            click.echo(each.text())
 
 
-def _row(state: StreamCondition) -> StreamRow:
+def _row(state: StreamCondition, beside: AmbientBias) -> StreamRow:
     window, hour = state.window, state.hour
     return StreamRow(
         name=state.stream.name,
@@ -204,6 +218,9 @@ def _row(state: StreamCondition) -> StreamRow:
         tension_shift=hour.compensated_shift if hour else NAN,
         tension_shift_sd=hour.compensated_sd if hour else NAN,
         learning=hour.learning if hour else "",
+        ambient_bias=beside.common,
+        ambient_bias_sd=beside.common_sd,
+        hammer_tests=beside.most_tests,
     )
 
 

@@ -11,10 +11,12 @@ from shm.api.analysing import diagnose, identify, select, update
 from shm.api.reading import load_hanger, load_modes, read, round_bar
 from shm.api.simulating import simulate
 from shm.api.stored import Store
+from shm.gap.any_simulator import diagnose_simulator
 
 __all__ = [
     "Store",
     "diagnose",
+    "diagnose_simulator",
     "identify",
     "load_hanger",
     "load_modes",

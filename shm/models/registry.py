@@ -1,16 +1,21 @@
-"""The registry of model classes: a new one is one file and one line here."""
+"""The registry of model classes: a new one is one file and one line here.
+
+Packages from outside add theirs by the entry points `shm.models` (`shm.models.plug_ins`).
+"""
 
 from __future__ import annotations
 
 from shm.errors import UsageError
 from shm.models.base import Model, held_otherwise
 from shm.models.beam import Beam1, Beam2, Beam3
+from shm.models.plug_ins import MODELS_GROUP, members_with_plug_ins
 from shm.models.solid import S1, S2, Solid0, Solid1, Solid2
 from shm.values import Hanger
 
-MODELS: dict[str, type[Model]] = {
-    model.name: model for model in (Beam1, Beam2, Beam3, S1, S2, Solid0, Solid1, Solid2)
-}
+_OWN = (Beam1, Beam2, Beam3, S1, S2, Solid0, Solid1, Solid2)
+MODELS: dict[str, type[Model]] = members_with_plug_ins(
+    MODELS_GROUP, {model.name: model for model in _OWN}, Model
+)
 
 
 def registered(name: str, hanger: Hanger) -> Model:

@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput
+from shm.identify.measuring.sensor_places import fault_of_place
+from shm.pipeline.import_outline import outline
 from shm.pipeline.import_times import rate_told, with_times
 from shm.pipeline.lineage import read_limits
 from shm.read import logger_words as words
@@ -29,17 +31,14 @@ from shm.read.sandbox import survey
 from shm.read.sidecar import document_beside
 from shm.read.survey import Survey, SurveyedColumn
 from shm.store import Workspace
-from shm.values import NAN, Channel, FloatArray, Plane, Quantity, Recording
+from shm.values import NAN, Channel, Plane, Quantity, Recording
 
-OUTLINE_BINS = 32
-"""Into how many parts of equal length the picture of a channel divides it."""
 WORTHS = {
     "full scale": ("the full scale", ("50 g", "2000 N")),
     "counts": ("one count", ("2.4e-6 m/s2", "0.001 N")),
 }
 """Units of which only the sensor's owner knows what one is worth."""
-# judgement: 500 g, the range of usual accelerometers of 10 mV/g, whose signal goes to 5 V
-_WILD_M_S2 = 4903.0
+_WILD_M_S2 = 4903.0  # judgement: 500 g, the range of accelerometers of 10 mV/g and 5 V
 _ASKED_UNITS = ("", "full scale", "1", "-", "counts", "digits", "lsb")
 
 
@@ -154,7 +153,10 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     hanger = described.get("hanger", found.hanger)
     rate, uneven = rate_told(found, described)
     questions = _questions(found, described, hanger, rate)
-    problems = _hanger_problem(hanger, workspace)
+    problems = (
+        *_hanger_problem(hanger, workspace),
+        *_place_problems(found, described, hanger, workspace),
+    )
     record, fault = _recording(found, described, rate, path)
     fault = uneven or fault
     if found.lines or any(question.about in ("unit", "rate") for question in questions):
@@ -215,6 +217,19 @@ def _hanger_problem(hanger: object, workspace: Workspace) -> tuple[str, ...]:
     except BadInput as error:
         return (str(error),)
     return ()
+
+
+def _place_problems(
+    found: Survey, described: Described, hanger: object, workspace: Workspace
+) -> list[str]:
+    """Sensors that are said to be off the hanger, where it is one of the bridge."""
+    tested = next((each for each in workspace.bridge.hangers if each.id == hanger), None)
+    if tested is None:
+        return []
+    columns = [_told(column, described) for column in found.columns]
+    of_sensors = [each for each in columns if each.quantity == "acceleration"]
+    faults = {each.name: fault_of_place(each.x_m, tested) for each in of_sensors}
+    return [f"{name}: {fault}" for name, fault in faults.items() if fault]
 
 
 # ---------------------------------------------------------------- what is open
@@ -307,10 +322,8 @@ def _of_unit(column: SurveyedColumn) -> Question:
 def _of_sensor(column: SurveyedColumn, described: Described) -> list[Question]:
     name, quoted = column.name, shlex.quote(column.name)
     asked = []
-    if math.isnan(column.x_m) and "x_m" not in {
-        *described.get("channel", {}).get(name, {}),
-        *described,
-    }:
+    said = {*described.get("channel", {}).get(name, {}), *described}
+    if math.isnan(column.x_m) and "x_m" not in said:
         text = f"Where is {name}, in m from the deck end (or 'unknown')?"
         asked.append(Question("place", name, text, f"--place {quoted}=M"))
     if column.plane is None and "plane" not in described:
@@ -382,16 +395,5 @@ def _understood(
         overloads=raw.overloads,
         is_clipped=raw.overloads > 0 or (measured and bool(clipped([good], limit)[0])),
         hits=hits,
-        outline=_outline(values),
+        outline=outline(values),
     )
-
-
-def _outline(values: FloatArray | None) -> tuple[float, ...]:
-    """The largest departure from the middle in each part, as a share of the largest of all."""
-    if values is None or len(values) < OUTLINE_BINS or not np.isfinite(values).any():
-        return ()
-    middle = float(np.nanmedian(values))
-    away = np.nan_to_num(np.abs(values - middle), posinf=0.0)
-    parts = np.array([part.max() for part in np.array_split(away, OUTLINE_BINS)])
-    top = float(parts.max())
-    return tuple(float(part) for part in (parts / top if top > 0 else parts))

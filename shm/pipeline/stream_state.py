@@ -15,6 +15,7 @@ from shm.store.ring_files import PERIOD
 from shm.values import NAN
 from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PooledReading, Stream, StreamEvent, WindowReading
+from shm.watch.ambient_hammer import TOGETHER, AmbientBias, ambient_bias
 
 State = Literal["live", "late", "silent", "never sent", "sensor at fault", "clock ahead"]
 
@@ -138,6 +139,25 @@ def _word(last: datetime | None, events: tuple[StreamEvent, ...], now: datetime)
         return "late"
     faults = (each for each in events if each.kind in _AT_FAULT)
     return "sensor at fault" if any(last - each.end < _FAULT_STANDS for each in faults) else "live"
+
+
+def against_hammer(store: Store, stream: Stream) -> AmbientBias:
+    """What a stream's frequencies differ by from those of hammer tests made while it ran."""
+    tests = [
+        each.test
+        for each in store.tests.list_all(stream.hanger)
+        if each.test.id != f"{stream.name}-{each.time:%Y-%m-%d}"  # a day of the stream itself
+    ]
+    times = [test.time for test in tests if test.time is not None]
+    near = (
+        reading
+        for at in times
+        for reading in store.streams.list_pooled(
+            stream.hanger, "hour", at - TOGETHER, at + TOGETHER
+        )
+    )
+    own = {each.start: each for each in near if each.stream == stream.name}
+    return ambient_bias(stream.hanger, tests, [own[start] for start in sorted(own)])
 
 
 def tension_words(hour: PooledReading | None) -> str:

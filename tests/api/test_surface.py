@@ -29,6 +29,7 @@ SIGNATURES = {
     "method='noise-floor', priors='description', progress)",
     "diagnose": "(tests, hanger, baseline='beam1', *, without=(), hold_out=(), draws=1000, seed=1, "
     "progress)",
+    "diagnose_simulator": "(simulator, readings, *, candidates=(), seed=1)",
     "simulate": "(hanger, *, tension_n=None, k1_n_m_rad=inf, k2_n_m_rad=inf, k3_n_m_rad=inf, "
     "k4_n_m_rad=inf, damping_ratio=0.001, hits=5, seconds_per_hit=20.0, sampling_rate_hz=512.0, "
     "sensors=2, hammer_x_m=nan, acceleration_noise_m_s2=0.02, effects=(), disturbances=(), "
@@ -52,7 +53,8 @@ SIGNATURES = {
 }
 NOUNS = {
     "AddedMass", "Diagnosis", "FrequencyResponse", "Hanger", "Identification", "ModalTest", "Mode",
-    "PlantedEffect", "Posterior", "Recording", "Selection", "ShmError",
+    "PlantedEffect", "Posterior", "Prior", "Reading", "Recording", "Selection", "ShmError",
+    "Simulator", "SimulatorEffect",
 }  # fmt: skip
 
 

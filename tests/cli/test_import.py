@@ -12,6 +12,7 @@ import pyuff
 from scipy.io import savemat, wavfile
 
 from shm.modes_document import load_modes
+from shm.pipeline.intake import as_taken_in
 from shm.read import read, sidecar_path
 from shm.read.modal_sets import _frequency
 from shm.store import Stage, Workspace
@@ -82,6 +83,28 @@ def test_the_second_file_of_a_logger_needs_nothing(
         ("transverse", 2.52),
         ("longitudinal", 2.52),
     ]
+
+
+def test_a_recording_is_looked_at_as_it_would_be_taken_in(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *SAID)
+    with as_taken_in(export(tmp_path / "b.csv", 2), workspace) as path:
+        found = read(path)
+    assert isinstance(found, Recording)
+    assert found.accelerations[1].plane == "longitudinal"
+    assert not sidecar_path(tmp_path / "b.csv").exists()
+
+
+def test_a_place_off_the_hanger_is_told_before_it_is_kept(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    said = ("--hanger", 3, "--place", "22", "--plane", "transverse,longitudinal")
+    ended = shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *said)
+    assert ended.code == 3
+    assert "A1: it is said to be at 22 m from the deck end" in ended.err + ended.out
+    assert files_of(workspace) == []
+    assert not (workspace.folder / "loggers").exists()
 
 
 def test_what_is_dropped_into_the_spool_is_read_by_its_profile(

@@ -1,4 +1,7 @@
-"""The catalogue of physical effects; a new one is one file and one line in `EFFECTS`."""
+"""The catalogue of physical effects; a new one is one file and one line in `EFFECTS`.
+
+Packages from outside add theirs by the entry points `shm.effects` (`shm.models.plug_ins`).
+"""
 
 from __future__ import annotations
 
@@ -25,6 +28,7 @@ from shm.models.effects.of_tension import (
     Sag,
     TemperatureTension,
 )
+from shm.models.plug_ins import EFFECTS_GROUP, members_with_plug_ins
 from shm.values import PLANES, EffectPrior, Hanger
 
 __all__ = [
@@ -61,7 +65,9 @@ _MEMBERS: tuple[Effect, ...] = (
     Timebase(),
 )
 
-EFFECTS: dict[str, Effect] = {effect.name: effect for effect in _MEMBERS}
+EFFECTS: dict[str, Effect] = members_with_plug_ins(
+    EFFECTS_GROUP, {effect.name: effect for effect in _MEMBERS}, Effect
+)
 
 
 def parameters_of(name: str, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:

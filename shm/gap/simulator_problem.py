@@ -1,0 +1,251 @@
+"""A user's own simulator as the gap diagnosis sees it: priors, predictions, errors of readings.
+
+    y_i = f(theta, condition_i)[observable_i] + e_i,    theta_j = prior_j(z_j),  z ~ N(0, 1)
+
+Every prior is a map of a standard normal z, as in the diagnosis of hangers, and the errors e are a
+few possibilities of unknown size (`NoiseNode`), so that `shm.gap.likelihood` serves both. What is
+the measurement's own (a gain, an offset) is a parameter of the simulator: it is in every
+hypothesis and competes with none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from scipy.special import ndtr
+
+from shm.errors import UsageError
+from shm.gap.contract import Covariance, Hypothesis, NoiseNode
+from shm.gap.noise import FACTOR_SPREAD, SD_LOWER, SD_UPPER
+from shm.values import FloatArray
+
+Condition: TypeAlias = Mapping[str, float]
+Predict: TypeAlias = Callable[[dict[str, Any], Condition], Mapping[str, Any]]
+
+# Gauss and Hermite's three points of a standard normal distribution.
+_HERMITE = ((-(3**0.5), 1 / 6), (0.0, 2 / 3), (3**0.5, 1 / 6))
+_UNKNOWN_SDS = 20  # technical: steps of a third in the logarithm of an unknown standard deviation
+# Judgement: what is off by more than half its own size is seen without a diagnosis.
+LARGEST_REMAINDER = 0.5
+_REMAINDERS = 8  # technical: from one standard deviation to a half of the value, factors of 2 to 3
+# Judgement: causes act alike at conditions that are less than a third of their range apart.
+_SMOOTH = 1 / 3
+_SEVERAL = 6  # technical: of more observables, a remainder is not tried in each one alone
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of a parameter before the data, as one of four spreads.
+
+    `uniform` and `logarithmic` lie between `a` and `b`; `normal` has the mean `a` and the standard
+    deviation `b`; `lognormal` has the median `a`, and its logarithm the standard deviation `b`.
+    """
+
+    spread: Literal["uniform", "logarithmic", "normal", "lognormal"]
+    a: float
+    b: float
+
+    def __post_init__(self) -> None:
+        rises = self.a < self.b if self.spread in ("uniform", "logarithmic") else self.b > 0
+        positive = self.a > 0 or self.spread in ("uniform", "normal")
+        if not (rises and positive):
+            raise UsageError(
+                f"Prior({self.spread!r}, {self.a:g}, {self.b:g}) cannot be.",
+                remedy="Bounds rise, deviations are above 0, logarithms need positive numbers.",
+            )
+
+    def value(self, z: FloatArray) -> FloatArray:
+        """The parameter at standard normal coordinates of any shape."""
+        match self.spread:
+            case "uniform":
+                return np.asarray(self.a + (self.b - self.a) * ndtr(z))
+            case "logarithmic":
+                return np.asarray(self.a * (self.b / self.a) ** ndtr(z))
+            case "normal":
+                return np.asarray(self.a + self.b * z)
+            case "lognormal":
+                return np.asarray(self.a * np.exp(self.b * z))
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One measured `observable` under a `condition`; an unknown `sd` is NaN."""
+
+    condition: Condition
+    observable: str
+    value: float
+    sd: float = float("nan")
+
+
+@dataclass(frozen=True)
+class SimulatorEffect:
+    """What may be true beside the simulator: its own priors and the simulator with it in.
+
+    `predict` gets the simulator's parameters and the effect's own in one dictionary.
+    """
+
+    name: str
+    parameters: Mapping[str, Prior]
+    predict: Predict
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """The model under test: `predict(parameters, condition)` gives observables by name.
+
+    Where it is `vectorised`, parameters come as arrays (n,) and observables are arrays (n,).
+    """
+
+    predict: Predict
+    parameters: Mapping[str, Prior]
+    effects: Sequence[SimulatorEffect] = ()
+    vectorised: bool = False
+
+    def __post_init__(self) -> None:
+        names = [each.name for each in self.effects]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        for each in self.effects:
+            twice += sorted(set(each.parameters) & set(self.parameters))
+        if twice:
+            raise UsageError(
+                f"Named twice in a simulator: {', '.join(twice)}.",
+                remedy="Each effect, and each parameter beside the simulator's, has its own name.",
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatorProblem:
+    """A simulator and its readings, ready to be fitted."""
+
+    simulator: Simulator
+    readings: tuple[Reading, ...]
+    value: FloatArray = field(init=False)
+    sd: FloatArray = field(init=False)
+    scale: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        value = np.array([each.value for each in self.readings], dtype=float)
+        sd = np.array([each.sd for each in self.readings], dtype=float)
+        if len(value) < 2 or not np.isfinite(value).all() or (sd <= 0).any():
+            raise UsageError(
+                "Readings are too few, not finite, or have a standard deviation of 0 or less.",
+                remedy="Give two and more; leave out what is unknown; an unknown sd is NaN.",
+            )
+        same = self.same_observable
+        object.__setattr__(self, "value", value)
+        object.__setattr__(self, "sd", sd)
+        object.__setattr__(self, "scale", np.sqrt(same @ value**2 / same.sum(axis=1)))
+
+    @property
+    def same_observable(self) -> FloatArray:
+        """(data, data): 1 where two readings are of one observable."""
+        names = np.array([each.observable for each in self.readings])
+        return np.asarray(names[:, None] == names, dtype=float)
+
+    def effect(self, hypothesis: Hypothesis) -> SimulatorEffect | None:
+        """The effect of a hypothesis; None of the simulator alone."""
+        return next((e for e in self.simulator.effects if (e.name,) == hypothesis.names), None)
+
+    def priors(self, hypothesis: Hypothesis) -> dict[str, Prior]:
+        """Of the simulator, then of the effect: one coordinate z each, in this order."""
+        effect = self.effect(hypothesis)
+        return {**self.simulator.parameters, **(effect.parameters if effect else {})}
+
+    def predicted(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
+        """Predictions (n, data) at z (n, d)."""
+        return self.predicted_of(hypothesis, z, self.readings)
+
+    def predicted_of(
+        self, hypothesis: Hypothesis, z: FloatArray, readings: Sequence[Reading]
+    ) -> FloatArray:
+        """Predictions (n, readings) at z (n, d), be they measured or only planned."""
+        effect = self.effect(hypothesis)
+        predict = effect.predict if effect else self.simulator.predict
+        priors = self.priors(hypothesis)
+        theta = {name: prior.value(z[:, j]) for j, (name, prior) in enumerate(priors.items())}
+        rows: dict[tuple[tuple[str, float], ...], list[int]] = {}
+        for i, each in enumerate(readings):
+            rows.setdefault(tuple(sorted(each.condition.items())), []).append(i)
+        predicted = np.empty((len(z), len(readings)))
+        for key, members in rows.items():
+            found = self._called(predict, theta, dict(key), len(z))
+            for i in members:
+                predicted[:, i] = _observable(found, readings[i], effect)
+        return predicted
+
+    def _called(
+        self, predict: Predict, theta: dict[str, FloatArray], condition: Condition, count: int
+    ) -> Mapping[str, Any]:
+        if self.simulator.vectorised:
+            return predict(dict(theta), condition)
+        each = [
+            predict({name: float(values[row]) for name, values in theta.items()}, condition)
+            for row in range(count)
+        ]
+        return {name: np.array([one[name] for one in each]) for name in each[0]}
+
+    def nodes(self) -> tuple[NoiseNode, ...]:
+        """The unknown errors: stated deviations times a common factor, unstated ones by a share."""
+        known = np.isfinite(self.sd)
+        shares = np.zeros(1) if known.all() else np.geomspace(SD_LOWER, SD_UPPER, _UNKNOWN_SDS)
+        factors = _HERMITE if known.any() else ((0.0, 1.0),)
+        return tuple(
+            _node(np.diag(own**2), np.log(weight / len(shares)))
+            for share in shares
+            for away, weight in factors
+            for own in [np.where(known, np.exp(FACTOR_SPREAD * away) * self.sd, share * self.scale)]
+        )
+
+    def flexible_nodes(self) -> tuple[NoiseNode, ...]:
+        """The unknown errors and a remainder that is free in form and size, log-uniform in size."""
+        plain = self.nodes()
+        own = plain[len(plain) // 2].covariance.frequency
+        sd = np.sqrt(np.diag(own))
+        largest = np.maximum(LARGEST_REMAINDER * self.scale, 2 * sd)
+        patterns, steps = self._patterns(), np.linspace(0, 1, _REMAINDERS)
+        log_weight = -np.log(len(patterns) * len(steps))
+        amplitudes = [sd ** (1 - step) * largest**step for step in steps]
+        return tuple(
+            _node(own + np.outer(size, size) * pattern, log_weight)
+            for pattern in patterns
+            for size in amplitudes
+        )
+
+    def _patterns(self) -> list[FloatArray]:
+        """Correlations (data, data) that a remainder may have: in all observables, and in each."""
+        same = self.same_observable
+        varied = self._varied_conditions()
+        apart = sum(((each[:, None] - each) ** 2 for each in varied), np.zeros_like(same))
+        forms = [np.eye(len(same)), same]
+        if varied:
+            forms.append(same * np.exp(-apart / (2 * _SMOOTH**2)))
+        forms += [same * np.outer(each, each) for each in varied]
+        observables = np.unique(same, axis=0)
+        if 1 < len(observables) <= _SEVERAL:
+            forms += [form * np.outer(one, one) for form in list(forms) for one in observables]
+        return forms
+
+    def _varied_conditions(self) -> list[FloatArray]:
+        """Each quantity that all conditions state and that varies, from 0 to 1."""
+        stated = set.intersection(*(set(each.condition) for each in self.readings))
+        values = [np.array([each.condition[n] for each in self.readings]) for n in sorted(stated)]
+        return [(each - each.min()) / np.ptp(each) for each in values if np.ptp(each) > 0]
+
+
+def _node(covariance: FloatArray, log_weight: float) -> NoiseNode:
+    return NoiseNode(Covariance(covariance, np.empty(0), np.empty((0, 0))), float(log_weight), 0.0)
+
+
+def _observable(
+    found: Mapping[str, Any], reading: Reading, effect: SimulatorEffect | None
+) -> FloatArray:
+    if reading.observable not in found:
+        of = f"effect {effect.name}" if effect else "the simulator"
+        raise UsageError(
+            f"{of} predicts no {reading.observable!r} at {dict(reading.condition)}.",
+            remedy=f"It gives {', '.join(found)}: return every observable that was read.",
+        )
+    return np.asarray(found[reading.observable], dtype=float)

@@ -1,0 +1,106 @@
+"""The gap diagnosis of a user's own simulator: closed form first, then three textbook systems."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shm.errors import UsageError
+from shm.gap.any_simulator import diagnose_simulator
+from shm.gap.contract import Hypothesis
+from shm.gap.simulator_fit import fitted
+from shm.gap.simulator_problem import (
+    Condition,
+    Prior,
+    Reading,
+    Simulator,
+    SimulatorEffect,
+    SimulatorProblem,
+)
+from tests.helpers.textbook_simulators import CANTILEVER, FRAME, OSCILLATOR
+from tests.worlds.textbook_systems import cantilever, frame, oscillator
+
+
+def line(p: dict[str, Any], at: Condition) -> Mapping[str, Any]:
+    return {"y": p["slope"] * at["x"] + p.get("offset", 0.0)}
+
+
+LINE = Simulator(
+    line,
+    {"slope": Prior("normal", 1.0, 0.5)},
+    [SimulatorEffect("offset", {"offset": Prior("normal", 0.0, 1.0)}, line)],
+)
+READINGS = tuple(Reading({"x": x}, "y", 1.3 * x + 0.4, 0.1) for x in (0.0, 1.0, 2.0, 3.0))
+
+
+def test_the_evidence_of_a_line_is_that_of_the_normal_distribution() -> None:
+    """y = (1 + z/2) x + e: N(x, x x'/4 + sd^2 I), over three sizes of sd as mixed in the nodes."""
+    problem = SimulatorProblem(LINE, READINGS)
+    x, y = np.arange(4.0), problem.value
+    log = []
+    for node in problem.nodes():
+        covariance = np.outer(x, x) / 4 + node.covariance.frequency
+        away = y - x
+        square = away @ np.linalg.solve(covariance, away)
+        volume = np.linalg.slogdet(2 * np.pi * covariance)[1]
+        log.append(node.log_weight - (square + volume) / 2)
+    fit = fitted(problem, Hypothesis(), np.random.default_rng(1))
+    assert fit.log_evidence == pytest.approx(np.logaddexp.reduce(log), abs=0.2)
+
+
+def test_one_point_at_a_time_and_all_at_once_are_the_same() -> None:
+    """A scalar function gives what a vectorised one does."""
+    one = diagnose_simulator(LINE, READINGS)
+    other = diagnose_simulator(replace(LINE, vectorised=True), READINGS)
+    assert one.named == other.named == ("offset",)
+    assert one.summary() == other.summary()
+
+
+def test_probabilities_add_to_one_and_the_summary_names_the_cause() -> None:
+    answer = diagnose_simulator(LINE, READINGS, candidates=[{"x": 0.0}, {"x": 1.7}])
+    assert sum(float(str(row["probability"])) for row in answer.to_records()) == pytest.approx(1)
+    assert "offset" in answer.summary().splitlines()[0]
+    assert answer.shrinkage.held_out_after < answer.shrinkage.held_out_before
+    assert answer.next_readings[0].condition == {"x": 0.0}  # where the slope alone can give nothing
+    assert answer.causes[0].size["offset"][0] == pytest.approx(0.4, abs=0.2)
+
+
+def test_without_stated_deviations_a_large_offset_is_found_all_the_same() -> None:
+    noise = 0.01 * np.random.default_rng(2).standard_normal(12)
+    readings = [Reading({"x": i / 3}, "y", 0.9 * i / 3 + 0.5 + e) for i, e in enumerate(noise)]
+    assert diagnose_simulator(LINE, readings).named == ("offset",)
+
+
+@pytest.mark.parametrize(
+    ("simulator", "world", "true", "size"),
+    [
+        (FRAME, frame, "loose_joint", 3e-4),
+        (CANTILEVER, cantilever, "support_moves", 2e-7),
+        (OSCILLATOR, oscillator, "friction", 1.5),
+    ],
+    ids=["frame", "cantilever", "oscillator"],
+)
+def test_a_textbook_system_gives_up_its_cause(
+    simulator: Simulator, world: Any, true: str, size: float
+) -> None:
+    """The truth is computed otherwise; with it off the catalogue, no other effect is blamed."""
+    readings = [Reading(*each) for each in world(np.random.default_rng(3), size)]
+    rivals = [each for each in simulator.effects if each.name != true]
+    two = [each for each in simulator.effects if each.name == true] + rivals[:1]
+    assert diagnose_simulator(replace(simulator, effects=two), readings).named == (true,)
+    assert diagnose_simulator(replace(simulator, effects=rivals[-1:]), readings).named == ()
+
+
+def test_what_cannot_be_is_refused_with_a_remedy() -> None:
+    with pytest.raises(UsageError, match="cannot be"):
+        Prior("logarithmic", -1.0, 1.0)
+    with pytest.raises(UsageError, match="Named twice in a simulator: slope"):
+        replace(LINE, effects=[SimulatorEffect("turned", LINE.parameters, line)])
+    with pytest.raises(UsageError, match="predicts no 'z'"):
+        diagnose_simulator(LINE, [*READINGS, Reading({"x": 1.0}, "z", 1.0, 0.1)])
+    with pytest.raises(UsageError, match="too few"):
+        diagnose_simulator(LINE, READINGS[:1])
