@@ -1,18 +1,21 @@
 """The JSON document of a gap diagnosis (`shm.diagnosis/1`), there and back.
 
+And that of a joint diagnosis of several hangers (`shm.bridge_diagnosis/1`), which holds theirs.
+
 As all documents it holds NaN until `shm.documents.dump` writes null; reading takes either.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any
 
 from shm.documents import value_of
-from shm.values import Cause, Diagnosis
+from shm.values import BridgeDiagnosis, Cause, Diagnosis
 
 DIAGNOSIS_SCHEMA = "shm.diagnosis/1"
+BRIDGE_DIAGNOSIS_SCHEMA = "shm.bridge_diagnosis/1"
 
 _PLAIN = (
     "hanger", "baseline", "no_gap_probability", "unexplained_probability", "fit_p_value",
@@ -22,6 +25,7 @@ _PLAIN = (
 
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     """The document of `shm gap diagnose --json`."""
+    compatible = diagnosis.compatibility
     return {
         "schema": DIAGNOSIS_SCHEMA,
         **{name: getattr(diagnosis, name) for name in _PLAIN},
@@ -41,6 +45,25 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "left_out": list(diagnosis.left_out),
         "remarks": list(diagnosis.remarks),
         "outliers": [asdict(outlier) for outlier in diagnosis.outliers],
+        "not_falsified": list(compatible.not_falsified) if compatible else None,
+        "compatibility": asdict(compatible) if compatible else None,
+        "remainder": asdict(diagnosis.remainder) if diagnosis.remainder else None,
+    }
+
+
+def bridge_diagnosis_document(found: BridgeDiagnosis) -> dict[str, Any]:
+    """The document of `shm gap diagnose --bridge --json`.
+
+    `causes` are those that hangers share, with `family` (the hangers tried) and `members` (each
+    with its probability and size); `tensions` are before, alone and jointly; `diagnoses` those of
+    each hanger alone.
+    """
+    return {
+        "schema": BRIDGE_DIAGNOSIS_SCHEMA,
+        **{each.name: getattr(found, each.name) for each in fields(found)},
+        "causes": [asdict(cause) for cause in found.causes],
+        "tensions": [asdict(tension) for tension in found.tensions],
+        "diagnoses": [diagnosis_document(each) for each in found.diagnoses],
     }
 
 
@@ -55,7 +78,7 @@ def _cause_document(cause: Cause) -> dict[str, Any]:
 def diagnosis_of(document: Mapping[str, Any]) -> Diagnosis:
     """A diagnosis back from its document; raises KeyError, TypeError or ValueError.
 
-    One from before outliers and 95 % intervals were told has none of them.
+    One from before outliers, 95 % intervals, compatibility and remainders were told has none.
     """
     tension = document["tension_n"]
     renamed = {

@@ -4,7 +4,8 @@ ShmError                      exit code 1
 ├── UsageError                2   the call itself is off
 ├── BadInput                  3   a file, channel, line or value that cannot be used
 │   ├── NotIdentifiable       3   a readable recording in which no mode can be trusted
-│   └── TooLarge              3   more bytes than are taken
+│   ├── TooLarge              3   more bytes than are taken
+│   └── DoubledChunk          3   another chunk of a stream has its number and time
 ├── NothingThere              4   a right question that has no answer yet
 ├── WorkerDied                1   a process died that worked on a file, perhaps not because of it
 ├── StoreError                5   the store cannot be used
@@ -99,6 +100,10 @@ class NotIdentifiable(BadInput):
 
 class TooLarge(BadInput):
     """A file of more bytes than are taken; it is neither copied nor read."""
+
+
+class DoubledChunk(BadInput):
+    """A chunk of a stream with the number and the time of one that is kept, and other samples."""
 
 
 class NothingThere(ShmError):

@@ -255,6 +255,11 @@ def open_workspace(ctx: click.Context, **flags: object) -> Workspace:
     return Workspace.open(ctx.obj, flags)
 
 
+def is_workspace(ctx: click.Context) -> bool:
+    """Whether the folder that the command works in is one."""
+    return (Path(ctx.obj) / "bridge.toml").is_file()
+
+
 @contextmanager
 def opened_store(ctx: click.Context) -> Iterator[tuple[Workspace, Store]]:
     """The workspace of the command and its store, open."""

@@ -15,6 +15,7 @@ from shm.errors import BadInput, UsageError
 from shm.identify import IDENTIFIERS, IdentifyOptions, identify
 from shm.identify.plausibility import signal_doubts
 from shm.modes_document import modes_document
+from shm.pipeline.intake import as_taken_in
 from shm.read.sandbox import read_test
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
@@ -22,15 +23,18 @@ from shm.report.contents import ModalTestReport
 from shm.report.figures.every_figure import modal_test_figures
 from shm.report.modal_test_report import modal_test_paper
 from shm.settings import Settings
-from shm.values import Hanger, Recording
+from shm.store import Workspace
+from shm.values import FrequencyResponse, Hanger, Recording
 from shm_cli.common import (
     counting_bar,
     drawing,
     figures_option,
     hanger_file_option,
     hanger_option,
+    is_workspace,
     json_option,
     one_hanger,
+    open_workspace,
     readable_width,
     show,
     told_doubts,
@@ -143,7 +147,8 @@ def command(
     """Modal parameters of recordings.
 
     Each file is a test of its own unless --together is given; a .zip holds the files of one test.
-    The hanger's description, where known, helps to number the modes. The page (--html) shows time
+    The hanger's description, where known, helps to number the modes; in a workspace the profile of
+    the file's logger says what `shm import` was told. The page (--html) shows time
     histories, frequency responses with the fitted modes, stabilisation, shapes and quality.
 
     \b
@@ -155,9 +160,12 @@ def command(
     if html is not None and len(groups) > 1:
         raise UsageError("--html shows one test.", remedy="Give one file, or --together.")
     options = _options(**chosen)
+    workspace = None
+    if hanger_file is None and (hanger_id is not None or is_workspace(ctx)):
+        workspace = open_workspace(ctx)
     with counting_bar() as bar:
         sheets = [
-            _identified(group, hanger, options)
+            _identified(group, hanger, options, workspace)
             for group in bar.track(groups, description="identifying")
         ]
     _refuse_several_hangers(sheets)
@@ -194,10 +202,13 @@ def _options(
 
 
 def _identified(
-    group: Sequence[Path], hanger: Hanger | None, options: IdentifyOptions
+    group: Sequence[Path],
+    hanger: Hanger | None,
+    options: IdentifyOptions,
+    workspace: Workspace | None,
 ) -> ModalTestReport:
     """One test; it is of the described hanger where its records do not say."""
-    records = [record for path in group for record in read_test(path)]
+    records = [record for path in group for record in _read(path, workspace)]
     for doubt in signal_doubts([r for r in records if isinstance(r, Recording)], hanger):
         click.echo(f"Doubtful: {doubt.text}", err=True)
     found = identify(records, options, test_id=group[0].stem, hanger=hanger)
@@ -213,6 +224,14 @@ def _identified(
     if hanger is not None:
         told_doubts([found.test], hanger)
     return ModalTestReport(found, records, hanger, (options.band_low_hz, options.band_high_hz))
+
+
+def _read(path: Path, workspace: Workspace | None) -> tuple[Recording | FrequencyResponse, ...]:
+    """As the workspace would take it in, by the profile of its logger."""
+    if workspace is None:
+        return read_test(path)
+    with as_taken_in(path, workspace) as found:
+        return read_test(found)
 
 
 def _refuse_several_hangers(sheets: Sequence[ModalTestReport]) -> None:

@@ -10,6 +10,7 @@ import rich_click as click
 
 from shm.errors import UsageError
 from shm.models import THESIS, Model, build
+from shm.report.figures.against_a_parameter import Curves, specify, write_png
 from shm.values import PLANES, FloatArray
 from shm_cli import completion
 from shm_cli.common import (
@@ -30,6 +31,12 @@ _MOST_POINTS = 10_000  # technical: a table that a person can still open, in sec
 @click.argument("model", shell_complete=completion.models)
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A parameter.")
 @click.option("--sweep", metavar="NAME=FROM:TO:N", help="A parameter over a range.")
+@click.option(
+    "--figure",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE.png",
+    help="Draw the frequencies of the --sweep here.",
+)
 @click.option("--modes", type=click.IntRange(1, 100), default=6, show_default=True)
 @hanger_option()
 @hanger_file_option
@@ -40,6 +47,7 @@ def command(
     model: str,
     settings: tuple[str, ...],
     sweep: str | None,
+    figure: Path | None,
     modes: int,
     hanger_id: int | None,
     hanger_file: Path | None,
@@ -54,14 +62,25 @@ def command(
 
     \b
     Example: shm predict beam1 --hanger-file H.toml --set theta_F=1 --set theta_L=0.97
+    Example: shm predict beam1 --hanger-file H.toml --sweep theta_F=0.5:2:50 --figure sweep.png
     """
+    if figure is not None and sweep is None:
+        raise UsageError("--figure draws a sweep.", remedy="Add --sweep theta_F=0.5:2:50, say.")
     chosen = build(model, one_hanger(ctx, hanger_file, hanger_id), THESIS)
     nominal = {name: 1.0 for name in chosen.parameter_names if name.startswith("theta_")}
     values = nominal | dict(_pair(setting) for setting in settings)
     if sweep is None:
         _show_one(chosen, values, modes, as_json)
     else:
-        _show_sweep(chosen, values, *_range(sweep), modes, as_json)
+        name, points = _range(sweep)
+        frequencies_hz = _swept(chosen, values, name, points, modes)
+        if figure is not None:
+            parts = [
+                Curves(plane, points, frequencies_hz[:, place])
+                for place, plane in enumerate(PLANES)
+            ]
+            write_png(specify(parts, name, "frequency (Hz)"), figure)
+        _show_sweep(chosen, values, name, points, frequencies_hz, as_json)
 
 
 def _show_one(model: Model, values: dict[str, float], modes: int, as_json: bool) -> None:
@@ -75,16 +94,27 @@ def _show_one(model: Model, values: dict[str, float], modes: int, as_json: bool)
     show_table(made)
 
 
-def _show_sweep(
-    model: Model, values: dict[str, float], name: str, points: FloatArray, modes: int, as_json: bool
-) -> None:
+def _swept(
+    model: Model, values: dict[str, float], name: str, points: FloatArray, modes: int
+) -> FloatArray:
+    """Frequencies in Hz, points by planes by modes."""
     theta = np.array([model.pack({**values, name: float(point)}) for point in points])
     with progress_bar("solving") as progress:
         rows_hz = []
         for done, row in enumerate(theta, start=1):
             rows_hz.append(_solved(model, row, modes))
             progress(model.name, done / len(theta))
-    frequencies = np.array(rows_hz)
+    return np.array(rows_hz)
+
+
+def _show_sweep(
+    model: Model,
+    values: dict[str, float],
+    name: str,
+    points: FloatArray,
+    frequencies: FloatArray,
+    as_json: bool,
+) -> None:
     if as_json:
         rows: list[dict[str, Any]] = [
             {name: float(point), "frequencies": _rows(row)}
@@ -92,7 +122,8 @@ def _show_sweep(
         ]
         show({"model": model.name, "parameters": values, "sweep": name, "points": rows})
         return
-    heads = [f"{plane[0].upper()}{order}" for plane in PLANES for order in range(1, modes + 1)]
+    orders = range(1, frequencies.shape[2] + 1)
+    heads = [f"{plane[0].upper()}{order}" for plane in PLANES for order in orders]
     made = table(f"{model.title}: frequencies in Hz (T transverse, L longitudinal)", name, *heads)
     for point, row in zip(points, frequencies, strict=True):
         made.add_row(f"{point:g}", *(f"{frequency:.3f}" for frequency in row.ravel()))

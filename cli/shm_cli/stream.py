@@ -11,12 +11,18 @@ import rich_click as click
 from shm.documents import format_time
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
-from shm.pipeline.stream_state import StreamCondition, stream_states, tension_words
+from shm.pipeline.stream_state import (
+    StreamCondition,
+    against_hammer,
+    stream_states,
+    tension_words,
+)
 from shm.read import write
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
 from shm.store.ring_recording import recording_of
 from shm.values import NAN
+from shm.watch.ambient_hammer import AmbientBias
 from shm_cli import completion
 from shm_cli.common import (
     json_option,
@@ -44,6 +50,7 @@ class StreamRow:
     sampling_rate_hz: float
     received_hz: float
     lost_share_24h: float
+    apart_s_24h: float
     ring_bytes: int
     last_window: datetime | None
     last_window_kind: str
@@ -52,6 +59,9 @@ class StreamRow:
     tension_shift: float
     tension_shift_sd: float
     learning: str
+    ambient_bias: float
+    ambient_bias_sd: float
+    hammer_tests: int
 
 
 _from = click.argument("start", type=Time(), metavar="FROM")
@@ -74,8 +84,11 @@ def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> Non
     """Permanent sensors: what is live, and what was lost.
 
     A stream is late once its last sample is 5 minutes old, silent after an hour. The share that was
-    lost is of the last 24 hours, up to the last sample; what comes late takes it back. Tension is
-    the change since the stream began, the weather taken off, with its 90 % interval.
+    lost is of the last 24 hours, up to the last sample; what comes late takes it back. Apart are
+    samples of a time that was there already, as of a clock that was set back: the first to come
+    count. Tension is the change since the stream began, the weather taken off, with its 90 %
+    interval. Where hammer tests were made while the sensors ran, it says what their frequencies
+    differ by.
 
     \b
     Example: shm stream --json
@@ -156,12 +169,13 @@ command.add_command(export)
 
 def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bool) -> None:
     states = stream_states(workspace, ring_of(workspace), store, now)
-    rows = [_row(each) for each in states]
+    beside = [against_hammer(store, each.stream) for each in states]
+    rows = [_row(*each) for each in zip(states, beside, strict=True)]
     if as_json:
         show({"streams": [asdict(row) for row in rows]})
         return
-    columns = ("stream", "hanger", "state", "last sample", "lag", "rate", "lost", "ring", "window",
-               "tension")  # fmt: skip
+    columns = ("stream", "hanger", "state", "last sample", "lag", "rate", "lost", "apart", "ring",
+               "window", "tension")  # fmt: skip
     made = table("Streams", *columns)
     for row, state in zip(rows, states, strict=True):
         made.add_row(
@@ -172,14 +186,18 @@ def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bo
             "" if state.lag is None else told(state.lag),
             f"{row.received_hz:.4g} Hz" if row.received_hz == row.received_hz else "",
             f"{row.lost_share_24h:.2%}" if row.lost_share_24h == row.lost_share_24h else "",
+            f"{row.apart_s_24h:.0f} s" if row.apart_s_24h else "",
             f"{row.ring_bytes / 1e6:.1f} MB",
             f"{_time(row.last_window)} {row.last_window_kind}, {row.last_window_how}".strip(" ,"),
             tension_words(state.hour),
         )
     show_table(made)
+    for each in beside:
+        if each.is_known:
+            click.echo(each.text())
 
 
-def _row(state: StreamCondition) -> StreamRow:
+def _row(state: StreamCondition, beside: AmbientBias) -> StreamRow:
     window, hour = state.window, state.hour
     return StreamRow(
         name=state.stream.name,
@@ -191,6 +209,7 @@ def _row(state: StreamCondition) -> StreamRow:
         sampling_rate_hz=state.stream.sampling_rate_hz,
         received_hz=state.received_hz,
         lost_share_24h=state.lost_share,
+        apart_s_24h=state.apart_s,
         ring_bytes=state.ring_bytes,
         last_window=window.window.start if window else None,
         last_window_kind=window.window.kind if window else "",
@@ -199,6 +218,9 @@ def _row(state: StreamCondition) -> StreamRow:
         tension_shift=hour.compensated_shift if hour else NAN,
         tension_shift_sd=hour.compensated_sd if hour else NAN,
         learning=hour.learning if hour else "",
+        ambient_bias=beside.common,
+        ambient_bias_sd=beside.common_sd,
+        hammer_tests=beside.most_tests,
     )
 
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
 
 import rich_click as click
 
 from shm.bridge import load_hanger
-from shm.errors import GateNotMet
+from shm.errors import GateNotMet, UsageError
+from shm.report.figures.against_a_parameter import write_png
 from shm_cli import thesis
 from shm_cli.common import json_option, markdown, progress_bar, seed_option, show, show_table, table
-from shm_cli.validation import frequencies, selection
+from shm_cli.validation import beam_solutions, frequencies, selection
 
 Texts = tuple[str, ...]
 
@@ -20,9 +22,22 @@ Texts = tuple[str, ...]
 @click.option(
     "--markdown", "as_markdown", is_flag=True, help="The tables as Markdown, for the docs."
 )
+@click.option(
+    "--figure",
+    type=click.Choice(tuple(beam_solutions.FIGURES)),
+    help="One figure of the thesis alone: dimensionless frequencies of a beam.",
+)
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE.png",
+    help="Draw the --figure here.",
+)
 @seed_option
 @json_option
-def command(as_markdown: bool, seed: int, as_json: bool) -> None:
+def command(
+    as_markdown: bool, figure: str | None, out: Path | None, seed: int, as_json: bool
+) -> None:
     """Our figures beside the thesis's, with a gate.
 
     The thesis's tables of computed frequencies, then hanger 3: all five model classes on both
@@ -31,7 +46,13 @@ def command(as_markdown: bool, seed: int, as_json: bool) -> None:
 
     \b
     Example: shm validate --markdown
+    Example: shm validate --figure 2.4 --out figure_2_4.png
     """
+    if figure is not None:
+        _show_figure(beam_solutions.solutions(beam_solutions.FIGURES[figure]), out, as_json)
+        return
+    if out is not None:
+        raise UsageError("--out draws one figure.", remedy="Say which: --figure 2.4, say.")
     tables, chosen = compared(seed)
     parts = {
         "computed frequencies of the thesis": (
@@ -66,6 +87,22 @@ def compared(
     with progress_bar("validating") as progress:
         tables = frequencies.compared(hanger, progress)
         return tables, selection.compared(hanger, seed, progress)
+
+
+def _show_figure(found: beam_solutions.Solutions, out: Path | None, as_json: bool) -> None:
+    if out is not None:
+        write_png(found.specification(), out)
+    if as_json:
+        show(found.document())
+    else:
+        names = [f"{found.figure.quantity}_{n}" for n in range(1, beam_solutions.MODES + 1)]
+        made = table(found.figure.title, "xi", *names)
+        for xi, row in found.rows():
+            made.add_row(f"{xi:.1f}", *(f"{value:.4f}" for value in row))
+        show_table(made)
+        click.echo(found.statement)
+    if found.difference > beam_solutions.LIMIT:
+        raise GateNotMet(found.statement, remedy="Report this: the beam's solver is at fault.")
 
 
 def _show(title: str, heads: Texts, rows: Sequence[Texts]) -> None:

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shm.errors import BadInput, ShmError
+from shm.errors import BadInput, DoubledChunk, ShmError
 from shm.pipeline.lineage import read_limits
 from shm.read import sidecar_path
 from shm.read.chunk_document import BY_TIME, chunk_document
@@ -75,7 +75,8 @@ class RollingFiles:
             contents = [chunk_document(chunk) for chunk in _chunks(workspace, stream, path)]
             take_chunks(workspace, self._store, name, contents, now)
         except BadInput as error:
-            note_refused(self._store, name, error, now)
+            if not isinstance(error, DoubledChunk):  # which is noted
+                note_refused(self._store, name, error, now)
             _lay_out(workspace, path, error, now)
         else:
             path.unlink()

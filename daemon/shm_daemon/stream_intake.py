@@ -6,7 +6,7 @@ import logging
 from collections.abc import Sequence
 from datetime import datetime
 
-from shm.errors import BadInput
+from shm.errors import BadInput, DoubledChunk
 from shm.store import Store, Workspace
 from shm.store.ring import Kept, ring_of
 from shm.values.stream import StreamEvent
@@ -24,6 +24,10 @@ def take_chunks(
     """
     try:
         return ring_of(workspace, lambda: now).append_all(contents, stream)
+    except DoubledChunk as error:
+        log.warning("stream %s: refused: %s", stream, error)
+        store.streams.save_event(StreamEvent(stream, "doubled", now, now, error.message))
+        raise
     except BadInput as error:
         note_refused(store, stream, error, now)
         raise

@@ -17,9 +17,9 @@ from shm.values import FrequencyResponse, Hanger, ModalTest, Recording
 def read(path: str | Path) -> Recording | FrequencyResponse:
     """The content of one file, in SI units, gaps as NaN.
 
-    CSV, UFF58, HDF5, MATLAB, TDMS or npz; a sidecar NAME.toml beside NAME.csv says what the file
-    does not. Time histories are a Recording, frequency responses a FrequencyResponse. Raises
-    BadInput naming file, line, channel and remedy. A .zip holds several files of one test:
+    CSV, UFF58, HDF5, MATLAB, TDMS, miniSEED or npz; a sidecar NAME.toml beside NAME.csv says what
+    the file does not. Time histories are a Recording, frequency responses a FrequencyResponse.
+    Raises BadInput naming file, line, channel and remedy. A .zip holds several files of one test:
     `shm.read.read_test` gives them all.
 
     Example:

@@ -12,7 +12,7 @@ from typing import Any
 
 from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, hook_of
-from shm.bridge.streams import stream_named, stream_of
+from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table
 from shm.errors import BadInput
 from shm.values import Hanger
@@ -97,9 +97,7 @@ def load_bridge(path: Path) -> Bridge:
     hooks = tuple(hook_of(table, path) for table in _tables(document, "hook", path))
     _refuse_doubles([hook.name for hook in hooks], "hook name", path)
     described = {each.id: each for each in hangers}
-    tables = _tables(document, "stream", path)
-    streams = tuple(stream_of(table, path, described) for table in tables)
-    _refuse_doubles([stream.name for stream in streams], "stream name", path)
+    streams = streams_of(_tables(document, "stream", path), path, described)
     return Bridge(
         name=str(document.get("bridge", {}).get("name", path.parent.name)),
         hangers=hangers,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,9 +67,35 @@ def _name(table: Table, example: str) -> str:
 
 
 def _refuse_doubles(names: list[str], table: Table) -> None:
+    if pair := _alike(names):
+        raise table.refusal(f"channel {_both(*pair)}", "Give each a name of its own.")
+
+
+def streams_of(
+    tables: list[dict[str, Any]], path: Path, hangers: Mapping[int, Hanger]
+) -> tuple[Stream, ...]:
+    """The streams of all `[[stream]]` tables; raises BadInput."""
+    streams = tuple(stream_of(table, path, hangers) for table in tables)
+    if pair := _alike([stream.name for stream in streams]):
+        remedy = "Give each a name of its own: each has a folder, and some disks know no capitals."
+        raise BadInput(f"stream name {_both(*pair)}.", file=path, remedy=remedy)
+    return streams
+
+
+def _alike(names: Sequence[str]) -> tuple[str, str] | None:
+    """Two names that are the same but for capitals."""
+    seen: dict[str, str] = {}
     for name in names:
-        if names.count(name) > 1:
-            raise table.refusal(f"channel {name} is given twice", "Give each a name of its own.")
+        if name.lower() in seen:
+            return seen[name.lower()], name
+        seen[name.lower()] = name
+    return None
+
+
+def _both(one: str, other: str) -> str:
+    if one == other:
+        return f"{one} is given twice"
+    return f"{other} is {one} but for capitals"
 
 
 def stream_named(streams: tuple[Stream, ...], name: str) -> Stream:
@@ -78,7 +104,10 @@ def stream_named(streams: tuple[Stream, ...], name: str) -> Stream:
         if stream.name == name:
             return stream
     known = ", ".join(stream.name for stream in streams) or "none"
+    meant = next((each.name for each in streams if each.name.lower() == name.lower()), None)
     raise BadInput(
-        f"stream {name!r} is not described in bridge.toml (known: {known}).",
-        remedy="Add a [[stream]] table with this name, or correct the name.",
+        f"stream {name[:64]!r} is not described in bridge.toml (known: {known}).",
+        remedy=f"Capitals count: write {meant}."
+        if meant
+        else "Add a [[stream]] table with this name, or correct the name.",
     )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from shm.gap.bridge_diagnosis import diagnose_bridge
 from shm.gap.contract import GapOptions, Progress
 from shm.gap.diagnose import diagnose
 
-__all__ = ["GapOptions", "Progress", "diagnose"]
+__all__ = ["GapOptions", "Progress", "diagnose", "diagnose_bridge"]

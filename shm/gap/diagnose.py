@@ -17,14 +17,16 @@ import numpy as np
 from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress, silent
 from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
-from shm.gap.data_checks import doubtful, set_aside, usable
+from shm.gap.data_checks import Usable, doubtful, set_aside, usable
+from shm.gap.falsification import compatibility
 from shm.gap.law_error import mixed
 from shm.gap.misfit import Misfit
 from shm.gap.next_measurement import ranked
 from shm.gap.observations import observed
-from shm.gap.outlier_removal import cleared, outliers, with_outliers
+from shm.gap.outlier_removal import Cleared, cleared, outliers, with_outliers
 from shm.gap.places import LocalCause, flexible_ends, local_causes, tried
 from shm.gap.problem import GapProblem
+from shm.gap.remainder import remainder_of
 from shm.gap.residuals import residuals, trends
 from shm.models import check_baseline
 from shm.models.as_made import TENSION_RATIO
@@ -40,6 +42,7 @@ from shm.values import (
     GapPlace,
     Hanger,
     ModalTest,
+    Outlier,
     TensionEstimate,
 )
 
@@ -67,7 +70,13 @@ def diagnose(
         >>> diagnosis.leading.effect
         'point_mass'
     """
-    options = options or GapOptions()
+    return examined(tests, hanger, options or GapOptions(), progress)[0]
+
+
+def examined(
+    tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions, progress: Progress = silent
+) -> tuple[Diagnosis, Attribution]:
+    """The diagnosis with the evidence that it rests on, for a diagnosis of several hangers."""
     started = time.perf_counter()
     check_effect_priors(hanger)
     check_baseline(options.baseline, hanger)
@@ -86,8 +95,9 @@ def diagnose(
     progress("next measurement", (1 + _ATTRIBUTION) / 2)
     following = ranked(problem, _contenders(attribution))
     progress("next measurement", 1.0)
+    compatible = compatibility(problem, attribution)
     tensions = [_tension(problem, f, rng) for f in ([(1.0, before)], possible(attribution))]
-    return Diagnosis(
+    diagnosis = Diagnosis(
         hanger=hanger.id,
         baseline=options.baseline,
         tests=tuple(test.id for test in found.tests),
@@ -108,15 +118,23 @@ def diagnose(
         next_measurements=following,
         remarks=(
             *_states(problem, before, after, tensions[1]),
-            *found.remarks,
-            *clear.misnumbered,
-            *set_aside(aside, clear.otherwise),
-            *doubtful(doubted),
+            *_on_the_way(found, clear, aside, doubted),
         ),
         seed=options.seed,
         seconds=time.perf_counter() - started,
         outliers=aside,
+        compatibility=compatible,
+        remainder=remainder_of(problem, attribution, compatible),
     )
+    return diagnosis, attribution
+
+
+def _on_the_way(
+    found: Usable, clear: Cleared, aside: Sequence[Outlier], doubted: Sequence[Outlier]
+) -> tuple[str, ...]:
+    """What was found on the way to data that can be used and hold no gross errors."""
+    gross = (*set_aside(aside, clear.otherwise), *doubtful(doubted))
+    return (*found.remarks, *clear.misnumbered, *gross)
 
 
 def _states(
@@ -200,7 +218,13 @@ def _tension(
         return TensionEstimate(NAN, NAN, NAN, NAN)
     weight = np.array([weight for weight, _ in fits])
     draws = [problem.tension_n(fit.hypothesis, fit.draws) for _, fit in fits]
-    samples = mixed(draws, weight, rng)
+    return tension_estimate(mixed(draws, weight, rng))
+
+
+def tension_estimate(samples: FloatArray) -> TensionEstimate:
+    """Of equal draws (n,) of a tension; NaN of a bar without any."""
+    if not np.isfinite(samples).all():
+        return TensionEstimate(NAN, NAN, NAN, NAN)
     low, high = (float(each) for each in np.quantile(samples, [0.025, 0.975]))
     return TensionEstimate(*_summary(samples), low, high)
 
@@ -220,6 +244,7 @@ _PASSES, _PASSES_OF_AN_END = 2, 16
 _BINS = 180
 _FINE = 8 * _BINS
 _LEAST_GAIN = 6.0  # of chi-square, for a size and a place: 95 % of chance alone
+_FEWEST = 4  # tension and stiffness take two frequencies, a size and its place two more
 _OUTSIDE = 0.05  # on either side of a 90 % interval
 
 
@@ -228,12 +253,14 @@ def places(problem: GapProblem, before: Fit) -> tuple[GapPlace, ...]:
 
     Kinds are `point mass`, `lateral spring`, `section loss` and `flexible end`, whose profile
     holds the two ends with their probabilities. Kinds that explain no more than noise would are
-    absent. A profile is the likelihood of the likeliest size at each place, scaled to a density
-    (means over 180 stretches).
+    absent, as all are where there are fewer than `_FEWEST` frequencies. A profile is the likelihood
+    of the likeliest size at each place, scaled to a density (means over 180 stretches).
     What a kind leaves unexplained counts as noise, so that a kind that does not fit does not claim
     to know its place. Where two places explain the data alike, as x and L - x do of a hanger with
     like ends whose shapes were not measured, the profile has both and the interval spans both.
     """
+    if problem.design.frequencies < _FEWEST:
+        return ()
     misfit = Misfit.of(problem, before)
     found = [_place(problem, before, misfit, cause) for cause in local_causes(problem)]
     found.append(_end(problem, before, misfit))

@@ -31,7 +31,7 @@ from shm.models.effects import Conditions, Survey
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
 
 _SAME_PLACE_M = 1e-3  # judgement: places are written in mm; no two sensors fit nearer
-_FEWEST_FREQUENCIES = _FEWEST_READINGS = 2  # of one there is no difference
+_FEWEST_READINGS = 2  # of one there is no difference
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ class _Component:
 def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
     """All usable data of `tests`; shapes without standard deviations are not usable.
 
-    Raises BadInput where there are no tests, fewer than two frequencies, a frequency or a sensor's
-    place that cannot be, or one mode twice in a test.
+    Raises BadInput where there are no frequencies, a frequency or a sensor's place that cannot be,
+    or one mode twice in a test.
     """
     _refuse_nonsense(tests, hanger)
     tests = [level for test in tests for level in _by_level(test)]
@@ -210,11 +210,10 @@ def _refuse_nonsense(tests: Sequence[ModalTest], hanger: Hanger) -> None:
                 f"test {test.id} holds the {twice[0]} mode {twice[1]} twice.",
                 remedy="Give each mode of a plane its own order, counted from 1.",
             )
-    if sum(len(test.modes) for test in tests) < _FEWEST_FREQUENCIES:
+    if not any(test.modes for test in tests):
         raise BadInput(
-            "a gap cannot be diagnosed from fewer than two frequencies: the tension alone can "
-            "follow any one of them.",
-            remedy="Identify more modes, or give more tests.",
+            "no test holds a frequency: there is nothing to diagnose.",
+            remedy="Identify modes, or give tests that have some.",
         )
 
 

@@ -18,7 +18,9 @@ from shm.identify.estimation.amplitude_dependence import with_amplitude_dependen
 from shm.identify.estimation.poles import modal_assurance
 from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
+from shm.identify.measuring.sensor_places import refuse_off_the_hanger
 from shm.identify.measuring.setups import measured, without_unused_force
+from shm.identify.mode_ordering.directions import directions
 from shm.identify.mode_ordering.placement import Placement, placed
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
@@ -79,6 +81,7 @@ def identify(
     The description of the `hanger`, where known, helps to number the modes. Raises BadInput
     where the records cannot be used together, NotIdentifiable where no mode can be trusted.
     """
+    refuse_off_the_hanger(records, hanger)
     recordings = [record for record in records if isinstance(record, Recording)]
     measurements = measured(records, options)
     recordings = without_unused_force(recordings, measurements)
@@ -86,6 +89,8 @@ def identify(
     second = _cross_check(measurements, options)
     steady = tones(measurements, recordings, options)
     quality = assess(Inspection(recordings, measurements, options, steady, found.finding, second))
+    if turned := directions(found.finding.modes, found.points):
+        quality = (*quality, turned)
     if refused := refusal(quality, records[0].source):
         raise refused
     placement = placed(found.finding.modes, found.points, hanger, steady)

@@ -83,6 +83,7 @@ class TMixture:
                 whole.whiten(population), clusters, minit="++", rng=rng
             )[1]
         members = [population[label == k] for k in range(clusters) if np.sum(label == k) > 2]
+        members = members or [population]  # of a few points apart, none makes a cluster
         shares = np.array([len(cluster) for cluster in members], dtype=float)
         return cls([_shrunk(cluster, whole) for cluster in members], shares)
 

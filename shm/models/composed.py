@@ -114,7 +114,7 @@ def _same(one: PhysicalHanger, other: PhysicalHanger) -> bool:
 
 
 def _numbers(physical: PhysicalHanger) -> list[FloatArray]:
-    parts = [*physical.zones, *physical.masses, *physical.springs]
+    parts = [*physical.zones, *physical.masses, *physical.springs, *physical.mode_laws]
     values = [getattr(physical, each.name) for each in fields(physical)]
     own = [value for value in values if isinstance(value, np.ndarray)]
     return own + [value for part in parts for value in vars(part).values()]

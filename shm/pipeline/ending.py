@@ -16,7 +16,7 @@ from dataclasses import replace
 from functools import partial
 
 from shm.store import StoredAlert
-from shm.values import Alert, Drift, Hanger, Posterior, WatchedTest
+from shm.values import Alert, Drift, Hanger, Moved, Posterior, WatchedTest
 from shm.values.drift import OF_ONE_VISIT
 
 SHM = "shm"
@@ -24,6 +24,8 @@ SHM = "shm"
 
 _HALF = 0.5  # judgement: of a shift, so much must be left of it
 _ODD = 0.5  # likelier than not: such a test agrees with nothing, and says nothing of a shift
+_SDS = 2.0  # by which two measurements of one change differ once in twenty times
+_OF_CHANGES = {"beyond threshold", "sudden change", "slow drift"}
 _REPEAT = ("repeat the test",)
 _REPEATS = (_REPEAT, ("tests disagree",))
 
@@ -77,6 +79,40 @@ def is_told(alert: Alert, standing: Sequence[Alert]) -> bool:
         return False
     known = {each for one in standing if beyond in one.kinds for each in _conditions(one)}
     return _conditions(alert) <= known
+
+
+def told_by_other(
+    alert: Alert | None, stored: Sequence[StoredAlert], *, of_stream: bool
+) -> StoredAlert | None:
+    """The standing alert of a stream, which is against no baseline (else of a test), that has told
+    the same event: the same quantity went the same way, by no more, before that was told. A test
+    that fits none before it is what such a change leads to.
+    """
+    if alert is None or not set(alert.kinds) <= {*_OF_CHANGES, *_REPEAT}:
+        return None
+    own = _change_of(alert)
+    for first in stored:
+        told = _change_of(first.alert)
+        if first.resolution or (first.baseline_id is None) != of_stream or told is None:
+            continue
+        if not set(first.alert.kinds) & _OF_CHANGES:
+            continue
+        if alert.kinds == _REPEAT:
+            return first
+        if own is None or (alert.change and alert.change.began_after > first.alert.time):
+            continue
+        is_same = own.quantity == told.quantity and own.shift_mean * told.shift_mean > 0
+        more = abs(own.shift_mean) - abs(told.shift_mean)
+        if is_same and more <= _SDS * math.hypot(own.shift_sd, told.shift_sd):
+            return first
+    return None
+
+
+def _change_of(alert: Alert) -> Drift | Moved | None:
+    """What an alert leads with."""
+    if alert.change and alert.change.moved:
+        return alert.change.moved[0]
+    return alert.drifts[0] if alert.drifts else None
 
 
 def seen_again(

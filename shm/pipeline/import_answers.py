@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from shm.errors import UsageError
-from shm.pipeline.importing import Import, Question, Understood
+from shm.pipeline.importing import WORTHS, Import, Question, Understood
 from shm.read.logger_words import measured_unit, seconds_of, sensitivity_of, volts_of
 from shm.read.units import KNOWN
 from shm.values import PLANES, Plane
@@ -43,7 +43,7 @@ def answer_to(question: Question, text: str, found: Import) -> dict[str, object]
     if plain.lower() in _NOTHING:
         return {"leave_out": True}
     unit = unit_recorded(question.channel, found)
-    is_raw = volts_of(unit) is not None or unit == "full scale"
+    is_raw = volts_of(unit) is not None or unit in WORTHS
     return channel_answer("sensitivity" if is_raw else "unit", plain, unit)
 
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput
+from shm.identify.measuring.sensor_places import fault_of_place
 from shm.pipeline.lineage import read_limits
 from shm.read import logger_words as words
 from shm.read.assemble import recording
@@ -32,6 +33,11 @@ from shm.values import NAN, Channel, FloatArray, Plane, Quantity, Recording
 
 OUTLINE_BINS = 32
 """Into how many parts of equal length the picture of a channel divides it."""
+WORTHS = {
+    "full scale": ("the full scale", ("50 g", "2000 N")),
+    "counts": ("one count", ("2.4e-6 m/s2", "0.001 N")),
+}
+"""Units of which only the sensor's owner knows what one is worth."""
 _ASKED_UNITS = ("", "full scale", "1", "-", "counts", "digits", "lsb")
 
 
@@ -135,7 +141,10 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     hanger = described.get("hanger", found.hanger)
     rate = float(described.get("sampling_rate_hz", found.sampling_rate_hz))
     questions = _questions(found, described, hanger, rate)
-    problems = _hanger_problem(hanger, workspace)
+    problems = (
+        *_hanger_problem(hanger, workspace),
+        *_place_problems(found, described, hanger, workspace),
+    )
     record, fault = _recording(found, described, rate, path)
     if found.lines or any(question.about in ("unit", "rate") for question in questions):
         fault = ""  # the answers may mend it
@@ -208,6 +217,19 @@ def _hanger_problem(hanger: object, workspace: Workspace) -> tuple[str, ...]:
     return ()
 
 
+def _place_problems(
+    found: Survey, described: Described, hanger: object, workspace: Workspace
+) -> list[str]:
+    """Sensors that are said to be off the hanger, where it is one of the bridge."""
+    tested = next((each for each in workspace.bridge.hangers if each.id == hanger), None)
+    if tested is None:
+        return []
+    columns = [_told(column, described) for column in found.columns]
+    of_sensors = [each for each in columns if each.quantity == "acceleration"]
+    faults = {each.name: fault_of_place(each.x_m, tested) for each in of_sensors}
+    return [f"{name}: {fault}" for name, fault in faults.items() if fault]
+
+
 # ---------------------------------------------------------------- what is open
 
 
@@ -276,15 +298,16 @@ def _open(columns: Sequence[SurveyedColumn]) -> list[SurveyedColumn]:
 
 def _of_unit(column: SurveyedColumn) -> Question:
     quoted = shlex.quote(column.name)
-    if words.volts_of(column.unit) is None and column.unit != "full scale":
+    if words.volts_of(column.unit) is None and column.unit not in WORTHS:
         text = f"In what unit is {column.name} recorded (N, kN, m/s2, g)?"
         option = f"--unit {quoted}=UNIT or --leave-out {quoted}"
     else:
         text = f"What does the sensor of {column.name} give (such as 100 mV/g, 2.25 mV/N)?"
         option = f"--sensitivity {quoted}='100 mV/g' or --leave-out {quoted}"
-        if column.unit == "full scale":
-            text = f"What is the full scale of {column.name} worth (such as 50 g, 2000 N)?"
-            option = f"--sensitivity {quoted}='50 g' or --leave-out {quoted}"
+        if column.unit in WORTHS:
+            one, examples = WORTHS[column.unit]
+            text = f"What is {one} of {column.name} worth (such as {', '.join(examples)})?"
+            option = f"--sensitivity {quoted}='{examples[0]}' or --leave-out {quoted}"
     return Question("unit", column.name, text, option)
 
 

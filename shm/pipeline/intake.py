@@ -6,9 +6,12 @@ The file is safe in the archive before it is entered, and entered before it leav
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 import uuid
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -124,6 +127,20 @@ def _keep(
             made = archive.keep(made_up, most_bytes=most, meanwhile=meanwhile)
         kept_sidecar = replace(made, entry=kept_sidecar.entry) if kept_sidecar else made
     return kept_sidecar, archive.keep(path, follow=follow, most_bytes=most, meanwhile=meanwhile)
+
+
+@contextmanager
+def as_taken_in(path: Path, workspace: Workspace) -> Iterator[Path]:
+    """A recording beside the sidecar with which it would be taken in: itself, or a copy for as
+    long as it is used, where its logger's profile says more than its own sidecar."""
+    text = _by_profile(path, workspace, follow=True)
+    if text is None:
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="shm-") as folder:
+        copied = Path(shutil.copy2(path, folder))
+        sidecar_path(copied).write_text(text, encoding="utf-8")
+        yield copied
 
 
 def _by_profile(path: Path, workspace: Workspace, follow: bool) -> str | None:

@@ -13,7 +13,7 @@ from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline.clock import Clock
-from shm.pipeline.ending import gap_stands, is_told, seen_again, why_over
+from shm.pipeline.ending import gap_stands, is_told, seen_again, told_by_other, why_over
 from shm.pipeline.judging import judge
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import registered, run_step
@@ -294,15 +294,16 @@ class Jobs:
             if found is None:  # the test still waits, to be watched from the baseline on
                 self.store.watch.forget_state(baseline)
                 return None
-            watched, alert, content = found
-            state = KeptWatch(needed.key, test.time, content)
+            watched, alert, state = *found[:2], KeptWatch(needed.key, test.time, found[2])
             if alert is not None and silences:
                 earlier = [each.alert for each in self.store.alerts.list_all(hanger.id)]
                 works = works_before(alert, silences, earlier)
                 alert = alert if works is None else after_works(alert, works)
             ended, alert = self._ended(hanger, baseline, watched, alert)
-            now = self.clock()
-            return self.store.watch.save(test, baseline, watched, alert, hooks, now, state, ended)
+            first = told_by_other(alert, self.store.alerts.list_all(hanger.id), of_stream=True)
+            rings, now = None if first else alert, self.clock()
+            of_test = (test, baseline, watched, rings, hooks, now)
+            return self.store.watch.save(*of_test, state, ended, first)
 
         return Step(run, keep)
 

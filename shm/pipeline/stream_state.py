@@ -15,6 +15,7 @@ from shm.store.ring_files import PERIOD
 from shm.values import NAN
 from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PooledReading, Stream, StreamEvent, WindowReading
+from shm.watch.ambient_hammer import TOGETHER, AmbientBias, ambient_bias
 
 State = Literal["live", "late", "silent", "never sent", "sensor at fault", "clock ahead"]
 
@@ -30,6 +31,8 @@ _FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends i
 class StreamCondition:
     """`lost_share` is of the samples of the last 24 hours up to the last one, NaN without any.
 
+    `apart_s` is how many seconds of samples came for a time that was there already, in 24 hours:
+    they do not count, and are kept beside those that came first.
     `behind` is how much has come and is not read yet; `events` are those of the last 24 hours.
     """
 
@@ -40,6 +43,7 @@ class StreamCondition:
     behind: timedelta | None
     received_hz: float
     lost_share: float
+    apart_s: float
     ring_bytes: int
     window: WindowReading | None
     hour: PooledReading | None
@@ -63,7 +67,8 @@ def _state(
     events = store.streams.list_events(stream.name, now - _LATELY)
     progress = store.streams.progress(stream.name)
     window = store.streams.last_window(stream.name)
-    received, lost = _received(ring.state(stream.name).received_s, last, now)
+    state = ring.state(stream.name)
+    received, lost = _received(state.received_s, last, now)
     return StreamCondition(
         stream=stream,
         state=_word(last, events, now),
@@ -72,6 +77,7 @@ def _state(
         behind=None if last is None or progress is None else max(timedelta(0), last - progress),
         received_hz=received * stream.sampling_rate_hz,
         lost_share=lost,
+        apart_s=_lately_s(state.apart_s, now),
         ring_bytes=ring.size_bytes(stream.name),
         window=window,
         hour=store.streams.last_hour(stream.name),
@@ -117,6 +123,11 @@ def _received(
     return min(known[last] / of_last_s, 1.0), min(max(1 - came_s / expected_s, 0.0), 1.0)
 
 
+def _lately_s(seconds: Mapping[str, float], now: datetime) -> float:
+    since = now - _LATELY
+    return sum(each for start, each in seconds.items() if parse_time(start) >= since)
+
+
 def _word(last: datetime | None, events: tuple[StreamEvent, ...], now: datetime) -> State:
     if last is None:
         return "never sent"
@@ -128,6 +139,25 @@ def _word(last: datetime | None, events: tuple[StreamEvent, ...], now: datetime)
         return "late"
     faults = (each for each in events if each.kind in _AT_FAULT)
     return "sensor at fault" if any(last - each.end < _FAULT_STANDS for each in faults) else "live"
+
+
+def against_hammer(store: Store, stream: Stream) -> AmbientBias:
+    """What a stream's frequencies differ by from those of hammer tests made while it ran."""
+    tests = [
+        each.test
+        for each in store.tests.list_all(stream.hanger)
+        if each.test.id != f"{stream.name}-{each.time:%Y-%m-%d}"  # a day of the stream itself
+    ]
+    times = [test.time for test in tests if test.time is not None]
+    near = (
+        reading
+        for at in times
+        for reading in store.streams.list_pooled(
+            stream.hanger, "hour", at - TOGETHER, at + TOGETHER
+        )
+    )
+    own = {each.start: each for each in near if each.stream == stream.name}
+    return ambient_bias(stream.hanger, tests, [own[start] for start in sorted(own)])
 
 
 def tension_words(hour: PooledReading | None) -> str:

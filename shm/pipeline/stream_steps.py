@@ -75,13 +75,14 @@ def _power(piece: Piece) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Pooled:
-    """A reading of a period, what the watch keeps and calls for, and a day as a modal test."""
+    """A reading of a period, what the watch keeps, calls for and ends, a day as a modal test."""
 
     reading: PooledReading | None
     kept: bytes | None = None
     alert: Alert | None = None
     events: tuple[StreamEvent, ...] = ()
     test: ModalTest | None = None
+    ended: tuple[str, ...] = ()
 
 
 def pool_stream(
@@ -112,4 +113,4 @@ def pool_stream(
         compensated_sd=found.compensated_sd,
         learning=found.learning,
     )
-    return Pooled(told, found.kept, found.alert, found.events)
+    return Pooled(told, found.kept, found.alert, found.events, ended=found.ended)

@@ -22,12 +22,13 @@ from typing import TYPE_CHECKING, Any
 from shm.documents import dump, format_time
 from shm.modes_document import modes_document
 from shm.pipeline.clock import Clock, utc_now
+from shm.pipeline.ending import told_by_other
 from shm.read.atomic import replace_text
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX, nothing
 from shm.store.ring import ring_of
 from shm.store.ring_files import PERIOD
-from shm.values import ModalTest, Posterior
+from shm.values import Alert, ModalTest, Posterior
 from shm.values.stream import PERIODS, Period, PooledReading, Stream, Window, WindowReading
 
 if TYPE_CHECKING:
@@ -319,12 +320,23 @@ class Streaming:
             why = f"alert {found.alert.key}"
             self.ring.keep(stream.name, end - _KEPT_BEFORE_ALERT, end, why)
         hooks = [hook.name for hook in self.workspace.bridge.hooks]
-        kept = found.kept or None
         raised = self.store.streams.save_pooled(
-            found.reading, kept, found.alert, hooks, self.clock()
+            found.reading,
+            found.kept or None,
+            None if found.alert is None or self._is_told(found.alert) else found.alert,
+            hooks,
+            self.clock(),
+            found.ended,
         )
         if raised is not None:
             log.warning("alert %s: %s", raised.alert.key, raised.alert.message)
+
+    def _is_told(self, alert: Alert) -> bool:
+        """Whether a hammer test, or a day as one, was first to tell it."""
+        first = told_by_other(alert, self.store.alerts.list_all(alert.hanger), of_stream=False)
+        if first is not None:
+            log.info("alert %s is that of %s", alert.key, first.alert.key)
+        return first is not None
 
     def _hand_on(self, test: ModalTest, reading: PooledReading) -> None:
         """A day as a modal test into the spool, which takes the same bytes once."""

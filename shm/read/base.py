@@ -56,8 +56,8 @@ class Format:
 
     `recognises` judges the first bytes of a file; `write` is None of a format that is only read;
     `may_be_gzipped` says whether NAME.csv.gz is read too; `holds_responses` is False of one that
-    holds time records alone, `names_channels` of one whose channels are only numbered. `table`
-    gives all columns of a file, None where it holds no time records.
+    holds time records alone, `names_channels` of one whose channels have numbers, or names of its
+    own. `table` gives all columns of a file, None where it holds no time records.
     """
 
     name: str

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from shm.bridge.streams import is_stream_name
 from shm.documents import Misfit, compact, finite, reader, value_of
 from shm.errors import BadInput, TooLarge
-from shm.values import NAN
+from shm.values import NAN, FloatArray
 from shm.values.stream import Chunk
 
 CHUNK_SCHEMA = "shm.chunk/1"
@@ -32,6 +32,9 @@ LARGEST_BYTES = 32 << 20
 
 BY_TIME = 2**61
 """Numbers from here on were made of the time, as of files that have none: they count nothing."""
+
+_LARGEST_M_S2 = 2e6
+"""Judgement: the toughest shock sensors end at 200 000 g (Endevco 7270A); more is no reading."""
 
 _FASTEST_HZ = 1e5  # judgement: far beyond any mode of a hanger
 _LARGEST_SEQUENCE = 2**62  # technical: kept as a number of 64 bits
@@ -62,32 +65,57 @@ def chunk_document(chunk: Chunk) -> bytes:
     return compact(header).encode() + b"\n" + body
 
 
+def refuse_long_chunk(size_bytes: int, most_bytes: int = LARGEST_BYTES) -> None:
+    """Raises TooLarge for a chunk of more bytes than are taken."""
+    if size_bytes > most_bytes:
+        raise TooLarge(
+            f"a chunk of {size_bytes} bytes is more than the {most_bytes} that are taken.",
+            remedy=f"Send shorter chunks, more often: each at most {most_bytes >> 20} MiB and "
+            "ten minutes; one of ten seconds to a minute is best.",
+        )
+
+
 def parse_chunk(content: bytes) -> Chunk:
     """The chunk of such bytes; raises BadInput that says what is wrong."""
-    if len(content) > LARGEST_BYTES:
-        raise TooLarge(
-            f"a chunk of {len(content)} bytes is more than the {LARGEST_BYTES} that are taken.",
-            remedy="Send shorter chunks, more often.",
-        )
     header, body = _header(content)
-    if header.schema != CHUNK_SCHEMA:
-        raise _wrong(f"schema = {header.schema!r} is not {CHUNK_SCHEMA}")
-    if not is_stream_name(header.stream):
-        raise _wrong(f"stream = {header.stream[:80]!r} is no name of a stream")
-    if not 0 <= header.sequence < _LARGEST_SEQUENCE:
-        raise _wrong(f"sequence = {header.sequence} is no count")
-    if not 0 < header.sampling_rate_hz <= _FASTEST_HZ:
-        raise _wrong(f"sampling_rate_hz = {header.sampling_rate_hz:g} is no sampling rate")
-    if not _FIRST_YEAR <= header.time.year < _LAST_YEAR:
-        raise _wrong(f"time = {header.time:%Y-%m-%d}: the logger's clock is not set")
+    _refuse_header(header)
     channels, values = _samples(header, body)
     rate = header.sampling_rate_hz
     if not 0 < values.shape[1] <= LONGEST.total_seconds() * rate:
-        raise _wrong(f"it has {values.shape[1]} samples, which is none or over ten minutes")
-    values[~np.isfinite(values)] = NAN
+        raise _wrong(
+            f"it has {values.shape[1]} samples, which is none or over ten minutes",
+            f"Send 1 to {LONGEST.total_seconds() * rate:.0f} samples of each channel.",
+        )
     weather = header.temperature_c, header.wind_m_s
     start = header.time
     return Chunk(header.stream, header.sequence, start, rate, channels, values, *weather)
+
+
+def _refuse_header(header: _Header) -> None:
+    if header.schema != CHUNK_SCHEMA:
+        raise _wrong(
+            f"schema = {header.schema[:80]!r} is not {CHUNK_SCHEMA}",
+            f'Write "schema": "{CHUNK_SCHEMA}".',
+        )
+    if not is_stream_name(header.stream):
+        raise _wrong(
+            f"stream = {header.stream[:80]!r} is no name of a stream",
+            "Write the name of a [[stream]] of bridge.toml.",
+        )
+    if not 0 <= header.sequence < _LARGEST_SEQUENCE:
+        raise _wrong(
+            f"sequence = {header.sequence} is no count", "Count the chunks 0, 1, 2 and so on."
+        )
+    if not 0 < header.sampling_rate_hz <= _FASTEST_HZ:
+        raise _wrong(
+            f"sampling_rate_hz = {header.sampling_rate_hz:g} is no sampling rate",
+            f"Give it in Hz, at most {_FASTEST_HZ:.0f}.",
+        )
+    if not _FIRST_YEAR <= header.time.year < _LAST_YEAR:
+        raise _wrong(
+            f"time = {header.time:%Y-%m-%d}: the logger's clock is not set",
+            "Set it by GPS or NTP, and send the chunk with its true time.",
+        )
 
 
 def _header(content: bytes) -> tuple[_Header, bytes]:
@@ -99,29 +127,75 @@ def _header(content: bytes) -> tuple[_Header, bytes]:
             node, body = json.loads(content), b""
         return value_of(_Header, node, by=_READER), body
     except (Misfit, ValueError, RecursionError) as error:
-        raise _wrong(f"its first line is no header: {str(error)[:200]}") from error
+        raise _wrong(
+            f"its first line is no header: {str(error)[:200]}",
+            'Begin it with a line of JSON as {"schema": "shm.chunk/1", "stream": "h3", ...}.',
+        ) from error
 
 
 def _samples(header: _Header, body: bytes) -> tuple[tuple[str, ...], NDArray[np.float32]]:
     channels = header.channels or tuple(header.values)
     if not channels or len(set(channels)) < len(channels) or not all(map(is_stream_name, channels)):
-        raise _wrong("channels are missing, or one is named twice or not by letters and digits")
+        raise _wrong(
+            "channels are missing, or one is named twice or not by letters and digits",
+            "Name them as the [[stream.channel]] of bridge.toml.",
+        )
     if header.encoding == "float32":
-        values = np.frombuffer(body, "<f4", len(body) // 4)
-        if len(body) % (4 * len(channels)):
-            raise _wrong(f"{len(body)} bytes are no whole samples of {len(channels)} channels")
-        return channels, values.reshape(-1, len(channels)).T.astype(np.float32)
-    if header.encoding or body or set(header.values) != set(channels):
-        raise _wrong('it has neither "encoding": "float32" and samples, nor all channels in values')
+        values = _of_body(body, len(channels))
+    elif header.encoding or body or set(header.values) != set(channels):
+        raise _wrong(
+            'it has neither "encoding": "float32" and samples, nor all channels in values',
+            "Give one of the two.",
+        )
+    else:
+        rows = [_of_list(header, name) for name in channels]
+        if len({len(row) for row in rows}) > 1:
+            told = ", ".join(f"{n} has {len(r)}" for n, r in zip(channels, rows, strict=True))
+            raise _wrong(
+                f"its values are not as many of each channel: {told}",
+                "Write null for a missing one.",
+            )
+        values = np.array(rows)
+    for name, row in zip(channels, values, strict=True):
+        absurd = np.flatnonzero(np.abs(row) > _LARGEST_M_S2)  # a missing one is NaN
+        if len(absurd):
+            raise _no_reading(header, name, int(absurd[0]), f"{row[absurd[0]]:g} m/s2")
+    return channels, values.astype(np.float32)
+
+
+def _of_body(body: bytes, channels: int) -> NDArray[np.float32]:
+    if len(body) % (4 * channels):
+        raise _wrong(
+            f"{len(body)} bytes are no whole samples of {channels} channels",
+            "Send 4 bytes for each channel of each sample, behind one line of JSON.",
+        )
+    return np.frombuffer(body, "<f4").reshape(-1, channels).T
+
+
+def _of_list(header: _Header, channel: str) -> FloatArray:
+    """The numbers of a channel; null and NaN are missing ones."""
+    found = header.values[channel]
+    for place, value in enumerate(found):
+        if not (value is None or (isinstance(value, int | float) and not isinstance(value, bool))):
+            raise _no_reading(header, channel, place, json.dumps(value)[:40])
     try:
-        with np.errstate(over="ignore"):
-            made = np.array([header.values[name] for name in channels], dtype=float)
-            return channels, made.astype(np.float32).reshape(len(channels), -1)
-    except (TypeError, ValueError) as error:
-        raise _wrong("its values are not numbers, or not as many of each channel") from error
+        return np.array(found, dtype=float)  # None is NaN
+    except OverflowError:
+        place = next(n for n, v in enumerate(found) if v is not None and abs(v) > _LARGEST_M_S2)
+        raise _no_reading(header, channel, place, "a number without end") from None
 
 
-def _wrong(what: str) -> BadInput:
+def _no_reading(header: _Header, channel: str, place: int, what: str) -> BadInput:
     return BadInput(
-        f"the chunk cannot be used: {what}.", remedy="See docs/permanent_sensors.md for its form."
+        f"chunk {header.sequence} of stream {header.stream} cannot be used: sample {place} is "
+        f"{what}, which is no acceleration in m/s2.",
+        channel=channel,
+        remedy="Send numbers in m/s2, and null or NaN for what is missing.",
+    )
+
+
+def _wrong(what: str, remedy: str) -> BadInput:
+    return BadInput(
+        f"the chunk cannot be used: {what}.",
+        remedy=f"{remedy} docs/permanent_sensors.md shows its form.",
     )

@@ -21,6 +21,7 @@ from shm.read.content import (
 from shm.read.excel_file import FORMAT as EXCEL
 from shm.read.hdf5_file import FORMAT as HDF5
 from shm.read.matlab_file import FORMAT as MATLAB
+from shm.read.mini_seed_file import FORMAT as MINI_SEED
 from shm.read.numpy_file import FORMAT as NUMPY
 from shm.read.tdms_file import FORMAT as TDMS
 from shm.read.universal_file import FORMAT as UFF
@@ -35,6 +36,7 @@ FORMATS: tuple[Format, ...] = (
     NUMPY,
     EXCEL,
     WAVE,
+    MINI_SEED,
     UFF,
     CSV,
 )

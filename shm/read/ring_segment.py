@@ -5,14 +5,15 @@
     /_chunks                                          a row a chunk: what came, when, where it is
 
 `first` of a row is the number of the chunk's first sample; where its `start_us`, microseconds since
-1970, is not the `end_us` of the row before, samples are missing or there twice.
+1970, is not the `end_us` of the row before, samples are missing or there twice: then those of the
+row with the smallest `arrived_us` count, and the others only lie here.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -25,7 +26,7 @@ from shm.errors import BadInput
 from shm.read.limits import guarded
 from shm.values.stream import Chunk
 
-_NUMBERS = ("start_us", "end_us", "sequence", "first", "samples")
+_NUMBERS = ("start_us", "end_us", "sequence", "first", "samples", "arrived_us")
 _ROW = np.dtype(
     [(name, "<i8") for name in _NUMBERS]
     + [("checksum", "S16"), ("temperature_c", "<f8"), ("wind_m_s", "<f8")]
@@ -38,11 +39,15 @@ _MICROSECOND = timedelta(microseconds=1)
 
 @dataclass(frozen=True, order=True)
 class ChunkKey:
-    """What tells a chunk of a stream from all others: when it began, its number, its contents."""
+    """What tells a chunk of a stream from all others: when it began, its number, its contents.
+
+    `arrived_us` is when it came: where two are of one time, the first counts. 0 in old segments.
+    """
 
     start_us: int
     sequence: int
     checksum: str
+    arrived_us: int = field(default=0, compare=False)
 
 
 def microseconds(time: datetime) -> int:
@@ -77,7 +82,8 @@ def _rows(chunks: Sequence[tuple[ChunkKey, Chunk]]) -> NDArray[np.void]:
     rows, first = [], 0
     for key, chunk in chunks:
         samples = chunk.values.shape[1]
-        numbers = (key.start_us, microseconds(chunk.end), key.sequence, first, samples)
+        times = key.start_us, microseconds(chunk.end)
+        numbers = (*times, key.sequence, first, samples, key.arrived_us)
         rows.append((*numbers, key.checksum.encode(), chunk.temperature_c, chunk.wind_m_s))
         first += samples
     return np.array(rows, _ROW)
@@ -109,4 +115,6 @@ def read_segment(path: Path) -> dict[ChunkKey, Chunk]:
 
 
 def _key(row: np.void) -> ChunkKey:
-    return ChunkKey(int(row["start_us"]), int(row["sequence"]), row["checksum"].decode())
+    arrived_us = int(row["arrived_us"]) if "arrived_us" in (row.dtype.names or ()) else 0
+    checksum = row["checksum"].decode()
+    return ChunkKey(int(row["start_us"]), int(row["sequence"]), checksum, arrived_us)

@@ -18,6 +18,7 @@ from shm.values import (
     NAN,
     Alert,
     Averaged,
+    BridgeDiagnosis,
     CreepRate,
     Diagnosis,
     Drift,
@@ -217,6 +218,14 @@ class DiagnosisSheet:
 
     diagnosis: Diagnosis
     hanger: Hanger
+    bridge: str = ""
+
+
+@dataclass(frozen=True)
+class BridgeDiagnosisSheet:
+    """A joint diagnosis of several hangers, and the bridge's name where it is known."""
+
+    diagnosis: BridgeDiagnosis
     bridge: str = ""
 
 

@@ -34,7 +34,7 @@ from shm.report.diagnosis_wording import (
     tension_unit,
 )
 from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
-from shm.values import Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
+from shm.values import NO_GAP, Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
 from shm.values.force_units import ForceUnit
 
 if TYPE_CHECKING:
@@ -124,18 +124,22 @@ def _made(
 
 def causes(sheet: DiagnosisSheet) -> Table:
     diagnosis = sheet.diagnosis
-    rows = [_cause_row(cause) for claim in claims(diagnosis) for cause in claim.causes]
+    rows = [_cause_row(diagnosis, cause) for claim in claims(diagnosis) for cause in claim.causes]
     rest = (
-        ("no gap", diagnosis.no_gap_probability),
+        (NO_GAP, diagnosis.no_gap_probability),
         ("something not in the catalogue", diagnosis.unexplained_probability),
     )
-    rows += [(what, formatting.probability(share), *("",) * 5) for what, share in rest]
+    rows += [
+        (what, formatting.probability(share), "", *_compatible(diagnosis, what), *("",) * 4)
+        for what, share in rest
+    ]
     return Table(
         "Causes, likeliest first",
         (
             "cause",
             "probability",
             "alike",
+            *(("compatible",) if diagnosis.compatibility else ()),
             "log Bayes factor",
             "gain of fit",
             "Occam's factor",
@@ -160,11 +164,18 @@ def _marks(diagnosis: Diagnosis) -> tuple[str, ...]:
     return (*rows, *("claimed" if is_it else "left" for is_it in rest))
 
 
-def _cause_row(cause: Cause) -> tuple[str, ...]:
+def _compatible(diagnosis: Diagnosis, name: str) -> tuple[str, ...]:
+    """Whether the data contradict it; no column of a diagnosis from before that was judged."""
+    found = diagnosis.compatibility
+    return () if found is None else ({True: "yes", False: "no", None: ""}[found.of(name)],)
+
+
+def _cause_row(diagnosis: Diagnosis, cause: Cause) -> tuple[str, ...]:
     return (
         label(cause),
         formatting.probability(cause.probability),
         "" if cause.group is None else _LETTERS[cause.group % len(_LETTERS)],
+        *_compatible(diagnosis, cause.effect),
         formatting.number(cause.log_bayes_factor, "+z.1f"),
         formatting.number(cause.log_fit, "+z.1f"),
         formatting.number(cause.log_occam, "+z.1f"),
@@ -173,12 +184,14 @@ def _cause_row(cause: Cause) -> tuple[str, ...]:
 
 
 def _cause_note(diagnosis: Diagnosis) -> str:
+    judged = diagnosis.compatibility is not None
     left_out = ", ".join(formatting.quantity(effect) for effect in diagnosis.left_out)
     return (
         f"Against the baseline {diagnosis.baseline}, in natural logarithms: the Bayes factor is "
         "what the better fit gains and what Occam's factor takes for free parameters. Causes alike "
         "by the same letter cannot be told apart with these data. How far each was taken: screened "
         "by a linear fit, or fitted in full with a normal or a sampled posterior."
+        + (" Compatible: all data within the bounds of their errors." if judged else "")
         + (f" Taken out of the catalogue: {left_out}." if left_out else "")
     )
 

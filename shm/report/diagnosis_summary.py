@@ -6,6 +6,7 @@ import math
 
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_remainder import compatible, law, like_tension, told_of_few
 from shm.report.diagnosis_wording import (
     AFTER,
     Answer,
@@ -60,7 +61,10 @@ def consequences(diagnosis: Diagnosis) -> str:
         _shrinkage(diagnosis),
         _misfit(diagnosis),
         _pattern(diagnosis),
+        law(diagnosis.remainder),
         _tension(diagnosis),
+        like_tension(diagnosis.remainder),
+        compatible(diagnosis),
         _set_aside(diagnosis),
         next_step(diagnosis),
     )
@@ -68,8 +72,14 @@ def consequences(diagnosis: Diagnosis) -> str:
 
 
 def verdict(diagnosis: Diagnosis) -> str:
-    """The claim with its probability."""
+    """The claim with its probability, and what few data keep to themselves."""
     claim = claimed(diagnosis)
+    if few := told_of_few(diagnosis):
+        return few if answer(diagnosis) is Answer.NO_GAP else f"{_verdict(diagnosis, claim)} {few}"
+    return _verdict(diagnosis, claim)
+
+
+def _verdict(diagnosis: Diagnosis, claim: Claim | None) -> str:
     match answer(diagnosis):
         case Answer.NO_GAP:
             sure = diagnosis.no_gap_probability >= _SURE

@@ -101,7 +101,7 @@ def label(cause: Cause) -> str:
 def phrase(cause: Cause) -> str:
     """`a point mass of 12 kg (9 to 15) at 3.4 m (3.1 to 3.7)`; a pair joined by `and`."""
     clauses = [
-        _clause(effect, at, own_estimates(cause, number))
+        effect_phrase(effect, at, own_estimates(cause, number))
         for number, (effect, at) in enumerate(zip(cause.effects, cause.places, strict=True))
     ]
     return " together with ".join(clauses) + _also(cause)
@@ -118,7 +118,7 @@ def _also(cause: Cause) -> str:
     return f" (about as likely: {formatting.listed(places)})"
 
 
-def _clause(effect: str, at: str, estimates: Sequence[EffectEstimate]) -> str:
+def effect_phrase(effect: str, at: str, estimates: Sequence[EffectEstimate]) -> str:
     """What the effect is, how large, where; the bare name where its size is not known."""
     where = _place(at)
     try:

@@ -12,16 +12,18 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
+import numpy as np
+
 from shm.bridge.streams import stream_named
 from shm.documents import dump, format_time
-from shm.errors import BadInput, StoreBusy
+from shm.errors import BadInput, DoubledChunk, StoreBusy
 from shm.read.atomic import replace_text
-from shm.read.chunk_document import parse_chunk
+from shm.read.chunk_document import chunk_document, parse_chunk, refuse_long_chunk
 from shm.read.ring_segment import ChunkKey, microseconds, time_of
 from shm.store.archive import disk_error, sync
 from shm.store.ring_files import PERIOD, StreamFolder, checksum_of_chunk, log
-from shm.store.ring_notices import StreamState, load_state
-from shm.store.ring_pieces import joined
+from shm.store.ring_notices import DRIFT_PPM, StreamState, load_state
+from shm.store.ring_pieces import agree, joined
 from shm.store.ring_sealing import Note, seal_stream
 from shm.store.ring_sweep import Swept, sweep
 from shm.store.workspace import Workspace
@@ -31,9 +33,13 @@ MOST_WAITING = 20_000
 """Judgement: chunks of a stream that are not sealed, a day of one every 4 s. Beyond, whoever seals
 has ended, or cannot: senders, which keep what is not acknowledged, are held up."""
 
-_NO_GAP = timedelta(seconds=1)  # technical: stamps jitter; no window is lost for a second
 _TRIES = 5  # technical: a reader meets a sealing once in a while, and not again at once
-_RATE_OFF = 0.01  # judgement: of the described rate; a clock is not off by 1 %
+_RATE_OFF = DRIFT_PPM * 1e-6
+"""Of the described rate, within which a chunk is taken as of that rate. Derived: no frequency is
+then further off than the setting frequency_allowance grants. Crystals keep to it: NI 9234, 50 ppm.
+"""
+_OVER_RANGE = 2.0
+"""Of full_scale. Judgement: a sensor that clips at 5 V, before a converter that does at 10 V."""
 _UNFINISHED = timedelta(hours=1)  # technical: no file takes so long; a killed process left it
 
 
@@ -79,40 +85,35 @@ class Ring:
     def append_all(self, contents: Sequence[bytes], stream: str = "") -> list[Kept]:
         """Several at once, which is quicker; where one cannot be used, none is kept.
 
+        Raises DoubledChunk for one of the number and time of another that has other samples.
+
         `stream` is whose they must be, where that is known.
         """
+        for content in contents:
+            refuse_long_chunk(len(content))
         chunks = [self._fitting(parse_chunk(content), stream) for content in contents]
-        found = []
         try:
-            for chunk, content in zip(chunks, contents, strict=True):
-                found.append(self._place(chunk, content))
+            placed = [self._place(chunk) for chunk in chunks]
+            found = [self._kept(*each) for each in zip(chunks, placed, strict=True)]
             for name in {chunk.stream for chunk in chunks}:
-                sync(self._folder(name).incoming)
+                if (incoming := self._folder(name).incoming).is_dir():
+                    sync(incoming)
         except OSError as error:
             raise disk_error(error, self.folder) from error
         return found
 
     def read(self, stream: str, start: datetime, end: datetime) -> tuple[Piece, ...]:
         """The samples from `start` on and before `end`, sealed and unsealed alike, by time."""
-        folder, since = self._folder(stream), start - 2 * PERIOD
+        folder = self._folder(stream)
         for left in reversed(range(_TRIES)):
-            waiting = folder.waiting()  # first: what is sealed meanwhile is in a segment then
-            found: dict[ChunkKey, Chunk] = {}
-            for segment in folder.segments(since):
-                if segment.start >= end:
-                    break
-                found |= folder.chunks(segment.path)
             try:
-                for each in waiting:
-                    is_within = since <= time_of(each.key.start_us) < end
-                    if is_within and each.key not in found and (chunk := folder.load(each)):
-                        found[each.key] = chunk
+                found = folder.between(start, end, folder.waiting())
             except FileNotFoundError:
                 if not left:
                     raise
                 continue
             break
-        return joined((self._ordered(chunk) for _, chunk in sorted(found.items())), start, end)
+        return joined({k: self._ordered(chunk) for k, chunk in found.items()}, start, end)
 
     def seal(self, now: datetime) -> list[tuple[str, datetime]]:
         """Chunks of finished ten minutes become segments; each stream and beginning of ten minutes
@@ -150,24 +151,6 @@ class Ring:
         ends = {folder.folder.name: self._recent(folder) for folder in self._folders()}
         return {name: time_of(max(e for _, e in spans)) for name, spans in ends.items() if spans}
 
-    def watermark(self, stream: str) -> datetime | None:
-        """Up to when all has come, or is not waited for; None before the first sample.
-
-        A gap is waited for until ten minutes more have come behind it. What comes later yet finds
-        its place, and `seal` tells of it.
-        """
-        spans = sorted(self._recent(self._folder(stream)))
-        if not spans:
-            return None
-        latest = max(end for _, end in spans)
-        until = spans[0][1]
-        for start_us, end_us in spans:
-            is_gap = time_of(start_us) - time_of(until) > _NO_GAP
-            if is_gap and time_of(latest) - time_of(start_us) < PERIOD:
-                return time_of(until)
-            until = max(until, end_us)
-        return time_of(until)
-
     def periods(self, stream: str, since: datetime) -> tuple[datetime, ...]:
         """The beginnings of the ten minutes from `since` on that have sealed samples."""
         return tuple(dict.fromkeys(each.start for each in self._folder(stream).segments(since)))
@@ -190,22 +173,36 @@ class Ring:
                 remedy="Name the same stream in the chunk and in the address.",
             )
         if self._streams is not None:
-            _refuse_other(chunk, stream_named(tuple(self._streams), chunk.stream))
+            described = stream_named(tuple(self._streams), chunk.stream)
+            _refuse_other(chunk, described)
+            chunk = replace(self._ordered(chunk), sampling_rate_hz=described.sampling_rate_hz)
         if self._clock is not None:
             _refuse_far(chunk, self._clock(), self._late, self._ahead)
         return chunk
 
-    def _place(self, chunk: Chunk, content: bytes) -> Kept:
-        folder = self._folder(chunk.stream)
-        folder.make()
-        end_us, checksum = microseconds(chunk.end), checksum_of_chunk(content)
-        key = ChunkKey(microseconds(chunk.start), chunk.sequence, checksum)
-        path = folder.chunk_path(key, end_us)
-        # In this order: what is sealed between both looks is found by the second.
-        is_new = not path.exists() and key not in folder.spans(folder.segment_path(chunk))
-        if is_new:
+    def _place(self, chunk: Chunk) -> tuple[Path, bytes] | None:
+        """The file for a chunk, in the one form in which all are kept; None where its samples are
+        there. Raises DoubledChunk.
+        """
+        folder, content = self._folder(chunk.stream), chunk_document(chunk)
+        key = ChunkKey(microseconds(chunk.start), chunk.sequence, checksum_of_chunk(content))
+        path = folder.chunk_path(key, microseconds(chunk.end))
+        if path.exists():
+            return None
+        for other in folder.alike(key):
+            if not agree(self._ordered(other), chunk):
+                raise _doubled(chunk)
+            if other.values.shape[1] >= chunk.values.shape[1]:
+                return None
+        return path, content
+
+    def _kept(self, chunk: Chunk, placed: tuple[Path, bytes] | None) -> Kept:
+        if placed is not None:
+            folder = self._folder(chunk.stream)
+            folder.make()
             self._refuse_crowd(folder)
-            self._write(path, content)
+            self._write(*placed)
+        is_new = placed is not None
         return Kept(chunk.stream, chunk.sequence, chunk.start, chunk.end, is_new)
 
     def _write(self, path: Path, content: bytes) -> None:
@@ -270,6 +267,15 @@ def ring_of(
     return Ring(folder, streams, clock, late=late, ahead=ahead, **noting)
 
 
+def _doubled(chunk: Chunk) -> DoubledChunk:
+    return DoubledChunk(
+        f"chunk {chunk.sequence} of stream {chunk.stream} of {format_time(chunk.start)} is kept "
+        "already, with other samples, which stay.",
+        remedy="Send a chunk again unchanged only; send other samples under the next number and "
+        "their own time.",
+    )
+
+
 def _refuse_other(chunk: Chunk, stream: Stream) -> None:
     """Raises BadInput for a chunk that is not sampled as its stream is described."""
     missing = {channel.name for channel in stream.channels} ^ set(chunk.channels)
@@ -282,10 +288,21 @@ def _refuse_other(chunk: Chunk, stream: Stream) -> None:
         )
     if abs(rate - stream.sampling_rate_hz) > _RATE_OFF * stream.sampling_rate_hz:
         raise BadInput(
-            f"chunk {chunk.sequence} of stream {stream.name} has {rate:g} Hz where bridge.toml "
-            f"says {stream.sampling_rate_hz:g}.",
-            remedy="Correct sampling_rate_hz there, or in the logger.",
+            f"chunk {chunk.sequence} of stream {stream.name} has {rate:.10g} Hz where bridge.toml "
+            f"says {stream.sampling_rate_hz:.10g}; {DRIFT_PPM:g} ppm of difference are taken.",
+            remedy=f"Write sampling_rate_hz = {rate:.10g} there, or correct the logger.",
         )
+    for channel in stream.channels:
+        values = np.abs(chunk.values[chunk.channels.index(channel.name)])
+        beyond = np.flatnonzero(values > _OVER_RANGE * channel.full_scale)  # none where unknown
+        if len(beyond):
+            raise BadInput(
+                f"chunk {chunk.sequence} of stream {stream.name}: sample {beyond[0]} is "
+                f"{values[beyond[0]]:g} m/s2 where full_scale is {channel.full_scale:g}.",
+                channel=channel.name,
+                remedy="Send m/s2, and null for what is no reading; or correct full_scale in "
+                "bridge.toml.",
+            )
 
 
 def _refuse_far(chunk: Chunk, now: datetime, late: timedelta, ahead: timedelta) -> None:

@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
+from itertools import takewhile
 from pathlib import Path
 
 from shm.documents import dump
@@ -31,7 +32,8 @@ log = logging.getLogger(__name__)
 PERIOD = timedelta(minutes=10)  # that of a window
 _PERIOD_US = PERIOD // timedelta(microseconds=1)
 _NAME = "%Y%m%dT%H%MZ"
-_SPANS_HELD = 512  # technical: the last segments of 100 streams, some 20 kB each
+_ROUNDING_US = 2  # technical: of two stamps
+_SPANS_HELD = 1024  # technical: those around the last one of 100 streams, some 20 kB each
 
 
 @dataclass(frozen=True, order=True)
@@ -41,6 +43,10 @@ class WaitingChunk:
     key: ChunkKey
     end_us: int
     path: Path
+
+    @property
+    def arrived(self) -> datetime:
+        return datetime.fromtimestamp(self.path.stat().st_mtime, UTC)
 
 
 @dataclass(frozen=True, order=True)
@@ -86,10 +92,10 @@ class StreamFolder:
         name = f"{start:{_NAME}}-{layout.hexdigest()[:8]}.h5"
         return self.folder / f"{start:%Y%m%d}" / name
 
-    def waiting(self) -> list[WaitingChunk]:
+    def waiting(self, pattern: str = "[0-9]*") -> list[WaitingChunk]:
         """The chunks that are not sealed, by time."""
         found = []
-        for path in self.incoming.glob("[0-9]*.chunk"):
+        for path in self.incoming.glob(f"{pattern}.chunk"):
             start_us, end_us, sequence, checksum = path.stem.split("-")
             key = ChunkKey(int(start_us), int(sequence), checksum)
             found.append(WaitingChunk(key, int(end_us), path))
@@ -103,6 +109,49 @@ class StreamFolder:
                 for path in sorted(day.glob("[0-9]*.h5")):
                     if path.name >= least:
                         yield Segment(datetime.strptime(path.stem[:14], f"{_NAME[:-1]}%z"), path)
+
+    def segments_at(self, start: datetime) -> list[Path]:
+        """Those of the ten minutes from `start` on: one for each way to sample."""
+        return sorted(self.folder.glob(f"{start:%Y%m%d}/{start:{_NAME}}-*.h5"))
+
+    def between(
+        self, start: datetime, end: datetime, waiting: Sequence[WaitingChunk]
+    ) -> dict[ChunkKey, Chunk]:
+        """The chunks that have samples within a time, sealed or among those that wait; where some
+        are of one time, those of ten minutes around too, which tell what counts.
+
+        `waiting` must have been looked up first: what is sealed meanwhile is in a segment then.
+        """
+        since, until = start - 3 * PERIOD, end + 2 * PERIOD
+        near = list(takewhile(lambda segment: segment.start < until, self.segments(since)))
+        spans = {s.path: [(k.start_us, e) for k, e in self.spans(s.path).items()] for s in near}
+        spans[self.incoming] = [(each.key.start_us, each.end_us) for each in waiting]
+        since_us, until_us = microseconds(start), microseconds(end)
+        if _is_tangled(pair for some in spans.values() for pair in some):
+            since_us, until_us = since_us - _PERIOD_US, until_us + _PERIOD_US
+        found: dict[ChunkKey, Chunk] = {}
+        for segment in near:
+            if any(s < until_us and since_us < e for s, e in spans[segment.path]):
+                found |= self.chunks(segment.path)
+        for each in waiting:
+            is_within = each.key.start_us < until_us and since_us < each.end_us
+            if is_within and each.key not in found:
+                key = replace(each.key, arrived_us=microseconds(each.arrived))
+                if (chunk := self.load(each)) is not None:
+                    found[key] = chunk
+        return found
+
+    def alike(self, key: ChunkKey) -> Iterator[Chunk]:
+        """Chunks of the same number and beginning, sealed or not."""
+        for each in self.waiting(f"{key.start_us:017d}-*-{key.sequence}-*"):
+            with suppress(FileNotFoundError):  # it has been sealed
+                if (chunk := self.load(each)) is not None:
+                    yield chunk
+        same = key.start_us, key.sequence
+        for path in self.segments_at(period_of(key.start_us)):
+            if any((k.start_us, k.sequence) == same for k in self.spans(path)):
+                found = self.chunks(path)
+                yield from (c for k, c in found.items() if (k.start_us, k.sequence) == same)
 
     def last_segments(self) -> Iterator[Segment]:
         """Those of the last two days that have any."""
@@ -162,6 +211,16 @@ class StreamFolder:
         log.error("%s is set aside: %s", path, error.message)
         replace_text(aside / f"{path.name}.reason.json", dump({"message": error.message}) + "\n")
         path.replace(aside / path.name)
+
+
+def _is_tangled(spans: Iterable[tuple[int, int]]) -> bool:
+    """Whether two of them, in microseconds, have more in common than rounding."""
+    until_us = 0
+    for start_us, end_us in sorted(set(spans)):
+        if start_us < until_us - _ROUNDING_US:
+            return True
+        until_us = max(until_us, end_us)
+    return False
 
 
 @lru_cache(_SPANS_HELD)

@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
+import numpy as np
+
 from shm.documents import Misfit, dump, value_of
 from shm.read.atomic import replace_text
 from shm.read.chunk_document import BY_TIME
+from shm.read.ring_segment import ChunkKey
 from shm.store.ring_files import PERIOD
 from shm.store.ring_pieces import slack_s
-from shm.values.stream import StreamEvent, StreamEventKind
+from shm.values.stream import Chunk, StreamEvent, StreamEventKind
 
 log = logging.getLogger(__name__)
 
 GRACE = timedelta(seconds=30)  # judgement: how long what is sent at once may be on its way
 _FILE_LATE = timedelta(hours=25)  # judgement: a logger may roll its files once a day
 _DRIFT_OVER_S = 6 * 3600.0  # derived: a jitter of 50 ms at both ends is then 5 ppm
-_DRIFT_PPM = 100.0  # as the setting frequency_allowance: every frequency is wrong by as much
+DRIFT_PPM = 100.0  # as the setting frequency_allowance: every frequency is wrong by as much
 
 
 @dataclass(frozen=True)
@@ -42,13 +45,15 @@ class PassedChunk:
 @dataclass(frozen=True)
 class StreamState:
     """What is known of a stream: its last chunk, since when its samples have been counted without
-    a break and how long they say that is, and how many seconds came of each ten minutes.
+    a break and how long they say that is, and of each ten minutes how many seconds of samples
+    count, and how many are kept apart, being of a time that was there before.
     """
 
     last: PassedChunk | None = None
     counted_since: datetime | None = None
     counted_s: float = 0.0
     received_s: dict[str, float] = field(default_factory=dict)
+    apart_s: dict[str, float] = field(default_factory=dict)
 
 
 def load_state(path: Path) -> StreamState:
@@ -91,6 +96,44 @@ def notice(
     return state, events
 
 
+def notice_overlap(
+    new: Mapping[ChunkKey, Chunk], covered: Mapping[ChunkKey, int]
+) -> list[StreamEvent]:
+    """What chunks have of a time that was there before they came, as one event."""
+    found = [(chunk, covered[key]) for key, chunk in sorted(new.items()) if key in covered]
+    if not found:
+        return []
+    first, last = found[0][0], found[-1][0]
+    samples = sum(count for _, count in found)
+    whose = f"chunk {first.sequence}"
+    if len(found) > 1:
+        whose = f"{len(found)} chunks, {first.sequence} to {last.sequence},"
+    said = (
+        f"{samples} samples of {whose} are of a time that was there already: the first to come "
+        "count, these are kept apart; see to the logger's clock"
+    )
+    end = max(chunk.end for chunk, _ in found)
+    return [_event(first.stream, "overlap", first.start, end, said)]
+
+
+def notice_missing(new: Mapping[ChunkKey, Chunk]) -> list[StreamEvent]:
+    """Values that a logger says it has not, of each channel as one event.
+
+    Of a channel without any the watch over the sensors says that it is dead.
+    """
+    if not new:
+        return []
+    chunks = [chunk for _, chunk in sorted(new.items())]
+    first, end = chunks[0], max(chunk.end for chunk in chunks)
+    events = []
+    for place, channel in enumerate(first.channels):
+        missing = sum(int(np.isnan(chunk.values[place]).sum()) for chunk in chunks)
+        if 0 < missing < sum(chunk.values.shape[1] for chunk in chunks):
+            said = f"{missing} samples have no value (null or NaN)"
+            events.append(StreamEvent(first.stream, "gap", first.start, end, said, channel))
+    return events
+
+
 def _is_next(before: PassedChunk, chunk: PassedChunk) -> bool:
     return chunk.sequence == before.sequence + 1 and chunk.sequence < BY_TIME
 
@@ -106,15 +149,12 @@ def _between(stream: str, before: PassedChunk | None, chunk: PassedChunk) -> Ite
     off_s = (chunk.start - before.end).total_seconds()
     if abs(off_s) <= _slack_s(before, chunk):
         return
-    samples = round(abs(off_s) * chunk.sampling_rate_hz)
     if _is_next(before, chunk):
         yield _stepped(stream, before, chunk)
     elif off_s > 0:
+        samples = round(off_s * chunk.sampling_rate_hz)
         said = f"{samples} samples are missing before chunk {chunk.sequence}"
         yield _event(stream, "gap", before.end, chunk.start, said)
-    else:
-        said = f"{samples} samples of chunk {chunk.sequence} are there already and do not count"
-        yield _event(stream, "overlap", chunk.start, before.end, said)
 
 
 def _stepped(stream: str, before: PassedChunk, chunk: PassedChunk) -> StreamEvent:
@@ -145,7 +185,7 @@ def _counted(
         return replace(state, last=chunk, counted_s=state.counted_s + length_s), []
     ppm = (state.counted_s - elapsed_s) / elapsed_s * 1e6
     begun = replace(state, last=chunk, counted_since=chunk.start, counted_s=length_s)
-    if abs(ppm) <= _DRIFT_PPM:
+    if abs(ppm) <= DRIFT_PPM:
         return begun, []
     what = "more" if ppm > 0 else "fewer"
     said = f"{abs(ppm):.0f} ppm {what} samples came than the stamps say: frequencies are as wrong"

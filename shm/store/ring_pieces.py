@@ -1,21 +1,40 @@
-"""Chunks joined to pieces without a gap, whatever their stamps say to the millisecond."""
+"""Chunks laid out in time and joined to pieces without a gap, whatever their stamps say to the
+millisecond.
+
+Where two chunks are of one time, the samples of the one that came first count: what comes later
+never takes their place. Where it contradicts them, its clock is wrong, and none of it is mixed with
+them, nor fills gaps between them, unless it is the next chunk and runs on behind them.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import replace
+from bisect import bisect_left, insort
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shm.read.chunk_document import BY_TIME
+from shm.read.ring_segment import ChunkKey
 from shm.values import NAN
 from shm.values.stream import Chunk, Piece
 
 _JITTER_S = 0.05  # judgement: of a logger's stamps; a radio clock or NTP is within 10 ms
 _DRIFT = 1e-3  # judgement: no crystal is further off; a long chunk differs by that from its stamps
-_OF_A_SAMPLE = 0.5  # derived: less than half a sample is the same sample
+_OF_A_SAMPLE = 0.501  # derived: up to half a sample, and a stamp's microsecond, is the same sample
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """`parts` are the samples that count, by time, each with the chunk that it is of; `covered` is
+    how many samples of a chunk do not count, for those that have any.
+    """
+
+    parts: tuple[tuple[ChunkKey, Chunk], ...]
+    covered: Mapping[ChunkKey, int]
 
 
 def slack_s(before: int, sequence: int, sampling_rate_hz: float, length_s: float) -> float:
@@ -30,32 +49,123 @@ def slack_s(before: int, sequence: int, sampling_rate_hz: float, length_s: float
     return _OF_A_SAMPLE * sample_s
 
 
-def joined(chunks: Iterable[Chunk], start: datetime, end: datetime) -> tuple[Piece, ...]:
-    """The samples from `start` on and before `end`, of chunks of one stream that are in order.
+def lay_out(found: Mapping[ChunkKey, Chunk]) -> Layout:
+    """Chunks of one stream, each without what came before it.
 
-    What is there twice is taken from the chunk that began first.
+    Whether a chunk counts depends on those of its time, and these on those of theirs: take some
+    more than you look at.
     """
+    parts: list[tuple[ChunkKey, Chunk]] = []
+    covered: dict[ChunkKey, int] = {}
+    earlier: list[tuple[datetime, int, Chunk]] = []
+    longest = timedelta(0)
+    for key, chunk in sorted(found.items(), key=_rank):
+        low = bisect_left(earlier, (chunk.start - longest,))
+        high = bisect_left(earlier, (chunk.end,))
+        free = _free(chunk, [before for _, _, before in earlier[low:high]])
+        if not free.all():
+            covered[key] = int((~free).sum())
+        for part in _parts(chunk, free):
+            parts.append((key, part))
+            insort(earlier, (part.start, len(parts), part))
+        longest = max(longest, chunk.end - chunk.start)
+    by_time = sorted(parts, key=lambda part: (part[1].start, part[1].sequence))
+    return Layout(tuple(by_time), covered)
+
+
+def joined(found: Mapping[ChunkKey, Chunk], start: datetime, end: datetime) -> tuple[Piece, ...]:
+    """The samples from `start` on and before `end` that count, of chunks of one stream."""
     runs: list[list[Chunk]] = []
-    until: datetime | None = None
-    for chunk in chunks:
+    for _, chunk in lay_out(found).parts:
         last = runs[-1][-1] if runs else None
-        rest = chunk
-        if last is not None and until is not None:
-            off_s = (chunk.start - until).total_seconds()
+        if last is not None and _is_alike(last, chunk):
             numbers = last.sequence, chunk.sequence
             slack = slack_s(*numbers, chunk.sampling_rate_hz, _seconds(last))
-            if off_s < -slack:
-                rest = _without(chunk, round(-off_s * chunk.sampling_rate_hz))
-                if not rest.values.shape[1]:
-                    continue
-            if off_s <= slack and _is_alike(last, chunk):
-                runs[-1].append(rest)
-                until = rest.end
+            if (chunk.start - last.end).total_seconds() <= slack:
+                runs[-1].append(chunk)
                 continue
-        runs.append([rest])
-        until = rest.end
+        runs.append([chunk])
     pieces = (_cut(_piece(run), start, end) for run in runs)
     return tuple(piece for piece in pieces if piece.values.shape[1])
+
+
+def agree(one: Chunk, other: Chunk) -> bool:
+    """Whether two chunks have the same samples, as far as both have any."""
+    samples = min(one.values.shape[1], other.values.shape[1])
+    first, second = one.values[:, :samples], other.values[:, :samples]
+    return _is_alike(one, other) and np.array_equal(first, second, equal_nan=True)
+
+
+def _rank(item: tuple[ChunkKey, Chunk]) -> tuple[int, int, int, str]:
+    """By when they came; what came at once, by number."""
+    key = item[0]
+    return key.arrived_us, key.sequence, key.start_us, key.checksum
+
+
+def _free(chunk: Chunk, earlier: Sequence[Chunk]) -> NDArray[np.bool_]:
+    """Which samples of a chunk are of a time that nothing counts for yet; none where it
+    contradicts what does.
+    """
+    free = np.ones(chunk.values.shape[1], bool)
+    for before in earlier:
+        taken = _taken(before, chunk)
+        free[taken] = False
+        if taken.stop and not (_runs_on(before, chunk) or _repeats(before, chunk, taken)):
+            return np.zeros(len(free), bool)
+    return free
+
+
+def _runs_on(before: Chunk, chunk: Chunk) -> bool:
+    """Whether it is the next one, of a clock that was set back a little; files are not counted."""
+    numbers = before.sequence, chunk.sequence
+    is_next = numbers[1] == numbers[0] + 1 or min(numbers) >= BY_TIME
+    return is_next and before.start <= chunk.start
+
+
+def _repeats(before: Chunk, chunk: Chunk, taken: slice) -> bool:
+    """Whether what is there twice is the same, as of a logger that sends again in other chunks."""
+    first = round((chunk.start - before.start).total_seconds() * chunk.sampling_rate_hz)
+    there = before.values[:, first + taken.start : first + taken.stop]
+    return _is_alike(before, chunk) and np.array_equal(
+        there, chunk.values[:, taken], equal_nan=True
+    )
+
+
+def _taken(before: Chunk, chunk: Chunk) -> slice:
+    """Which samples of a chunk are of the time of one that came before it."""
+    rate = chunk.sampling_rate_hz
+    begin, end = max(before.start, chunk.start), min(before.end, chunk.end)
+    common_s = (end - begin).total_seconds()
+    first, second = (before, chunk) if before.start <= chunk.start else (chunk, before)
+    slack = slack_s(first.sequence, second.sequence, rate, _seconds(first))
+    is_jitter = common_s <= slack and not _ends_as_begins(first, second, round(common_s * rate))
+    if common_s <= 0 or is_jitter:
+        return slice(0)
+    return slice(*(round((time - chunk.start).total_seconds() * rate) for time in (begin, end)))
+
+
+def _ends_as_begins(first: Chunk, second: Chunk, samples: int) -> bool:
+    """Whether so many samples at a seam are there twice, to the bit; of a sensor that shows the
+    same value all the time, nobody can tell.
+    """
+    if samples < 1 or not _is_alike(first, second):
+        return False
+    tail, head = first.values[:, -samples:], second.values[:, :samples]
+    is_telling = len(np.unique(tail)) > tail.size / 2
+    return is_telling and np.array_equal(tail, head, equal_nan=True)
+
+
+def _parts(chunk: Chunk, free: NDArray[np.bool_]) -> list[Chunk]:
+    """The stretches of a chunk that are free, the whole of it where all is."""
+    if free.all():
+        return [chunk]
+    edges = np.flatnonzero(np.diff(free, prepend=False, append=False))
+    return [_part(chunk, *pair) for pair in edges.reshape(-1, 2).tolist()]
+
+
+def _part(chunk: Chunk, first: int, last: int) -> Chunk:
+    later = chunk.start + timedelta(seconds=first / chunk.sampling_rate_hz)
+    return replace(chunk, start=later, values=chunk.values[:, first:last])
 
 
 def _seconds(chunk: Chunk) -> float:
@@ -65,11 +175,6 @@ def _seconds(chunk: Chunk) -> float:
 def _is_alike(one: Chunk, other: Chunk) -> bool:
     rates = one.sampling_rate_hz, other.sampling_rate_hz
     return one.channels == other.channels and rates[0] == rates[1]
-
-
-def _without(chunk: Chunk, samples: int) -> Chunk:
-    later = chunk.start + timedelta(seconds=samples / chunk.sampling_rate_hz)
-    return replace(chunk, start=later, values=chunk.values[:, samples:])
 
 
 def _piece(run: list[Chunk]) -> Piece:

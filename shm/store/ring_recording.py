@@ -33,9 +33,13 @@ def recording_of(
         )
     layouts = {(piece.sampling_rate_hz, piece.channels) for piece in pieces}
     if len(layouts) > 1:
+        first = pieces[0].sampling_rate_hz, pieces[0].channels
+        other = next(each for each in pieces if (each.sampling_rate_hz, each.channels) != first)
         raise BadInput(
-            f"stream {stream.name} was sampled in {len(layouts)} ways in that time.",
-            remedy="Take a shorter time.",
+            f"stream {stream.name} was sampled in {len(layouts)} ways in that time: at "
+            f"{first[0]:.10g} Hz, from {format_time(other.start)} on at "
+            f"{other.sampling_rate_hz:.10g} Hz with the channels {', '.join(other.channels)}.",
+            remedy="Export each of both times alone.",
         )
     return _joined(pieces, stream)
 

@@ -6,17 +6,20 @@ next time was left by a crash, or came again, and goes.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from functools import partial
 from pathlib import Path
+
+import numpy as np
 
 from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read.atomic import replace_file
-from shm.read.ring_segment import ChunkKey, write_segment
+from shm.read.ring_segment import ChunkKey, microseconds, time_of, write_segment
 from shm.store.archive import sync
 from shm.store.ring_files import PERIOD, StreamFolder, WaitingChunk, period_of
 from shm.store.ring_notices import (
@@ -25,8 +28,11 @@ from shm.store.ring_notices import (
     StreamState,
     load_state,
     notice,
+    notice_missing,
+    notice_overlap,
     save_state,
 )
+from shm.store.ring_pieces import Layout, agree, lay_out
 from shm.values.stream import Chunk, StreamEvent
 
 _QUIET = timedelta(seconds=10)  # technical: a segment is not written anew for each late chunk
@@ -40,21 +46,33 @@ def seal_stream(folder: StreamFolder, now: datetime, note: Note) -> list[datetim
 
     What is noticed is noted before the chunks go.
     """
-    finished = _finished(folder.waiting(), now)
+    waiting = folder.waiting()
+    finished = _finished(waiting, now)
     if not finished:
         return []
     path = folder.folder / "state.json"
     state, sealed = load_state(path), []
-    for start, waiting in finished:
-        state, has_new = _seal(folder, start, waiting, state, note)
+    for start, own in finished:
+        near = _near(waiting, start)
+        state, has_new = _seal(folder, start, own, near, state, note)
         if has_new:
             sealed.append(start)
     oldest = format_time(now - _RECEIVED_KEPT) or ""
-    save_state(
-        path,
-        replace(state, received_s={k: s for k, s in state.received_s.items() if k >= oldest}),
+    received_s, apart_s = (
+        {k: s for k, s in known.items() if k >= oldest}
+        for known in (state.received_s, state.apart_s)
     )
+    save_state(path, replace(state, received_s=received_s, apart_s=apart_s))
     return sealed
+
+
+def _near(waiting: Sequence[WaitingChunk], start: datetime) -> Sequence[WaitingChunk]:
+    """Those by which it is told which samples count of what began in ten minutes."""
+    low, high = (
+        bisect_left(waiting, microseconds(time), key=lambda each: each.key.start_us)
+        for time in (start - 3 * PERIOD, start + 4 * PERIOD)
+    )
+    return waiting[low:high]
 
 
 def _finished(
@@ -68,69 +86,91 @@ def _finished(
         (start, chunks)
         for start, chunks in sorted(found.items())
         if start + PERIOD + GRACE <= now
-        and all(abs(now - _arrived(chunk)) >= _QUIET for chunk in chunks)
+        and all(abs(now - chunk.arrived) >= _QUIET for chunk in chunks)
     ]
-
-
-def _arrived(chunk: WaitingChunk) -> datetime:
-    return datetime.fromtimestamp(chunk.path.stat().st_mtime, UTC)
 
 
 def _seal(
     folder: StreamFolder,
     start: datetime,
     waiting: Sequence[WaitingChunk],
+    near: Sequence[WaitingChunk],
     state: StreamState,
     note: Note,
 ) -> tuple[StreamState, bool]:
-    by_segment: defaultdict[Path, dict[ChunkKey, Chunk]] = defaultdict(dict)
-    arrived = {each.key: _arrived(each) for each in waiting}
-    for each in waiting:
-        chunk = folder.load(each)
-        if chunk is not None:
-            by_segment[folder.segment_path(chunk)][each.key] = chunk
-    has_new, received_s = False, 0.0
-    for path, chunks in by_segment.items():
-        known = folder.chunks(path) if path.exists() else {}
-        new = _without_doubled(folder, waiting, known, chunks, note)
-        passed = [_passed(chunk, arrived[key]) for key, chunk in sorted(new.items())]
-        state, events = notice(folder.folder.name, state, passed)
-        for event in events:
-            note(event)
-        if new:
-            _write(path, known | new)
-            has_new = True
-        received_s += sum(map(_seconds, (known | new).values()))
+    end = max(start + PERIOD, time_of(max(each.end_us for each in waiting)))
+    # What was sealed with ten minutes before is in a segment by now.
+    found = folder.between(start, end, [each for each in near if each.path.exists()])
+    known = {key for path in folder.segments_at(start) for key in folder.spans(path)}
+    new = {each.key for each in waiting if each.key in found} - known
+    for doubled in _doubled(found, new):
+        _set_doubled_aside(folder, waiting, found.pop(doubled), doubled, note)
+        new.discard(doubled)
+    chunks = {key: chunk for key, chunk in found.items() if key in new}
+    passed = [_passed(chunk, time_of(key.arrived_us)) for key, chunk in sorted(chunks.items())]
+    state, events = notice(folder.folder.name, state, passed)
+    layout = lay_out(found)
+    events += notice_overlap(chunks, layout.covered) + notice_missing(chunks)
+    for event in events:
+        note(event)
+    _write_all(folder, {k: c for k, c in found.items() if period_of(k.start_us) == start}, new)
     for each in waiting:
         each.path.unlink(missing_ok=True)  # what was damaged is set aside already
-    if by_segment:
-        sums = {**state.received_s, format_time(start) or "": received_s}
-        state = replace(state, received_s=sums)
-    return state, has_new
+    return _counting(state, start, layout, found), bool(new)
 
 
-def _without_doubled(
+def _doubled(found: Mapping[ChunkKey, Chunk], new: Set[ChunkKey]) -> list[ChunkKey]:
+    """Of chunks of one number and time that differ, all but the first: two that came at the same
+    moment were both taken.
+    """
+    seen = {(k.start_us, k.sequence): chunk for k, chunk in found.items() if k not in new}
+    by_arrival = sorted((k for k in found if k in new), key=lambda key: key.arrived_us)
+    return [
+        key
+        for key in by_arrival
+        if not agree(seen.setdefault((key.start_us, key.sequence), found[key]), found[key])
+    ]
+
+
+def _set_doubled_aside(
     folder: StreamFolder,
     waiting: Sequence[WaitingChunk],
-    known: Mapping[ChunkKey, Chunk],
-    chunks: Mapping[ChunkKey, Chunk],
+    chunk: Chunk,
+    key: ChunkKey,
     note: Note,
-) -> dict[ChunkKey, Chunk]:
-    """What is new; of two chunks of one number and time that differ, the first counts."""
-    new: dict[ChunkKey, Chunk] = {}
-    seen = {(key.start_us, key.sequence) for key in known}
-    for each in waiting:
-        key, chunk = each.key, chunks.get(each.key)
-        if chunk is None or key in known:
-            continue
-        if (key.start_us, key.sequence) in seen:
-            said = f"chunk {key.sequence} came twice, with other samples; the first counts"
-            note(StreamEvent(chunk.stream, "doubled", chunk.start, chunk.end, said))
-            folder.set_aside(each.path, BadInput(said))
-            continue
-        seen.add((key.start_us, key.sequence))
-        new[key] = chunk
-    return new
+) -> None:
+    said = f"chunk {chunk.sequence} came twice, with other samples; the first counts"
+    note(StreamEvent(chunk.stream, "doubled", chunk.start, chunk.end, said))
+    path = next(each.path for each in waiting if each.key == key)
+    folder.set_aside(path, BadInput(said))
+
+
+def _write_all(folder: StreamFolder, chunks: Mapping[ChunkKey, Chunk], new: Set[ChunkKey]) -> None:
+    """Each segment that has new chunks."""
+    by_segment: defaultdict[Path, dict[ChunkKey, Chunk]] = defaultdict(dict)
+    for key, chunk in chunks.items():
+        by_segment[folder.segment_path(chunk)][key] = chunk
+    for path, whole in by_segment.items():
+        if not new.isdisjoint(whole):
+            _write(path, whole)
+
+
+def _counting(
+    state: StreamState, start: datetime, layout: Layout, found: Mapping[ChunkKey, Chunk]
+) -> StreamState:
+    """With what came of ten minutes: samples that any channel has, once each."""
+    name = format_time(start) or ""
+    received_s = apart_s = 0.0
+    for key, part in layout.parts:
+        if period_of(key.start_us) == start:
+            came = int((~np.isnan(part.values).all(axis=0)).sum())
+            received_s += came / part.sampling_rate_hz
+    for key, samples in layout.covered.items():
+        if period_of(key.start_us) == start:
+            apart_s += samples / found[key].sampling_rate_hz
+    sums = {**state.received_s, name: received_s}
+    apart = {**state.apart_s, name: apart_s} if apart_s else state.apart_s
+    return replace(state, received_s=sums, apart_s=apart)
 
 
 def _write(path: Path, chunks: dict[ChunkKey, Chunk]) -> None:
@@ -144,7 +184,3 @@ def _write(path: Path, chunks: dict[ChunkKey, Chunk]) -> None:
 
 def _passed(chunk: Chunk, arrived: datetime) -> PassedChunk:
     return PassedChunk(chunk.sequence, chunk.start, chunk.end, chunk.sampling_rate_hz, arrived)
-
-
-def _seconds(chunk: Chunk) -> float:
-    return float(chunk.values.shape[1] / chunk.sampling_rate_hz)

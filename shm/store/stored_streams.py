@@ -14,7 +14,7 @@ from sqlalchemy.engine import Connection, Row
 from shm.documents import compact, value_of
 from shm.store.checksums import decoding, readable, whole
 from shm.store.database import Repository, insert
-from shm.store.outbox import raise_alert
+from shm.store.outbox import raise_alert, resolve
 from shm.store.rows import StoredAlert
 from shm.store.stream_tables import (
     pooled_readings,
@@ -23,6 +23,7 @@ from shm.store.stream_tables import (
     stream_watch,
     stream_windows,
 )
+from shm.store.tables import alerts
 from shm.values import Alert, Plane, ShapePoint
 from shm.values.modes import Mode
 from shm.values.stream import PERIODS, Period, PooledReading, StreamEvent, WindowReading
@@ -33,6 +34,7 @@ HOURS_KEPT = timedelta(days=800)
 _LATEST = 36
 """Windows of a train-free night: a mode that traffic hides for some hours is not forgotten."""
 _EVENT = tuple(field.name for field in fields(StreamEvent))
+_OVER = "the sensors do not show it any more"
 _T = TypeVar("_T", WindowReading, PooledReading)
 
 
@@ -114,11 +116,13 @@ class Streams(Repository):
         alert: Alert | None = None,
         hooks: Sequence[str] = (),
         at: datetime | None = None,
+        ended: Sequence[str] = (),
     ) -> StoredAlert | None:
         """Keeps a reading of an hour or a day, in the place of the one of then before.
 
         `kept` is what the watch of the hanger goes on from. The alert, where it is a new one, is
         owed to `hooks` from `at` on (the reading's end where nothing is said), and given back.
+        `ended` are the keys of alerts whose condition the reading shows to be over.
         """
         end = reading.start + PERIODS[reading.period]
         row = {name: getattr(reading, name) for name in ("stream", "hanger", "period", "start")}
@@ -128,6 +132,9 @@ class Streams(Repository):
             if kept is not None:
                 state = {"hanger": reading.hanger, "reading_time": end, "content": kept}
                 _replace(connection, stream_watch, state, "hanger")
+            of_keys = sa.select(alerts.c.id).where(alerts.c.key.in_(ended)).order_by(alerts.c.id)
+            for alert_id in connection.scalars(of_keys).all() if ended else ():
+                resolve(connection, alert_id, "shm", _OVER, at or end)
             if alert is None:
                 return None
             return raise_alert(connection, None, None, alert, hooks, at or end)

@@ -62,12 +62,14 @@ class Watch(Repository):
         at: datetime,
         state: KeptWatch | None = None,
         ended: Mapping[int, str] = MappingProxyType({}),
+        first: StoredAlert | None = None,
     ) -> StoredAlert | None:
         """Keeps what the watch made of a test; the alert where it is a new one, else None.
 
         An alert whose key was raised before is the same standing condition and is not raised again.
         `state` is what the watch goes on from at the next test. `ended` are the numbers of alerts
-        whose condition this test ends, with the reason.
+        whose condition this test ends, with the reason; `first` is the alert of a stream that has
+        told what this test shows, and which the test joins.
         """
         with self.writing() as connection:
             if not all_at(connection, [test], Stage.UPDATED):
@@ -77,7 +79,7 @@ class Watch(Repository):
             raised = None
             if alert is not None:
                 raised = raise_alert(connection, test.id, baseline.id, alert, hooks, at)
-            values = _watch_values(found, test, baseline, raised)
+            values = _watch_values(found, test, baseline, raised, first)
             insert(connection, watches, values)
             if state is not None:
                 _keep_state(connection, baseline, state)
@@ -333,12 +335,17 @@ def _drift(row: Row[Any]) -> Drift:
 
 
 def _watch_values(
-    found: WatchedTest, test: StoredTest, baseline: Baseline, raised: StoredAlert | None
+    found: WatchedTest,
+    test: StoredTest,
+    baseline: Baseline,
+    raised: StoredAlert | None,
+    first: StoredAlert | None,
 ) -> dict[str, Any]:
     # Names its shifts and its alert, so that one that is gone is missed.
     told = {
         "shifts": [drift.quantity for drift in found.drifts],
         "alert": None if raised is None else raised.id,
+        **({} if first is None else {"joins": first.id}),
     }
     return {
         "test_id": test.id,

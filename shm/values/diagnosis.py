@@ -10,6 +10,8 @@ from shm.values.kinds import NAN, Plane
 
 Leads = Literal["cause", "no gap", "unexplained"]
 _AND = " + "
+NO_GAP = "no gap"
+"""How `Compatibility` calls the baseline without any effect."""
 
 NO_GAP_STANDS_FROM = 0.05
 """A gap is not shown while no gap keeps this probability, what a 95 % interval leaves out: many
@@ -197,6 +199,72 @@ class NextMeasurement:
 
 
 @dataclass(frozen=True)
+class Compatibility:
+    """Which explanations the data do not contradict, without priors.
+
+    Names are those of `Cause.effect` and `NO_GAP`; what was not fitted in full is in neither.
+    Bounds that all `data` keep with 95 % are `bound_percent` for a frequency (the median).
+    """
+
+    not_falsified: tuple[str, ...]
+    falsified: tuple[str, ...]
+    bound_percent: float
+    data: int
+
+    def of(self, name: str) -> bool | None:
+        """Whether it is compatible; None of what was not judged."""
+        return (
+            None
+            if name not in self.not_falsified + self.falsified
+            else (name in self.not_falsified)
+        )
+
+
+OverOrders = Literal["even", "order", "order squared", "alternating", "lowest orders", "local"]
+OverTests = Literal["all tests", "temperature", "level", "level squared", "above a level"]
+
+
+@dataclass(frozen=True)
+class LawTerm:
+    """One term of the law that something unknown follows, as a change of the frequencies.
+
+    `x_m` is the place of a local one (NaN for others), from the nearer end as frequencies do not
+    tell the ends apart; `threshold` the level above which it acts. `planes` holds one or both.
+    `change_percent` is its largest change less its smallest, with the sign of the term.
+    `log_bayes_factor` compares the law with it to the law without, less the logarithm of how many
+    terms were tried.
+    """
+
+    over_orders: OverOrders
+    over_tests: OverTests
+    planes: tuple[Plane, ...]
+    change_percent: float
+    change_sd_percent: float
+    log_bayes_factor: float
+    x_m: float = NAN
+    threshold: float = NAN
+    coefficient: float = NAN
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What is left of the frequencies where something unknown is possible.
+
+    `like_tension` is the part of its root mean square `rms_percent` that looks like a change of
+    the tension, of `tension_percent`. `law` is empty where nothing is claimed; where it is claimed,
+    `held_out_before_percent` and `held_out_after_percent` are root mean squares of what modes (or
+    single frequencies, where the law is one of the tests) miss that were not used for it.
+    """
+
+    rms_percent: float
+    like_tension: float
+    tension_percent: float
+    law: tuple[LawTerm, ...] = ()
+    held_out_before_percent: float = NAN
+    held_out_after_percent: float = NAN
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """Where a baseline and the measurements of a hanger differ, why, and what that changes.
 
@@ -205,7 +273,8 @@ class Diagnosis:
     `fit_p_value` is the posterior predictive p-value of the leading explanation. `invisible` names
     the effects that these data cannot show, and why; `left_out` those that were taken out of the
     catalogue. `remarks` say in words what is wrong with the data and what it does to the answer.
-    `outliers` are frequencies that were set aside.
+    `outliers` are frequencies that were set aside. `remainder` is None where nothing unknown is
+    worth a description.
     """
 
     hanger: int | None
@@ -230,6 +299,8 @@ class Diagnosis:
     seed: int
     seconds: float
     outliers: tuple[Outlier, ...] = ()
+    compatibility: Compatibility | None = None
+    remainder: Remainder | None = None
 
     def claim(self, cause: Cause) -> float:
         """The probability of a cause together with those that the data cannot tell it from."""

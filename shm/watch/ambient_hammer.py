@@ -48,6 +48,11 @@ class AmbientBias:
         """Whether a hammer test ever came within half a day of a reading of the stream."""
         return bool(self.modes)
 
+    @property
+    def most_tests(self) -> int:
+        """How many tests the mode rests on that was compared most often."""
+        return max(self.tests, default=0)
+
     def text(self) -> str:
         """For a report: a sentence, and one of the mode that differs most."""
         if not self.is_known:
@@ -58,7 +63,7 @@ class AmbientBias:
         half = NINETY_PERCENT * self.common_sd
         most = int(np.argmax(np.abs(self.mean) / self.sd))
         plane, order = self.modes[most]
-        tests = max(self.tests)
+        tests = self.most_tests
         own = rounded_percent(self.mean[most], NINETY_PERCENT * self.sd[most], "+")
         return (
             f"Hanger {self.hanger}: frequencies by wind and traffic differ from those of hammer "

@@ -12,13 +12,16 @@ import pyuff
 from scipy.io import wavfile
 
 from shm.modes_document import load_modes
+from shm.pipeline.intake import as_taken_in
 from shm.read import read, sidecar_path
 from shm.read.modal_sets import _frequency
 from shm.store import Stage, Workspace
-from shm.values import Recording
+from shm.values import Channel, Recording
 from tests.cli.conftest import Shm
 from tests.helpers.flows import ingest
+from tests.helpers.nouns import NOW
 from tests.helpers.workspaces import make_workspace
+from tests.helpers.written import write_counts
 
 HEAD = "catman\nMessung;quer\nAbtastrate;{rate:.0f} Hz\n\nZeit [s];Kraft [N];A1 [m/s²];A2 [g]\n"
 SAID = ("--hanger", 3, "--place", "2.52", "--plane", "transverse,longitudinal")
@@ -80,6 +83,28 @@ def test_the_second_file_of_a_logger_needs_nothing(
         ("transverse", 2.52),
         ("longitudinal", 2.52),
     ]
+
+
+def test_a_recording_is_looked_at_as_it_would_be_taken_in(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *SAID)
+    with as_taken_in(export(tmp_path / "b.csv", 2), workspace) as path:
+        found = read(path)
+    assert isinstance(found, Recording)
+    assert found.accelerations[1].plane == "longitudinal"
+    assert not sidecar_path(tmp_path / "b.csv").exists()
+
+
+def test_a_place_off_the_hanger_is_told_before_it_is_kept(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    said = ("--hanger", 3, "--place", "22", "--plane", "transverse,longitudinal")
+    ended = shm("--workspace", workspace.folder, "import", export(tmp_path / "a.csv"), *said)
+    assert ended.code == 3
+    assert "A1: it is said to be at 22 m from the deck end" in ended.err + ended.out
+    assert files_of(workspace) == []
+    assert not (workspace.folder / "loggers").exists()
 
 
 def test_what_is_dropped_into_the_spool_is_read_by_its_profile(
@@ -182,6 +207,27 @@ def test_volts_and_shares_of_a_full_scale_are_asked_for_what_they_are_worth(
     assert isinstance(found, Recording)
     assert [c.quantity for c in found.channels] == ["force", "acceleration"]
     assert np.std(found.channels[0].values) == pytest.approx(200, rel=0.05)
+
+
+def test_counts_of_a_seismic_recorder_are_asked_for_what_they_are_worth(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    rows = np.random.default_rng(1).normal(0, 1e5, (2, 3000))
+    path = tmp_path / "night.mseed"
+    channels = (Channel("acc_1", "acceleration", rows[0]),)
+    write_counts(path, rows, Recording("", channels, 200.0, None, NOW))
+    asked = shm("--workspace", workspace.folder, "import", path, "--json").document
+    assert [q["about"] for q in asked["questions"]] == ["hanger", "unit", "unit"]
+    assert "What is one count of XX_HGR3_00_HN1 worth" in asked["questions"][1]["text"]
+    ended = shm(
+        "--workspace", workspace.folder, "import", path, "--hanger", 3,
+        "--sensitivity", "XX_HGR3_00_HN1=2e-6 m/s2", "--sensitivity", "XX_HGR3_00_HN2=1e-4 mg",
+        "--place", "2.52", "--plane", "transverse,longitudinal",
+    )  # fmt: skip
+    assert ended.code == 0
+    found = read(workspace.spool / "night.mseed")
+    assert isinstance(found, Recording)
+    assert np.allclose(found.channels[0].values, 2e-6 * np.round(rows[0]), rtol=1e-9)
 
 
 def test_modes_of_another_program_come_in_with_their_orders_and_no_made_up_uncertainty(

@@ -93,3 +93,12 @@ def test_a_wrong_parameter_is_a_usage_error_that_says_how(
     ended = shm("predict", *arguments, "--hanger-file", hanger_file)
     assert ended.code == 2
     assert said in ended.err
+
+
+def test_a_sweep_is_drawn(shm: Shm, hanger_file: Path, tmp_path: Path) -> None:
+    drawn = ("--sweep", "theta_F=0.5:2:4", "--figure", tmp_path / "sweep.png")
+    assert shm("predict", "beam1", "--hanger-file", hanger_file, *drawn).code == 0
+    assert (tmp_path / "sweep.png").read_bytes().startswith(b"\x89PNG")
+    alone = shm("predict", "beam1", "--hanger-file", hanger_file, *drawn[2:])
+    assert alone.code == 2
+    assert "--sweep" in alone.err

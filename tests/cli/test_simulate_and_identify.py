@@ -165,7 +165,7 @@ def test_every_choice_of_the_command_reaches_the_identification(
 ) -> None:
     seen: list[IdentifyOptions] = []
 
-    def stop(group: object, hanger: object, options: IdentifyOptions) -> None:
+    def stop(group: object, hanger: object, options: IdentifyOptions, _: object) -> None:
         seen.append(options)
         raise NothingThere("seen.", remedy="None.")
 

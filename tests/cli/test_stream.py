@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -18,7 +19,8 @@ from shm.store.ring import Ring, ring_of
 from shm.store.ring_files import PERIOD, period_of
 from shm.values import Recording
 from tests.cli.conftest import Shm
-from tests.helpers.streams import a_chunk, a_window, an_event, with_stream
+from tests.helpers.outboxes import entered
+from tests.helpers.streams import a_chunk, a_reading, a_window, an_event, with_stream
 from tests.helpers.workspaces import make_workspace
 
 
@@ -58,6 +60,7 @@ def test_the_table_says_what_is_live_and_what_was_lost(
     assert row["lost_share_24h"] == pytest.approx(0.05)  # the first ten minutes do not count
     assert row["ring_bytes"] > 100_000
     assert (row["last_window_kind"], row["last_window_how"]) == ("wind", "tracked")
+    assert row["apart_s_24h"] == 0
     said = shm("--workspace", bridge.folder, "stream").out
     assert "5.00%" in said
     assert "late" in said
@@ -70,6 +73,24 @@ def test_a_stream_that_never_sent_or_sends_now(shm: Shm, tmp_path: Path) -> None
     assert row["lost_share_24h"] is None
     Ring(workspace.folder / "ring").append(chunk_document(a_chunk(0, utc_now())))
     assert "live" in shm("--workspace", workspace.folder, "stream").out
+
+
+def test_what_a_stream_differs_by_from_hammer_tests_is_said_where_both_exist(
+    shm: Shm, tmp_path: Path
+) -> None:
+    workspace = with_stream(make_workspace(tmp_path / "both"))
+    with workspace.store() as store:
+        (test,) = entered(store, [1])
+        lower = replace(test.test.modes[0], frequency_hz=test.test.modes[0].frequency_hz * 0.99)
+        hour = replace(a_reading(), start=test.time, modes=(lower,))
+        store.streams.save_pooled(replace(hour, start=test.time - timedelta(days=3)))
+        (row,) = shm("--workspace", workspace.folder, "stream", "--json").document["streams"]
+        assert (row["ambient_bias"], row["hammer_tests"]) == (None, 0)
+        store.streams.save_pooled(hour)
+    (row,) = shm("--workspace", workspace.folder, "stream", "--json").document["streams"]
+    assert row["hammer_tests"] == 1
+    assert -0.01 < row["ambient_bias"] < -row["ambient_bias_sd"] < 0  # it is shrunk towards 0
+    assert "differ from those of hammer" in shm("--workspace", workspace.folder, "stream").out
 
 
 def test_events_are_listed_with_their_times(shm: Shm, bridge: Workspace, start: datetime) -> None:

@@ -76,6 +76,7 @@ def test_a_scrape_tells_lag_and_size_of_each_stream(client: httpx.Client) -> Non
     lines = client.get("/metrics").text.splitlines()
     (lag,) = (line for line in lines if line.startswith("shm_stream_lag_seconds{"))
     assert 2.8 * 3600 < float(lag.split()[-1]) < 4 * 3600
+    assert f'shm_stream_apart_seconds{{stream="{NAME}"}} 0.0' in lines
     (size,) = (line for line in lines if line.startswith("shm_stream_ring_bytes{"))
     assert float(size.split()[-1]) > 100_000
 

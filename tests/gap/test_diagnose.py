@@ -96,10 +96,16 @@ def test_other_classes_may_be_the_baseline(baseline: str) -> None:
     assert probabilities(found) == pytest.approx(1.0)
 
 
-def test_one_mode_only_is_refused_with_the_reason() -> None:
+def test_of_one_frequency_the_tension_is_as_wide_as_mass_and_length_are_known() -> None:
+    """A string's tension goes with mass and length squared; the first mode bends as well."""
     (test,) = planted()
-    with pytest.raises(BadInput, match="the tension alone can follow any one"):
-        diagnose([replace(test, modes=test.modes[:1])], PLAIN)
+    found = diagnose([replace(test, modes=test.modes[:1])], PLAIN)
+    tension_n, scatter = found.tension_after_n, PLAIN.scatter
+    least = np.sqrt(scatter.section**2 + scatter.density**2 + (2 * scatter.length) ** 2)
+    assert found.leads == "no gap"
+    assert tension_n.q025 < 711e3 < tension_n.q975
+    assert tension_n.sd / tension_n.mean > least
+    assert found.places == ()
 
 
 def test_few_modes_are_answered_with_a_remark() -> None:

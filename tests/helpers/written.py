@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import math
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import h5py
@@ -15,13 +16,14 @@ import pytest
 import scipy.io
 import scipy.io.wavfile
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
+from pymseed import MS3TraceList, nslc2sourceid
 
 from shm.read import FORMATS, Format
 from shm.read import write as write_ours
 from shm.read.arrays import Layout, layout_of
 from shm.read.base import PeekChannel
 from shm.read.comma_separated import recording_text, response_text
-from shm.read.sidecar import write_sidecar
+from shm.read.sidecar import sidecar_path, write_sidecar
 from shm.read.units import SI
 from shm.values import FrequencyResponse, Recording
 
@@ -36,6 +38,9 @@ def write(described: Recording | FrequencyResponse, path: Path) -> None:
         return
     if path.suffix == ".wav":
         _wave(described, path)
+        return
+    if path.suffix == ".mseed":
+        _mini_seed(described, path)
         return
     if path.suffix in _WRITERS:
         _WRITERS[path.suffix](layout_of(described), path)
@@ -107,6 +112,45 @@ def _wave(described: Recording | FrequencyResponse, path: Path) -> None:
         for place, c in enumerate(described.channels, start=1)
     ]
     write_sidecar(described, channels, described.sampling_rate_hz, path)
+
+
+def _mini_seed(described: Recording | FrequencyResponse, path: Path) -> None:
+    """Counts of a thousand-millionth of the largest value; the sidecar says what they are worth."""
+    assert isinstance(described, Recording)
+    largest = [np.nanmax(np.abs(c.values), initial=1.0) / 1e9 for c in described.channels]
+    rows = [c.values / one for c, one in zip(described.channels, largest, strict=True)]
+    write_counts(path, rows, described)
+    channels = [
+        PeekChannel(name, c.quantity, SI[c.quantity], c.plane, c.x_m)
+        for name, c in zip(mini_seed_names(len(rows)), described.channels, strict=True)
+    ]
+    write_sidecar(described, channels, described.sampling_rate_hz, path)
+    text = sidecar_path(path).read_text()
+    sidecar_path(path).write_text(f"calibration = {[float(one) for one in largest]}\n{text}")
+
+
+def mini_seed_names(channels: int) -> list[str]:
+    return [f"XX_HGR3_00_HN{place}" for place in range(1, channels + 1)]
+
+
+def write_counts(
+    path: Path, rows: Sequence[np.ndarray], described: Recording, version: int = 2
+) -> None:
+    """Rows as whole numbers; where they are NaN, the file has a gap."""
+    traces = MS3TraceList()
+    epoch = datetime(1970, 1, 1, tzinfo=UTC)
+    start_ns = ((described.time or epoch) - epoch) // timedelta(microseconds=1) * 1000
+    for name, row in zip(mini_seed_names(len(rows)), rows, strict=True):
+        known = np.flatnonzero(np.isfinite(row))
+        for part in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
+            traces.add_data(
+                sourceid=nslc2sourceid(*name.split("_")),
+                data_samples=np.round(row[part]).astype(np.int32),
+                sample_type="i",
+                sample_rate=described.sampling_rate_hz,
+                starttime=start_ns + round(part[0] / described.sampling_rate_hz * 1e9),
+            )
+    traces.to_file(path, overwrite=True, format_version=version, max_record_length=512)
 
 
 def _number(cell: str) -> float | str | None:

@@ -11,15 +11,16 @@ import pytest
 
 from shm.pipeline import steps
 from shm.pipeline.bridge_reporting import hanger_lines
-from shm.pipeline.ending import SHM, why_over
+from shm.pipeline.ending import SHM, told_by_other, why_over
 from shm.report.hanger_status import Status
-from shm.store import Stage, Workspace
+from shm.store import Stage, StoredAlert, Workspace
 from shm.store.missing import missing_rows
 from shm.values import Alert, WatchedTest
 from tests.helpers import quick_update
 from tests.helpers.any_bar import take_any_bar
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
-from tests.helpers.nouns import NOW, a_drift, a_watched_test
+from tests.helpers.nouns import NOW, a_change, a_drift, a_watched_test, an_alert
+from tests.helpers.streams import a_reading
 from tests.helpers.workspaces import START, make_workspace, write_test
 
 
@@ -56,6 +57,39 @@ def test_a_tension_that_comes_back_resolves_its_alert(bridge: Workspace) -> None
         assert found.resolution.who == "shm"
         with store.engine.connect() as connection:
             assert missing_rows(connection) == ()
+
+
+@pytest.mark.parametrize(("lost", "rings"), [(0.2, False), (0.1, True)])
+def test_a_loss_that_a_stream_has_told_rings_again_only_where_tests_show_more(
+    bridge: Workspace, *, lost: float, rings: bool
+) -> None:
+    postman = Postman()
+    take(bridge, postman, 0, 1.0)
+    at = START + timedelta(days=58, hours=12)
+    drift = replace(a_drift(), shift_mean=-lost, shift_sd=0.002)
+    told = Alert("hanger-3:stream", 3, "h3 hour", at, "It fell.", (drift,), ("sudden change",))
+    with bridge.store() as store:
+        store.streams.save_pooled(replace(a_reading(), start=at), None, told)
+    for day in (59, 60):
+        take(bridge, postman, day, 0.8)
+    assert bool(postman.told) is rings
+    if not rings:
+        with bridge.store() as store:
+            assert [each.alert.key for each in store.alerts.list_all()] == [told.key]
+            with store.engine.connect() as connection:
+                assert missing_rows(connection) == ()
+
+
+def test_a_stream_joins_what_tests_have_told_before_and_not_what_begins_later() -> None:
+    alert = replace(an_alert(), kinds=("sudden change",), change=a_change())
+    of_test = StoredAlert(1, replace(alert, change=None), NOW, baseline_id=1)
+    assert told_by_other(alert, [of_test], of_stream=False) is of_test
+    assert told_by_other(alert, [of_test], of_stream=True) is None
+    later = a_change(began_after=NOW + timedelta(hours=1))
+    assert told_by_other(replace(alert, change=later), [of_test], of_stream=False) is None
+    up = a_change(moved=(replace(a_change().moved[0], shift_mean=0.08),))
+    assert told_by_other(replace(alert, change=up), [of_test], of_stream=False) is None
+    assert told_by_other(replace(alert, kinds=("gap",)), [of_test], of_stream=False) is None
 
 
 def test_tests_within_a_maintenance_window_raise_nothing_and_the_first_after_it_says_so(

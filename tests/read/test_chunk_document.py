@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput, TooLarge
-from shm.read.chunk_document import LARGEST_BYTES, chunk_document, parse_chunk
+from shm.read.chunk_document import (
+    LARGEST_BYTES,
+    chunk_document,
+    parse_chunk,
+    refuse_long_chunk,
+)
 from tests.helpers.nouns import NOW
 from tests.helpers.streams import a_chunk
 
@@ -24,7 +29,7 @@ def test_a_chunk_comes_back_to_the_bit() -> None:
 def test_samples_may_be_json() -> None:
     header = {
         "schema": "shm.chunk/1", "stream": "h3", "sequence": 0, "time": NOW.isoformat(),
-        "sampling_rate_hz": 100, "values": {"acc_1": [1, None, 3.5], "acc_2": [4, 5, 1e99]},
+        "sampling_rate_hz": 100, "values": {"acc_1": [1, None, 3.5], "acc_2": [4, 5, float("nan")]},
     }  # fmt: skip
     for text in (json.dumps(header), json.dumps(header, indent=1)):
         found = parse_chunk(text.encode())
@@ -65,13 +70,36 @@ def test_what_is_wrong_is_said(content: bytes, said: str) -> None:
         parse_chunk(content)
 
 
-def test_values_that_are_no_numbers_are_refused() -> None:
-    for values in ({"acc_1": [1], "acc_2": [1, 2]}, {"acc_1": ["x"], "acc_2": [1]}):
-        head = json.loads(changed(encoding="", values=values).partition(b"\n")[0])
-        with pytest.raises(BadInput, match="its values are not numbers"):
-            parse_chunk(json.dumps(head).encode())
+@pytest.mark.parametrize(
+    "value", [3e38, -3e38, 1e99, float("inf"), 10**400, True, [1], [[1]], "x", {}]
+)
+def test_a_value_that_is_no_acceleration_is_refused_by_stream_channel_and_place(
+    value: object,
+) -> None:
+    values = {"acc_1": [1, 2, 3], "acc_2": [1, None, value]}
+    head = json.loads(changed(encoding="", values=values).partition(b"\n")[0])
+    with pytest.raises(BadInput, match=r"chunk 3 of stream h3 .*: sample 2 is .* m/s2") as caught:
+        parse_chunk(json.dumps(head).encode())
+    assert caught.value.channel == "acc_2"
 
 
-def test_a_chunk_without_end_is_not_parsed() -> None:
-    with pytest.raises(TooLarge):
-        parse_chunk(b" " * (LARGEST_BYTES + 1))
+def test_samples_without_bound_are_refused_and_nan_is_a_missing_one() -> None:
+    chunk = a_chunk(3)
+    chunk.values[1, 5] = np.nan
+    assert np.isnan(parse_chunk(chunk_document(chunk)).values[1, 5])
+    chunk.values[0, 7] = np.inf
+    with pytest.raises(BadInput, match="sample 7 is inf") as caught:
+        parse_chunk(chunk_document(chunk))
+    assert caught.value.channel == "acc_1"
+
+
+def test_channels_of_different_lengths_are_refused() -> None:
+    head = json.loads(changed(encoding="", values={"acc_1": [1], "acc_2": [1, 2]}).split(b"\n")[0])
+    with pytest.raises(BadInput, match="acc_1 has 1, acc_2 has 2"):
+        parse_chunk(json.dumps(head).encode())
+
+
+def test_a_chunk_without_end_is_told_how_long_it_may_be() -> None:
+    with pytest.raises(TooLarge) as caught:
+        refuse_long_chunk(LARGEST_BYTES + 1)
+    assert "at most 32 MiB and ten minutes" in caught.value.remedy

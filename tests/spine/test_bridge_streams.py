@@ -78,6 +78,16 @@ def test_what_is_given_twice_is_refused(tmp_path: Path) -> None:
         bridge(tmp_path, STREAM + OTHER_CHANNEL.replace("acc_2", "acc_1"))
 
 
+def test_names_that_differ_by_capitals_alone_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="stream name H3 is h3 but for capitals"):
+        bridge(tmp_path, STREAM + STREAM.replace('"h3"', '"H3"'))
+    with pytest.raises(BadInput, match="channel ACC_1 is acc_1 but for capitals"):
+        bridge(tmp_path, STREAM + OTHER_CHANNEL.replace("acc_2", "ACC_1"))
+    with pytest.raises(BadInput, match="'H3' is not described") as caught:
+        bridge(tmp_path, STREAM).stream("H3")
+    assert caught.value.remedy == "Capitals count: write h3."
+
+
 def test_the_example_of_a_new_workspace_is_right(tmp_path: Path) -> None:
     text = default_config().read_text()
     begin = text.index("# [[stream]]")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shm.documents import dump, parse_time, summary
@@ -147,6 +147,7 @@ json_values = st.recursive(
 )
 
 
+@settings(suppress_health_check=[HealthCheck.too_slow])  # a machine that does other work
 @given(value=json_values, key=st.sampled_from(["plane", "order", "frequency_hz", "shape"]))
 def test_no_document_raises_anything_but_bad_input(value: Any, key: str) -> None:
     try:

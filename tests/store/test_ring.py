@@ -15,11 +15,13 @@ import h5py
 import numpy as np
 import pytest
 
-from shm.errors import BadInput, StoreBusy, StoreError
-from shm.read import read
+from shm.documents import format_time
+from shm.errors import BadInput, DoubledChunk, StoreBusy, StoreError
+from shm.read import read, ring_segment
 from shm.read.chunk_document import chunk_document
 from shm.store import ring as ring_module
 from shm.store.ring import Ring
+from shm.store.ring_recording import recording_of
 from shm.values import Recording
 from shm.values.stream import Chunk, Stream, StreamChannel, StreamEvent
 from tests.helpers.nouns import NOW
@@ -82,7 +84,6 @@ def test_chunks_are_joined_whether_they_are_sealed_or_not(logger: Logger) -> Non
         assert piece.temperature_c == pytest.approx(11.5)
         assert np.isnan(piece.wind_m_s)
     assert logger.ring.latest() == {"h3": NOW + timedelta(minutes=25)}
-    assert logger.ring.watermark("h3") == NOW + timedelta(minutes=25)
     assert logger.ring.periods("h3", NOW + timedelta(minutes=5)) == (NOW + timedelta(minutes=10),)
     assert logger.events == []
 
@@ -125,18 +126,147 @@ def test_a_chunk_that_comes_again_is_kept_once(logger: Logger) -> None:
 
 
 @pytest.mark.parametrize("is_sealed", [False, True])
-def test_another_chunk_of_the_same_number_and_time_is_set_aside(
+def test_another_chunk_of_the_same_number_and_time_is_refused(
     logger: Logger, is_sealed: bool
 ) -> None:
     first, second = a_chunk(0), replace(a_chunk(0), values=a_chunk(1).values)
     logger.send(first, seals=is_sealed)
+    with pytest.raises(DoubledChunk, match="with other samples, which stay"):
+        logger.send(second)
+    said_otherwise = replace(first, temperature_c=12.0)
+    assert not logger.ring.append(chunk_document(said_otherwise)).is_new
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert np.array_equal(piece.values, first.values)
+
+
+def test_two_chunks_of_one_number_that_came_at_the_same_moment(
+    logger: Logger, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = a_chunk(0), replace(a_chunk(0), values=a_chunk(1).values)
+    logger.send(first, seals=False)
+    monkeypatch.setattr("shm.store.ring_files.StreamFolder.alike", lambda *_: ())
+    logger.now += timedelta(seconds=1)
     logger.send(second)
     assert logger.kinds == ["doubled"]
     assert len(list(logger.ring.folder.glob("h3/aside/*.chunk"))) == 1
     (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
-    assert piece.values.shape == (2, 500)
-    if is_sealed:
-        assert np.array_equal(piece.values, first.values)
+    assert np.array_equal(piece.values, first.values)
+
+
+def test_a_file_that_has_grown_adds_what_is_new(logger: Logger) -> None:
+    whole = a_chunk(0)
+    logger.send(replace(whole, values=whole.values[:, :200]), whole)
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert np.array_equal(piece.values, whole.values)
+    assert logger.ring.state("h3").received_s == {format_time(NOW): 5.0}
+
+
+@pytest.mark.parametrize("is_sealed", [False, True])
+def test_a_clock_that_is_set_back_replaces_no_sample_and_fills_no_gap(
+    logger: Logger, is_sealed: bool
+) -> None:
+    """After 20 minutes it falls back by 13 minutes and 3 s, and runs on for 15; the tenth minute
+    was not sent yet.
+    """
+    good, back = minutes(*range(10), *range(11, 20)), timedelta(minutes=13, seconds=3)
+    stepped = [replace(each, start=each.start - back) for each in minutes(*range(20, 35))]
+    logger.send(*good, seals=is_sealed)
+    logger.now += timedelta(seconds=1)
+    for each in stepped:
+        logger.now += timedelta(minutes=1)
+        logger.ring.append(chunk_document(each))
+    expected = [good[:10], good[10:], stepped[-1:]]  # the last begins behind all that was there
+    for _ in range(2):
+        pieces = logger.ring.read("h3", NOW, NOW + HOUR)
+        assert len(pieces) == 3
+        for piece, chunks in zip(pieces, expected, strict=True):
+            assert np.array_equal(piece.values, samples(chunks))
+        logger.seal()
+    assert "overlap" in logger.kinds
+    state = logger.ring.state("h3")
+    assert (sum(state.received_s.values()), sum(state.apart_s.values())) == (20 * 60, 14 * 60)
+    with_all = sum(h5py.File(path)["acc_1"].size for path in logger.ring.folder.glob("h3/*/*.h5"))
+    assert with_all == 34 * 6000  # those that do not count lie there too
+    logger.send(*minutes(10))
+    (piece, _) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert np.array_equal(piece.values, samples(minutes(*range(20))))
+
+
+@pytest.mark.parametrize("again", [1, 3])
+def test_a_few_samples_that_come_again_are_noted(logger: Logger, again: int) -> None:
+    """Within the jitter of stamps, and with the next number: only the samples tell."""
+    first, second = minutes(0, 1)
+    values = np.concatenate([first.values[:, -again:], second.values], axis=1)
+    start = second.start - timedelta(seconds=again / 100)
+    logger.send(first, replace(second, start=start, values=values))
+    assert logger.kinds == ["overlap"]
+    assert f"{again} samples of chunk 1 are" in logger.events[0].detail
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert np.array_equal(piece.values, samples([first, second]))
+
+
+@pytest.mark.parametrize("is_same", [True, False])
+def test_a_late_chunk_that_overlaps_fills_the_gap_where_it_contradicts_nothing(
+    logger: Logger, is_same: bool
+) -> None:
+    before, within, after = minutes(0, 1, 2)
+    ends = [before.values[:, -1000:], after.values[:, :1000]]
+    values = np.concatenate([ends[not is_same], within.values, ends[is_same]], axis=1)
+    start = within.start - timedelta(seconds=10)
+    logger.send(before, after)
+    logger.send(replace(within, sequence=77, start=start, values=values))
+    assert logger.kinds == ["gap", "overlap"]
+    assert f"{2000 if is_same else 8000} samples of chunk 77" in logger.events[1].detail
+    found = np.concatenate([p.values for p in logger.ring.read("h3", NOW, NOW + HOUR)], axis=1)
+    count = [before, within, after] if is_same else [before, after]
+    assert np.array_equal(found, samples(count))
+    assert sum(logger.ring.state("h3").received_s.values()) == 60.0 * len(count)
+
+
+def test_values_that_are_missing_are_noted_and_do_not_count(logger: Logger) -> None:
+    chunk = a_chunk(0)
+    chunk.values[0, :100] = np.nan
+    chunk.values[1, :20] = np.nan
+    logger.send(chunk)
+    assert [(each.kind, each.channel) for each in logger.events] == [
+        ("gap", "acc_1"), ("gap", "acc_2")
+    ]  # fmt: skip
+    assert logger.events[0].detail == "100 samples have no value (null or NaN)"
+    assert sum(logger.ring.state("h3").received_s.values()) == pytest.approx(4.8)
+
+
+def test_a_rate_within_a_crystals_tolerance_is_the_described_one(logger: Logger) -> None:
+    near = replace(a_chunk(0), sampling_rate_hz=100.009)
+    logger.send(near, a_chunk(1))
+    recording = recording_of(logger.ring, STREAM, NOW, NOW + HOUR, 10**6)
+    assert (recording.sampling_rate_hz, recording.samples) == (100.0, 1000)
+    with pytest.raises(BadInput, match=r"100.05 Hz where bridge.toml says 100; 100 ppm") as caught:
+        logger.send(replace(a_chunk(2), sampling_rate_hz=100.05))
+    assert "sampling_rate_hz = 100.05" in caught.value.remedy
+
+
+def test_values_beyond_what_the_sensor_measures_are_refused(logger: Logger) -> None:
+    chunk = a_chunk(0)
+    chunk.values[:, 3] = 39.0  # acc_2 clips at 20: a converter may go on for a while
+    logger.send(chunk)
+    chunk = a_chunk(1)
+    chunk.values[:, 3] = -41.0
+    with pytest.raises(BadInput, match="sample 3 is 41 m/s2 where full_scale is 20") as caught:
+        logger.send(chunk)
+    assert caught.value.channel == "acc_2"
+
+
+def test_segments_of_before_the_time_of_arrival_was_kept_are_read(
+    logger: Logger, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = [(name, kind) for name, kind in ring_segment._ROW.descr if name != "arrived_us"]
+    rows = ring_segment._rows
+    with monkeypatch.context() as patch:
+        patch.setattr(ring_segment, "_rows", lambda chunks: rows(chunks)[[n for n, _ in old]])
+        logger.send(*minutes(*range(9)))
+    logger.send(*minutes(9))
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert np.array_equal(piece.values, samples(minutes(*range(10))))
 
 
 def test_a_new_session_may_count_from_nought(logger: Logger) -> None:
@@ -163,14 +293,6 @@ def test_a_gap_is_noted_and_filled_by_what_comes_late(logger: Logger) -> None:
     assert np.array_equal(piece.values, samples(minutes(*range(30))))
 
 
-def test_a_gap_is_waited_for_until_ten_minutes_more_have_come(logger: Logger) -> None:
-    logger.send(*minutes(0, 1, *range(3, 12)), seals=False)
-    assert logger.ring.watermark("h3") == NOW + timedelta(minutes=2)
-    logger.send(*minutes(*range(12, 15)))
-    assert logger.ring.watermark("h3") == NOW + timedelta(minutes=15)
-    assert logger.ring.watermark("h4") is None
-
-
 def test_three_days_offline_are_caught_up_in_any_order(logger: Logger) -> None:
     before, offline = minutes(0, 1, 2), minutes(*range(3, 3 * 1440, 40))
     after = minutes(3 * 1440)
@@ -185,11 +307,29 @@ def test_three_days_offline_are_caught_up_in_any_order(logger: Logger) -> None:
     assert logger.kinds.count("late") >= 1
 
 
-def test_what_is_there_twice_counts_once(logger: Logger) -> None:
+def test_an_hour_that_comes_days_late_is_kept_counted_and_read(logger: Logger) -> None:
+    """A logger kept it while it was offline; its windows were sealed and left long ago."""
+    before, offline, after = minutes(0, 1), minutes(*range(2, 62)), minutes(*range(62, 75))
+    logger.send(*before, *after)
+    logger.now += timedelta(days=3)
+    assert all(logger.ring.append(chunk_document(each)).is_new for each in offline)
+    assert [start for _, start in logger.seal()] == [
+        NOW + n * timedelta(minutes=10) for n in range(7)
+    ]
+    late = [event for event in logger.events if event.kind == "late"]
+    assert sum(int(event.detail.split()[0]) for event in late) == 60
+    assert "72.2 hours late" in late[-1].detail
+    (piece,) = logger.ring.read("h3", NOW, NOW + 2 * HOUR)
+    assert np.array_equal(piece.values, samples([*before, *offline, *after]))
+    with pytest.raises(BadInput, match="late_hours"):
+        logger.ring.append(chunk_document(a_chunk(99, NOW - timedelta(days=2))))
+
+
+def test_the_next_chunk_of_a_clock_that_was_set_back_runs_on_behind(logger: Logger) -> None:
     first, second = minutes(0, 1)
-    shifted = replace(second, sequence=9, start=second.start - timedelta(seconds=10))
+    shifted = replace(second, start=second.start - timedelta(seconds=10))
     logger.send(first, shifted)
-    assert logger.kinds == ["overlap"]
+    assert logger.kinds == ["clock step", "overlap"]
     (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
     assert np.array_equal(piece.values[:, :6000], first.values)
     assert np.array_equal(piece.values[:, 6000:], shifted.values[:, 1000:])

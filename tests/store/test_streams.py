@@ -70,6 +70,10 @@ def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) ->
     assert (owed.hook, owed.stored.alert.key) == ("mail", "hanger-3:stream")
     again = store.streams.save_pooled(a_reading(1), b"later", alert, ["mail"], NOW)
     assert (again, store.streams.watch_state(3)) == (None, b"later")
+    store.streams.save_pooled(a_reading(2), b"over", ended=["hanger-3:stream"])
+    (over,) = store.alerts.list_all(3, standing=False)
+    assert over.resolution is not None
+    assert over.resolution.at == NOW + timedelta(hours=3)
 
 
 def test_an_alert_of_a_stream_is_delivered_though_no_test_raised_it(store: Store) -> None:

@@ -14,7 +14,15 @@ from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
-from shm.errors import BadInput, NothingThere, ShmError, StoreError, TooLarge, UsageError
+from shm.errors import (
+    BadInput,
+    DoubledChunk,
+    NothingThere,
+    ShmError,
+    StoreError,
+    TooLarge,
+    UsageError,
+)
 from shm_daemon.web.frame import for_a_person, problem
 
 log = logging.getLogger(__name__)
@@ -22,6 +30,7 @@ log = logging.getLogger(__name__)
 # Statuses as RFC 9110 defines them, 429 as RFC 6585.
 _STATUS: tuple[tuple[type[ShmError], int], ...] = (
     (TooLarge, 413),
+    (DoubledChunk, 409),
     (NothingThere, 404),
     (BadInput, 422),
     (UsageError, 409),

@@ -166,6 +166,7 @@ def _streams(site: Site) -> Iterator[Metric]:
         ("lag_seconds", "How long ago the last sample of a stream was measured.", _lag_s),
         ("behind_seconds", "How much of a stream has come and is not read yet.", _behind_s),
         ("lost_share", "What did not come of the samples of the last day.", _lost),
+        ("apart_seconds", "Samples of the last day for a time that was there: kept apart.", _apart),
         ("ring_bytes", "Room that the raw samples of a stream take.", _size),
     )
     for name, text, value in told:
@@ -185,6 +186,10 @@ def _behind_s(state: StreamCondition) -> float:
 
 def _lost(state: StreamCondition) -> float:
     return state.lost_share
+
+
+def _apart(state: StreamCondition) -> float:
+    return state.apart_s
 
 
 def _size(state: StreamCondition) -> float:

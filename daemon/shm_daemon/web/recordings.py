@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+from collections.abc import Callable
 from datetime import datetime
 from typing import Annotated, Any, Protocol
 
@@ -164,10 +165,17 @@ class Sink(Protocol):
         """Raises TooLarge before more is kept than is taken."""
 
 
-async def receive_body(request: Request, file: Sink, max_bytes: int) -> None:
-    """Writes the body of a request to a file; refuses a form, and one that says it is too large."""
+async def receive_body(
+    request: Request,
+    file: Sink,
+    max_bytes: int,
+    refuse_large: Callable[[int, int], object] = refuse_oversize,
+) -> None:
+    """Writes the body of a request to a file; refuses a form, and one that says it is too large,
+    before a byte of it is sent, where the sender waits for our word.
+    """
     _refuse_form(request)
-    _refuse_large(request, max_bytes)
+    refuse_large(int(request.headers.get("content-length", 0)), max_bytes)
     await _stream(request, file)
 
 
@@ -197,11 +205,6 @@ def _refuse_form(request: Request) -> None:
         raise Refused(
             415, "A form is not taken.", "Send the bytes of the file as the body: `curl -T FILE`."
         )
-
-
-def _refuse_large(request: Request, max_bytes: int) -> None:
-    """Before a byte of it is sent, where the sender says how much it is and waits for our word."""
-    refuse_oversize(int(request.headers.get("content-length", 0)), max_bytes)
 
 
 def _land(

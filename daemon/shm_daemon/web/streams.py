@@ -10,8 +10,7 @@ from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 
 from shm.pipeline import utc_now
-from shm.read.chunk_document import LARGEST_BYTES
-from shm.store.archive import refuse_oversize
+from shm.read.chunk_document import LARGEST_BYTES, refuse_long_chunk
 from shm_daemon.stream_intake import take_chunks
 from shm_daemon.web.access import AtSite, Writer
 from shm_daemon.web.address import STREAMS
@@ -38,7 +37,7 @@ class _Body:
         self.content = bytearray()
 
     def write(self, piece: bytes | bytearray) -> None:
-        refuse_oversize(len(self.content) + len(piece), LARGEST_BYTES)
+        refuse_long_chunk(len(self.content) + len(piece))
         self.content += piece
 
 
@@ -46,7 +45,7 @@ class _Body:
     "/{name}/chunks",
     status_code=202,
     response_model=AcknowledgedChunk,
-    responses=answers(400, 401, 403, 408, 413, 415, 422, 503),
+    responses=answers(400, 401, 403, 408, 409, 413, 415, 422, 503),
     openapi_extra=PLAIN_BODY,
     summary="Send a chunk of a stream",
 )
@@ -55,14 +54,15 @@ async def chunks(
 ) -> AcknowledgedChunk:
     """Takes one chunk (`shm.chunk/1`) and answers once it is on disk.
 
-    The same chunk may be sent again after a broken connection: it is kept once. 503 says to keep it
-    and to send it again after `Retry-After`.
+    The same chunk may be sent again after a broken connection: it is kept once. 409 says that its
+    number and time are another's, whose samples differ and stay. 503 says to keep it and to send it
+    again after `Retry-After`.
 
     Example: `curl --data-binary @chunk.json -H "Authorization: Bearer $TOKEN"
     http://127.0.0.1:8400/api/streams/h3/chunks`
     """
     body = _Body()
-    await receive_body(request, body, LARGEST_BYTES)
+    await receive_body(request, body, LARGEST_BYTES, refuse_long_chunk)
     content = [bytes(body.content)]
     workspace, store = site.workspace, site.store
     (kept,) = await run_in_threadpool(take_chunks, workspace, store, name, content, utc_now())

@@ -94,6 +94,8 @@ def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Fin
     mixed = references(measurement.decays)
     rows = block_rows(measurement, options)
     matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
+    if nobody_hit:
+        matrices = _few_sums(matrices)
     found = modes_of_hankel(matrices, rows, measurement, options)
     if nobody_hit:
         few = replace(options, max_order=min(options.max_order or _FEW_ORDERS, _FEW_ORDERS))
@@ -139,9 +141,15 @@ def _in_window(window: Window, measurement: Measurement, options: IdentifyOption
     mixed = references(decays)
     rows = min(_ROWS_WINDOW, min(decay.shape[1] for decay in decays) // 3)
     matrices = [hankel(decay, mixed @ decay, rows) for decay in decays]
-    sums = [np.sum(matrices[n::_MOST_SUMS], axis=0) for n in range(min(len(decays), _MOST_SUMS))]
     slow = replace(measurement, decays=decays, sampling_rate_hz=rate_slow)
-    return modes_of_hankel(sums, rows, slow, window.options(options), window.shift_hz)
+    return modes_of_hankel(
+        _few_sums(matrices), rows, slow, window.options(options), window.shift_hz
+    )
+
+
+def _few_sums(matrices: Sequence[FloatArray]) -> list[FloatArray]:
+    """The matrices as no more than ten sums, each to be left out in turn."""
+    return [np.sum(matrices[n::_MOST_SUMS], axis=0) for n in range(min(len(matrices), _MOST_SUMS))]
 
 
 def _size(decays: Sequence[FloatArray]) -> float:

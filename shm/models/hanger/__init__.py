@@ -5,6 +5,7 @@ from __future__ import annotations
 from shm.models.hanger.physical import (
     HangerModes,
     LateralSpring,
+    ModeLaw,
     PhysicalHanger,
     PointMass,
     SupportMode,
@@ -15,6 +16,7 @@ from shm.models.hanger.solution import solve
 __all__ = [
     "HangerModes",
     "LateralSpring",
+    "ModeLaw",
     "PhysicalHanger",
     "PointMass",
     "SupportMode",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,6 +59,23 @@ class SupportMode:
 
 
 @dataclass(frozen=True, eq=False)
+class ModeLaw:
+    """A change of the frequencies whose mechanism nobody knows, only its law.
+
+    Logarithms of frequencies change by `shift` (n, planes) times what `over_orders` makes of the
+    orders (modes,). Shapes stay.
+    """
+
+    shift: FloatArray
+    over_orders: Callable[[FloatArray], FloatArray]
+
+    def factor(self, modes: int) -> FloatArray:
+        """By which the frequencies (n, planes, modes) are multiplied."""
+        over = self.over_orders(np.arange(1.0, modes + 1))
+        return np.asarray(np.exp(self.shift[:, :, None] * over))
+
+
+@dataclass(frozen=True, eq=False)
 class PhysicalHanger:
     """`n` hangers in one test. Ends are deck 0, arch 1; planes transverse 0, longitudinal 1.
 
@@ -72,7 +90,7 @@ class PhysicalHanger:
     of a string's parabola unless the bar `sags_as_it_bends`. `joint_loss_factor` (n, ends) is that
     of the end springs. `clock_factor` (n,) multiplies the frequencies that the logger reports;
     `sensor_turn_rad` (n, places) is the angle by which each sensor is turned about the hanger's
-    axis, from the transverse axis to the longitudinal one.
+    axis, from the transverse axis to the longitudinal one. `mode_laws` change the frequencies.
     """
 
     deck_end_m: FloatArray
@@ -93,6 +111,7 @@ class PhysicalHanger:
     masses: tuple[PointMass, ...] = ()
     springs: tuple[LateralSpring, ...] = ()
     support_modes: tuple[SupportMode, ...] = ()
+    mode_laws: tuple[ModeLaw, ...] = ()
     sags_as_it_bends: bool = False
 
     @classmethod

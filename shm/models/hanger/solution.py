@@ -40,6 +40,8 @@ def solve(
     found = motion(asked, parts, modes, shapes)
     frequency = found.omega_rad_s / (2 * np.pi) * physical.clock_factor[:, None, None]
     frequency = _both(frequency)
+    for law in physical.mode_laws:
+        frequency = frequency * law.factor(modes)
     if not shapes:
         unknown = np.nan if has_losses(physical) else 0.0
         none = np.empty((*frequency.shape, 0, 2))

@@ -40,8 +40,9 @@ def serve() -> None:
     pythons_own()  # found once, for all children
     for library in ("scipy.io", "openpyxl"):  # likewise: else each would load it within its limits
         import_module(library)
-    with suppress(ImportError):
-        import_module("nptdms")  # an extra
+    for extra in ("nptdms", "pymseed"):
+        with suppress(ImportError):
+            import_module(extra)
     gc.freeze()
     with suppress(ConnectionError):  # it was killed meanwhile
         requests.sendall(b"+")

@@ -7,6 +7,7 @@ from shm.report.figures.along_the_bridge import SHIFTS, TENSIONS
 from shm.report.figures.gap_before_and_after import BEFORE_AND_AFTER, GAP_TENSION
 from shm.report.figures.gap_causes import FIGURE as CAUSES
 from shm.report.figures.gap_map import FIGURE as GAP_MAP
+from shm.report.figures.gap_shared import FIGURE as SHARED
 from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
 from shm.report.figures.hanger_response import FIGURE as RESPONSE_OF_LATEST
 from shm.report.figures.hanger_states import FIGURE as STATES
@@ -30,7 +31,7 @@ from shm.report.figures.trial_errors import (
     RELIABILITY,
     TENSION_ERRORS,
 )
-from shm.values import TrialScore
+from shm.values import BridgeDiagnosis, TrialScore
 
 OF_HANGER: tuple[Member[HangerReport], ...] = (
     TREND, STATES, TENSION, FREQUENCIES, RESPONSE_OF_LATEST, STIFFNESS
@@ -41,6 +42,7 @@ _ON_A_SHEET: tuple[Member[Shown], ...] = (
 )  # fmt: skip
 OF_MODAL_TEST = (QUALITY, *_ON_A_SHEET)
 OF_DIAGNOSIS: tuple[Member[DiagnosisSheet], ...] = (CAUSES, GAP_MAP, BEFORE_AND_AFTER, GAP_TENSION)
+OF_BRIDGE_DIAGNOSIS: tuple[Member[BridgeDiagnosis], ...] = (SHARED,)
 OF_TRIAL: tuple[Member[TrialScore], ...] = (
     DETECTION, CONFUSION, RELIABILITY, LOG_SCORE, LEFT_OUT, TENSION_ERRORS, COVERAGE, HELD_OUT
 )  # fmt: skip
@@ -70,6 +72,11 @@ def modal_test_page_figures(sheet: ModalTestReport) -> tuple[Illustration, ...]:
 def diagnosis_figures(sheet: DiagnosisSheet) -> tuple[Illustration, ...]:
     """Those of a gap diagnosis."""
     return drawn(OF_DIAGNOSIS, sheet)
+
+
+def bridge_diagnosis_figures(diagnosis: BridgeDiagnosis) -> tuple[Illustration, ...]:
+    """Those of a joint diagnosis."""
+    return drawn(OF_BRIDGE_DIAGNOSIS, diagnosis)
 
 
 def trial_figures(score: TrialScore) -> tuple[Illustration, ...]:

@@ -13,12 +13,19 @@ from fastapi.responses import JSONResponse
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.stream_course import stream_course
-from shm.pipeline.stream_state import StreamCondition, stream_states, tension_words
+from shm.pipeline.stream_state import (
+    StreamCondition,
+    against_hammer,
+    stream_states,
+    tension_words,
+)
 from shm.report import formatting
 from shm.report.figures.stream_course import alt, caption, specify
 from shm.report.paper import Table
 from shm.store.ring import ring_of
+from shm.values.rounding import NINETY_PERCENT, rounded_percent
 from shm.values.stream import Stream, StreamEvent
+from shm.watch.ambient_hammer import AmbientBias
 from shm_daemon.heartbeat import told
 from shm_daemon.web import with_plotly
 from shm_daemon.web.access import AtSite, Reader
@@ -76,7 +83,7 @@ def stream_page(
         "stream.html.j2",
         stream=stream,
         row=_row(state),
-        facts=_facts(state),
+        facts=[*_facts(state), *_beside_hammer(against_hammer(site.store, stream))],
         events=_events(state.events),
         address=f"/api/streams/{name}/figure?days={days:g}",
         days=days,
@@ -86,7 +93,7 @@ def stream_page(
 @router.get("/api/streams", responses=answers(400, 401, 403, 503), summary="Permanent sensors")
 def streams(site: AtSite, _: Reader) -> Any:
     """Each stream: whether it is live, its lag, what it lost, what its last window said."""
-    return JSONResponse(plain({"streams": [_document(each) for each in _states(site)]}))
+    return JSONResponse(plain({"streams": [_document(each, site) for each in _states(site)]}))
 
 
 @router.get(
@@ -140,6 +147,8 @@ def _facts(state: StreamCondition) -> list[tuple[str, str, str]]:
         ("Hanger", str(stream.hanger), f"{len(stream.channels)} channels"),
         ("Last sample", formatting.moment(state.last_sample) if state.last_sample else "none yet",
          f"{behind} of it not read yet"),
+        ("Kept apart", f"{state.apart_s:.0f} s" if state.apart_s else "nothing",
+         "in 24 hours, for a time that was there already"),
         ("Kept raw", f"{state.ring_bytes / 1e6:.0f} MB", ""),
         ("Tension", tension_words(state.hour), "since the beginning, as of the last hour"),
     ]  # fmt: skip
@@ -150,6 +159,13 @@ def _facts(state: StreamCondition) -> list[tuple[str, str, str]]:
         found.append(("Last window", f"{window.window.kind}, {len(window.modes)} modes",
                       window.why or how))  # fmt: skip
     return found
+
+
+def _beside_hammer(found: AmbientBias) -> list[tuple[str, str, str]]:
+    if not found.is_known:
+        return []
+    half = NINETY_PERCENT * found.common_sd
+    return [("Against hammer tests", rounded_percent(found.common, half, "+"), found.text())]
 
 
 def _events(events: tuple[StreamEvent, ...]) -> Table:
@@ -166,8 +182,9 @@ def _events(events: tuple[StreamEvent, ...]) -> Table:
     )
 
 
-def _document(state: StreamCondition) -> dict[str, Any]:
+def _document(state: StreamCondition, site: Site) -> dict[str, Any]:
     window, hour = state.window, state.hour
+    beside = against_hammer(site.store, state.stream)
     return {
         "stream": state.stream.name,
         "hanger": state.stream.hanger,
@@ -176,11 +193,15 @@ def _document(state: StreamCondition) -> dict[str, Any]:
         "lag_s": state.lag.total_seconds() if state.lag is not None else None,
         "behind_s": state.behind.total_seconds() if state.behind is not None else None,
         "lost_share": state.lost_share,
+        "apart_s": state.apart_s,
         "ring_bytes": state.ring_bytes,
         "window": window and {"start": window.window.start, "kind": window.window.kind,
                               "modes": len(window.modes), "how": window.how, "why": window.why},
         "tension_shift": hour.compensated_shift if hour else None,
         "tension_shift_sd": hour.compensated_sd if hour else None,
         "learning": hour.learning if hour else None,
+        "ambient_bias": beside.common,
+        "ambient_bias_sd": beside.common_sd,
+        "hammer_tests": beside.most_tests,
         "events": [vars(each) for each in state.events],
     }  # fmt: skip

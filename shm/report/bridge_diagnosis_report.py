@@ -1,0 +1,208 @@
+"""The report of a joint diagnosis: what hangers share, who has it, and what it does to tension."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from shm.diagnosis_document import bridge_diagnosis_document
+from shm.report import formatting
+from shm.report.contents import BridgeDiagnosisSheet
+from shm.report.diagnosis_summary import verdict
+from shm.report.diagnosis_wording import effect_phrase, quantity, size, tension_of
+from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
+from shm.values import BridgeDiagnosis, SharedCause, TensionEstimate, effect_label
+from shm.values.force_units import ForceUnit, force_unit
+
+if TYPE_CHECKING:
+    from shm.report.figures.illustration import Illustration
+
+_STATES = {
+    "shared cause": ("A shared cause", "first"),
+    "each for itself": ("Nothing shared", "steady"),
+    "shared unknown": ("Shared, not explained", "alert"),
+}
+_WORTH_A_ROW = 0.001  # of a probability: what the three decimals show
+_SENSOR_KG = 0.2
+"""Judgement: heavier than an accelerometer with its magnet and the end of its cable."""
+_MOST_ALIKE = 3  # what a sentence bears
+
+
+def bridge_diagnosis_paper(sheet: BridgeDiagnosisSheet) -> Paper:
+    """The answer, its figure, the answer in numbers, each hanger for itself."""
+    diagnosis = sheet.diagnosis
+    status, style = _STATES[diagnosis.leads]
+    seconds = f" in {diagnosis.seconds:.0f} s" if math.isfinite(diagnosis.seconds) else ""
+    return Paper(
+        title=f"Gap diagnosis, {len(diagnosis.hangers)} hangers",
+        bridge=sheet.bridge,
+        status=status,
+        style=style,
+        parts=(
+            Part("In short", lead=shared_verdict(diagnosis), summary=_consequences(diagnosis)),
+            Part("Who has it", figures=lambda: _figures(diagnosis)),
+            Part(
+                "The answer in numbers",
+                tables=filled(_causes(diagnosis), _members(diagnosis), _tensions(diagnosis)),
+            ),
+            Part("Each hanger for itself", tables=(_alone(diagnosis),)),
+        ),
+        closing=(
+            f"From hangers {_hangers(diagnosis.hangers)}, baseline {diagnosis.baseline}, seed "
+            f"{diagnosis.seed}{seconds}. {CREDIBLE}."
+        ),
+    )
+
+
+def bridge_diagnosis_json(sheet: BridgeDiagnosisSheet) -> dict[str, Any]:
+    """A document for `shm.documents.dump`; unknown numbers become null there."""
+    summary = f"{shared_verdict(sheet.diagnosis)} {_consequences(sheet.diagnosis)}".rstrip()
+    return {
+        **bridge_diagnosis_document(sheet.diagnosis),
+        "answer": sheet.diagnosis.leads,
+        "summary": summary,
+    }
+
+
+def shared_verdict(diagnosis: BridgeDiagnosis) -> str:
+    """`Rotational end flexibility (deck end) is shared by hangers 3, 5 and 7 (0.97).`"""
+    apart, leading = diagnosis.each_for_itself_probability, diagnosis.leading
+    if leading is not None:
+        claim = formatting.told_probability(diagnosis.claim(leading))
+        what = effect_label(leading.effect, leading.at)
+        alike = _alike(diagnosis, leading)
+        start = f"{what[0].upper()}{what[1:]}{alike}"
+        everyone = len(leading.named) == len(diagnosis.hangers)
+        who = (
+            f"all {len(leading.named)} hangers"
+            if everyone
+            else f"hangers {_hangers(leading.named)}"
+        )
+        return f"{start} is shared by {who} ({claim})."
+    if diagnosis.leads == "shared unknown":
+        chance = formatting.told_probability(diagnosis.unknown_probability)
+        return f"Hangers share something that is not in the catalogue ({chance})."
+    return (
+        "No cause is shown that hangers share: each has its own or none "
+        f"({formatting.told_probability(apart)})."
+    )
+
+
+def _alike(diagnosis: BridgeDiagnosis, leading: SharedCause) -> str:
+    """What these data cannot tell from it."""
+    if leading.group is None:
+        return ""
+    names = [n for n in diagnosis.groups[leading.group] if n != leading.effect][:_MOST_ALIKE]
+    return f", or {formatting.listed([formatting.quantity(each) for each in names])},"
+
+
+def _hangers(numbers: Sequence[int]) -> str:
+    return formatting.listed([str(each) for each in numbers]) if numbers else "none for sure"
+
+
+def _consequences(diagnosis: BridgeDiagnosis) -> str:
+    leading = diagnosis.leading
+    if leading is None:
+        return "Each hanger's own diagnosis stands."
+    others = [each for each in diagnosis.hangers if each not in leading.named]
+    told = f"It is {effect_phrase(leading.effect, leading.at, [leading.size])}"
+    told += f", from hanger to hanger within some {100 * leading.scatter:.0f} %."
+    if leading.also_at:
+        told += f" About as likely: {formatting.listed(list(leading.also_at[:_MOST_ALIKE]))}."
+    if leading.effect == "point_mass" and leading.size.q05 < _SENSOR_KG:
+        told += " So small a mass may be that of the sensors: it is then no cause in the hangers."
+    if others:
+        told += f" Without it: {_hangers(others)}."
+    moved = [
+        100 * (each.jointly_n.mean / each.before_n.mean - 1)
+        for each in diagnosis.tensions
+        if each.hanger in leading.named and math.isfinite(each.jointly_n.mean)
+    ]
+    if moved:
+        told += f" It changes their tensions by {min(moved):+.1f} to {max(moved):+.1f} %."
+    return told
+
+
+def _figures(diagnosis: BridgeDiagnosis) -> Sequence[Illustration]:
+    from shm.report.figures.every_figure import bridge_diagnosis_figures
+
+    return bridge_diagnosis_figures(diagnosis)
+
+
+def _causes(diagnosis: BridgeDiagnosis) -> Table:
+    rows = [
+        (
+            effect_label(each.effect, each.at),
+            formatting.probability(each.probability),
+            "" if each.group is None else "A",
+            formatting.number(each.log_bayes_factor, "+z.1f"),
+            f"{each.likeness} ({len(each.named)} of {len(each.family)})",
+        )
+        for each in diagnosis.causes
+        if each.probability >= _WORTH_A_ROW
+    ]
+    rest = (
+        ("each hanger for itself", diagnosis.each_for_itself_probability),
+        ("something not in the catalogue, shared", diagnosis.unknown_probability),
+    )
+    return Table(
+        "Causes in common, likeliest first",
+        ("cause", "probability", "alike", "log Bayes factor", "family (members)"),
+        (*rows, *((what, formatting.probability(share), "", "", "") for what, share in rest)),
+        note=(
+            "Against each hanger having causes of its own, in natural logarithms. Causes with the "
+            "letter A cannot be told apart with these data."
+        ),
+    )
+
+
+def _members(diagnosis: BridgeDiagnosis) -> Table:
+    if (leading := diagnosis.leading) is None:
+        return Table("Who has it", (), ())
+    return Table(
+        "Who has it",
+        ("hanger", "probability", "size (90 % interval)"),
+        tuple(
+            (
+                str(each.hanger),
+                formatting.probability(each.probability),
+                f"{quantity(each.size.name)} {size(each.size)}"
+                if each.hanger in leading.named
+                else "",
+            )
+            for each in leading.members
+        ),
+        note="A hanger in which the size would be invisible has the share of its family.",
+    )
+
+
+def _tensions(diagnosis: BridgeDiagnosis) -> Table:
+    known = [each for each in diagnosis.tensions if math.isfinite(each.before_n.mean)]
+    unit = force_unit(*(each.before_n.mean for each in known)) if known else force_unit(1.0)
+    return Table(
+        f"Tension of each hanger, {unit.name} (90 % interval)",
+        ("hanger", f"baseline {diagnosis.baseline}", "diagnosed alone", "diagnosed together"),
+        tuple(
+            (
+                str(each.hanger),
+                *(_tension(t, unit) for t in (each.before_n, each.alone_n, each.jointly_n)),
+            )
+            for each in known
+        ),
+    )
+
+
+def _tension(estimate: TensionEstimate, unit: ForceUnit) -> str:
+    told, places = tension_of(estimate).in_unit(unit), unit.decimals(estimate.mean)
+    return f"{told.mean:.{places}f} ({told.low:.{places}f} to {told.high:.{places}f})"
+
+
+def _alone(diagnosis: BridgeDiagnosis) -> Table:
+    return Table(
+        "What each hanger says for itself",
+        ("hanger", "tests", "its own diagnosis"),
+        tuple(
+            (str(each.hanger), str(len(each.tests)), verdict(each)) for each in diagnosis.diagnoses
+        ),
+    )

@@ -1,0 +1,181 @@
+"""A cause that hangers share, from likelihoods that are known in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+from shm.diagnosis_document import bridge_diagnosis_document
+from shm.documents import dump
+from shm.errors import UsageError
+from shm.gap import GapOptions, diagnose_bridge
+from shm.gap.bridge_diagnosis import jointly
+from shm.gap.kin import kin
+from shm.gap.shared_causes import two_at_least
+from shm.gap.shared_evidence import Evidence, Faint, Patient, Place, Reach
+from shm.models.effects import EFFECTS, Variant
+from shm.report.as_text import as_text
+from shm.report.bridge_diagnosis_report import bridge_diagnosis_paper
+from shm.report.contents import BridgeDiagnosisSheet
+from shm.report.figures.every_figure import bridge_diagnosis_figures
+from shm.values import BridgeDiagnosis, Hanger, ModalTest
+from tests.helpers.diagnoses import a_diagnosis
+from tests.helpers.hangers import HANGER_3
+
+MASS: Place = ("distributed_mass", "everywhere")
+CLOCK: Place = ("timebase", "all tests")
+REACH = Reach.of(EFFECTS[MASS[0]].parameters(HANGER_3, Variant())[0])
+SOUND = {"no_gap": 3.2, "gap": 0.27, "unknown": 0.3}
+"""A no-gap probability of 0.8, against a prior of 0.25."""
+ILL = {"no_gap": 0.1, "gap": 1.3, "unknown": 0.8}
+
+
+def evidence(bayes_factor: float, size: float, sd: float = 0.03) -> Evidence:
+    """A size known to `sd` decades, and a tension that is known with it."""
+    x = np.log10(size) + sd * np.random.default_rng(3).standard_normal(400)
+    return Evidence(bayes_factor, REACH, x, np.ones(400), 700e3 * (1 + 10**x), -0.5, faint())
+
+
+def faint(log_gain: float = 0.0) -> Faint:
+    """Sizes from 0.2 % down, likelier than no effect by a log likelihood."""
+    x = REACH.lower - np.linspace(0.0, 0.5, 20)
+    ratio = np.full(20, np.exp(log_gain))
+    return Faint(x, np.ones(20), ratio, 700e3 * (1 + 10**x))
+
+
+def hanger(number: int, effects: dict[Place, Evidence], said: dict[str, float]) -> Patient:
+    described: Hanger = replace(HANGER_3, id=number, length_m=8.0 + number)
+    diagnosis = replace(a_diagnosis(), hanger=number)
+    tension_n = 700e3 * (1 + 0.05 * np.random.default_rng(number).random(1000))
+    return Patient(
+        described, (ModalTest("t1", ()),), diagnosis, **said, tension_n=tension_n, effects=effects
+    )
+
+
+def bridge(factors: Sequence[float], sizes: Sequence[float]) -> BridgeDiagnosis:
+    """Hangers for which the mass has these Bayes factors; the clock fits none of them."""
+    return jointly(
+        [
+            hanger(
+                number,
+                {MASS: evidence(factor, size), CLOCK: evidence(0.3, 0.004, 0.3)},
+                ILL if factor > 1 else SOUND,
+            )
+            for number, (factor, size) in enumerate(zip(factors, sizes, strict=True), 1)
+        ],
+        GapOptions(),
+    )
+
+
+@pytest.fixture(scope="module")
+def family() -> BridgeDiagnosis:
+    """Four of six hangers are by 5 % too heavy, each of which alone is odds of 8."""
+    return bridge((8, 8, 0.05, 8, 0.05, 8), (0.05, 0.052, 0.02, 0.048, 0.02, 0.051))
+
+
+def test_what_no_hanger_shows_alone_the_family_does(family: BridgeDiagnosis) -> None:
+    assert family.leading is not None
+    assert family.leading.effect == "distributed_mass"
+    assert family.leading.named == (1, 2, 4, 6)
+    assert family.claim(family.leading) > 0.8
+    assert family.leading.size.mean == pytest.approx(0.05, rel=0.1)
+
+
+def test_all_probabilities_add_to_one(family: BridgeDiagnosis) -> None:
+    told = sum(cause.probability for cause in family.causes)
+    told += family.each_for_itself_probability + family.unknown_probability
+    assert told == pytest.approx(1.0)
+
+
+def test_sound_hangers_share_nothing() -> None:
+    found = bridge([0.3] * 8, [0.004] * 8)
+    assert found.leads == "each for itself"
+    assert found.each_for_itself_probability > 0.7
+
+
+def test_one_hanger_with_a_cause_of_its_own_shares_it_with_nobody() -> None:
+    found = bridge([40.0, *[0.05] * 5], [0.05, *[0.02] * 5])
+    assert found.leads == "each for itself"
+
+
+def test_what_none_can_see_adds_up() -> None:
+    def found(log_gain: float) -> BridgeDiagnosis:
+        little = replace(evidence(0.3, 0.003), faint=faint(log_gain))
+        return jointly([hanger(n, {MASS: little}, SOUND) for n in range(1, 11)], GapOptions())
+
+    assert found(0.0).leads == "each for itself"
+    assert found(1.2).leading is not None
+    assert found(-1.2).each_for_itself_probability > found(0.0).each_for_itself_probability
+
+
+def test_sizes_that_differ_speak_against_a_common_cause() -> None:
+    alike = bridge([8.0] * 4, [0.05] * 4).causes[0].log_bayes_factor
+    apart = bridge([8.0] * 4, [0.004, 0.02, 0.08, 0.25]).causes[0].log_bayes_factor
+    assert alike > apart + 3
+
+
+def test_a_size_known_poorly_in_one_hanger_takes_that_of_the_others() -> None:
+    poor = {MASS: evidence(8.0, 0.1, 0.4)}
+    others = [hanger(n, {MASS: evidence(8.0, 0.05)}, ILL) for n in range(2, 7)]
+    found = jointly([hanger(1, poor, ILL), *others], GapOptions())
+    assert found.leading is not None
+    size = found.leading.members[0].size
+    assert size.mean == pytest.approx(0.05, rel=0.2)
+    assert size.sd < 0.3 * 0.1
+    tension = found.tensions[0].jointly_n
+    assert abs(tension.mean / (700e3 * 1.05) - 1) < 0.01
+
+
+def test_a_hanger_that_cannot_show_it_neither_joins_nor_leaves() -> None:
+    blind = hanger(9, {}, SOUND)
+    shown = [hanger(n, {MASS: evidence(20.0, 0.05)}, ILL) for n in range(1, 5)]
+    found = jointly([*shown, blind], GapOptions())
+    assert found.leading is not None
+    assert 0.5 < found.leading.members[-1].probability < 0.95
+
+
+def test_two_at_least_is_the_sum_over_all_such_choices() -> None:
+    rng = np.random.default_rng(5)
+    absent, present = rng.standard_normal((2, 5))
+    whole = sum(
+        np.exp(np.where(chosen, present, absent).sum())
+        for chosen in product((False, True), repeat=5)
+        if sum(chosen) >= 2
+    )
+    assert two_at_least(absent, np.exp(present - absent)) == pytest.approx(np.log(whole))
+
+
+def test_families_are_the_hangers_alike_each_set_once() -> None:
+    made = [replace(hanger(n, {}, SOUND)) for n in range(1, 5)]
+    older = [
+        replace(p, hanger=replace(p.hanger, family="A" if n < 2 else "B"))
+        for n, p in enumerate(made)
+    ]
+    found = {each.members: each.likeness for each in kin(older)}
+    assert found[(0, 1, 2, 3)] == "all hangers"
+    assert found[(0, 1)] == found[(2, 3)] == "hangers of one delivery"
+
+
+def test_fewer_than_two_hangers_or_twice_the_same_are_wrong_usage() -> None:
+    with pytest.raises(UsageError, match="two hangers"):
+        diagnose_bridge([(HANGER_3, ())])
+    with pytest.raises(UsageError, match="number 3"):
+        diagnose_bridge([(HANGER_3, ()), (HANGER_3, ())])
+
+
+def test_the_report_says_who_shares_what_in_plain_words(family: BridgeDiagnosis) -> None:
+    text = as_text(bridge_diagnosis_paper(BridgeDiagnosisSheet(family, "Arch")), 100)
+    assert "Distributed mass is shared by hangers 1, 2, 4 and 6 (" in " ".join(text.split())
+    assert [each.name for each in bridge_diagnosis_figures(family)] == ["shared"]
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_its_document_holds_those_of_the_hangers(family: BridgeDiagnosis) -> None:
+    document = bridge_diagnosis_document(family)
+    assert document["schema"] == "shm.bridge_diagnosis/1"
+    assert [each["schema"] for each in document["diagnoses"]] == ["shm.diagnosis/1"] * 6
+    assert dump(document).count('"hanger"') > 6

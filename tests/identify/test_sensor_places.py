@@ -1,0 +1,80 @@
+"""A sensor whose axes are exchanged or turned, or that is said to be off the hanger, is noticed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.errors import BadInput, NotIdentifiable
+from shm.identify import Identification, IdentifyOptions, identify
+from shm.identify.contract import FoundMode
+from shm.identify.mode_ordering.directions import directions
+from shm.simulate import HammerPlan, HangerState, hammer_test
+from shm.values import NAN, PLANES, Recording, ResponsePoint
+from tests.helpers.hangers import HANGER_3
+
+HANGER = replace(HANGER_3, plate=None)
+PLAN = HammerPlan(
+    hits=4, seconds_per_hit=8.0, sampling_rate_hz=256.0, peak_force_n=1000.0, hammer_angle_deg=40.0
+)
+TWO_PLACES = [ResponsePoint(f"{x_m} {plane}", plane, x_m) for x_m in (2.5, 4.0) for plane in PLANES]
+
+
+@pytest.fixture(scope="module")
+def record() -> Recording:
+    """Of ends that differ by plane: a round bar alike in both has no axes to exchange."""
+    state = HangerState(711e3, k1_n_m_rad=5e6, k3_n_m_rad=5e6)
+    return hammer_test(HANGER, state, PLAN, np.random.default_rng(5))
+
+
+def identified(record: Recording) -> Identification:
+    return identify([record], IdentifyOptions(2.0, 60.0), test_id="t", hanger=HANGER)
+
+
+def with_places(record: Recording, *places_m: float) -> Recording:
+    force, *others = record.channels
+    moved = [replace(c, x_m=x_m) for c, x_m in zip(others, places_m, strict=True)]
+    return replace(record, channels=(force, *moved))
+
+
+def test_sensors_that_agree_are_said_to(record: Recording) -> None:
+    (check,) = [each for each in identified(record).quality if each.name == "directions"]
+    assert check.verdict == "good"
+    assert check.value < 5
+
+
+def test_axes_that_are_exchanged_at_one_place_are_refused(record: Recording) -> None:
+    *others, one, other = record.channels
+    exchanged = (*others, replace(one, plane=other.plane), replace(other, plane=one.plane))
+    with pytest.raises(NotIdentifiable, match=r"directions: .* degrees apart.*are exchanged"):
+        identified(replace(record, channels=exchanged))
+
+
+def test_a_place_off_the_hanger_is_refused_with_its_channel(record: Recording) -> None:
+    for x_m in (-3.0, 22.0):
+        with pytest.raises(BadInput, match=f"{x_m:g} m from the deck end") as raised:
+            identified(with_places(record, 2.5, 2.5, x_m, x_m))
+        assert raised.value.channel == "acc_3"
+
+
+def turned(degrees: float, amplitude: float = 1.0) -> list[FoundMode]:
+    """Modes of either plane, seen turned at the second place."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    shapes = [[1.0, 0.0, c, s], [0.0, 1.0, -s, c]] * 2
+    scale = np.array([1.0, 1.0, amplitude, amplitude])
+    return [FoundMode(f, 0.01, 0.01, 0.001, np.array(v) * scale, NAN * scale)
+            for f, v in zip((3.0, 3.1, 6.0, 6.1), shapes, strict=True)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("degrees", "verdict"), [(3, "good"), (-30, "warning"), (88, "refused")])
+def test_the_angle_between_places_decides(degrees: float, verdict: str) -> None:
+    check = directions(turned(degrees), TWO_PLACES)
+    assert check is not None
+    assert (check.verdict, check.value) == (verdict, pytest.approx(abs(degrees)))
+
+
+def test_nothing_is_said_near_nodes_and_of_one_place() -> None:
+    assert directions(turned(88, amplitude=0.1), TWO_PLACES) is None
+    assert directions(turned(88), [*TWO_PLACES[:2], *TWO_PLACES[:2]]) is None

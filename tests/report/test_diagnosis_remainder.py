@@ -1,0 +1,101 @@
+"""What a diagnosis leaves open, in words; the law of the unknown as an effect's module."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.diagnosis_document import diagnosis_document, diagnosis_of
+from shm.errors import NothingThere
+from shm.models.composed import ComposedHanger
+from shm.models.effects import EFFECTS, Conditions, Effect, Survey, Variant
+from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_report import causes
+from shm.report.diagnosis_summary import consequences, verdict
+from shm.report.effect_file import effect_file
+from shm.values import Compatibility, LawTerm, Remainder, TensionEstimate
+from tests.report.diagnoses import HANGER, LED, NO_GAP, UNEXPLAINED, make_residuals
+
+LONGITUDINAL = LawTerm(
+    "order squared", "all tests", ("longitudinal",), 2.1, 0.1, 8.2, coefficient=3e-4
+)
+ABOVE = LawTerm(
+    "local", "above a level", ("transverse", "longitudinal"), -0.6, 0.1, 4.6,
+    x_m=3.6, threshold=0.65, coefficient=-6e-3,
+)  # fmt: skip
+WARM = LawTerm("even", "temperature", ("transverse",), 0.4, 0.1, 5.0, coefficient=2e-4)
+LEFT = Remainder(0.8, 0.3, -2.3, (LONGITUDINAL, ABOVE, WARM), 1.1, 0.4)
+WITH_LAW = replace(UNEXPLAINED, remainder=LEFT)
+ONE_TEST = Survey(("t1",), ("transverse",), (), False, (), (), ())
+KEPT = Compatibility(("no gap", "point_mass"), ("section_loss",), 0.17, 80)
+
+
+def test_the_law_is_told_with_its_evidence_and_what_is_held_out() -> None:
+    said = consequences(WITH_LAW)
+    assert "grows with the order squared in the longitudinal plane only (+2.1 %" in said
+    assert "log Bayes factor 8" in said
+    assert "only above a level of 0.65" in said
+    assert "held out it shrinks from 1.1 to 0.4 %" in said
+    assert "30 % looks like a change of the tension, of -2.3 %" in said
+    assert "What is left" not in consequences(LED)
+
+
+def test_what_is_compatible_stands_in_the_table_and_in_a_sentence() -> None:
+    found = replace(LED, compatibility=KEPT)
+    rows = {row[0]: row[3] for row in causes(DiagnosisSheet(found, HANGER)).rows}
+    assert (rows["point mass"], rows["section loss"]) == ("yes", "no")
+    assert (rows["no gap"], rows["something not in the catalogue"]) == ("yes", "")
+    assert "do not contradict no gap and point mass" in consequences(found)
+    none = replace(KEPT, not_falsified=(), falsified=("no gap",))
+    assert "contradict all that was fitted" in consequences(replace(LED, compatibility=none))
+
+
+@pytest.mark.parametrize(("count", "words"), [(1, "one mode"), (3, "three modes")])
+def test_of_few_data_the_first_sentence_says_how_little_they_say(count: int, words: str) -> None:
+    few = tuple(each for each in make_residuals(1, count) if each.plane == "transverse")
+    tension_n = TensionEstimate(700e3, 14e3, 677e3, 723e3, 672e3, 728e3)
+    said = verdict(replace(NO_GAP, where=few, tension_after_n=tension_n))
+    assert said.startswith(f"Nothing visible in {words} of transverse vibration")
+    assert "the tension may be off by 4 % (95 %)" in said
+    assert "decide little" in verdict(replace(UNEXPLAINED, where=few))
+
+
+def test_the_document_holds_all_of_it() -> None:
+    found = replace(WITH_LAW, compatibility=KEPT)
+    document = diagnosis_document(found)
+    assert document["not_falsified"] == ["no gap", "point_mass"]
+    back = diagnosis_of(document)
+    assert back.compatibility == KEPT
+    assert back.remainder is not None
+    assert back.remainder.law[1] == ABOVE
+    for key in ("not_falsified", "compatibility", "remainder"):
+        del document[key]
+    assert diagnosis_of(document).remainder is None
+
+
+def test_the_written_effect_does_what_was_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the sizes found, mode n changes by the sum of the terms; at zero by nothing."""
+    module: dict[str, object] = {}
+    exec(effect_file(WITH_LAW, HANGER, "found_play"), module)
+    effect = module["EFFECT"]
+    assert isinstance(effect, Effect)
+    monkeypatch.setitem(EFFECTS, effect.name, effect)
+    hanger = ComposedHanger(HANGER, "beam1", ((effect.name, Variant()),), ())
+    sizes = [3e-4, 6e-3, 2e-4]
+    own = hanger.parameters[-3:]
+    assert all(e.lower < size < e.upper for e, size in zip(own, sizes, strict=True))
+    rest = [1.0, 0.0, 0.0, 0.0, 0.0]
+    theta = np.array([[*rest, 0.0, 0.0, 0.0], [*rest, 3e-4, -6e-3, 2e-4]])
+    found = hanger.modes(theta, Conditions("t1", 5.0, 1.0), 6, shapes=False).frequency_hz
+    order = np.arange(1.0, 7.0)
+    local = -6e-3 * np.sin(order * np.pi * 3.6 / HANGER.length_m) ** 2
+    change = np.stack([local + 1e-3, local + 3e-4 * order**2])
+    assert np.log(found[1] / found[0]) == pytest.approx(change, abs=1e-9)
+    assert effect.invisible(HANGER, ONE_TEST).startswith("It takes tests at two known temp")
+
+
+def test_without_a_law_no_effect_is_written() -> None:
+    with pytest.raises(NothingThere, match="no law"):
+        effect_file(UNEXPLAINED, HANGER, "nothing")
