@@ -90,6 +90,7 @@ def whole_samples(folder: Path) -> list[Sample]:
     table = io.BytesIO()
     np.save(table, rng.standard_normal((3, SAMPLES)))
     rows = b'sampling_rate_hz = 512\n[channel.row_1]\nunit = "N"\n[channel.row_2]\nunit = "g"\n'
+    units = b'[channel.force]\nunit = "N"\n[channel.acc_1]\nunit = "m/s2"\n'
     tests = [ModalTest("t1", (Mode("transverse", 1, 5.8, 0.006, 0.001, 0.0001),), hanger=3)]
     return [
         *found,
@@ -100,7 +101,7 @@ def whole_samples(folder: Path) -> list[Sample]:
         Sample("packed npz", ".npz", _packed_npz(rng)),
         Sample("packed mat", ".mat", _packed_mat(rng, folder / "packed.mat")),
         Sample("packed hdf5", ".h5", _packed_hdf5(rng, folder / "packed.h5")),
-        Sample("mat 7.3", ".mat", _mat_7_3(rng, folder / "new.mat")),
+        Sample("mat 7.3", ".mat", _mat_7_3(rng, folder / "new.mat"), units),
         Sample("npy", ".npy", table.getvalue(), rows),
         Sample("modal tests", ".modes.json", dump(modes_document(tests)).encode()),
     ]
@@ -123,8 +124,9 @@ def _packed_mat(rng: np.random.Generator, path: Path) -> bytes:
 def _packed_hdf5(rng: np.random.Generator, path: Path) -> bytes:
     with h5py.File(path, "w") as file:
         file.attrs["sampling_rate_hz"] = 512.0
-        for name, row in zip(("force", "acc_1"), _rows(rng), strict=True):
-            file.create_dataset(f"run/{name}", data=row, compression="gzip", chunks=(50,))
+        for name, unit, row in zip(("force", "acc_1"), ("N", "m/s2"), _rows(rng), strict=True):
+            kept = file.create_dataset(f"run/{name}", data=row, compression="gzip", chunks=(50,))
+            kept.attrs["unit"] = unit
     return path.read_bytes()
 
 
