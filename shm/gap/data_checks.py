@@ -8,7 +8,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
+import numpy as np
+import scipy
+
 from shm.errors import BadInput
+from shm.models.as_made import TENSION_RATIO
+from shm.models.tensioned_beam import frequencies_hz
 from shm.values import PLANES, Hanger, ModalTest, Mode, Outlier
 
 _FEW_FREQUENCIES = 4  # judgement: tension and stiffness take two, and two are left to disagree
@@ -139,7 +144,32 @@ def _what_few_do(tests: Sequence[ModalTest], hanger: Hanger) -> str:
         )
     return (
         "tension alone can follow so few frequencies, so that a gap can hardly show and its cause "
-        "cannot"
+        f"cannot{_between_ends(tests[0], hanger)}"
+    )
+
+
+def _between_ends(test: ModalTest, hanger: Hanger) -> str:
+    """The tensions by a test's lowest mode, from clamped ends to pinned ones, which so few modes
+    cannot tell; empty where a bar of this description has none."""
+    mode = min(test.modes, key=lambda each: each.order)
+
+    def missed_hz(tension_n: float, spring_n_m_rad: float) -> float:
+        length_m, stiffness = hanger.length_m, hanger.bending_stiffness_n_m2
+        given = (length_m, tension_n, stiffness, hanger.mass_per_length_kg_m)
+        length, tension, bending, mass, spring = map(np.asarray, (*given, spring_n_m_rad))
+        found_hz = frequencies_hz(length, tension, bending, mass, spring, spring, mode.order)
+        return float(found_hz[-1]) - mode.frequency_hz
+
+    slack, most = (share * hanger.nominal_tension_n for share in TENSION_RATIO)
+    found = []
+    for spring in (math.inf, 0.0):
+        if missed_hz(slack, spring) > 0 or missed_hz(most, spring) < 0:
+            return ""
+        found.append(scipy.optimize.brentq(missed_hz, slack, most, (spring,), rtol=1e-6))
+    clamped, pinned = found
+    return (
+        f"; by {_name(mode)} alone the tension is {clamped / 1e3:.0f} kN between clamped ends and "
+        f"{pinned / 1e3:.0f} kN between pinned ones"
     )
 
 

@@ -27,7 +27,7 @@ def told_of_few(diagnosis: Diagnosis) -> str:
     chance = formatting.told_probability(diagnosis.no_gap_probability)
     tension = (
         f"; the tension may be off by {off} (95 %): mass, length and stiffness are known no "
-        f"better, and it is off by more where the ends are not those of {diagnosis.baseline}"
+        f"better, and it is off by far more where the ends are not those of {diagnosis.baseline}"
         if off
         else ""
     )
