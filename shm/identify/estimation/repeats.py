@@ -36,8 +36,8 @@ hits are few, its shape proves nothing."""
 _SAME_SHAPE, _SURE_SHAPE = 0.95, 2.0
 """A mode that has the same shape whichever hit is left out may have twice the limit of the
 frequency's standard deviation, to which Student's quantile for three hits adds 1.8, and any of
-damping. In 184 records with hits (tests/worlds/recordings.py, seeds 2000 to 2007) that finds 29
-modes and 3 tracks of noise more."""
+damping. In some 180 records with hits (tests/worlds/recordings.py, seeds 2000 to 2006), before
+planes and orders are given, that finds 29 modes and 3 tracks of noise more."""
 _MOST_TO_BE_ALONE = 3
 """Hits of which one alone may excite a plane. In the same records that finds 124 modes of two hits
 and 1 track of noise, 16 and none of three, 7 and none of more, where it may be a disturbance."""
