@@ -135,15 +135,18 @@ class Evidence:
         """Probability (D,) of each direction, given a change."""
         return np.asarray(self.shares.sum(axis=(0, 1, 2, 4)))
 
-    def change_at(self, index: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
-        """Mean (n + q,) and factor (n + q, r) of the covariance of one change, as of the last test.
-
-        A ramp's is what has come of it by then.
-        """
-        return self.changes_at([index])[0]
-
     def changes_at(self, indices: Sequence[tuple[int, ...]]) -> list[tuple[FloatArray, FloatArray]]:
-        """The same of each; factors of fewer columns than others have zeros there."""
+        """Mean (n + q,) and factor (n + q, r) of the covariance of each change, by the last test.
+
+        A ramp's is what has come of it by then; directions of fewer columns have zeros there.
+        """
+        at, _, kind, *_ = np.array(indices).T
+        done = np.where(kind == RAMP, self._progress(at), 1.0)[:, None]
+        means, factors = self._at_their_rate(indices)
+        return list(zip(done * means, done[..., None] * factors, strict=True))
+
+    def _at_their_rate(self, indices: Sequence[tuple[int, ...]]) -> tuple[FloatArray, FloatArray]:
+        """Means (changes, n + q) and factors (changes, n + q, r); of a ramp, a year of it."""
         new = [index for index in indices if index not in self._asked]
         if new:
             at, k, kind, d, size = np.array(new).T
@@ -154,10 +157,10 @@ class Evidence:
             root = np.linalg.cholesky(np.linalg.inv((inner + inner.transpose(0, 2, 1)) / 2))
             reach = factor @ root
             pulled = reach.transpose(0, 2, 1) @ pull[kind, at, k][..., None]
-            done = np.where(kind == RAMP, self._progress(at), 1.0)[:, None]
-            means, factors = done * (reach @ pulled)[..., 0], done[..., None] * reach
-            self._asked.update(zip(new, zip(means, factors, strict=True), strict=True))
-        return [self._asked[index] for index in indices]
+            means = (reach @ pulled)[..., 0]
+            self._asked.update(zip(new, zip(means, reach, strict=True), strict=True))
+        found = [self._asked[index] for index in indices]
+        return np.array([mean for mean, _ in found]), np.array([factor for _, factor in found])
 
     @cached_property
     def _factors(self) -> FloatArray:
@@ -184,16 +187,12 @@ class Evidence:
 
         Means and variances, both (changes, rows).
         """
-        at, k, kind, d, size = np.array(indices).T
-        information, pull, response = self.seen
-        factor = SIZES[size][:, None, None] * self._factors[d]
-        crossed = factor.transpose(0, 2, 1)
-        inner = np.linalg.inv(np.eye(factor.shape[2]) + crossed @ information[kind, at, k] @ factor)
-        mean = factor @ inner @ (crossed @ pull[kind, at, k][..., None])
-        reach, moved = loadings @ self.null_covariance[k], response[kind, at, k]
-        of_change = reach @ moved @ factor
-        variance = (reach * loadings).sum(axis=2) + (of_change @ inner * of_change).sum(axis=2)
-        return self.null_mean[k] @ loadings.T - (reach @ (moved @ mean))[..., 0], variance
+        at, k, kind, *_ = np.array(indices).T
+        means, factors = self._at_their_rate(indices)
+        reach, moved = loadings @ self.null_covariance[k], self.seen[2][kind, at, k]
+        variance = (reach * loadings).sum(axis=2) + np.square(reach @ moved @ factors).sum(axis=2)
+        shifts = (reach @ moved @ means[..., None])[..., 0]
+        return self.null_mean[k] @ loadings.T - shifts, variance
 
 
 def evidence_of(

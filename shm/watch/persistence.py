@@ -143,7 +143,7 @@ def _shown(
 ) -> tuple[FloatArray, FloatArray, float]:
     """How much of a change each test (T,) shows by itself, 1 all of it, the sd of that, and the
     largest that it does to a log frequency."""
-    change, _ = evidence.change_at(index)
+    ((change, _),) = evidence.changes_at([index])
     ((null,), _) = evidence.of_null([index], np.eye(evidence.null_mean.shape[1]))
     measured = np.isfinite(course.variances)
     weight = np.where(measured, 1 / np.where(measured, course.variances, 1.0), 0.0)

@@ -195,7 +195,7 @@ def test_the_size_of_a_change_is_that_of_the_dense_gaussian_posterior() -> None:
         gain = change.T @ np.linalg.inv(example.covariance(k) + change @ change.T)
         unit = SIZES[size] * example.directions[d].factor
         done = example.evidence.progress(at) if kind == RAMP else 1.0
-        mean, root = example.evidence.change_at(index)
+        ((mean, root),) = example.evidence.changes_at([index])
         left = np.eye(change.shape[1]) - gain @ change
         assert mean == pytest.approx(done * unit @ gain @ seen, abs=1e-6)
         assert root @ root.T == pytest.approx(done**2 * unit @ left @ unit.T, abs=1e-6)

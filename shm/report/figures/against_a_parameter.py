@@ -13,7 +13,6 @@ from shm.values import FloatArray
 # In a fixed order; dashed where a higher mode begins the list anew.
 _HUES = ("blue", "orange", "green", "purple", "red", "quiet")
 _ASIDE_INCHES = 3.2  # layout
-_DOTS_PER_INCH = 150
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +43,7 @@ def specify(parts: Sequence[Curves], x_label: str, y_label: str) -> Specificatio
 
 def write_png(figure: Specification, path: Path) -> None:
     """The figure on white."""
-    path.write_bytes(illustration.png(with_matplotlib.draw(figure), _DOTS_PER_INCH))
+    path.write_bytes(illustration.png(with_matplotlib.draw(figure)))
 
 
 def _lines(curves: Curves) -> list[Mark]:

@@ -19,6 +19,8 @@ from shm.report.figures import with_matplotlib
 from shm.report.figures.specification import Specification
 
 Data = TypeVar("Data")
+DOTS_PER_INCH = 150
+"""Of a file, for a screen; a PDF has more (`as_pdf`)."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Illustration:
         """An `<svg>` element whose ids are its own and whose colours follow the page."""
         return svg(self.figure, self.name, self.title, self.alt)
 
-    def png(self, dots_per_inch: int = 150) -> bytes:
+    def png(self, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
         """The picture on white."""
         return png(self.figure, dots_per_inch)
 
@@ -75,7 +77,7 @@ _ID = re.compile(r'\bid="([^"]+)"')
 _REFERENCE = re.compile(r'(href="#|url\(#)([^")]+)')
 
 
-def png(figure: Figure, dots_per_inch: int) -> bytes:
+def png(figure: Figure, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
     """The figure on white."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=dots_per_inch, facecolor="white")
