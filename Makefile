@@ -31,8 +31,8 @@ test: .venv/development
 # whether they round between multiplying and adding: another processor gives other last digits, and
 # a test that stands on them passes on one machine alone. So the quick ones of the numerics run
 # again as on a processor without AVX2 and FMA, which differs most; as on one without AVX-512 alone,
-# and the slow ones, with `make bench`. numpy warns, and a
-# warning is an error here, of names that it does not choose by; hence it is asked for them.
+# and the slow ones, with `make bench`. numpy warns, and a warning is an error here, of names that it
+# does not choose by; hence it is asked for them.
 CHOSEN_BY = $(shell $(BIN)/python -c "from numpy._core import _multiarray_umath as m; print(*m.__cpu_dispatch__)")
 WITHOUT_AVX512 = OPENBLAS_CORETYPE=Haswell \
 	NPY_DISABLE_CPU_FEATURES="$(filter X86_V4 AVX512%,$(CHOSEN_BY))"
