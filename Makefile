@@ -31,8 +31,8 @@ test: .venv/development
 # whether they round between multiplying and adding: another processor gives other last digits, and
 # a test that stands on them passes on one machine alone. So the quick ones of the numerics run
 # again as on a processor without AVX2 and FMA, which differs most; as on one without AVX-512 alone,
-# and those that sample for long or watch whole histories, with `make bench`. numpy warns, and a
-# warning is an error here, of names that it does not choose by; hence it is asked for them.
+# and the slow ones, with `make bench`. numpy warns, and a warning is an error here, of names that it
+# does not choose by; hence it is asked for them.
 CHOSEN_BY = $(shell $(BIN)/python -c "from numpy._core import _multiarray_umath as m; print(*m.__cpu_dispatch__)")
 WITHOUT_AVX512 = OPENBLAS_CORETYPE=Haswell \
 	NPY_DISABLE_CPU_FEATURES="$(filter X86_V4 AVX512%,$(CHOSEN_BY))"
@@ -43,9 +43,11 @@ SAMPLED := tests/gap/test_calibration.py tests/inference/test_described.py \
 WATCHED := $(patsubst %,tests/watch/test_%.py,agreement baseline_check frequencies lone_baseline \
 	persistence)
 WORDS := $(patsubst %,tests/watch/test_%.py,alert_language alert_text)
-SLOW := $(SAMPLED) $(WATCHED) $(WORDS) $(patsubst %,tests/models/test_%.py,models solid solid_basis) \
-	$(patsubst %,tests/gap/test_%.py,attribution diagnose discrepancy fit importance_sampling \
-		law_allowances law_error minor_cause numbering outliers places readings) \
+SLOW := $(SAMPLED) $(WATCHED) $(WORDS) $(patsubst %,tests/models/test_%.py,hanger_composed models solid \
+		solid_basis) \
+	$(patsubst %,tests/gap/test_%.py,amplitude_slopes any_simulator attribution descent diagnose \
+		discrepancy fit importance_sampling law_allowances law_error minor_cause numbering outliers \
+		places readings search) \
 	$(patsubst %,tests/inference/test_%.py,conditions ensemble evidence sharp updating) \
 	$(patsubst %,tests/watch/test_%.py,bridge_drifts false_call_rate neighbours state \
 		watcher watching)
@@ -69,8 +71,8 @@ lint: .venv/development
 bench: .venv/development
 	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile -m trial
 	$(MAKE) without-avx512
-	$(WITHOUT_AVX512) $(BIN)/python -m pytest --quiet $(SAMPLED) $(WATCHED)
-	$(WITHOUT_AVX2) $(BIN)/python -m pytest --quiet $(SAMPLED) $(WATCHED)
+	$(WITHOUT_AVX512) $(BIN)/python -m pytest --quiet $(SLOW)
+	$(WITHOUT_AVX2) $(BIN)/python -m pytest --quiet $(SLOW)
 	for benchmark in $(filter-out %peers.py,$(wildcard tests/benchmarks/*.py)); do \
 		echo "== $$benchmark"; $(BIN)/python $$benchmark || exit 1; done
 

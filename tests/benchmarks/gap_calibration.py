@@ -113,7 +113,7 @@ def _with_the_whole_catalogue(clear: Cleared, truth: TrueCase) -> dict[str, obje
     )
     share = second_cause(problem, found.baseline, pair.best.fit)[1] if pair else 1.0
     return {
-        "own": _ways(problem, found.baseline, planted) if planted and truth.effects else None,
+        "own": ways_of(problem, found.baseline, planted) if planted and truth.effects else None,
         "second": share if truth.effects and pair and pair.is_pair and share < 1 else None,
         "undetected": bool(truth.effects) if found.leads == "unexplained" else None,
     }
@@ -129,7 +129,7 @@ def _without_the_planted(clear: Cleared) -> dict[str, object]:
     return {
         "mimics": len(likeliest.best.hypothesis.effects) if fits else 0,
         "pair": leading.best.hypothesis.names if leading and leading.is_pair else (),
-        "mimicking": _ways(clear.problem, found.baseline, fit) if fit else None,
+        "mimicking": ways_of(clear.problem, found.baseline, fit) if fit else None,
     }
 
 
@@ -144,7 +144,7 @@ def _fit_of(found: Attribution, effects: tuple[str, ...]) -> Fit | None:
     return max(tried, key=lambda each: each.log_evidence).fit if tried else None
 
 
-def _ways(problem: GapProblem, baseline: Fit, fit: Fit) -> Ways:
+def ways_of(problem: GapProblem, baseline: Fit, fit: Fit) -> Ways:
     """All allowances of one way are as likely."""
     logs = by_its_laws(problem, baseline, fit, np.random.default_rng(0)).log_evidences
     ways = [("exact", 0.0), *(each.way for each in allowances(problem, baseline, fit))]

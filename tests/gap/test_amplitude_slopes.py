@@ -17,7 +17,7 @@ from tests.helpers.hangers import HANGER_3
 
 PLAIN = replace(HANGER_3, plate=None)
 SLIP = PlantedEffect("joint_softening", "both ends", {"log10_k_at_reference_level": 8.3})
-KNOWN = ("joint_softening", "rotational_end_flexibility", "bending_stiffness", "timebase")
+KNOWN = ("joint_softening", "rotational_end_flexibility")
 PLAN = CampaignPlan(modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0)
 SLOPE, SLOPE_SD, SD = -2e-3, 3e-5, 2e-4
 

@@ -11,9 +11,21 @@ import pytest
 
 from shm.blind.making import make_trial
 from shm.errors import BadInput
-from shm.gap.calibration import CALIBRATION, FILE, Provenance, read_calibration
-from shm.models.effects import EFFECTS
-from tests.benchmarks.gap_calibration import Lesson, Ways, calibrated, lesson, minor, shares, text
+from shm.gap.calibration import CALIBRATION, FILE, Calibration, Provenance, read_calibration
+from shm.gap.contract import Hypothesis
+from shm.gap.fit import baseline_fit, fitted
+from shm.models.effects import EFFECTS, Variant
+from tests.benchmarks.gap_calibration import (
+    Lesson,
+    Ways,
+    calibrated,
+    lesson,
+    minor,
+    shares,
+    text,
+    ways_of,
+)
+from tests.helpers.gap_campaigns import campaign, problem_of
 
 ABOUT = Provenance("toy", "1", "2", "", date(2026, 11, 25), "none")
 
@@ -77,14 +89,37 @@ def test_shares_of_ways_are_those_by_which_they_were_drawn() -> None:
     assert found["rough 0.1"] == pytest.approx(2 / 3, abs=0.15)
 
 
+def test_what_lessons_teach_reads_back_as_it_was_written(tmp_path: Path) -> None:
+    """Of the laws of a real fit, by the names that a case gives them."""
+    stiffer = Hypothesis((("bending_stiffness", Variant()),))
+    problem, rng = problem_of(campaign(stiffer.effects, [0.25])), np.random.default_rng(1)
+    baseline = baseline_fit(problem, rng)
+    own = ways_of(problem, baseline, fitted(problem, stiffer, rng))
+    pair = ("sag", "timebase")
+    lessons = [
+        Lesson(f"c{k}", 1 + k % 2, own, 0.1 * (k % 3), k % 2 == 0, k % 3, pair, own)
+        for k in range(12)
+    ]
+    read = _read_back(lessons, tmp_path)
+    assert read.in_mimicking_pairs == {"sag": 12, "timebase": 12}
+    assert (read.mimics_one, read.undetected_share) == (pytest.approx(1 / 3, rel=1e-3), 0.5)
+    assert read.exact.own != CALIBRATION.exact.own
+
+
+def _read_back(lessons: list[Lesson], folder: Path) -> Calibration:
+    found = calibrated(lessons, ABOUT)
+    (folder / "calibration.toml").write_text(text(found))
+    read = read_calibration(folder / "calibration.toml")
+    assert text(read) == text(found)
+    return read
+
+
+@pytest.mark.trial
 def test_a_trial_teaches_what_the_file_holds(tmp_path: Path) -> None:
     """Two cases, each taken for ten: the file written of them reads back as it was."""
     made = make_trial(tmp_path / "trial", tmp_path / "key", 2, seed=7, ways=("modes",))
     lessons = [lesson(tmp_path / "trial" / "cases" / each.case, each) for each in made.cases]
     assert any(each.own for each in lessons)
-    found = calibrated(lessons * 10, ABOUT)
-    (tmp_path / "calibration.toml").write_text(text(found))
-    read = read_calibration(tmp_path / "calibration.toml")
-    assert text(read) == text(found)
+    read = _read_back(lessons * 10, tmp_path)
     assert set(read.in_mimicking_pairs) <= set(EFFECTS)
     assert sum(each.own for each in read.of_a_mode.values()) < 1

@@ -29,6 +29,7 @@ def _tests() -> list[ModalTest]:
     return campaign(HANGER_3, HangerState(711e3), [SWUNG], plan, np.random.default_rng(3))
 
 
+@cache
 def _fits(*effects: str) -> tuple[GapProblem, Fit, Fit]:
     problem = GapProblem(HANGER_3, "beam1", observed(_tests(), HANGER_3))
     rng = np.random.default_rng(1)

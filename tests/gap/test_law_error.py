@@ -87,13 +87,10 @@ def test_a_law_that_shifts_its_action_from_mode_to_mode_is_forgiven() -> None:
     rng = np.random.default_rng(1)
     baseline, count = baseline_fit(problem, rng), problem.design.frequencies
     typical = np.sqrt(np.mean((fit.predicted - baseline.predicted)[:count] ** 2))
-    gains = []
-    for _ in range(5):
-        away = problem.observations.value.copy()
-        away[:count] += 0.2 * typical * rng.standard_normal(count)
-        moved = GapProblem(HANGER_3, "beam1", replace(problem.observations, value=away))
-        gains.append(by_its_laws(moved, baseline, fit, rng).gain)
-    assert np.median(gains) > 50
+    away = problem.observations.value.copy()
+    away[:count] += 0.2 * typical * rng.standard_normal(count)
+    moved = GapProblem(HANGER_3, "beam1", replace(problem.observations, value=away))
+    assert by_its_laws(moved, baseline, fit, rng).gain > 50
 
 
 def test_where_a_law_is_far_off_the_fit_goes_all_the_way() -> None:

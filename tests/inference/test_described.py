@@ -235,6 +235,11 @@ def unread() -> Posterior:
     return update([a_test()], build("beam1", ROD), UpdateOptions(4000))
 
 
+@pytest.fixture(scope="module")
+def on_springs() -> Posterior:
+    return update([a_test()], build("beam2", ROD), UpdateOptions(200, seed=4))
+
+
 def test_without_a_reading_the_tension_has_the_spread_of_what_no_frequency_sees(
     unread: Posterior,
 ) -> None:
@@ -243,7 +248,7 @@ def test_without_a_reading_the_tension_has_the_spread_of_what_no_frequency_sees(
     assert 0.8 * 0.0077 < relative < 1.2 * np.hypot(0.01, 0.003)
 
 
-@pytest.mark.parametrize("off", [-0.02, 0.01])
+@pytest.mark.parametrize("off", [-0.02, pytest.param(0.01, marks=pytest.mark.trial)])
 def test_a_reading_makes_of_it_the_product_of_both_normals(unread: Posterior, off: float) -> None:
     """1/v = 1/v0 + 1/r, m = v (m0/v0 + read/r)."""
     log = np.log(unread.tension_n)
@@ -302,13 +307,13 @@ def test_a_calibration_narrows_the_tension_of_the_next_test_and_moves_it(
     assert found.tension_n.mean() / ROD.nominal_tension_n == pytest.approx(1.02, abs=0.005)
 
 
-def test_a_calibration_of_one_class_serves_another(taught: Calibration) -> None:
+def test_a_calibration_of_one_class_serves_another(
+    taught: Calibration, on_springs: Posterior
+) -> None:
     """It is of the bar, not of the class."""
-    found = [
-        update([a_test()], build("beam2", ROD), UpdateOptions(300, calibration=each))
-        for each in (taught, None)
-    ]
-    assert found[0].tension_n.std() < 0.5 * found[1].tension_n.std()
+    options = UpdateOptions(200, calibration=taught)
+    found = update([a_test()], build("beam2", ROD), options)
+    assert found.tension_n.std() < 0.5 * on_springs.tension_n.std()
 
 
 def test_a_calibration_is_the_mean_and_covariance_of_the_deviations_drawn() -> None:
@@ -351,17 +356,19 @@ def test_the_evidence_of_a_bar_as_made_is_that_of_quadrature(unread: Posterior) 
     assert unread.log_evidence_sd < 0.05
 
 
-def test_an_update_of_the_bar_as_made_holds_the_tension_and_repeats_with_its_seed() -> None:
-    found = [update([a_test()], build("beam2", ROD), UpdateOptions(200, seed=4)) for _ in range(2)]
-    np.testing.assert_array_equal(found[0].samples, found[1].samples)
-    low, high = np.quantile(found[0].tension_n, [0.005, 0.995])
+def test_an_update_of_the_bar_as_made_holds_the_tension_and_repeats_with_its_seed(
+    on_springs: Posterior,
+) -> None:
+    again = update([a_test()], build("beam2", ROD), UpdateOptions(200, seed=4))
+    np.testing.assert_array_equal(on_springs.samples, again.samples)
+    low, high = np.quantile(again.tension_n, [0.005, 0.995])
     assert low < ROD.nominal_tension_n < high
-    assert found[0].effective_sample_size > 100
+    assert again.effective_sample_size > 100
 
 
 def test_a_later_test_of_the_bar_as_made_is_refreshed_to_the_same_answer() -> None:
     model = build("beam2", ROD)
-    known = update([a_test(modes=4, log10_k=7.0)], model, UpdateOptions(300))
+    known = update([a_test(modes=4, log10_k=7.0)], model, UpdateOptions(200))
     later = a_test(log10_k=7.0)
     found = refresh([later], model, known, UpdateOptions(600))
     expected = update([later], model, UpdateOptions(600, seed=2))

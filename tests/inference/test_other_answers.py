@@ -15,12 +15,13 @@ from shm.values import PLANES, Hanger, ModalTest, Mode, Posterior
 STEEL = {"elastic_modulus_pa": 200e9, "density_kg_m3": 7850.0, "nominal_tension_n": 180e3}
 BAR = shm.round_bar(3, diameter_m=0.05, length_m=9.0, **STEEL)
 TENSION_N = 171e3
-OPTIONS = UpdateOptions(samples=500)
+OPTIONS = UpdateOptions(samples=200)
+CLASS = "beam2"
 
 
 def a_test(orders: range, hanger: Hanger = BAR, **about: float) -> ModalTest:
     """Exact modes of both planes at `TENSION_N`, ends of k L/EI = 30."""
-    model = build("beam3", hanger, THESIS)
+    model = build(CLASS, hanger, THESIS)
     spring = np.log10(30 * hanger.bending_stiffness_n_m2 / hanger.length_m)
     truth = {"theta_F": TENSION_N / hanger.nominal_tension_n, "theta_L": 1.0}
     theta = np.array([[truth.get(name, spring) for name in model.parameter_names]])
@@ -38,7 +39,7 @@ def numbered_lower(test: ModalTest) -> ModalTest:
 
 
 def posterior(test: ModalTest, hanger: Hanger = BAR) -> Posterior:
-    return update([test], build("beam3", hanger), OPTIONS)
+    return update([test], build(CLASS, hanger), OPTIONS)
 
 
 def test_higher_modes_that_are_numbered_one_too_low_are_told() -> None:
@@ -55,7 +56,9 @@ def test_right_orders_are_left_alone(orders: range) -> None:
     assert found.faults == ()
 
 
-@pytest.mark.parametrize(("read", "says"), [(1.0, False), (1.3, True), (0.8, True)])
+@pytest.mark.parametrize(
+    ("read", "says"), [(1.0, False), (1.3, True), pytest.param(0.8, True, marks=pytest.mark.trial)]
+)
 def test_a_reading_is_held_against_the_frequencies(read: float, says: bool) -> None:
     test = a_test(range(1, 6), tension_read_n=read * TENSION_N, tension_read_sd_n=0.01 * TENSION_N)
     found = posterior(test)

@@ -10,7 +10,7 @@ import pytest
 from shm.errors import UsageError
 from shm.models import build
 from shm.models.base import silent
-from shm.models.solid import S1, Solid0, Solid2, basis, reduction
+from shm.models.solid import S1, Solid2, basis, reduction
 from shm.values import Turnbuckle
 from tests.helpers.hangers import HANGER_3
 
@@ -24,11 +24,27 @@ def empty_cache(tmp_path, monkeypatch):
     return tmp_path / "cache"
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A basis as made, and the progress that was told."""
+    told: list[float] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SHM_CACHE", str(tmp_path_factory.mktemp("made")))
+        return basis.transverse_basis(S1(SHORT).description(), 6, told.append), told
+
+
+@pytest.fixture
+def made_at_once(made, monkeypatch) -> None:
+    """What is made is the basis made before."""
+    monkeypatch.setattr(basis.Description, "system", lambda *_: None)
+    monkeypatch.setattr(reduction, "reduce", lambda *_: made[0])
+
+
 def a_basis():
     return basis.transverse_basis(S1(SHORT).description(), 6, silent)
 
 
-def test_a_basis_is_made_once_and_then_read_from_disk(monkeypatch) -> None:
+def test_a_basis_is_made_once_and_then_read_from_disk(made_at_once, monkeypatch) -> None:
     first = a_basis()
     monkeypatch.setattr(basis, "_made", {})
     monkeypatch.setattr(reduction, "reduce", None)
@@ -37,7 +53,9 @@ def test_a_basis_is_made_once_and_then_read_from_disk(monkeypatch) -> None:
     assert again.estimated_error == first.estimated_error
 
 
-def test_a_broken_file_is_reported_and_made_anew(empty_cache, monkeypatch, caplog) -> None:
+def test_a_broken_file_is_reported_and_made_anew(
+    made_at_once, empty_cache, monkeypatch, caplog
+) -> None:
     first = a_basis()
     (kept,) = empty_cache.glob("basis-*.npz")
     kept.write_bytes(kept.read_bytes()[:100])
@@ -49,7 +67,7 @@ def test_a_broken_file_is_reported_and_made_anew(empty_cache, monkeypatch, caplo
 
 
 def test_a_folder_that_cannot_be_written_is_reported_and_work_goes_on(
-    tmp_path, monkeypatch, caplog
+    made_at_once, tmp_path, monkeypatch, caplog
 ) -> None:
     blocked = tmp_path / "a file"
     blocked.write_text("")
@@ -70,9 +88,8 @@ def test_the_key_changes_with_geometry_material_prior_and_modes() -> None:
     assert len(keys) == 5
 
 
-def test_progress_is_told_and_never_falls() -> None:
-    told: list[float] = []
-    basis.transverse_basis(Solid0(HANGER_3).description(), 6, told.append)
+def test_progress_is_told_and_never_falls(made) -> None:
+    _, told = made
     assert told == sorted(told)
     assert 0 < told[0] < told[-1] <= 1
 

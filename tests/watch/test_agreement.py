@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from functools import cache
 
 import numpy as np
 import pytest
@@ -42,10 +43,14 @@ def baseline_of(first: ModalTest) -> tuple[Posterior, list[tuple[ModalTest, date
     return quick_update.update([first], build("beam1", HANGER_3), options), [(first, BEGIN)]
 
 
+@cache
+def sound_baseline() -> tuple[Posterior, list[tuple[ModalTest, datetime]]]:
+    return baseline_of(a_test(0, 1.0))
+
+
 def watch(newest: ModalTest, beside: Beside | None) -> Newest:
     dated = [(newest, newest.time or BEGIN)]
-    baseline = baseline_of(a_test(0, 1.0))
-    found = watch_newest(*baseline, dated, HANGER, WatchOptions(), beside=beside)
+    found = watch_newest(*sound_baseline(), dated, HANGER, WatchOptions(), beside=beside)
     assert found is not None
     return found
 
@@ -120,7 +125,7 @@ def test_a_second_test_that_agrees_with_none_is_asked_to_be_repeated() -> None:
 def test_tests_of_later_visits_are_the_watchs_to_judge() -> None:
     """Of tests a month apart none is told for agreeing. Three of them doubt a baseline of one."""
     apart = [replace(a_test(n), time=BEGIN + n * timedelta(days=30)) for n in range(1, 6)]
-    baseline = baseline_of(a_test(0, 1.0))
+    baseline = sound_baseline()
     kept: bytes | None = None
     before: ModalTest | None = None
     alerts = []

@@ -104,6 +104,9 @@ THIN = replace(
     plate=None,
 )
 IN_ONE_PLANE: list[tuple[Plane, int]] = [("transverse", order) for order in range(1, 5)]
+SEEDS = pytest.mark.parametrize(
+    "seeds", [range(1), pytest.param(range(1, 6), marks=pytest.mark.trial)], ids=["one", "five"]
+)
 CASES = pytest.mark.parametrize(
     ("hanger", "springs", "modes"),
     [
@@ -133,21 +136,23 @@ def unlike(
     return found
 
 
+@SEEDS
 @CASES
 def test_other_tensions_and_looser_ends_within_a_baseline_are_no_mistakes(
-    hanger: Hanger, springs: Sequence[float], modes: Sequence[tuple[Plane, int]]
+    hanger: Hanger, springs: Sequence[float], modes: Sequence[tuple[Plane, int]], seeds: range
 ) -> None:
     model = described("beam2", hanger, DESCRIPTION)
-    checks = [check_baseline(unlike(hanger, springs, modes, seed), model) for seed in range(6)]
-    assert [each.left_out for each in checks] == [()] * 6
+    for seed in seeds:
+        assert check_baseline(unlike(hanger, springs, modes, seed), model).left_out == ()
 
 
+@SEEDS
 @CASES
 def test_a_wrong_order_a_tone_and_the_other_planes_mode_are_found_all_the_same(
-    hanger: Hanger, springs: Sequence[float], modes: Sequence[tuple[Plane, int]]
+    hanger: Hanger, springs: Sequence[float], modes: Sequence[tuple[Plane, int]], seeds: range
 ) -> None:
     model = described("beam2", hanger, DESCRIPTION)
-    for seed in range(6):
+    for seed in seeds:
         tests = unlike(hanger, springs, modes, seed)
         known = {(mode.plane, mode.order): mode.frequency_hz for mode in tests[0].modes}
         wrong = {

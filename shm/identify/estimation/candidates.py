@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -42,15 +43,15 @@ class Candidate:
     poles: tuple[Pole, ...]
     blur_hz: float = 0.0
 
-    @property
+    @cached_property
     def frequency_hz(self) -> float:
         return float(np.median([pole.frequency_hz for pole in self.poles]))
 
-    @property
+    @cached_property
     def damping_ratio(self) -> float:
         return float(np.median([pole.damping_ratio for pole in self.poles]))
 
-    @property
+    @cached_property
     def shape(self) -> FloatArray:
         """Median real shape over the orders, (channels,); its largest absolute value is 1."""
         return median_shape([pole.shape for pole in self.poles])

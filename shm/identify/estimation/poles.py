@@ -103,6 +103,10 @@ def aligned(shape: FloatArray, reference: FloatArray) -> FloatArray:
 
 def median_shape(shapes: Sequence[ComplexArray]) -> FloatArray:
     """Median over complex shapes (channels,) made real, its largest value 1."""
-    real = [real_shape(shape) for shape in shapes]
-    middle = np.median([aligned(shape, real[-1]) for shape in real], axis=0)
+    given = np.array(shapes)
+    turn = np.exp(-0.5j * np.angle(np.sum(given**2, axis=1, keepdims=True)))
+    real = (given * turn).real
+    # By least squares to the last one, whose own scale is taken out at the end.
+    scale = (real @ real[-1]) / np.sum(real**2, axis=1)
+    middle = np.median(scale[:, np.newaxis] * real, axis=0)
     return np.asarray(middle / middle[np.argmax(np.abs(middle))])

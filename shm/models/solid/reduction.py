@@ -200,12 +200,18 @@ def _smallest(
 ) -> tuple[FloatArray, Projected, float]:
     """The smallest compression within the target of the reservoir, and its worst error."""
     whole = reservoir.whole().frequencies_hz(candidates, modes)
+    within, worst = (1 - _SHARE_OF_TARGET) * TARGET_ERROR, 0
     for unknowns in range(modes, reservoir.size + 1):
         basis, projected = reservoir.compressed(unknowns)
-        error = float(_error(projected, candidates, whole).max())
-        if error < (1 - _SHARE_OF_TARGET) * TARGET_ERROR:
+        last = unknowns == reservoir.size
+        # Where one too small erred most the next one mostly errs too, and the others cost time.
+        if not last and _error(projected, candidates[[worst]], whole[[worst]])[0] >= within:
+            continue
+        errors = _error(projected, candidates, whole)
+        worst = int(errors.argmax())
+        if errors[worst] < within:
             break
-    return basis, projected, error
+    return basis, projected, float(errors[worst])
 
 
 @dataclass(frozen=True, eq=False)
