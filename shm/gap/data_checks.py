@@ -8,15 +8,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
-import numpy as np
-import scipy
-
 from shm.errors import BadInput
-from shm.models.as_made import TENSION_RATIO
-from shm.models.tensioned_beam import frequencies_hz
+from shm.gap.few_frequencies import told_of_few
 from shm.values import PLANES, Hanger, ModalTest, Mode, Outlier
 
-_FEW_FREQUENCIES = 4  # judgement: tension and stiffness take two, and two are left to disagree
 # Judgement: 4.5 are rare and no proof (`shm.gap.outliers`); among some hundred pairs six never are.
 _CONTRADICTION_SD = 6.0
 # Judgement: no thermometer on a bar, and no hand with a hammer, is more alike from test to test.
@@ -107,7 +102,7 @@ def _doubtful(test: ModalTest) -> dict[str, str]:
 
 def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
     remarks = [
-        _few(tests, hanger),
+        told_of_few(tests, hanger),
         _irregular(tests),
         _without_sd(tests),
         _without_temperature(tests),
@@ -115,62 +110,6 @@ def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
         _amplitude(tests),
     ]
     return [remark for remark in remarks if remark] + _contradictions(tests)
-
-
-def _few(tests: Sequence[ModalTest], hanger: Hanger) -> str:
-    names = {_name(mode) for test in tests for mode in test.modes}
-    if len(names) >= _FEW_FREQUENCIES:
-        return ""
-    only = "Only one mode is" if len(names) == 1 else f"Only {len(names)} modes are"
-    return (
-        f"{only} given ({', '.join(sorted(names))}): {_what_few_do(tests, hanger)}; give at least "
-        f"{_FEW_FREQUENCIES}, better eight a plane."
-    )
-
-
-def _what_few_do(tests: Sequence[ModalTest], hanger: Hanger) -> str:
-    """A tension that cannot follow the frequencies lets a gap show, though not its cause."""
-    alike = "but most causes look alike in so few frequencies"
-    if hanger.nominal_tension_n == 0:
-        return f"the bar carries no tension that could follow them, so that a gap can show, {alike}"
-    if math.isfinite(hanger.scatter.tension):
-        known = f"the tension is known to {100 * hanger.scatter.tension:.2g} %"
-        return f"{known}, so that a gap can show, {alike}"
-    read_n = {test.tension_read_n for test in tests if math.isfinite(test.tension_read_n)}
-    if len(read_n) > 1:
-        return (
-            "a gap shows only where the frequencies do not change as the tensions that were read "
-            "do, and most causes look alike in that"
-        )
-    return (
-        "tension alone can follow so few frequencies, so that a gap can hardly show and its cause "
-        f"cannot{_between_ends(tests[0], hanger)}"
-    )
-
-
-def _between_ends(test: ModalTest, hanger: Hanger) -> str:
-    """The tensions by a test's lowest mode, from clamped ends to pinned ones, which so few modes
-    cannot tell; empty where a bar of this description has none."""
-    mode = min(test.modes, key=lambda each: each.order)
-
-    def missed_hz(tension_n: float, spring_n_m_rad: float) -> float:
-        length_m, stiffness = hanger.length_m, hanger.bending_stiffness_n_m2
-        given = (length_m, tension_n, stiffness, hanger.mass_per_length_kg_m)
-        length, tension, bending, mass, spring = map(np.asarray, (*given, spring_n_m_rad))
-        found_hz = frequencies_hz(length, tension, bending, mass, spring, spring, mode.order)
-        return float(found_hz[-1]) - mode.frequency_hz
-
-    slack, most = (share * hanger.nominal_tension_n for share in TENSION_RATIO)
-    found = []
-    for spring in (math.inf, 0.0):
-        if missed_hz(slack, spring) > 0 or missed_hz(most, spring) < 0:
-            return ""
-        found.append(scipy.optimize.brentq(missed_hz, slack, most, (spring,), rtol=1e-6))
-    clamped, pinned = found
-    return (
-        f"; by {_name(mode)} alone the tension is {clamped / 1e3:.0f} kN between clamped ends and "
-        f"{pinned / 1e3:.0f} kN between pinned ones"
-    )
 
 
 def _irregular(tests: Sequence[ModalTest]) -> str:

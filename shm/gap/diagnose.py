@@ -19,6 +19,7 @@ from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress, silent
 from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
 from shm.gap.data_checks import Usable, doubtful, set_aside, usable
 from shm.gap.falsification import compatibility
+from shm.gap.few_frequencies import tension_of_any_ends_n
 from shm.gap.law_error import mixed
 from shm.gap.misfit import Misfit
 from shm.gap.next_measurement import ranked
@@ -97,6 +98,9 @@ def examined(
     progress("next measurement", 1.0)
     compatible = compatibility(problem, attribution)
     tensions = [_tension(problem, f, rng) for f in ([(1.0, before)], possible(attribution))]
+    of_any_ends = tension_of_any_ends_n(found.tests, hanger, options.seed)
+    if of_any_ends is not None:
+        tensions[1] = tension_estimate(of_any_ends)
     diagnosis = Diagnosis(
         hanger=hanger.id,
         baseline=options.baseline,

@@ -7,8 +7,9 @@ deviations, and springs of planes that were not measured, is drawn from the prio
 what a measured tension says of it: exactly, at no cost. That draw is what makes the tension's
 interval absolute.
 
-Priors: the tension's logarithm is uniform, as are log10 k L/EI; deviations are normal with the
-standard deviations of the description, or as an earlier measured tension has calibrated them.
+Priors: the tension is about as designed, or its logarithm is uniform, as are log10 k L/EI;
+deviations are normal with the standard deviations of the description, or as an earlier measured
+tension has calibrated them.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from shm.inference.priors import (
     Calibration,
     Deviations,
     EndDetails,
+    TensionPrior,
     reading_of,
 )
 from shm.models.as_made import (
@@ -79,6 +81,7 @@ class DescribedCoordinates:
         self._inner = Coordinates(self.box, swaps, wave_stiffness_n_m_rad)
         round_ = isinstance(model.model, Beam) and self._hanger.plate is None
         self._details = EndDetails(self.box.names, model.springs, round_, bool(model.swaps))
+        self._tension = TensionPrior(model.bounds[TENSION])
         self._reading = reading_of(tests)
         others = []
         if isinstance(model.model, Beam3) and not model.is_strand:
@@ -253,14 +256,16 @@ class DescribedCoordinates:
         count = len(self.box.names)
         log = self._inner.log_prior(z[:, :count]) + log_normal(z[:, count:])
         inside = np.isfinite(log)
+        inner = self._inner.theta(z[inside, :count])
+        log[inside] += self._tension.log_density(inner[:, 0])
         if len(self._details.columns) and inside.any():
-            shares = self._shares_of_springs(self._inner.theta(z[inside, :count]))
-            log[inside] += self._details.log_density(shares)
+            log[inside] += self._details.log_density(self._shares_of_springs(inner))
         return np.asarray(log)
 
     def draw_prior(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Places (n, d) from the folded prior."""
         inner = rng.uniform(self.box.lower, self.box.upper, (n, len(self.box.names)))
+        inner[:, 0] = self._tension.draw(n, rng)
         columns = self._details.columns
         width = self.box.upper[columns] - self.box.lower[columns]
         inner[:, columns] = self.box.lower[columns] + width * self._details.draw(n, rng)

@@ -18,6 +18,7 @@ from shm.inference.described import DescribedCoordinates
 from shm.inference.options import silent
 from shm.inference.priors import TensionReading
 from shm.inference.problem import Problem
+from shm.models.as_made import TENSION
 from shm.values import NAN, FloatArray, ModalTest
 
 # Forward difference: root of the 1e-12 to which frequencies are exact (docs/trials/validation.md).
@@ -106,11 +107,12 @@ def _tension_of_other_ends_n(
     `ratio` (draws,), theta_F.
 
     NaN where there is none. Frequencies tell springs from tension worst where all ends turn softly
-    and alike, which are few among all pairs of ends.
+    and alike, which are few among all pairs of ends. And where few modes of a short stiff bar tell
+    nearly nothing, clamped ends rule the nominal tension out that springs would allow.
     """
     found = [
-        climbed(problem, coordinates, best.place, best.sigma, coordinates.springs_alike(alike))
-        for alike in _ALIKE
+        climbed(problem, coordinates, best.place, best.sigma, held)
+        for held in (*map(coordinates.springs_alike, _ALIKE), {TENSION: 0.0})
     ]
     others = np.array([theta for theta, _ in found])
     fits = _fits(problem, found)

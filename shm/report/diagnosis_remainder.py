@@ -6,9 +6,8 @@ import math
 
 from shm.report import formatting
 from shm.report.diagnosis_wording import Answer, answer
-from shm.values import NO_GAP, Diagnosis, LawTerm, Remainder, TensionEstimate
+from shm.values import FEW_MODES, NO_GAP, Diagnosis, LawTerm, Remainder, TensionEstimate
 
-_FEW_MODES = 4  # tension and stiffness take two, and two are left to disagree
 _MOST_NAMED = 3  # what a sentence bears
 _COUNTS = ("no mode", "one mode", "two modes", "three modes")
 
@@ -16,7 +15,7 @@ _COUNTS = ("no mode", "one mode", "two modes", "three modes")
 def told_of_few(diagnosis: Diagnosis) -> str:
     """What fewer than four modes say, and how far off the tension may be; else empty."""
     modes = {(each.plane, each.order) for each in diagnosis.where}
-    if len(modes) >= _FEW_MODES or not modes:
+    if len(modes) >= FEW_MODES or not modes:
         return ""
     planes = sorted({plane for plane, _ in modes})
     measured = f"{_COUNTS[len(modes)]} of {formatting.listed(planes)} vibration"
@@ -26,8 +25,8 @@ def told_of_few(diagnosis: Diagnosis) -> str:
         return f"So few data, {measured}, decide little{sure}."
     chance = formatting.told_probability(diagnosis.no_gap_probability)
     tension = (
-        f"; the tension may be off by {off} (95 %): mass, length and stiffness are known no "
-        f"better, and it is off by far more where the ends are not those of {diagnosis.baseline}"
+        f"; the tension may be off by {off} (95 %): the ends, mass, length and stiffness are known "
+        "no better"
         if off
         else ""
     )

@@ -15,6 +15,7 @@ from shm.values.bridge_diagnosis import (
     SharedMember,
 )
 from shm.values.diagnosis import (
+    FEW_MODES,
     NO_GAP,
     Cause,
     Compatibility,
@@ -128,6 +129,7 @@ from shm.values.trial import (
 
 __all__ = [
     "ENOUGH_EFFECTIVE",
+    "FEW_MODES",
     "FREQUENCY",
     "LONGEST_TEST_ID",
     "MIX",

@@ -10,6 +10,9 @@ from shm.values.kinds import NAN, Plane
 
 Leads = Literal["cause", "no gap", "unexplained"]
 _AND = " + "
+FEW_MODES = 4
+"""Below which nothing is left to disagree: tension and stiffness take two."""
+
 NO_GAP = "no gap"
 """How `Compatibility` calls the baseline without any effect."""
 

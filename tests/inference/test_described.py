@@ -11,10 +11,10 @@ from scipy.stats import kstest, norm
 from shm.inference import UpdateOptions, refresh, select, update
 from shm.inference.described import DescribedCoordinates
 from shm.inference.options import silent
-from shm.inference.priors import Calibration, EndDetails, calibration_of, reading_of
+from shm.inference.priors import Calibration, EndDetails, TensionPrior, calibration_of, reading_of
 from shm.inference.problem import Problem
 from shm.models import AsMade, build
-from shm.models.as_made import RESTRAINT
+from shm.models.as_made import RESTRAINT, TENSION_RATIO
 from shm.models.base import Conditions
 from shm.values import (
     NAN,
@@ -161,6 +161,31 @@ def test_the_prior_of_ends_integrates_to_one_and_is_that_of_its_draws(
     assert inverse.mean() == pytest.approx(1, abs=5 * inverse.std() / np.sqrt(len(drawn)))
     density = np.exp(details.log_density(rng.random((60_000, len(springs)))))
     assert density.mean() == pytest.approx(1, abs=5 * density.std() / np.sqrt(len(density)))
+
+
+def test_the_prior_of_the_tension_integrates_to_one_and_is_that_of_its_draws() -> None:
+    prior, bounds = TensionPrior(TENSION_RATIO), np.log(TENSION_RATIO)
+    x = np.linspace(*bounds, 20001)
+    density = np.exp(prior.log_density(x)) / (bounds[1] - bounds[0])
+    cumulative = np.append(0.0, np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(x)))
+    assert cumulative[-1] == pytest.approx(1, abs=1e-6)
+    draws = prior.draw(20_000, np.random.default_rng(1))
+    assert kstest(draws, lambda at: np.interp(at, x, cumulative)).pvalue > 0.01
+
+
+def test_two_modes_a_plane_of_a_short_thick_bar_leave_its_tension_open() -> None:
+    """Clamped ends with next to no tension fit as well as the planted springs and 752 kN do."""
+    short = replace(ROD, length_m=4.44, nominal_tension_n=711e3)
+    hz = {"transverse": (29.0057, 78.0443), "longitudinal": (28.7476, 77.4957)}
+    modes = tuple(
+        Mode(plane, order, value, 1e-4 * value)
+        for plane, both in hz.items()
+        for order, value in enumerate(both, start=1)
+    )
+    found = update([ModalTest("t", modes)], AsMade(build("beam2", short)), UpdateOptions())
+    low, high = np.quantile(found.tension_n, [0.05, 0.95])
+    assert low < 300e3
+    assert high > 752e3
 
 
 def test_every_spring_is_uniform_but_for_the_share_of_ends_made_to_clamp() -> None:
