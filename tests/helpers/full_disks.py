@@ -22,7 +22,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from shm.errors import ShmError
-from shm.pipeline import steps
 from shm.store import Workspace
 from shm.store.checking import check_archive, check_store
 from shm_daemon import Wakeup, loop
@@ -151,8 +150,7 @@ def _look(feed: Feed) -> None:
 def main() -> None:
     folder, files, every, seed = Path(sys.argv[1]), *map(int, sys.argv[2:5])
     logging.disable(logging.CRITICAL)
-    for verb in ("update", "refresh", "select"):
-        setattr(steps, verb, getattr(quick_update, verb))
+    quick_update.stand_in(setattr)
     drafts = folder / "drafts"
     drafts.mkdir()
     template = make_workspace(folder / "template", hooks={"mail": ["true"]})

@@ -44,6 +44,7 @@ def imported(workspace: Workspace, path: Path, *, each_time: bool = False) -> No
     keep_profile(found, workspace, each_time=each_time)
 
 
+@pytest.mark.usefixtures("doubts_of_bars")
 def test_modes_of_another_hanger_are_held_and_the_profile_is_named(workspace: Workspace) -> None:
     imported(workspace, record(workspace.folder / "first.csv", workspace, 3))
     record(workspace.spool / "second.csv", workspace, 3)

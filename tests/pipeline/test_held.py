@@ -16,7 +16,6 @@ from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Decision, Outcome, Stage, Store, StoredAlert, Workspace
 from shm.store.checking import check_store
 from shm.values import ModalTest, Recording
-from tests.helpers.any_bar import take_any_bar
 from tests.helpers.contents import quiet
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all
 from tests.helpers.hangers import HANGER_3
@@ -25,12 +24,6 @@ from tests.helpers.workspaces import START, make_workspace, modelled_test, put, 
 from tests.helpers.written import write
 
 EPOCH = datetime(1970, 1, 1, 0, 3, tzinfo=UTC)
-
-
-@pytest.fixture(autouse=True)
-def of_any_bar(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What rings here is no hanger: these tests are of clocks, copies and decisions."""
-    take_any_bar(monkeypatch)
 
 
 def spool(
