@@ -27,7 +27,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import shm_daemon
 from shm.errors import ShmError
-from shm.pipeline import steps
 from shm.store import Workspace
 from shm.store.checking import check_archive, check_store
 from shm_daemon.wakeup import Wakeup
@@ -113,8 +112,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     began, rng, counts = time.monotonic(), random.Random(options.seed), Counter[str]()
-    for verb in ("update", "refresh", "select"):
-        setattr(steps, verb, getattr(quick_update, verb))
+    quick_update.stand_in(setattr)
     memory = "/dev/shm" if Path("/dev/shm").is_dir() else None
     with tempfile.TemporaryDirectory(dir=memory) as folder:
         whole = made(Path(folder))

@@ -11,7 +11,9 @@ from typing import Any
 import pytest
 
 from shm.store import Workspace
+from shm_cli import working
 from shm_cli.main import run
+from tests.helpers.flows import threads
 from tests.helpers.taken_in import with_a_loss
 from tests.helpers.workspaces import make_workspace, write_test
 
@@ -35,6 +37,8 @@ Shm = Callable[..., Ended]
 @pytest.fixture
 def shm(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Shm:
     monkeypatch.delenv("SHM_WORKSPACE", raising=False)
+    # What it ingests begins no processes: each first command would import all steps in new ones.
+    monkeypatch.setattr(working, "executor_of", threads)
 
     def call(*arguments: object) -> Ended:
         capsys.readouterr()

@@ -5,30 +5,30 @@ The command runs at a pseudo-terminal, as a person would have it.
 
 from __future__ import annotations
 
-import fcntl
 import os
 import pty
 import re
 import select
 import signal
-import subprocess
 import sys
-import termios
 import time
 import tomllib
+import traceback
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
 from scipy.io import wavfile
 
 from shm.store import Workspace
+from shm_cli.main import run
 from tests.cli.test_import import export, modes_file
 from tests.helpers.workspaces import make_workspace
 
-PROGRAM = [sys.executable, "-c", "from shm_cli.main import main; main()"]
 PATIENCE_S = 60.0
 _STYLE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 
@@ -36,8 +36,9 @@ _STYLE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 class Terminal:
     """A command at a terminal, and a person at its keys."""
 
-    def __init__(self, process: subprocess.Popen[bytes], keys: int):
+    def __init__(self, process: int, keys: int):
         self._process, self._keys = process, keys
+        self._code: int | None = None
         self.shown, self._seen = "", 0
 
     def answer(self, question: str, *answers: str) -> None:
@@ -61,17 +62,32 @@ class Terminal:
         """Its exit code."""
         while self._more():
             pass
-        return self._process.wait(PATIENCE_S)
+        deadline = time.monotonic() + PATIENCE_S
+        while not self._has_ended() and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert self._code is not None, f"it goes on after its terminal was closed:\n{self.shown}"
+        return self._code
 
     def leave(self, key: str) -> int:
         """Its exit code after a key that is pressed until it ends: one in the moment between a
         question and the wait for its answer is not seen."""
         deadline = time.monotonic() + PATIENCE_S
-        while self._process.poll() is None and time.monotonic() < deadline:
+        while not self._has_ended() and time.monotonic() < deadline:
             self.press(key)
             while self._more(1.0):
                 pass
         return self.end()
+
+    def kill(self) -> None:
+        if not self._has_ended():
+            os.kill(self._process, signal.SIGKILL)
+            os.waitpid(self._process, 0)
+
+    def _has_ended(self) -> bool:
+        if self._code is None:
+            process, status = os.waitpid(self._process, os.WNOHANG)
+            self._code = os.waitstatus_to_exitcode(status) if process else None
+        return self._code is not None
 
     def _more(self, patience_s: float = PATIENCE_S) -> bool:
         ready, _, _ = select.select([self._keys], [], [], patience_s)
@@ -85,25 +101,35 @@ class Terminal:
 
 @contextmanager
 def terminal(workspace: Workspace, *arguments: object) -> Iterator[Terminal]:
-    keys, screen = pty.openpty()
-    command = [*PROGRAM, "--workspace", str(workspace.folder), "import", *map(str, arguments)]
-    process = subprocess.Popen(
-        command, stdin=screen, stdout=screen, stderr=screen, start_new_session=True,
-        preexec_fn=_take_terminal, env={**os.environ, "COLUMNS": "200", "TERM": "dumb"},
-    )  # fmt: skip
-    os.close(screen)
+    """In a process forked off this one, which has everything imported."""
+    words = ["--workspace", str(workspace.folder), "import", *map(str, arguments)]
+    with warnings.catch_warnings():  # the threads of pytest-xdist hold nothing that a command needs
+        warnings.simplefilter("ignore", DeprecationWarning)
+        process, keys = pty.fork()
+    if process == 0:
+        _become(words)
+    person = Terminal(process, keys)
     try:
-        yield Terminal(process, keys)
+        yield person
     finally:
-        process.kill()
-        process.wait()
+        person.kill()
         os.close(keys)
 
 
-def _take_terminal() -> None:
-    """Ctrl-C reaches only whom the terminal belongs to; what runs in the background ignores it."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+def _become(words: list[str]) -> NoReturn:
+    """The command at its terminal; of the tests' own streams and signals it has none."""
+    code = 1
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        os.environ.update(COLUMNS="200", TERM="dumb")
+        sys.stdin, sys.stdout, sys.stderr = os.fdopen(0), os.fdopen(1, "w"), os.fdopen(2, "w")
+        code = run(words)
+    except BaseException:
+        traceback.print_exc()
+        raise
+    finally:
+        sys.stdout.flush()
+        os._exit(code)
 
 
 @pytest.fixture

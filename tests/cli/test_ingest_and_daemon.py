@@ -139,11 +139,10 @@ def test_peek_goes_on_after_a_file_it_cannot_read(
     assert "t9: 12 modes" in ended.out
 
 
-def test_a_refusal_names_line_and_channel(tmp_path: Path) -> None:
-    workspace = make_workspace(tmp_path / "bridge")
+def test_a_refusal_names_line_and_channel(shm: Shm, empty: Workspace, tmp_path: Path) -> None:
     rows = "\n".join("0.0,0.1" for _ in range(40))
     head = "# hanger: 3\n# sampling_rate_hz: 512\n# unit: N, furlong\nforce,acc_1\n"
     (tmp_path / "unit.csv").write_text(f"{head}{rows}\n")
-    ended = shm_process("--workspace", workspace.folder, "ingest", tmp_path / "unit.csv")
-    assert ended.returncode == 3
-    assert "unit.csv: line 3: channel acc_1: the unit 'furlong'" in ended.stderr
+    ended = shm("--workspace", empty.folder, "ingest", tmp_path / "unit.csv")
+    assert ended.code == 3
+    assert "unit.csv: line 3: channel acc_1: the unit 'furlong'" in ended.err

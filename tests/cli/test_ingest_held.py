@@ -13,8 +13,7 @@ from shm.modes_document import modes_document
 from shm.pipeline.redescribed import discarded_of
 from shm.store import Stage, Workspace
 from tests.cli.conftest import Shm
-from tests.helpers.flows import ingest
-from tests.helpers.taken_in import copied
+from tests.helpers.taken_in import copied, ingest_quickly
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put, write_test
 
 
@@ -27,9 +26,9 @@ def held(tmp_path: Path) -> Workspace:
 def _make_held(folder: Path) -> None:
     made = make_workspace(folder)
     write_test(made.spool / "good.modes.json", made)
-    ingest(made)
+    ingest_quickly(made)
     put(made.spool / "lost.modes.json", epoch(made))
-    ingest(made)
+    ingest_quickly(made)
 
 
 def epoch(workspace: Workspace) -> str:
@@ -168,7 +167,7 @@ def test_a_decision_is_undone_by_the_file_beside_a_sidecar(shm: Shm, held: Works
     assert "it was confirmed by" in shm(*say, "--discard", 2).err
     put(held.spool / "lost.modes.toml", "temperature_c = 12.0\n")
     put(held.spool / "lost.modes.json", epoch(held))
-    ingest(held)
+    ingest_quickly(held)
     assert [hold["recording"] for hold in shm(*say, "--held", "--json").document["held"]] == [2]
     assert shm(*say, "--discard", 2).code == 0
     with held.store() as store:
@@ -179,7 +178,7 @@ def test_a_decision_is_undone_by_the_file_beside_a_sidecar(shm: Shm, held: Works
 def test_a_copy_is_not_confirmed_without_a_reason(shm: Shm, held: Workspace) -> None:
     test = modelled_test("twin", held.bridge.hanger(3))
     put(held.spool / "twin.modes.json", dump(modes_document([test])))
-    ingest(held)
+    ingest_quickly(held)
     say = ("--workspace", held.folder, "ingest", "--confirm", 3)
     refused = shm(*say)
     assert refused.code == 2

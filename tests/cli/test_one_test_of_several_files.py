@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from shm.identify import Identification, identify
+from shm.pipeline import reporting
 from shm.store import Stage, Workspace
+from shm_cli import working
 from shm_cli.main import run
 from tests.cli.conftest import Shm
+from tests.helpers.flows import threads
+from tests.helpers.painting import unpaint
 from tests.helpers.workspaces import make_workspace
 
 PLACES_M = (1.9, 2.7, 3.5)
@@ -37,7 +43,10 @@ def taken_in(
 ) -> tuple[Workspace, int]:
     workspace = make_workspace(tmp_path_factory.mktemp("together") / "bridge")
     files = [str(path) for path in set_ups]
-    return workspace, run(["--workspace", str(workspace.folder), "ingest", "--together", *files])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(working, "executor_of", threads)
+        code = run(["--workspace", str(workspace.folder), "ingest", "--together", *files])
+    return workspace, code
 
 
 def test_the_shapes_of_a_roving_hammer_stand_at_its_places(
@@ -68,9 +77,19 @@ def test_files_taken_in_together_are_one_test_kept_as_one_archive(
 
 
 def test_a_stored_test_shows_how_it_was_identified(
-    shm: Shm, taken_in: tuple[Workspace, int], tmp_path: Path
+    shm: Shm, taken_in: tuple[Workspace, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Each form of the sheet is of the same files: they are identified for the first."""
     workspace, _ = taken_in
+    unpaint(monkeypatch)
+    found: list[Identification] = []
+
+    def identify_once(*arguments: Any, **options: Any) -> Identification:
+        if not found:
+            found.append(identify(*arguments, **options))
+        return found[0]
+
+    monkeypatch.setattr(reporting, "identify", identify_once)
     ask = ("--workspace", workspace.folder, "report", "--hanger", 3, "--test", "set_up_0")
     document = json.loads(shm(*ask, "--json").out)
     with workspace.store() as store:

@@ -16,7 +16,7 @@ from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.store import Workspace
 from shm.values import Hanger
 from tests.cli.conftest import Shm
-from tests.helpers.flows import ingest
+from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import served
 from tests.helpers.workspaces import START, make_workspace, write_test
 
@@ -27,7 +27,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     workspace = make_workspace(tmp_path_factory.mktemp("redescribed") / "bridge")
     for day in range(2):
         write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day)
-    ingest(workspace)
+    ingest_quickly(workspace)
     return workspace
 
 
@@ -49,7 +49,7 @@ def test_a_baseline_of_a_discarded_test_is_said_first_until_there_is_a_new_one(
     workspace = make_workspace(tmp_path / "discarded")
     for day in (0, 30, 60):
         write_test(workspace.spool / f"t{day}.modes.json", workspace, day=day)
-    ingest(workspace)
+    ingest_quickly(workspace)
     say = ("--workspace", workspace.folder)
     discard = ("ingest", "--discard", "t0", "--why", "loose sensor", "--who", "Ann")
     assert shm(*say, *discard).code == 0

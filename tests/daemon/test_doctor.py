@@ -20,10 +20,10 @@ from shm.store import Archive, DeliveryState, Stage, Workspace
 from shm_cli.main import run
 from shm_daemon.doctor import Finding, Level, checks, examine
 from shm_daemon.heartbeat import HEARTBEAT, beat, turn_failed
-from tests.helpers.flows import ingest
 from tests.helpers.nouns import NOW
 from tests.helpers.outboxes import entered, make_baseline, raise_alerts
 from tests.helpers.postgres import Databases
+from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.taken_over import obeying_readers
 from tests.helpers.workspaces import make_workspace, put, write_test
 
@@ -231,11 +231,11 @@ def test_raw_files_that_came_after_a_restored_backup_are_named_and_can_be_taken_
     workspace: Workspace, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_test(workspace.spool / "a.modes.json", workspace)
-    ingest(workspace)
+    ingest_quickly(workspace)
     say = ["--workspace", str(workspace.folder)]
     assert run([*say, "db", "backup", str(workspace.folder / "backup.db")]) == 0
     write_test(workspace.spool / "b.modes.json", workspace, day=30)
-    ingest(workspace)
+    ingest_quickly(workspace)
     restore = [*say, "db", "restore", str(workspace.folder / "backup.db"), "--replace"]
     assert run(restore) == 0
     said = " ".join(capsys.readouterr().err.split())

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from shm.errors import UsageError
-from shm.pipeline import steps
 from shm.settings import Settings
 from shm.store import Workspace
 from shm_daemon import run
@@ -139,8 +138,7 @@ def test_libraries_do_not_tell_addresses_even_at_debug(tmp_path: Path) -> None:
 def test_a_run_can_be_followed_by_recording_hanger_test_stage_and_hook(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for verb in ("update", "refresh", "select"):
-        monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
+    quick_update.stand_in(monkeypatch.setattr)
     workspace = _with_a_hook(tmp_path)
     begin_logging(Settings(log_format="json"), tmp_path / "shm.log")
     write_slow_loss(workspace.spool, workspace)

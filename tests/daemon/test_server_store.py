@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from shm.pipeline import steps
 from shm.store import Stage, Store, Workspace
 from shm_daemon import Wakeup, run
 from tests.helpers import quick_update
@@ -30,8 +29,7 @@ def served(
 ) -> Iterator[Workspace]:
     """A workspace on the server, and a daemon that serves it from a thread."""
     caplog.set_level(logging.INFO)
-    for verb in ("update", "refresh", "select"):
-        monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
+    quick_update.stand_in(monkeypatch.setattr)
     monkeypatch.setenv("SHM_STORE", url.replace("postgres@", "postgres:hush@"))
     workspace, wakeup = make_workspace(tmp_path / "bridge"), Wakeup()
     options = {"wakeup": wakeup, "make_executor": threads}

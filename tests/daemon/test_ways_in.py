@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import os
 import signal
 import socket
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import httpx
@@ -58,10 +60,13 @@ def until(condition: Callable[[], object], seconds: float = 90.0) -> None:
 
 
 def answers(port: int) -> bool:
-    try:
-        httpx.get(f"http://127.0.0.1:{port}/health", timeout=5, trust_env=False)
-    except httpx.HTTPError:
-        return False
+    asked = http.client.HTTPConnection("127.0.0.1", port, timeout=5)
+    with closing(asked):
+        try:
+            asked.request("GET", "/health")
+            asked.getresponse()
+        except (OSError, http.client.HTTPException):
+            return False
     return True
 
 

@@ -14,7 +14,7 @@ from shm.store.database import insert
 from shm.store.tables import alerts
 from shm_daemon.web.access import COOKIE
 from shm_daemon.web.pages import alerts as alerts_page
-from tests.helpers.flows import ingest
+from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import make_workspace, write_slow_loss
 
@@ -27,7 +27,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """Hanger 3 has lost tension; the hook that should tell somebody fails."""
     workspace = make_workspace(tmp_path_factory.mktemp("alerts") / "bridge", hooks=FAILING)
     write_slow_loss(workspace.spool, workspace)
-    ingest(workspace)
+    ingest_quickly(workspace)
     return workspace
 
 

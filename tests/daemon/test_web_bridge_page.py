@@ -23,7 +23,7 @@ from shm_daemon.web.address import Address
 from shm_daemon.web.bridge_view import HangerGlance
 from shm_daemon.web.pages.bridge import CLASSES, elevation, kind_of, shift_words
 from shm_daemon.web.site import Description, Site
-from tests.helpers.flows import ingest
+from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import START, make_workspace, write_test
 
@@ -47,7 +47,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     for day, tension in ((0, 1.0), (10, 1.0), (20, 1.0), (40, 0.8), (50, 0.8), (60, 0.8)):
         path = workspace.spool / f"d{day}.modes.json"
         write_test(path, workspace, day=day, tension=tension)
-    ingest(workspace)
+    ingest_quickly(workspace)
     return workspace
 
 

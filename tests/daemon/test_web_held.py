@@ -11,7 +11,6 @@ import pytest
 
 from shm.documents import dump
 from shm.modes_document import modes_document
-from shm.pipeline import steps
 from shm.store import Workspace
 from shm_daemon.heartbeat import beat
 from tests.helpers import quick_update
@@ -25,8 +24,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """Hanger 3 with a good test and one of 1970, hanger 4 with one of 1970 alone."""
     made = make_workspace(tmp_path_factory.mktemp("held") / "bridge", hangers=(3, 4))
     with pytest.MonkeyPatch.context() as patch:
-        for verb in ("update", "refresh", "select"):
-            patch.setattr(steps, verb, getattr(quick_update, verb))
+        quick_update.stand_in(patch.setattr)
         write_test(made.spool / "good.modes.json", made)
         ingest(made)
         for number in (3, 4):

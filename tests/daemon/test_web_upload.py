@@ -11,7 +11,7 @@ import pytest
 
 from shm.read import sidecar_path
 from shm.store import Stage, Workspace
-from tests.helpers.flows import ingest
+from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace, write_test
 
@@ -43,19 +43,19 @@ def test_an_upload_is_safe_in_the_spool_and_goes_through_like_a_dropped_file(
     assert (told["sha256"], told["size_bytes"], told["outcome"]) == (sha256, len(content), "new")
     assert (workspace.spool / "t0.modes.json").read_bytes() == content
     assert client.get(told["status_url"]).status_code == 404  # the daemon has not taken it yet
-    ingest(workspace)
+    ingest_quickly(workspace)
     assert client.get(told["status_url"]).json()["stage"] == Stage.DONE
     assert spooled(workspace) == []
     again = client.post("/api/recordings?name=again.modes.json", content=content)
     assert again.json()["outcome"] == "duplicate"
-    ingest(workspace)
+    ingest_quickly(workspace)
     with workspace.store() as store:
         assert [event.kind for event in store.recordings.list_events()] == ["duplicate"]
 
 
 def test_a_refused_upload_tells_its_reason(client: httpx.Client, workspace: Workspace) -> None:
     told = client.post("/api/recordings?name=bad.csv&hanger=3", content=b"no,numbers\n").json()
-    ingest(workspace)
+    ingest_quickly(workspace)
     status = client.get(told["status_url"]).json()
     assert status["stage"] == "refused"
     assert status["reason"]["remedy"]

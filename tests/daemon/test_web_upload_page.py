@@ -12,7 +12,7 @@ import pytest
 from shm.store import Workspace
 from shm_daemon.heartbeat import beat
 from shm_daemon.web.access import COOKIE
-from tests.helpers.flows import ingest
+from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import put, write_loss
 
@@ -58,7 +58,7 @@ def test_a_file_is_followed_until_it_is_a_test_or_its_reason_is_told(
     asked = f"/api/recordings?sha256={sent['sha256']}"
     assert writer.get(asked).json() == {"recordings": []}
     put(workspace.spool / "bad.csv", "no recording\n")
-    ingest(workspace)
+    ingest_quickly(workspace)
     (found,) = writer.get(asked).json()["recordings"]
     assert found == writer.get(sent["status_url"]).json()
     (test,) = found["tests"]

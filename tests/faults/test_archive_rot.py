@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from shm.pipeline import steps
 from shm.store import Outcome, Stage
 from shm_cli import working
 from shm_cli.main import run
@@ -18,8 +17,7 @@ from tests.helpers.workspaces import make_workspace, write_test
 def test_rot_is_refused_and_the_same_file_dropped_again_heals_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for verb in ("update", "refresh", "select"):
-        monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
+    quick_update.stand_in(monkeypatch.setattr)
     monkeypatch.setattr(working, "executor_of", threads)
     workspace = make_workspace(tmp_path / "bridge")
     write_test(workspace.spool / "t0.modes.json", workspace)

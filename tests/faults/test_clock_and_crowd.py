@@ -18,10 +18,7 @@ from tests.helpers.workspaces import make_workspace, write_test
 
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
-    from shm.pipeline import steps
-
-    for verb in ("update", "refresh", "select"):
-        monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
+    quick_update.stand_in(monkeypatch.setattr)
     return make_workspace(tmp_path / "bridge")
 
 

@@ -15,7 +15,6 @@ import pytest
 import sqlalchemy as sa
 
 import shm_daemon
-from shm.pipeline import steps
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.pipeline.reporting import hanger_report
 from shm.report.hanger_status import Status
@@ -26,7 +25,6 @@ from shm.values import FloatArray
 from shm_cli import working
 from shm_cli.main import run
 from tests.helpers import quick_update
-from tests.helpers.any_bar import take_any_bar
 from tests.helpers.contents import quiet
 from tests.helpers.damaging import change, damage, flipped
 from tests.helpers.flows import Clock, a_flow, receive_all, tension_kn, threads
@@ -38,9 +36,7 @@ def _quick() -> Iterator[None]:
     """The sampler's stand-in, also for the command line. Two equal hangers ring alike, which
     is not what is tried here."""
     with pytest.MonkeyPatch.context() as patch:
-        take_any_bar(patch)
-        for verb in ("update", "refresh", "select"):
-            patch.setattr(steps, verb, getattr(quick_update, verb))
+        quick_update.stand_in(patch.setattr)
         patch.setattr(working, "executor_of", threads)
         yield
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from shm.pipeline import steps
 from shm.store import Workspace
 from tests.helpers import quick_update
 from tests.helpers.feeds import Feed
@@ -29,8 +28,7 @@ FILES, MOMENTS, SEED = 3, 4, 20261125
 def test_a_disk_that_fills_at_any_write_or_commit_costs_nothing(
     postgresql: Databases, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for verb in ("update", "refresh", "select"):
-        monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
+    quick_update.stand_in(monkeypatch.setattr)
     rng = random.Random(SEED)
     drafts = tmp_path / "drafts"
     drafts.mkdir()

@@ -13,7 +13,6 @@ import pytest
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
-from shm.pipeline import steps
 from shm.store import Store, Workspace
 from shm.store.backups import back_up, copy_store, restore
 from shm.store.checking import check_store
@@ -25,7 +24,6 @@ from shm.store.tables import metadata
 from shm_cli import working
 from shm_cli.main import run
 from tests.helpers import quick_update
-from tests.helpers.any_bar import take_any_bar
 from tests.helpers.contents import quiet
 from tests.helpers.damaging import damage
 from tests.helpers.flows import threads
@@ -55,9 +53,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def bridge(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     """The history, to be changed at will, with the sampler's stand-in."""
-    take_any_bar(monkeypatch)
-    for verb in ("update", "refresh", "select"):
-        monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
+    quick_update.stand_in(monkeypatch.setattr)
     monkeypatch.setattr(working, "executor_of", threads)
     return Workspace.open(Path(shutil.copytree(made, tmp_path / "bridge")))
 

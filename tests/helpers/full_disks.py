@@ -22,7 +22,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from shm.errors import ShmError
-from shm.pipeline import steps
 from shm.store import Workspace
 from shm.store.checking import check_archive, check_store
 from shm_daemon import Wakeup, loop
@@ -36,6 +35,9 @@ from tests.helpers.workspaces import START, make_workspace
 
 _FASTER = 600.0
 """A minute of the daemon's waiting passes in a tenth of a second."""
+
+_SHORTEST_S, _LONGEST_WAIT_S = 0.01, 0.05
+"""What is shorter is not worth waiting for by the processor; what is longer hides the end."""
 
 _FULL_S = 2.0
 """A disk that stays full is met for so long: twenty of the daemon's minutes."""
@@ -70,7 +72,9 @@ def _daemon(workspace: Workspace, moment: Moment | None) -> int:
     recorder, wakeup, began = ctypes.CDLL(None), Wakeup(), time.monotonic()
     loop.time = SimpleNamespace(monotonic=lambda: began + _FASTER * (time.monotonic() - began))  # type: ignore[assignment]
     wait = wakeup.wait
-    wakeup.wait = lambda seconds: wait(min(seconds / _FASTER, 0.05))  # type: ignore[method-assign]
+    wakeup.wait = lambda seconds: wait(  # type: ignore[method-assign]
+        min(max(seconds / _FASTER, _SHORTEST_S), _LONGEST_WAIT_S)
+    )
 
     def clock() -> object:
         return START + timedelta(days=100, seconds=_FASTER * (time.monotonic() - began))
@@ -146,8 +150,7 @@ def _look(feed: Feed) -> None:
 def main() -> None:
     folder, files, every, seed = Path(sys.argv[1]), *map(int, sys.argv[2:5])
     logging.disable(logging.CRITICAL)
-    for verb in ("update", "refresh", "select"):
-        setattr(steps, verb, getattr(quick_update, verb))
+    quick_update.stand_in(setattr)
     drafts = folder / "drafts"
     drafts.mkdir()
     template = make_workspace(folder / "template", hooks={"mail": ["true"]})

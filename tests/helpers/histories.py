@@ -11,7 +11,6 @@ import pytest
 
 from shm.documents import dump
 from shm.modes_document import modes_document
-from shm.pipeline import steps
 from shm.store import (
     Adoption,
     Archive,
@@ -27,7 +26,6 @@ from shm.store.retention import copy_archive, removable, remove
 from shm.store.upkeep import Scope
 from shm.values import Fingerprint
 from tests.helpers import quick_update
-from tests.helpers.any_bar import take_any_bar
 from tests.helpers.contents import quiet
 from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
@@ -46,9 +44,7 @@ def a_history(folder: Path) -> Workspace:
     hooks = {"mail": ["true"], "phone": ["true"]}
     workspace = make_workspace(folder / "bridge", hangers=(3, 4), hooks=hooks)
     with pytest.MonkeyPatch.context() as patch:
-        take_any_bar(patch)
-        for verb in ("update", "refresh", "select"):
-            patch.setattr(steps, verb, getattr(quick_update, verb))
+        quick_update.stand_in(patch.setattr)
         clock = Clock()
         _samples(workspace, clock)
         for hanger in (3, 4):

@@ -10,7 +10,10 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from shm.store import Workspace
+from tests.helpers import quick_update
 from tests.helpers.flows import ingest
 from tests.helpers.workspaces import make_workspace, write_loss, write_slow_loss
 
@@ -37,6 +40,13 @@ def copied(name: str, folder: Path, make: Callable[[Path], object]) -> Workspace
             make(unfinished)
             unfinished.rename(kept)
     return Workspace.open(Path(shutil.copytree(kept, folder)))
+
+
+def ingest_quickly(workspace: Workspace) -> None:
+    """Takes in all that lies in the spool, with the stand-in for the sampler."""
+    with pytest.MonkeyPatch.context() as patch:
+        quick_update.stand_in(patch.setattr)
+        ingest(workspace)
 
 
 def _taken_in(folder: Path, write: Callable[[Path, Workspace], None]) -> None:

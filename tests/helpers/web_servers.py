@@ -30,7 +30,10 @@ class Served:
         """A caller with that token, or with none."""
         if token:
             headers["Authorization"] = f"Bearer {token}"
-        return httpx.Client(base_url=self.url, headers=headers, timeout=30, trust_env=False)
+        verify = self.url.startswith("https")  # whom the machine trusts takes 29 ms to load
+        return httpx.Client(
+            base_url=self.url, headers=headers, timeout=30, trust_env=False, verify=verify
+        )
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from shm.pipeline import steps
 from shm.store import Workspace
 from tests.helpers import quick_update
 from tests.helpers.workspaces import make_workspace
@@ -19,10 +18,15 @@ def workspace(tmp_path: Path) -> Workspace:
 def _quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """The flow is tested with a stand-in for the sampler, unless a test asks for the real one."""
     if "real_sampler" not in request.fixturenames:
-        for verb in ("update", "refresh", "select"):
-            monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
+        any_bar = "doubts_of_bars" not in request.fixturenames
+        quick_update.stand_in(monkeypatch.setattr, any_bar=any_bar)
 
 
 @pytest.fixture
 def real_sampler() -> None:
     """Asks for the real sampler."""
+
+
+@pytest.fixture
+def doubts_of_bars() -> None:
+    """Asks for the check of which hanger modes are of."""

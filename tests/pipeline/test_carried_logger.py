@@ -44,18 +44,19 @@ def imported(workspace: Workspace, path: Path, *, each_time: bool = False) -> No
     keep_profile(found, workspace, each_time=each_time)
 
 
+@pytest.mark.usefixtures("doubts_of_bars")
 def test_modes_of_another_hanger_are_held_and_the_profile_is_named(workspace: Workspace) -> None:
     imported(workspace, record(workspace.folder / "first.csv", workspace, 3))
     record(workspace.spool / "second.csv", workspace, 3)
-    record(workspace.spool / "third.csv", workspace, 4, day=1.0)
+    record(workspace.spool / "third.csv", workspace, 4, day=-20_000.0)  # by a dead clock
     ingest(workspace)
     with workspace.store() as store:
         own, carried = store.recordings.list_all()
         assert (own.stage, own.hanger) == (Stage.DONE, 3)
         assert carried.stage is Stage.HELD
         (hold,) = store.recordings.list_holds(3)
-    (doubt,) = [each for test in hold.tests for each in test.doubts]
-    assert doubt.check == "right hanger"
+    early, doubt = [each for test in hold.tests for each in test.doubts]
+    assert (early.check, doubt.check) == ("clock before the bridge", "right hanger")
     assert "fit hanger 4 rather than hanger 3" in doubt.state
     (profile,) = (workspace.folder / "loggers").iterdir()
     assert f"loggers/{profile.name} books all files of its logger to hanger 3" in doubt.why

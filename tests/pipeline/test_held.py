@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,6 @@ from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Decision, Outcome, Stage, Store, StoredAlert, Workspace
 from shm.store.checking import check_store
 from shm.values import ModalTest, Recording
-from tests.helpers.any_bar import take_any_bar
 from tests.helpers.contents import quiet
 from tests.helpers.flows import Postman, a_flow, ingest, receive_all
 from tests.helpers.hangers import HANGER_3
@@ -25,12 +25,7 @@ from tests.helpers.workspaces import START, make_workspace, modelled_test, put, 
 from tests.helpers.written import write
 
 EPOCH = datetime(1970, 1, 1, 0, 3, tzinfo=UTC)
-
-
-@pytest.fixture(autouse=True)
-def of_any_bar(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What rings here is no hanger: these tests are of clocks, copies and decisions."""
-    take_any_bar(monkeypatch)
+QUICK_PLAN = HammerPlan(hits=3, seconds_per_hit=8.0)
 
 
 def spool(
@@ -460,10 +455,11 @@ def test_the_same_bytes_are_a_duplicate_while_they_are_held(held: Workspace) -> 
         assert flow.store.recordings.get(2).stage is Stage.HELD
 
 
+@cache
 def a_recording(seed: int = 1) -> Recording:
     state = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
-    plan, rng = HammerPlan(hits=3), np.random.default_rng(seed)
-    return hammer_test(HANGER_3, state, plan, rng, time=day(0), source="s")
+    rng = np.random.default_rng(seed)
+    return hammer_test(HANGER_3, state, QUICK_PLAN, rng, time=day(0), source="s")
 
 
 def test_one_impact_counts_once_in_whatever_format_it_comes_again(workspace: Workspace) -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from shm.pipeline import steps
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.pipeline.ending import SHM, told_by_other, why_over
 from shm.report.hanger_status import Status
@@ -17,7 +16,6 @@ from shm.store import Stage, StoredAlert, Workspace
 from shm.store.missing import missing_rows
 from shm.values import Alert, WatchedTest
 from tests.helpers import quick_update
-from tests.helpers.any_bar import take_any_bar
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
 from tests.helpers.nouns import NOW, a_change, a_drift, a_watched_test, an_alert
 from tests.helpers.streams import a_reading
@@ -26,9 +24,7 @@ from tests.helpers.workspaces import START, make_workspace, write_test
 
 @pytest.fixture
 def bridge(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
-    take_any_bar(monkeypatch)
-    for verb in ("update", "refresh", "select"):
-        monkeypatch.setattr(steps, verb, getattr(quick_update, verb))
+    quick_update.stand_in(monkeypatch.setattr)
     return make_workspace(tmp_path / "bridge", hooks={"mail": ["true"]})
 
 

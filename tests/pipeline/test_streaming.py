@@ -46,11 +46,19 @@ def hours_of(store: Store, period: str = "hour") -> tuple[PooledReading, ...]:
     )
 
 
-def test_chunks_become_windows_hours_and_a_day_in_the_spool(workspace: Workspace) -> None:
+@pytest.fixture(scope="module")
+def two_hours(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """Two hours of a stream a day later, brought to its end; only to be looked at."""
+    workspace = with_live_streams(make_workspace(tmp_path_factory.mktemp("hours") / "bridge"))
     send(workspace, 2)
     clock = Clock(FIRST + timedelta(days=1))
-    with at_work(workspace, clock) as (streaming, store):
+    with at_work(workspace, clock) as (streaming, _):
         drain(streaming, clock)
+    return workspace
+
+
+def test_chunks_become_windows_hours_and_a_day_in_the_spool(two_hours: Workspace) -> None:
+    with two_hours.store() as store:
         windows = store.streams.list_windows(3, FIRST, FIRST + 2 * HOUR)
         assert [each.window.start for each in windows] == [
             FIRST + n * timedelta(minutes=10) for n in range(12)
@@ -61,22 +69,19 @@ def test_chunks_become_windows_hours_and_a_day_in_the_spool(workspace: Workspace
         assert [each.start for each in hours_of(store)] == [FIRST + n * HOUR for n in range(2)]
         assert "learning" in hours_of(store)[0].learning
         (day,) = hours_of(store, "day")
-    (test,) = load_modes(workspace.spool / "hanger03-2026-06-01.modes.json")
+    (test,) = load_modes(two_hours.spool / "hanger03-2026-06-01.modes.json")
     assert test.hanger == 3
     assert [mode.frequency_hz for mode in test.modes] == [m.frequency_hz for m in day.modes]
 
 
-def test_a_day_gives_the_frequency_that_was_planted(workspace: Workspace) -> None:
+def test_a_day_gives_the_frequency_that_was_planted(two_hours: Workspace) -> None:
     """To a hundredth of a per cent: 1 % of tension moves it by 0.4 %."""
     from shm.simulate import HangerState, natural_frequencies
     from shm.simulate.monitored import Weather
 
-    send(workspace, 2)
-    clock = Clock(FIRST + timedelta(days=1))
-    with at_work(workspace, clock) as (streaming, store):
-        drain(streaming, clock)
+    with two_hours.store() as store:
         (day,) = hours_of(store, "day")
-    hanger = workspace.bridge.hangers[0]
+    hanger = two_hours.bridge.hangers[0]
     mode = next(m for m in day.modes if (m.plane, m.order) == ("transverse", 3))
     cold, warm = (
         natural_frequencies(hanger, HangerState(711e3 * (1 + 3 * sign * CALM.per_kelvin * 10)), 3)
