@@ -235,6 +235,15 @@ def test_values_that_are_missing_are_noted_and_do_not_count(logger: Logger) -> N
     assert sum(logger.ring.state("h3").received_s.values()) == pytest.approx(4.8)
 
 
+def test_what_a_logger_says_was_done_to_it_is_noted_once(logger: Logger) -> None:
+    told = replace(minutes(1)[0], event="gain of acc_1 set to 2")
+    logger.send(*minutes(0), told)
+    logger.send(told)
+    (event,) = logger.events
+    assert (event.kind, event.detail) == ("logger", "gain of acc_1 set to 2")
+    assert event.start == told.start
+
+
 def test_a_rate_within_a_crystals_tolerance_is_the_described_one(logger: Logger) -> None:
     near = replace(a_chunk(0), sampling_rate_hz=100.009)
     logger.send(near, a_chunk(1))

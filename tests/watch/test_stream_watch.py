@@ -13,8 +13,9 @@ import pytest
 from shm.errors import BadInput
 from shm.models.tensioned_beam import frequencies_hz
 from shm.values import FloatArray, Hanger, ModalTest, Mode, Thresholds
-from shm.values.stream import PooledReading
+from shm.values.stream import PooledReading, StreamEvent
 from shm.watch.ambient_hammer import ambient_bias
+from shm.watch.stream_hints import led_by
 from shm.watch.stream_reading import ModeTable, sensitivities
 from shm.watch.stream_watch import (
     StreamOptions,
@@ -118,6 +119,25 @@ def test_a_loss_of_one_percent_is_told_once_within_a_day_and_ends_when_it_is_bac
     assert [keys for _, keys in ended] == [(told.key,)]
     assert 700 < ended[0][0] < 724
     assert not state.standing
+
+
+@pytest.mark.parametrize("hour", [500, 450])
+def test_what_the_logger_said_as_a_change_began_leads_its_alert(hour: int) -> None:
+    at = START + timedelta(hours=hour, minutes=14)
+    said = StreamEvent("north", "logger", at, at, "acc_1 exchanged")
+    gap = replace(said, kind="gap", detail="9 samples are missing")
+    found, _ = watched(hours(530, tension=from_hour(500, -0.01)))
+    (alert,) = [each.alert for each in found if each.alert]
+
+    led = led_by(alert, [gap, said])
+    if hour == 450:
+        assert led == alert
+        return
+    assert led.key == alert.key
+    assert led.message.startswith(
+        "Hanger 7: check the sensors first, at 2026-05-21 20:14 the logger said acc_1 exchanged. "
+        "Tension fell by "
+    )
 
 
 def test_a_loss_beyond_its_threshold_is_urgent() -> None:
