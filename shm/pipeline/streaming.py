@@ -29,7 +29,15 @@ from shm.store.archive import MODES_SUFFIX, nothing
 from shm.store.ring import ring_of
 from shm.store.ring_files import PERIOD
 from shm.values import Alert, ModalTest, Posterior
-from shm.values.stream import PERIODS, Period, PooledReading, Stream, StreamEvent, Window, WindowReading
+from shm.values.stream import (
+    PERIODS,
+    Period,
+    PooledReading,
+    Stream,
+    StreamEvent,
+    Window,
+    WindowReading,
+)
 
 if TYPE_CHECKING:
     from shm.pipeline.stream_steps import Pooled, WindowFound
