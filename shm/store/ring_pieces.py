@@ -2,8 +2,9 @@
 millisecond.
 
 Where two chunks are of one time, the samples of the one that came first count: what comes later
-never takes their place, but of one that came before its own time. Where it contradicts them, its clock is wrong, and none of it is mixed with
-them, nor fills gaps between them, unless it is the next chunk and runs on behind them.
+never takes their place, but of one that came before its own time. Where it contradicts them, its
+clock is wrong, and none of it is mixed with them, nor fills gaps between them, unless it is the
+next chunk and runs on behind them.
 """
 
 from __future__ import annotations
