@@ -16,7 +16,7 @@ from shm.values import FloatArray, Hanger, ModalTest, Mode, Thresholds
 from shm.values.stream import PooledReading, StreamEvent
 from shm.watch.ambient_hammer import ambient_bias
 from shm.watch.stream_hints import led_by
-from shm.watch.stream_reading import ModeTable, sensitivities
+from shm.watch.stream_reading import ModeTable, exchanged, sensitivities
 from shm.watch.stream_watch import (
     StreamOptions,
     StreamState,
@@ -165,6 +165,29 @@ def test_a_time_base_that_steps_is_the_measurements() -> None:
     assert event.kind == "clock drift"
     assert event.start < START + timedelta(hours=501) < event.end
     assert abs(found[-1].compensated_shift) < 0.002
+
+
+@pytest.mark.parametrize("lacking", [0, 2])
+def test_planes_that_are_exchanged_are_told_as_such_within_hours(lacking: int) -> None:
+    """Also where one plane lacks modes; the other one's springs are softer here."""
+    apart = np.repeat([0.0, -0.04], 5)
+    plain = hours(530, modes=lambda _: apart)
+    kept = [
+        replace(each, modes=tuple(m for m in each.modes if m.order <= 5 - lacking or m.plane[0] > "l"))
+        for each in plain
+    ]  # fmt: skip
+    found, state = watched(
+        [*kept[:500], *(replace(e, modes=exchanged(e.modes)) for e in kept[500:])]
+    )
+
+    assert not any(each.alert for each in found)
+    (event,) = [event for each in found for event in each.events]
+    assert event.kind == "swapped"
+    assert event.end <= START + timedelta(hours=504)
+    assert abs(found[-1].compensated_shift) < 0.002
+    later = [replace(each, modes=exchanged(each.modes)) for each in kept[506:530]]
+    shift, sd = daily_shift(state.to_bytes(), later)
+    assert abs(shift) < 4 * sd < 0.01
 
 
 def test_a_mode_that_went_astray_moves_nothing() -> None:
