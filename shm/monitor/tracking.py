@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from zlib import crc32
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from shm.monitor.spectrum import REACH, Peaks, Stretch
 from shm.monitor.windows import Judged, judged
 from shm.values import (
     NAN,
+    PLANES,
     Channel,
     FloatArray,
     Hanger,
@@ -27,7 +29,7 @@ from shm.values import (
     ShapePoint,
 )
 from shm.values.rounding import listed
-from shm.values.stream import Piece, Stream, WindowReading
+from shm.values.stream import Piece, Stream, Window, WindowReading
 
 _HALF_WIDTHS = 10.0
 """Of a peak, to either side of it in its band. What white force leaves out of the slope of the
@@ -46,6 +48,9 @@ _LEAK = 0.01  # judgement: of the power; sensors that are 6 degrees off
 _FLOOR = 0.2  # quantile of the lines of a band, as shm/identify/quality/of_ambient.py
 _STEPS_WITHOUT = 6  # technical: from the fit with the mode; what is gained later is small
 _SAME = 3.0  # standard deviations
+_REVIEW_S, _REVIEW_FEW_S, _FEW = 12 * 3600, 3600, 2
+"""judgement: how often modes are sought that were missed at first, by day and by night; each hour
+where so few are known. From scratch costs as much as twenty windows that are followed."""
 
 
 def read_window(
@@ -75,11 +80,62 @@ def read_window(
                 return WindowReading(found.window, fresh, "from scratch", "; ".join(why))
             except ShmError as error:
                 why.append(str(error))
+    elif found.window.kind != "quiet" and _is_reviewed(known, found.window):
+        return _reviewed(known, found, modes, stream, hanger, options, "; ".join(why))
     return WindowReading(found.window, modes, "tracked" if modes else "none", "; ".join(why))
 
 
 def _has(modes: Sequence[Mode], known: Mode) -> bool:
     return any((m.plane, m.order) == (known.plane, known.order) for m in modes)
+
+
+def _is_reviewed(known: Sequence[Mode], window: Window) -> bool:
+    """Where an order lacks in a plane, each stream at ten minutes of its own."""
+    orders = [{m.order for m in known if m.plane == plane} for plane in PLANES]
+    highest = max(mode.order for mode in known)
+    if all(len(each) == highest for each in orders):
+        return False
+    every_s = _REVIEW_S if len(known) > _FEW else _REVIEW_FEW_S
+    since_s = window.start.timestamp() + crc32(window.stream.encode()) % every_s
+    return since_s % every_s < window.duration_s
+
+
+def _reviewed(
+    known: Sequence[Mode],
+    found: Judged,
+    modes: tuple[Mode, ...],
+    stream: Stream,
+    hanger: Hanger,
+    options: IdentifyOptions,
+    why: str,
+) -> WindowReading:
+    """The followed modes with those that were missed at first; all from scratch, where these are
+    more than twice as many: what was followed was a peak of the deck or of the traffic.
+
+    One that the windows after this do not show again is forgotten, and no hour has it (`pooling`).
+    """
+    try:
+        fresh = _from_scratch(found, stream, hanger, options)
+    except ShmError as error:
+        return WindowReading(found.window, modes, "tracked", f"{why}; none sought: {error}")
+    if len(fresh) > 2 * len(known):
+        return WindowReading(found.window, fresh, "from scratch", why)
+    return WindowReading(found.window, modes + _missed(known, fresh), "tracked", why)
+
+
+def _missed(known: Sequence[Mode], fresh: Sequence[Mode]) -> tuple[Mode, ...]:
+    """Modes from scratch that are not followed, each where its order puts it in its plane: the
+    orders and frequencies of those that are followed stand."""
+
+    def is_between(mode: Mode) -> bool:
+        own = [each for each in known if each.plane == mode.plane]
+        return all(
+            (each.frequency_hz - mode.frequency_hz) * (each.order - mode.order) > 0
+            and abs(each.frequency_hz / mode.frequency_hz - 1) > _OTHER_PLANE
+            for each in own
+        )
+
+    return tuple(mode for mode in fresh if not _has(known, mode) and is_between(mode))
 
 
 def _from_scratch(

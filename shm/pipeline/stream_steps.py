@@ -14,6 +14,7 @@ from shm.identify.options import PASSED
 from shm.monitor import as_modal_test, offsets, pooled, read_window, sensor_faults
 from shm.values import Alert, Hanger, ModalTest, Mode, Posterior
 from shm.values.stream import Period, Piece, PooledReading, Stream, StreamEvent, WindowReading
+from shm.watch.stream_hints import led_by
 from shm.watch.stream_watch import StreamOptions, watch_reading
 
 _LINES = 200  # technical: of a spectrogram, as many as a panel has pixels
@@ -93,8 +94,12 @@ def pool_stream(
     baseline: Posterior | None,
     kept: bytes | None,
     false_call_years: float,
+    events: Sequence[StreamEvent] = (),
 ) -> Pooled:
-    """The windows of a period as one; an hour goes on to the watch, a day becomes a test."""
+    """The windows of a period as one; an hour goes on to the watch, a day becomes a test.
+
+    An alert is led by that of `events` which was at the time of its change.
+    """
     reading = pooled(readings, period, start)
     if reading is None:
         return Pooled(None)
@@ -113,4 +118,5 @@ def pool_stream(
         compensated_sd=found.compensated_sd,
         learning=found.learning,
     )
-    return Pooled(told, found.kept, found.alert, found.events, ended=found.ended)
+    alert = found.alert and led_by(found.alert, (*events, *found.events))
+    return Pooled(told, found.kept, alert, found.events, ended=found.ended)

@@ -29,7 +29,15 @@ from shm.store.archive import MODES_SUFFIX, nothing
 from shm.store.ring import ring_of
 from shm.store.ring_files import PERIOD
 from shm.values import Alert, ModalTest, Posterior
-from shm.values.stream import PERIODS, Period, PooledReading, Stream, Window, WindowReading
+from shm.values.stream import (
+    PERIODS,
+    Period,
+    PooledReading,
+    Stream,
+    StreamEvent,
+    Window,
+    WindowReading,
+)
 
 if TYPE_CHECKING:
     from shm.pipeline.stream_steps import Pooled, WindowFound
@@ -43,6 +51,9 @@ _OWN_DAYS = 7  # judgement: by then every class has been selected and the watch 
 _OFFSETS = 144  # windows of a day, with which a sensor's offset is compared
 _WHOLE = 0.98  # judgement: of ten minutes; a chunk that lacks seconds is not waited for
 _PATIENCE = timedelta(minutes=20)  # judgement: a logger that sends each quarter of an hour
+
+_LOOKED_BACK = timedelta(days=10)
+"""Judgement: for what was noticed as a change began; what is told later is a slow one."""
 
 _EVER = datetime.min.replace(tzinfo=UTC)
 
@@ -243,10 +254,14 @@ class Streaming:
                 self._baseline(stream),
                 self.store.streams.watch_state(stream.hanger) if period == "hour" else None,
                 self.workspace.settings.false_call_years,
+                self._recent_events(stream, start) if period == "hour" else (),
             ),
             partial(self._keep_pooled, stream, period, start),
             partial(self._give_up_pool, stream, period, start),
         )
+
+    def _recent_events(self, stream: Stream, start: datetime) -> tuple[StreamEvent, ...]:
+        return self.store.streams.list_events(stream.name, start - _LOOKED_BACK)
 
     def _baseline(self, stream: Stream) -> Posterior | None:
         """The baseline of the hanger, unless it is of the stream's own first days: another model

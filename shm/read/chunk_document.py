@@ -39,6 +39,7 @@ _LARGEST_M_S2 = 2e6
 _FASTEST_HZ = 1e5  # judgement: far beyond any mode of a hanger
 _LARGEST_SEQUENCE = 2**62  # technical: kept as a number of 64 bits
 _FIRST_YEAR, _LAST_YEAR = 2000, 2200  # judgement: a clock before was never set
+_LONGEST_EVENT = 200  # judgement: what a line of a message bears
 _READER = reader(finite)
 
 
@@ -52,6 +53,7 @@ class _Header:
     channels: tuple[str, ...] = ()
     temperature_c: float = NAN
     wind_m_s: float = NAN
+    event: str = ""
     encoding: str = ""
     values: dict[str, list[Any]] = field(default_factory=dict)
 
@@ -61,6 +63,7 @@ def chunk_document(chunk: Chunk) -> bytes:
     names = ("stream", "sequence", "sampling_rate_hz", "channels", "temperature_c", "wind_m_s")
     header = {"schema": CHUNK_SCHEMA, "time": chunk.start, "encoding": "float32"}
     header |= {name: getattr(chunk, name) for name in names}
+    header |= {"event": chunk.event} if chunk.event else {}
     body = np.ascontiguousarray(chunk.values.T, dtype="<f4").tobytes()
     return compact(header).encode() + b"\n" + body
 
@@ -86,9 +89,9 @@ def parse_chunk(content: bytes) -> Chunk:
             f"it has {values.shape[1]} samples, which is none or over ten minutes",
             f"Send 1 to {LONGEST.total_seconds() * rate:.0f} samples of each channel.",
         )
-    weather = header.temperature_c, header.wind_m_s
+    told = header.temperature_c, header.wind_m_s, header.event[:_LONGEST_EVENT]
     start = header.time
-    return Chunk(header.stream, header.sequence, start, rate, channels, values, *weather)
+    return Chunk(header.stream, header.sequence, start, rate, channels, values, *told)
 
 
 def _refuse_header(header: _Header) -> None:

@@ -134,6 +134,15 @@ def notice_missing(new: Mapping[ChunkKey, Chunk]) -> list[StreamEvent]:
     return events
 
 
+def notice_told(new: Mapping[ChunkKey, Chunk]) -> list[StreamEvent]:
+    """What loggers say was done to them or to their sensors."""
+    return [
+        StreamEvent(chunk.stream, "logger", chunk.start, chunk.start, chunk.event)
+        for _, chunk in sorted(new.items())
+        if chunk.event
+    ]
+
+
 def _is_next(before: PassedChunk, chunk: PassedChunk) -> bool:
     return chunk.sequence == before.sequence + 1 and chunk.sequence < BY_TIME
 

@@ -2,8 +2,9 @@
 millisecond.
 
 Where two chunks are of one time, the samples of the one that came first count: what comes later
-never takes their place. Where it contradicts them, its clock is wrong, and none of it is mixed with
-them, nor fills gaps between them, unless it is the next chunk and runs on behind them.
+never takes their place, but of one that came before its own time. Where it contradicts them, its
+clock is wrong, and none of it is mixed with them, nor fills gaps between them, unless it is the
+next chunk and runs on behind them.
 """
 
 from __future__ import annotations
@@ -18,12 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shm.read.chunk_document import BY_TIME
-from shm.read.ring_segment import ChunkKey
+from shm.read.ring_segment import ChunkKey, microseconds
 from shm.values import NAN
 from shm.values.stream import Chunk, Piece
 
 _JITTER_S = 0.05  # judgement: of a logger's stamps; a radio clock or NTP is within 10 ms
 _DRIFT = 1e-3  # judgement: no crystal is further off; a long chunk differs by that from its stamps
+_AHEAD_US = 60_000_000  # judgement: of the server's clock, which may be off as well
 _OF_A_SAMPLE = 0.501  # derived: up to half a sample, and a stamp's microsecond, is the same sample
 
 
@@ -96,10 +98,12 @@ def agree(one: Chunk, other: Chunk) -> bool:
     return _is_alike(one, other) and np.array_equal(first, second, equal_nan=True)
 
 
-def _rank(item: tuple[ChunkKey, Chunk]) -> tuple[int, int, int, str]:
-    """By when they came; what came at once, by number."""
-    key = item[0]
-    return key.arrived_us, key.sequence, key.start_us, key.checksum
+def _rank(item: tuple[ChunkKey, Chunk]) -> tuple[bool, int, int, int, str]:
+    """By when they came; what came at once, by number. Those last that came before they were: their
+    clock was ahead, and the time is that of others."""
+    key, chunk = item
+    is_ahead = microseconds(chunk.end) - key.arrived_us > _AHEAD_US
+    return is_ahead, key.arrived_us, key.sequence, key.start_us, key.checksum
 
 
 def _free(chunk: Chunk, earlier: Sequence[Chunk]) -> NDArray[np.bool_]:

@@ -30,6 +30,7 @@ from shm.store.ring_notices import (
     notice,
     notice_missing,
     notice_overlap,
+    notice_told,
     save_state,
 )
 from shm.store.ring_pieces import Layout, agree, lay_out
@@ -111,6 +112,7 @@ def _seal(
     state, events = notice(folder.folder.name, state, passed)
     layout = lay_out(found)
     events += notice_overlap(chunks, layout.covered) + notice_missing(chunks)
+    events += notice_told(chunks)
     for event in events:
         note(event)
     _write_all(folder, {k: c for k, c in found.items() if period_of(k.start_us) == start}, new)

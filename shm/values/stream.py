@@ -19,7 +19,7 @@ from shm.values.modes import Mode
 
 StreamEventKind: TypeAlias = Literal[
     "gap", "overlap", "late", "doubled", "clock step", "clock drift", "refused",
-    "dead", "drifting", "swapped", "saturated", "lost modes",
+    "dead", "drifting", "swapped", "saturated", "lost modes", "logger",
 ]  # fmt: skip
 WindowKind: TypeAlias = Literal["wind", "traffic", "knock", "quiet", "unusable"]
 Period: TypeAlias = Literal["hour", "six hours", "day"]
@@ -55,7 +55,7 @@ class Chunk:
     """Consecutive samples of all channels of a stream: `values` (channels, samples) in m/s^2.
 
     `sequence` counts the chunks of a stream from any beginning, one by one; `start` is the logger's
-    clock at the first sample.
+    clock at the first sample; `event` what was done to it or its sensors just before.
     """
 
     stream: str
@@ -66,6 +66,7 @@ class Chunk:
     values: NDArray[np.float32]
     temperature_c: float = NAN
     wind_m_s: float = NAN
+    event: str = ""
 
     @property
     def end(self) -> datetime:

@@ -18,6 +18,10 @@ from shm.watch.stream_reading import ModeTable, planes_of
 
 TIME_BASE = "timebase"
 SWAPPED = "swapped"
+EXCHANGED = (
+    "The modes of each plane lie where those of the other did: the planes are exchanged, "
+    "not the tension. Check the cables of the sensors."
+)
 _SENSOR, _UNEXPLAINED = "sensor_mass", "unexplained"
 _MEASUREMENT = (TIME_BASE, SWAPPED, _SENSOR)
 # Prior sds: 3 % of ln T, 0.3 decades (`quantities`), 1 % of a time base and of single modes.
@@ -85,10 +89,7 @@ class Cause:
                 f"Only the modes of the {self.plane} plane moved, each by its own fraction: the "
                 "sensors, not the tension. Check which sensors are mounted, and where."
             )
-        return (
-            "The modes of each plane lie where those of the other did: the planes are exchanged, "
-            "not the tension. Check the cables of the sensors."
-        )
+        return EXCHANGED
 
 
 def cause_of(moved: FloatArray, table: ModeTable, readings: FloatArray) -> Cause:

@@ -20,7 +20,7 @@ import numpy as np
 
 from shm.models import class_of
 from shm.models.tensioned_beam import frequencies_hz
-from shm.values import BoolArray, FloatArray, Hanger, Mode, Posterior
+from shm.values import PLANES, BoolArray, FloatArray, Hanger, Mode, Posterior
 from shm.values.stream import PooledReading
 from shm.watch.quantities import MeasuredMode, base_point, log_frequencies, moved
 from shm.watch.steel_softening import MODULUS_PER_KELVIN
@@ -31,6 +31,8 @@ _UNKNOWN_SD = 1e-3  # as of a hammer test without stated errors (`readings`)
 _MEMORY_READINGS = 120.0  # judgement: five days of what modes differ by, ten times a night's
 _DEGREES = 4.0  # judgement: of Student's t, as robust regressions take (Lange et al. 1989)
 _ROUNDS = 4  # technical: of reweighting, from the weighted median on
+_APART, _LEAST_APART = 5.0, 3
+"""Judgement: in spreads, from when on a mode is told from that of the other plane; in how many."""
 _CLIP = 4.0  # sds: what a mode may add to its spread at once
 _STEP = 0.01  # technical: of the tension, for a slope by central differences
 _DECADES = 0.1  # technical: of the springs, likewise
@@ -153,6 +155,25 @@ class ModeTable:
         level = np.append(self.level, more.level - more.tension * shift)
         return replace(self, modes=(*self.modes, *more.modes), level=level, **parts)
 
+    def are_exchanged(self, modes: Sequence[Mode], shift: float) -> bool | None:
+        """Whether each mode lies where that of the other plane does, at a tension moved by `shift`.
+
+        None where too few are told apart.
+        """
+        level = dict(zip(self.modes, self.level + self.tension * shift, strict=True))
+        spread = dict(zip(self.modes, np.sqrt(self.spread), strict=True))
+        nearer = []
+        for mode, log_hz in zip(modes, _measured(modes)[0], strict=True):
+            own = mode.plane, mode.order
+            other = _other(mode).plane, mode.order
+            apart = abs(level[other] - level[own]) if {own, other} <= level.keys() else 0.0
+            if apart > _APART * max(spread.get(own, 0.0), spread.get(other, 0.0), LEAST_SD):
+                off, otherwise = abs(log_hz - level[own]), abs(log_hz - level[other])
+                nearer.append((otherwise < off / 2) - float(off < otherwise / 2))
+        if len(nearer) < _LEAST_APART:
+            return None
+        return float(np.mean(nearer)) > 0.5
+
     @property
     def softer(self) -> FloatArray:
         """By what ln f goes with a kelvin, as steel softens."""
@@ -208,6 +229,15 @@ def usable(reading: PooledReading) -> tuple[Mode, ...]:
         if is_measured and not mode.irregular and not np.isinf(mode.frequency_sd_hz):
             found.setdefault((mode.plane, mode.order), mode)
     return tuple(found.values())
+
+
+def exchanged(modes: Sequence[Mode]) -> tuple[Mode, ...]:
+    """Each as one of the other plane."""
+    return tuple(map(_other, modes))
+
+
+def _other(mode: Mode) -> Mode:
+    return replace(mode, plane=PLANES[PLANES[0] == mode.plane])
 
 
 def _measured(modes: Sequence[Mode]) -> tuple[FloatArray, FloatArray]:

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput
-from shm.values import NAN, FloatArray
+from shm.values import NAN, FloatArray, Mode
 from shm.values.stream import PooledReading
 from shm.watch.alert_state import AlertState
 from shm.watch.stream_filter import FEATURES, Bank
-from shm.watch.stream_reading import ModeTable, SeenReading
+from shm.watch.stream_reading import ModeTable, SeenReading, exchanged
 
 HOURS_A_DAY = 24.0  # by definition
 # Prior sds of what the conditions do to ln T: a kelvin now, over 3 hours' mean, over a day's, over
@@ -32,6 +32,8 @@ CONDITION_SD = np.array([1e-3] * 4 + [2e-5, 2e-3, 2e-4] + [1e-3] * 6)
 # Judgement: by what an hour's temperature differs from ten days' mean, and that the errors of some
 # ten hours without a thermometer are one error: an hour counts for a third of what it would.
 _UNKNOWN_K, TOGETHER = 4.0, 3.0
+HOURS_EXCHANGED, _SURELY_EXCHANGED = 3, 8
+"""Judgement: until it is told, as mistaken modes look like it for an hour; and until it is over."""
 _RING = 24  # readings: a change is told within a day or is slow
 OLD_READINGS = 120.0  # judgement: five days, as what a mode differs by is learnt over
 
@@ -45,6 +47,7 @@ class StreamState:
     newest readings' modes with the conditions taken off, `ring_day` their days, `old` (n,) the mean
     of those before. Shifts count from `zero`, compensated ones from `compensated_zero`; a change
     that was told moved the tension by `called_shift` from `called_from` on, 0 where none stands.
+    So many hours the planes were exchanged.
     """
 
     key: str
@@ -65,6 +68,7 @@ class StreamState:
     called_shift: float = 0.0
     told: AlertState = field(default_factory=AlertState)
     standing: tuple[str, ...] = ()
+    exchanged_hours: int = 0
 
     @classmethod
     def begun(cls, key: str, start: datetime, table: ModeTable) -> StreamState:
@@ -121,7 +125,7 @@ class StreamState:
                 table=ModeTable(modes=modes, tension_n=head["tension_n"], **parts["table"]),
                 bank=Bank(day=head["day"], watched=head["watched"], **parts["bank"]),
                 told=AlertState.from_text(head["told"]),
-                **{name: head[name] for name in _SCALARS},
+                **{name: head[name] for name in _SCALARS if name in head},
                 **parts["state"],
             )
         except (AttributeError, KeyError, TypeError, ValueError) as error:
@@ -133,8 +137,21 @@ class StreamState:
 
 _SCALARS = (
     "key", "known_day", "zero", "compensated_zero", "readings", "is_learning", "called_from",
-    "called_shift", "standing",
+    "called_shift", "standing", "exchanged_hours",
 )  # fmt: skip
+
+
+def as_mounted(
+    state: StreamState, modes: tuple[Mode, ...], shift: float
+) -> tuple[StreamState, tuple[Mode, ...]]:
+    """The modes in the planes that were always theirs, where those of the sensors are exchanged."""
+    found = None if state.is_learning else state.table.are_exchanged(modes, shift)
+    hours = state.exchanged_hours
+    if found or (found is None and hours >= HOURS_EXCHANGED):
+        hours = hours + 1 if hours < HOURS_EXCHANGED else _SURELY_EXCHANGED
+    else:
+        hours = hours - 1 if hours > HOURS_EXCHANGED + 1 else 0
+    return replace(state, exchanged_hours=hours), exchanged(modes) if hours else modes
 
 
 def warmth(state: StreamState) -> float:

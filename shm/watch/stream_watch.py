@@ -36,15 +36,17 @@ from shm.values import (
     WatchedTest,
 )
 from shm.values.stream import PERIODS, PooledReading, StreamEvent, StreamEventKind
-from shm.watch.stream_cause import MODEL_OFF, SWAPPED, TIME_BASE, Cause, cause_of
+from shm.watch.stream_cause import EXCHANGED, MODEL_OFF, SWAPPED, TIME_BASE, Cause, cause_of
 from shm.watch.stream_filter import FAST, LEVEL, NOTHING, SLOW, Bank, Evidence
-from shm.watch.stream_reading import ModeTable, SeenReading, usable
+from shm.watch.stream_reading import ModeTable, SeenReading, exchanged, usable
 from shm.watch.stream_state import (
     CONDITION_SD,
     HOURS_A_DAY,
+    HOURS_EXCHANGED,
     OLD_READINGS,
     TOGETHER,
     StreamState,
+    as_mounted,
     warmth,
     with_conditions,
     with_ring,
@@ -156,6 +158,7 @@ class StreamWatch:
         state, conditions, extra = with_conditions(state, reading, day)
         bank = state.bank.advanced(day, CONDITION_SD)
         expected = bank.along(bank.design(conditions))[0]
+        state, modes = as_mounted(state, modes, expected)
         table = state.table.with_new(self.baseline, self.hanger, modes, expected)
         seen = table.seen(modes, warmth(state))
         if not state.is_learning:
@@ -187,6 +190,9 @@ class StreamWatch:
     ) -> tuple[StreamWatched, StreamState]:
         evidence = state.bank.evidence(self.options.least_shift)
         events: tuple[StreamEvent, ...] = ()
+        if state.exchanged_hours == HOURS_EXCHANGED:
+            began = end - timedelta(hours=HOURS_EXCHANGED)
+            events = (StreamEvent(reading.stream, "swapped", began, end, EXCHANGED),)
         moved: tuple[Moved, ...] = ()
         if self._is_called(evidence):
             cause = _cause_of(state, evidence)
@@ -194,7 +200,7 @@ class StreamWatch:
             if cause.takes_hours and since < _HOURS_OF_A_FAULT:
                 evidence = NOTHING
             elif cause.is_measurement:
-                events = (_event(cause, state, evidence, reading, end),)
+                events += (_event(cause, state, evidence, reading, end),)
                 state, evidence = _absorbed(state, cause), NOTHING
             else:
                 evidence = _sized(evidence, cause, state)
@@ -298,7 +304,10 @@ def daily_shift(kept: bytes, hours: Sequence[PooledReading]) -> tuple[float, flo
     state = StreamState.from_bytes(kept)
     seen = []
     for reading in hours:
-        known = [mode for mode in usable(reading) if (mode.plane, mode.order) in state.table.modes]
+        modes = usable(reading)
+        if state.table.are_exchanged(modes, state.zero):
+            modes = exchanged(modes)
+        known = [mode for mode in modes if (mode.plane, mode.order) in state.table.modes]
         if known:
             kelvin = reading.temperature_c - state.reference[0]
             seen.append(state.table.seen(known, kelvin if math.isfinite(kelvin) else 0.0))

@@ -32,9 +32,9 @@ sys.path.insert(0, str(ROOT))
 
 from shm.identify import IdentifyOptions  # noqa: E402
 from shm.monitor import pooled, read_window  # noqa: E402
-from shm.monitor.pooling import LENGTHS  # noqa: E402
 from shm.values import Hanger, Mode  # noqa: E402
 from shm.values.stream import (  # noqa: E402
+    PERIODS,
     Piece,
     PooledReading,
     Stream,
@@ -216,7 +216,7 @@ def followed(
 
 def pool(seed: int, readings: dict[int, list[WindowReading]], score: Score, hours: float) -> None:
     for h, own in readings.items():
-        for period, length in LENGTHS.items():
+        for period, length in PERIODS.items():
             for step in range(int(timedelta(hours=hours) / length)):
                 reading: PooledReading | None = pooled(own, period, START + step * length)
                 if reading is None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from shm.identify import IdentifyOptions, identify
-from shm.monitor import read_window
+from shm.monitor import read_window, tracking
 from shm.values import Channel, Hanger, Mode, Recording
 from shm.values.stream import Piece, Stream, StreamChannel, WindowReading
 from tests.helpers.ambient_stream import (
@@ -131,6 +131,38 @@ def test_noise_proves_no_mode() -> None:
         assert reading.how == "none"
         assert reading.window.kind == "quiet"
         assert "hidden by the noise" in reading.why
+
+
+@pytest.mark.parametrize("minute", [20, 30])
+def test_modes_that_were_missed_at_first_join_the_others_once(
+    minute: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sought each hour here, by this stream in the window at half past."""
+    monkeypatch.setattr(tracking, "_REVIEW_S", 3600)
+    rng = np.random.default_rng(7)
+    motion = drawn(rng, orders=4)
+    missed = {("transverse", 3), ("longitudinal", 4)}
+    known = tuple(mode for mode in motion.known() if (mode.plane, mode.order) not in missed)
+    at = replace(piece(values(motion, rng)), start=START.replace(minute=minute))
+    reading = read_window([at], stream(), known, HANGER, OPTIONS)
+    assert reading.how == "tracked"
+    joined = _by_name(reading.modes).keys() - _by_name(known).keys()
+    assert joined == (missed if minute == 30 else set())
+    for key in joined:
+        assert _by_name(reading.modes)[key].frequency_hz == pytest.approx(
+            motion.frequency_hz[key], rel=1e-3
+        )
+
+
+def test_a_lone_peak_of_the_deck_gives_way_to_the_modes_of_the_hanger() -> None:
+    rng = np.random.default_rng(7)
+    motion = drawn(rng, orders=4)
+    second = motion.scaled(1.0).known()[1]
+    lone = replace(second, plane="transverse", order=1)
+    at = replace(piece(values(motion, rng)), start=START.replace(minute=30))
+    reading = read_window([at], stream(), (lone,), HANGER, OPTIONS)
+    assert reading.how == "from scratch"
+    assert len(reading.modes) == 8
 
 
 def test_a_mode_that_is_gone_is_told_and_the_others_stay() -> None:

@@ -192,6 +192,28 @@ def test_a_clock_that_is_set_back_replaces_no_sample_and_fills_no_gap(
     assert np.array_equal(piece.values, samples(minutes(*range(20))))
 
 
+@pytest.mark.parametrize("is_sealed", [True, False])
+def test_a_clock_that_was_set_ahead_takes_no_time_from_the_true_samples(
+    logger: Logger, is_sealed: bool
+) -> None:
+    """After 10 minutes it is 5 minutes and 3 s ahead for ten, then right again."""
+    ahead, true = timedelta(minutes=5, seconds=3), minutes(*range(30))
+    for number, each in enumerate(true):
+        logger.now = each.end
+        is_off = 10 <= number < 20
+        sent = replace(each, start=each.start + ahead) if is_off else each
+        logger.ring.append(chunk_document(sent))
+        if is_sealed:
+            logger.ring.seal(logger.now)
+    logger.seal()
+    logger.now += HOUR
+    logger.seal()
+    pieces = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert "clock step" in logger.kinds
+    assert np.array_equal(pieces[0].values, samples(true[:10]))
+    assert np.array_equal(pieces[-1].values, samples(true[20:]))
+
+
 @pytest.mark.parametrize("again", [1, 3])
 def test_a_few_samples_that_come_again_are_noted(logger: Logger, again: int) -> None:
     """Within the jitter of stamps, and with the next number: only the samples tell."""
@@ -233,6 +255,15 @@ def test_values_that_are_missing_are_noted_and_do_not_count(logger: Logger) -> N
     ]  # fmt: skip
     assert logger.events[0].detail == "100 samples have no value (null or NaN)"
     assert sum(logger.ring.state("h3").received_s.values()) == pytest.approx(4.8)
+
+
+def test_what_a_logger_says_was_done_to_it_is_noted_once(logger: Logger) -> None:
+    told = replace(minutes(1)[0], event="gain of acc_1 set to 2")
+    logger.send(*minutes(0), told)
+    logger.send(told)
+    (event,) = logger.events
+    assert (event.kind, event.detail) == ("logger", "gain of acc_1 set to 2")
+    assert event.start == told.start
 
 
 def test_a_rate_within_a_crystals_tolerance_is_the_described_one(logger: Logger) -> None:

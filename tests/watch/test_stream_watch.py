@@ -13,9 +13,10 @@ import pytest
 from shm.errors import BadInput
 from shm.models.tensioned_beam import frequencies_hz
 from shm.values import FloatArray, Hanger, ModalTest, Mode, Thresholds
-from shm.values.stream import PooledReading
+from shm.values.stream import PooledReading, StreamEvent
 from shm.watch.ambient_hammer import ambient_bias
-from shm.watch.stream_reading import ModeTable, sensitivities
+from shm.watch.stream_hints import led_by
+from shm.watch.stream_reading import ModeTable, exchanged, sensitivities
 from shm.watch.stream_watch import (
     StreamOptions,
     StreamState,
@@ -120,6 +121,25 @@ def test_a_loss_of_one_percent_is_told_once_within_a_day_and_ends_when_it_is_bac
     assert not state.standing
 
 
+@pytest.mark.parametrize("hour", [500, 450])
+def test_what_the_logger_said_as_a_change_began_leads_its_alert(hour: int) -> None:
+    at = START + timedelta(hours=hour, minutes=14)
+    said = StreamEvent("north", "logger", at, at, "acc_1 exchanged")
+    gap = replace(said, kind="gap", detail="9 samples are missing")
+    found, _ = watched(hours(530, tension=from_hour(500, -0.01)))
+    (alert,) = [each.alert for each in found if each.alert]
+
+    led = led_by(alert, [gap, said])
+    if hour == 450:
+        assert led == alert
+        return
+    assert led.key == alert.key
+    assert led.message.startswith(
+        "Hanger 7: check the sensors first, at 2026-05-21 20:14 the logger said acc_1 exchanged. "
+        "Tension fell by "
+    )
+
+
 def test_a_loss_beyond_its_threshold_is_urgent() -> None:
     found, _ = watched(hours(560, tension=from_hour(500, -0.08)))
 
@@ -145,6 +165,31 @@ def test_a_time_base_that_steps_is_the_measurements() -> None:
     assert event.kind == "clock drift"
     assert event.start < START + timedelta(hours=501) < event.end
     assert abs(found[-1].compensated_shift) < 0.002
+
+
+@pytest.mark.parametrize("lacking", [0, 2])
+def test_planes_that_are_exchanged_are_told_as_such_within_hours(lacking: int) -> None:
+    """Also where one plane lacks modes; the other one's springs are softer here."""
+    apart = np.repeat([0.0, -0.04], 5)
+    plain = hours(530, modes=lambda _: apart)
+    whole = range(1, 6 - lacking)
+    kept = [
+        replace(
+            each,
+            modes=tuple(m for m in each.modes if m.order in whole or m.plane == "transverse"),
+        )
+        for each in plain
+    ]
+    off = [replace(each, modes=exchanged(each.modes)) for each in kept[500:]]
+    found, state = watched([*kept[:500], *off])
+
+    assert not any(each.alert for each in found)
+    (event,) = [event for each in found for event in each.events]
+    assert event.kind == "swapped"
+    assert event.end <= START + timedelta(hours=504)
+    assert abs(found[-1].compensated_shift) < 0.002
+    shift, sd = daily_shift(state.to_bytes(), off[6:])
+    assert abs(shift) < 4 * sd < 0.01
 
 
 def test_a_mode_that_went_astray_moves_nothing() -> None:
