@@ -295,6 +295,7 @@ def set_aside(outliers: Sequence[Outlier], otherwise: str = "") -> tuple[str, ..
     told = tuple(
         f"{_measured(each)}, is set aside as a gross error (probability {_probability(each)}): "
         f"{_expected(each)}. A wrong mode, a tone or a slip; look at the recording again."
+        f"{_acts_alone(each)}"
         for each in outliers
     )
     if not told or not otherwise:
@@ -310,6 +311,15 @@ def doubtful(outliers: Sequence[Outlier]) -> tuple[str, ...]:
         f"{_expected(each)}. It is kept, and the answer may lean on it; look at the recording "
         f"again."
         for each in outliers
+    )
+
+
+def _acts_alone(outlier: Outlier) -> str:
+    if not outlier.acts_alone:
+        return ""
+    return (
+        f" Or a part that only this mode's swing reaches, such as a guide with play or a crack "
+        f"that opens ({outlier.acts_alone:.2f}): test again with softer and with harder hits."
     )
 
 

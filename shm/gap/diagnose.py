@@ -125,6 +125,9 @@ def examined(
         outliers=aside,
         compatibility=compatible,
         remainder=remainder_of(problem, attribution, compatible),
+        widest_swing_m=max(
+            (t.widest_swing_m for t in found.tests if t.widest_swing_m > 0), default=NAN
+        ),
     )
     return diagnosis, attribution
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Literal
@@ -137,6 +138,18 @@ class ModalTest:
     def regular_modes(self) -> tuple[Mode, ...]:
         """Those from which a tension is inferred; see `Mode.irregular`."""
         return tuple(mode for mode in self.modes if not mode.irregular)
+
+    @property
+    def widest_swing_m(self) -> float:
+        """What its hits move the sensors by at most: all modes of a plane together; NaN where
+        unknown."""
+        swings = {mode.plane: 0.0 for mode in self.modes}
+        for mode in self.modes:
+            if math.isfinite(mode.acceleration_m_s2):
+                swings[mode.plane] += (
+                    mode.acceleration_m_s2 / (2 * math.pi * mode.frequency_hz) ** 2
+                )
+        return max(swings.values(), default=0.0) or NAN
 
     @property
     def frequencies_amplitude(self) -> float:
