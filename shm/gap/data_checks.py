@@ -113,6 +113,7 @@ def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
         _without_temperature(tests),
         _without_shape_sd(tests),
         _amplitude(tests),
+        _rattling(tests),
     ]
     return [remark for remark in remarks if remark] + _contradictions(tests)
 
@@ -240,6 +241,17 @@ def _amplitude(tests: Sequence[ModalTest]) -> str:
     return (
         f"{which} on amplitude, at that of a hit up to {100 * abs(most):.2g} % {side}: those of "
         "small amplitude are compared, and the change counts as a test at another amplitude."
+    )
+
+
+def _rattling(tests: Sequence[ModalTest]) -> str:
+    told = [test for test in tests if math.isfinite(test.rattles_above)]
+    if not told:
+        return ""
+    return (
+        f"Above a level of {min(test.rattles_above for test in told):.2g} the hanger does not ring "
+        f"as a bar does ({_listed([test.id for test in told])}): something knocks, such as a guide "
+        "with play, slips or opens. The frequencies are those of smaller swings."
     )
 
 

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from shm.gap.alone import rattling, with_what_acts
 from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress, silent
 from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
@@ -85,7 +86,8 @@ def examined(
     check_hold_out(whole, options.hold_out)
     rng = np.random.default_rng(options.seed)
     clear = cleared(whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done))
-    problem, attribution = clear.problem, clear.attribution
+    problem = clear.problem
+    attribution = with_what_acts(clear.attribution, rattling(found.tests))
     progress("shrinkage", _ATTRIBUTION)
     answer = answered(attribution)
     before, leading = attribution.baseline, attribution.leading

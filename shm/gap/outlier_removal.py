@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from shm.gap.alone import acts_alone
+from shm.gap.alone import acts_alone, with_what_acts
 from shm.gap.attribution import Attribution, answered, attributed, more_thorough
 from shm.gap.contract import Fit, GapOptions, Progress, silent
 from shm.gap.fit import baseline_fit, with_remainder
@@ -84,19 +84,9 @@ def cleared(
     last = found.attribution if wrong else more_thorough(found.attribution)
     otherwise = _led_before(first.attribution, last)
     done = replace(found, attribution=last, otherwise=otherwise, misnumbered=wrong)
-    return replace(done, attribution=_with_what_acts_alone(done))
-
-
-def _with_what_acts_alone(found: Cleared) -> Attribution:
-    """No gap stands only as far as what was set aside was a slip and no part that acts alone."""
-    last = found.attribution
-    slips = float(np.prod([1 - _alone(found, each, last.baseline) for each in found.aside]))
-    moved = (1 - slips) * last.no_gap_probability
-    return replace(
-        last,
-        no_gap_probability=last.no_gap_probability - moved,
-        unexplained_probability=last.unexplained_probability + moved,
-    )
+    # No gap stands only as far as what was set aside was a slip and no part that acts alone.
+    slips = np.prod([1 - _alone(done, each, last.baseline) for each in done.aside])
+    return replace(done, attribution=with_what_acts(last, 1 - float(slips)))
 
 
 def _alone(found: Cleared, error: GrossError, fit: Fit) -> float:

@@ -117,7 +117,8 @@ class ModalTest:
 
     `id` is of 1 to LONGEST_TEST_ID printable characters, else that is a ValueError: no document
     with another can be read back. `tension_read_n` is what a load cell or a lift-off showed during
-    the test, with the reading's standard deviation.
+    the test, with the reading's standard deviation. Above the level `rattles_above` (in the unit of
+    `amplitude`) the hanger does not ring as a bar does; NaN where it does at that of the hits, too.
     """
 
     id: str
@@ -129,6 +130,7 @@ class ModalTest:
     added_mass: AddedMass | None = None
     tension_read_n: float = NAN
     tension_read_sd_n: float = NAN
+    rattles_above: float = NAN
 
     def __post_init__(self) -> None:
         if not is_test_id(self.id):

@@ -178,7 +178,7 @@ class Hanger:
 
 
 def tested(hanger: Hanger, crew: Crew, level: float, rng: np.random.Generator) -> list[Record]:
-    """A test at `level` times the crew's force: a record for each hit, some degrees off its plane."""
+    """A test at `level` times the crew's force: a record for each hit, a bit off its plane."""
     count = len(crew.sensors_m)
     off = crew.place_m * rng.standard_normal(count)
     gains = 1 + crew.gain * rng.standard_normal((count, 2))
