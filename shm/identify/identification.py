@@ -127,21 +127,24 @@ def _once_calm(
     steady: Sequence[Tone],
 ) -> tuple[Placement, float, tuple[str, ...]] | None:
     """What the ring-downs say once they have died away so far that they are a bar's, with what is
-    left of their level by then, and a note; None where they never are."""
+    left of their level by then, and a note; None where they never are.
+
+    Of the parts that shows most modes counts.
+    """
     if not all(m.driven for m in measurements):
         return None
+    found = []
     for left_out in LEFT_OUT:
-        later = calmed(measurements, left_out)
-        found = _found(later, options.identifier, options)
-        placement = placed(found.finding.modes, found.points, hanger, steady)
-        if len(placement.modes) >= _FEWEST_CALM:
-            note = (
-                f"the first {left_out:.0%} of each ring-down are left out: there the hanger does "
-                "not ring as a bar; something knocks (a guide with play), slips or opens while it "
-                "swings far"
-            )
-            return placement, level_left_at(measurements, left_out), (note,)
-    return None
+        later = _found(calmed(measurements, left_out), options.identifier, options)
+        found.append((placed(later.finding.modes, later.points, hanger, steady), left_out))
+    placement, left_out = max(found, key=lambda each: (len(each[0].modes), each[1]))
+    if len(placement.modes) < _FEWEST_CALM:
+        return None
+    note = (
+        f"the first {left_out:.0%} of each ring-down are left out: there the hanger does not ring "
+        "as a bar; something knocks (a guide with play), slips or opens while it swings far"
+    )
+    return placement, level_left_at(measurements, left_out), (note,)
 
 
 def _cross_check(measurements: Sequence[Measurement], options: IdentifyOptions) -> Finding | None:

@@ -186,3 +186,14 @@ def test_what_another_test_hit_as_hard_shows_in_its_place_was_a_slip(
     kept = observed([replace(test, modes=test.modes[1:]), tests[1]], PLAIN).design
     assert (acts_alone(design, kept, int(every[0]), 0.1) > 0) == possible
     assert acts_alone(design, kept, int(every[0]), 0.5) == 0.0  # farther than any guide moves one
+
+
+def test_a_hanger_that_knocks_while_it_swings_far_is_not_called_sound() -> None:
+    (test,) = measured()
+    few = GapOptions(without=all_but("point_mass"))
+    sound = diagnose([test], PLAIN, few)
+    knocks = diagnose([replace(test, amplitude=0.1, rattles_above=0.1)], PLAIN, few)
+    assert sound.leads == "no gap"
+    assert knocks.leads == "unexplained"
+    assert knocks.no_gap_probability < 0.05
+    assert any("something knocks" in remark for remark in knocks.remarks)

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 PLANES = ("transverse", "longitudinal")
 MODES, ELEMENTS = 12, 40
 STEP_HZ, RATE_HZ = 2048, 1024
-PAUSE_S, RING_S = 0.25, 12.0
+PAUSE_S = 0.25
 DAMPING = 0.0015
 
 
@@ -143,6 +143,7 @@ class Crew:
     hits: int = 5
     peak_n: float = 1500.0
     contact_s: float = 0.003
+    ring_s: float = 12.0
     noise_m_s2: float = 5e-4
     noise_n: float = 0.3
     gain: float = 0.01
@@ -210,7 +211,7 @@ def _rung(
     """Each hit from rest, side by side: accelerations (sensors, hits, samples), the largest that
     the part saw, and the pulse of a peak of 1."""
     step = 1 / STEP_HZ
-    pause, count = int(PAUSE_S * STEP_HZ), int((PAUSE_S + RING_S) * STEP_HZ)
+    pause, count = int(PAUSE_S * STEP_HZ), int((PAUSE_S + crew.ring_s) * STEP_HZ)
     pole = modes.omega * (-DAMPING + 1j * np.sqrt(1 - DAMPING**2))
     turn, swing = np.exp(pole * step), pole.imag
     since = (np.arange(count) - pause) * step
