@@ -29,6 +29,7 @@ from shm.gap.places import LocalCause, flexible_ends, local_causes, tried
 from shm.gap.problem import GapProblem
 from shm.gap.remainder import remainder_of
 from shm.gap.residuals import residuals, trends
+from shm.gap.sensor_errors import sensor_remarks
 from shm.models import check_baseline
 from shm.models.as_made import TENSION_RATIO
 from shm.models.effects import check_effect_priors
@@ -121,6 +122,7 @@ def examined(
         remarks=(
             *_states(problem, before, after, tensions[1]),
             *_on_the_way(found, clear, aside, doubted),
+            *sensor_remarks(problem, answer[0][1]),
         ),
         seed=options.seed,
         seconds=time.perf_counter() - started,
