@@ -123,6 +123,9 @@ def _none_explains(diagnosis: Diagnosis) -> str:
 
 def _explained(claim: Claim) -> str:
     sure = "is explained by" if claim.probability >= _SURE else "is most likely due to"
+    if claim.of_the_measurement:
+        likely = "is" if claim.probability >= _SURE else "is most likely"
+        return f"What differs {likely} the measurement's, not the hanger's: {_told(claim)}."
     return f"The gap {sure} {_told(claim)}."
 
 
