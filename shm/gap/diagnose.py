@@ -44,6 +44,7 @@ from shm.values import (
     GapPlace,
     Hanger,
     ModalTest,
+    NextMeasurement,
     Outlier,
     TensionEstimate,
 )
@@ -95,9 +96,7 @@ def examined(
     after = leading.best.fit if leading else None
     aside, doubted = (outliers(clear, e, answer[0][1]) for e in (clear.aside, clear.doubted))
     held = held_out(problem, before, after, options.hold_out, rng)
-    progress("next measurement", (1 + _ATTRIBUTION) / 2)
-    following = ranked(problem, _contenders(attribution))
-    progress("next measurement", 1.0)
+    following = _following(problem, attribution, progress)
     compatible = compatibility(problem, attribution)
     tensions = [_tension(problem, f, rng) for f in ([(1.0, before)], possible(attribution))]
     diagnosis = Diagnosis(
@@ -121,27 +120,44 @@ def examined(
         next_measurements=following,
         remarks=(
             *_states(problem, before, after, tensions[1]),
-            *_on_the_way(found, clear, aside, doubted),
-            *sensor_remarks(problem, answer[0][1]),
+            *_on_the_way(found, clear, aside, doubted, after or before),
         ),
         seed=options.seed,
         seconds=time.perf_counter() - started,
         outliers=aside,
         compatibility=compatible,
         remainder=remainder_of(problem, attribution, compatible),
-        widest_swing_m=max(
-            (t.widest_swing_m for t in found.tests if t.widest_swing_m > 0), default=NAN
-        ),
+        widest_swing_m=_widest_swing_m(found.tests),
     )
     return diagnosis, attribution
 
 
+def _widest_swing_m(tests: Sequence[ModalTest]) -> float:
+    swings = [test.widest_swing_m for test in tests]
+    return max((each for each in swings if each > 0), default=NAN)
+
+
+def _following(
+    problem: GapProblem, attribution: Attribution, progress: Progress
+) -> tuple[NextMeasurement, ...]:
+    progress("next measurement", (1 + _ATTRIBUTION) / 2)
+    found = ranked(problem, _contenders(attribution))
+    progress("next measurement", 1.0)
+    return found
+
+
 def _on_the_way(
-    found: Usable, clear: Cleared, aside: Sequence[Outlier], doubted: Sequence[Outlier]
+    found: Usable,
+    clear: Cleared,
+    aside: Sequence[Outlier],
+    doubted: Sequence[Outlier],
+    best: Fit,
 ) -> tuple[str, ...]:
-    """What was found on the way to data that can be used and hold no gross errors."""
+    """What was found on the way to data that can be used and hold no gross errors, and what the
+    measurement errs by."""
     gross = (*set_aside(aside, clear.otherwise), *doubtful(doubted))
-    return (*found.remarks, *clear.misnumbered, *gross)
+    measured = sensor_remarks(clear.problem, best)
+    return (*found.remarks, *clear.misnumbered, *gross, *measured)
 
 
 def _states(
