@@ -231,7 +231,8 @@ def _nothing_found(source: str, found: Finding, placement: Placement) -> NotIden
     return NotIdentifiable(
         f"no mode can be trusted ({'; '.join(reasons)}).",
         file=source,
-        remedy="Check that the hits ring down undisturbed and that the band holds modes.",
+        remedy="Check that hits ring down undisturbed, that the band holds modes and that nothing "
+        "knocks while the hanger swings far: hit softer.",
     )
 
 
