@@ -88,7 +88,7 @@ def _beyond_the_swing(diagnosis: Diagnosis) -> str:
         swing = f"of {formatting.plain(1e3 * diagnosis.widest_swing_m, 2)} mm at the sensors"
     return (
         f" What acts only beyond swings {swing}, such as a guide with more play or a crack that "
-        "traffic opens, is not visible."
+        "traffic opens, is not visible; what touches only right after a hit hardly is."
     )
 
 
