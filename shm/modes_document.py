@@ -32,7 +32,7 @@ _REMEDIES = {
 }  # fmt: skip
 _TEST_KEYS = (
     "id", "time", "temperature_c", "amplitude", "added_mass", "tension_read_n",
-    "tension_read_sd_n", "modes",
+    "tension_read_sd_n", "rattles_above", "modes",
 )  # fmt: skip
 _MODE_KEYS = tuple(field.name for field in fields(Mode))
 _SPELT = {"added_mass": 'Write added_mass = {"mass_kg": ..., "x_m": ...}, in kg and m.'}
@@ -58,6 +58,8 @@ def test_document(test: ModalTest) -> dict[str, Any]:
     if math.isnan(test.tension_read_n):
         document.pop("tension_read_n")
         document.pop("tension_read_sd_n")
+    if math.isnan(test.rattles_above):
+        document.pop("rattles_above")
     for mode in document["modes"]:
         if not mode["irregular"]:
             mode.pop("irregular")

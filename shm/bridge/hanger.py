@@ -263,6 +263,7 @@ def _support_kind(table: Table, key: str, usual: Support) -> Support:
 
 
 _LARGEST_SCATTER = 0.5  # judgement: who is half off wrote another unit
+_LARGEST_TURN_DEG = 45.0  # nothing is farther from the nearer of two axes
 
 
 def scatter_of(table: Table | None) -> Scatter:
@@ -271,8 +272,9 @@ def scatter_of(table: Table | None) -> Scatter:
         return Scatter()
     known = {field.name: getattr(Scatter(), field.name) for field in fields(Scatter)}
     table.refuse_unknown(known)
+    most = dict.fromkeys(known, _LARGEST_SCATTER) | {"sensor_turn_deg": _LARGEST_TURN_DEG}
     return Scatter(
-        **{key: table.fraction(key, usual, 0.0, _LARGEST_SCATTER) for key, usual in known.items()}
+        **{key: table.fraction(key, usual, 0.0, most[key]) for key, usual in known.items()}
     )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Fit, GapOptions, Hypothesis, NoiseNode, Progress, silent
+from shm.gap.damping import with_damping
 from shm.gap.groups import SAME_BELOW, faces, grouped
 from shm.gap.likelihood import Likelihood
 from shm.gap.model_probabilities import (
@@ -143,7 +144,8 @@ def more_thorough(found: Attribution) -> Attribution:
 
 
 def _weighed(search: Search, tried: list[ScoredHypothesis]) -> Attribution:
-    kinds = families(search.with_laws(search.with_sampled(tried)), search.variants)
+    weighed = families(search.with_laws(search.with_sampled(tried)), search.variants)
+    kinds = with_damping(search.problem.observations, weighed)
     search.progress("weighing", 1.0)
     likeliest = _fit([kind for kind in kinds if not kind.flexible])
     p_value = search.p_value(likeliest)

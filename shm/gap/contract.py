@@ -58,18 +58,27 @@ class Observations:
 
     `sd` of a frequency is fractional (of its logarithm); NaN where nobody gave one. `turned`
     (data,), None where nothing is, is what one standard deviation of a turn about the hanger's axis
-    does to a component of a shape; all of a mode turn together.
+    does to a component of a shape; all of a mode turn together. `known_damping` (F, 2)
+    holds the logarithm of each mode's damping ratio and its standard deviation; NaN where unknown.
     """
 
     design: Design
     value: FloatArray
     sd: FloatArray
     turned: FloatArray | None = None
+    known_damping: FloatArray | None = None
+
+    @property
+    def damping(self) -> FloatArray:
+        if self.known_damping is None:
+            return np.full((self.design.frequencies, 2), np.nan)
+        return self.known_damping
 
     def part(self, design: Design, data: IntArray) -> Observations:
         """Those of another design, which are `data` of these."""
         turned = None if self.turned is None else self.turned[data]
-        return Observations(design, self.value[data], self.sd[data], turned)
+        damping = self.damping[data[: design.frequencies]]
+        return Observations(design, self.value[data], self.sd[data], turned, damping)
 
 
 @dataclass(frozen=True, eq=False)

@@ -108,6 +108,7 @@ def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
         _without_temperature(tests),
         _without_shape_sd(tests),
         _amplitude(tests),
+        _rattling(tests),
     ]
     return [remark for remark in remarks if remark] + _contradictions(tests)
 
@@ -182,6 +183,17 @@ def _amplitude(tests: Sequence[ModalTest]) -> str:
     )
 
 
+def _rattling(tests: Sequence[ModalTest]) -> str:
+    told = [test for test in tests if math.isfinite(test.rattles_above)]
+    if not told:
+        return ""
+    return (
+        f"Above a level of {min(test.rattles_above for test in told):.2g} the hanger does not ring "
+        f"as a bar does ({_listed([test.id for test in told])}): something knocks, such as a guide "
+        "with play, slips or opens. The frequencies are those of smaller swings."
+    )
+
+
 def _contradictions(tests: Sequence[ModalTest]) -> list[str]:
     """Pairs of tests under like conditions whose frequencies differ beyond their errors."""
     found = []
@@ -234,6 +246,7 @@ def set_aside(outliers: Sequence[Outlier], otherwise: str = "") -> tuple[str, ..
     told = tuple(
         f"{_measured(each)}, is set aside as a gross error (probability {_probability(each)}): "
         f"{_expected(each)}. A wrong mode, a tone or a slip; look at the recording again."
+        f"{_acts_alone(each)}"
         for each in outliers
     )
     if not told or not otherwise:
@@ -249,6 +262,15 @@ def doubtful(outliers: Sequence[Outlier]) -> tuple[str, ...]:
         f"{_expected(each)}. It is kept, and the answer may lean on it; look at the recording "
         f"again."
         for each in outliers
+    )
+
+
+def _acts_alone(outlier: Outlier) -> str:
+    if not outlier.acts_alone:
+        return ""
+    return (
+        f" Or a part that only this mode's swing reaches, such as a guide with play or a crack "
+        f"that opens ({outlier.acts_alone:.2f}): test again with softer and with harder hits."
     )
 
 

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from shm.gap.alone import rattling, with_what_acts
 from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress, silent
 from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
@@ -29,6 +30,7 @@ from shm.gap.places import LocalCause, flexible_ends, local_causes, tried
 from shm.gap.problem import GapProblem
 from shm.gap.remainder import remainder_of
 from shm.gap.residuals import residuals, trends
+from shm.gap.sensor_errors import sensor_remarks
 from shm.models import check_baseline
 from shm.models.as_made import TENSION_RATIO
 from shm.models.effects import check_effect_priors
@@ -43,6 +45,7 @@ from shm.values import (
     GapPlace,
     Hanger,
     ModalTest,
+    NextMeasurement,
     Outlier,
     TensionEstimate,
 )
@@ -86,16 +89,15 @@ def examined(
     check_hold_out(whole, options.hold_out)
     rng = np.random.default_rng(options.seed)
     clear = cleared(whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done))
-    problem, attribution = clear.problem, clear.attribution
+    problem = clear.problem
+    attribution = with_what_acts(clear.attribution, rattling(found.tests))
     progress("shrinkage", _ATTRIBUTION)
     answer = answered(attribution)
     before, leading = attribution.baseline, attribution.leading
     after = leading.best.fit if leading else None
     aside, doubted = (outliers(clear, e, answer[0][1]) for e in (clear.aside, clear.doubted))
     held = held_out(problem, before, after, options.hold_out, rng)
-    progress("next measurement", (1 + _ATTRIBUTION) / 2)
-    following = ranked(problem, _contenders(attribution))
-    progress("next measurement", 1.0)
+    following = _following(problem, attribution, progress)
     compatible = compatibility(problem, attribution)
     tensions = [_tension(problem, f, rng) for f in ([(1.0, before)], possible(attribution))]
     of_any_ends = tension_of_any_ends_n(found.tests, hanger, options.seed)
@@ -122,23 +124,44 @@ def examined(
         next_measurements=following,
         remarks=(
             *_states(problem, before, after, tensions[1]),
-            *_on_the_way(found, clear, aside, doubted),
+            *_on_the_way(found, clear, aside, doubted, after or before),
         ),
         seed=options.seed,
         seconds=time.perf_counter() - started,
         outliers=aside,
         compatibility=compatible,
         remainder=remainder_of(problem, attribution, compatible),
+        widest_swing_m=_widest_swing_m(found.tests),
     )
     return diagnosis, attribution
 
 
+def _widest_swing_m(tests: Sequence[ModalTest]) -> float:
+    swings = [test.widest_swing_m for test in tests]
+    return max((each for each in swings if each > 0), default=NAN)
+
+
+def _following(
+    problem: GapProblem, attribution: Attribution, progress: Progress
+) -> tuple[NextMeasurement, ...]:
+    progress("next measurement", (1 + _ATTRIBUTION) / 2)
+    found = ranked(problem, _contenders(attribution))
+    progress("next measurement", 1.0)
+    return found
+
+
 def _on_the_way(
-    found: Usable, clear: Cleared, aside: Sequence[Outlier], doubted: Sequence[Outlier]
+    found: Usable,
+    clear: Cleared,
+    aside: Sequence[Outlier],
+    doubted: Sequence[Outlier],
+    best: Fit,
 ) -> tuple[str, ...]:
-    """What was found on the way to data that can be used and hold no gross errors."""
+    """What was found on the way to data that can be used and hold no gross errors, and what the
+    measurement errs by."""
     gross = (*set_aside(aside, clear.otherwise), *doubtful(doubted))
-    return (*found.remarks, *clear.misnumbered, *gross)
+    measured = sensor_remarks(clear.problem, best)
+    return (*found.remarks, *clear.misnumbered, *gross, *measured)
 
 
 def _states(

@@ -80,7 +80,15 @@ def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
         np.concatenate([np.log(frequency), shape]),
         np.concatenate([np.where(sd > 0, sd, np.nan), shape_sd]),
         np.concatenate([np.zeros_like(sd), turned]) if turned.any() else None,
+        np.array([_damping(mode) for _, mode in modes]),
     )
+
+
+def _damping(mode: Mode) -> tuple[float, float]:
+    """The logarithm of a damping ratio and its standard deviation; NaN where either is unknown."""
+    if not (mode.damping_ratio > 0 and mode.damping_sd > 0):
+        return math.nan, math.nan
+    return math.log(mode.damping_ratio), mode.damping_sd / mode.damping_ratio
 
 
 def survey_of(tests: Sequence[ModalTest]) -> Survey:
@@ -109,6 +117,7 @@ def _by_level(test: ModalTest) -> Iterator[ModalTest]:
             frequency_sd_hz=(1 + mode.amplitude_slope)
             * math.hypot(mode.frequency_sd_hz, mode.frequency_hz * mode.amplitude_slope_sd),
             shape=(),
+            damping_ratio=math.nan,
         )
         for mode in test.modes
         if mode.depends_on_amplitude and mode.frequency_sd_hz > 0

@@ -11,6 +11,7 @@ from itertools import product
 
 import numpy as np
 
+from shm.gap.alone import acts_alone, with_what_acts
 from shm.gap.attribution import Attribution, answered, attributed, more_thorough
 from shm.gap.contract import Fit, GapOptions, Progress, silent
 from shm.gap.fit import baseline_fit, with_remainder
@@ -82,7 +83,15 @@ def cleared(
     wrong = misnumbered(found.problem, found.attribution)
     last = found.attribution if wrong else more_thorough(found.attribution)
     otherwise = _led_before(first.attribution, last)
-    return replace(found, attribution=last, otherwise=otherwise, misnumbered=wrong)
+    done = replace(found, attribution=last, otherwise=otherwise, misnumbered=wrong)
+    # No gap stands only as far as what was set aside was a slip and no part that acts alone.
+    slips = np.prod([1 - _alone(done, each, last.baseline) for each in done.aside])
+    return replace(done, attribution=with_what_acts(last, 1 - float(slips)))
+
+
+def _alone(found: Cleared, error: GrossError, fit: Fit) -> float:
+    deviation, _ = found.seen(error, fit).expected
+    return acts_alone(found.whole.design, found.problem.design, error.row, float(deviation[0]))
 
 
 def _led_before(first: Attribution, last: Attribution) -> str:
@@ -123,6 +132,7 @@ def _outlier(found: Cleared, error: GrossError, fit: Fit) -> Outlier:
         expected_hz=expected_hz,
         expected_sd_hz=expected_hz * float(np.sqrt(max(sd**2 - own**2, 0.0))),
         probability=error.probability,
+        acts_alone=_alone(found, error, fit) if error in found.aside else 0.0,
     )
 
 

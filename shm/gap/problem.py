@@ -139,10 +139,9 @@ class GapProblem:
     @cached_property
     def repeated(self) -> Repeated:
         """What the errors that repeat do to the data, from the baseline near the data."""
-        length_m = self.hanger.length_m
-        sensors = sensor_loads(self.observations, self._predicted_near, length_m)
+        sensors, errors = sensor_loads(self.observations, self._predicted_near, self.hanger)
         shapes = np.hstack([sensors, turn_loads(self.observations)])
-        return Repeated(self.section_of(self.design), self.readings_of(self.design), shapes)
+        return Repeated(self.section_of(self.design), self.readings_of(self.design), shapes, errors)
 
     def readings_of(self, design: Design) -> FloatArray:
         """What errors of tensions read do to the frequencies of a design: loads (F, tests)."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -19,9 +20,6 @@ from shm.gap.contract import Design, Observations
 from shm.models.hanger import PhysicalHanger, Zone, solve
 from shm.values import BoolArray, FloatArray, Hanger, IntArray
 
-# Judgement, three to five times what care gives (0.5 % by ISO 16063-21, a tape, a bubble level):
-# with less, careless mounting passes for skewed axes or a mass; with more, these hide behind it.
-GAIN_SD, PLACE_SD_M, TURN_SD_RAD = 0.015, 0.01, float(np.radians(1.5))
 SECTION_REACH_M = 1.0
 """The standard deviation of the distance, in which the covariance of the section is normal."""
 
@@ -35,18 +33,24 @@ Predict = Callable[[Design], FloatArray]
 """The data (data,) that the baseline, near the measured ones, predicts of another design."""
 
 
+SensorError: TypeAlias = tuple[Literal["gain", "place", "turn"], int, int]
+"""What a sensor errs in, the index of its place, and the component (of a gain; else 0)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Repeated:
     """Loads of what repeats.
 
     `section` (F, k) is that of the section along the bar and `readings` (F, tests with a reading)
     that of tensions read, both of frequencies; `sensors` (S, l) is that of shapes, with those of
-    modes that may be turned, which do not repeat (`turn_loads`).
+    modes that may be turned, which do not repeat (`turn_loads`); its first are those of
+    `sensor_errors`.
     """
 
     section: FloatArray
     readings: FloatArray
     sensors: FloatArray
+    sensor_errors: tuple[SensorError, ...] = ()
 
     @classmethod
     def none(cls, design: Design) -> Repeated:
@@ -101,33 +105,38 @@ def _influence(physical: PhysicalHanger, edges_m: FloatArray, orders: int) -> Fl
     return np.asarray(np.moveaxis(log[:-1] - log[-1], 0, 2) / _STRETCH_CHANGE)
 
 
-def sensor_loads(observations: Observations, predict: Predict, length_m: float) -> FloatArray:
-    """Loads (S, k) of every channel's gain, every sensor's place, and every biaxial sensor's turn.
+def sensor_loads(
+    observations: Observations, predict: Predict, hanger: Hanger
+) -> tuple[FloatArray, tuple[SensorError, ...]]:
+    """Loads (S, k) of every channel's gain, every sensor's place, and every biaxial sensor's turn,
+    and which they are.
 
     Measured shapes say what a gain and a turn do to them, the shapes that the baseline predicts
     what a place does. All are taken along the shapes' scaling, which hides a part of them.
     """
-    design = observations.design
+    design, usual = observations.design, hanger.scatter
     place, component = design.shape_place, design.shape_component
     if not len(place):
-        return np.zeros((0, 0))
+        return np.zeros((0, 0)), ()
     value = observations.value[design.frequencies :]
-    channel = _columns(2 * place + component)
-    sensor = _columns(place)
+    channel, sensor = np.unique(2 * place + component), np.unique(place)
+    of_channel = (2 * place + component)[:, None] == channel
+    of_sensor = place[:, None] == sensor
+    slopes = _slopes(observations, predict, hanger.length_m)
+    turned = np.radians(usual.sensor_turn_deg) * _turned(design, value)
     raw = np.column_stack(
         [
-            GAIN_SD * value[:, None] * channel,
-            PLACE_SD_M * _slopes(observations, predict, length_m)[:, None] * sensor,
-            TURN_SD_RAD * _turned(design, value)[:, None] * sensor,
+            usual.sensor_gain * value[:, None] * of_channel,
+            usual.sensor_place_m * slopes[:, None] * of_sensor,
+            turned[:, None] * of_sensor,
         ]
     )
+    names: list[SensorError] = [("gain", each // 2, each % 2) for each in channel.tolist()]
+    names += [("place", each, 0) for each in sensor.tolist()]
+    names += [("turn", each, 0) for each in sensor.tolist()]
     loads = _beside_scaling(observations, raw)
-    return np.asarray(loads[:, np.abs(loads).max(axis=0) > _LEAST_LOAD])
-
-
-def _columns(label: IntArray) -> FloatArray:
-    """(S, labels): 1 where a component has the label."""
-    return np.asarray((label[:, None] == np.unique(label)).astype(float))
+    felt = np.abs(loads).max(axis=0) > _LEAST_LOAD
+    return np.asarray(loads[:, felt]), tuple(n for n, f in zip(names, felt, strict=True) if f)
 
 
 def _turned(design: Design, value: FloatArray) -> FloatArray:

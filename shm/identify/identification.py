@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from shm.errors import NotIdentifiable, UsageError
-from shm.identify.contract import Dropped, Finding, FoundMode, Hit, Measurement, Poles
+from shm.identify.contract import Dropped, Finding, FoundMode, Hit, Measurement, Poles, Tone
 from shm.identify.estimation.amplitude_dependence import with_amplitude_dependence
 from shm.identify.estimation.poles import modal_assurance
 from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
@@ -24,6 +24,7 @@ from shm.identify.mode_ordering.directions import directions
 from shm.identify.mode_ordering.placement import Placement, placed
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
+from shm.identify.setup_merging.calm_part import LEFT_OUT, calmed, level_left_at
 from shm.identify.setup_merging.hit_directions import alike, sharpened, together
 from shm.identify.setup_merging.joined import Joined, joined
 from shm.identify.setup_merging.modal_participation import fitted
@@ -67,6 +68,7 @@ class Identification:
 
 
 _DEFAULTS = IdentifyOptions()
+_FEWEST_CALM = 3  # judgement: two frequencies fit a bar's tension and stiffness by chance
 
 
 def identify(
@@ -94,24 +96,55 @@ def identify(
     if refused := refusal(quality, records[0].source):
         raise refused
     placement = placed(found.finding.modes, found.points, hanger, steady)
+    level_left, noted = 1.0, found.notes
     if not placement.modes:
-        raise _nothing_found(records[0].source, found.finding, placement)
+        calm = _once_calm(measurements, options, hanger, steady)
+        if calm is None:
+            raise _nothing_found(records[0].source, found.finding, placement)
+        placement, level_left, noted = calm
     hits = sorted(
         (hit for measurement in measurements for hit in measurement.hits),
         key=lambda hit: (hit.record, hit.start),
     )
     return Identification(
-        test=_test(test_id, records, placement.modes, _amplitude(hits, options)),
+        test=_test(test_id, records, placement.modes, _amplitude(hits, options), level_left),
         frequency_response=joined_response(measurements),
         hits=tuple(hits),
         dropped=_all_dropped(measurements, found.finding),
         poles=found.finding.poles,
-        notes=(*placement.notes, *found.notes, *_few_hits(measurements), *_no_force(measurements)),
+        notes=(*placement.notes, *noted, *_few_hits(measurements), *_no_force(measurements)),
         window_time_constant_s=measurements[0].window_time_constant_s,
         quality=(*quality, *([placement.check] if placement.check else [])),
         set_aside=placement.set_aside,
-        fit=fitted(measurements, found.apart, options),
+        fit=fitted(measurements, found.apart, options) if level_left == 1 else None,
     )
+
+
+def _once_calm(
+    measurements: Sequence[Measurement],
+    options: IdentifyOptions,
+    hanger: Hanger | None,
+    steady: Sequence[Tone],
+) -> tuple[Placement, float, tuple[str, ...]] | None:
+    """What the ring-downs say once they have died away so far that they are a bar's, with what is
+    left of their level by then, and a note; None where they never are.
+
+    Of the parts that shows most modes counts.
+    """
+    if not all(m.driven for m in measurements):
+        return None
+    found = []
+    for left_out in LEFT_OUT:
+        later = _found(calmed(measurements, left_out), options.identifier, options)
+        found.append((placed(later.finding.modes, later.points, hanger, steady), left_out))
+    placement, left_out = max(found, key=lambda each: (len(each[0].modes), each[1]))
+    if len(placement.modes) < _FEWEST_CALM:
+        return None
+    note = (
+        f"the first {left_out:.0%} of each ring-down are left out: there the hanger does not ring "
+        "as a bar; something knocks (a guide with play), slips or opens while it swings far"
+    )
+    return placement, level_left_at(measurements, left_out), (note,)
 
 
 def _cross_check(measurements: Sequence[Measurement], options: IdentifyOptions) -> Finding | None:
@@ -175,8 +208,10 @@ def _test(
     records: Sequence[Recording | FrequencyResponse],
     modes: tuple[Mode, ...],
     amplitude: float,
+    level_left: float,
 ) -> ModalTest:
-    """The test with the earliest time and the mean temperature of its records."""
+    """The test with the earliest time and the mean temperature of its records; below 1 `level_left`
+    is what its frequencies' level is of that of its hits."""
     temperatures = [r.temperature_c for r in records if not math.isnan(r.temperature_c)]
     return ModalTest(
         id=as_test_id(test_id),
@@ -184,7 +219,8 @@ def _test(
         hanger=next((r.hanger for r in records if r.hanger is not None), None),
         time=min((r.time for r in records if r.time is not None), default=None),
         temperature_c=float(np.mean(temperatures)) if temperatures else NAN,
-        amplitude=amplitude,
+        amplitude=level_left * amplitude,
+        rattles_above=level_left * amplitude if level_left < 1 else NAN,
         added_mass=next((r.added_mass for r in records if r.added_mass is not None), None),
     )
 
@@ -195,7 +231,8 @@ def _nothing_found(source: str, found: Finding, placement: Placement) -> NotIden
     return NotIdentifiable(
         f"no mode can be trusted ({'; '.join(reasons)}).",
         file=source,
-        remedy="Check that the hits ring down undisturbed and that the band holds modes.",
+        remedy="Check that hits ring down undisturbed, that the band holds modes and that nothing "
+        "knocks while the hanger swings far: hit softer.",
     )
 
 

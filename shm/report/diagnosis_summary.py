@@ -76,7 +76,20 @@ def verdict(diagnosis: Diagnosis) -> str:
     claim = claimed(diagnosis)
     if few := told_of_few(diagnosis):
         return few if answer(diagnosis) is Answer.NO_GAP else f"{_verdict(diagnosis, claim)} {few}"
-    return _verdict(diagnosis, claim)
+    return f"{_verdict(diagnosis, claim)}{_beyond_the_swing(diagnosis)}"
+
+
+def _beyond_the_swing(diagnosis: Diagnosis) -> str:
+    """What no hit reached, said where nothing was found."""
+    if answer(diagnosis) is not Answer.NO_GAP:
+        return ""
+    swing = "of these hits"
+    if math.isfinite(diagnosis.widest_swing_m):
+        swing = f"of {formatting.plain(1e3 * diagnosis.widest_swing_m, 2)} mm at the sensors"
+    return (
+        f" What acts only beyond swings {swing}, such as a guide with more play or a crack that "
+        "traffic opens, is not visible; what touches only right after a hit hardly is."
+    )
 
 
 def _verdict(diagnosis: Diagnosis, claim: Claim | None) -> str:
@@ -110,6 +123,9 @@ def _none_explains(diagnosis: Diagnosis) -> str:
 
 def _explained(claim: Claim) -> str:
     sure = "is explained by" if claim.probability >= _SURE else "is most likely due to"
+    if claim.of_the_measurement:
+        likely = "is" if claim.probability >= _SURE else "is most likely"
+        return f"What differs {likely} the measurement's, not the hanger's: {_told(claim)}."
     return f"The gap {sure} {_told(claim)}."
 
 

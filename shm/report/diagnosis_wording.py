@@ -42,6 +42,17 @@ class Claim:
     def leading(self) -> Cause:
         return self.causes[0]
 
+    @property
+    def of_the_measurement(self) -> bool:
+        """Whether all that it names are faults of sensors, clock or what was clamped on to
+        measure."""
+        names = {effect for cause in self.causes for effect in cause.effects}
+        return all(name == "timebase" or _of_no_hanger(name) for name in names)
+
+
+def _of_no_hanger(effect: str) -> bool:
+    return effect in EFFECTS and not EFFECTS[effect].of_the_hanger
+
 
 def claims(diagnosis: Diagnosis) -> tuple[Claim, ...]:
     """The causes, those of a group together, likeliest first."""

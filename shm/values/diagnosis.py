@@ -168,7 +168,8 @@ class Outlier:
     """A frequency that belongs neither to the model nor to any effect: a blunder, most likely.
 
     `expected_hz` is what the other data say with its standard deviation; `probability` is that of
-    the blunder. The diagnosis sets it aside.
+    the blunder. The diagnosis sets it aside. `acts_alone` is how probable it then is that it was no
+    blunder, but something that acts on this mode alone, such as a guide that its swing meets.
     """
 
     plane: Plane
@@ -178,6 +179,7 @@ class Outlier:
     expected_hz: float
     expected_sd_hz: float
     probability: float
+    acts_alone: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -276,8 +278,9 @@ class Diagnosis:
     `fit_p_value` is the posterior predictive p-value of the leading explanation. `invisible` names
     the effects that these data cannot show, and why; `left_out` those that were taken out of the
     catalogue. `remarks` say in words what is wrong with the data and what it does to the answer.
-    `outliers` are frequencies that were set aside. `remainder` is None where nothing unknown is
-    worth a description.
+    `outliers` are frequencies that were set aside. Hits moved the sensors by `widest_swing_m` at
+    most; what acts only beyond, such as a guide with more play, is not visible. `remainder` is
+    None where nothing unknown is worth a description.
     """
 
     hanger: int | None
@@ -304,6 +307,7 @@ class Diagnosis:
     outliers: tuple[Outlier, ...] = ()
     compatibility: Compatibility | None = None
     remainder: Remainder | None = None
+    widest_swing_m: float = NAN
 
     def claim(self, cause: Cause) -> float:
         """The probability of a cause together with those that the data cannot tell it from."""
@@ -313,9 +317,12 @@ class Diagnosis:
 
     @property
     def leads(self) -> Leads:
-        """What it says: a cause, no gap, or something unknown."""
+        """What it says: a cause, no gap, or something unknown; that too where a frequency that was
+        set aside may be no blunder."""
         claim = max((self.claim(cause) for cause in self.causes), default=0.0)
-        return leads(self.no_gap_probability, self.unexplained_probability, claim)
+        found = leads(self.no_gap_probability, self.unexplained_probability, claim)
+        alone = max((each.acts_alone for each in self.outliers), default=0.0)
+        return "unexplained" if found == "no gap" and alone >= NO_GAP_STANDS_FROM else found
 
     @property
     def leading(self) -> Cause | None:

@@ -71,6 +71,9 @@ class Scatter:
     `tension` is how far the tension may be from the nominal one where that was weighed or measured;
     infinite where the nominal one says next to nothing. `bending_factor` is that of a strand's
     stated `bending_stiffness_factor`; NaN: anything from 0.3 to 1 (Papailiou 1997).
+    `sensor_gain` (a fraction), `sensor_place_m` and `sensor_turn_deg` are what sensors err by in
+    all tests: three to five times what care gives (0.5 % by ISO 16063-21, a tape, a bubble level),
+    for with less, careless mounting passes for skewed axes or a mass, and with more these hide.
     `effective_length` is by which the length that swings may differ from the taped one; NaN: by
     the tape's own error, and what `Hanger.fittings_m` leave open.
     """
@@ -83,6 +86,9 @@ class Scatter:
     tension: float = math.inf
     bending_factor: float = NAN
     effective_length: float = NAN
+    sensor_gain: float = 0.015
+    sensor_place_m: float = 0.01
+    sensor_turn_deg: float = 1.5
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Literal
@@ -116,7 +117,8 @@ class ModalTest:
 
     `id` is of 1 to LONGEST_TEST_ID printable characters, else that is a ValueError: no document
     with another can be read back. `tension_read_n` is what a load cell or a lift-off showed during
-    the test, with the reading's standard deviation.
+    the test, with the reading's standard deviation. Above the level `rattles_above` (in the unit of
+    `amplitude`) the hanger does not ring as a bar does; NaN where it does at that of the hits, too.
     """
 
     id: str
@@ -128,6 +130,7 @@ class ModalTest:
     added_mass: AddedMass | None = None
     tension_read_n: float = NAN
     tension_read_sd_n: float = NAN
+    rattles_above: float = NAN
 
     def __post_init__(self) -> None:
         if not is_test_id(self.id):
@@ -137,6 +140,18 @@ class ModalTest:
     def regular_modes(self) -> tuple[Mode, ...]:
         """Those from which a tension is inferred; see `Mode.irregular`."""
         return tuple(mode for mode in self.modes if not mode.irregular)
+
+    @property
+    def widest_swing_m(self) -> float:
+        """What its hits move the sensors by at most: all modes of a plane together; NaN where
+        unknown."""
+        swings = {mode.plane: 0.0 for mode in self.modes}
+        for mode in self.modes:
+            if math.isfinite(mode.acceleration_m_s2):
+                swings[mode.plane] += (
+                    mode.acceleration_m_s2 / (2 * math.pi * mode.frequency_hz) ** 2
+                )
+        return max(swings.values(), default=0.0) or NAN
 
     @property
     def frequencies_amplitude(self) -> float:

@@ -11,10 +11,12 @@ import pytest
 from scipy import stats
 
 from shm.gap import GapOptions, diagnose, outliers
+from shm.gap.alone import acts_alone
 from shm.gap.fit import baseline_fit
 from shm.gap.observations import observed
 from shm.gap.outliers import FREEDOM, GROSS_ERROR, SURE, left_out, log_gross, log_ordinary
 from shm.gap.problem import GapProblem
+from shm.report.diagnosis_wording import Answer, answer
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, Reality, campaign
 from shm.values import Diagnosis, ModalTest
 from tests.helpers.effects import all_but
@@ -160,3 +162,39 @@ def test_tension_stiffness_and_two_to_contradict_them_are_left_and_nine_of_ten(
     rows, rng = np.arange(frequencies), np.random.default_rng(1)
     found = outliers.gross_errors(problem, rows, None, rng)  # type: ignore[arg-type]
     assert [each.row for each in found] == list(range(aside))
+
+
+def test_a_frequency_that_stands_alone_at_the_highest_level_may_be_met_by_a_guide(
+    one_wrong: Diagnosis,
+) -> None:
+    """Of one test nobody knows; where a test as hard shows the mode in its place, it is a slip."""
+    (found,) = one_wrong.outliers
+    assert 0.05 < found.acts_alone < 0.5
+    assert one_wrong.leads == "unexplained"
+    assert one_wrong.unexplained_probability >= found.acts_alone * one_wrong.no_gap_probability
+    assert "softer and with harder hits" in one_wrong.remarks[0]
+    assert answer(one_wrong) in (Answer.UNDECIDED, Answer.UNEXPLAINED)
+
+
+@pytest.mark.parametrize(("other", "possible"), [(0.2, True), (1.0, False), (2.0, False)])
+def test_what_another_test_hit_as_hard_shows_in_its_place_was_a_slip(
+    other: float, possible: bool
+) -> None:
+    (test,) = measured()
+    tests = [test, replace(test, id="t2", amplitude=other)]
+    design = observed(tests, PLAIN).design
+    every = np.arange(design.frequencies)
+    kept = observed([replace(test, modes=test.modes[1:]), tests[1]], PLAIN).design
+    assert (acts_alone(design, kept, int(every[0]), 0.1) > 0) == possible
+    assert acts_alone(design, kept, int(every[0]), 0.5) == 0.0  # farther than any guide moves one
+
+
+def test_a_hanger_that_knocks_while_it_swings_far_is_not_called_sound() -> None:
+    (test,) = measured()
+    few = GapOptions(without=all_but("point_mass"))
+    sound = diagnose([test], PLAIN, few)
+    knocks = diagnose([replace(test, amplitude=0.1, rattles_above=0.1)], PLAIN, few)
+    assert sound.leads == "no gap"
+    assert knocks.leads == "unexplained"
+    assert knocks.no_gap_probability < 0.05
+    assert any("something knocks" in remark for remark in knocks.remarks)

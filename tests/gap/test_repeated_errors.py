@@ -11,10 +11,7 @@ from shm.gap.contract import Hypothesis, Observations
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.gap.repeated_errors import (
-    GAIN_SD,
-    PLACE_SD_M,
     STRETCHES,
-    TURN_SD_RAD,
     Repeated,
     ShapeScaling,
     section_loads,
@@ -31,6 +28,7 @@ PLAN = CampaignPlan(
     modes=5, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, as_made=False, shape_sd=1e-3
 )
 TENSION_N = 711e3
+USUAL = HANGER_3.scatter
 
 
 @pytest.fixture(scope="module")
@@ -50,13 +48,13 @@ def _scaled(problem: GapProblem, raw: FloatArray) -> FloatArray:
 def test_a_channels_gain_changes_what_its_load_says(problem: GapProblem) -> None:
     design, value = problem.design, _shapes(problem.observations)
     channel = (design.shape_place == 1) & (design.shape_component == 0)
-    change = _scaled(problem, value * np.where(channel, 1 + GAIN_SD, 1.0)) - value
+    change = _scaled(problem, value * np.where(channel, 1 + USUAL.sensor_gain, 1.0)) - value
     assert _nearest(problem.repeated.sensors, change) < 0.02
 
 
 def test_a_turned_sensor_changes_what_its_load_says(problem: GapProblem) -> None:
     design, value = problem.design, _shapes(problem.observations)
-    turned = TURN_SD_RAD * (design.shape_place == 2)
+    turned = np.radians(USUAL.sensor_turn_deg) * (design.shape_place == 2)
     other = value.reshape(-1, 2)[:, ::-1].ravel()
     sign = np.where(design.shape_component == 0, 1.0, -1.0)
     change = _scaled(problem, value + sign * turned * other) - value
@@ -66,7 +64,7 @@ def test_a_turned_sensor_changes_what_its_load_says(problem: GapProblem) -> None
 def test_a_sensor_elsewhere_changes_what_its_load_says(problem: GapProblem) -> None:
     """The shapes of the baseline there, against those where it should be."""
     design = problem.design
-    moved = (*design.places_m, design.places_m[2] + PLACE_SD_M)
+    moved = (*design.places_m, design.places_m[2] + USUAL.sensor_place_m)
     place = np.where(design.shape_place == 2, len(design.places_m), design.shape_place)
     theta = np.array([[TENSION_N / HANGER_3.nominal_tension_n, 0, 0, 0, 0]])
     z = problem.coordinates(Hypothesis()).z(theta)

@@ -84,6 +84,13 @@ def test_the_answer_in_a_word(name: str, found: Answer) -> None:
         (ALIKE, "or what these data cannot tell from it: effective length (both ends) and "
                 "bending stiffness; together probability 0.900."),
         (NO_GAP, "No gap: the baseline beam1 explains the measurements, probability 0.920."),
+        (NO_GAP, "What acts only beyond swings of these hits, such as a guide with more play"),
+        (replace(NO_GAP, widest_swing_m=8.3e-5),
+         "What acts only beyond swings of 0.083 mm at the sensors"),
+        (replace(LED, causes=(make_cause("sensor_misalignment", 0.93),)),
+         "What differs is the measurement's, not the hanger's: "),
+        (replace(LED, causes=(make_cause("timebase", 0.6), make_cause("point_mass", 0.33))),
+         "What differs is most likely the measurement's, not the hanger's: "),
         (replace(NO_GAP, no_gap_probability=0.7), "Most likely no gap: the baseline beam1"),
         (UNEXPLAINED, "Most likely none of the effects that were tried (rotational end "
                       "flexibility left out) explains it: the probability of something else is "

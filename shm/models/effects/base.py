@@ -120,9 +120,10 @@ class Effect:
     springs `log10_k1` to `log10_k4`. `source` is the literature it follows;
     `seen_by` are the measurements that show it, `imitated_by` the effects that it is easily taken
     for. The first parameter is the effect's size. `follows` are the conditions of a test that it
-    depends on; `of_the_hanger` is False where it is one of the measurement, that other sensors
-    would not have. `other_laws` says in words by which other laws, about as likely as its own, the
-    same parameters may act. `over_time` is None of an effect that the watch does not look for.
+    depends on; where it `dissipates`, damping rises with the level. `of_the_hanger` is False where
+    it is one of the measurement, that other sensors would not have. `other_laws` says in words by
+    which other laws, about as likely as its own, the same parameters may act. `over_time` is None
+    of an effect that the watch does not look for.
     `localised_as` is what one is called that a diagnosis looks for at each place along the hanger.
     """
 
@@ -133,6 +134,7 @@ class Effect:
     seen_by: ClassVar[tuple[str, ...]]
     imitated_by: ClassVar[tuple[str, ...]]
     follows: ClassVar[tuple[Literal["temperature", "amplitude"], ...]] = ()
+    dissipates: ClassVar[bool] = False
     of_the_hanger: ClassVar[bool] = True
     other_laws: ClassVar[tuple[str, ...]] = ()
     over_time: ClassVar[OverTime | None] = None

@@ -22,7 +22,7 @@ _LEAST_RATIO = 1.2
 _DYING = 1.5
 _SLIP = 0.5
 
-# Judgement: bolted joints lose a few per cent to tens of them. No diagnosis uses the damping.
+# Judgement: bolted joints lose a few per cent to tens of them. A diagnosis uses only that it rises.
 _LOSS_AT_REFERENCE_LEVEL = 0.1
 
 
@@ -138,7 +138,7 @@ class JointSoftening(Effect):
 
     The rotational stiffness of the joint is k over the level of the hit, in both planes alike; its
     loss factor is 0.1 times the level. Frequencies fall with the level. Damping rises too,
-    which the diagnosis does not use.
+    by how much nobody knows.
     """
 
     name = "joint_softening"
@@ -152,6 +152,7 @@ class JointSoftening(Effect):
     imitated_by = ("rotational_end_flexibility", "skewed_principal_axes")
     other_laws = ("the compliance grows with the square root of the level",)
     follows = ("amplitude",)
+    dissipates = True
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         if not hanger.supports.ends("clamped"):

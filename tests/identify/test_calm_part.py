@@ -1,0 +1,62 @@
+"""A hanger that knocks while it swings far is identified once it is calm, and says so."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from shm.documents import dump
+from shm.identify.contract import Measurement
+from shm.identify.identification import Identification
+from shm.identify.setup_merging.calm_part import calmed, level_left_at
+from shm.modes_document import modes_document, parse_modes
+from shm.values import ResponsePoint
+from tests.helpers.struck import identified
+from tests.worlds import struck_bar as world
+
+CREW = world.Crew(hits=3, ring_s=8.0, sensors_m=(1.5, 2.9))
+
+
+@pytest.fixture(scope="module")
+def knocking() -> Identification:
+    return identified(world.Guide(3.4, 6e5, 1.8e-5), 1.0, [2], "t1", CREW)
+
+
+def test_a_guide_with_play_leaves_the_frequencies_of_small_swings(
+    knocking: Identification,
+) -> None:
+    exact_hz = world.modes_of(world.Bar()).omega / (2 * np.pi)
+    found = knocking.test.modes
+    assert len(found) >= 9
+    for mode in found:
+        assert mode.frequency_hz == pytest.approx(exact_hz[mode.order - 1], rel=5e-4)
+
+
+def test_its_test_says_above_which_level_it_knocks_and_why_a_part_was_left_out(
+    knocking: Identification,
+) -> None:
+    test = knocking.test
+    assert 0 < test.rattles_above < 0.5
+    assert test.amplitude == test.rattles_above
+    assert any("does not ring as a bar" in note for note in knocking.notes)
+    assert (
+        parse_modes(json.loads(dump(modes_document([test]))))[0].rattles_above == test.rattles_above
+    )
+
+
+def test_later_parts_keep_what_rings_and_know_what_is_left() -> None:
+    time_s = np.arange(1000) / 100
+    decay = np.exp(-0.3 * time_s) * np.sin(20 * time_s)[None]
+    one = Measurement("a", (ResponsePoint("a"),), (decay, decay), 100.0, None, driven=(decay,))
+    (later,) = calmed([one], 0.5)
+    assert np.array_equal(later.decays[0], decay[:, 500:])
+    assert later.driven == ()
+    assert level_left_at([one], 0.5) == pytest.approx(np.exp(-0.3 * 5), rel=0.1)
+
+
+def test_a_sound_test_says_nothing_of_it() -> None:
+    found = identified(None, 1.0, [3], "t1", world.Crew(hits=3, ring_s=3.0, sensors_m=(1.5,)))
+    assert np.isnan(found.test.rattles_above)
+    assert "rattles_above" not in modes_document([found.test])["tests"][0]
