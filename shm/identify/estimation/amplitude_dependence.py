@@ -24,6 +24,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import ndtri, stdtrit
 
 from shm.identify.contract import Finding, FoundMode, Measurement
+from shm.identify.estimation.repeats import LEAST_HITS
 from shm.values import NAN, ComplexArray, FloatArray
 from shm.values.modes import MOST_SLOPE, SURE_SDS
 
@@ -43,21 +44,34 @@ It is in the slope's standard deviation alone."""
 _UNSEEN = 2.0
 """Times what others shift: one that is not seen in the phases may shift more. 89 % without."""
 _LAW_ERROR = 0.3
-"""Of the change that is left at the end of the ring-downs: what no law here foretells (judgement)."""
+"""Of the change that is left where ring-downs end: what no law here foretells (judgement)."""
 _SHIFT_ERROR = 0.02
 """Of a shift: the phase of a stretch is that of its middle, the amplitude is smoothed."""
-_HALVES = (0.1, 0.3, 1.0)  # of A_hit: h; from a tenth on it is friction, below nothing of it is seen
+_HALVES = (
+    0.1,
+    0.3,
+    1.0,
+)  # of A_hit: h; from a tenth on it is friction, below nothing of it is seen
 _LEAK = 0.01
 """Of a neighbour's motion, at least: comes into a mode's by the error of its shape."""
 _BESIDE_HZ = 2.0  # what stretches of half a second do not part by frequency: one over their length
 _SOME = 0.2
 """Share of the modes that must be sure, for others to be corrected, too. 85 % if they never are."""
+_ALONE = 1e-3
+"""A shift beyond that of one mode while the others stay: no joint does it. It only widens."""
 _OVERLAP = 2.0
 """Stretches overlap by half: so much less is known than they seem to say. 81 % without."""
 _STRETCH_SECONDS = 0.5  # judgement: some periods of most modes; phases turn by little in it
 _MOST_STRETCHES = 40  # technical: time
 _INDEPENDENT = 8.0
 """Values among the phases, at most: what no law here explains is alike in all ring-downs."""
+_UNLIKE = 0.25
+"""Of the rate by which a mode's amplitude falls otherwise than its pole says: so much its frequency
+may be off. A chirp that was found as a mode of thrice its damping is off by that."""
+_MOST_ASTRAY = 0.1
+"""Radians by which phases leave a law, the surer ones counting more: then it is something else that
+turns them. A law that is wrong by a tenth of 0.5 % leaves 0.03 in a second of 20 Hz."""
+_GROWS = 1.3  # judgement: more than beats of a weak neighbour make
 _FINE = 16  # technical: steps of the integral a stretch
 _LEAST_RATIO = 2.0
 """Of an amplitude to its standard deviation: its phase is known to half a radian. With 4 the
@@ -135,6 +149,8 @@ def _with_slope(mode: FoundMode, fit: _Fit | None, expected: float, usual: float
     slope = (fit.slope, fit.slope_sd) if fit is not None else (NAN, NAN)
     known = replace(mode, amplitude_slope=slope[0], amplitude_slope_sd=slope[1])
     prior_hz = usual * mode.frequency_hz
+    if fit is not None and not usual and abs(fit.shift_hz) > _ALONE * mode.frequency_hz:
+        return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, fit.shift_hz))
     if fit is None or abs(fit.slope) > MOST_SLOPE:
         return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, _UNSEEN * prior_hz))
     # Beside what the other modes shift, a shift that is not sure by itself counts by its share.
@@ -216,7 +232,7 @@ def _fits(
 ) -> _Fit | None:
     """What the laws say together; None where too little of the phase is known."""
     decay = 2 * math.pi * mode.frequency_hz * mode.damping_ratio
-    seen = [_phases(course, index) for course in courses]
+    seen = [_phases(course, index, decay) for course in courses]
     rows = [row for row in seen if row is not None]
     if not rows:
         return None
@@ -224,7 +240,12 @@ def _fits(
     starts = np.array([size[0] for *_, size in rows])
     struck = float(np.median(starts * np.exp(decay * leads)))
     laws = [_fit(mode, [_through(row, decay, law, struck) for row in rows]) for law in _LAWS]
-    return _averaged([law for law in laws if law is not None])
+    fit = _averaged([law for law in laws if law is not None])
+    if fit is None:
+        return None
+    off = [math.log(size[-1] / size[0]) / (time_s[-1] - time_s[0]) for time_s, _, _, size in rows]
+    unlike_hz = _UNLIKE * abs(float(np.median(off))) / (2 * math.pi)
+    return replace(fit, shift_sd_hz=math.hypot(fit.shift_sd_hz, unlike_hz))
 
 
 def _averaged(laws: Sequence[_Fit]) -> _Fit | None:
@@ -250,10 +271,13 @@ _Row = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 """Times, phases, their standard deviations; amplitudes referred to the beginning."""
 
 
-def _phases(course: _Course, index: int) -> _Row | None:
+def _phases(course: _Course, index: int, decay: float) -> _Row | None:
     """Of the stretches from the beginning on in which the mode stands out of the rest."""
     motion, sd = course.motion[:, index], course.sd[:, index]
-    clear = np.abs(motion) > _LEAST_RATIO * sd
+    now = np.abs(motion) * np.exp(-decay * course.middle_s)
+    # What grows again is no free decay: something else was heard at its frequency.
+    falls = now < _GROWS * np.minimum.accumulate(now)
+    clear = falls & (np.abs(motion) > _LEAST_RATIO * sd)
     last = int(np.argmin(clear)) if not np.all(clear) else len(clear)
     if last < 4:
         return None
@@ -263,6 +287,9 @@ def _phases(course: _Course, index: int) -> _Row | None:
     smooth = np.polynomial.Polynomial.fit(course.middle_s[:last], np.log(size), 2, w=1 / sd)
     return course.middle_s[:last], phase, sd, np.exp(smooth(course.middle_s[:last]))
 
+
+_Grown = tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]
+"""Times, phases, standard deviations, the law's integral up to each time; the law at the end."""
 
 _Law = Callable[[FloatArray], FloatArray]
 
@@ -278,10 +305,7 @@ _LAWS: tuple[_Law, ...] = (
 )
 
 
-def _through(
-    row: _Row, decay: float, law: _Law, struck: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]:
-    """Times, phases, standard deviations, the law's integral up to each time; the law at the end."""
+def _through(row: _Row, decay: float, law: _Law, struck: float) -> _Grown:
     time_s, phase, sd, size = row
     fine_s = np.linspace(time_s[0], time_s[-1], _FINE * (len(time_s) - 1) + 1)
     amplitude = np.exp(np.interp(fine_s, time_s, np.log(size)) - decay * fine_s) / struck
@@ -289,9 +313,7 @@ def _through(
     return time_s, phase, sd, grown[::_FINE], float(law(amplitude[-1:])[0])
 
 
-def _fit(
-    mode: FoundMode, rows: Sequence[tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]]
-) -> _Fit | None:
+def _fit(mode: FoundMode, rows: Sequence[_Grown]) -> _Fit | None:
     """Weighted least squares: a phase for each ring-down, the shift and the slope for all."""
     count = len(rows)
     blocks = []
@@ -315,9 +337,12 @@ def _fit(
         return None
     inverse = np.linalg.inv(square) / np.outer(scale, scale)
     solved = inverse @ (weighted.T @ (values * weight))
-    misfit = float(np.sum(((matrix @ solved - values) * weight) ** 2))
-    widening = float(stdtrit(freedom, 0.95) / ndtri(0.95))
-    spread = np.sqrt(np.diag(inverse) * max(1.0, misfit / freedom)) * widening * _OVERLAP
+    left_over = (values - matrix @ solved) * weight
+    misfit = float(left_over @ left_over)
+    if misfit > (_MOST_ASTRAY * np.linalg.norm(weight)) ** 2:
+        return None
+    spread = np.sqrt(np.diag(inverse) * max(1.0, misfit / freedom)) * _widening(freedom) * _OVERLAP
+    spread = np.fmax(spread, _by_ring_downs(weighted, left_over, inverse, rows))
     shift_hz, slope = solved[count:].tolist()
     return _Fit(
         shift_hz,
@@ -328,3 +353,27 @@ def _fit(
         misfit,
         freedom,
     )
+
+
+def _by_ring_downs(
+    weighted: FloatArray, left_over: FloatArray, inverse: FloatArray, rows: Sequence[_Grown]
+) -> FloatArray:
+    """Standard deviations from what each ring-down leaves unexplained; NaN for fewer than three.
+
+    The sandwich of Liang and Zeger (Biometrika 73, 1986) with ring-downs as clusters.
+    """
+    count = len(rows)
+    if count < LEAST_HITS:
+        return np.full(len(inverse), np.nan)
+    ends = np.cumsum([len(row[0]) for row in rows])[:-1]
+    scores = np.array([
+        part.T @ rest
+        for part, rest in zip(np.split(weighted, ends), np.split(left_over, ends), strict=True)
+    ])  # fmt: skip
+    squares = np.sum((scores @ inverse) ** 2, axis=0)
+    return np.asarray(np.sqrt(squares * count / (count - 1)) * _widening(count - 1))
+
+
+def _widening(freedom: int) -> float:
+    """Student's 95 % quantile over the normal one."""
+    return float(stdtrit(freedom, 0.95) / ndtri(0.95))
