@@ -43,7 +43,7 @@ It is in the slope's standard deviation alone."""
 # were found, whose errors are then twice as large.
 _UNSEEN = 2.0
 """Times what others shift: one that is not seen in the phases may shift more. 89 % without."""
-_LAW_ERROR = 0.3
+_LAW_ERROR = 0.2
 """Of the change that is left where ring-downs end: what no law here foretells (judgement)."""
 _SHIFT_ERROR = 0.02
 """Of a shift: the phase of a stretch is that of its middle, the amplitude is smoothed."""
@@ -59,13 +59,13 @@ _SOME = 0.2
 """Share of the modes that must be sure, for others to be corrected, too. 85 % if they never are."""
 _ALONE = 1e-3
 """A shift beyond that of one mode while the others stay: no joint does it. It only widens."""
-_OVERLAP = 2.0
+_OVERLAP = 1.4
 """Stretches overlap by half: so much less is known than they seem to say. 81 % without."""
 _STRETCH_SECONDS = 0.5  # judgement: some periods of most modes; phases turn by little in it
 _MOST_STRETCHES = 40  # technical: time
 _INDEPENDENT = 8.0
 """Values among the phases, at most: what no law here explains is alike in all ring-downs."""
-_UNLIKE = 0.25
+_UNLIKE = 0.17
 """Of the rate by which a mode's amplitude falls otherwise than its pole says: so much its frequency
 may be off. A chirp that was found as a mode of thrice its damping is off by that."""
 _MOST_ASTRAY = 0.1
