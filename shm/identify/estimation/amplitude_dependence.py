@@ -19,7 +19,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import ndtri, stdtrit
 
@@ -309,8 +308,10 @@ def _through(row: _Row, decay: float, law: _Law, struck: float) -> _Grown:
     time_s, phase, sd, size = row
     fine_s = np.linspace(time_s[0], time_s[-1], _FINE * (len(time_s) - 1) + 1)
     amplitude = np.exp(np.interp(fine_s, time_s, np.log(size)) - decay * fine_s) / struck
-    grown = scipy.integrate.cumulative_trapezoid(law(amplitude), fine_s, initial=0.0)
-    return time_s, phase, sd, grown[::_FINE], float(law(amplitude[-1:])[0])
+    height = law(amplitude)
+    areas = np.diff(fine_s) * (height[1:] + height[:-1]) / 2
+    grown = np.concatenate(([0.0], np.cumsum(areas)))
+    return time_s, phase, sd, grown[::_FINE], float(height[-1])
 
 
 def _fit(mode: FoundMode, rows: Sequence[_Grown]) -> _Fit | None:
