@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rich_click as click
 
@@ -15,15 +15,11 @@ from shm.errors import BadInput, UsageError
 from shm.identify import IDENTIFIERS, IdentifyOptions, identify
 from shm.identify.plausibility import signal_doubts
 from shm.modes_document import modes_document
-from shm.pipeline.intake import as_taken_in
 from shm.read.sandbox import read_test
-from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.contents import ModalTestReport
-from shm.report.figures.every_figure import modal_test_figures
 from shm.report.modal_test_report import modal_test_paper
 from shm.settings import Settings
-from shm.store import Workspace
 from shm.values import FrequencyResponse, Hanger, Recording
 from shm_cli.common import (
     counting_bar,
@@ -40,6 +36,9 @@ from shm_cli.common import (
     told_doubts,
 )
 from shm_cli.parameter_types import NewFile
+
+if TYPE_CHECKING:
+    from shm.store import Workspace
 
 _DEFAULT = Settings()
 
@@ -230,6 +229,8 @@ def _read(path: Path, workspace: Workspace | None) -> tuple[Recording | Frequenc
     """As the workspace would take it in, by the profile of its logger."""
     if workspace is None:
         return read_test(path)
+    from shm.pipeline.intake import as_taken_in
+
     with as_taken_in(path, workspace) as found:
         return read_test(found)
 
@@ -259,11 +260,17 @@ def _write(
 ) -> None:
     if out is not None:
         out.write_text(dump(_document(sheets)) + "\n", encoding="utf-8")
+    # What draws is loaded where something is drawn: it takes a third of a second.
     if html is not None:
+        from shm.report.as_html import as_html
+
         html.write_text(as_html(modal_test_paper(sheets[0])), encoding="utf-8")
-    for sheet in sheets if figures is not None else ():
+    if figures is None:
+        return
+    from shm.report.figures.every_figure import modal_test_figures
+
+    for sheet in sheets:
         for illustration in modal_test_figures(sheet):
-            assert figures is not None
             figures.mkdir(parents=True, exist_ok=True)
             name = f"{sheet.identification.test.id}-{illustration.name}.png"
             (figures / name).write_bytes(illustration.png())

@@ -18,6 +18,7 @@ from shm.identify.estimation.amplitude_dependence import with_amplitude_dependen
 from shm.identify.estimation.poles import modal_assurance
 from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
+from shm.identify.measuring.recorded_window import recorded_window_rate
 from shm.identify.measuring.sensor_places import refuse_off_the_hanger
 from shm.identify.measuring.setups import measured, without_unused_force
 from shm.identify.mode_ordering.directions import directions
@@ -200,7 +201,17 @@ def _allowed_for(found: Joined, shape_allowance: float) -> Joined:
 
 def _finished(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
     found = coherent_only(without_window(found, measurement), measurement, options)
-    return with_amplitude_dependence(found, measurement)
+    return _unsure_of_damping(with_amplitude_dependence(found, measurement), measurement)
+
+
+def _unsure_of_damping(found: Finding, measurement: Measurement) -> Finding:
+    """The finding with what an analyser's window may add to its damping as an uncertainty."""
+    rate = recorded_window_rate(measurement)
+    modes = tuple(
+        replace(m, damping_sd=math.hypot(m.damping_sd, rate / (2 * math.pi * m.frequency_hz)))
+        for m in found.modes
+    )
+    return replace(found, modes=modes) if rate else found
 
 
 def _test(

@@ -6,6 +6,8 @@ The phase of a mode whose frequency is f (1 + c A / A_hit), A falling as exp(-s 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,8 @@ FREQUENCIES_HZ, DAMPING_RATIO = (9.0, 21.0, 34.0), 0.003
 SHAPES = ((1.0, 0.7), (0.8, -0.6), (0.5, 1.0))
 
 
-def _recording(slope: float) -> Recording:
+def _recording(slope: float, half: float = math.inf) -> Recording:
+    """The change goes with A, or where `half` is finite with (1 + half) A / (A + half)."""
     rng = np.random.default_rng(5)
     slot, before = int(SLOT_S * RATE_HZ), int(0.4 * RATE_HZ)
     motion = 1e-3 * rng.standard_normal((2, before + HITS * slot))
@@ -29,7 +32,11 @@ def _recording(slope: float) -> Recording:
         t = np.arange(slot) / RATE_HZ
         for frequency_hz, shape in zip(FREQUENCIES_HZ, SHAPES, strict=True):
             decay = 2 * np.pi * frequency_hz * DAMPING_RATIO
-            late = t + slope * strength * -np.expm1(-decay * t) / decay
+            grown = strength * -np.expm1(-decay * t) / decay
+            if math.isfinite(half):
+                fallen = (strength + half) / (strength * np.exp(-decay * t) + half)
+                grown = (1 + half) / decay * np.log(fallen)
+            late = t + slope * grown
             ring = strength * np.exp(-decay * t) * np.sin(2 * np.pi * frequency_hz * late)
             motion[:, begin : begin + slot] += np.outer(shape, ring)
     channels = [Channel("force", "force", force, None, 1.0)] + [
@@ -39,8 +46,8 @@ def _recording(slope: float) -> Recording:
     return Recording("made.csv", tuple(channels), RATE_HZ)
 
 
-def _identified(slope: float) -> Identification:
-    return identify([_recording(slope)], IdentifyOptions(2.0, 50.0), test_id="t")
+def _identified(slope: float, half: float = math.inf) -> Identification:
+    return identify([_recording(slope, half)], IdentifyOptions(2.0, 50.0), test_id="t")
 
 
 @pytest.mark.parametrize("slope", [-1e-3, -2e-4, 5e-4])
@@ -55,6 +62,16 @@ def test_the_slope_is_told_and_the_frequency_is_that_of_small_amplitude(slope: f
     (check,) = [check for check in found.quality if check.name == "amplitude"]
     assert check.verdict == "warning"
     assert ("lower" if slope < 0 else "higher") in check.found
+
+
+@pytest.mark.parametrize("half", [0.2, 0.7])
+def test_where_a_ring_down_ends_before_its_law_shows_the_interval_is_wide(half: float) -> None:
+    """The mode of 9 Hz ends at a third of its amplitude, where more than half of 0.2 % is left."""
+    found = _identified(-2e-3, half)
+    assert len(found.test.modes) == len(FREQUENCIES_HZ)
+    for mode, frequency_hz in zip(found.test.modes, FREQUENCIES_HZ, strict=True):
+        assert abs(mode.frequency_hz - frequency_hz) < 2 * mode.frequency_sd_hz
+        assert mode.frequency_sd_hz < 1e-3 * frequency_hz
 
 
 def test_a_linear_hanger_has_no_slope_and_no_warning() -> None:

@@ -10,6 +10,7 @@ import pytest
 from shm.identify import IdentifyOptions, identify
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.values import Hanger, Plane, Recording
+from tests.identify.signals import as_recording, force_signal, hanger_modes, response
 
 AREA = np.pi * 0.13**2 / 4
 HANGER = Hanger(3, 12.0, 200e9, AREA, np.pi * 0.13**4 / 64, 7800 * AREA, 711e3)
@@ -42,3 +43,28 @@ def test_an_allowance_for_shapes_is_added_to_their_deviations() -> None:
     for one, other in zip(plain.test.modes, allowed.test.modes, strict=True):
         for a, b in zip(one.shape, other.shape, strict=True):
             assert b.sd == pytest.approx(np.hypot(a.sd, 0.02), rel=1e-6)
+
+
+@pytest.mark.parametrize("directions", ["tltltl", "tlttl"])
+def test_hits_of_both_planes_in_one_file_are_compared_by_plane(directions: str) -> None:
+    slot, rate_hz = 8 * 512, 512.0
+    rng = np.random.default_rng(1)
+    force, motion = np.zeros(len(directions) * slot), np.zeros((2, len(directions) * slot))
+    for row, plane in enumerate("tl"):
+        starts = [150 + n * slot for n, each in enumerate(directions) if each == plane]
+        pushes = force_signal(starts, len(force), rate_hz, rng.uniform(1500, 2500, len(starts)))
+        modes = [
+            replace(mode, drive=mode.drive * (1.0 if number // 4 == row else 0.05))
+            for number, mode in enumerate(hanger_modes(3.0))
+        ]
+        force += pushes
+        motion += response(modes, pushes, rate_hz)
+    motion += 1e-2 * rng.standard_normal(motion.shape)
+    force += 0.2 * rng.standard_normal(force.shape)
+    found = identify(
+        [as_recording(force, motion, rate_hz)], IdentifyOptions(2.0, 50.0), test_id="t"
+    )
+    assert len(found.test.modes) == 8
+    assert all(hit.used for hit in found.hits)
+    verdicts = {check.name: check.verdict for check in found.quality}
+    assert verdicts["coherence"] == verdicts["repeatability"] == "good"

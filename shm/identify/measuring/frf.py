@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.fft import next_fast_len, rfft
 
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES, HitRecord
@@ -199,7 +199,8 @@ def band_limited(
     reach, factor = filter_reach(sampling_rate_hz, band_high_hz)
     if factor < 2:
         return signals, sampling_rate_hz
-    taps = scipy.signal.firwin(2 * reach + 1, 1 / factor, window=("kaiser", _KAISER_BETA))
-    filtered = np.asarray(scipy.signal.upfirdn(taps, signals, down=factor, axis=-1))
-    last = (signals.shape[-1] - 1) // factor
-    return filtered[..., 2 * _HALF_LENGTH : last + 1], sampling_rate_hz / factor
+    if signals.shape[-1] <= 2 * reach:
+        return signals[..., :0], sampling_rate_hz / factor
+    taps = np.sinc(np.arange(-reach, reach + 1) / factor) * np.kaiser(2 * reach + 1, _KAISER_BETA)
+    parts = sliding_window_view(signals, 2 * reach + 1, axis=-1)[..., ::factor, :]
+    return np.asarray(parts @ (taps / taps.sum())), sampling_rate_hz / factor

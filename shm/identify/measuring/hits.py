@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
 from shm.values import FloatArray
 
@@ -83,11 +82,15 @@ def find_pulses(force: FloatArray, sampling_rate_hz: float) -> list[Pulse]:
         return []
     push, noise = _push(force, sampling_rate_hz)
     level = max(HIT_SIGMAS * noise, LEAST_SHARE_OF_HARDEST * float(push.max(initial=0.0)))
-    # A pulse may begin with the record: a zero on either side makes its edge a peak.
-    peaks = scipy.signal.find_peaks(np.concatenate(([0.0], push, [0.0])), height=level)[0]
+    # A pulse may begin with the record: a zero on either side makes its edge a peak, and of a flat
+    # top the first sample. `scipy.signal` takes longer to load than all hits to be found.
+    steps = np.diff(np.concatenate(([0.0], push, [0.0])))
+    moves = np.flatnonzero(steps)
+    peaks = moves[:-1][(steps[moves[:-1]] > 0) & (steps[moves[1:]] < 0)]
+    peaks = peaks[push[peaks] >= level]
     if not len(peaks):
         return []
-    groups = _grouped((peaks - 1).tolist(), int(GROUP_SECONDS * sampling_rate_hz))
+    groups = _grouped(peaks.tolist(), int(GROUP_SECONDS * sampling_rate_hz))
     starts = [_start(push, group[0], noise) for group in groups]
     margin = int(PULSE_SECONDS * sampling_rate_hz) + RINGING_SAMPLES
     stops = [*(start - margin for start in starts[1:]), len(push)]

@@ -35,9 +35,10 @@ from shm.identify.measuring.signal_faults import (
     clipped_ends,
     faults_of_channels,
 )
+from shm.identify.measuring.struck_planes import struck_planes
 from shm.identify.measuring.unforced_hits import find_unforced
 from shm.identify.options import IdentifyOptions
-from shm.values import BoolArray, Channel, ComplexArray, FloatArray, Recording
+from shm.values import BoolArray, Channel, ComplexArray, FloatArray, Plane, Recording
 
 _LEAST_SHARE_OF_LONGEST = 0.25  # judgement: a quarter as sharp, it blurs the others
 LEAST_HITS = 3  # that say how well they repeat
@@ -75,7 +76,8 @@ def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screenin
     ring_downs = _with_rows(ring_downs, rows)
     reasons = _reasons(ring_downs, [[each[row] for row in rows] for each in faults], rate, options)
     if records[0].force is not None:
-        reasons = _with_outliers(ring_downs, reasons, rate, options)
+        planes = [channels[row].plane for row in rows]
+        reasons = _with_outliers(ring_downs, reasons, rate, options, planes)
     reasons = _with_double_hits(reasons, faults, rows)
     used = [ring_down for ring_down, reason in zip(ring_downs, reasons, strict=True) if not reason]
     if not used or not rows:
@@ -206,11 +208,12 @@ def _with_outliers(
     reasons: Sequence[str],
     sampling_rate_hz: float,
     options: IdentifyOptions,
+    planes: Sequence[Plane | None],
 ) -> list[str]:
     """The reasons, with one for each hit that is sound by itself and disagrees with the others."""
     sound = [index for index, reason in enumerate(reasons) if not reason]
     band_hz = options.band_low_hz, options.band_high_hz
-    apart = disagreement([ring_downs[index] for index in sound], sampling_rate_hz, band_hz)
+    apart = disagreement([ring_downs[index] for index in sound], sampling_rate_hz, band_hz, planes)
     odd = {index for index, is_odd in zip(sound, outliers(apart), strict=True) if is_odd}
     return [OUTLIER if index in odd else reason for index, reason in enumerate(reasons)]
 
@@ -242,7 +245,10 @@ def _listed(dropped: Sequence[Dropped]) -> str:
 
 
 def disagreement(
-    hits: Sequence[HitRecord], sampling_rate_hz: float, band_hz: tuple[float, float]
+    hits: Sequence[HitRecord],
+    sampling_rate_hz: float,
+    band_hz: tuple[float, float],
+    planes: Sequence[Plane | None],
 ) -> FloatArray:
     """How far each hit's accelerance is from that of the others, (hits,): 0 alike, 1 unlike.
 
@@ -250,7 +256,8 @@ def disagreement(
     assurance criterion, Allemang 1982, of two responses), which a hammer's level and calibration
     do not move; for each hit the lower median over the others. NaN where there are none, for a hit
     whose pulse the record's beginning may cut off, that struck twice or was clipped, and for one so
-    soon after another that nobody can say what of its ring-down is its own.
+    soon after another that nobody can say what of its ring-down is its own. Where both of the
+    channels' `planes` were struck in turn, the others are those of its plane.
     """
     apart = np.full(len(hits), np.nan)
     step = _step(hits, sampling_rate_hz, band_hz)
@@ -265,8 +272,10 @@ def disagreement(
     flat = responses.reshape(len(known), -1)
     level = np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
     alike = np.abs((flat / level) @ (flat / level).conj().T) ** 2
-    ordered = np.sort(1 - alike + 2 * np.eye(len(known)), axis=1)
-    apart[known] = np.maximum(ordered[:, (len(known) - 2) // 2], 0.0)
+    power = np.sum(np.abs(responses) ** 2, axis=2)
+    for group in list(struck_planes(power, planes).values()) or [list(range(len(known)))]:
+        ordered = np.sort((1 - alike + 2 * np.eye(len(known)))[np.ix_(group, group)], axis=1)
+        apart[np.array(known)[group]] = np.maximum(ordered[:, (len(group) - 2) // 2], 0.0)
     return apart
 
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import solve
 from scipy.ndimage import median_filter
@@ -334,7 +333,7 @@ def _rule(parts: Sequence[FloatArray]) -> FloatArray:
 def _worst(part: FloatArray, rule: FloatArray) -> float:
     if len(part) < 2 * _ORDER:
         return float("nan")
-    error = np.abs(scipy.signal.oaconvolve(part, rule, mode="valid"))
+    error = np.abs(np.convolve(part, rule, mode="valid"))
     peaks = error[: len(error) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).max(axis=1)
     width = min(_AROUND, len(peaks))
     around = median_filter(peaks, width)

@@ -19,6 +19,7 @@ CHECKS: tuple[Check, ...] = (
     of_hits.hits_used,
     of_hits.double_hits,
     of_signals.clipping,
+    of_signals.recorded_window,
     of_signals.cable,
     of_signals.drop_outs,
     of_hits.pre_trigger,

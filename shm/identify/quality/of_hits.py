@@ -178,7 +178,12 @@ def _apart(measurement: Measurement, inspection: Inspection) -> float:
     ]
     options = inspection.options
     rate = inspection.records[measurement.hits[0].record].sampling_rate_hz
-    apart = disagreement(records, rate, (options.band_low_hz, options.band_high_hz))
+    planes = [
+        c.plane
+        for c in inspection.records[measurement.hits[0].record].accelerations
+        if c.name in names
+    ]
+    apart = disagreement(records, rate, (options.band_low_hz, options.band_high_hz), planes)
     known = apart[np.isfinite(apart)]
     return float(np.median(known)) if len(known) else NAN
 

@@ -8,6 +8,8 @@ import numpy as np
 
 from shm.identify.contract import Measurement
 from shm.identify.estimation.amplitude_dependence import is_sure
+from shm.identify.measuring.frf import response_of
+from shm.identify.measuring.struck_planes import struck_planes
 from shm.identify.quality.inspection import Inspection
 from shm.values import NAN, BoolArray, FloatArray, QualityCheck, Verdict
 from shm.values.modes import SLOPE_OF_NOTE
@@ -71,16 +73,32 @@ def _coherence(measurement: Measurement, inspection: Inspection) -> FloatArray |
     if response is None or response.coherence is None:
         return None
     options, finding = inspection.options, inspection.finding
-    frequency = response.frequency_hz
+    frequency, coherence = response.frequency_hz, _coherence_by_plane(measurement)
     in_band = (frequency >= options.band_low_hz) & (frequency <= options.band_high_hz)
     if not np.any(in_band):
         return None
     if finding is not None and finding.modes:
         near = _near(frequency, np.array([mode.frequency_hz for mode in finding.modes]))
-        return np.asarray(response.coherence[:, near & in_band].ravel())
+        return np.asarray(coherence[:, near & in_band].ravel())
     size = np.where(in_band, np.nan_to_num(np.abs(response.accelerance)), 0.0)
     least = np.quantile(size[:, in_band], 1 - _STRONGEST, axis=1, keepdims=True)
-    return np.asarray(response.coherence[(size >= least) & in_band])
+    return np.asarray(coherence[(size >= least) & in_band])
+
+
+def _coherence_by_plane(measurement: Measurement) -> FloatArray:
+    """Of each point with the hits of its plane, where both planes were struck in turn."""
+    response = measurement.frequency_response
+    assert response is not None
+    assert response.coherence is not None
+    if measurement.spectra is None:
+        return response.coherence
+    planes = [point.plane for point in measurement.points]
+    force, motion = np.split(np.sum(np.abs(measurement.spectra) ** 2, axis=2), [1], axis=1)
+    coherence = response.coherence.copy()
+    for plane, hits in struck_planes(motion / force, planes).items():
+        own = [each == plane for each in planes]
+        coherence[own] = response_of(measurement.spectra[hits], "h1")[1][own]
+    return coherence
 
 
 def _near(frequency_hz: FloatArray, modes_hz: FloatArray) -> BoolArray:

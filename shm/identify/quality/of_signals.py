@@ -8,6 +8,7 @@ import numpy as np
 
 from shm.identify.contract import Hit, Measurement
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES
+from shm.identify.measuring.recorded_window import recorded_window_rate
 from shm.identify.measuring.screening import LEAST_SAMPLES
 from shm.identify.measuring.signal_faults import (
     CABLE,
@@ -110,6 +111,19 @@ def _clipped_hits(
     if channel.quantity == "force" and not np.isfinite(channel.full_scale):
         found |= same_peaks(parts) | same_peaks([-part for part in parts])
     return [bool(bad) for bad in found]
+
+
+def recorded_window(inspection: Inspection) -> QualityCheck | None:
+    """An exponential window that the analyser laid on the records; None where none is seen."""
+    rate = max((recorded_window_rate(m) for m in inspection.measurements), default=0.0)
+    if not rate:
+        return None
+    return QualityCheck(
+        "window", "warning", rate, 0.0, "1/s",
+        f"the hammer's noise falls by {rate:.2g}/s after each hit, as an exponential window of "
+        f"{1 / rate:.2g} s makes it: damping ratios are too high by up to {rate:.2g}/(2 pi f)",
+        "Switch off the analyser's exponential window, or export the time records without it.",
+    )  # fmt: skip
 
 
 def cable(inspection: Inspection) -> QualityCheck | None:
