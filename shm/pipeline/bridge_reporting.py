@@ -13,7 +13,7 @@ from shm.errors import DamagedRow, NothingThere
 from shm.pipeline.lineage import settings_words, software
 from shm.pipeline.open_warnings import warnings_of
 from shm.report.contents import BridgeReport, Course, HangerLine
-from shm.report.hanger_status import Known, findings, hanger_message
+from shm.report.hanger_status import Known, findings, hanger_message, still_detected
 from shm.report.intervals import Interval
 from shm.report.period import Period
 from shm.report.states import called_words
@@ -28,7 +28,7 @@ from shm.store import (
 )
 from shm.store.checksums import of_readable
 from shm.store.stored_silences import silenced_until
-from shm.values import TENSION, Change, Drift, Hanger
+from shm.values import TENSION, Change, Drift, Hanger, WatchedTest
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern, shifts_of
 
 
@@ -141,10 +141,9 @@ class _Kept:
             said = str(self.damaged[hanger.id])
             message = hanger_message(Known(hanger, damage=said))
             return HangerLine(hanger, message, called=said, open_alerts=opened)
-        baseline, watch = self.baselines.get(hanger.id), self.watches.get(hanger.id)
-        drifts = watch.watched.drifts if watch else ()
+        baseline, watched = self.baselines.get(hanger.id), self._watched(hanger)
         called = self.called.get(hanger.id, ())
-        message = hanger_message(self._known(hanger, point, drifts))
+        message = hanger_message(self._known(hanger, point))
         if point is None:
             return HangerLine(hanger, message, open_alerts=opened)
         return HangerLine(
@@ -154,7 +153,7 @@ class _Kept:
             Interval.of_averaged(point.averaged),
             "; ".join(called_words(change) for change in called),
             opened,
-            next((each for each in drifts if each.quantity == TENSION), None),
+            next((d for d in (watched.drifts if watched else ()) if d.quantity == TENSION), None),
             point.test,
             point.model,
             baseline_tension_n=Interval.of_averaged(baseline.averaged) if baseline else None,
@@ -162,7 +161,12 @@ class _Kept:
             warnings=self.warnings.get(hanger.id, ()),
         )
 
-    def _known(self, hanger: Hanger, point: TrendPoint | None, drifts: Sequence[Drift]) -> Known:
+    def _watched(self, hanger: Hanger) -> WatchedTest | None:
+        found = self.watches.get(hanger.id)
+        return found.watched if found else None
+
+    def _known(self, hanger: Hanger, point: TrendPoint | None) -> Known:
+        watched = self._watched(hanger)
         standing = [each for each in self.standing if each.alert.hanger == hanger.id]
         baseline = self.baselines.get(hanger.id)
         return Known(
@@ -171,8 +175,8 @@ class _Kept:
             point.time if point else None,
             point.test if point else "",
             point is not None and (baseline is None or point.test in baseline.tests),
-            drifts,
-            self.called.get(hanger.id, ()),
+            watched.drifts if watched else (),
+            still_detected(self.called.get(hanger.id, ()), watched, hanger),
             findings(each.alert for each in standing),
             self.warnings.get(hanger.id, ()),
             notes_of(standing, self.silences, hanger.id, self.now),

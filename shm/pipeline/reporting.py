@@ -24,7 +24,7 @@ from shm.pipeline.steps import identify_options
 from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import read_test
 from shm.report.contents import HangerReport, ModalTestReport, trend_row_of
-from shm.report.hanger_status import findings
+from shm.report.hanger_status import findings, still_detected
 from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
 from shm.report.structure_report import StructureReport
@@ -130,7 +130,11 @@ def hanger_now(
         gap_watch=str(watch) if watch else "",
         drift_watch=watch_words(watched),
         creep=watched[-1].creep_per_year if watched else None,
-        called=tuple(each.change for each in watched if each.change.called),
+        called=still_detected(
+            (each.change for each in watched if each.change.called),
+            watched[-1] if watched else None,
+            hanger,
+        ),
         lineage={**test_lineage(store, latest), **_baseline_words(baseline)},
         settings=settings_words(workspace.settings),
         redescribed=redescribed(hanger, in_force),

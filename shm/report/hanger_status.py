@@ -14,7 +14,7 @@ from enum import Enum
 
 from shm.report import formatting
 from shm.report.intervals import Interval
-from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger
+from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedTest
 from shm.values.force_units import force_unit
 from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
 from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
@@ -175,10 +175,21 @@ def hanger_message(known: Known) -> HangerMessage:
         return HangerMessage(status, _of_change(known), known.notes)
     if status is Status.CHECK:
         doubts = [Lead.of(each) for each in known.warnings]
-        doubts += [Lead.of(each.message) for each in known.standing]
+        doubts += [Lead.of(each.message) for each in reversed(known.standing)]
         return HangerMessage(status, _first(doubts), known.notes)
     status, lead = _quiet(known, status)
     return HangerMessage(status, lead, known.notes)
+
+
+def still_detected(
+    detected: Iterable[Change], latest: WatchedTest | None, hanger: Hanger
+) -> tuple[Change, ...]:
+    """The changes that were detected, unless the latest test shows that they are gone.
+
+    As the watch does: below half the level at which its owner is alerted.
+    """
+    over = latest and latest.change.probability < hanger.thresholds.end_probability
+    return () if over else tuple(detected)
 
 
 def findings(alerts: Iterable[Alert]) -> tuple[Alert, ...]:
@@ -230,7 +241,7 @@ def _of_change(known: Known) -> Lead:
     if any(_CHANGES & set(each.kinds) for each in known.standing):
         others = list(known.standing)  # what its row said of the change is lost
     if others:
-        return _first([Lead.of(each.message) for each in others])
+        return _first([Lead.of(each.message) for each in reversed(others)])
     likeliest = max(drifts, key=lambda each: each.probability)
     words = f"{quantity_words(likeliest.quantity)} {size_words(likeliest)}"
     return Lead(

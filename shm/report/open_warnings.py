@@ -54,10 +54,7 @@ def open_warnings(
     if neighbours:
         found.append(neighbours)
     if latest is not None and latest.change.is_baseline_alone:
-        found.append(
-            f"Hanger {hanger.id}: {against_baseline_words(latest.change)} Find out {WEEK} what was "
-            "different on its day, and set another (`shm drift rebaseline`)."
-        )
+        found.append(against_baseline_words(latest.change, hanger))
     notable = [each for each in latest.mistaken if each.is_notable] if latest else []
     if notable:
         found.append(warning_words(notable, hanger))

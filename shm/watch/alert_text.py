@@ -13,7 +13,7 @@ from datetime import datetime
 
 from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.force_units import force_unit
-from shm.values.messages import Lead
+from shm.values.messages import WEEK, Lead
 from shm.values.rounding import NINETY_PERCENT, listed, rounded, rounded_percent
 from shm.watch.alert_action import action_words, as_sentence, gravest
 from shm.watch.change_words import (
@@ -166,11 +166,12 @@ def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
     )
 
 
-def against_baseline_words(change: Change) -> str:
-    """That the baseline is the odd one."""
+def against_baseline_words(change: Change, hanger: Hanger) -> str:
+    """That the baseline is the odd one, and what to do: of an alert and of a warning."""
     return (
-        f"the {change.against_baseline} tests since the baseline agree with each other and not "
-        "with it."
+        f"Hanger {hanger.id}: the {change.against_baseline} tests since the baseline agree with "
+        f"each other and not with it. Find out {WEEK} what was different on its day, and set "
+        "another (`shm drift rebaseline`)."
     )
 
 

@@ -169,8 +169,6 @@ def _message(hanger: Hanger, lead: Drift, tests: int) -> str:
 def message_of_baseline(test: WatchedTest, hanger: Hanger) -> str:
     """Of a baseline that agrees with none of the tests since."""
     return (
-        f"Hanger {hanger.id}: {against_baseline_words(test.change)} Find out what was different on "
-        "the day of the baseline within a week: either it was disturbed, by a load on the deck for "
-        "one, or the hanger changed right after it; no test tells which. Then set another "
-        "(`shm drift rebaseline`)."
+        f"{against_baseline_words(test.change, hanger)} Either the baseline was disturbed, by a "
+        "load on the deck for one, or the hanger changed right after it; no test shows which."
     )

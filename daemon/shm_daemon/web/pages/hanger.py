@@ -9,6 +9,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
+from shm.pipeline import utc_now
+from shm.pipeline.bridge_reporting import hanger_lines
 from shm.report import formatting, hanger_tables
 from shm.report.contents import HangerReport, message
 from shm.report.diagnosis_report import answers, evidence
@@ -78,7 +80,8 @@ def hanger(request: Request, site: AtSite, _: Reader, hanger_id: Number) -> HTML
         "held": held_documents(site, one.id),
     }
     if view.report is None:
-        return page(request, "hanger_untested.html.j2", **common)
+        (line,) = hanger_lines(site.workspace, site.store, utc_now(), [one])
+        return page(request, "hanger_untested.html.j2", message=line.message, **common)
     return page(request, "hanger.html.j2", **common, **_content(view, view.report))
 
 
