@@ -136,7 +136,7 @@ def bridge_message(messages: Mapping[int, HangerMessage]) -> BridgeMessage:
 
     def rank(id_: int) -> tuple[int, int]:
         status = needing[id_].status
-        return -URGENCIES.index(needing[id_].urgency), order.index(status) if status else -1
+        return -URGENCIES.index(needing[id_].urgency), order.index(status) if status else len(order)
 
     if needing:
         first, *others = sorted(needing, key=rank)

@@ -46,7 +46,7 @@ def details(data: HangerReport) -> str:
         else "",
         data.creep.words if data.creep else "",
         in_period(data),
-        f"Over the bridge: {data.neighbours.sentence}" if data.neighbours else "",
+        data.neighbours.sentence if data.neighbours else "",
         _model(data),
         _gap(data),
         *_further_advice(data),
@@ -126,9 +126,7 @@ def _against_nominal(data: HangerReport) -> str:
     share = data.tension_n.scaled(1 / nominal)
     half, off = share.width / 2, share.mean - 1
     if abs(off) <= half:
-        return (
-            f"That is the nominal tension within its interval ({rounded_percent(off, half, '+')})."
-        )
+        return f"That agrees with the nominal tension ({rounded_percent(off, half, '+')})."
     return f"That is {rounded_percent(abs(off), half)} {'above' if off > 0 else 'below'} nominal."
 
 

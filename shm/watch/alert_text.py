@@ -14,7 +14,7 @@ from datetime import datetime
 from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.force_units import force_unit
 from shm.values.messages import WEEK, Lead
-from shm.values.rounding import NINETY_PERCENT, listed, rounded, rounded_percent
+from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
 from shm.watch.alert_action import action_words, as_sentence, gravest
 from shm.watch.change_words import (
     CAUSES,
@@ -61,7 +61,8 @@ def message_of(
     lead = lead_of(hanger, change, everything, test.drifts, is_further=is_further)
     is_new = bool(beyond and standing) and gravest(everything) not in beyond
     if hanger.is_modelled:
-        details = _of_hanger(test, change, beyond, is_call=is_call, has_half="±" in lead.state)
+        sizes = _sizes(change, everything) or _HALF_WIDTH * ("±" in lead.state)
+        details = _of_hanger(test, change, beyond, sizes, is_call=is_call)
     else:
         details = _of_frequencies(test, change, is_call=is_call)
     said = (lead.words, _new(beyond) if is_new else "", _when(change), *details)
@@ -95,9 +96,9 @@ def _of_hanger(
     test: WatchedTest,
     change: Change | None,
     beyond: Sequence[Drift],
+    sizes: str,
     *,
     is_call: bool,
-    has_half: bool,
 ) -> list[str]:
     tension = next((each for each in test.drifts if each.quantity == TENSION), None)
     spoken = {each.quantity for each in (*beyond, *(suspects(change) if change else ()))}
@@ -106,7 +107,7 @@ def _of_hanger(
         "This test itself is probably an outlier." if is_odd else "",
         _tension_now(tension) if tension and TENSION in spoken else "",
         _details(
-            _sizes(change, beyond) or _HALF_WIDTH * has_half,
+            sizes,
             _probabilities(test, change, beyond),
             _false_alarms(change) if is_call else "",
         ),
@@ -302,11 +303,10 @@ def _between(after: datetime, by: datetime) -> str:
 
 
 def _tension_now(drift: Drift) -> str:
-    """The tension in the unit that fits it: a figure that the owner knows."""
+    """The tension to three digits, of which its absolute interval hardly leaves more."""
     unit = force_unit(drift.value, drift.baseline)
-    half_n = NINETY_PERCENT * drift.shift_sd * drift.baseline
-    both = (rounded(unit.of(n), unit.of(half_n)) for n in (drift.value, drift.baseline))
-    now, then = (f"{each.partition(' ±')[0]} {unit.name}" for each in both)
+    places = max(0, 2 - math.floor(math.log10(unit.of(drift.baseline))))
+    now, then = (f"{unit.of(n):.{places}f} {unit.name}" for n in (drift.value, drift.baseline))
     return f"Tension is now {now}, {then} at the baseline."
 
 

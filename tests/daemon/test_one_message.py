@@ -35,6 +35,7 @@ from shm.values.messages import Lead, Urgency
 from shm.watch.alert_text import message_of
 from shm.watch.watching import new_alert
 from shm_cli.main import cli
+from tests.helpers.damaging import damage
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import NOW, a_change, a_file, a_posterior, a_test
 from tests.helpers.web_servers import Served, served
@@ -51,6 +52,7 @@ _QUIET = a_change(
 class Hangers:
     """Fills a store with one hanger a state."""
 
+    workspace: Workspace
     store: Store
     now: datetime
 
@@ -62,7 +64,7 @@ class Hangers:
         test = a_test(name, days, hanger=hanger)
         self.store.tests.save(recording.id, [IdentifiedTest(test)], _LINEAGE, NOW)
         stored = next(t for t in self.store.tests.list_all(hanger) if t.test.id == name)
-        posterior = replace(a_posterior(tests=(name,)), hanger=hanger)
+        posterior = replace(a_posterior(tests=(name,)), hanger=hanger, effective_sample_size=400.0)
         posterior = replace(posterior, samples=posterior.samples * np.array([tension, 1, 1]))
         if count:
             self.store.posteriors.save(stored, posterior, _LINEAGE, NOW)
@@ -235,8 +237,12 @@ def _raise(
 
 
 def _damaged(of: Hangers, hanger: int) -> None:
-    of.test(hanger, 0)
-    of.store.upkeep.note_damage(DamagedRow("posteriors", 7, hanger, "Reprocess it."), NOW)
+    """Its posterior is not as it was written, and the daemon has noted that."""
+    test = of.test(hanger, 0)
+    posterior = of.store.posteriors.latest_trends([replace(HANGER_3, id=hanger)])[hanger]
+    damage(of.workspace, "posteriors", "samples", posterior.posterior_id)
+    error = DamagedRow("posteriors", posterior.posterior_id, test.hanger, "Reprocess it.")
+    of.store.upkeep.note_damage(error, NOW)
 
 
 Make = Callable[[Hangers, int], None]
@@ -276,7 +282,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     numbers = tuple(NUMBER_OF.values())
     workspace = make_workspace(folder, hangers=numbers, hooks={"mail": ["true"]})
     with workspace.store() as store:
-        hangers = Hangers(store, utc_now())
+        hangers = Hangers(workspace, store, utc_now())
         for name, (make, *_) in STATES.items():
             make(hangers, NUMBER_OF[name])
     return workspace

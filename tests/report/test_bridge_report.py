@@ -96,7 +96,7 @@ def test_a_hanger_whose_change_is_called_tells_of_those_beside_it(
     table = neighbours(called)
     assert [row[0] for row in table.rows] == ["1", "2", "3", "4", "5"]
     assert "shm report --bridge" in table.note
-    assert "Over the bridge: Load has moved from hanger 3" in summary(called)
+    assert "Load has moved from hanger 3" in summary(called)
     assert neighbours(season).rows == ()
 
 

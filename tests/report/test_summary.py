@@ -192,7 +192,7 @@ def test_the_paragraph_reads_so_from_beginning_to_end(
     assert summary(bare) == (
         "Hanger 3: tension 711 ± 14 kN by its first test. Choose a warmer or colder day at "
         "the next planned test, so that the baseline covers temperature. Its tension is 711 ± "
-        "14 kN by test only. That is the nominal tension within its interval (+0.0 ± 2.0 %). "
+        "14 kN by test only. That agrees with the nominal tension (+0.0 ± 2.0 %). "
         "There is no earlier test to compare with: this one is the baseline. The model class "
         "is beam1. It predicts one measured frequency to 0.34 % (root mean square). Each lies "
         "within its 90 % interval: the model explains what was measured. Record the "

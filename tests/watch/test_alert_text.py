@@ -232,9 +232,9 @@ def test_a_sudden_loss_says_the_state_then_what_to_do_then_why() -> None:
     ("baseline_n", "said"),
     [
         (5.4, "Tension is now 4.97 N, 5.40 N at the baseline."),
-        (20e3, "Tension is now 18.40 kN, 20.00 kN at the baseline."),
-        (12e6, "Tension is now 11.04 MN, 12.00 MN at the baseline."),
-        (10.5e6, "Tension is now 9.66 MN, 10.50 MN at the baseline."),
+        (20e3, "Tension is now 18.4 kN, 20.0 kN at the baseline."),
+        (12e6, "Tension is now 11.0 MN, 12.0 MN at the baseline."),
+        (10.5e6, "Tension is now 9.7 MN, 10.5 MN at the baseline."),
     ],
 )
 def test_the_tension_is_told_in_the_unit_that_fits_it(baseline_n: float, said: str) -> None:

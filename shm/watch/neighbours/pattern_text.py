@@ -41,7 +41,8 @@ def leading_suspect(pattern: BridgePattern, name: ExplanationName) -> Suspect | 
 def _undecided(pattern: BridgePattern) -> str:
     best = pattern.explanations[0]
     suspect = leading_suspect(pattern, best.name)
-    of = f" of {_hangers(suspect.hangers).lower()}" if suspect else ""
+    way = "from" if best.name == REDISTRIBUTION else "of"
+    of = f" {way} {_hangers(suspect.hangers).lower()}" if suspect else ""
     largest = max(pattern.rows, key=lambda row: abs(row.shift_fraction))
     return (
         "It is not clear yet whether load moved between hangers. Most probable is "
