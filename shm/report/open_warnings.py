@@ -40,16 +40,15 @@ def open_warnings(
     found = [slack] if slack else []
     if check is not None and check.misfit:
         found.append(
-            f"Hanger {hanger.id}: its baseline does not fit: {check.misfit}. Check the "
-            "description and the numbers of the modes, and repeat the test within a week."
+            f"Hanger {hanger.id}: its baseline does not fit. Check the description and the numbers "
+            f"of the modes, and repeat the test {WEEK}. Why: {check.misfit}."
         )
     if check is not None and check.tests:
         many = len(check.tests) > 1
         names = listed([each.test for each in check.tests])
         found.append(
-            f"Hanger {hanger.id}: its baseline is made without test{'s' * many} {names}: "
-            f"{check.tests[0].why}. Find out {WEEK} which hanger was hit, and check the logger's "
-            "clock."
+            f"Hanger {hanger.id}: its baseline is made without test{'s' * many} {names}. Find out "
+            f"{WEEK} which hanger was hit, and check the logger's clock. Why: {check.tests[0].why}."
         )
     if neighbours:
         found.append(neighbours)

@@ -19,7 +19,7 @@ from tests.helpers.flows import ingest
 from tests.helpers.web_servers import served
 from tests.helpers.workspaces import START, make_workspace, modelled_test, put
 
-SAID = "Hanger 3: its baseline does not fit: "
+SAID = "Hanger 3: its baseline does not fit. "
 
 
 @pytest.fixture(scope="module")

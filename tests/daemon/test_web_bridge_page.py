@@ -79,7 +79,7 @@ def test_each_hanger_is_a_link_with_its_state_in_words(client: httpx.Client) -> 
     links = drawn(client.get("/").text).findall("a")
     assert [link.get("href") for link in links] == ["/hangers/3", "/hangers/4"]
     lost, never = (link.get("aria-label", "") for link in links)
-    assert re.match(r"Hanger 3, -(19|20|21)\.?\d* % .* since the baseline", lost)
+    assert re.match(r"Hanger 3, -(19|20|21)\.?\d* ± .* % since the baseline", lost)
     assert "open alert" in lost
     assert "no test yet" in never
 
@@ -99,8 +99,8 @@ def test_the_table_says_the_same(client: httpx.Client) -> None:
     text = [" ".join(re.sub(r"<[^>]+>", " ", row).split()) for row in rows]
     assert len(text) == 2
     assert text[0].startswith("Hanger 3 Alert ")
-    assert re.search(r"-(19|20|21)\.\d+ \(-\d+\.\d+ to -\d+\.\d+\)", text[0])
-    assert text[1].startswith("Hanger 4 no test yet")
+    assert re.search(r"-(19|20|21)\.\d+ ± \d+\.\d+", text[0])
+    assert text[1].startswith("Hanger 4 Hanger 4: no test yet.")
     assert "/alerts?hanger=3" in rows[0]
 
 

@@ -116,7 +116,7 @@ def test_a_test_by_a_wrong_clock_is_left_out_and_the_hanger_is_not_quiet(
     with workspace.store() as store:
         report = hanger_report(workspace, store, 3, Clock().now)
         (line,) = hanger_lines(workspace, store, utc_now())
-    assert summary(report).startswith("The baseline of hanger 3 is made without test t1: ")
+    assert summary(report).startswith("Hanger 3: its baseline is made without test t1.")
     assert "test t1: all its frequencies" in report.lineage["left_out_of_the_baseline"]
     assert line.warnings == report.warnings
     assert status(report) is line.status is Status.CHECK
