@@ -78,8 +78,9 @@ def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
         if row["gap"] is not None:
             click.echo(f"hanger {row['hanger']}: {row['gap']['said']}")
         for said in row["warnings"]:
-            if not said.startswith(row["state"]):
-                click.echo(paragraph(f"hanger {row['hanger']}: check: {said}"))
+            rest = said.removeprefix(f"{row['state']} {row['action']}").strip()
+            if rest:
+                click.echo(paragraph(f"hanger {row['hanger']}: check: {rest}"))
         if row["left_out"]:
             said = "; ".join(row["left_out"])
             click.echo(paragraph(f"hanger {row['hanger']}: left out of its baseline: {said}"))

@@ -87,6 +87,11 @@ class HangerMessage:
     def words(self) -> str:
         return " ".join((self.lead.words, *self.notes))
 
+    def beyond_lead(self, warnings: Sequence[str]) -> tuple[str, ...]:
+        """What `warnings` say that the lead has not said."""
+        rest = (each.removeprefix(self.lead.words).strip() for each in warnings)
+        return tuple(each for each in rest if each)
+
     @property
     def document(self) -> dict[str, object]:
         """As every JSON document gives it."""

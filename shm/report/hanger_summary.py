@@ -30,9 +30,9 @@ def summary(data: HangerReport) -> str:
 
 def details(data: HangerReport) -> str:
     """Why, and how sure: what the report says after state and action."""
-    lead = message(data).lead
+    said = message(data)
     sentences = (
-        *(each for each in data.warnings if not each.startswith(lead.words)),
+        *said.beyond_lead(data.warnings),
         outdated_baseline.redescribed(data),
         outdated_baseline.discarded(data),
         *data.averaged.caveats,
@@ -62,7 +62,7 @@ def advice(data: HangerReport) -> tuple[str, ...]:
 
 def _further_advice(data: HangerReport) -> tuple[str, ...]:
     made = (_quality, _sampling, _width, _diagnose, _thermometer)
-    return tuple(said for make in made if (said := make(data)))
+    return tuple(each for make in made if (each := make(data)))
 
 
 def tension_change(data: HangerReport) -> Interval | None:

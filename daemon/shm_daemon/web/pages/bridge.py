@@ -64,8 +64,7 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
         warnings=[
             said
             for each in bridge.hangers
-            for said in each.line.warnings
-            if not said.startswith(each.line.message.lead.words)
+            for said in each.line.message.beyond_lead(each.line.warnings)
         ],
         rows=[_row(each, unit, now) for each in bridge.hangers],
     )
