@@ -33,6 +33,7 @@ from shm.values import (
     Selection,
     Summary,
 )
+from shm.values.messages import Lead
 
 
 def dump(document: object) -> str:
@@ -307,9 +308,16 @@ def creep_document(creep: CreepRate | None) -> dict[str, Any] | None:
 
 
 def alert_document(alert: Alert) -> dict[str, Any]:
-    """What a hook gets on its standard input."""
+    """What a hook gets on its standard input; what its message leads with stands by itself, too."""
     tension = alert.tension and averaged_document(alert.tension)
-    document = {"schema": "shm.alert/1", **asdict(alert), "tension": tension}
+    lead = Lead.of(alert.message)
+    document = {
+        "schema": "shm.alert/1",
+        **asdict(alert),
+        "tension": tension,
+        **asdict(lead),
+        "urgency": lead.urgency,
+    }
     if alert.alerts:
         return {**document, "alerts": [alert_document(each) for each in alert.alerts]}
     del document["alerts"]

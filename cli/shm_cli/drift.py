@@ -60,8 +60,9 @@ _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
 def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
     """Which hangers gained and which lost, and whether it is the bridge at all.
 
-    Compares the latest tension shift of each hanger with its neighbours': one hanger that sheds
-    load, one that gains it, all alike (a temperature or a clock), or each by itself. Hangers stand
+    Compares the latest tension shift of each hanger with its neighbours': one hanger whose
+    load moved to others, one that gained load, all alike (a temperature or a clock), or each
+    without the others. Hangers stand
     along the bridge as in bridge.toml; tests more than 30 days older than the newest are left out.
     `shm report --bridge --out bridge.html` shows the same with the elevation of the bridge.
 

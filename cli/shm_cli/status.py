@@ -19,8 +19,9 @@ from shm.documents import creep_document
 from shm.errors import DamagedRow
 from shm.models import applicable
 from shm.pipeline import utc_now
-from shm.pipeline.open_warnings import warnings_of
+from shm.pipeline.bridge_reporting import hanger_lines
 from shm.report.formatting import model_class
+from shm.report.hanger_status import Status
 from shm.store import (
     ENDED,
     Decision,
@@ -65,6 +66,10 @@ def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
         show(document)
         return
     _show(document)
+    for row in document["hangers"]:
+        if row["urgency"] != "none" and row["tests"]:
+            said = " ".join((row["state"], row["action"], *row["notes"]))
+            click.echo(paragraph(said))
     for said, hangers in _competitions(document["hangers"]).items():
         click.echo(f"hanger{'s' if ',' in hangers else ''} {hangers}: {said}")
     for row in document["hangers"]:
@@ -73,7 +78,9 @@ def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
         if row["gap"] is not None:
             click.echo(f"hanger {row['hanger']}: {row['gap']['said']}")
         for said in row["warnings"]:
-            click.echo(paragraph(f"hanger {row['hanger']}: check baseline: {said}"))
+            rest = said.removeprefix(f"{row['state']} {row['action']}").strip()
+            if rest:
+                click.echo(paragraph(f"hanger {row['hanger']}: check: {rest}"))
         if row["left_out"]:
             said = "; ".join(row["left_out"])
             click.echo(paragraph(f"hanger {row['hanger']}: left out of its baseline: {said}"))
@@ -111,6 +118,7 @@ def _show(document: dict[str, Any]) -> None:
     made = table(
         "hangers",
         "hanger",
+        "state",
         "tests",
         "held",
         "latest",
@@ -122,6 +130,7 @@ def _show(document: dict[str, Any]) -> None:
         latest, since = row["latest_test"], row["baseline_since"]
         made.add_row(
             str(row["hanger"]),
+            Status[row["status"].upper()].value if row["status"] else "no test yet",
             str(row["tests"]),
             str(row["held"] or ""),
             f"{latest:%Y-%m-%d %H:%M}" if latest else "none",
@@ -274,7 +283,7 @@ def _hangers(
     models, latest, rows = store.posteriors.selected_models(), store.tests.latest(), []
     damage = {each.hanger: str(each) for each in store.upkeep.known_damage()}
     watches = of_readable(store.watch.latest, {})
-    warnings = warnings_of(workspace, store, workspace.bridge.hangers)
+    lines = {each.hanger.id: each for each in hanger_lines(workspace, store, utc_now())}
     for hanger in workspace.bridge.hangers:
         found, baseline, watch, adopted = latest.get(hanger.id), None, None, []
         of_baseline: Sequence[StoredTest] = ()
@@ -290,6 +299,7 @@ def _hangers(
         rows.append(
             {
                 "hanger": hanger.id,
+                **lines[hanger.id].message.document,
                 "tests": found.tests if found else 0,
                 "latest_test": found.time if found else None,
                 "model": models.get(hanger.id),
@@ -302,7 +312,7 @@ def _hangers(
                 ),
                 "open_alerts": open_alerts[hanger.id],
                 "held": held[hanger.id],
-                "warnings": list(warnings.get(hanger.id, ())),
+                "warnings": list(lines[hanger.id].warnings),
                 "left_out": list(check.left_out) if check else [],
                 "gap": _gap(watch),
                 "damage": damage.get(hanger.id),

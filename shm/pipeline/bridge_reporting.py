@@ -6,20 +6,29 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import datetime, timedelta
 
 import shm
 from shm.errors import DamagedRow, NothingThere
 from shm.pipeline.lineage import settings_words, software
 from shm.pipeline.open_warnings import warnings_of
 from shm.report.contents import BridgeReport, Course, HangerLine
-from shm.report.hanger_status import findings, status_of
+from shm.report.hanger_status import Known, findings, hanger_message, still_detected
 from shm.report.intervals import Interval
 from shm.report.period import Period
 from shm.report.states import called_words
-from shm.store import BaselineGlance, Store, StoredAlert, StoredWatch, TrendPoint, Workspace
+from shm.store import (
+    BaselineGlance,
+    Silence,
+    Store,
+    StoredAlert,
+    StoredWatch,
+    TrendPoint,
+    Workspace,
+)
 from shm.store.checksums import of_readable
-from shm.values import TENSION, Change, Drift, Hanger
+from shm.store.stored_silences import silenced_until
+from shm.values import TENSION, Change, Drift, Hanger, WatchedTest
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern, shifts_of
 
 
@@ -31,7 +40,7 @@ def bridge_report(
     Raises NothingThere before any test is through, and where none lies in the period.
     """
     hangers = workspace.bridge.hangers
-    lines = hanger_lines(workspace, store)
+    lines = hanger_lines(workspace, store, generated_at)
     if all(line.tension_n is None for line in lines):
         raise NothingThere(
             "no test of any hanger has been through updating yet.",
@@ -60,36 +69,68 @@ def bridge_report(
     )
 
 
-def hanger_lines(workspace: Workspace, store: Store) -> tuple[HangerLine, ...]:
-    """Each hanger in a line, in their order along the bridge, without samples."""
-    hangers = workspace.bridge.hangers
-    kept = _Kept.of(workspace, store, hangers)
+def hanger_lines(
+    workspace: Workspace, store: Store, now: datetime, hangers: Sequence[Hanger] = ()
+) -> tuple[HangerLine, ...]:
+    """Each of `hangers` in a line, or all in their order along the bridge, without samples."""
+    hangers = hangers or workspace.bridge.hangers
+    kept = _Kept.of(workspace, store, hangers, now)
     return tuple(kept.line(hanger) for hanger in hangers)
+
+
+def quiet_for(workspace: Workspace, latest: datetime, now: datetime) -> timedelta | None:
+    """The time since the latest test of a hanger where that is too long."""
+    since = now - latest
+    return since if since > timedelta(days=workspace.settings.quiet_days) else None
+
+
+def notes_of(
+    standing: Sequence[StoredAlert], silences: tuple[Silence, ...], hanger: int, now: datetime
+) -> tuple[str, ...]:
+    """What people did about the alerts of a hanger that stand."""
+    noted = [(each.id, each.acknowledgement) for each in standing if each.alert.kinds != ("test",)]
+    until = silenced_until(silences, hanger, now) if noted else None
+    return (
+        *(
+            f"Alert {id_} was acknowledged by {note.who} on {note.at:%Y-%m-%d}."
+            for id_, note in noted
+            if note is not None
+        ),
+        *([f"Hooks are silenced until {until:%Y-%m-%d %H:%M} UTC."] if until else []),
+    )
 
 
 @dataclass(frozen=True)
 class _Kept:
     """What the store says of all hangers, asked in a few queries without any samples."""
 
+    workspace: Workspace
+    now: datetime
     latest: Mapping[int, TrendPoint]
     baselines: Mapping[int, BaselineGlance]
     watches: Mapping[int, StoredWatch]
     called: Mapping[int, Sequence[Change]]
     open_alerts: Mapping[int, int]
     standing: Sequence[StoredAlert]
+    silences: tuple[Silence, ...]
     damaged: Mapping[int, DamagedRow]
     warnings: Mapping[int, tuple[str, ...]]
 
     @classmethod
-    def of(cls, workspace: Workspace, store: Store, hangers: Sequence[Hanger]) -> _Kept:
+    def of(
+        cls, workspace: Workspace, store: Store, hangers: Sequence[Hanger], now: datetime
+    ) -> _Kept:
         damaged = {row.hanger: row for row in store.upkeep.known_damage() if row.hanger is not None}
         return cls(
+            workspace,
+            now,
             store.posteriors.latest_trends(hangers),
             store.watch.baselines_in_force(hangers),
             of_readable(store.watch.latest, damaged),
             of_readable(store.watch.detected_changes, damaged),
             store.alerts.open_counts(),
             store.alerts.list_all(standing=True),
+            store.silences.list_current(now),
             damaged,
             warnings_of(workspace, store, hangers),
         )
@@ -97,34 +138,49 @@ class _Kept:
     def line(self, hanger: Hanger) -> HangerLine:
         opened, point = self.open_alerts.get(hanger.id, 0), self.latest.get(hanger.id)
         if hanger.id in self.damaged:  # no status: what would be said of it cannot be read
-            return HangerLine(hanger, None, called=str(self.damaged[hanger.id]), open_alerts=opened)
+            said = str(self.damaged[hanger.id])
+            message = hanger_message(Known(hanger, damage=said))
+            return HangerLine(hanger, message, called=said, open_alerts=opened)
+        baseline, watched = self.baselines.get(hanger.id), self._watched(hanger)
+        called = self.called.get(hanger.id, ())
+        message = hanger_message(self._known(hanger, point))
         if point is None:
-            return HangerLine(hanger, None, open_alerts=opened)
-        baseline = self.baselines.get(hanger.id)
-        drifts = self.watches[hanger.id].watched.drifts if hanger.id in self.watches else ()
-        called, warnings = self.called.get(hanger.id, ()), self.warnings.get(hanger.id, ())
+            return HangerLine(hanger, message, open_alerts=opened)
         return HangerLine(
             hanger,
-            status_of(
-                drifts,
-                hanger,
-                is_first=baseline is None or point.test in baseline.tests,
-                is_called=bool(called),
-                warnings=warnings,
-                standing=findings(
-                    each.alert for each in self.standing if each.alert.hanger == hanger.id
-                ),
-            ),
+            message,
             point.time,
             Interval.of_averaged(point.averaged),
             "; ".join(called_words(change) for change in called),
             opened,
-            next((each for each in drifts if each.quantity == TENSION), None),
+            next((d for d in (watched.drifts if watched else ()) if d.quantity == TENSION), None),
             point.test,
             point.model,
             baseline_tension_n=Interval.of_averaged(baseline.averaged) if baseline else None,
             averaged=point.averaged,
-            warnings=warnings,
+            warnings=self.warnings.get(hanger.id, ()),
+        )
+
+    def _watched(self, hanger: Hanger) -> WatchedTest | None:
+        found = self.watches.get(hanger.id)
+        return found.watched if found else None
+
+    def _known(self, hanger: Hanger, point: TrendPoint | None) -> Known:
+        watched = self._watched(hanger)
+        standing = [each for each in self.standing if each.alert.hanger == hanger.id]
+        baseline = self.baselines.get(hanger.id)
+        return Known(
+            hanger,
+            point.averaged if point else None,
+            point.time if point else None,
+            point.test if point else "",
+            point is not None and (baseline is None or point.test in baseline.tests),
+            watched.drifts if watched else (),
+            still_detected(self.called.get(hanger.id, ()), watched, hanger),
+            findings(each.alert for each in standing),
+            self.warnings.get(hanger.id, ()),
+            notes_of(standing, self.silences, hanger.id, self.now),
+            quiet_for(self.workspace, point.time, self.now) if point else None,
         )
 
 

@@ -10,7 +10,7 @@ import shm
 from shm.errors import NothingThere
 from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
-from shm.pipeline.bridge_reporting import stored_pattern
+from shm.pipeline.bridge_reporting import notes_of, quiet_for, stored_pattern
 from shm.pipeline.lineage import (
     IDENTIFY_SETTINGS,
     identify_lineage,
@@ -24,12 +24,12 @@ from shm.pipeline.steps import identify_options
 from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import read_test
 from shm.report.contents import HangerReport, ModalTestReport, trend_row_of
-from shm.report.hanger_status import findings
+from shm.report.hanger_status import findings, still_detected
 from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
 from shm.report.structure_report import StructureReport
 from shm.store import Baseline, Store, StoredAlert, TrendPoint, Workspace
-from shm.values import Drift, Hanger, WatchedTest
+from shm.values import Hanger, WatchedTest
 from shm.watch import WatchOptions, watch_hanger
 from shm.watch.alert_text import watch_words
 from shm.watch.frequency_text import frequency_words
@@ -110,6 +110,8 @@ def hanger_now(
     in_force = store.watch.baseline(hanger.id)
     diagnosis, watch = store.posteriors.latest_diagnosis(hanger.id), gap_watch(store, hanger.id)
     watched, alerts = _watched_against(store, baseline), store.alerts.list_all(hanger.id)
+    standing = [each for each in alerts if each.resolution is None]
+    silences = store.silences.list_current(generated_at)
     return HangerReport(
         bridge=workspace.bridge.name,
         hanger=hanger,
@@ -120,7 +122,7 @@ def hanger_now(
         trend=tuple(trend_row_of(point) for point in trend),
         baseline=baseline.posterior if baseline else None,
         selection=selection.selection if selection else None,
-        drifts=_drifts(watched, latest.test.id),
+        drifts=watched[-1].drifts if watched else (),
         alerts=tuple(stored.alert for stored in alerts),
         acknowledged=_acknowledged(alerts),
         quality=latest.quality,
@@ -128,13 +130,19 @@ def hanger_now(
         gap_watch=str(watch) if watch else "",
         drift_watch=watch_words(watched),
         creep=watched[-1].creep_per_year if watched else None,
-        is_called=any(each.change.called for each in watched),
+        called=still_detected(
+            (each.change for each in watched if each.change.called),
+            watched[-1] if watched else None,
+            hanger,
+        ),
         lineage={**test_lineage(store, latest), **_baseline_words(baseline)},
         settings=settings_words(workspace.settings),
         redescribed=redescribed(hanger, in_force),
         discarded=discarded_of(store, in_force),
         warnings=warnings_of(workspace, store, [hanger]).get(hanger.id, ()),
-        standing=findings(each.alert for each in alerts if each.resolution is None),
+        standing=findings(each.alert for each in standing),
+        notes=notes_of(standing, silences, hanger.id, generated_at),
+        quiet_for=quiet_for(workspace, latest.time, generated_at),
     )
 
 
@@ -169,16 +177,14 @@ def _baseline_words(baseline: Baseline | None) -> dict[str, str]:
     return told
 
 
-def _drifts(watched: Sequence[WatchedTest], test: str) -> tuple[Drift, ...]:
-    """The shifts of a test from the baseline in force; none where it was compared with another."""
-    return next((each.drifts for each in watched if each.test == test), ())
-
-
 def _acknowledged(alerts: Sequence[StoredAlert]) -> dict[str, str]:
-    """Who took note of an alert, when and why, by its key."""
-    noted = {each.alert.key: each.acknowledgement for each in alerts}
+    """Who took note of an alert, or that it ended, when and why, by its key."""
+    noted = {each.alert.key: each.acknowledgement or each.resolution for each in alerts}
+    ended = {each.alert.key for each in alerts if each.resolution and not each.acknowledgement}
     return {
-        key: f"{note.who}, {note.at:%Y-%m-%d}: {note.why}" for key, note in noted.items() if note
+        key: f"{'ended: ' * (key in ended)}{note.who}, {note.at:%Y-%m-%d}: {note.why}"
+        for key, note in noted.items()
+        if note
     }
 
 

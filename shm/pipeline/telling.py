@@ -193,7 +193,7 @@ def _of_several(deliveries: Sequence[Delivery]) -> str:
         if "held" in alerts[0].kinds:
             return (
                 f"{len(alerts)} hangers: tests are held until you decide: {named}. Decide on each "
-                f"today: `shm ingest --held`. One of them: {alerts[0].message}"
+                f"within a week: `shm ingest --held`. One of them: {alerts[0].message}"
             )
         return f"{len(alerts)} hangers: {kinds}: {named}. {alerts[0].message}"
     largest = max(leads, key=lambda drift: abs(drift.shift_mean))

@@ -42,16 +42,17 @@ def _what_to_do(doubts: Sequence[Doubt], recording_id: int) -> str:
     why = " --why TEXT" if any(doubt.check == "copy" for doubt in doubts) else ""
     ways = [f"--confirm {recording_id}{time}{why}", f"--discard {recording_id}"]
     leading = next((doubt for doubt in doubts if _is_of_others(doubt)), doubts[0])
+    action = f"Within a week, {leading.action[:1].lower()}{leading.action[1:]}"
     if leading.instead_of:
         discards = (f"`shm ingest --discard {each} --why TEXT`" for each in leading.instead_of)
         first = ", ".join(discards)
         return (
-            f"{leading.action}: {first}, then `shm ingest {ways[0]}`. Or keep the part: "
+            f"{action}: {first}, then `shm ingest {ways[0]}`. Or keep the part: "
             f"`shm ingest {ways[1]}`."
         )
     if _is_of_others(leading):
         ways.reverse()  # most of these are what they seem
-    return f"{leading.action}: `shm ingest {ways[0]}` or `shm ingest {ways[1]}`."
+    return f"{action}: `shm ingest {ways[0]}` or `shm ingest {ways[1]}`."
 
 
 def _is_of_others(doubt: Doubt) -> bool:

@@ -17,6 +17,8 @@ from shm.report.period import period_json
 from shm.report.shifts import _day, pattern_tables, shift_cells
 from shm.values import Drift
 from shm.values.force_units import ForceUnit
+from shm.values.messages import NEXT_TEST
+from shm.values.rounding import rounded_percent
 from shm.values.stated_tension import stated
 from shm.watch.neighbours import BridgePattern
 
@@ -32,7 +34,7 @@ def bridge_paper(data: BridgeReport) -> Paper:
         status=data.worst.value if data.worst else "",
         style=data.worst.name.lower() if data.worst else "first",
         parts=(
-            Part("In short", summary=summary(data), facts=facts(data)),
+            Part("In short", lead=data.message.words, summary=details(data), facts=facts(data)),
             Part("Along the bridge", figures=lambda: _figures(data)),
             Part("Numbers", tables=tables(data)),
         ),
@@ -69,36 +71,30 @@ def facts(data: BridgeReport) -> tuple[Fact, ...]:
 
 
 def summary(data: BridgeReport) -> str:
-    """One paragraph in plain words."""
-    told = data.pattern.sentence if data.pattern else data.why_no_pattern
-    remarks = data.pattern.remarks if data.pattern else ()
-    sentences = (
-        f"{_counts(data.hangers)}.", _extremes(data), _in_period(data), told, *remarks,
-        *advice(data),
-    )  # fmt: skip
+    """What is said first of the bridge, then the details."""
+    return f"{data.message.words} {details(data)}".rstrip()
+
+
+def details(data: BridgeReport) -> str:
+    """Why, and how sure."""
+    pattern = data.pattern.sentence if data.pattern else data.why_no_pattern
+    sentences = (_extremes(data), _in_period(data), pattern, *advice(data)[1:])
     return " ".join(sentence for sentence in sentences if sentence)
 
 
 def advice(data: BridgeReport) -> tuple[str, ...]:
     """What to do next, most urgent first; never empty."""
-    alert, watch = (of_status(data.hangers, each) for each in (Status.ALERT, Status.WATCH))
-    opened = [line for line in data.hangers if line.open_alerts]
-    found = []
-    if alert:
-        found.append(f"Repeat the test of {named(alert)} within days, and inspect what stays.")
-    found += [each for line in data.hangers for each in line.warnings]
-    if watch:
-        found.append(f"Test {named(watch)} again within a week.")
-    if opened:
-        found.append(f"Take note of the open alerts of {named(opened)} (shm alerts ack).")
+    found = [data.message.lead.action]
+    if opened := [line for line in data.hangers if line.open_alerts]:
+        found.append(f"Acknowledge the open alerts of {named(opened)} (`shm alerts ack`).")
     if wide := [line for line in data.hangers if line.is_hardly_known]:
         found.append(
-            f"Find more modes of {named(wide)}: the interval of the tension is wider than half the "
-            "tension itself, and what percentage of it a shift is, is as little known."
+            f"Identify more modes of {named(wide)}: the interval of the tension is wider than half "
+            "the tension itself."
         )
-    if untested := [line for line in data.hangers if line.status is None]:
-        found.append(f"Test {named(untested)}, of which nothing is known.")
-    return tuple(found) or ("Nothing needs doing before the next planned tests.",)
+    if untested := [line for line in data.hangers if line.latest is None]:
+        found.append(f"Test {named(untested)} {NEXT_TEST}.")
+    return tuple(found)
 
 
 def of_status(lines: Sequence[HangerLine], status: Status | None) -> list[HangerLine]:
@@ -111,34 +107,21 @@ def named(lines: Sequence[HangerLine]) -> str:
     return f"hanger {numbers}" if len(lines) == 1 else f"hangers {numbers}"
 
 
-def _counts(lines: Sequence[HangerLine]) -> str:
-    told = []
-    for status in Status:
-        found = of_status(lines, status)
-        if found:
-            which = f" ({formatting.listed([str(line.hanger.id) for line in found])})"
-            shown = which if status in (Status.ALERT, Status.WATCH, Status.CHECK) else ""
-            told.append(f"{status.value}: {formatting.counted(len(found), 'hanger')}{shown}")
-    missing = of_status(lines, None)
-    told += [f"without a test: {formatting.counted(len(missing), 'hanger')}"] if missing else []
-    return "; ".join(told)
-
-
 def _extremes(data: BridgeReport) -> str:
     """Who carries most and least of the nominal tension."""
     shares = [(line, share) for line in data.hangers if (share := line.of_nominal) is not None]
     if len(shares) < 2:
         return ""
     by_share = sorted(shares, key=lambda each: each[1].mean)
-    least, most = by_share[0], by_share[-1]
+    (least, low), (most, high) = by_share[0], by_share[-1]
     return (
-        f"Of its nominal tension hanger {most[0].hanger.id} carries most, {_percent(most[1])}, and "
-        f"hanger {least[0].hanger.id} least, {_percent(least[1])}."
+        f"Hanger {most.hanger.id} carries most of its nominal tension: {_percent(high)}. Hanger "
+        f"{least.hanger.id} carries least: {_percent(low)}."
     )
 
 
 def _percent(share: Interval) -> str:
-    return f"{formatting.mean(share)} % (90 % interval {formatting.span(share)} %)"
+    return rounded_percent(share.mean / 100, share.width / 200)
 
 
 def _in_period(data: BridgeReport) -> str:
@@ -322,13 +305,14 @@ def bridge_json(data: BridgeReport) -> dict[str, Any]:
         "schema": REPORT_SCHEMA,
         "bridge": data.bridge,
         "summary": summary(data),
+        "message": data.message.document,
         "advice": list(advice(data)),
         "period": period_json(data.period),
         "hangers": [
             {
                 "hanger": line.hanger.id,
                 "name": line.hanger.name,
-                "status": line.status.name.lower() if line.status else None,
+                **line.message.document,
                 "warnings": list(line.warnings),
                 "latest": line.latest,
                 "tension_n": asdict(line.tension_n) if line.tension_n else None,

@@ -23,7 +23,14 @@ PALETTE = {
     "red": RED,
     "quiet": QUIET,
 }
-STATUS_COLOURS = {"alert": RED, "watch": ORANGE, "steady": GREEN, "first": BLUE}
+STATUS_COLOURS = {
+    "alert": RED,
+    "watch": ORANGE,
+    "check": ORANGE,
+    "unclear": ORANGE,
+    "steady": GREEN,
+    "first": BLUE,
+}
 """By the page's style of a state."""
 VERDICT_COLOURS: dict[Verdict, str] = {
     "good": GREEN,

@@ -5,12 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import datetime, timedelta
 from functools import cached_property
 from typing import ClassVar, Protocol
 
 from shm.identify import Dropped, Hit, Identification
-from shm.report.hanger_status import Status, status_of
+from shm.report.hanger_status import (
+    BridgeMessage,
+    HangerMessage,
+    Known,
+    Status,
+    bridge_message,
+    hanger_message,
+)
 from shm.report.intervals import Interval
 from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
@@ -19,6 +26,7 @@ from shm.values import (
     Alert,
     Averaged,
     BridgeDiagnosis,
+    Change,
     CreepRate,
     Diagnosis,
     Drift,
@@ -111,14 +119,15 @@ class HangerReport:
     `lineage` names where the numbers come from: checksums, settings, files. `quality` is that of
     the latest test, empty where it was not checked; `diagnosis` the latest of its gap. `gap_watch`
     says in a sentence how the gap has gone since an effect was adopted, `drift_watch` what the
-    sequential test has called since the baseline, `is_called` whether it has, `creep`
+    sequential test has detected since the baseline, `called` these changes, `creep`
     how fast the tension creeps. `states` are empty
     where the hanger has no baseline. `neighbours` is what moved over the whole bridge, None where
     nothing is called. Of a `period`, `tests`, `trend` and `alerts` are those that lie in it.
     `settings` are those that decide the numbers, each with its unit. `redescribed` says what of the
     hanger's description has changed since the baseline, where that moves results; `discarded` names
     the tests of the baseline that count no more. `warnings` are the open ones, `standing` the
-    alerts whose condition has not ended.
+    alerts whose condition has not ended, `notes` what people did about these; `quiet_for` is the
+    time since the latest test where that is long.
     """
 
     bridge: str
@@ -141,7 +150,7 @@ class HangerReport:
     drift_watch: str = ""
     creep: CreepRate | None = None
     states: StatesOverTime = NOTHING_WATCHED
-    is_called: bool = False
+    called: tuple[Change, ...] = ()
     neighbours: BridgePattern | None = None
     period: Period | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
@@ -149,6 +158,13 @@ class HangerReport:
     discarded: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     standing: tuple[Alert, ...] = ()
+    notes: tuple[str, ...] = ()
+    quiet_for: timedelta | None = None
+
+    @property
+    def is_called(self) -> bool:
+        """Whether a change was detected since the baseline."""
+        return bool(self.called)
 
     @property
     def latest(self) -> ModalTest:
@@ -194,16 +210,28 @@ class HangerReport:
         return force_unit(*(each.mean for each in both if each))
 
 
-def status(data: HangerReport) -> Status:
-    """The state that the watch gives."""
-    return status_of(
-        data.drifts,
-        data.hanger,
-        is_first=data.baseline_tension_n is None,
-        is_called=data.is_called,
-        warnings=data.warnings,
-        standing=data.standing,
+def message(data: HangerReport) -> HangerMessage:
+    """What is said first of the hanger."""
+    return hanger_message(
+        Known(
+            data.hanger,
+            data.averaged,
+            data.latest.time or data.generated_at,
+            data.latest.id,
+            data.baseline_tension_n is None,
+            data.drifts,
+            data.called,
+            data.standing,
+            data.warnings,
+            data.notes,
+            data.quiet_for,
+        )
     )
+
+
+def status(data: HangerReport) -> Status:
+    """The state in a word; of a hanger with a test it is known."""
+    return message(data).status or Status.UNCLEAR
 
 
 def of_nominal(tension_n: Interval, hanger: Hanger) -> Interval | None:
@@ -253,7 +281,7 @@ class HangerLine:
     """
 
     hanger: Hanger
-    status: Status | None
+    message: HangerMessage
     latest: datetime | None = None
     tension_n: Interval | None = None
     called: str = ""
@@ -265,6 +293,10 @@ class HangerLine:
     baseline_tension_n: Interval | None = None
     averaged: Averaged | None = None
     warnings: tuple[str, ...] = ()
+
+    @property
+    def status(self) -> Status | None:
+        return self.message.status
 
     @property
     def of_nominal(self) -> Interval | None:
@@ -297,10 +329,13 @@ class BridgeReport:
     settings: Mapping[str, str] = field(default_factory=dict)
 
     @property
+    def message(self) -> BridgeMessage:
+        return bridge_message({line.hanger.id: line.message for line in self.hangers})
+
+    @property
     def worst(self) -> Status | None:
         """The status of the hanger that is worst off; None before the first test."""
-        found = {line.status for line in self.hangers}
-        return next((status for status in Status if status in found), None)
+        return self.message.status
 
 
 @dataclass(frozen=True, eq=False)

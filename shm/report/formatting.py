@@ -12,6 +12,7 @@ from shm.report.intervals import Interval
 from shm.values import stated_tension
 from shm.values.diagnosis import joined
 from shm.values.force_units import ForceUnit
+from shm.values.rounding import rounded
 
 _LONGEST_NAME = 24  # layout: what a column of a table holds
 _ROTATIONAL_SPRINGS = {
@@ -58,6 +59,12 @@ def with_interval(interval: Interval, unit: str) -> str:
 def tension(tension_n: Interval, unit: ForceUnit) -> str:
     """`655 kN (90 % interval 640 to 671 kN)` of a tension in N."""
     return with_interval(tension_n.in_unit(unit), unit.name)
+
+
+def with_half(interval: Interval, unit: ForceUnit) -> str:
+    """`655 ± 16 kN` of a tension in N: the half width of its 90 % interval."""
+    own = interval.in_unit(unit)
+    return f"{rounded(own.mean, own.width / 2)} {unit.name}"
 
 
 def rounded_tension(tension_n: float, unit: ForceUnit) -> str:

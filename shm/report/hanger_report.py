@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from shm import documents, modes_document
 from shm.report import formatting
 from shm.report.bridge_report import pattern_json
-from shm.report.contents import DiagnosisSheet, HangerReport, of_nominal, status
+from shm.report.contents import DiagnosisSheet, HangerReport, message, of_nominal, status
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_part
-from shm.report.hanger_summary import advice, is_found, summary, tension_change
+from shm.report.hanger_summary import advice, details, is_found, summary, tension_change
 from shm.report.hanger_tables import numbers, origins
 from shm.report.paper import CREDIBLE, Fact, Paper, Part
 from shm.report.period import period_json
@@ -33,7 +33,7 @@ def hanger_paper(data: HangerReport) -> Paper:
         status=state.value,
         style=state.name.lower(),
         parts=(
-            Part("In short", summary=summary(data), facts=facts(data)),
+            Part("In short", lead=message(data).words, summary=details(data), facts=facts(data)),
             Part("Figures", figures=lambda: _figures(data)),
             Part("Numbers", tables=numbers(data)),
             gap_part(data),
@@ -147,6 +147,7 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
         "bridge": data.bridge,
         "hanger": asdict(data.hanger),
         "status": status(data).name.lower(),
+        "message": message(data).document,
         "summary": summary(data),
         "advice": list(advice(data)),
         "test": modes_document.test_document(data.latest),

@@ -1,17 +1,35 @@
-"""The state of a hanger in a word, by its watch, its alerts and what is doubtful."""
+"""The state of a hanger: in a word, and in the two sentences that everybody reads first.
+
+Home page, the hanger's page, report, `shm status` and their documents call `hanger_message`; an
+alert and what its hooks get lead with the same words of what was found (`lead_of`).
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from enum import Enum
 
-from shm.values import Alert, Drift, Hanger
+from shm.report import formatting
+from shm.report.intervals import Interval
+from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedTest
+from shm.values.force_units import force_unit
+from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
+from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
+from shm.watch.alert_text import lead_of
+from shm.watch.change_words import quantity_words, size_words
 
 WATCH_PROBABILITY = 0.5  # likelier than not
-
+# Judgement: dead load and erection leave the hangers of sound bridges some 10 % off nominal. With
+# the whole interval beyond 15 % either the description or the hanger is in doubt, until the owner
+# gives limits.
+OFF_NOMINAL = 0.15
 
 _DOUBTS = frozenset({"check the modes", "check the baseline"})
+_BEYOND = "beyond threshold"
+_CHANGES = frozenset({_BEYOND, "sudden change", "slow drift"})
 
 
 class Status(Enum):
@@ -19,9 +37,164 @@ class Status(Enum):
 
     ALERT = "Alert"
     WATCH = "Watch"
-    CHECK = "Check baseline"
+    CHECK = "Check"
+    UNCLEAR = "Cannot judge"
     STEADY = "No change"
     FIRST = "First test"
+
+
+_QUIET = (Status.STEADY, Status.FIRST)
+
+
+@dataclass(frozen=True)
+class Known:
+    """All that the message of a hanger rests on.
+
+    `latest` is when it was tested last, None before the first test; `drifts` are those of that
+    test from the baseline in force, `called` the changes detected since, `standing` the alerts
+    whose condition has not ended, the oldest first. `notes` say what people did about these.
+    `quiet_for` is the time since the latest test where that is long, `damage` what keeps the
+    results from being read.
+    """
+
+    hanger: Hanger
+    tension: Averaged | None = None
+    latest: datetime | None = None
+    test: str = ""
+    is_first: bool = False
+    drifts: Sequence[Drift] = ()
+    called: Sequence[Change] = ()
+    standing: Sequence[Alert] = ()
+    warnings: Sequence[str] = ()
+    notes: tuple[str, ...] = ()
+    quiet_for: timedelta | None = None
+    damage: str = ""
+
+
+@dataclass(frozen=True)
+class HangerMessage:
+    """The state in a word, None where nothing is known; its lead; what people did about it."""
+
+    status: Status | None
+    lead: Lead
+    notes: tuple[str, ...] = ()
+
+    @property
+    def urgency(self) -> Urgency:
+        return self.lead.urgency
+
+    @property
+    def words(self) -> str:
+        return " ".join((self.lead.words, *self.notes))
+
+    def beyond_lead(self, warnings: Sequence[str]) -> tuple[str, ...]:
+        """What `warnings` say that the lead has not said."""
+        rest = (each.removeprefix(self.lead.words).strip() for each in warnings)
+        return tuple(each for each in rest if each)
+
+    @property
+    def document(self) -> dict[str, object]:
+        """As every JSON document gives it."""
+        return _document(self)
+
+
+@dataclass(frozen=True)
+class BridgeMessage:
+    """What is said first of a bridge: of its most urgent hanger, then which others need action."""
+
+    status: Status | None
+    lead: Lead
+    others: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def urgency(self) -> Urgency:
+        return self.lead.urgency
+
+    @property
+    def words(self) -> str:
+        return " ".join(part for part in (self.lead.words, *self.notes, self.others) if part)
+
+    @property
+    def document(self) -> dict[str, object]:
+        """As every JSON document gives it."""
+        return _document(self)
+
+
+def _document(message: HangerMessage | BridgeMessage) -> dict[str, object]:
+    return {
+        "status": message.status.name.lower() if message.status else None,
+        "state": message.lead.state,
+        "action": message.lead.action,
+        "urgency": message.urgency,
+        "notes": list(message.notes),
+    }
+
+
+def bridge_message(messages: Mapping[int, HangerMessage]) -> BridgeMessage:
+    """That of a bridge from those of its hangers, by their numbers."""
+    order = list(Status)
+    known = {id_: each for id_, each in messages.items() if each.status or each.urgency == "today"}
+    found = {each.status for each in known.values()}
+    worst = next((status for status in Status if status in found), None)
+    needing = {id_: each for id_, each in known.items() if each.status not in _QUIET}
+
+    def rank(id_: int) -> tuple[int, int]:
+        status = needing[id_].status
+        return -URGENCIES.index(needing[id_].urgency), order.index(status) if status else len(order)
+
+    if needing:
+        first, *others = sorted(needing, key=rank)
+        more = f"Other hangers that need action: {listed(list(map(str, sorted(others))))}."
+        return BridgeMessage(
+            worst, needing[first].lead, more if others else "", needing[first].notes
+        )
+    if not known:
+        return BridgeMessage(None, Lead("No hanger has been tested yet.", f"Test all {NEXT_TEST}."))
+    untested = [str(id_) for id_ in messages if id_ not in known]
+    many = formatting.counted(len(known), "hanger")
+    return BridgeMessage(
+        worst,
+        Lead(f"No change detected on {many}.", "No action is needed before the next planned test."),
+        f"Not tested yet: {listed(untested)}." if untested else "",
+    )
+
+
+def hanger_message(known: Known) -> HangerMessage:
+    """What is said first of a hanger, wherever it is said."""
+    name = f"Hanger {known.hanger.id}"
+    if known.damage:
+        lead = Lead(f"{name}: its results cannot be read.", "Run `shm doctor` today.")
+        return HangerMessage(None, lead)
+    if known.latest is None and not known.standing:
+        return HangerMessage(None, Lead(f"{name}: no test yet.", f"Test it {NEXT_TEST}."))
+    status = status_of(
+        known.drifts,
+        known.hanger,
+        is_first=known.is_first,
+        is_called=bool(known.called),
+        warnings=known.warnings,
+        standing=known.standing,
+    )
+    if status in (Status.ALERT, Status.WATCH):
+        return HangerMessage(status, _of_change(known), known.notes)
+    if status is Status.CHECK:
+        doubts = [Lead.of(each) for each in known.warnings]
+        doubts += [Lead.of(each.message) for each in reversed(known.standing)]
+        return HangerMessage(status, _first(doubts), known.notes)
+    status, lead = _quiet(known, status)
+    return HangerMessage(status, lead, known.notes)
+
+
+def still_detected(
+    detected: Iterable[Change], latest: WatchedTest | None, hanger: Hanger
+) -> tuple[Change, ...]:
+    """The changes that were detected, unless the latest test shows that they are gone.
+
+    As the watch does: below half the level at which its owner is alerted.
+    """
+    over = latest and latest.change.probability < hanger.thresholds.end_probability
+    return () if over else tuple(detected)
 
 
 def findings(alerts: Iterable[Alert]) -> tuple[Alert, ...]:
@@ -38,16 +211,14 @@ def status_of(
     warnings: Sequence[str] = (),
     standing: Sequence[Alert] = (),
 ) -> Status:
-    """The state that the drifts of the latest test give, and whether a change was called.
+    """The state that the drifts of the latest test give, and whether a change was detected.
 
     With open `warnings` no hanger is quiet: what it is compared with may be wrong. Nor is one of
-    which an alert is `standing`: two tests that agree tell of a shift before the watch is sure.
+    which an alert is `standing`: two tests that agree show a shift before the watch is sure.
     """
-    highest = max((drift.probability for drift in drifts), default=math.nan)
+    highest = max((d.probability for d in drifts if d.probability >= 0), default=math.nan)
     kinds = [each.kinds for each in standing]
-    if highest >= hanger.thresholds.alert_probability or any(
-        "beyond threshold" in k for k in kinds
-    ):
+    if highest >= hanger.thresholds.alert_probability or any(_BEYOND in k for k in kinds):
         return Status.ALERT
     if (
         highest >= WATCH_PROBABILITY
@@ -58,3 +229,138 @@ def status_of(
     if warnings or standing:
         return Status.CHECK
     return Status.FIRST if is_first else Status.STEADY
+
+
+# ---------------------------------------------------------------- what was found
+
+
+def _of_change(known: Known) -> Lead:
+    """What was found to have changed; else what an alert of another kind asks for."""
+    hanger, drifts = known.hanger, known.drifts
+    beyond, change = _beyond(known), _change(known)
+    others = [each for each in known.standing if not _CHANGES & set(each.kinds)]
+    if beyond or change:
+        before = change and [each for each in known.called if each.began_by < change.began_by]
+        is_further = bool(before)
+        return lead_of(hanger, change, beyond, drifts, is_further=is_further)
+    if any(_CHANGES & set(each.kinds) for each in known.standing):
+        others = list(known.standing)  # what its row said of the change is lost
+    if others:
+        return _first([Lead.of(each.message) for each in reversed(others)])
+    likeliest = max(drifts, key=lambda each: each.probability)
+    words = f"{quantity_words(likeliest.quantity)} {size_words(likeliest)}"
+    return Lead(
+        f"Hanger {hanger.id}: {words}, more likely than not beyond its threshold.",
+        f"Repeat the hammer test {WEEK}.",
+    )
+
+
+def _beyond(known: Known) -> list[Drift]:
+    """The shifts beyond their threshold, as the latest test has them.
+
+    What an alert said stays as sure as it was while it stands; where two tests that agree said it,
+    the watch may not have seen it, and the alert's own number stays.
+    """
+    level = known.hanger.thresholds.alert_probability
+    found = {_way(each): each for each in known.drifts if each.probability >= level}
+    now = {_way(each): each for each in known.drifts}
+    for alert in known.standing:
+        for told in alert.drifts if _BEYOND in alert.kinds else ():
+            key = _way(told)
+            newest = now.get(key, told)
+            is_of_latest = alert.test == known.test
+            seen = newest if not is_of_latest and newest.may_be_beyond(told.shift_mean) else told
+            found[key] = replace(seen, probability=max(seen.probability, told.probability))
+    return list(found.values())
+
+
+def _way(drift: Drift) -> tuple[str, bool]:
+    return drift.quantity, drift.shift_mean < 0
+
+
+def _change(known: Known) -> Change | None:
+    """That of the newest alert that stands; else the last that was detected."""
+    told = [each.change for each in known.standing if each.change and _CHANGES & set(each.kinds)]
+    return told[-1] if told else known.called[-1] if known.called else None
+
+
+def _first(leads: Sequence[Lead]) -> Lead:
+    """The first of the most urgent."""
+    return max(leads, key=lambda each: URGENCIES.index(each.urgency))
+
+
+# ---------------------------------------------------------------- nothing was found
+
+
+def _quiet(known: Known, status: Status) -> tuple[Status, Lead]:
+    """Where nothing was found: whether it could have been, and what the tension is."""
+    name = f"Hanger {known.hanger.id}"
+    off = _off_limits(known)
+    if known.quiet_for is not None and (off is None or off.urgency == "next_test"):
+        return Status.UNCLEAR, Lead(
+            f"{name}: not tested for {known.quiet_for.days} days.",
+            f"Repeat the hammer test {WEEK}.",
+        )
+    if off:
+        return Status.CHECK, off
+    if status is Status.FIRST:
+        return status, Lead(
+            f"{name}: tension {_tension(known)} by its first test.",
+            f"Choose a warmer or colder day {NEXT_TEST}, so that the baseline covers temperature.",
+        )
+    drift = next((each for each in known.drifts if each.quantity == TENSION), None)
+    if drift is None or not math.isfinite(drift.shift_mean + drift.shift_sd):
+        return Status.UNCLEAR, Lead(
+            f"{name}: its latest test cannot be compared with the baseline.",
+            f"Repeat the hammer test {WEEK}, with the modes of the baseline.",
+        )
+    half = NINETY_PERCENT * drift.shift_sd
+    shift = rounded_percent(drift.shift_mean, half, "+")
+    if half > drift.threshold:
+        return Status.UNCLEAR, Lead(
+            f"{name}: no change detected, but its tests are too few or too rough to show one "
+            f"(tension {shift}).",
+            f"Identify more modes {NEXT_TEST}, or test more often.",
+        )
+    return status, Lead(
+        f"{name}: no change detected since the baseline (tension {shift}).",
+        "No action is needed before the next planned test.",
+    )
+
+
+def _off_limits(known: Known) -> Lead | None:
+    """That the tension is beyond the owner's limits; without limits, far off the nominal one."""
+    name, hanger, tension = f"Hanger {known.hanger.id}", known.hanger, known.tension
+    if tension is None:
+        return None
+    limits = hanger.limits
+    for probability, words, soon in (
+        (tension.probability_slack, "below its lower limit", TODAY),
+        (tension.probability_above_limit, "above its upper limit", WEEK),
+    ):
+        if probability > WATCH_PROBABILITY:
+            return Lead(
+                f"{name}: tension {_tension(known)} is probably {words}.",
+                f"Repeat the hammer test {soon}, and compare the hanger with its design.",
+            )
+    nominal_n, kept = hanger.nominal_tension_n, tension.tension_n
+    if not nominal_n > 0:
+        return None
+    low, high = kept.q05 / nominal_n - 1, kept.q95 / nominal_n - 1
+    limit_n = limits.tension_max_n if low > 0 else limits.tension_min_n
+    if (low <= OFF_NOMINAL and high >= -OFF_NOMINAL) or math.isfinite(limit_n):
+        return None
+    off = kept.mean / nominal_n - 1
+    size = rounded_percent(abs(off), (high - low) / 2)
+    return Lead(
+        f"{name}: tension is {size} {'above' if off > 0 else 'below'} nominal.",
+        f"Compare it with the design {NEXT_TEST}, or give limits in bridge.toml.",
+    )
+
+
+def _tension(known: Known) -> str:
+    """`654 ± 16 kN`, rounded by its interval."""
+    if known.tension is None:
+        return "not known"
+    interval = Interval.of_averaged(known.tension)
+    return formatting.with_half(interval, force_unit(interval.mean))

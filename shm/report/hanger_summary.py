@@ -8,15 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.report import formatting, outdated_baseline
-from shm.report.contents import HangerReport, status
+from shm.report.contents import HangerReport, message
 from shm.report.diagnosis_summary import next_step, verdict
 from shm.report.diagnosis_wording import AFTER, tension_of
-from shm.report.hanger_status import WATCH_PROBABILITY, Status
 from shm.report.intervals import Interval
-from shm.report.shifts import shift_cells, threshold_cell
-from shm.values import TENSION, Diagnosis, Drift, PredictedFrequency
+from shm.values import TENSION, Diagnosis, PredictedFrequency
+from shm.values.rounding import rounded_percent
 from shm.values.stated_tension import stated
-from shm.watch.alert_action import action_words
 
 # 1.1 by Gelman and Rubin (1992). Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
 # three names are what a sentence bears.
@@ -26,9 +24,15 @@ _MOST_NAMED = 3
 
 
 def summary(data: HangerReport) -> str:
-    """One paragraph in plain words."""
+    """What is said first of the hanger, wherever it is said, then the details."""
+    return f"{message(data).words} {details(data)}"
+
+
+def details(data: HangerReport) -> str:
+    """Why, and how sure: what the report says after state and action."""
+    said = message(data)
     sentences = (
-        *data.warnings,
+        *said.beyond_lead(data.warnings),
         outdated_baseline.redescribed(data),
         outdated_baseline.discarded(data),
         *data.averaged.caveats,
@@ -36,22 +40,29 @@ def summary(data: HangerReport) -> str:
         *_repeats_and_limits(data),
         _against_nominal(data),
         _against_baseline(data),
-        _change(data),
+        _unseen(data),
+        "Once the change is explained, set a new baseline (`shm drift rebaseline`)."
+        if data.is_called
+        else "",
         data.creep.words if data.creep else "",
         in_period(data),
-        f"Over the bridge: {data.neighbours.sentence}" if data.neighbours else "",
+        data.neighbours.sentence if data.neighbours else "",
         _model(data),
         _gap(data),
-        *advice(data),
+        *_further_advice(data),
     )
     return " ".join(sentence for sentence in sentences if sentence)
 
 
 def advice(data: HangerReport) -> tuple[str, ...]:
     """What to do next, most urgent first; never empty."""
-    made = (_urgent, _quality, _sampling, _width, _diagnose, _thermometer)
-    found = tuple(told for make in made if (told := make(data)))
-    return found or ("Nothing needs doing before the next planned test.",)
+    first, further = message(data).lead, _further_advice(data)
+    return further if further and first.urgency == "none" else (first.action, *further)
+
+
+def _further_advice(data: HangerReport) -> tuple[str, ...]:
+    made = (_quality, _sampling, _width, _diagnose, _thermometer)
+    return tuple(each for make in made if (each := make(data)))
 
 
 def tension_change(data: HangerReport) -> Interval | None:
@@ -98,13 +109,9 @@ def residuals_percent(predicted: tuple[PredictedFrequency, ...]) -> list[float]:
 
 
 def _tension(data: HangerReport) -> str:
-    name = formatting.hanger_name(data.hanger.id, data.hanger.name)
-    tension = formatting.tension(data.tension_n, data.tension_unit)
-    when = formatting.moment(data.latest.time)
-    return (
-        f"{name} of {data.bridge} carries {tension} by the test {data.latest.id} "
-        f"({when}, {formatting.temperature(data.latest.temperature_c)})."
-    )
+    tension = formatting.with_half(data.tension_n, data.tension_unit)
+    day = f" of {data.latest.time:%Y-%m-%d}" if data.latest.time else ""
+    return f"Its tension is {tension} by test {data.latest.id}{day}."
 
 
 def _repeats_and_limits(data: HangerReport) -> tuple[str, ...]:
@@ -116,22 +123,20 @@ def _against_nominal(data: HangerReport) -> str:
     nominal = data.hanger.nominal_tension_n
     if not nominal > 0:
         return "It has no nominal tension to compare with."
-    shift = data.tension_n.scaled(1 / nominal)
-    fraction = Interval(shift.mean - 1, shift.low - 1, shift.high - 1)
-    given = formatting.rounded_tension(nominal, data.tension_unit)
-    return f"Against the nominal {given} that is {formatting.signed_percent(fraction)}."
+    share = data.tension_n.scaled(1 / nominal)
+    half, off = share.width / 2, share.mean - 1
+    if abs(off) <= half:
+        return f"That agrees with the nominal tension ({rounded_percent(off, half, '+')})."
+    return f"That is {rounded_percent(abs(off), half)} {'above' if off > 0 else 'below'} nominal."
 
 
 def _against_baseline(data: HangerReport) -> str:
-    then, change = data.baseline_tension_n, tension_change(data)
-    if then is None or change is None or data.baseline is None:
+    change = tension_change(data)
+    if change is None or data.baseline is None:
         return "There is no earlier test to compare with: this one is the baseline."
-    tension = formatting.tension(then, data.tension_unit)
-    tests = told_tests(data.baseline.tests)
-    found = (
-        f"Against the baseline, {tests} with {tension}, it is {formatting.signed_percent(change)}"
-    )
-    return f"{found}{'' if is_found(data) else ', if it has moved at all'}."
+    size = rounded_percent(change.mean, change.width / 2, "+")
+    doubt = "" if is_found(data) else ", if it has changed at all"
+    return f"Against the baseline of {counted_tests(data.baseline.tests)} it is {size}{doubt}."
 
 
 def is_found(data: HangerReport) -> bool:
@@ -140,54 +145,21 @@ def is_found(data: HangerReport) -> bool:
     return data.is_called or not data.drifts or any(e.probability >= level for e in data.drifts)
 
 
-def told_tests(tests: tuple[str, ...]) -> str:
+def counted_tests(tests: tuple[str, ...]) -> str:
     """`test t001`, `5 tests`."""
     return f"test {tests[0]}" if len(tests) == 1 else f"{len(tests)} tests"
-
-
-def _change(data: HangerReport) -> str:
-    if not data.drifts:
-        return ""
-    level = data.hanger.thresholds.alert_probability
-    shifted = [drift for drift in data.drifts if drift.probability >= level]
-    if shifted:
-        return " ".join(_shift(drift) for drift in shifted)
-    top = max(data.drifts, key=lambda drift: drift.probability)
-    if data.is_called and top.is_clearly_beyond:
-        return (
-            f"A change was detected; whether it is the {formatting.quantity(top.quantity)} that "
-            "changed is not settled. If it is, the shift is beyond its threshold of "
-            f"{threshold_cell(top)}."
-        )
-    return (
-        f"No quantity has surely moved beyond its threshold: the likeliest is "
-        f"{formatting.quantity(top.quantity)}, with probability "
-        f"{formatting.told_probability(top.probability)} of a shift beyond {threshold_cell(top)}."
-        f"{_unseen(data)}"
-    )
 
 
 def _unseen(data: HangerReport) -> str:
     """What keeps a shift of the tension from being seen, or from being trusted in percent."""
     change, threshold = tension_change(data), data.hanger.thresholds.tension_shift_fraction
+    if not data.drifts:
+        return ""
     if change is not None and change.width / 2 > threshold:
-        return (
-            f" These tests could hardly show it if the tension had moved by {100 * threshold:.3g} "
-            "%: that it has not was held probable before them."
-        )
+        return f"These tests could hardly show a change of tension of {100 * threshold:.3g} %."
     if data.tension_n.is_wide:
-        return " The tension itself is hardly known, and so is what percentage of it a shift is."
+        return "The tension itself is hardly known, and so is what percentage of it a change is."
     return ""
-
-
-def _shift(drift: Drift) -> str:
-    verb = "risen" if drift.shift_mean > 0 else "fallen"
-    _, shift, span, threshold, _ = shift_cells(drift)
-    size = "" if drift.quantity == TENSION else f" to {shift} what it was (90 % interval {span})"
-    return (
-        f"The {formatting.quantity(drift.quantity)} has {verb}{size}; the probability of a shift "
-        f"beyond its threshold of {threshold} is {formatting.told_probability(drift.probability)}."
-    )
 
 
 def in_period(data: HangerReport) -> str:
@@ -215,14 +187,11 @@ def _model(data: HangerReport) -> str:
     misfits = misfits_percent(data)
     if not misfits:
         return f"{_chosen(data)}."
-    worst, off = max(misfits, key=lambda each: abs(each[1].mean))
-    count = "one measured mode" if len(misfits) == 1 else f"{len(misfits)} measured modes"
-    return (
-        f"{_chosen(data)}; over {count} it misses the frequencies by "
-        f"{formatting.plain(_rms_percent(data), 2)} % (rms), at most {worst.plane} {worst.order} "
-        f"by {formatting.mean(off, signed=True)} % (90 % interval "
-        f"{formatting.span(off, signed=True)} %)."
+    count = (
+        "one measured frequency" if len(misfits) == 1 else f"{len(misfits)} measured frequencies"
     )
+    rms = formatting.plain(_rms_percent(data), 2)
+    return f"{_chosen(data)}. It predicts {count} to {rms} % (root mean square)."
 
 
 def _rms_percent(data: HangerReport) -> float:
@@ -246,12 +215,12 @@ def _outside(data: HangerReport) -> str:
     if not misfits:
         return ""
     if len(outside) > _by_chance(len(misfits)):
-        return f"{_outliers(outside)}: these the model does not explain, and why was not diagnosed."
-    chance = f"{_outliers(outside)}, as chance alone would have it" if outside else ""
-    start = chance or "Each lies within its interval"
+        return f"{_outliers(outside)}: the model does not explain these, and no diagnosis was made."
+    chance = f"{_outliers(outside)}, no more than by chance" if outside else ""
+    start = chance or "Each lies within its 90 % interval"
     if _rms_percent(data) >= _WORTH_DIAGNOSING_PERCENT:
-        return f"{start}, but the intervals are so wide that they may hide what is not explained."
-    return f"{start}: nothing that was measured is clearly left unexplained."
+        return f"{start}, but the intervals are so wide that they may hide a misfit."
+    return f"{start}: the model explains what was measured."
 
 
 def _outliers(modes: Sequence[PredictedFrequency]) -> str:
@@ -270,7 +239,7 @@ def _by_chance(modes: int) -> float:
 def _diagnosed_on(diagnosis: Diagnosis) -> str:
     return (
         f"What the plain class {diagnosis.baseline} would leave unexplained was diagnosed on "
-        f"{told_tests(diagnosis.tests)}."
+        f"{counted_tests(diagnosis.tests)}."
     )
 
 
@@ -290,44 +259,10 @@ def _chosen(data: HangerReport) -> str:
     names = [formatting.model_class(posterior.model) for posterior in data.selection.posteriors]
     if model not in names:
         return f"The model class is {model}"
-    share = data.selection.probabilities[names.index(model)]
-    best = "the most probable" if names[0] == model else f"not the most probable ({names[0]} is)"
-    return (
-        f"The model class is {model}, {best} of {', '.join(names)} "
-        f"(probability {formatting.told_probability(share)})"
-    )
-
-
-def _urgent(data: HangerReport) -> str:
-    """The same action and urgency as in the alert."""
-    level = data.hanger.thresholds.alert_probability
-    beyond = [drift for drift in data.drifts if drift.probability >= level] or [
-        drift
-        for alert in data.standing
-        if "beyond threshold" in alert.kinds
-        for drift in alert.drifts
-    ]
-    change = next((each.change for each in reversed(data.alerts) if each.change), None)
-    match status(data):
-        case Status.ALERT:
-            return action_words(data.hanger, change, beyond, data.drifts)
-        case Status.WATCH if data.is_called:
-            return (
-                "A change was detected, though nothing is surely beyond its threshold. "
-                f"{action_words(data.hanger, change, beyond, data.drifts)} Once it is explained, "
-                "set a new baseline (shm drift rebaseline)."
-            )
-        case Status.WATCH if not any(each.probability >= WATCH_PROBABILITY for each in data.drifts):
-            tests = formatting.listed(list(dict.fromkeys(each.test for each in data.standing)))
-            return f"The alert of test {tests} still stands: do what it asks for."
-        case Status.WATCH:
-            return "Test this hanger again within a week: a shift is likelier than not."
-        case Status.CHECK:
-            return "Do what the first sentences ask for before you rely on the comparison."
-        case Status.FIRST:
-            return "Repeat the test at another temperature to make the baseline firm."
-        case Status.STEADY:
-            return ""
+    rivals = formatting.listed([each for each in names if each != model])
+    if names[0] != model:
+        return f"The model class is {model}, less probable than {names[0]}"
+    return f"The model class is {model}, the most probable (beside {rivals})"
 
 
 def _quality(data: HangerReport) -> str:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from shm.report import formatting
 from shm.report.contents import HangerReport, TrendRow, of_nominal
-from shm.report.hanger_summary import misfits_percent, tension_change, told_tests
+from shm.report.hanger_summary import counted_tests, misfits_percent, tension_change
 from shm.report.intervals import Interval
 from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Table, filled
@@ -190,7 +190,7 @@ def models(data: HangerReport) -> Table:
         "Model classes",
         ("model", "probability", "log evidence", "its sd", *formatting.tension_headings(unit)),
         tuple(_model_row(posterior, share, unit) for posterior, share in pairs),
-        note=f"Compared on {told_tests(pairs[0][0].tests)}, all classes held equally probable "
+        note=f"Compared on {counted_tests(pairs[0][0].tests)}, all classes held equally probable "
         "before. Evidence in natural logarithms, with the standard deviation of its sampling."
         if pairs
         else "",

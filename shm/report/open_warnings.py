@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 
 from shm.report.formatting import listed
 from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
+from shm.values.messages import WEEK
 from shm.values.rounding import rounded_percent
 from shm.watch.alert_text import against_baseline_words
 from shm.watch.mistakes_text import warning_words
@@ -39,24 +40,20 @@ def open_warnings(
     found = [slack] if slack else []
     if check is not None and check.misfit:
         found.append(
-            f"The baseline of hanger {hanger.id} does not fit: {check.misfit}. Check the "
-            "description and the numbers of the modes, and repeat the test within a week."
+            f"Hanger {hanger.id}: its baseline does not fit. Check the description and the numbers "
+            f"of the modes, and repeat the test {WEEK}. Why: {check.misfit}."
         )
     if check is not None and check.tests:
         many = len(check.tests) > 1
         names = listed([each.test for each in check.tests])
         found.append(
-            f"The baseline of hanger {hanger.id} is made without test{'s' * many} {names}: "
-            f"{check.tests[0].why}. Find out which hanger was hit, and check the logger's clock."
+            f"Hanger {hanger.id}: its baseline is made without test{'s' * many} {names}. Find out "
+            f"{WEEK} which hanger was hit, and check the logger's clock. Why: {check.tests[0].why}."
         )
     if neighbours:
         found.append(neighbours)
     if latest is not None and latest.change.is_baseline_alone:
-        found.append(
-            f"The baseline of hanger {hanger.id} stands alone: "
-            f"{against_baseline_words(latest.change)} Find out what was different on its day, and "
-            "set another (`shm drift rebaseline`)."
-        )
+        found.append(against_baseline_words(latest.change, hanger))
     notable = [each for each in latest.mistaken if each.is_notable] if latest else []
     if notable:
         found.append(warning_words(notable, hanger))
@@ -103,9 +100,9 @@ def standing_out(hanger: Hanger, hangers: Sequence[Hanger], tensions: Mapping[in
     if off < _OFF_NOMINAL or abs(of_others - 1) > _OFF_NOMINAL:
         return ""
     return (
-        f"The baseline of hanger {hanger.id} stands out: its tension is {100 * (mean - 1):+.0f} % "
-        "off the nominal one, and that of its neighbours is not. Check its length, its section and "
-        "the numbers of its modes within a week."
+        f"Hanger {hanger.id}: its baseline lies {rounded_percent(abs(mean - 1), (high - low) / 2)} "
+        f"{'above' if mean > 1 else 'below'} nominal, unlike its neighbours. Check its length, its "
+        "section and the numbers of its modes within a week."
     )
 
 

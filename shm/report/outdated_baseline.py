@@ -27,8 +27,8 @@ def discarded(data: HangerReport) -> str:
         return ""
     names, number = ", ".join(data.discarded), data.hanger.id
     return (
-        f"The baseline of hanger {number} was made from {names}, discarded since: what is said of "
-        f"change stands on what counts no more. {_anew(number)}"
+        f"The baseline of hanger {number} was made from {names}, discarded since: the comparison "
+        f"with it is no longer valid. {_anew(number)}"
     )
 
 

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 NINETY_PERCENT = 1.645  # sds on either side that hold 90 % of a normal law
 
 
+def rounded(value: float, half: float, sign: str = "", most_decimals: int = 6) -> str:
+    """`8.2 ± 1.1`, `1040 ± 130`: both to two significant digits of the half width."""
+    if not (math.isfinite(half) and half > 0):
+        return f"{value:{sign}.1f}"
+    places = min(most_decimals, 1 - math.floor(math.log10(half)))
+    value, half = round(value, places), round(half, places)
+    shown = max(places, 0)
+    return f"{value:{sign}z.{shown}f} ± {half:.{shown}f}"
+
+
 def rounded_percent(fraction: float, half: float, sign: str = "") -> str:
     """`8.2 ± 1.1 %` of fractions: two digits of the half width, two decimals at most."""
-    percent = 100 * half
-    places = 0 if percent >= 10 else 1 if percent >= 1 else 2
-    return f"{100 * fraction:{sign}.{places}f} ± {percent:.{places}f} %"
+    return f"{rounded(100 * fraction, 100 * half, sign, most_decimals=2)} %"
 
 
 def listed(words: Sequence[str]) -> str:

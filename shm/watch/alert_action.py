@@ -6,12 +6,12 @@ Traffic is named for lost tension and loosened ends alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 from shm.values import TENSION, Change, Drift, Hanger, Moved
+from shm.values.messages import NEXT_TEST, TODAY, WEEK, Urgency
 from shm.watch.change_words import CAUSES, ends_words, probable_groups
 
-Urgency = Literal["next_test", "week", "today"]
+_WHEN: dict[Urgency, str] = {"next_test": NEXT_TEST, "week": WEEK, "today": TODAY}
 _LOOK_AT = "bearings, joints, cracks, new loads and the sensors"
 
 
@@ -48,26 +48,25 @@ def action_words(
     """What to do and how soon, in a sentence."""
     urgency = urgency_of(hanger, change, beyond, drifts)
     if not hanger.is_modelled:
-        when = "within a week" if urgency == "week" else "at the next planned inspection"
-        return f"Look at the structure {when}: {_LOOK_AT}."
+        return f"Look at the structure {_WHEN[urgency]}: {_LOOK_AT}."
     if urgency == "today":
         look = _look(gravest(beyond), change)
-        return f"Repeat the hammer test today and decide on traffic until then; {look}."
+        return f"Repeat the hammer test {TODAY} and decide on traffic until then; {look}."
     groups = probable_groups(change) if change else []
     if len(groups) > 1 and not beyond:
         return _tell_apart(groups, urgency)
     lead = gravest(beyond) if beyond else groups[0][0] if groups else None
-    when = "within a week" if urgency == "week" else "at the next planned date"
+    test = _again(urgency)
     if lead is None:
-        return f"Repeat the hammer test {when}, with more modes."
+        return f"{test}, with more modes."
     if lead.quantity in CAUSES:
         check = CAUSES[lead.quantity].check
-        return as_sentence(f"{_before(urgency)}, {check}, then test again")
-    return f"Repeat the hammer test {when}; {_look(lead, change)}."
+        return as_sentence(f"{_WHEN[urgency]}, {check}, then test again")
+    return f"{test}; {_look(lead, change)}."
 
 
-def _before(urgency: Urgency) -> str:
-    return "within a week" if urgency == "week" else "before the next planned test"
+def _again(urgency: Urgency) -> str:
+    return f"Repeat the hammer test {WEEK}" if urgency == "week" else f"Compare again {NEXT_TEST}"
 
 
 def _tell_apart(groups: Sequence[Sequence[Moved]], urgency: Urgency) -> str:
@@ -75,11 +74,9 @@ def _tell_apart(groups: Sequence[Sequence[Moved]], urgency: Urgency) -> str:
     causes = [CAUSES[each[0].quantity] for each in groups if each[0].quantity in CAUSES]
     if not causes:
         with_what = "a sensor near each end and more modes"
-        return f"Repeat the hammer test {_before(urgency)} with {with_what}, to see what changed."
+        return f"{_again(urgency)} with {with_what}, to see what changed."
     check, apart_by = causes[0].check, causes[0].apart_by
-    return as_sentence(
-        f"{_before(urgency)}, {check}; then test with {apart_by}, to tell them apart"
-    )
+    return as_sentence(f"{_WHEN[urgency]}, {check}; then test with {apart_by}, to tell them apart")
 
 
 def _look(lead: Moved | Drift, change: Change | None) -> str:

@@ -13,6 +13,7 @@ from datetime import datetime
 
 from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.force_units import force_unit
+from shm.values.messages import WEEK, Lead
 from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
 from shm.watch.alert_action import action_words, as_sentence, gravest
 from shm.watch.change_words import (
@@ -46,49 +47,76 @@ def message_of(
     *,
     is_call: bool,
     is_further: bool = False,
+    standing: Sequence[Drift] = (),
 ) -> str:
-    """What moved and by how much, what to do and how soon, since when; then details.
+    """The lead of the hanger as it is now; since when; then details.
 
     `change` is the change behind it, as far as one is known; `is_call` says whether it is detected
     now, and `is_further` whether others were before it, from which on its shift counts. `beyond`
-    are the shifts from the baseline that the alert says to be beyond their threshold.
+    are the shifts from the baseline that the alert says to be beyond their threshold, `standing`
+    those that were said before and still are.
     """
     change = change if change and change.moved else None
-    if not hanger.is_modelled:
-        return _of_frequencies(test, hanger, change, beyond, is_call=is_call, is_further=is_further)
+    everything = (*beyond, *standing)
+    lead = lead_of(hanger, change, everything, test.drifts, is_further=is_further)
+    is_new = bool(beyond and standing) and gravest(everything) not in beyond
+    if hanger.is_modelled:
+        sizes = _sizes(change, everything) or _HALF_WIDTH * ("±" in lead.state)
+        details = _of_hanger(test, change, beyond, sizes, is_call=is_call)
+    else:
+        details = _of_frequencies(test, change, is_call=is_call)
+    said = (lead.words, _new(beyond) if is_new else "", _when(change), *details)
+    return " ".join(part for part in said if part)
+
+
+def lead_of(
+    hanger: Hanger,
+    change: Change | None,
+    beyond: Sequence[Drift],
+    drifts: Sequence[Drift] = (),
+    *,
+    is_further: bool = False,
+) -> Lead:
+    """The state of a hanger of which something was found, and what to do about it how soon.
+
+    The only place where it is put into words: alerts, pages, reports and `shm status` ask here.
+    """
+    say = _state if hanger.is_modelled else frequencies_state
+    return Lead(
+        say(hanger, change, beyond, is_further=is_further),
+        action_words(hanger, change, beyond, drifts),
+    )
+
+
+def _new(beyond: Sequence[Drift]) -> str:
+    return f"New: {quantity_words(beyond[0].quantity)} {size_words(beyond[0])}."
+
+
+def _of_hanger(
+    test: WatchedTest,
+    change: Change | None,
+    beyond: Sequence[Drift],
+    sizes: str,
+    *,
+    is_call: bool,
+) -> list[str]:
     tension = next((each for each in test.drifts if each.quantity == TENSION), None)
     spoken = {each.quantity for each in (*beyond, *(suspects(change) if change else ()))}
     is_odd = test.change.outlier_probability > 0.5
-    state = _state(hanger, change, beyond, is_further=is_further)
-    parts = [
-        state,
-        action_words(hanger, change, beyond, test.drifts),
-        _when(change),
+    return [
         "This test itself is probably an outlier." if is_odd else "",
         _tension_now(tension) if tension and TENSION in spoken else "",
         _details(
-            _sizes(change, beyond) or _HALF_WIDTH * ("±" in state),
+            sizes,
             _probabilities(test, change, beyond),
             _false_alarms(change) if is_call else "",
         ),
     ]
-    return " ".join(part for part in parts if part)
 
 
-def _of_frequencies(
-    test: WatchedTest,
-    hanger: Hanger,
-    change: Change | None,
-    beyond: Sequence[Drift],
-    *,
-    is_call: bool,
-    is_further: bool,
-) -> str:
-    """What `message_of` says of a structure of which frequencies alone are watched."""
-    parts = [
-        frequencies_state(hanger, change, beyond, is_further=is_further),
-        action_words(hanger, change, beyond, test.drifts),
-        _when(change),
+def _of_frequencies(test: WatchedTest, change: Change | None, *, is_call: bool) -> list[str]:
+    """The same of a structure of which frequencies alone are watched."""
+    return [
         "Temperature, frost and excitation are taken off as far as the tests show what they do.",
         _details(
             _HALF_WIDTH,
@@ -99,7 +127,6 @@ def _of_frequencies(
             _false_alarms(change) if is_call else "",
         ),
     ]
-    return " ".join(part for part in parts if part)
 
 
 def message_of_agreeing(
@@ -140,21 +167,12 @@ def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
     )
 
 
-def message_of_baseline(test: WatchedTest, hanger: Hanger) -> str:
-    """Of a baseline that agrees with none of the tests since."""
+def against_baseline_words(change: Change, hanger: Hanger) -> str:
+    """That the baseline is the odd one, and what to do: of an alert and of a warning."""
     return (
-        f"Hanger {hanger.id}: {against_baseline_words(test.change)} Find out what was different on "
-        "the day of the baseline within a week: either it was disturbed, by a load on the deck for "
-        "one, or the hanger changed right after it; no test tells which. Then set another "
-        "(`shm drift rebaseline`)."
-    )
-
-
-def against_baseline_words(change: Change) -> str:
-    """That the baseline is the odd one."""
-    return (
-        f"the {change.against_baseline} tests since the baseline agree with each other and not "
-        "with it."
+        f"Hanger {hanger.id}: the {change.against_baseline} tests since the baseline agree with "
+        f"each other and not with it. Find out {WEEK} what was different on its day, and set "
+        "another (`shm drift rebaseline`)."
     )
 
 
@@ -285,12 +303,11 @@ def _between(after: datetime, by: datetime) -> str:
 
 
 def _tension_now(drift: Drift) -> str:
-    """The tension in the unit that fits it: a figure that the owner knows."""
+    """The tension to three digits, of which its absolute interval hardly leaves more."""
     unit = force_unit(drift.value, drift.baseline)
-    half = unit.of(NINETY_PERCENT * drift.shift_sd * drift.baseline)
-    places = max(0, 1 - math.floor(math.log10(half))) if 0 < half < 10 else 0
-    now = f"{unit.of(drift.value):.{min(places, unit.decimals(drift.baseline))}f} {unit.name}"
-    return f"Tension is now {now}, {unit.told(drift.baseline)} at the baseline."
+    places = max(0, 2 - math.floor(math.log10(unit.of(drift.baseline))))
+    now, then = (f"{unit.of(n):.{places}f} {unit.name}" for n in (drift.value, drift.baseline))
+    return f"Tension is now {now}, {then} at the baseline."
 
 
 def _details(*parts: str) -> str:

@@ -51,7 +51,7 @@ def watch_gap(
         time=time,
         message=f"Hanger {hanger.id}: the frequencies that {current.model} predicts lie "
         f"{now:.2f} % off the measured ones, {before:.2f} % when it was adopted: its effects do "
-        f"not describe this test. Diagnose the gap again.",
+        f"not describe this test. Diagnose the gap again within a week.",
         drifts=(),
         kinds=("gap",),
     )

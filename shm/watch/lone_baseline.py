@@ -40,7 +40,7 @@ from shm.watch.agreement import (
     read_alone,
     scatter_of,
 )
-from shm.watch.alert_text import message_of_baseline, short_name
+from shm.watch.alert_text import against_baseline_words, short_name
 from shm.watch.change_words import is_stiffness, quantity_words, size_words
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
@@ -163,4 +163,12 @@ def _message(hanger: Hanger, lead: Drift, tests: int) -> str:
         f"different on the day of the baseline. {now}The last {tests} tests agree with each other "
         "and not with it; no test tells which. If it was disturbed, set another (`shm drift "
         "rebaseline`)."
+    )
+
+
+def message_of_baseline(test: WatchedTest, hanger: Hanger) -> str:
+    """Of a baseline that agrees with none of the tests since."""
+    return (
+        f"{against_baseline_words(test.change, hanger)} Either the baseline was disturbed, by a "
+        "load on the deck for one, or the hanger changed right after it; no test shows which."
     )

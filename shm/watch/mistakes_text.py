@@ -38,8 +38,8 @@ def _words(mistaken: Sequence[RepeatedMistake]) -> tuple[str, str, str]:
 
 def _of_misfit(since: str) -> tuple[str, str, str]:
     return (
-        f"its modes have not fitted the baseline's since {since}, too many to be misnamed.",
-        "Before the next planned test, compare how the modes were numbered then and now, and "
+        f"its modes have not fitted the baseline's since {since}, too many to be misnumbered.",
+        "At the next planned test, compare how the modes were numbered then and now, and "
         "look for new fittings.",
         "No tension and no end stiffness of the baseline's model explains them, so these tests "
         "count for little until another baseline is set (`shm drift rebaseline`).",

@@ -214,7 +214,7 @@ def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertSta
     odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
     change = test.change if news.call else _explaining(news.beyond, called, test.change)
     is_further = news.call and bool(standing.called)
-    alert = _alert(news, change, test, hanger, is_further=is_further)
+    alert = _alert(news, change, test, hanger, standing, is_further=is_further)
     alone = told.alone
     since_baseline: tuple[Drift, ...] = ()
     if alert is None and test.change.is_baseline_alone and not (alone or standing.beyond):
@@ -321,7 +321,13 @@ def _explaining(beyond: Sequence[Drift], called: Sequence[Change], now: Change) 
 
 
 def _alert(
-    news: _News, change: Change | None, test: WatchedTest, hanger: Hanger, *, is_further: bool
+    news: _News,
+    change: Change | None,
+    test: WatchedTest,
+    hanger: Hanger,
+    standing: AlertState,
+    *,
+    is_further: bool,
 ) -> Alert | None:
     kinds: tuple[AlertKind, ...] = ((_BEYOND,) if news.beyond else ()) + (
         (_kind(test.change),) if news.call else ()
@@ -334,12 +340,28 @@ def _alert(
         test=test.test,
         time=test.time,
         message=message_of(
-            test, hanger, change, news.beyond, is_call=news.call, is_further=is_further
+            test,
+            hanger,
+            change,
+            news.beyond,
+            is_call=news.call,
+            is_further=is_further,
+            standing=_standing(test, standing, hanger),
         ),
         drifts=news.beyond or _suspected(test),
         kinds=kinds,
         change=change,
     )
+
+
+def _standing(test: WatchedTest, standing: AlertState, hanger: Hanger) -> list[Drift]:
+    """What was said to be beyond its threshold and still is: as sure as it was then."""
+    level = hanger.thresholds.alert_probability
+    return [
+        replace(each, probability=max(each.probability, level))
+        for each in test.drifts
+        if (each.quantity, way_of(each.shift_mean)) in standing.beyond.keys() - standing.agreed
+    ]
 
 
 def _kind(change: Change) -> AlertKind:

@@ -23,6 +23,7 @@ from shm_daemon.web.address import Address
 from shm_daemon.web.bridge_view import HangerGlance
 from shm_daemon.web.pages.bridge import CLASSES, elevation, kind_of, shift_words
 from shm_daemon.web.site import Description, Site
+from tests.helpers.nouns import a_message
 from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import START, make_workspace, write_test
@@ -32,12 +33,12 @@ def glance(hanger: Hanger, shift: float = 0.0, sd: float = 0.003) -> HangerGlanc
     """A hanger whose tension moved by so much since its baseline."""
     moved = Drift(hanger.id, "t9", START, TENSION, 711e3, 711e3, shift, sd, 0.05, 0.1)
     tension = Interval.normal(711e3, 5e3)
-    line = HangerLine(hanger, Status.STEADY, START, tension, drift=moved)
+    line = HangerLine(hanger, a_message(Status.STEADY), START, tension, drift=moved)
     return HangerGlance(line, tests=9)
 
 
 def never_tested(hanger: Hanger) -> HangerGlance:
-    return HangerGlance(HangerLine(hanger, None))
+    return HangerGlance(HangerLine(hanger, a_message()))
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +79,7 @@ def test_each_hanger_is_a_link_with_its_state_in_words(client: httpx.Client) -> 
     links = drawn(client.get("/").text).findall("a")
     assert [link.get("href") for link in links] == ["/hangers/3", "/hangers/4"]
     lost, never = (link.get("aria-label", "") for link in links)
-    assert re.match(r"Hanger 3, -(19|20|21)\.?\d* % .* since the baseline", lost)
+    assert re.match(r"Hanger 3, -(19|20|21)\.?\d* ± .* % since the baseline", lost)
     assert "open alert" in lost
     assert "no test yet" in never
 
@@ -98,8 +99,8 @@ def test_the_table_says_the_same(client: httpx.Client) -> None:
     text = [" ".join(re.sub(r"<[^>]+>", " ", row).split()) for row in rows]
     assert len(text) == 2
     assert text[0].startswith("Hanger 3 Alert ")
-    assert re.search(r"-(19|20|21)\.\d+ \(-\d+\.\d+ to -\d+\.\d+\)", text[0])
-    assert text[1].startswith("Hanger 4 no test yet")
+    assert re.search(r"-(19|20|21)\.\d+ ± \d+\.\d+", text[0])
+    assert text[1].startswith("Hanger 4 Hanger 4: no test yet.")
     assert "/alerts?hanger=3" in rows[0]
 
 
@@ -145,8 +146,8 @@ def test_a_shift_has_a_class_that_the_legend_names(hanger: Hanger, shift: float,
 
 def test_where_there_is_no_change_to_tell_none_is_told(hanger: Hanger) -> None:
     tension = Interval.normal(711e3, 5e3)
-    first = HangerLine(hanger, Status.FIRST, START, tension, baseline_tension_n=tension)
-    unready = HangerLine(hanger, Status.FIRST, START, tension)
+    first = HangerLine(hanger, a_message(Status.FIRST), START, tension, baseline_tension_n=tension)
+    unready = HangerLine(hanger, a_message(Status.FIRST), START, tension)
     told = {
         "is the baseline": HangerGlance(first),
         "no baseline yet": HangerGlance(unready),
@@ -158,7 +159,7 @@ def test_where_there_is_no_change_to_tell_none_is_told(hanger: Hanger) -> None:
 
 def test_a_test_that_the_watch_passed_over_is_compared_by_itself(hanger: Hanger) -> None:
     then, now = Interval.normal(700e3, 5e3), Interval.normal(630e3, 5e3)
-    line = HangerLine(hanger, Status.STEADY, START, now, baseline_tension_n=then)
+    line = HangerLine(hanger, a_message(Status.STEADY), START, now, baseline_tension_n=then)
     assert kind_of(HangerGlance(line)) == "lost3"
 
 

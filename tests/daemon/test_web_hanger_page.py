@@ -14,9 +14,9 @@ import plotly.graph_objects as plotly
 import pytest
 
 from shm.pipeline.reporting import hanger_report
-from shm.report.contents import status
+from shm.report.contents import message, status
 from shm.report.hanger_status import Status
-from shm.report.hanger_summary import summary
+from shm.report.hanger_summary import details
 from shm.report.states import NOTHING_WATCHED, StatesOverTime
 from shm.store import Lineage, Workspace
 from shm_daemon.web.background_work import BackgroundWorker, Order
@@ -103,6 +103,11 @@ def names_in(document: dict[str, Any]) -> set[str]:
     return {trace.get("name", "") for trace in document["data"]}
 
 
+def _plain(text: str) -> str:
+    """Without the marks around commands, and the spaces that tags leave."""
+    return re.sub(r"[`\s]", "", text)
+
+
 def test_the_page_says_what_the_report_says(
     page: str, bridge: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -111,7 +116,9 @@ def test_the_page_says_what_the_report_says(
     with bridge.store() as store:
         report = hanger_report(bridge, store, 3, START)
     assert status(report) is Status.ALERT
-    assert summary(report) in words_of(page)
+    said = _plain(words_of(page))
+    assert _plain(message(report).words) in said
+    assert _plain(details(report)) in said
     assert f'<span class="status alert">{Status.ALERT.value}</span>' in page
 
 

@@ -15,6 +15,7 @@ import pytest
 import sqlalchemy as sa
 
 import shm_daemon
+from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.pipeline.reporting import hanger_report
 from shm.report.hanger_status import Status
@@ -140,7 +141,7 @@ def test_what_all_hangers_are_asked_for_answers_without_the_damaged_one(bridge: 
     ):
         with values_changed(bridge, table, column, id_):
             with bridge.store() as store:
-                lines = hanger_lines(bridge, store)
+                lines = hanger_lines(bridge, store, utc_now())
                 assert len(lines) == 2
                 assert lines[1].status is Status.ALERT, table
                 assert hanger_report(bridge, store, 4, START).posterior.hanger == 4
@@ -153,7 +154,7 @@ def test_what_all_hangers_are_asked_for_answers_without_the_damaged_one(bridge: 
 def test_a_damaged_watch_shows_no_green_hanger(bridge: Workspace) -> None:
     damage(bridge, "watches", "document", 2)
     with bridge.store() as store:
-        line = hanger_lines(bridge, store)[0]
+        line = hanger_lines(bridge, store, utc_now())[0]
     assert line.status is None
     assert "row 2 of watches of hanger 3 is damaged" in line.called
 

@@ -6,6 +6,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
+from shm.report.hanger_status import HangerMessage, Status
 from shm.store import ReceivedFile
 from shm.values import (
     Alert,
@@ -23,6 +24,7 @@ from shm.values import (
     ShapePoint,
     WatchedTest,
 )
+from shm.values.messages import Lead
 
 NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)
 
@@ -133,3 +135,12 @@ def a_watched_test(test: str = "t2", **changes: object) -> WatchedTest:
 
 def an_alert(key: str = "hanger-3:tension-down", test: str = "t2") -> Alert:
     return Alert(key, 3, test, NOW, "Hanger 3: tension moved.", (a_drift(test),))
+
+
+def a_message(status: Status | None = None) -> HangerMessage:
+    return HangerMessage(
+        status,
+        Lead(
+            f"Hanger 3: {status.value if status else 'no test'}.", "Repeat the test within a week."
+        ),
+    )

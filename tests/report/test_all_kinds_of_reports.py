@@ -32,6 +32,7 @@ from shm.report.period import Period
 from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
 from shm.watch.history import Band
+from tests.helpers.nouns import a_change, a_message
 from tests.helpers.pdf_words import Pdf
 from tests.report.conftest import START
 from tests.report.diagnoses import CASES
@@ -96,7 +97,7 @@ KINDS: dict[str, Change] = {
         trend=tuple(unrecorded(row) for row in data.trend),
     ),
     "called drift": lambda data: replace(
-        data, states=watched(data), is_called=True, drift_watch="Called: the tension fell by 7 %."
+        data, states=watched(data), called=(a_change(),), drift_watch="Tension fell by 7 %."
     ),
     "adopted class": lambda data: replace(
         data,
@@ -173,13 +174,14 @@ def test_a_bridge_is_told_in_numbers_and_words(season: HangerReport, with_period
     tension = Interval(650e3, 640e3, 660e3)
     course = Course(2, 1, Interval(-0.07, -0.08, -0.06)) if with_period else None
     lines = (
-        HangerLine(season.hanger, Status.ALERT, START, tension, "", 1, season.drifts[0],
+        HangerLine(season.hanger, a_message(Status.ALERT), START, tension, "", 1, season.drifts[0],
                    "t009", "beam2", course),
-        HangerLine(replace(season.hanger, id=4), Status.FIRST, None, tension, "", 0, drift,
-                   course=Course(1) if with_period else None),
-        HangerLine(replace(season.hanger, id=5, nominal_tension_n=0.0), Status.STEADY, START,
-                   tension),
-        HangerLine(replace(season.hanger, id=6), None, course=Course() if with_period else None),
+        HangerLine(replace(season.hanger, id=4), a_message(Status.FIRST), None, tension, "", 0,
+                   drift, course=Course(1) if with_period else None),
+        HangerLine(replace(season.hanger, id=5, nominal_tension_n=0.0), a_message(Status.STEADY),
+                   START, tension),
+        HangerLine(replace(season.hanger, id=6), a_message(),
+                   course=Course() if with_period else None),
     )  # fmt: skip
     period = Period(START, season.generated_at) if with_period else None
     data = BridgeReport(

@@ -30,6 +30,7 @@ from shm.values import Hanger, Posterior, Selection, TensionEstimate
 from shm.values.force_units import force_unit
 from shm.watch.history import Band
 from shm.watch.neighbours import HangerShift, bridge_pattern
+from tests.helpers.nouns import a_message
 from tests.report.diagnoses import HANGER, sheet
 
 NOW = datetime(2026, 5, 1, tzinfo=UTC)
@@ -157,7 +158,7 @@ def test_a_bridge_has_one_unit_for_its_tensions_and_their_shifts(
     pattern = bridge_pattern(shifts, range(1, 7))
     carried = Interval(0.95 * tension_n, 0.94 * tension_n, 0.96 * tension_n)
     lines = tuple(
-        HangerLine(replace(hanger, id=number), Status.STEADY, NOW, carried)
+        HangerLine(replace(hanger, id=number), a_message(Status.STEADY), NOW, carried)
         for number in range(1, 7)
     )
     told = as_text(bridge_paper(BridgeReport("Arch", lines, pattern, "", NOW, "0.1.0")))
@@ -171,7 +172,9 @@ def test_a_bridge_has_one_unit_for_its_tensions_and_their_shifts(
 
 def test_the_largest_tension_of_a_bridge_decides_for_all(hanger: Hanger) -> None:
     lines = tuple(
-        HangerLine(replace(hanger, id=number), Status.STEADY, NOW, Interval(t, 0.9 * t, 1.1 * t))
+        HangerLine(
+            replace(hanger, id=number), a_message(Status.STEADY), NOW, Interval(t, 0.9 * t, 1.1 * t)
+        )
         for number, t in ((1, 900.0), (2, 30e3))
     )
     told = as_text(bridge_paper(BridgeReport("Arch", lines, None, "too few", NOW, "0.1.0")))

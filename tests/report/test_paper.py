@@ -22,6 +22,7 @@ from shm.report.modal_test_report import modal_test_paper
 from shm.report.paper import Paper, Part, Table
 from shm.report.trial_report import trial_paper
 from shm.watch.neighbours import HangerShift, bridge_pattern
+from tests.helpers.nouns import a_message
 from tests.helpers.pdf_words import Pdf
 from tests.report.conftest import START
 from tests.report.diagnoses import CASES, sheet
@@ -46,7 +47,9 @@ def of_bridge(season: HangerReport) -> Paper:
         HangerShift(number, number - 1, START, 700e3, -34e3 if number == 3 else 0.0, 1.5e3)
         for number in range(1, 6)
     ]
-    line = HangerLine(season.hanger, Status.ALERT, START, season.tension_n, "", 1, season.drifts[0])
+    line = HangerLine(
+        season.hanger, a_message(Status.ALERT), START, season.tension_n, "", 1, season.drifts[0]
+    )
     report = BridgeReport("Arch", (line,), bridge_pattern(shifts, range(1, 7)), "", START, "0.1.0")
     return bridge_paper(replace(report, settings={"seed": "1"}))
 

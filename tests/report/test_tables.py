@@ -77,7 +77,7 @@ def test_the_text_begins_with_hanger_and_status(season: HangerReport) -> None:
     first, rule, paragraph = as_text(hanger_paper(season)).splitlines()[:3]
     assert first == "Hanger 3, Arch bridge: Alert"
     assert set(rule) == {"="}
-    assert paragraph.startswith("Hanger 3 of Arch bridge carries")
+    assert paragraph.startswith("Hanger 3: tension fell by 7.2 ± 2.0 %, beyond its threshold.")
 
 
 def test_a_long_history_is_cut_in_the_text_and_says_so(season: HangerReport) -> None:

@@ -231,10 +231,10 @@ def test_a_sudden_loss_says_the_state_then_what_to_do_then_why() -> None:
 @pytest.mark.parametrize(
     ("baseline_n", "said"),
     [
-        (5.4, "Tension is now 4.97 N, 5.4 N at the baseline."),
-        (20e3, "Tension is now 18.40 kN, 20 kN at the baseline."),
-        (12e6, "Tension is now 11.04 MN, 12 MN at the baseline."),
-        (10.5e6, "Tension is now 9.66 MN, 10.5 MN at the baseline."),
+        (5.4, "Tension is now 4.97 N, 5.40 N at the baseline."),
+        (20e3, "Tension is now 18.4 kN, 20.0 kN at the baseline."),
+        (12e6, "Tension is now 11.0 MN, 12.0 MN at the baseline."),
+        (10.5e6, "Tension is now 9.7 MN, 10.5 MN at the baseline."),
     ],
 )
 def test_the_tension_is_told_in_the_unit_that_fits_it(baseline_n: float, said: str) -> None:
@@ -342,7 +342,7 @@ def test_a_slow_change_below_its_threshold_waits_for_the_next_planned_test() -> 
     slow = change(called=True, began=2, sudden=0.1)
     message = only(day(9, slow)).message
     assert "It came slowly and began between 2026-04-30 and 2026-05-03." in message
-    assert "Repeat the hammer test at the next planned date;" in message
+    assert "Compare again at the next planned test;" in message
     assert "Repeat the hammer test within a week;" in only(day(9, slow, 0.6)).message
 
 

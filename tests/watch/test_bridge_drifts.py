@@ -54,5 +54,5 @@ def test_the_shifts_of_neighbours_that_took_up_half_a_percent_each_are_found() -
 def test_a_bridge_on_which_nothing_moved_is_not_accused() -> None:
     pattern = bridge(3, {})
 
-    assert pattern.explanations[0].name == "nothing moved"
+    assert pattern.explanations[0].name == "no change"
     assert all(row.way == "unchanged" for row in pattern.rows)

@@ -14,7 +14,7 @@ from fastapi import Request
 from shm.errors import NothingThere
 from shm.pipeline.bridge_reporting import hanger_lines, hanger_shifts
 from shm.report.contents import HangerLine
-from shm.report.hanger_status import Status
+from shm.report.hanger_status import BridgeMessage, Status, bridge_message
 from shm.report.intervals import Interval
 from shm.values import NAN, Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
@@ -68,10 +68,14 @@ class BridgeGlance:
     hangers: tuple[HangerGlance, ...]
 
     @property
+    def message(self) -> BridgeMessage:
+        """What the page says first."""
+        return bridge_message({each.hanger.id: each.line.message for each in self.hangers})
+
+    @property
     def worst(self) -> Status | None:
         """The status of the hanger that is worst off; None before the first test."""
-        found = {each.line.status for each in self.hangers}
-        return next((status for status in Status if status in found), None)
+        return self.message.status
 
     @property
     def latest(self) -> HangerLine | None:
@@ -122,7 +126,7 @@ def glance(site: Site, now: datetime) -> BridgeGlance:
             tests[line.hanger.id].tests if line.hanger.id in tests else 0,
             line.latest is not None and line.latest < quiet_before,
         )
-        for line in hanger_lines(workspace, store)
+        for line in hanger_lines(workspace, store, now)
     )
     return BridgeGlance(workspace.bridge.name, hangers)
 

@@ -10,7 +10,9 @@ from fastapi import APIRouter, Path
 
 from shm.documents import averaged_document
 from shm.errors import BadInput, NothingThere
-from shm.store import DeliveryState, Store, StoredWatch, TrendPoint, Workspace
+from shm.pipeline import utc_now
+from shm.pipeline.bridge_reporting import hanger_lines
+from shm.store import DeliveryState, StoredWatch, TrendPoint, Workspace
 from shm.store.checksums import of_readable
 from shm.values import Hanger
 from shm_daemon.heartbeat import seconds_since_beat
@@ -19,6 +21,7 @@ from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
 from shm_daemon.web.models import LARGEST_NUMBER, Hangers, HangerState, Status
 from shm_daemon.web.plotting import plain
+from shm_daemon.web.site import Site
 
 router = APIRouter(prefix="/api", tags=["state"])
 Number = Annotated[int, Path(ge=0, le=LARGEST_NUMBER, description="The number of the hanger.")]
@@ -53,7 +56,7 @@ def status(site: AtSite, _: Reader) -> Any:
 )
 def hangers(site: AtSite, _: Reader) -> Any:
     """Tension with its interval, shifts and open alerts of each hanger."""
-    return {"hangers": _states(site.store, site.workspace.bridge.hangers)}
+    return {"hangers": _states(site, site.workspace.bridge.hangers)}
 
 
 @router.get(
@@ -64,7 +67,7 @@ def hangers(site: AtSite, _: Reader) -> Any:
 )
 def hanger(site: AtSite, _: Reader, hanger_id: Number) -> Any:
     """Tension with its interval, shifts and open alerts of one hanger."""
-    return _states(site.store, [described(site.workspace, hanger_id)])[0]
+    return _states(site, [described(site.workspace, hanger_id)])[0]
 
 
 def described(workspace: Workspace, hanger_id: int) -> Hanger:
@@ -80,8 +83,11 @@ def quarantined(workspace: Workspace) -> int:
     return sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json"))
 
 
-def _states(store: Store, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
+def _states(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
     """Of many hangers in as many questions as of one."""
+    store = site.store
+    lines = hanger_lines(site.workspace, store, utc_now(), hangers)
+    messages = {each.hanger.id: each.message.document for each in lines}
     trends, baselines = (
         store.posteriors.latest_trends(hangers),
         store.watch.baselines_in_force(hangers),
@@ -91,6 +97,7 @@ def _states(store: Store, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
     return [
         {
             "hanger": hanger.id,
+            **messages[hanger.id],
             "tests": tests[hanger.id].tests if hanger.id in tests else 0,
             "latest_test_at": tests[hanger.id].time if hanger.id in tests else None,
             "nominal_tension_n": hanger.nominal_tension_n,

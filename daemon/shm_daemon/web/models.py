@@ -115,7 +115,17 @@ class Creep(BaseModel):
     sd: float
 
 
-class HangerState(BaseModel):
+class Message(BaseModel):
+    """What is said first, the same on every surface; `status` is null where nothing is known."""
+
+    status: Literal["alert", "watch", "check", "unclear", "steady", "first"] | None
+    state: str = Field(description="What is the matter, with its interval.")
+    action: str = Field(description="What to do, and how soon.")
+    urgency: Literal["none", "next_test", "week", "today"]
+    notes: list[str] = Field(description="What people did about it.")
+
+
+class HangerState(Message):
     """What is known of a hanger after its latest test; null or empty before the first."""
 
     hanger: int
@@ -157,7 +167,7 @@ class Acknowledged(BaseModel):
 
 
 class AlertState(BaseModel):
-    """An alert; it is open while `acknowledged` is null."""
+    """An alert; it is open while `acknowledged` and `resolved` are null."""
 
     id: int
     hanger: int
@@ -166,6 +176,9 @@ class AlertState(BaseModel):
     test_at: datetime
     kinds: list[str] = Field(description="The rules that raised it.")
     message: str
+    state: str = Field(description="The first sentence of the message.")
+    action: str = Field(description="What the alert asks to do, and how soon.")
+    urgency: Literal["none", "next_test", "week", "today"]
     acknowledged: Acknowledged | None
     resolved: Acknowledged | None = Field(
         description="How its condition ended; null while it stands."
@@ -285,14 +298,13 @@ class Bounded(BaseModel):
     high: float
 
 
-class HangerAtAGlance(BaseModel):
+class HangerAtAGlance(Message):
     """One hanger as the page of the bridge shows it; null before its first test."""
 
     hanger: int
     name: str
     length_m: float
     nominal_tension_n: float
-    status: Literal["alert", "watch", "check", "steady", "first"] | None
     tests: int
     latest_test: str | None
     latest_test_at: datetime | None
@@ -307,11 +319,10 @@ class HangerAtAGlance(BaseModel):
     warnings: list[str] = Field(description="What is wrong with what the hanger is compared with.")
 
 
-class BridgeState(BaseModel):
-    """The whole bridge: `status` is that of the hanger that is worst off."""
+class BridgeState(Message):
+    """The whole bridge: its message is that of its most urgent hanger."""
 
     bridge: str
-    status: Literal["alert", "watch", "check", "steady", "first"] | None
     hangers: list[HangerAtAGlance]
 
 

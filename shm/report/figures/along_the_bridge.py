@@ -209,6 +209,7 @@ _MARKS = {
     Status.ALERT: (colours.RED, "v"),
     Status.WATCH: (colours.ORANGE, "D"),
     Status.CHECK: (colours.ORANGE, "X"),
+    Status.UNCLEAR: (colours.ORANGE, "P"),
     Status.STEADY: (colours.GREEN, "o"),
     Status.FIRST: (colours.BLUE, "s"),
 }

@@ -142,7 +142,8 @@ def _caption(data: StatesOverTime) -> str:
         else ""
     )
     return (
-        f"Tension and stiffness over time{at}: the swing with the temperature is taken out. Dots: "
+        f"Tension and stiffness over time{at}, temperature-compensated. Bands compare tests: what "
+        "all tests share is left out, so they are narrower than the absolute interval. Dots: "
         "what each test says by itself with its own 90 % interval, hollow where it was taken as an "
         "outlier, triangles where it lies out of view. Solid: the state from the tests up to each, "
         "with its 90 % band; dashed orange: from all tests. Dashed green: baseline; dash-dotted: "

@@ -67,8 +67,8 @@ def _at_one_scale(
     bridge: Bridge, causes: Sequence[AlikeCause], options: NeighbourOptions
 ) -> tuple[Part, ...]:
     found = nothing(bridge)
-    weight = found.log_evidence + math.log(options.prior["nothing moved"])
-    still = _part("nothing moved", weight, _NOBODY, found, bridge, options)
+    weight = found.log_evidence + math.log(options.prior["no change"])
+    still = _part("no change", weight, _NOBODY, found, bridge, options)
     return (
         still,
         _alike(bridge, causes, options),
@@ -92,10 +92,10 @@ def _part(
 
 def _by_itself(bridge: Bridge, options: NeighbourOptions) -> Part:
     found = independent(bridge, options)
-    weight = found.log_evidence + math.log(options.prior["each by itself"])
+    weight = found.log_evidence + math.log(options.prior["independent shifts"])
     unknown = np.full((1, len(bridge.shift_n)), np.nan)
     return Part(
-        "each by itself", np.array([weight]), _NOBODY, found.gained[None], found.lost[None],
+        "independent shifts", np.array([weight]), _NOBODY, found.gained[None], found.lost[None],
         unknown, unknown,
     )  # fmt: skip
 
@@ -103,8 +103,8 @@ def _by_itself(bridge: Bridge, options: NeighbourOptions) -> Part:
 def _alike(bridge: Bridge, causes: Sequence[AlikeCause], options: NeighbourOptions) -> Part:
     patterns = np.array([each.fractions * bridge.baseline_n for each in causes])
     found = weighed(bridge, _sized(patterns[:, :, None], options))
-    prior = math.log(options.prior["all alike"] / len(found.log_evidence))
-    return _part("all alike", found.log_evidence + prior, _NOBODY, found, bridge, options)
+    prior = math.log(options.prior["common shift"] / len(found.log_evidence))
+    return _part("common shift", found.log_evidence + prior, _NOBODY, found, bridge, options)
 
 
 def _sized(factors: FloatArray, options: NeighbourOptions) -> FloatArray:
@@ -124,7 +124,7 @@ def _moves(bridge: Bridge, options: NeighbourOptions) -> tuple[Part, Part, Part]
     two = _pairs(with_sign(found, one, -1), count)
     both = np.concatenate([factors[two[:, 0]], factors[two[:, 1]]], axis=2)
     found_of_two = weighed(bridge, _sized(both, options))
-    shed, gained = options.prior["shed load"], options.prior["gained load"]
+    shed, gained = options.prior["load redistribution"], options.prior["load gain"]
     one_shed = shed * (1 - options.two_hangers) / (count * sizes)
     two_shed = shed * options.two_hangers / (count * (count - 1) / 2 * sizes)
     two = np.tile(two, (sizes, 1))
@@ -136,9 +136,9 @@ def _moves(bridge: Bridge, options: NeighbourOptions) -> tuple[Part, Part, Part]
         return _part(name, weight, members, of, bridge, options)
 
     return (
-        part("shed load", one, found, -1, one_shed),
-        part("gained load", one, found, 1, gained / (count * sizes)),
-        part("shed load", two, found_of_two, -1, two_shed),
+        part("load redistribution", one, found, -1, one_shed),
+        part("load gain", one, found, 1, gained / (count * sizes)),
+        part("load redistribution", two, found_of_two, -1, two_shed),
     )
 
 

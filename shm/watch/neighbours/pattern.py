@@ -215,7 +215,7 @@ def _alike(
     shifts: Sequence[HangerShift], parts: Sequence[Part], causes: Sequence[AlikeCause]
 ) -> tuple[float, float, AlikeCause]:
     """The likeliest common cause, with the mean fraction of the hangers that it moves."""
-    alike = [part for part in parts if part.name == "all alike"]
+    alike = [part for part in parts if part.name == "common shift"]
     logs = np.array([part.log_weight for part in alike]).reshape(-1, len(causes))
     best = int(scipy.special.logsumexp(logs, axis=0).argmax())
     touched = causes[best].fractions != 0
@@ -240,10 +240,10 @@ def _sum_kept(
 ) -> SumKept:
     """The sum over those who moved with their neighbours; over all where nobody stands out."""
     best = explanations[0].name
-    if best in ("shed load", "gained load"):
+    if best in ("load redistribution", "load gain"):
         movers = next((s.hangers for s in suspects if s.name == best), ())
         centres = [row.place for row in rows if row.hanger in movers]
-    elif best == "each by itself":
+    elif best == "independent shifts":
         centres = [row.place for row in rows if row.way != "unchanged"]
     else:
         centres = []
@@ -251,7 +251,7 @@ def _sum_kept(
     group = [index for index, close in enumerate(near) if close]
     wanted = {c + step for c in centres for step in range(-_REACH, _REACH + 1)}
     wanted = wanted or set(range(min(bridge.places), max(bridge.places) + 1))
-    keeping = ("nothing moved", "shed load", "gained load")
+    keeping = ("no change", "load redistribution", "load gain")
     return SumKept(
         hangers=tuple(rows[index].hanger for index in group),
         sum_n=float(bridge.shift_n[group].sum()),

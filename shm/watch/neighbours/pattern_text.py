@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shm.values.force_units import force_unit
-from shm.values.rounding import NINETY_PERCENT, listed
+from shm.values.rounding import NINETY_PERCENT, listed, rounded, rounded_percent
 from shm.watch.neighbours.pattern_types import (
+    REDISTRIBUTION,
     BridgePattern,
     ExplanationName,
     HangerRow,
@@ -23,11 +24,11 @@ def sentence_of(pattern: BridgePattern, alike_remedy: str, options: NeighbourOpt
     best = pattern.explanations[0]
     if best.probability < options.named_from:
         return _undecided(pattern)
-    if best.name == "nothing moved":
+    if best.name == "no change":
         return _nothing(pattern)
-    if best.name == "all alike":
+    if best.name == "common shift":
         return _alike(pattern, alike_remedy)
-    if best.name == "each by itself":
+    if best.name == "independent shifts":
         return _each(pattern)
     return _moved(pattern, best.name)
 
@@ -38,53 +39,49 @@ def leading_suspect(pattern: BridgePattern, name: ExplanationName) -> Suspect | 
 
 
 def _undecided(pattern: BridgePattern) -> str:
-    likely = [each for each in pattern.explanations if each.probability > 0.05]
-    told = []
-    for each in likely:
-        suspect = leading_suspect(pattern, each.name)
-        which = f", most likely {_hangers(suspect.hangers).lower()}" if suspect else ""
-        told.append(f"{each.name} (probability {each.probability:.2f}{which})")
+    best = pattern.explanations[0]
+    suspect = leading_suspect(pattern, best.name)
+    way = "from" if best.name == REDISTRIBUTION else "of"
+    of = f" {way} {_hangers(suspect.hangers).lower()}" if suspect else ""
     largest = max(pattern.rows, key=lambda row: abs(row.shift_fraction))
     return (
-        f"It cannot be told yet what moved: {listed(told)}; the largest shift is "
-        f"{_percent(largest)} of hanger {largest.hanger}: test it and its neighbours again."
+        "It is not clear yet whether load moved between hangers. Most probable is "
+        f"{best.name}{of} (probability {best.probability:.2f}). The largest shift is "
+        f"{_percent(largest)}, of hanger {largest.hanger}."
     )
 
 
 def _nothing(pattern: BridgePattern) -> str:
     largest = max(pattern.rows, key=lambda row: abs(row.shift_fraction))
     return (
-        f"No hanger has moved: of the {len(pattern.rows)} compared the largest shift is "
-        f"{_percent(largest)} of hanger {largest.hanger}, no more than chance makes it."
+        f"No load has moved between hangers: the largest shift, {_percent(largest)} of hanger "
+        f"{largest.hanger}, is within the scatter."
     )
 
 
 def _alike(pattern: BridgePattern, remedy: str) -> str:
-    half = NINETY_PERCENT * pattern.alike_sd
-    mean, low, high = (100 * (pattern.alike_fraction + s * half) for s in (0, -1, 1))
-    who = "The hangers of one logger" if pattern.alike_cause.startswith("logger") else (
-        f"All {len(pattern.rows)} hangers"
-    )  # fmt: skip
+    size = rounded_percent(pattern.alike_fraction, NINETY_PERCENT * pattern.alike_sd, "+")
+    is_of_logger = pattern.alike_cause.startswith("logger")
+    who = "The hangers of one logger" if is_of_logger else "All hangers"
     return (
-        f"{who} moved by about {mean:+.1f} % (90 % interval {low:+.1f} to {high:+.1f} %): "
-        f"{pattern.alike_cause} rather than a hanger; {remedy}."
+        f"{who} shifted alike, by {size}. The probable cause is {pattern.alike_cause}, not the "
+        f"hangers. {remedy[0].upper()}{remedy[1:]}."
     )
 
 
 def _each(pattern: BridgePattern) -> str:
     moved = [row for row in pattern.rows if row.way != "unchanged"]
-    if len(moved) == 1:
-        return (
-            f"Hanger {moved[0].hanger} has {_way(moved[0], pattern)}, and its neighbours did "
-            "not take it up: check its sensor, its clamps and its description first, then itself."
-        )
     if not moved:
-        return "Some hangers moved a little, each by itself: test again to see which."
-    told = [f"{row.hanger}: {_force(row.shift_n, pattern, '+')}" for row in moved]
-    return (
-        f"{len(moved)} hangers moved, and their neighbours did not take it up ({listed(told)}): "
-        "check their tests, sensors and descriptions first, then the hangers themselves."
-    )
+        return (
+            "Some hangers changed a little, without load moving between them; the tests do not "
+            "show which."
+        )
+    alone = "A wrong sensor, clamp or description would look the same."
+    if len(moved) == 1:
+        row = moved[0]
+        return f"Hanger {row.hanger} {_way(row)}, and its neighbours did not take it up. {alone}"
+    names = _hangers([row.hanger for row in moved])
+    return f"{names} changed, and their neighbours did not take it up. {alone}"
 
 
 def _moved(pattern: BridgePattern, name: ExplanationName) -> str:
@@ -93,19 +90,16 @@ def _moved(pattern: BridgePattern, name: ExplanationName) -> str:
         return _undecided(pattern)
     rows = {row.hanger: row for row in pattern.rows}
     movers = [rows[hanger] for hanger in suspect.hangers]
-    told = " and ".join(f"hanger {row.hanger} has {_way(row, pattern)}" for row in movers)
-    doubt = _others(pattern, suspect)
-    remedy = (
-        "look at its ends, its clamps and its anchorage"
-        if name == "shed load"
-        else "ask whether it was tightened or worked on"
-    )
-    return f"{told[0].upper()}{told[1:]} and {_answer(pattern, movers, name)}{doubt}: {remedy}."
+    lost = name == REDISTRIBUTION
+    first = " ".join(f"Hanger {row.hanger} {_way(row)}." for row in movers)
+    whose = f"{_hangers(suspect.hangers).lower()} to {'its' if len(movers) == 1 else 'their'}"
+    lead = f"Load has moved from {whose} neighbours." if lost else ""
+    parts = (lead, first, _answer(pattern, movers, lost=lost), _others(pattern, suspect))
+    return " ".join(part for part in parts if part)
 
 
-def _answer(pattern: BridgePattern, movers: Sequence[HangerRow], name: ExplanationName) -> str:
+def _answer(pattern: BridgePattern, movers: Sequence[HangerRow], *, lost: bool) -> str:
     """How much of it the neighbours took up or gave."""
-    lost = name == "shed load"
     own = {row.hanger for row in movers}
     near = [
         row
@@ -115,19 +109,13 @@ def _answer(pattern: BridgePattern, movers: Sequence[HangerRow], name: Explanati
     answering = [
         row for row in near if (row.gained_probability if lost else row.lost_probability) > 0.5
     ] or near
-    whose = "its" if len(movers) == 1 else "their"
+    its, it = ("Its", "it") if len(movers) == 1 else ("Their", "them")
     if not answering:
-        return f"{whose} neighbours have no test to compare"
+        return f"{its} neighbours have no test to compare."
     taken = sum(row.shift_n for row in answering)
     half = sum((row.high_n - row.shift_n) ** 2 for row in answering) ** 0.5
-    low_n, high_n = sorted(abs(taken + s * half) for s in (-1, 1))
-    verb = "taken up" if lost else "given up"
-    names = listed([str(row.hanger) for row in answering])
-    many = len(answering) > 1
-    return (
-        f"{whose} neighbour{'s' if many else ''} {names} {'have' if many else 'has'} {verb} "
-        f"{_force(abs(taken), pattern)} of it {_within(low_n, high_n, pattern)}"
-    )
+    names, did = _hangers([row.hanger for row in answering]), "took up" if lost else "gave up"
+    return f"{names} beside {it} {did} {_force(abs(taken), half)} of it."
 
 
 def _others(pattern: BridgePattern, leading: Suspect) -> str:
@@ -137,70 +125,51 @@ def _others(pattern: BridgePattern, leading: Suspect) -> str:
     if len(alike) < 2 or leading.probability > _SURE_WHICH * whole:
         return ""
     return (
-        f" (or rather {_hangers(alike[1].hangers).lower()}: probabilities "
-        f"{leading.probability:.2f} and {alike[1].probability:.2f})"
+        f"It may also be {_hangers(alike[1].hangers).lower()} (probability "
+        f"{alike[1].probability:.2f})."
     )
 
 
 def remarks_of(pattern: BridgePattern) -> tuple[str, ...]:
     """What qualifies the sentence: the sum, and who was not compared."""
-    remarks = [_sum(pattern)]
+    kept = pattern.sum_kept
+    half = NINETY_PERCENT * kept.sum_sd_n
+    remarks = [
+        f"The sum of the tensions of {_group(pattern)} changed by {_force(kept.sum_n, half, '+')}."
+    ]
+    if not kept.complete:
+        remarks.append("A hanger without a test, or the bridge's end, may carry a part of it.")
     if pattern.not_compared:
         names = _hangers([each.hanger for each in pattern.not_compared])
         remarks.append(f"Not compared: {names.lower()}, whose tests are too old or missing.")
     return tuple(remarks)
 
 
-def _sum(pattern: BridgePattern) -> str:
-    kept = pattern.sum_kept
-    moved = (
-        f"The sum over {_group(pattern)} has moved by {_force(kept.sum_n, pattern, '+')} "
-        f"(sd {_force(kept.sum_sd_n, pattern)})"
-    )
-    if kept.complete:
-        return f"{moved}; the probability that it is kept is {kept.probability:.2f}."
-    return (
-        f"{moved}; a hanger without a test, or the bridge's end, may carry a part of it, and with "
-        f"that part the probability that the sum is kept is {kept.probability:.2f}."
-    )
-
-
 def _group(pattern: BridgePattern) -> str:
-    """`all 20 hangers`, `hangers 5 to 9`, or their numbers."""
+    """`all hangers compared`, `hangers 5 to 9`, or their numbers."""
     hangers = pattern.sum_kept.hangers
     if len(hangers) == len(pattern.rows):
-        return f"all {len(hangers)} hangers compared"
+        return "all hangers compared"
     places = [row.place for row in pattern.rows if row.hanger in hangers]
     if len(hangers) > 2 and places == list(range(places[0], places[0] + len(places))):
         return f"hangers {hangers[0]} to {hangers[-1]}"
     return _hangers(hangers).lower()
 
 
-def _way(row: HangerRow, pattern: BridgePattern) -> str:
-    """`lost 34 kN (90 % interval 28 to 40 kN)`."""
-    low_n, high_n = sorted(abs(value) for value in (row.low_n, row.high_n))
+def _way(row: HangerRow) -> str:
+    """`lost 34.1 ± 5.8 kN`."""
     verb = "lost" if row.shift_n < 0 else "gained"
-    return f"{verb} {_force(abs(row.shift_n), pattern)} {_within(low_n, high_n, pattern)}"
+    return f"{verb} {_force(abs(row.shift_n), (row.high_n - row.low_n) / 2)}"
 
 
-def _within(low_n: float, high_n: float, pattern: BridgePattern) -> str:
-    """`(90 % interval 28 to 40 kN)`."""
-    low, _, _ = _force(low_n, pattern).partition(" ")
-    return f"(90 % interval {low} to {_force(high_n, pattern)})"
-
-
-def _force(force_n: float, pattern: BridgePattern, sign: str = "") -> str:
-    """`34 kN`: in the unit of the tensions that shift, so that all of a sentence compare."""
-    largest_n = max(row.baseline_n for row in pattern.rows)
-    unit = force_unit(largest_n)
-    return f"{unit.of(force_n):{sign}.{unit.decimals(largest_n) - 1}f} {unit.name}"
+def _force(force_n: float, half_n: float, sign: str = "") -> str:
+    """`34.1 ± 5.8 kN`, rounded by its interval."""
+    unit = force_unit(force_n, half_n)
+    return f"{rounded(unit.of(force_n), unit.of(half_n), sign)} {unit.name}"
 
 
 def _percent(row: HangerRow) -> str:
-    mean, low, high = (
-        100 * each for each in (row.shift_fraction, row.low_fraction, row.high_fraction)
-    )
-    return f"{mean:+.1f} % (90 % interval {low:+.1f} to {high:+.1f} %)"
+    return rounded_percent(row.shift_fraction, (row.high_fraction - row.low_fraction) / 2, "+")
 
 
 def _hangers(hangers: Sequence[int]) -> str:

@@ -10,8 +10,9 @@ from typing import Literal
 from shm.values import NAN
 
 ExplanationName = Literal[
-    "nothing moved", "shed load", "gained load", "all alike", "each by itself"
+    "no change", "load redistribution", "load gain", "common shift", "independent shifts"
 ]
+REDISTRIBUTION: ExplanationName = "load redistribution"
 Way = Literal["gained", "lost", "unchanged"]
 
 
@@ -37,11 +38,11 @@ class HangerShift:
 
 # Judgement: why, says `NeighbourOptions`.
 _PRIOR: dict[ExplanationName, float] = {
-    "nothing moved": 0.70,
-    "shed load": 0.10,
-    "gained load": 0.04,
-    "all alike": 0.08,
-    "each by itself": 0.08,
+    "no change": 0.70,
+    "load redistribution": 0.10,
+    "load gain": 0.04,
+    "common shift": 0.08,
+    "independent shifts": 0.08,
 }
 
 

@@ -5,14 +5,18 @@ then the others.
 from __future__ import annotations
 
 from collections.abc import Container, Sequence
+from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
 from shm.pipeline import utc_now
+from shm.pipeline.bridge_reporting import hanger_lines
+from shm.report.hanger_status import HangerMessage
 from shm.store import AlertRow, Silence
 from shm.store.stored_silences import silenced_until
+from shm.values.messages import Lead
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import test_page
 from shm_daemon.web.faults import answers
@@ -64,12 +68,34 @@ def _some(
     """Alerts as the page shows them, and the number to go on after, if there are more."""
     rows = site.store.alerts.list_rows(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
     shown = rows[:_SHOWN]
-    documents = alert_documents(shown, site)
+    documents, now = alert_documents(shown, site), _messages(shown, site)
     older = shown[-1].id if len(rows) > _SHOWN else None
     return [
-        {**document, "address": _address(each, site), "stream": _stream_of(each, site)}
+        {
+            **document,
+            "address": _address(each, site),
+            "stream": _stream_of(each, site),
+            "now": _now(each, now.get(each.hanger)),
+        }
         for each, document in zip(shown, documents, strict=True)
     ], older
+
+
+def _messages(shown: Sequence[AlertRow], site: Site) -> dict[int, HangerMessage]:
+    """What is said first of the hangers of these alerts, by their numbers."""
+    numbers = {each.hanger for each in shown if each.resolution is None}
+    hangers = [each for each in site.workspace.bridge.hangers if each.id in numbers]
+    if not hangers:
+        return {}
+    lines = hanger_lines(site.workspace, site.store, utc_now(), hangers)
+    return {each.hanger.id: each.message for each in lines}
+
+
+def _now(alert: AlertRow, message: HangerMessage | None) -> str:
+    """How the hanger of an alert that stands is now; empty where the alert says just that."""
+    if message is None or alert.resolution or alert.kinds == ("test",):
+        return ""
+    return "" if alert.message.startswith(message.lead.words) else message.lead.words
 
 
 def _address(alert: AlertRow, site: Site) -> str | None:
@@ -155,7 +181,7 @@ def alert_documents(found: Sequence[AlertRow], site: Site) -> list[dict[str, Any
 def _document(
     alert: AlertRow, escalates: Container[str], silences: tuple[Silence, ...], now: datetime
 ) -> dict[str, Any]:
-    noted, ended = alert.acknowledgement, alert.resolution
+    noted, ended, lead = alert.acknowledgement, alert.resolution, Lead.of(alert.message)
     return {
         "id": alert.id,
         "hanger": alert.hanger,
@@ -164,6 +190,8 @@ def _document(
         "test_at": alert.test_time,
         "kinds": list(alert.kinds),
         "message": alert.message,
+        **asdict(lead),
+        "urgency": lead.urgency,
         "acknowledged": noted and noted.said,
         "resolved": ended and ended.said,
         "silenced_until": None if ended else silenced_until(silences, alert.hanger, now),

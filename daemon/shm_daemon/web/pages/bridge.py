@@ -22,6 +22,7 @@ from shm.report import formatting
 from shm.report.contents import hangers_unit
 from shm.report.intervals import Interval
 from shm.values.force_units import ForceUnit
+from shm.values.rounding import rounded_percent
 from shm_daemon.heartbeat import told
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import test_page
@@ -40,7 +41,6 @@ from shm_daemon.web.site import held_documents
 
 router = APIRouter(tags=["state"])
 
-_MOST_DECIMALS = 2  # judgement: of a per cent; no test tells tensions to a hundredth of that
 _COMPARING = "The hangers are being compared …"
 
 
@@ -61,7 +61,11 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
         legend=[(kind, said, triangles(kind, 16, 24)) for kind, said in CLASSES],
         moved=found.sentence if found else None,
         unit=unit.name,
-        warnings=[said for each in bridge.hangers for said in each.line.warnings],
+        warnings=[
+            said
+            for each in bridge.hangers
+            for said in each.line.message.beyond_lead(each.line.warnings)
+        ],
         rows=[_row(each, unit, now) for each in bridge.hangers],
     )
 
@@ -86,7 +90,7 @@ def bridge(site: AtSite, _: Reader) -> Any:
     found = glance(site, utc_now())
     return {
         "bridge": found.name,
-        "status": found.worst.name.lower() if found.worst else None,
+        **found.message.document,
         "hangers": [_glance_document(each) for each in found.hangers],
     }
 
@@ -138,10 +142,12 @@ def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
         "id": hanger.id,
         "name": formatting.hanger_name(hanger.id, hanger.name),
         "status": line.status,
-        "tension": formatting.with_span(tension.in_unit(unit)) if tension else "no test yet",
-        "nominal": f"{line.of_nominal.mean:.1f}" if line.of_nominal else "",
+        "tension": formatting.with_half(tension, unit).removesuffix(f" {unit.name}")
+        if tension
+        else "no test yet",
+        "nominal": formatting.mean(line.of_nominal) if line.of_nominal else "",
         "shift": _shift(each),
-        "called": line.called,
+        "message": line.message,
         "open_alerts": line.open_alerts,
         "day": f"{latest:%Y-%m-%d}" if latest else "",
         "age": f"{told(now - latest)} ago" if latest else "",
@@ -151,15 +157,14 @@ def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
     }
 
 
+def _in(unit: ForceUnit, tension: Interval) -> str:
+    return formatting.with_half(tension, unit).removesuffix(f" {unit.name}")
+
+
 def _shift(each: HangerGlance) -> str:
     if each.shift is None:
         return shift_words(each) if each.line.latest else ""
-    percent = each.shift.scaled(100)
-    places = min(_MOST_DECIMALS, max(1, formatting.decimals(percent.width)))
-    mean, low, high = (
-        f"{value:+z.{places}f}" for value in (percent.mean, percent.low, percent.high)
-    )
-    return f"{mean} ({low} to {high})"
+    return rounded_percent(each.shift.mean, each.shift.width / 2, "+").removesuffix(" %")
 
 
 def _glance_document(each: HangerGlance) -> dict[str, Any]:
@@ -169,7 +174,7 @@ def _glance_document(each: HangerGlance) -> dict[str, Any]:
         "name": hanger.name,
         "length_m": hanger.length_m,
         "nominal_tension_n": hanger.nominal_tension_n,
-        "status": line.status.name.lower() if line.status else None,
+        **line.message.document,
         "tests": each.tests,
         "latest_test": line.test or None,
         "latest_test_at": line.latest,
@@ -282,7 +287,8 @@ def shift_words(glance: HangerGlance) -> str:
         return "is the baseline"
     if glance.shift is None:
         return "no baseline yet" if glance.line.tension_n else "no test yet"
-    return f"{formatting.signed_percent(glance.shift)} since the baseline"
+    shift = glance.shift
+    return f"{rounded_percent(shift.mean, shift.width / 2, '+')} since the baseline"
 
 
 def triangles(kind: str, x: float, base: float, hollow: bool = False) -> tuple[Triangle, ...]:

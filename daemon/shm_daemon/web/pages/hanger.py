@@ -9,11 +9,13 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
+from shm.pipeline import utc_now
+from shm.pipeline.bridge_reporting import hanger_lines
 from shm.report import formatting, hanger_tables
-from shm.report.contents import HangerReport, status
+from shm.report.contents import HangerReport, message
 from shm.report.diagnosis_report import answers, evidence
 from shm.report.hanger_report import facts, gap_part
-from shm.report.hanger_summary import summary
+from shm.report.hanger_summary import details
 from shm.report.paper import Table
 from shm.report.states import called_words
 from shm.report.temperatures import temperature_table
@@ -78,7 +80,8 @@ def hanger(request: Request, site: AtSite, _: Reader, hanger_id: Number) -> HTML
         "held": held_documents(site, one.id),
     }
     if view.report is None:
-        return page(request, "hanger_untested.html.j2", **common)
+        (line,) = hanger_lines(site.workspace, site.store, utc_now(), [one])
+        return page(request, "hanger_untested.html.j2", message=line.message, **common)
     return page(request, "hanger.html.j2", **common, **_content(view, view.report))
 
 
@@ -107,11 +110,13 @@ def all_tests(
 
 
 def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
-    found = status(report)
+    said = message(report)
+    assert said.status is not None  # a hanger with a test has one
     return {
-        "status_word": found.value,
-        "style": found.name.lower(),
-        "summary": summary(report),
+        "status_word": said.status.value,
+        "style": said.status.name.lower(),
+        "lead": said.words,
+        "details": details(report),
         "facts": facts(report),
         "is_called": report.is_called,
         "charts": {part: _charts(view, part) for part in ("trends", "model", "gap")},
@@ -142,15 +147,15 @@ def _tables(view: HangerView, report: HangerReport) -> list[Table]:
 
 
 def _events(view: HangerView) -> Table:
-    """What people did and what the watch called, the latest first."""
+    """What people did and what the watch detected, the latest first."""
     done = [(e.at, _EVENTS[e.kind], e.who, e.why) for e in view.events if e.kind in _EVENTS]
     called = [
-        (call.watched.time, "change called", "the watch", called_words(call.watched.change))
+        (call.watched.time, "change detected", "the watch", called_words(call.watched.change))
         for call in view.calls
     ]
     rows = sorted([*done, *called], key=lambda row: row[0], reverse=True)
     return Table(
-        "What was set, adopted and called, latest first",
+        "What was set, adopted and detected, latest first",
         ("time", "what", "by", "why"),
         tuple((formatting.moment(at), *rest) for at, *rest in rows[:_LATEST_EVENTS]),
         note=formatting.some(min(len(rows), _LATEST_EVENTS), len(rows), "events").strip(),

@@ -24,6 +24,14 @@
     noted.textContent = `Acknowledged by ${alert.acknowledged.who}: ${alert.acknowledged.why}`;
     form.closest("details").replaceWith(noted);
     card.classList.remove("open");
+    const open = document.getElementById("open");
+    open.dataset.count -= 1;
+    open.textContent = `${open.dataset.title} (${open.dataset.count})`;
+    const closed = document.querySelector("section[aria-labelledby=acknowledged]");
+    if (closed) {
+      closed.hidden = false;
+      closed.querySelector("h2").after(card);
+    }
     const told = document.getElementById("told");
     told.textContent = `Alert ${alert.id} is acknowledged.`;
     card.tabIndex = -1;

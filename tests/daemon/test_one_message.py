@@ -1,0 +1,460 @@
+"""Every state of a hanger, on every surface: the same state, number, action and urgency.
+
+The surfaces are home page, hanger page, report, alert, what a hook gets, and `shm status`; each as
+a person reads it and as a document. What they say keeps to the rules of the product's language.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import datetime, timedelta
+
+import httpx
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from shm.documents import alert_document
+from shm.errors import DamagedRow
+from shm.pipeline import utc_now
+from shm.pipeline.bridge_reporting import bridge_report
+from shm.pipeline.reporting import hanger_report
+from shm.report.as_text import as_text
+from shm.report.bridge_report import bridge_json, bridge_paper
+from shm.report.bridge_report import summary as bridge_summary
+from shm.report.hanger_report import hanger_json, hanger_paper
+from shm.report.hanger_status import Status
+from shm.report.hanger_summary import summary
+from shm.store import IdentifiedTest, Lineage, Store, StoredTest, Workspace
+from shm.values import Alert, Change, Drift, RepeatedMistake, Selection, WatchedTest
+from shm.values.messages import Lead, Urgency
+from shm.watch.alert_text import message_of
+from shm.watch.watching import new_alert
+from shm_cli.main import cli
+from tests.helpers.damaging import damage
+from tests.helpers.hangers import HANGER_3
+from tests.helpers.nouns import NOW, a_change, a_file, a_posterior, a_test
+from tests.helpers.web_servers import Served, served
+from tests.helpers.workspaces import make_workspace
+from tests.watch.test_alert_language import AVOIDED, MOST_NUMBERS, MOST_WORDS, NUMBER
+
+_LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
+_QUIET = a_change(
+    evidence_years=0.2, probability=0.02, moved=(a_change().moved[0],), outlier_probability=0.01
+)
+
+
+@dataclass
+class Hangers:
+    """Fills a store with one hanger a state."""
+
+    workspace: Workspace
+    store: Store
+    now: datetime
+
+    def test(self, hanger: int, days: float, tension: float = 1.0) -> StoredTest:
+        """One test that has been through updating, so many days after the baseline."""
+        count = len(self.store.tests.list_all(hanger))
+        name = f"h{hanger}-{count}"
+        recording = self.store.recordings.receive(a_file(100 * hanger + count), NOW).recording
+        test = a_test(name, days, hanger=hanger)
+        self.store.tests.save(recording.id, [IdentifiedTest(test)], _LINEAGE, NOW)
+        stored = next(t for t in self.store.tests.list_all(hanger) if t.test.id == name)
+        posterior = replace(a_posterior(tests=(name,)), hanger=hanger, effective_sample_size=400.0)
+        posterior = replace(posterior, samples=posterior.samples * np.array([tension, 1, 1]))
+        if count:
+            self.store.posteriors.save(stored, posterior, _LINEAGE, NOW)
+        else:
+            chosen = Selection((posterior,), (1.0,))
+            self.store.posteriors.save_selection(hanger, [stored], chosen, _LINEAGE, NOW)
+        return stored
+
+    def watched(self, hanger: int, drifts: Sequence[Drift], change: Change, **more: object) -> None:
+        """A test after those there are, as the watch found it, with the alert it calls for."""
+        days = 30 * len(self.store.tests.list_all(hanger))
+        test, baseline = self.test(hanger, days), self.store.watch.baseline(hanger)
+        assert baseline is not None
+        name, time = test.test.id, test.time
+        own = tuple(replace(d, hanger=hanger, test=name, time=time) for d in drifts)
+        found = WatchedTest(name, time, 11.5, own, change, None, **more)  # type: ignore[arg-type]
+        before = [each.watched for each in self.store.watch.list_all(hanger, baseline.id)]
+        alert = new_alert([*before, found], replace(HANGER_3, id=hanger))
+        self.store.watch.save(test, baseline, found, alert, ["mail"], time)
+
+    def raised(self, hanger: int) -> int:
+        return self.store.alerts.list_all(hanger)[-1].id
+
+
+def tension(shift: float = 0.002, sd: float = 0.007, probability: float = 0.01) -> Drift:
+    return Drift(3, "", NOW, "tension", 711e3, 711e3 * (1 + shift), shift, sd, 0.05, probability)
+
+
+def deck_end(shift: float, probability: float) -> Drift:
+    return Drift(3, "", NOW, "log10_k1", 7.0, 7.0 + shift, shift, 0.1, 0.5, probability)
+
+
+def a_loss(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    of.watched(hanger, [tension(-0.085, 0.0055, 0.999)], a_change())
+
+
+def _first(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+
+
+def _steady(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    of.watched(hanger, [tension()], _QUIET)
+
+
+def _rough(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    of.watched(hanger, [tension(0.01, 0.04, 0.1)], _QUIET)
+
+
+def _unknown(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    of.watched(hanger, [tension(float("nan"), float("nan"), float("nan"))], _QUIET)
+
+
+def _not_compared(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    of.test(hanger, 30)
+
+
+def _likely(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    of.watched(hanger, [tension(-0.055, 0.012, 0.7)], _QUIET)
+
+
+def _below(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    moved = replace(a_change().moved[0], shift_mean=-0.03, probability=0.97, alike=())
+    of.watched(hanger, [tension(-0.03, 0.01, 0.05)], a_change(moved=(moved,)))
+
+
+def _slow(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    moved = replace(a_change().moved[0], shift_mean=-0.03, probability=0.97, alike=())
+    of.watched(hanger, [tension(-0.03, 0.01, 0.05)], a_change(moved=(moved,), sudden=0.05))
+
+
+def _gain(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    moved = replace(a_change().moved[0], shift_mean=0.08)
+    of.watched(hanger, [tension(0.08, 0.006, 0.99)], a_change(moved=(moved,)))
+
+
+def _two_quantities(of: Hangers, hanger: int) -> None:
+    """A loss stands; then an end loosens, too."""
+    a_loss(of, hanger)
+    later = [tension(-0.09, 0.005, 0.999), deck_end(-0.8, 0.99)]
+    of.watched(hanger, later, replace(_QUIET, probability=0.99))
+
+
+def _acknowledged(of: Hangers, hanger: int) -> None:
+    a_loss(of, hanger)
+    of.store.alerts.acknowledge(of.raised(hanger), "Ann", "crew is on its way", NOW)
+
+
+def _silenced(of: Hangers, hanger: int) -> None:
+    a_loss(of, hanger)
+    period = (of.now - timedelta(hours=1), of.now + timedelta(days=3))
+    of.store.silences.make(hanger, period, "Ann", "works", of.now)
+
+
+def _ended(of: Hangers, hanger: int) -> None:
+    a_loss(of, hanger)
+    of.store.alerts.resolve(of.raised(hanger), "Ann", "retensioned", NOW)
+    of.watched(hanger, [tension()], _QUIET)
+
+
+def _odd(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    of.watched(hanger, [tension()], replace(_QUIET, outlier_probability=0.97))
+
+
+def _three_odd(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    for _ in range(3):
+        of.watched(hanger, [tension()], replace(_QUIET, outlier_probability=0.97))
+
+
+def _misnumbered(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    wrong = (RepeatedMistake("transverse", 3, NOW, 3),)
+    of.watched(hanger, [tension()], _QUIET, mistaken=wrong)
+
+
+def _baseline_alone(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    of.watched(hanger, [tension()], replace(_QUIET, against_baseline=4))
+
+
+def _off_nominal(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0, 1.2)
+
+
+def _stale(of: Hangers, hanger: int) -> None:
+    of.test(hanger, -900)
+    of.store.watch.baseline(hanger)
+
+
+def _held(of: Hangers, hanger: int) -> None:
+    of.test(hanger, 0)
+    _raise(of, hanger, "held", f"Hanger {hanger}: test t9 (recording 12) is held: its time cannot "
+           "be 2001-01-01 00:00. Within a week, confirm it with its true time, or discard it: "
+           "`shm ingest --confirm 12 --time TIME` or `shm ingest --discard 12`.")  # fmt: skip
+
+
+def _stream_alone(of: Hangers, hanger: int) -> None:
+    """Permanent sensors have raised an alert; no hammer test was ever made."""
+    drifts, change = (replace(tension(-0.085, 0.0055, 0.999), hanger=hanger),), a_change()
+    test = WatchedTest("h 12:00", NOW, 11.5, drifts, change)
+    said = message_of(test, replace(HANGER_3, id=hanger), change, drifts, is_call=True)
+    _raise(of, hanger, "beyond threshold", said, drifts, change)
+
+
+def _raise(
+    of: Hangers,
+    hanger: int,
+    kind: str,
+    message: str,
+    drifts: tuple[Drift, ...] = (),
+    change: Change | None = None,
+) -> None:
+    from shm.store.outbox import raise_alert
+
+    alert = Alert(
+        f"hanger-{hanger}:{kind}", hanger, "h 12:00", NOW, message, drifts, (kind,), change
+    )  # type: ignore[arg-type]
+    with of.store.alerts.writing() as connection:
+        raise_alert(connection, None, None, alert, ["mail"], NOW)
+
+
+def _damaged(of: Hangers, hanger: int) -> None:
+    """Its posterior is not as it was written, and the daemon has noted that."""
+    test = of.test(hanger, 0)
+    posterior = of.store.posteriors.latest_trends([replace(HANGER_3, id=hanger)])[hanger]
+    damage(of.workspace, "posteriors", "samples", posterior.posterior_id)
+    error = DamagedRow("posteriors", posterior.posterior_id, test.hanger, "Reprocess it.")
+    of.store.upkeep.note_damage(error, NOW)
+
+
+Make = Callable[[Hangers, int], None]
+STATES: dict[str, tuple[Make, Status | None, Urgency]] = {
+    "no test yet": (lambda of, hanger: None, None, "next_test"),
+    "first test": (_first, Status.FIRST, "next_test"),
+    "steady": (_steady, Status.STEADY, "none"),
+    "too rough to judge": (_rough, Status.UNCLEAR, "next_test"),
+    "shift not known": (_unknown, Status.UNCLEAR, "week"),
+    "not compared": (_not_compared, Status.UNCLEAR, "week"),
+    "likely beyond": (_likely, Status.WATCH, "week"),
+    "detected below its threshold": (_below, Status.WATCH, "week"),
+    "slow": (_slow, Status.WATCH, "next_test"),
+    "loss": (a_loss, Status.ALERT, "today"),
+    "gain": (_gain, Status.ALERT, "week"),
+    "an end after a loss": (_two_quantities, Status.ALERT, "today"),
+    "acknowledged": (_acknowledged, Status.ALERT, "today"),
+    "silenced": (_silenced, Status.ALERT, "today"),
+    "odd test": (_odd, Status.WATCH, "week"),
+    "three odd tests": (_three_odd, Status.WATCH, "week"),
+    "misnumbered mode": (_misnumbered, Status.CHECK, "next_test"),
+    "baseline alone": (_baseline_alone, Status.CHECK, "week"),
+    "off nominal": (_off_nominal, Status.CHECK, "next_test"),
+    "stale": (_stale, Status.UNCLEAR, "week"),
+    "held": (_held, Status.WATCH, "week"),
+    "stream alone": (_stream_alone, Status.ALERT, "today"),
+    "damaged": (_damaged, None, "today"),
+    "ended": (_ended, Status.STEADY, "none"),
+}
+NUMBER_OF = {name: number for number, name in enumerate(STATES, start=1)}
+every_state = pytest.mark.parametrize("name", STATES)
+
+
+@pytest.fixture(scope="module")
+def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    folder = tmp_path_factory.mktemp("states") / "bridge"
+    numbers = tuple(NUMBER_OF.values())
+    workspace = make_workspace(folder, hangers=numbers, hooks={"mail": ["true"]})
+    with workspace.store() as store:
+        hangers = Hangers(workspace, store, utc_now())
+        for name, (make, *_) in STATES.items():
+            make(hangers, NUMBER_OF[name])
+    return workspace
+
+
+@pytest.fixture(scope="module")
+def store(bridge: Workspace) -> Iterator[Store]:
+    with bridge.store() as store:
+        yield store
+
+
+@pytest.fixture(scope="module")
+def client(bridge: Workspace) -> Iterator[httpx.Client]:
+    with served(bridge) as site, site.client() as client:
+        assert isinstance(site, Served)
+        yield client
+
+
+@pytest.fixture(scope="module")
+def home(client: httpx.Client) -> tuple[str, dict[int, dict[str, object]]]:
+    rows = client.get("/api/bridge").json()["hangers"]
+    return _read(client.get("/").text), {row["hanger"]: row for row in rows}
+
+
+@pytest.fixture(scope="module")
+def status(bridge: Workspace) -> tuple[str, dict[int, dict[str, object]]]:
+    def run(*arguments: str) -> str:
+        told = CliRunner().invoke(cli, ["--workspace", str(bridge.folder), "status", *arguments])
+        assert told.exit_code == 0, told.output
+        return told.stdout
+
+    rows = json.loads(run("--json"))["hangers"]
+    return _flat(run()), {row["hanger"]: row for row in rows}
+
+
+def _read(page: str) -> str:
+    """A page's words."""
+    return _flat(html.unescape(re.sub(r"<(?:.|\n)*?>", "", page)))
+
+
+def _flat(text: str) -> str:
+    return " ".join(text.replace("`", "").split())
+
+
+def _lead(document: dict[str, object]) -> tuple[object, ...]:
+    return tuple(document[key] for key in ("state", "action", "urgency"))
+
+
+@every_state
+def test_all_surfaces_say_the_same(
+    name: str,
+    bridge: Workspace,
+    store: Store,
+    client: httpx.Client,
+    home: tuple[str, dict[int, dict[str, object]]],
+    status: tuple[str, dict[int, dict[str, object]]],
+) -> None:
+    number, (_, expected, urgency) = NUMBER_OF[name], STATES[name]
+    first = home[1][number]
+    words = _flat(f"{first['state']} {first['action']}")
+    assert (first["status"], first["urgency"]) == (expected and expected.name.lower(), urgency)
+    for document in (status[1][number], client.get(f"/api/hangers/{number}").json()):
+        assert _lead(document) == _lead(first)
+        assert (document["status"], document["notes"]) == (first["status"], first["notes"])
+    assert words in home[0]
+    if store.tests.list_all(number) and urgency != "none":
+        assert words in status[0]
+    if name == "damaged":
+        return
+    assert words in _read(client.get(f"/hangers/{number}").text)
+    if store.tests.list_all(number):
+        report = hanger_report(bridge, store, number, utc_now())
+        assert _lead(hanger_json(report)["message"]) == _lead(first)
+        assert words in _flat(as_text(hanger_paper(report)))
+
+
+@every_state
+def test_a_standing_alert_and_its_hooks_say_what_the_pages_say(
+    name: str, store: Store, home: tuple[str, dict[int, dict[str, object]]]
+) -> None:
+    standing = store.alerts.list_all(NUMBER_OF[name], standing=True)
+    for stored in standing[-1:]:
+        lead = Lead.of(stored.alert.message)
+        document = alert_document(stored.alert)
+        assert _lead(document) == (lead.state, lead.action, lead.urgency)
+        assert _lead(document) == _lead(home[1][NUMBER_OF[name]])
+
+
+def test_the_bridge_leads_with_its_most_urgent_hanger(
+    bridge: Workspace, store: Store, home: tuple[str, dict[int, dict[str, object]]]
+) -> None:
+    report = bridge_report(bridge, store, utc_now())
+    told = bridge_json(report)["message"]
+    assert _lead(told) == _lead(home[1][NUMBER_OF["loss"]])
+    assert report.message.urgency == "today"
+    assert _flat(report.message.words) in home[0]
+    assert _flat(as_text(bridge_paper(report))).count(_flat(report.message.words)) == 1
+
+
+def test_who_acknowledged_and_who_silenced_is_said_beside_it(
+    home: tuple[str, dict[int, dict[str, object]]],
+) -> None:
+    for name, words in (("acknowledged", "acknowledged by Ann"), ("silenced", "silenced until")):
+        (note,) = home[1][NUMBER_OF[name]]["notes"]  # type: ignore[misc]
+        assert words in note
+    assert home[1][NUMBER_OF["acknowledged"]]["state"] == home[1][NUMBER_OF["loss"]][
+        "state"
+    ].replace(f"Hanger {NUMBER_OF['loss']}", f"Hanger {NUMBER_OF['acknowledged']}")  # type: ignore[attr-defined]
+
+
+# ---------------------------------------------------------------- the rules of the language
+
+
+def sentences(text: str) -> list[str]:
+    return re.split(r"(?<=[.?]) (?=[A-Z±`])", text)
+
+
+_NAMES = re.compile(
+    r"`[^`]*`"  # commands
+    r"|\d{4}-\d{2}-\d{2}( \d{2}:\d{2})?|\bh\d+-\d+"  # dates and tests
+    r"|angers?( that need action)?:? \d[\d, and]*|yet: \d[\d, and]*"
+    r"|\(recording \d+\)|Alert \d+|beam\d|(transverse|longitudinal) \d+|90 % (?=interval)"
+)
+
+
+def numbers_of(sentence: str) -> list[str]:
+    """Those of a sentence but for names, dates and commands."""
+    return NUMBER.findall(_NAMES.sub("", sentence))
+
+
+def rendered(bridge: Workspace, store: Store) -> Iterator[str]:
+    """All that a person reads first: of each hanger, of the bridge, of each alert."""
+    report = bridge_report(bridge, store, utc_now())
+    yield from (line.message.words for line in report.hangers)
+    yield bridge_summary(report)
+    for number in NUMBER_OF.values():
+        if store.tests.list_all(number) and number != NUMBER_OF["damaged"]:
+            yield summary(hanger_report(bridge, store, number, utc_now()))
+    yield from (each.alert.message for each in store.alerts.list_all())
+
+
+@pytest.fixture(scope="module")
+def texts(bridge: Workspace, store: Store) -> tuple[str, ...]:
+    return tuple(rendered(bridge, store))
+
+
+def test_the_first_sentence_has_few_words(texts: tuple[str, ...]) -> None:
+    assert [t for t in texts if len(sentences(t)[0].split()) > MOST_WORDS] == []
+
+
+def test_no_sentence_has_more_than_two_numbers(texts: tuple[str, ...]) -> None:
+    said = [each for text in texts for each in sentences(text.split(" Details: ")[0])]
+    assert [each for each in said if len(numbers_of(each)) > MOST_NUMBERS] == []
+
+
+def test_no_word_is_one_to_avoid(texts: tuple[str, ...]) -> None:
+    avoided = re.compile(rf"\b({'|'.join(map(re.escape, AVOIDED))})\b", re.IGNORECASE)
+    assert [found.group() for text in texts if (found := avoided.search(text))] == []
+
+
+def test_a_number_has_no_more_digits_than_its_interval(texts: tuple[str, ...]) -> None:
+    """Both to two significant digits of the half width, as `rounded` writes them."""
+    pairs = [pair for text in texts for pair in re.findall(r"([+-]?[\d.]+) ± ([\d.]+)", text)]
+    assert len(pairs) > 10
+    for value, half in pairs:
+        assert value.partition(".")[2].__len__() == half.partition(".")[2].__len__(), (value, half)
+        assert len(half.replace(".", "").lstrip("0").rstrip("0") or "0") <= 2, (value, half)
+
+
+def test_the_document_of_an_alert_names_what_it_leads_with(store: Store) -> None:
+    alert = store.alerts.list_all(NUMBER_OF["loss"])[-1].alert
+    document = alert_document(alert)
+    assert document["urgency"] == "today"
+    assert str(document["message"]).startswith(f"{document['state']} {document['action']}")
+    assert asdict(Lead.of(alert.message)).keys() <= document.keys()
