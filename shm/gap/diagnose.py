@@ -82,27 +82,20 @@ def examined(
 ) -> tuple[Diagnosis, Attribution]:
     """The diagnosis with the evidence that it rests on, for a diagnosis of several hangers."""
     started = time.perf_counter()
-    check_effect_priors(hanger)
-    check_baseline(options.baseline, hanger)
-    found = usable(tests, hanger)
-    whole = GapProblem(hanger, options.baseline, observed(found.tests, hanger))
-    check_hold_out(whole, options.hold_out)
+    found, whole = _to_explain(tests, hanger, options)
     rng = np.random.default_rng(options.seed)
     clear = cleared(whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done))
     problem = clear.problem
     attribution = with_what_acts(clear.attribution, rattling(found.tests))
     progress("shrinkage", _ATTRIBUTION)
-    answer = answered(attribution)
-    before, leading = attribution.baseline, attribution.leading
-    after = leading.best.fit if leading else None
+    answer, before = answered(attribution), attribution.baseline
+    after = attribution.leading.best.fit if attribution.leading else None
     aside, doubted = (outliers(clear, e, answer[0][1]) for e in (clear.aside, clear.doubted))
     held = held_out(problem, before, after, options.hold_out, rng)
     following = _following(problem, attribution, progress)
     compatible = compatibility(problem, attribution)
-    tensions = [_tension(problem, f, rng) for f in ([(1.0, before)], possible(attribution))]
-    of_any_ends = tension_of_any_ends_n(found.tests, hanger, options.seed)
-    if of_any_ends is not None:
-        tensions[1] = tension_estimate(of_any_ends)
+    any_ends_n = tension_of_any_ends_n(found.tests, hanger, options.seed)
+    after_n = _tension(problem, possible(attribution), rng, any_ends_n)
     diagnosis = Diagnosis(
         hanger=hanger.id,
         baseline=options.baseline,
@@ -119,11 +112,11 @@ def examined(
         fit_p_value=attribution.p_value,
         model_error_percent=100 * answer[0][1].model_error,
         shrinkage=shrinkage(problem, before, after, held),
-        tension_before_n=tensions[0],
-        tension_after_n=tensions[1],
+        tension_before_n=_tension(problem, [(1.0, before)], rng),
+        tension_after_n=after_n,
         next_measurements=following,
         remarks=(
-            *_states(problem, before, after, tensions[1]),
+            *_states(problem, before, after, after_n),
             *_on_the_way(found, clear, aside, doubted, after or before),
         ),
         seed=options.seed,
@@ -134,6 +127,17 @@ def examined(
         widest_swing_m=_widest_swing_m(found.tests),
     )
     return diagnosis, attribution
+
+
+def _to_explain(
+    tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions
+) -> tuple[Usable, GapProblem]:
+    check_effect_priors(hanger)
+    check_baseline(options.baseline, hanger)
+    found = usable(tests, hanger)
+    whole = GapProblem(hanger, options.baseline, observed(found.tests, hanger))
+    check_hold_out(whole, options.hold_out)
+    return found, whole
 
 
 def _widest_swing_m(tests: Sequence[ModalTest]) -> float:
@@ -238,13 +242,24 @@ def _contenders(attribution: Attribution) -> list[Fit]:
 
 
 def _tension(
-    problem: GapProblem, fits: Sequence[tuple[float, Fit]], rng: np.random.Generator
+    problem: GapProblem,
+    fits: Sequence[tuple[float, Fit]],
+    rng: np.random.Generator,
+    without_gap_n: FloatArray | None = None,
 ) -> TensionEstimate:
-    """The tension over some fits, each with its weight; NaN of a bar without any."""
+    """The tension over some fits, each with its weight; NaN of a bar without any.
+
+    `without_gap_n` (draws,) stands for the fit of the baseline alone, if given.
+    """
     if not problem.hanger.nominal_tension_n:
         return TensionEstimate(NAN, NAN, NAN, NAN)
     weight = np.array([weight for weight, _ in fits])
-    draws = [problem.tension_n(fit.hypothesis, fit.draws) for _, fit in fits]
+    draws = [
+        without_gap_n
+        if without_gap_n is not None and not (fit.hypothesis.name or fit.hypothesis.flexible)
+        else problem.tension_n(fit.hypothesis, fit.draws)
+        for _, fit in fits
+    ]
     return tension_estimate(mixed(draws, weight, rng))
 
 

@@ -1,8 +1,8 @@
 """Of fewer than four modes: what they can tell, and the tension that they leave open.
 
-A tension alone can follow so few frequencies, whatever the ends are. The baseline's ends and the
-causes that these data could show hold it far too closely; what `shm update` finds with ends of any
-stiffness, averaged over its classes of beam, does not.
+A tension alone can follow so few frequencies, whatever the ends are. The baseline's ends hold it
+far too closely; what `shm update` finds with ends of any stiffness, averaged over its classes of
+beam, does not, and stands for the baseline where there is no gap.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def _what_they_do(tests: Sequence[ModalTest], hanger: Hanger) -> str:
         return held
     return (
         "tension alone can follow so few frequencies, so that a gap can hardly show and its cause "
-        "cannot; the tension is that of `shm update`, with ends of any stiffness"
+        "cannot; without one the tension is that of `shm update`, with ends of any stiffness"
     )
 
 

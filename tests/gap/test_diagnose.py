@@ -100,11 +100,13 @@ def test_other_classes_may_be_the_baseline(baseline: str) -> None:
 def test_of_one_frequency_the_tension_is_as_wide_as_mass_and_length_are_known() -> None:
     """A string's tension goes with mass and length squared; the first mode bends as well."""
     (test,) = planted()
+    drawn_n = 866e3  # by the campaign, about 711 kN: what all modes give between clamped ends
     found = diagnose([replace(test, modes=test.modes[:1])], PLAIN)
     tension_n, scatter = found.tension_after_n, PLAIN.scatter
     least = np.sqrt(scatter.section**2 + scatter.density**2 + (2 * scatter.length) ** 2)
     assert found.leads == "no gap"
-    assert tension_n.q025 < 711e3 < tension_n.q975
+    assert tension_n.q025 < drawn_n < tension_n.q975
+    assert tension_n.q975 > 1.2 * drawn_n  # ends that turn
     assert tension_n.sd / tension_n.mean > least
     assert found.places == ()
 

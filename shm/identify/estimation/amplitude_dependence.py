@@ -300,6 +300,7 @@ _LAWS: tuple[_Law, ...] = (
     lambda size: size**2,
     *(_slips_no_further(half) for half in _HALVES),
 )
+"""How a frequency falls with the amplitude: dry friction, stretching, and a joint that slips."""
 
 
 def _through(row: _Row, decay: float, law: _Law, struck: float) -> _Grown:
