@@ -16,9 +16,12 @@ from shm.documents import dump
 from shm.store import Baseline, Stage, Store
 from shm.values import Hanger
 
-MOVES_NOTHING = frozenset({"id", "name", "thresholds", "limits", "models", "effect_priors"})
+MOVES_NOTHING = frozenset(
+    {"id", "name", "thresholds", "limits", "models", "effect_priors"}
+    | {"scatter.sensor_gain", "scatter.sensor_place_m", "scatter.sensor_turn_deg"}
+)
 """What no posterior depends on: names, what an owner calls much, which classes may compete, and
-ranges of the gap diagnosis."""
+what is of the gap diagnosis alone."""
 
 
 def redescribed(hanger: Hanger, baseline: Baseline | None) -> tuple[str, ...]:
@@ -42,11 +45,14 @@ def _comparable(described: Mapping[str, Any]) -> dict[str, Any]:
         default = each.default_factory() if each.default_factory is not MISSING else each.default
         if each.name in MOVES_NOTHING:
             continue
-        if each.name in described:
-            told[each.name] = described[each.name]
-        elif default is not MISSING:
-            is_table = is_dataclass(default) and not isinstance(default, type)
-            told[each.name] = asdict(default) if is_table else default
+        stated = described.get(each.name, default)
+        if is_dataclass(default) and not isinstance(default, type):
+            usual = asdict(default)
+            stated = described.get(each.name, usual)
+            if isinstance(stated, Mapping):
+                stated = {**usual, **stated}
+        if stated is not MISSING:
+            told[each.name] = stated
     plain: dict[str, Any] = json.loads(dump(told))
     return plain
 
@@ -54,6 +60,8 @@ def _comparable(described: Mapping[str, Any]) -> dict[str, Any]:
 def _changes(before: Mapping[str, Any], now: Mapping[str, Any], within: str = "") -> Iterator[str]:
     for name in sorted({*before, *now}):
         old, new = before.get(name), now.get(name)
+        if f"{within}{name}" in MOVES_NOTHING:
+            continue
         if isinstance(old, dict) and isinstance(new, dict):
             yield from _changes(old, new, f"{within}{name}.")
         elif old != new:

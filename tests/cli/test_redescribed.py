@@ -110,6 +110,8 @@ def test_a_field_that_an_older_version_did_not_know_has_its_default(before: Work
         baseline = store.watch.baseline(3)
     assert baseline is not None
     assert redescribed(hanger, replace(baseline, described=described)) == ()
+    older = {**described, "scatter": {"section": 0.01, "density": 0.003}}
+    assert redescribed(hanger, replace(baseline, described=older)) == ()
     strand = replace(hanger, kind="strand", scatter=replace(hanger.scatter, section=0.02))
     assert redescribed(strand, replace(baseline, described=described)) == (
         "kind from rod to strand",
