@@ -84,6 +84,15 @@ class HangerMessage:
         return self.lead.urgency
 
     @property
+    def needs_action(self) -> bool:
+        """Beyond what is planned anyhow."""
+        return self.is_known and self.status not in _QUIET
+
+    @property
+    def is_known(self) -> bool:
+        return self.status is not None or self.urgency == "today"
+
+    @property
     def words(self) -> str:
         return " ".join((self.lead.words, *self.notes))
 
@@ -134,10 +143,10 @@ def _document(message: HangerMessage | BridgeMessage) -> dict[str, object]:
 def bridge_message(messages: Mapping[int, HangerMessage]) -> BridgeMessage:
     """That of a bridge from those of its hangers, by their numbers."""
     order = list(Status)
-    known = {id_: each for id_, each in messages.items() if each.status or each.urgency == "today"}
+    known = {id_: each for id_, each in messages.items() if each.is_known}
     found = {each.status for each in known.values()}
     worst = next((status for status in Status if status in found), None)
-    needing = {id_: each for id_, each in known.items() if each.status not in _QUIET}
+    needing = {id_: each for id_, each in known.items() if each.needs_action}
 
     def rank(id_: int) -> tuple[int, int]:
         status = needing[id_].status

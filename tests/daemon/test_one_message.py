@@ -347,7 +347,8 @@ def test_all_surfaces_say_the_same(
     for document in (status[1][number], client.get(f"/api/hangers/{number}").json()):
         assert _lead(document) == _lead(first)
         assert (document["status"], document["notes"]) == (first["status"], first["notes"])
-    assert words in home[0]
+    if expected not in (None, Status.STEADY, Status.FIRST):
+        assert words in home[0]
     if store.tests.list_all(number) and urgency != "none":
         assert words in status[0]
     if name == "damaged":

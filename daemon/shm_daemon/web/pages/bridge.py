@@ -22,6 +22,7 @@ from shm.report import formatting
 from shm.report.contents import hangers_unit
 from shm.report.intervals import Interval
 from shm.values.force_units import ForceUnit
+from shm.values.messages import TODAY, WEEK
 from shm.values.rounding import rounded_percent
 from shm_daemon.heartbeat import told
 from shm_daemon.web.access import AtSite, Reader
@@ -41,6 +42,12 @@ from shm_daemon.web.site import held_documents
 
 router = APIRouter(tags=["state"])
 
+_WHEN = {
+    "none": "",
+    "next_test": "next test",
+    "week": WEEK,
+    "today": TODAY,
+}  # of an action, in words
 _COMPARING = "The hangers are being compared …"
 
 
@@ -148,6 +155,7 @@ def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
         "nominal": formatting.mean(line.of_nominal) if line.of_nominal else "",
         "shift": _shift(each),
         "message": line.message,
+        "when": _WHEN[line.message.urgency],
         "open_alerts": line.open_alerts,
         "day": f"{latest:%Y-%m-%d}" if latest else "",
         "age": f"{told(now - latest)} ago" if latest else "",
