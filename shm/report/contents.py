@@ -7,9 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from shm.identify import Dropped, Hit, Identification
 from shm.report.hanger_status import (
     BridgeMessage,
     HangerMessage,
@@ -45,6 +44,9 @@ from shm.values.force_units import ForceUnit, force_unit
 from shm.values.stated_tension import averaged_now, selection_now
 from shm.watch import end_stiffness
 from shm.watch.neighbours import BridgePattern
+
+if TYPE_CHECKING:  # `shm status` lists hangers and identifies nothing
+    from shm.identify import Dropped, Hit, Identification
 
 
 @dataclass(frozen=True)

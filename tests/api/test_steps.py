@@ -93,7 +93,8 @@ def test_what_is_read_is_identified_and_updated(
     assert (found.test.id, found.test.hanger) == ("hanger3", 3)
     posterior = shm.update(found, hanger, "beam1", samples=200)
     assert posterior.tension_n.mean() == pytest.approx(711e3, abs=3 * posterior.tension_n.std())
-    assert posterior.repeatability_sd_n < 0.005 * 711e3
+    # Within eight seconds a hit a softening of the first mode would hardly show.
+    assert posterior.repeatability_sd_n < 0.01 * 711e3
 
 
 def test_one_test_or_many_identified_or_given_are_taken_alike(
