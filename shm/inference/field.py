@@ -168,6 +168,14 @@ class FieldLikelihood:
         own[: self.frequencies] = np.sqrt(own[: self.frequencies] ** 2 + shared)
         return own
 
+    def whitening(self, sigma: float) -> FloatArray:
+        """What makes misfits (data,) independent with standard deviations of 1 (data, data), with
+        errors of `sigma` that repeat."""
+        covariance = np.diag(self.identification_error**2)
+        shared = self._loads @ self._loads.T
+        covariance[: self.frequencies, : self.frequencies] += sigma**2 * self._together + shared
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+
     def misfit(self, predicted: FloatArray) -> FloatArray:
         """Logarithms of predictions, with mean errors of the bar, over measurements (n, data)."""
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -10,11 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 import scipy
 
 from shm.inference.described import DescribedCoordinates
+from shm.inference.field import FieldLikelihood
 from shm.inference.options import silent
 from shm.inference.priors import TensionReading
 from shm.inference.problem import Problem
@@ -217,13 +219,15 @@ def climbed(
     whole = np.append(shares.clip(0, 1), seen)
     count = len(shares)
     free = np.array([name not in held for name in box.names] + [True] * len(seen))
-    noise = np.hypot(sigma, problem.likelihood.fit_error)
+    # What modes share counts together: supports give two per cent of a short thick bar.
+    whitening = cast(FieldLikelihood, problem.likelihood).whitening(sigma)
 
     def scaled(points: FloatArray) -> FloatArray:
         full = np.repeat(whole[None], len(points), axis=0)
         full[:, free] = points
         theta = coordinates.of_smooth(full[:, :count], full[:, count:])
-        return np.hstack([problem.likelihood.misfit(problem.run(theta)) / noise, full[:, count:]])
+        misfit = problem.likelihood.misfit(problem.run(theta))
+        return np.hstack([misfit @ whitening.T, full[:, count:]])
 
     lower = np.append(np.zeros(count), np.full(len(seen), -np.inf))[free]
     upper = np.append(np.ones(count), np.full(len(seen), np.inf))[free]

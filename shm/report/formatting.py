@@ -61,9 +61,16 @@ def tension(tension_n: Interval, unit: ForceUnit) -> str:
     return with_interval(tension_n.in_unit(unit), unit.name)
 
 
+_LOPSIDED = 2.5  # judgement: a half width then says neither end
+
+
 def with_half(interval: Interval, unit: ForceUnit) -> str:
-    """`655 ± 16 kN` of a tension in N: the half width of its 90 % interval."""
+    """`655 ± 16 kN` of a tension in N: the half width of its 90 % interval; where that is much
+    farther on one side, `13 to 490 kN`."""
     own = interval.in_unit(unit)
+    above, below = own.high - own.mean, own.mean - own.low
+    if max(above, below) > _LOPSIDED * min(above, below):
+        return f"{span(own)} {unit.name}"
     return f"{rounded(own.mean, own.width / 2)} {unit.name}"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -63,6 +63,14 @@ class Summary:
         q05, q50, q95 = np.quantile(samples, [0.05, 0.5, 0.95])
         spread = float(samples.std(ddof=1))
         return cls(float(samples.mean()), spread, float(q05), float(q50), float(q95))
+
+    def reaching(self, values: Sequence[float]) -> Self:
+        """With an interval that holds `values`, too."""
+        return (
+            replace(self, q05=min(self.q05, *values), q95=max(self.q95, *values))
+            if values
+            else self
+        )
 
 
 @dataclass(frozen=True)
@@ -207,7 +215,8 @@ class Posterior:
 class Averaged:
     """The tension over all model classes, each with its probability: what a report leads with.
 
-    `tension_n` is absolute; `repeatability_sd_n` that of the most probable class, in N.
+    `tension_n` is absolute, and its interval reaches to the tension with other ends where the data
+    do not speak against these; `repeatability_sd_n` that of the most probable class, in N.
     `probability_above_limit` and `probability_slack` are those of a tension beyond the hanger's
     limits (the thesis's robust reliability, 4.18), NaN where the owner sets none. `caveats` are
     what keeps it from being taken at its word.
@@ -248,8 +257,9 @@ class Selection:
         draws, limits = self.tension_n, limits or Limits()
         above, slack = limits.tension_max_n, limits.tension_min_n
         likely = [p for p, w in zip(self.posteriors, self.probabilities, strict=True) if w > 0.05]
+        others = [p.tension_of_other_ends_n for p in likely]
         return Averaged(
-            Summary.of(draws),
+            Summary.of(draws).reaching([each for each in others if math.isfinite(each)]),
             self.selected.repeatability_sd_n,
             float(np.mean(draws > above)) if above == above else NAN,
             float(np.mean(draws < slack)) if slack == slack else NAN,
