@@ -131,7 +131,11 @@ def tried(
         rest = state.change.deviation - wanted[:, None] * state.change.per_size
         size = state.size + length * (wanted - state.size)
         step = misfit.parameters(rest) - state.z
-        moved = _at(problem, misfit, cause, state.z + length[:, None] * step, size)
+        try:
+            moved = _at(problem, misfit, cause, state.z + length[:, None] * step, size)
+        except np.linalg.LinAlgError:
+            # So stiff that rounding leaves the model no modes: no step down.
+            moved = replace(state, left=np.full(len(size), np.inf))
         state, better = state.better_of(moved)
         length = np.where(better, 1.0, _SHORTER * length)
     return state.change

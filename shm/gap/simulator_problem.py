@@ -17,7 +17,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from scipy.special import ndtr
 
-from shm.errors import UsageError
+from shm.errors import BadInput, UsageError
 from shm.gap.contract import Covariance, Hypothesis, NoiseNode
 from shm.gap.noise import FACTOR_SPREAD, SD_LOWER, SD_UPPER
 from shm.values import FloatArray
@@ -174,6 +174,12 @@ class SimulatorProblem:
             found = self._called(predict, theta, dict(key), len(z))
             for i in members:
                 predicted[:, i] = _observable(found, readings[i], effect)
+        if len(z) and not np.isfinite(predicted).any():
+            name = f"effect {effect.name}" if effect else "simulator"
+            raise BadInput(
+                f"no prediction of the {name} is finite.",
+                remedy="Let it return numbers for all that its priors allow.",
+            )
         return predicted
 
     def _called(

@@ -8,6 +8,7 @@ from shm.report import formatting
 from shm.report.diagnosis_wording import Answer, answer
 from shm.values import FEW_MODES, NO_GAP, Diagnosis, LawTerm, Remainder, TensionEstimate
 
+_WORTH_SAYING = 0.01  # of what is left: less rounds to nothing
 _MOST_NAMED = 3  # what a sentence bears
 _COUNTS = ("no mode", "one mode", "two modes", "three modes")
 
@@ -70,7 +71,7 @@ def compatible(diagnosis: Diagnosis) -> str:
 
 def like_tension(remainder: Remainder | None) -> str:
     """Which part of what is left looks like another tension."""
-    if remainder is None or math.isnan(remainder.like_tension):
+    if remainder is None or not remainder.like_tension >= _WORTH_SAYING:
         return ""
     return (
         f"Of what something unknown would leave ({formatting.plain(remainder.rms_percent, 2)} % "

@@ -21,7 +21,7 @@ from shm.report.diagnosis_wording import (
 )
 from shm.report.intervals import Interval
 from shm.report.paper import Fact
-from shm.values import Diagnosis, NextMeasurement, Trend
+from shm.values import MOST_MISFIT_PERCENT, Diagnosis, NextMeasurement, Trend
 
 _SURE = 0.9
 _POOR_FIT = 0.01
@@ -96,10 +96,16 @@ def _verdict(diagnosis: Diagnosis, claim: Claim | None) -> str:
     match answer(diagnosis):
         case Answer.NO_GAP:
             sure = diagnosis.no_gap_probability >= _SURE
+            chance = formatting.told_probability(diagnosis.no_gap_probability)
+            if diagnosis.shrinkage.rms_before_percent > MOST_MISFIT_PERCENT:
+                return (
+                    f"No gap can be shown, though the baseline {diagnosis.baseline} misses the "
+                    "frequencies by more than a sound model does: on so stiff a bar what supports "
+                    f"and sensors give may be as large (no gap, probability {chance})."
+                )
             return (
                 f"{'No gap' if sure else 'Most likely no gap'}: the baseline {diagnosis.baseline} "
-                "explains the measurements, probability "
-                f"{formatting.told_probability(diagnosis.no_gap_probability)}."
+                f"explains the measurements, probability {chance}."
             )
         case Answer.UNEXPLAINED:
             return (
@@ -232,7 +238,8 @@ def _shrinkage(diagnosis: Diagnosis) -> str:
     undecided = answer(diagnosis) is Answer.UNDECIDED
     what = label(claim.leading) if undecided else "it"
     both = _percent(found.rms_before_percent), _percent(found.rms_after_percent)
-    inside = f"With {what} the frequencies' error shrinks from {both[0]} to {both[1]} (rms)"
+    goes = "shrinks" if found.rms_after_percent < found.rms_before_percent else "grows"
+    inside = f"With {what} the frequencies' error {goes} from {both[0]} to {both[1]} (rms)"
     return f"{inside}{_held_out(diagnosis)}"
 
 

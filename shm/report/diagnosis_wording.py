@@ -71,8 +71,11 @@ def claimed(diagnosis: Diagnosis) -> Claim | None:
 
 
 def answer(diagnosis: Diagnosis) -> Answer:
-    """What the diagnosis says; undecided where nothing is likelier than not."""
-    claim = claimed(diagnosis)
+    """What the diagnosis says; undecided where nothing is likelier than not, and where the claim
+    leaves the frequencies no nearer."""
+    claim, shrinkage = claimed(diagnosis), diagnosis.shrinkage
+    if claim is not None and shrinkage.rms_after_percent >= shrinkage.rms_before_percent:
+        return Answer.UNDECIDED
     if claim is not None:
         sure, said = claim.probability, Answer.EXPLAINED if len(claim.causes) == 1 else Answer.ALIKE
     elif diagnosis.leads == "no gap":

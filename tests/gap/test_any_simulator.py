@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shm.errors import UsageError
+from shm.errors import BadInput, UsageError
 from shm.gap.any_simulator import diagnose_simulator
 from shm.gap.contract import Hypothesis
 from shm.gap.simulator_fit import fitted
@@ -104,3 +104,6 @@ def test_what_cannot_be_is_refused_with_a_remedy() -> None:
         diagnose_simulator(LINE, [*READINGS, Reading({"x": 1.0}, "z", 1.0, 0.1)])
     with pytest.raises(UsageError, match="too few"):
         diagnose_simulator(LINE, READINGS[:1])
+    silent = replace(LINE, predict=lambda p, at: {"y": np.nan * p["slope"]})
+    with pytest.raises(BadInput, match="no prediction of the simulator is finite"):
+        diagnose_simulator(silent, READINGS)

@@ -147,6 +147,17 @@ def test_a_gap_that_shrinks_only_where_it_was_fitted_is_not_relied_on() -> None:
     assert "nothing was held out of the fit to check that" in said(unchecked)
 
 
+def test_a_cause_with_which_the_frequencies_come_no_nearer_explains_nothing() -> None:
+    grown = replace(LED, shrinkage=Shrinkage(0.1, 0.23, 0.15, 0.15))
+    assert answer(grown) is Answer.UNDECIDED
+    assert "the frequencies' error grows from" in said(grown)
+
+
+def test_no_gap_is_not_called_an_explanation_where_the_baseline_misses_by_percents() -> None:
+    missed = replace(NO_GAP, shrinkage=Shrinkage(2.4, NAN, NAN, NAN))
+    assert said(missed).startswith("No gap can be shown, though the baseline")
+
+
 def test_a_measurement_that_hardly_tells_is_not_recommended() -> None:
     poor = NextMeasurement("two more modes", ("point_mass", "no gap"), 0.6)
     assert "No measurement that was considered would tell point mass from no gap" in said(
