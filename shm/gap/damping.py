@@ -37,7 +37,8 @@ _LEAST_RATIO = 1.2  # of levels, as `shm.models.effects` asks
 
 def with_damping(observations: Observations, kinds: Sequence[Family]) -> tuple[Family, ...]:
     """Families with what damping says of each, the likeliest first."""
-    told = [(kind, log_odds(observations, kind.best.hypothesis)) for kind in kinds]
+    rising = _log_rising(observations)
+    told = [(kind, _odds(rising, kind.best.hypothesis)) for kind in kinds]
     found = [
         replace(kind, log_evidence=kind.log_evidence + odds, log_mimic=kind.log_mimic + odds)
         for kind, odds in told
@@ -50,10 +51,14 @@ def log_odds(observations: Observations, hypothesis: Hypothesis) -> float:
 
     Of something unknown no one knows whether it takes energy: both are as likely.
     """
+    return _odds(_log_rising(observations), hypothesis)
+
+
+def _odds(log_rising: float, hypothesis: Hypothesis) -> float:
     rises = any(EFFECTS[name].dissipates for name in hypothesis.names)
     if not (rises or hypothesis.flexible):
         return 0.0
-    odds = float(np.clip(_log_rising(observations), -MOST, MOST))
+    odds = float(np.clip(log_rising, -MOST, MOST))
     return odds if rises else float(np.logaddexp(odds, 0.0) - np.log(2))
 
 

@@ -45,12 +45,11 @@ def _comparable(described: Mapping[str, Any]) -> dict[str, Any]:
         default = each.default_factory() if each.default_factory is not MISSING else each.default
         if each.name in MOVES_NOTHING:
             continue
-        stated = described.get(each.name, default)
         if is_dataclass(default) and not isinstance(default, type):
-            usual = asdict(default)
-            stated = described.get(each.name, usual)
-            if isinstance(stated, Mapping):
-                stated = {**usual, **stated}
+            default = asdict(default)
+        stated = described.get(each.name, default)
+        if isinstance(default, dict) and isinstance(stated, Mapping):
+            stated = {**default, **stated}
         if stated is not MISSING:
             told[each.name] = stated
     plain: dict[str, Any] = json.loads(dump(told))

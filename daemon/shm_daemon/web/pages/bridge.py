@@ -149,9 +149,7 @@ def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
         "id": hanger.id,
         "name": formatting.hanger_name(hanger.id, hanger.name),
         "status": line.status,
-        "tension": formatting.with_half(tension, unit).removesuffix(f" {unit.name}")
-        if tension
-        else "no test yet",
+        "tension": _in(unit, tension) if tension else "no test yet",
         "nominal": formatting.mean(line.of_nominal) if line.of_nominal else "",
         "shift": _shift(each),
         "message": line.message,
