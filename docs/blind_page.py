@@ -33,7 +33,7 @@ def fragment(score: TrialScore, drawn: Sequence[Illustration]) -> str:
     parts = [summary(score), f"Seed {score.seed}; SHA-256 of the key `{score.key_sha256}`."]
     if lost := misses(score):
         parts.append("\n".join(["Missed:\n", *(f"- {each}" for each in lost)]))
-    parts += [f"![{item.title}](figures/{item.name}.png)\n\n*{item.title}*" for item in drawn]
+    parts += [f"![{item.title}](figures/{item.name}.png)" for item in drawn]
     listed = [f"- [{each.title}](blind_trial/{file_name(each)})" for each in tables(score)]
     listed.append(f"- [The figures explained, and in words](blind_trial/{_IN_WORDS})")
     return "\n\n".join([*parts, "\n".join(["All numbers, as tables:\n", *listed])])
