@@ -49,6 +49,7 @@ ROUTES = (
     "POST /api/alerts/{alert_id}/acknowledgement",
     "GET /api/bridge",
     "GET /api/bridge/moved",
+    "GET /api/compare/figure",
     "GET /api/operation",
     "GET /api/operation/examination",
     "GET /api/streams",

@@ -31,7 +31,17 @@ from shm_daemon.web.faults import handle_faults
 from shm_daemon.web.frame import prepare_templates
 from shm_daemon.web.front import Pages
 from shm_daemon.web.metrics import Exposition
-from shm_daemon.web.pages import alerts, bridge, hanger, health, one_test, sensors, static, upload
+from shm_daemon.web.pages import (
+    alerts,
+    bridge,
+    comparison,
+    hanger,
+    health,
+    one_test,
+    sensors,
+    static,
+    upload,
+)
 from shm_daemon.web.site import Site
 
 _described = APIRouter(include_in_schema=False)
@@ -67,6 +77,7 @@ def load_pages(site: Site) -> Pages:
         signing_in,
         static,
         bridge,
+        comparison,
         upload,
         health,
         sensors,

@@ -27,6 +27,7 @@ STATIC = Path(__file__).with_name("static")
 
 NAVIGATION = (
     ("/", "Bridge"),
+    ("/compare", "Compare"),
     ("/alerts", "Alerts"),
     ("/streams", "Sensors"),
     ("/upload", "Upload"),

@@ -12,6 +12,7 @@
   const drawn = new Map(); // plot -> document
   let script = null;
   let onPaper = false; // while it is printed, a figure is light and no wider than paper
+  let period = null; // what all time axes of the page show; null: each all of its own
 
   function plotly() {
     script ??= new Promise((resolve, reject) => {
@@ -85,10 +86,39 @@
     Object.keys(given).filter((key) => /^[xy]axis\d*$/.test(key)).forEach((key) => axes.add(key));
     for (const name of axes) base[name] = axis;
     const found = merged(base, given);
+    if (period) for (const name of timeAxes(found)) found[name] = { ...found[name], range: period };
     delete found.width;
     found.autosize = true;
     if (!onPaper) return found;
     return { ...found, autosize: false, width: PAPER.width, height: PAPER.share * height };
+  }
+
+  const timeAxes = (layout) =>
+    Object.keys(layout).filter((key) => /^xaxis\d*$/.test(key) && layout[key].type === "date");
+
+  // Who enlarges a stretch of time in one figure sees it in all; a double click shows all again.
+  function follow(plot, change) {
+    const of = timeAxes(drawn.get(plot).layout ?? {}).find((name) =>
+      [`${name}.range[0]`, `${name}.range`, `${name}.autorange`].some((key) => key in change));
+    if (!of) return;
+    const from = change[`${of}.range[0]`] ?? change[`${of}.range`]?.[0];
+    const to = change[`${of}.range[1]`] ?? change[`${of}.range`]?.[1];
+    show(from && to ? [from, to] : null);
+  }
+
+  function show(stretch) {
+    period = stretch;
+    for (const [plot, figure] of drawn) {
+      if (timeAxes(figure.layout ?? {}).length) draw(plot, figure);
+    }
+  }
+
+  function lastDays(days) {
+    const ends = [...drawn.values()].flatMap(({ layout = {} }) =>
+      timeAxes(layout).map((name) => Date.parse(layout[name].range?.[1])).filter(Number.isFinite));
+    if (!ends.length) return;
+    const end = Math.max(...ends);
+    show([new Date(end - 86_400_000 * days).toISOString(), new Date(end).toISOString()]);
   }
 
   async function draw(plot, figure) {
@@ -100,6 +130,9 @@
       layoutOf(inTheme(figure.layout ?? {}, turned), light, narrow, parseFloat(plot.style.height)),
       { responsive: true, displaylogo: false, scrollZoom: false,
         modeBarButtonsToRemove: ["lasso2d", "select2d"] });
+    if (plot.dataset.follows) return;
+    plot.dataset.follows = "yes";
+    plot.on("plotly_relayout", (change) => follow(plot, change));
   }
 
   function tell(chart, text) {
@@ -169,6 +202,10 @@
       }
     }, { rootMargin: "400px" });
     charts.forEach((chart) => watcher.observe(chart));
+    for (const button of document.querySelectorAll("button[data-days]")) {
+      const days = Number(button.dataset.days);
+      button.addEventListener("click", () => (days ? lastDays(days) : show(null)));
+    }
     dark.addEventListener("change", redraw);
     addEventListener("beforeprint", () => print(true));
     addEventListener("afterprint", () => print(false));

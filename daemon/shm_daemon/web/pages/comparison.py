@@ -1,0 +1,167 @@
+"""The page that compares hangers: their tension since the baseline on one axis, and a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime, time
+from datetime import date as Day
+from typing import Annotated
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse, JSONResponse
+
+from shm.errors import BadInput, NothingThere
+from shm.pipeline import utc_now
+from shm.pipeline.bridge_reporting import hanger_lines
+from shm.report import formatting
+from shm.report.contents import HangerLine, hangers_unit
+from shm.report.figures.compared_hangers import MOST, Course, alt, caption, specify
+from shm.report.intervals import Interval
+from shm.report.paper import Table
+from shm.values import Hanger
+from shm.values.rounding import rounded_percent
+from shm_daemon.web import with_plotly
+from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.bridge_view import HangerGlance
+from shm_daemon.web.faults import answers
+from shm_daemon.web.frame import page
+from shm_daemon.web.hanger_models import FigureDocument
+from shm_daemon.web.hangers import described
+from shm_daemon.web.models import LARGEST_NUMBER
+from shm_daemon.web.plotting import answer
+from shm_daemon.web.site import Site
+
+router = APIRouter(tags=["hangers"])
+
+_Chosen = Annotated[
+    list[Annotated[int, Query(ge=0, le=LARGEST_NUMBER)]] | None,
+    Query(description=f"The number of a hanger; up to {MOST} of them."),
+]
+_Since = Annotated[Day | None, Query(description="The first day; all tests without it.")]
+
+
+@router.get("/compare", include_in_schema=False)
+def compare_page(
+    request: Request,
+    site: AtSite,
+    _: Reader,
+    hanger: _Chosen = None,
+    since: Annotated[str, Query(max_length=10)] = "",
+) -> HTMLResponse:
+    """Hangers to choose from, and those that were chosen, beside each other."""
+    lines = {each.hanger.id: each for each in hanger_lines(site.workspace, site.store, utc_now())}
+    chosen = _chosen(site, hanger) if hanger else _likely(list(lines.values()))
+    day = _day(since)
+    rows = [lines[each.id] for each in chosen]
+    asked = [("hanger", each.id) for each in chosen] + ([("since", day)] if day else [])
+    return page(
+        request,
+        "comparison.html.j2",
+        choices=[
+            (each.hanger.id, formatting.hanger_name(each.hanger.id, each.hanger.name),
+             each.hanger in chosen)
+            for each in lines.values()
+        ],
+        most=MOST,
+        since=day,
+        address=f"/api/compare/figure?{urlencode(asked)}" if _courses(site, chosen, day) else "",
+        table=_table(rows) if rows else None,
+    )  # fmt: skip
+
+
+@router.get(
+    "/api/compare/figure",
+    response_model=FigureDocument,
+    responses=answers(400, 401, 403, 404, 422, 503),
+    summary="Hangers on one time axis",
+)
+def compare_figure(
+    site: AtSite, _: Reader, hanger: _Chosen = None, since: _Since = None
+) -> JSONResponse:
+    """A plotly document: the tension of each hanger since its baseline."""
+    courses = _courses(site, _chosen(site, hanger or []), since)
+    if not courses:
+        raise NothingThere(
+            "none of these hangers was tested since a baseline of its own.",
+            remedy="Choose others, or an earlier day.",
+        )
+    words = {"caption": caption(courses), "alt": alt(courses)}
+    return answer({**with_plotly.document(specify(courses)), **words})
+
+
+def _chosen(site: Site, numbers: Sequence[int]) -> list[Hanger]:
+    """Each once, in the order of the description; raises BadInput, NothingThere."""
+    if len(set(numbers)) > MOST:
+        raise BadInput(
+            f"{len(set(numbers))} hangers are too many for one figure.",
+            remedy=f"Choose up to {MOST}.",
+        )
+    wanted = {described(site.workspace, each).id for each in numbers}
+    return [each for each in site.workspace.bridge.hangers if each.id in wanted]
+
+
+def _likely(lines: Sequence[HangerLine]) -> list[Hanger]:
+    """Where nobody has chosen: the hanger that is worst off, between its neighbours."""
+    if not lines:
+        return []
+    first = next((i for i, each in enumerate(lines) if each.message.urgency == "today"), 0)
+    start = max(0, min(first - 1, len(lines) - 3))
+    return [each.hanger for each in lines[start : start + 3]]
+
+
+def _day(text: str) -> Day | None:
+    """Of a form whose field may be left empty; raises BadInput."""
+    if not text:
+        return None
+    try:
+        return Day.fromisoformat(text)
+    except ValueError as error:
+        raise BadInput(f"{text} is no day.", remedy="Give it as 2026-05-31.") from error
+
+
+def _courses(site: Site, chosen: Sequence[Hanger], since: Day | None) -> list[Course]:
+    """Of those that have a baseline and tests since that day."""
+    begin = datetime.combine(since, time(), UTC) if since else None
+    baselines = site.store.watch.baselines_in_force(chosen)
+    found = []
+    for hanger in chosen:
+        points = site.store.posteriors.trend(hanger, begin)
+        if hanger.id in baselines and points:
+            base = Interval.of_averaged(baselines[hanger.id].averaged)
+            found.append(
+                Course(
+                    formatting.hanger_name(hanger.id, hanger.name),
+                    [point.time for point in points],
+                    [point.test for point in points],
+                    [Interval.of_averaged(point.averaged).since(base) for point in points],
+                )
+            )
+    return found
+
+
+def _table(lines: Sequence[HangerLine]) -> Table:
+    unit = hangers_unit(lines)
+    return Table(
+        "The latest test of each",
+        ("hanger", "state", f"tension, {unit.name}", "of nominal, %", "since the baseline, %",
+         "length", "last test"),
+        tuple(
+            (
+                formatting.hanger_name(line.hanger.id, line.hanger.name),
+                line.status.value if line.status else "",
+                formatting.with_half(line.tension_n, unit).removesuffix(f" {unit.name}")
+                if line.tension_n else "no test yet",
+                formatting.mean(line.of_nominal) if line.of_nominal else "",
+                _shift(line),
+                f"{line.hanger.length_m:g} m",
+                f"{line.latest:%Y-%m-%d}" if line.latest else "",
+            )
+            for line in lines
+        ),
+    )  # fmt: skip
+
+
+def _shift(line: HangerLine) -> str:
+    shift = HangerGlance(line).shift
+    return rounded_percent(shift.mean, shift.width / 2, "+").removesuffix(" %") if shift else ""
