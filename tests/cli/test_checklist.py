@@ -1,0 +1,39 @@
+"""Every item of the thesis is found where the checklist says."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from shm_cli import thesis, validate
+from shm_cli.validation import beam_solutions, frequencies
+
+ROOT = Path(__file__).parents[2]
+ITEMS = tomllib.loads(thesis.CHECKLIST_FILE.read_text(encoding="utf-8"))["item"]
+COMMANDS = sorted({item["where"] for item in ITEMS if item["where"].startswith("shm ")})
+
+
+def test_every_page_of_it_exists() -> None:
+    pages = [item["where"] for item in ITEMS if item["where"].startswith("docs/")]
+    assert pages and [page for page in pages if not (ROOT / page).is_file()] == []
+
+
+def test_every_command_of_it_is_one_of_validate() -> None:
+    known = {f"shm validate --figure {number}" for number in beam_solutions.FIGURES}
+    known |= {f"shm validate --table {number}" for number in frequencies.TABLES}
+    assert known == set(COMMANDS)
+
+
+# The beams are solved in a second; the solids' tables are compared in test_validate.py.
+@pytest.mark.parametrize("command", [c for c in COMMANDS if "--figure" in c or c[-3:] > "A.5"])
+def test_a_quick_command_of_it_runs(command: str) -> None:
+    result = CliRunner().invoke(validate.command, [*command.split()[2:], "--json"])
+    assert result.exit_code == 0, result.output
+
+
+def test_the_list_names_every_item() -> None:
+    output = CliRunner().invoke(validate.command, ["--list", "--json"]).output
+    assert all(item["of"] in output for item in ITEMS)
