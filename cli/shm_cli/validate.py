@@ -14,7 +14,7 @@ from shm.errors import GateNotMet, UsageError
 from shm.report.figures.against_a_parameter import write_png
 from shm_cli import thesis
 from shm_cli.common import json_option, markdown, progress_bar, seed_option, show, show_table, table
-from shm_cli.validation import beam_solutions, frequencies, selection
+from shm_cli.validation import beam_solutions, formulas, frequencies, selection
 
 Texts = tuple[str, ...]
 
@@ -35,6 +35,12 @@ Texts = tuple[str, ...]
     help="One table of the thesis alone.",
 )
 @click.option(
+    "--formulas",
+    "practice",
+    is_flag=True,
+    help="Formulas of practice beside our answer, on beams of known tension.",
+)
+@click.option(
     "--list", "listed", is_flag=True, help="Every item of the thesis, and where it is shown."
 )
 @click.option(
@@ -49,6 +55,7 @@ def command(
     as_markdown: bool,
     figure: str | None,
     wanted: str | None,
+    practice: bool,
     listed: bool,
     out: Path | None,
     seed: int,
@@ -64,6 +71,7 @@ def command(
     Example: shm validate --markdown
     Example: shm validate --figure 2.4 --out figure_2_4.png
     Example: shm validate --table A.5
+    Example: shm validate --formulas
     """
     if figure is not None:
         _show_figure(beam_solutions.solutions(beam_solutions.FIGURES[figure]), out, as_json)
@@ -72,6 +80,9 @@ def command(
         raise UsageError("--out draws one figure.", remedy="Say which: --figure 2.4, say.")
     if listed:
         _show_list(as_json)
+        return
+    if practice:
+        _show_formulas(seed, as_json)
         return
     if wanted is not None:
         _show_table(wanted, as_json)
@@ -139,6 +150,16 @@ def _show_table(wanted: str, as_json: bool) -> None:
     if misses:
         message = "; ".join(misses)
         raise GateNotMet(f"{message}.", remedy="See docs/trials/validation.md for the marks.")
+
+
+def _show_formulas(seed: int, as_json: bool) -> None:
+    with progress_bar("validating") as progress:
+        rows = formulas.compared(load_hanger(thesis.HANGER_FILE), seed, progress)
+    if as_json:
+        show([asdict(row) for row in rows])
+        return
+    _show("formulas of practice", formulas.FORMULA_HEADS, formulas.formula_cells())
+    _show("error of the tension", formulas.HEADS, [*map(formulas.cells, rows)])
 
 
 def _show_list(as_json: bool) -> None:
