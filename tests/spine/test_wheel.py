@@ -54,6 +54,8 @@ def test_data_and_templates_are_in_the_wheel(unpacked: Path) -> None:
         "assert all(path.is_file() for path in thesis.PRINTINGS.values())\n"
         "assert load_hanger(thesis.HANGER_FILE).id == 3\n"
         "assert resources.default_config().is_file() and resources.migrations_folder().is_dir()\n"
+        "units = ('shm.service', 'shm-web.service', 'shm-backup.service', 'shm-backup.timer')\n"
+        "assert all(resources.unit_file(name).is_file() for name in units)\n"
     )
     run(unpacked, code)
     names = {path.name for path in unpacked.rglob("*") if path.is_file()}
