@@ -1,43 +1,26 @@
-"""The licence of everything that a plain installation brings along, as its package declares it."""
+"""No package of a plain installation declares a licence of the GPL family: `shm notices`."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from importlib import metadata
 
-from packaging.requirements import Requirement
+from shm_cli.notices import notices
 
 # GPL, LGPL and AGPL bind whoever passes the software on: such packages are extras (npTDMS is one).
 _COPYLEFT = re.compile(r"\b[AL]?GPL|GNU .*General Public", re.IGNORECASE)
-_NAMED = re.compile(r"MIT|BSD|Apache|PSF|Python Software Foundation|MPL")
+_NAMED = re.compile(r"MIT|BSD|Apache|PSF|Python Software Foundation|MPL|Mozilla")
 
 
-def _brought(name: str, found: dict[str, str]) -> Mapping[str, str]:
-    """The declared licence by package name, of all that `name` requires without any extra."""
-    for text in metadata.requires(name) or ():
-        wanted = Requirement(text)
-        if wanted.name in found or (wanted.marker and not wanted.marker.evaluate({"extra": ""})):
-            continue
-        found[wanted.name] = "; ".join(_declared(wanted.name))
-        _brought(wanted.name, found)
-    return found
-
-
-def _declared(name: str) -> Iterator[str]:
-    fields = metadata.metadata(name)
-    classifiers = [c for c in fields.get_all("Classifier") or () if c.startswith("License ::")]
-    # A licence given as its whole text names the licences of others: its first line is its own.
-    first = next(iter((fields.get("License") or "").strip().splitlines()), "")
-    yield from filter(None, (fields.get("License-Expression"), *classifiers, first))
-
-
-def test_each_required_package_declares_a_licence_that_binds_nobody_further() -> None:
-    found = _brought("shm", {})
+def test_each_package_that_is_required_declares_a_licence_outside_the_gpl_family() -> None:
+    found = {each.package.lower(): each.licence for each in notices() if not each.extra}
     assert {"numpy", "alembic", "contourpy"} <= set(found)
+    assert sum(name.startswith("charset") for name in found) == 1
     assert {n: text for n, text in found.items() if not _NAMED.search(text)} == {}
     assert {n: text for n, text in found.items() if _COPYLEFT.search(text)} == {}
 
 
-def test_a_copyleft_licence_would_be_noticed() -> None:
-    assert _COPYLEFT.search("; ".join(_declared("npTDMS")))
+def test_such_a_licence_would_be_noticed_and_is_told_of_the_extras() -> None:
+    of_extras = {each.package: each for each in notices() if _COPYLEFT.search(each.licence)}
+    assert {"npTDMS", "psycopg", "psycopg-binary"} <= set(of_extras)
+    assert (of_extras["npTDMS"].extra, of_extras["psycopg-binary"].extra) == ("tdms", "postgres")
+    assert not {"pytest", "hatchling"} & {each.package for each in notices()}
