@@ -29,9 +29,9 @@ def default_config() -> Path:
     return _locate("config/default.toml")
 
 
-def service_unit() -> Path:
-    """The systemd unit of the daemon."""
-    return _locate("config/shm.service")
+def unit_file(name: str) -> Path:
+    """A unit of systemd, such as the daemon's `shm.service`."""
+    return _locate(f"config/{name}")
 
 
 def one_thread_a_process() -> None:

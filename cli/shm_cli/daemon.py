@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import re
-import sys
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import rich_click as click
 
 from shm.errors import UsageError
-from shm.resources import service_unit
 from shm_cli.common import log_file_option, open_workspace, tls_options
-
-if TYPE_CHECKING:
-    from shm_daemon.web.address import Address
+from shm_cli.units import print_unit, print_unit_option, serving_words
 
 
 @click.command()
@@ -31,11 +24,7 @@ if TYPE_CHECKING:
 @tls_options
 @click.option("--workers", type=click.IntRange(1, 64), help="Processes that identify and update.")
 @log_file_option
-@click.option(
-    "--print-unit",
-    is_flag=True,
-    help="Only print a systemd unit that begins it with the other options given here.",
-)
+@print_unit_option
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -48,7 +37,7 @@ def command(
     key: Path | None,
     workers: int | None,
     log_file: Path | None,
-    print_unit: bool,
+    as_unit: bool,
 ) -> None:
     """Watch the spool and do the whole job, unattended.
 
@@ -66,9 +55,14 @@ def command(
     if not web and any(tls.values()):
         raise UsageError("--certificate and --key are for --web.", remedy="Give --web as well.")
     workspace = open_workspace(ctx, workers=workers)
-    if print_unit:
-        options = _options(standby, web, Address(host, port), tls, workers)
-        click.echo(unit_text(workspace.folder, Path(sys.prefix), options), nl=False)
+    if as_unit:
+        words = [
+            "daemon",
+            *(["--standby"] if standby else []),
+            *(["--web", *serving_words(host, port, tls)] if web else []),
+            *(["--workers", str(workers)] if workers is not None else []),
+        ]
+        print_unit("shm.service", workspace.folder, words)
         return
     begin_logging(workspace.settings, log_file)
     address = Address(host, port) if web else None
@@ -76,62 +70,3 @@ def command(
         from shm_daemon.loop import run  # while the interface, which needs less, begins
 
         run(workspace, once=once, standby=standby)
-
-
-def _options(
-    standby: bool,
-    web: bool,
-    address: Address,
-    tls: Mapping[str, Path | None],
-    workers: int | None,
-) -> Sequence[str]:
-    """The options as they are typed, with paths that hold from everywhere."""
-    place = ["--web", "--host", address.host, "--port", str(address.port)]
-    files = [str(word) for name, file in tls.items() if file for word in (name, file.resolve())]
-    return [
-        *(["--standby"] if standby else []),
-        *([*place, *files] if web else []),
-        *(["--workers", str(workers)] if workers is not None else []),
-    ]
-
-
-_HOMES = (Path("/home"), Path("/root"), Path("/run/user"))
-_PLAIN = re.compile(r"[A-Za-z0-9_./:@+,=-]+")
-
-
-def unit_text(workspace: Path, prefix: Path, options: Sequence[str] = ()) -> str:
-    """The unit for a workspace, with the shm installed under `prefix` and options of `shm daemon`;
-    it runs as the owner of the workspace.
-
-    Raises UsageError where a path or an option holds what a unit would have to quote.
-    """
-    folder = str(workspace)
-    _refuse_odd((folder, str(prefix), *options))
-    values = {
-        "ExecStart": " ".join(["/usr/bin/env", "shm", "daemon", *options]),
-        "Environment=PATH": f"{prefix}/bin:/usr/local/bin:/usr/bin:/bin",
-        "Environment=SHM_WORKSPACE": folder,
-        "WorkingDirectory": folder,
-        "ReadWritePaths": folder,
-        "User": workspace.owner(),
-    }
-    if _is_in_a_home(workspace) or _is_in_a_home(prefix):
-        values["ProtectHome"] = "read-only"  # hidden homes would hide workspace or program
-    text = service_unit().read_text(encoding="utf-8")
-    for key, value in values.items():
-        line = re.compile(rf"^{re.escape(key)}=.*$", re.MULTILINE)
-        text = line.sub(lambda _, key=key, value=value: f"{key}={value}", text, count=1)  # type: ignore[misc]
-    return text
-
-
-def _is_in_a_home(path: Path) -> bool:
-    return any(path.resolve().is_relative_to(home) for home in _HOMES)
-
-
-def _refuse_odd(texts: Sequence[str]) -> None:
-    for text in texts:
-        if not _PLAIN.fullmatch(text):
-            raise UsageError(
-                f"{text!r} would have to be quoted in a unit.",
-                remedy="Use paths without spaces, or write it by hand from config/shm.service.",
-            )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm.errors import DamagedRow, StoreError, sentence
+from shm.errors import DamagedRow, StoreError, UsageError, sentence
 from shm.store import Archive, Store, Workspace
 from shm.store.backups import back_up, copy_store, restore
 from shm.store.checking import (
@@ -37,6 +37,7 @@ from shm_cli.common import (
     waiting,
 )
 from shm_cli.parameter_types import Words
+from shm_cli.units import print_unit, print_unit_option
 
 _copies_option = click.option(
     "--archive",
@@ -141,14 +142,26 @@ def check(ctx: click.Context, with_archive: bool, accepted: str | None, as_json:
 
 
 @command.command()
-@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("target", metavar="FILE|FOLDER", type=click.Path(path_type=Path))
 @_copies_option
+@print_unit_option
+@click.option(
+    "--print-timer", "as_timer", is_flag=True, help="Only print a timer that begins it each night."
+)
 @json_option
 @click.pass_context
-def backup(ctx: click.Context, file: Path, copies: Path | None, as_json: bool) -> None:
+def backup(
+    ctx: click.Context,
+    target: Path,
+    copies: Path | None,
+    as_unit: bool,
+    as_timer: bool,
+    as_json: bool,
+) -> None:
     """Write what the store holds into a new file, while the daemon goes on.
 
-    The file is a SQLite store, of a store in PostgreSQL too. With --archive the raw files that are
+    The file is a SQLite store, of a store in PostgreSQL too. In a FOLDER that is there it becomes
+    TIME/shm.db, beside copies of bridge.toml and loggers/. With --archive the raw files that are
     not in DIR yet are copied there, and the store notes which recordings have a copy: only their
     raw files may ever be deleted here.
 
@@ -156,14 +169,22 @@ def backup(ctx: click.Context, file: Path, copies: Path | None, as_json: bool) -
     Example: shm db backup /backup/arch-2026-05-01.db --archive /backup/archive
     """
     workspace = open_workspace(ctx)
+    if as_unit or as_timer:
+        _print_backup_unit(workspace.folder, target, copies, as_timer)
+        return
+    file = target
+    if target.is_dir():
+        file = target / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}" / "shm.db"
     copied, noted = None, 0
     with workspace.store() as store, progress_bar("backup") as tell:
         written = back_up(store, file, tell)
+        if target.is_dir():
+            workspace.copy_description(file.parent)
         if copies is not None:
-            target, removed = Archive(copies), store.upkeep.removed_names(workspace.archive)
+            kept, removed = Archive(copies), store.upkeep.removed_names(workspace.archive)
             names = [name for name in archived_names(store) if name not in removed]
-            copied = copy_archive(workspace.archive, target, names, tell)
-            noted = store.upkeep.note_copies(target, datetime.now(UTC))
+            copied = copy_archive(workspace.archive, kept, names, tell)
+            noted = store.upkeep.note_copies(kept, datetime.now(UTC))
         store.upkeep.note_backup(file.resolve(), datetime.now(UTC))
     if as_json:
         document = {"file": str(file), **_document(written.tables, copied), "newly_noted": noted}
@@ -176,6 +197,21 @@ def backup(ctx: click.Context, file: Path, copies: Path | None, as_json: bool) -
         (*written.troubles, *(copied.troubles if copied else ())),
         "The backup holds all else. Keep the older ones, and run `shm db check --archive`.",
     )
+
+
+def _print_backup_unit(workspace: Path, target: Path, copies: Path | None, timer: bool) -> None:
+    folder = target.resolve()
+    if not folder.is_dir():
+        raise UsageError(
+            f"{target} is no folder: each night's backup needs a name of its own.",
+            remedy="Make a folder that belongs to the owner of the workspace, and give that.",
+        )
+    words = ["db", "backup", str(folder)]
+    writes = [folder]
+    if copies is not None:
+        words += ["--archive", str(copies.resolve())]
+        writes += [] if copies.resolve().is_relative_to(folder) else [copies.resolve()]
+    print_unit("shm-backup.timer" if timer else "shm-backup.service", workspace, words, *writes)
 
 
 @command.command("restore")

@@ -68,6 +68,10 @@ VERBS: dict[str, Verb] = {
     "doctor": Verb("shm_cli.doctor", "Whether all is well, and what to do where it is not."),
     "status": Verb("shm_cli.status", "What the workspace holds and what waits."),
     "settings": Verb("shm_cli.settings", "Every setting: its default, its range, what it means."),
+    "notices": Verb(
+        "shm_cli.notices",
+        "Other people's packages that work here, with the licence that each declares.",
+    ),
     "completion": Verb(
         "shm_cli.completion", "Print the script that completes `shm` in bash or zsh."
     ),

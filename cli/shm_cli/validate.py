@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -13,7 +14,7 @@ from shm.errors import GateNotMet, UsageError
 from shm.report.figures.against_a_parameter import write_png
 from shm_cli import thesis
 from shm_cli.common import json_option, markdown, progress_bar, seed_option, show, show_table, table
-from shm_cli.validation import beam_solutions, frequencies, selection
+from shm_cli.validation import beam_solutions, formulas, frequencies, selection
 
 Texts = tuple[str, ...]
 
@@ -28,6 +29,21 @@ Texts = tuple[str, ...]
     help="One figure of the thesis alone: dimensionless frequencies of a beam.",
 )
 @click.option(
+    "--table",
+    "wanted",
+    type=click.Choice(frequencies.TABLES),
+    help="One table of the thesis alone.",
+)
+@click.option(
+    "--formulas",
+    "practice",
+    is_flag=True,
+    help="Formulas of practice beside our answer, on beams of known tension.",
+)
+@click.option(
+    "--list", "listed", is_flag=True, help="Every item of the thesis, and where it is shown."
+)
+@click.option(
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE.png",
@@ -36,7 +52,14 @@ Texts = tuple[str, ...]
 @seed_option
 @json_option
 def command(
-    as_markdown: bool, figure: str | None, out: Path | None, seed: int, as_json: bool
+    as_markdown: bool,
+    figure: str | None,
+    wanted: str | None,
+    practice: bool,
+    listed: bool,
+    out: Path | None,
+    seed: int,
+    as_json: bool,
 ) -> None:
     """Our figures beside the thesis's, with a gate.
 
@@ -47,12 +70,23 @@ def command(
     \b
     Example: shm validate --markdown
     Example: shm validate --figure 2.4 --out figure_2_4.png
+    Example: shm validate --table A.5
+    Example: shm validate --formulas
     """
     if figure is not None:
         _show_figure(beam_solutions.solutions(beam_solutions.FIGURES[figure]), out, as_json)
         return
     if out is not None:
         raise UsageError("--out draws one figure.", remedy="Say which: --figure 2.4, say.")
+    if listed:
+        _show_list(as_json)
+        return
+    if practice:
+        _show_formulas(seed, as_json)
+        return
+    if wanted is not None:
+        _show_table(wanted, as_json)
+        return
     tables, chosen = compared(seed)
     parts = {
         "computed frequencies of the thesis": (
@@ -103,6 +137,38 @@ def _show_figure(found: beam_solutions.Solutions, out: Path | None, as_json: boo
         click.echo(found.statement)
     if found.difference > beam_solutions.LIMIT:
         raise GateNotMet(found.statement, remedy="Report this: the beam's solver is at fault.")
+
+
+def _show_table(wanted: str, as_json: bool) -> None:
+    with progress_bar("validating") as progress:
+        rows = frequencies.compared(load_hanger(thesis.HANGER_FILE), progress, wanted)
+    if as_json:
+        show([asdict(row) for row in rows])
+    else:
+        _show(f"table {wanted} of the thesis", frequencies.HEADS, [*map(frequencies.cells, rows)])
+    misses = frequencies.misses(rows)
+    if misses:
+        message = "; ".join(misses)
+        raise GateNotMet(f"{message}.", remedy="See docs/trials/validation.md for the marks.")
+
+
+def _show_formulas(seed: int, as_json: bool) -> None:
+    with progress_bar("validating") as progress:
+        rows = formulas.compared(load_hanger(thesis.HANGER_FILE), seed, progress)
+    if as_json:
+        show([asdict(row) for row in rows])
+        return
+    _show("formulas of practice", formulas.FORMULA_HEADS, formulas.formula_cells())
+    _show("error of the tension", formulas.HEADS, [*map(formulas.cells, rows)])
+
+
+def _show_list(as_json: bool) -> None:
+    items = tomllib.loads(thesis.CHECKLIST_FILE.read_text(encoding="utf-8"))["item"]
+    if as_json:
+        show(items)
+    else:
+        heads = ("of", "what", "where")
+        _show("the thesis", heads, [tuple(item[head] for head in heads) for item in items])
 
 
 def _show(title: str, heads: Texts, rows: Sequence[Texts]) -> None:

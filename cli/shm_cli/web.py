@@ -7,6 +7,7 @@ from pathlib import Path
 import rich_click as click
 
 from shm_cli.common import log_file_option, open_workspace, tls_options
+from shm_cli.units import print_unit, print_unit_option, serving_words
 
 
 @click.command()
@@ -16,6 +17,7 @@ from shm_cli.common import log_file_option, open_workspace, tls_options
 )
 @tls_options
 @log_file_option
+@print_unit_option
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -24,6 +26,7 @@ def command(
     certificate: Path | None,
     key: Path | None,
     log_file: Path | None,
+    as_unit: bool,
 ) -> None:
     """The dashboard and its API: pages for people, upload, alerts, health and metrics.
 
@@ -40,6 +43,11 @@ def command(
     from shm_daemon.web.serving import leaving, serve
 
     workspace, address = open_workspace(ctx), Address(host, port)
+    if as_unit:
+        files = {"--certificate": certificate, "--key": key}
+        words = ["web", *serving_words(host, port, files)]
+        print_unit("shm-web.service", workspace.folder, words)
+        return
     begin_logging(workspace.settings, log_file)
     page = address.page(certificate is not None)
     said = f"The dashboard: {page}  (Ctrl+C ends it)"

@@ -72,6 +72,14 @@ class Workspace:
         """The same workspace as its `bridge.toml` describes it now."""
         return type(self).open(self.folder, self.flags)
 
+    def copy_description(self, folder: Path) -> None:
+        """Copies what describes bridge and loggers into a folder: no store holds it."""
+        from shm.read.profiles import FOLDER  # which opens readers: only a backup waits for them
+
+        shutil.copyfile(self.folder / "bridge.toml", folder / "bridge.toml")
+        if (self.folder / FOLDER).is_dir():
+            shutil.copytree(self.folder / FOLDER, folder / FOLDER)
+
     @property
     def database(self) -> Path:
         """The store's file, where the store is one."""

@@ -107,6 +107,34 @@ def test_a_lost_workspace_comes_back_from_its_backup(
     assert shm("--workspace", copied.folder, "drift", "--hanger", 3).code == 0
 
 
+def test_each_night_has_a_folder_of_its_own_in_the_folder_of_backups(
+    shm: Shm, copied: Workspace, tmp_path: Path
+) -> None:
+    """As shm-backup.service calls it; the folder's copy is what a bare machine needs."""
+    copies = tmp_path / "nights"
+    (copied.folder / "loggers").mkdir()
+    (copied.folder / "loggers" / "l.toml").write_text("")
+    call = ("--workspace", copied.folder, "db", "backup", copies, "--archive", copies / "archive")
+    refused = shm(*call, "--print-unit")
+    assert refused.code == 2
+    assert "Make a folder" in refused.err
+    copies.mkdir()
+    unit = shm(*call, "--print-unit").out
+    assert f"\nReadWritePaths={copied.folder} {copies}\n" in unit
+    assert "\nOnCalendar=" in shm(*call, "--print-timer").out
+    assert [*copies.iterdir()] == []
+    (line,) = (line for line in unit.splitlines() if line.startswith("ExecStart="))
+    words = line.split(" shm ")[1].split()
+    file = Path(shm("--workspace", copied.folder, *words, "--json").document["file"])
+    assert file.parent.parent == copies
+    again = file.parent / "bridge"
+    shutil.copytree(file.parent / "loggers", again / "loggers")
+    assert shm("init", again, "--from", file.parent / "bridge.toml").code == 0
+    call = ("--workspace", again, "db")
+    assert shm(*call, "restore", file, "--archive", copies / "archive").code == 0
+    assert shm(*call, "check", "--archive").code == 0
+
+
 def test_raw_files_that_cannot_be_copied_are_told_and_not_noted(
     shm: Shm, copied: Workspace, tmp_path: Path
 ) -> None:

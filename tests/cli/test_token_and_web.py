@@ -48,3 +48,5 @@ def test_the_daemon_serves_https_as_the_web_interface_alone_does(
     assert "--web" in without.err
     given = ("daemon", "--web", "--certificate", pem, "--key", pem, "--print-unit")
     assert f"--certificate {pem} --key {pem}" in shm("--workspace", empty.folder, *given).out
+    web = shm("--workspace", empty.folder, "web", "--port", 8500, *given[2:]).out
+    assert f"ExecStart=/usr/bin/env shm web --host 127.0.0.1 --port 8500 --certificate {pem}" in web

@@ -19,11 +19,12 @@ def rows() -> list[frequencies.FrequencyRow]:
 
 def test_every_table_keeps_its_mark(rows) -> None:
     assert frequencies.misses(rows) == []
-    assert {row.table for row in rows} == {f"A.{number}" for number in range(1, 8)}
+    assert {row.table for row in rows} == set(frequencies.TABLES)
 
 
 def test_a_table_beyond_its_mark_is_named(rows) -> None:
-    (miss,) = frequencies.misses([replace(rows[0], difference_percent=0.31), rows[1]])
+    first = next(row for row in rows if row.table == "A.1")
+    (miss,) = frequencies.misses([replace(first, difference_percent=0.31), rows[1]])
     assert miss == "table A.1, 711 kN: 0.31 % off, the mark is 0.3 %"
 
 

@@ -13,15 +13,16 @@ from pathlib import Path
 import pytest
 
 from shm.errors import UsageError
-from shm.resources import service_unit
+from shm.resources import unit_file
 from shm.store import Workspace
-from shm_cli.daemon import unit_text
+from shm_cli.units import unit_text
 from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import LONGEST_REST_S, longest_wait_s, tell_systemd
 from tests.helpers.flows import threads
 from tests.helpers.workspaces import make_workspace
 
 SYSTEMD = shutil.which("systemd-analyze")
+UNITS = ["shm.service", "shm-web.service", "shm-backup.service"]
 needs_systemd = pytest.mark.skipif(SYSTEMD is None, reason="systemd-analyze is not installed")
 
 
@@ -34,15 +35,16 @@ def verified(unit: Path) -> tuple[int, str]:
 
 
 @needs_systemd
-@pytest.mark.parametrize("name", ["shm.service", "shm-dask-worker.service"])
+@pytest.mark.parametrize("name", [*UNITS, "shm-dask-worker.service", "shm-backup.timer"])
 def test_the_units_pass_systemds_own_check(name: str) -> None:
-    assert verified(service_unit().with_name(name)) == (0, "")
+    assert verified(unit_file(name)) == (0, "")
 
 
 @needs_systemd
 def test_the_printed_unit_passes_too_with_our_paths(tmp_path: Path) -> None:
     unit = tmp_path / "shm.service"
-    unit.write_text(unit_text(tmp_path, Path("/opt/arch"), ["--web", "--port", "8400"]))
+    words = ["daemon", "--web", "--port", "8400"]
+    unit.write_text(unit_text("shm.service", tmp_path, Path("/opt/arch"), words))
     assert verified(unit) == (0, "")
     lines = unit.read_text().splitlines()
     assert "ExecStart=/usr/bin/env shm daemon --web --port 8400" in lines
@@ -53,21 +55,30 @@ def test_the_printed_unit_passes_too_with_our_paths(tmp_path: Path) -> None:
 
 def test_what_our_readers_confine_themselves_with_is_let_through() -> None:
     """Landlock is in none of systemd's own groups of calls."""
-    allowed = service_unit().read_text()
+    allowed = unit_file("shm.service").read_text()
     for call in ("landlock_create_ruleset", "landlock_add_rule", "landlock_restrict_self"):
         assert call in allowed
 
 
+def test_what_confines_the_daemon_confines_all() -> None:
+    """The backup reads no files of strangers, so that it need not be let confine its readers."""
+    first, *others = ({*unit_file(name).read_text().splitlines()} for name in UNITS)
+    confining = {line for line in first if line.startswith(("Protect", "Restrict", "NoNew", "Cap"))}
+    assert len(confining) >= 15
+    assert all(confining <= other for other in others)
+
+
 def test_a_workspace_in_a_home_stays_visible(tmp_path: Path) -> None:
-    assert "\nProtectHome=true\n" in unit_text(tmp_path, Path("/opt/shm"))
-    assert "\nProtectHome=read-only\n" in unit_text(tmp_path, Path("/home/ann/shm"))
+    for name in UNITS:
+        assert "\nProtectHome=true\n" in unit_text(name, tmp_path, Path("/opt/shm"), [])
+        assert "\nProtectHome=read-only\n" in unit_text(name, tmp_path, Path("/home/ann/shm"), [])
 
 
 def test_a_path_that_would_have_to_be_quoted_is_refused(tmp_path: Path) -> None:
     odd = tmp_path / "my bridge\nExecStartPre=rm"
     odd.mkdir()
     with pytest.raises(UsageError, match="quoted"):
-        unit_text(odd, Path("/opt/shm"))
+        unit_text("shm.service", odd, Path("/opt/shm"), [])
 
 
 @pytest.fixture

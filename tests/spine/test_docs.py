@@ -97,7 +97,7 @@ def test_links_lead_to_files_of_the_repository(page: Path) -> None:
     [
         ("README.md", "selection", "solid2", 1),
         ("docs/trials/validation.md", "selection", "| solid2", 2),
-        ("docs/trials/validation.md", "frequencies", "| A.5", 1),
+        ("docs/trials/validation.md", "frequencies", "| A.5", 3),
     ],
 )
 def test_the_validation_tables_stand_in_their_pages(page, name, word, times) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 FOLDER = Path(__file__).parent
 HANGER_FILE = FOLDER / "hanger3.toml"
 TABLES_FILE = FOLDER / "tables.toml"
+CHECKLIST_FILE = FOLDER / "checklist.toml"
 
 PRINTINGS = {
     "table 1.1": FOLDER / "table_1_1.modes.json",

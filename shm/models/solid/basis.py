@@ -49,10 +49,13 @@ class Description:
 
     def system(self, plane: Plane, modes: int) -> AffineSystem:
         """The full model's bending plane, on a mesh that resolves that many modes."""
+        return self.meshed(plane, max(self.geometry.fineness.rod, _CELLS_A_MODE * modes))
+
+    def meshed(self, plane: Plane, rod: int) -> AffineSystem:
+        """The full model's bending plane with that many cells along the rod."""
         from shm.models.solid.assembly import assembled
 
-        fine = self.geometry.fineness
-        fine = replace(fine, rod=max(fine.rod, _CELLS_A_MODE * modes))
+        fine = replace(self.geometry.fineness, rod=rod)
         return assembled(replace(self.geometry, fineness=fine), self.material, self.support, plane)
 
     def full_frequencies_hz(self, points: FloatArray, modes: int) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -77,6 +77,15 @@ class SolidModel(Model):
         points = np.vstack([self._points(theta, plane) for plane in PLANES])
         found = self.description().full_frequencies_hz(points, modes)
         return np.stack(np.split(found, 2), axis=1)
+
+    def convergence_hz(self, rods: tuple[int, ...], modes: int) -> Iterator[tuple[int, FloatArray]]:
+        """Unknowns and frequencies (modes,) of held ends at nominal tension, by cells along it."""
+        from shm.models.solid.affine import natural_modes
+
+        for rod in rods:
+            system = self.description().meshed("transverse", rod)
+            found = natural_modes(system, self.hanger.nominal_tension_n, np.zeros(0), modes)
+            yield system.unknowns, found.frequencies_hz
 
     def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
         # Slow to import, and seldom needed.

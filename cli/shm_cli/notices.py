@@ -1,0 +1,83 @@
+"""`shm notices`: what an installation brings along, under which licence each package stands."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import asdict, dataclass
+from importlib import metadata
+
+import rich_click as click
+
+from shm_cli.common import json_option, show, show_table, table
+
+_REQUIREMENT = re.compile(r"([\w.-]+)\s*(?:\[([^\]]*)\])?[^;]*;?(.*)")
+_ONLY_FOR = re.compile(r"""extra\s*==\s*['"]([\w.-]+)['"]""")
+_NOT_AT_WORK = {"dev", "build"}
+
+
+@dataclass(frozen=True)
+class Notice:
+    """One package, its licence as the package declares it, and the extra of shm that brings it."""
+
+    package: str
+    version: str
+    licence: str
+    extra: str
+
+
+@click.command()
+@json_option
+def command(as_json: bool) -> None:
+    """Other people's packages that work here, with the licence that each declares.
+
+    Those of an extra, such as `web`, are listed where they are installed. The texts of the licences
+    lie in each package's own folder of the installation.
+
+    \b
+    Example: shm notices
+    """
+    found = notices()
+    if as_json:
+        show({"packages": [asdict(each) for each in found]})
+        return
+    shown = table("", "package", "version", "licence", "extra")
+    for each in found:
+        shown.add_row(each.package, each.version, each.licence, each.extra)
+    show_table(shown)
+
+
+def notices() -> Sequence[Notice]:
+    """Every installed package that shm requires, directly or not, and those of its extras."""
+    found: dict[str, Notice] = {}
+    _gather("shm", (), "", found)
+    for extra in metadata.metadata("shm").get_all("Provides-Extra") or ():
+        if extra not in _NOT_AT_WORK:
+            _gather("shm", (extra,), extra, found)
+    return sorted(found.values(), key=lambda each: (each.extra, each.package.lower()))
+
+
+def _gather(name: str, chosen: Collection[str], extra: str, found: dict[str, Notice]) -> None:
+    for text in metadata.requires(name) or ():
+        needed = _REQUIREMENT.match(text)
+        assert needed is not None
+        package, its_extras, condition = needed.groups()
+        key = re.sub(r"[-_.]+", "-", package).lower()  # one name is spelled in several ways
+        only_for = _ONLY_FOR.search(condition)
+        if key in found or (only_for and only_for[1] not in chosen):
+            continue
+        try:
+            fields = metadata.metadata(package)
+        except metadata.PackageNotFoundError:  # of another system, or of an extra that is not here
+            continue
+        licence = _declared(fields)
+        found[key] = Notice(fields["Name"], fields["Version"], licence, extra)
+        _gather(package, re.findall(r"[\w.-]+", its_extras or ""), extra, found)
+
+
+def _declared(fields: metadata.PackageMetadata) -> str:
+    classifiers = [c for c in fields.get_all("Classifier") or () if c.startswith("License ::")]
+    names = [c.rpartition(" :: ")[2] for c in classifiers if c != "License :: OSI Approved"]
+    # A licence given as its whole text names the licences of others: its first line is its own.
+    written = [text.strip().partition("\n")[0] for text in fields.get_all("License") or ()]
+    return "; ".join(fields.get_all("License-Expression") or names or written)
