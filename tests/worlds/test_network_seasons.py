@@ -29,6 +29,8 @@ from tests.worlds.network_seasons import (
     season,
 )
 
+pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the product
+
 ORDERS = np.arange(1, 6)
 BAR = Beam(
     length_m=10.0,

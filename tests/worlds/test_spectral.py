@@ -29,6 +29,8 @@ from tests.worlds.spectral import (
     sound_hangers,
 )
 
+pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the product
+
 LENGTH_M, MASS_KG_M, BENDING_NM2, TENSION_N = 8.0, 15.4, 6.3e4, 2.0e5
 SHEAR_N, ROTARY_KG_M = 1.37e8, 2.4e-3
 PINS = (End(0.0), End(0.0))

@@ -33,6 +33,8 @@ from tests.worlds.tied_arch_seasons import (
     season,
 )
 
+pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the product
+
 BAR = Bar(9.0, 0.08, 2.05e11, 7850.0, own_weight=False)
 SIX = np.arange(1, 7)
 
