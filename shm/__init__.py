@@ -7,7 +7,7 @@ In a notebook, from a recording to the tension and what limits it::
     hanger = shm.load_hanger("H.toml")
     test = shm.identify(shm.read("hanger3.csv"), hanger=hanger)
     posterior = shm.update(test, hanger, model="beam2", seed=1)
-    posterior.tension_n.mean(), posterior.tension_n.std()      # N
+    print(posterior.summary())                                 # the tension, its interval
     choice = shm.select(test, hanger)                          # which model class, how surely
     diagnosis = shm.diagnose(test, hanger)                     # why model and measurement differ
     shm.plot.tension(posterior, hanger)                        # a matplotlib figure
@@ -20,7 +20,8 @@ In a notebook, from a recording to the tension and what limits it::
 - `diagnose_simulator` asks the same of any simulator of your own: a `Simulator` with a `Prior` for
   each parameter, a `SimulatorEffect` for each possible cause, and a `Reading` for each measurement.
 - `Store` reads what a workspace keeps of years of tests.
-- `plot` draws, `export` hands over to pandas, ArviZ, CSV, netCDF.
+- `plot` draws, `export` hands over to pandas, ArviZ, CSV, netCDF; of a value by itself, its
+  `summary()`, `to_dataframe()`, `to_arviz()` do.
 - The nouns that flow between the steps are frozen dataclasses: `Recording`, `FrequencyResponse`,
   `Identification`, `ModalTest`, `Mode`, `AddedMass`, `Posterior`, `Selection`, `Diagnosis`.
 - What goes wrong on purpose is a `ShmError`, which says what to do (`shm.errors` has the tree).
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from inspect import Signature
 
     from shm import export as export
+    from shm import notebook as notebook
     from shm import plot as plot
     from shm.api import Store as Store
     from shm.api import diagnose as diagnose
@@ -124,6 +126,8 @@ class _Shm(ModuleType):
     def __setattr__(self, name: str, value: object) -> None:
         if name in _STEPS_AND_PACKAGES and type(value) is ModuleType:
             value.__class__ = _StepAndPackage
+        if name == "values":
+            import_module("shm.values.showing").hand_over_to(self)
         super().__setattr__(name, value)
 
 
@@ -133,7 +137,7 @@ if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
         """What is asked for is loaded then, so that `import shm` stays cheap."""
-        if name in _MODULES:
+        if name in (*_MODULES, "notebook"):
             return import_module(f"shm.{name}")
         if name not in _HOME:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

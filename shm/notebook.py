@@ -1,15 +1,16 @@
-"""How values show themselves in a notebook: small tables with units, figures as pictures.
+"""Values as a person reads them: small tables with units, as text and in a notebook; figures.
 
-`import shm` in a notebook is enough; elsewhere `%load_ext shm.notebook`. IPython finds the
-functions below by the names of the classes, so that the values stay plain data and nothing is
-imported before it is shown.
+`summary()` and the view of a notebook are one sheet, in the words of the report. `import shm` in a
+notebook is enough for its figures; elsewhere `%load_ext shm.notebook`.
 """
 
 from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -17,28 +18,59 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from shm.report.intervals import Interval
-    from shm.values import Diagnosis, Hanger, Posterior, Selection
+    from shm.values import Diagnosis, Hanger, ModalTest, Posterior, Selection
 
 _CAUSES_SHOWN = 5  # technical: rows of a cell's table
+_WIDTH = 88  # technical: characters of a line in a notebook's cell
 
 
 def load_ipython_extension(shell: Any) -> None:
-    """Tells a shell of IPython how to show a hanger, posterior, selection, diagnosis, figure."""
-    html = shell.display_formatter.formatters["text/html"]
-    for home, kind, shown in (
-        ("shm.values.hanger", "Hanger", hanger_html),
-        ("shm.values.posterior", "Posterior", posterior_html),
-        ("shm.values.posterior", "Selection", selection_html),
-        ("shm.values.diagnosis", "Diagnosis", diagnosis_html),
-    ):
-        html.for_type_by_name(home, kind, shown)
+    """Tells a shell of IPython how to show a figure; values show themselves."""
     png = shell.display_formatter.formatters["image/png"]
     before = png.for_type_by_name("matplotlib.figure", "Figure", figure_png)
     if before is not None:
         png.for_type_by_name("matplotlib.figure", "Figure", before)
 
 
-def hanger_html(hanger: Hanger) -> str:
+@dataclass(frozen=True)
+class Sheet:
+    """A value in words: a titled table, whose headings may be empty, and paragraphs under it."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """In columns, without blanks at the ends of lines."""
+        table = [self.head, *self.rows] if any(self.head) else list(self.rows)
+        widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+        lines = [
+            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+            for row in table
+        ]
+        notes = [textwrap.fill(each, _WIDTH) for each in self.notes]
+        return "\n".join([self.title, *lines, *notes])
+
+    @property
+    def html(self) -> str:
+        headings = "".join(f"<th>{escape(each)}</th>" for each in self.head)
+        shown = f"<thead><tr>{headings}</tr></thead>" if any(self.head) else ""
+        body = "".join(
+            "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>"
+            for row in self.rows
+        )
+        table = f"<caption>{escape(self.title)}</caption>{shown}<tbody>{body}</tbody>"
+        return f"<table>{table}</table>" + "".join(f"<p>{escape(each)}</p>" for each in self.notes)
+
+
+def sheet(value: Any) -> Sheet:
+    """That of a hanger, modal test, posterior, selection or diagnosis."""
+    return _SHEETS[type(value).__name__](value)
+
+
+def _hanger(hanger: Hanger) -> Sheet:
     """The description of a hanger, in the units of a drawing."""
     from shm.report import formatting
     from shm.values.force_units import force_unit
@@ -56,14 +88,26 @@ def hanger_html(hanger: Hanger) -> str:
         ("ends", f"{hanger.supports.deck} (deck), {hanger.supports.arch} (arch)"),
         ("end plates", "yes" if hanger.plate else "none"),
     ]
-    return _table(formatting.hanger_name(hanger.id, hanger.name), ("", ""), rows)
+    return Sheet(formatting.hanger_name(hanger.id, hanger.name), ("", ""), rows)
 
 
-def posterior_html(posterior: Posterior) -> str:
+def _modal_test(test: ModalTest) -> Sheet:
+    """When and how warm, and the modes."""
+    from shm.report import formatting
+    from shm.report.modal_test_report import MODE_HEADINGS, mode_row
+
+    whose = "" if test.hanger is None else f" of hanger {test.hanger}"
+    when = f"{formatting.moment(test.time)}, {formatting.temperature(test.temperature_c)}"
+    title = f"Modal test {test.id}{whose}, {when}"
+    return Sheet(title, MODE_HEADINGS, [mode_row(mode) for mode in test.modes])
+
+
+def _posterior(posterior: Posterior) -> Sheet:
     """Tension and parameters: mean, 90 % interval, most probable value, meaning."""
     from shm.report import formatting
     from shm.report.intervals import Interval
     from shm.values.force_units import force_unit
+    from shm.values.stated_tension import averaged_now, stated
 
     tension_n = Interval.of_samples(posterior.tension_n)
     unit = force_unit(tension_n.mean)
@@ -78,14 +122,17 @@ def posterior_html(posterior: Posterior) -> str:
             _interval_row(name, interval, best[name], formatting.meaning(name, posterior.model))
         )
     head = ("", "mean", "90 % interval", "most probable", "what it is")
-    return _table(f"{_whose(posterior)}, {formatting.model_class(posterior.model)}", head, rows) + (
-        f"<p>{len(posterior.samples)} draws, log evidence {posterior.log_evidence:.2f} "
+    sampled = (
+        f"{len(posterior.samples)} draws, log evidence {posterior.log_evidence:.2f} "
         f"± {formatting.number(posterior.log_evidence_sd, '.2f')}, "
-        f"R-hat {formatting.number(posterior.r_hat, '.3f')}.</p>"
+        f"R-hat {formatting.number(posterior.r_hat, '.3f')}."
     )
+    title = f"{_whose(posterior)}, {formatting.model_class(posterior.model)}"
+    said = " ".join(stated(averaged_now(posterior), unit).sentences)
+    return Sheet(title, head, rows, (said, *posterior.caveats, sampled))
 
 
-def selection_html(selection: Selection) -> str:
+def _selection(selection: Selection) -> Sheet:
     """The model classes, most probable first, with the tension that each gives."""
     from shm.report import formatting
     from shm.report.intervals import Interval
@@ -108,10 +155,10 @@ def selection_html(selection: Selection) -> str:
             )
         )
     head = ("class", "probability", "log evidence", *formatting.tension_headings(unit))
-    return _table(f"{_whose(selection.selected)}, model classes", head, rows)
+    return Sheet(f"{_whose(selection.selected)}, model classes", head, rows)
 
 
-def diagnosis_html(diagnosis: Diagnosis) -> str:
+def _diagnosis(diagnosis: Diagnosis) -> Sheet:
     """The verdict in words, the likeliest causes, no gap, something unknown."""
     from shm.report import formatting
     from shm.report.diagnosis_summary import consequences, verdict
@@ -131,7 +178,7 @@ def diagnosis_html(diagnosis: Diagnosis) -> str:
     whose = "" if diagnosis.hanger is None else f" of hanger {diagnosis.hanger}"
     title = f"Gap{whose} to {formatting.model_class(diagnosis.baseline)}"
     paragraph = f"{verdict(diagnosis)} {consequences(diagnosis)}".strip()
-    return _table(title, ("cause", "probability"), rows) + f"<p>{escape(paragraph)}</p>"
+    return Sheet(title, ("cause", "probability"), rows, (paragraph, *diagnosis.remarks))
 
 
 def figure_png(figure: Figure) -> bytes:
@@ -157,10 +204,10 @@ def _interval_row(name: str, interval: Interval, best: float, meaning: str) -> t
     )
 
 
-def _table(title: str, head: Sequence[str], rows: Sequence[tuple[str, ...]]) -> str:
-    headings = "".join(f"<th>{escape(each)}</th>" for each in head)
-    shown = f"<thead><tr>{headings}</tr></thead>" if any(head) else ""
-    body = "".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
-    )
-    return f"<table><caption>{escape(title)}</caption>{shown}<tbody>{body}</tbody></table>"
+_SHEETS: dict[str, Callable[[Any], Sheet]] = {
+    "Diagnosis": _diagnosis,
+    "Hanger": _hanger,
+    "ModalTest": _modal_test,
+    "Posterior": _posterior,
+    "Selection": _selection,
+}

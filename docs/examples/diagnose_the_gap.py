@@ -24,13 +24,7 @@ tests = campaign(hanger, HangerState(711e3), [lamp], plan, rng)
 diagnosis = shm.diagnose(tests[:1], hanger, draws=200, seed=1)
 cause = diagnosis.leading
 assert cause is not None
-print(f"{cause.effect} with probability {diagnosis.claim(cause):.2f}")
-for estimate in cause.parameters:
-    print(f"  {estimate.name} = {estimate.mean:.2f} ± {estimate.sd:.2f} {estimate.unit}")
-print(
-    f"rms of the frequencies' error: {diagnosis.shrinkage.rms_before_percent:.2f} % before, "
-    f"{diagnosis.shrinkage.rms_after_percent:.2f} % with the cause"
-)
+print(diagnosis.summary())
 
 found = {estimate.name: estimate for estimate in cause.parameters}
 assert cause.effect == "point_mass"

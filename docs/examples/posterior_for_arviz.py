@@ -1,14 +1,9 @@
-"""The posterior as ArviZ reads it: a DataTree in netCDF, with the likelihood of each measurement.
+"""The posterior in ArviZ, with the likelihood of each measurement.
 
-Needs `pip install shm[export]`. With ArviZ: `arviz.summary(arviz.from_netcdf("hanger3.nc"))`,
-`arviz.loo(...)`, `arviz.plot_ppc(...)`.
+Needs `pip install 'shm[arviz]'`; then `arviz.summary`, `arviz.loo`, `arviz.plot_ppc` take it.
 """
 
-from pathlib import Path
-from tempfile import TemporaryDirectory
-
 import numpy as np
-import xarray
 
 import shm
 
@@ -24,15 +19,10 @@ recording = shm.simulate(hanger, hits=3, seconds_per_hit=10.0, seed=5)
 test = shm.identify(recording, hanger=hanger, cross_check="none")
 posterior = shm.update(test, hanger, model="beam1", samples=500, seed=1, priors="thesis")
 
-with TemporaryDirectory() as folder:
-    path = Path(folder) / "hanger3.nc"
-    shm.export.write(posterior, path, tests=[test.test], hanger=hanger)
-    tree = xarray.load_datatree(path, engine="h5netcdf")
+tree = posterior.to_arviz([test.test], hanger)
 
 tension = tree["posterior"]["tension_n"]
-print(
-    f"tension {float(tension.mean()):.0f} {tension.attrs['units']}, groups {sorted(tree.children)}"
-)
+print(f"tension {float(tension.mean()):.0f} {tension.attrs['units']}")
 replicated = tree["posterior_predictive"]["frequency_hz"]
 observed = tree["observed_data"]["frequency_hz"]
 low, high = replicated.quantile([0.025, 0.975], dim=("chain", "draw"))

@@ -23,10 +23,10 @@ recording = shm.simulate(hanger, hits=3, seconds_per_hit=10.0, temperature_c=12.
 test = shm.identify(recording, hanger=hanger, cross_check="none")
 posterior = shm.update(test, hanger, model="beam1", samples=500, seed=1)
 
-modes = shm.export.modes([test.test])
+modes = test.test.to_dataframe()
 print(modes[["plane", "order", "frequency_hz", "frequency_sd_hz"]].to_string(index=False))
 
-table = shm.export.samples(posterior)
+table = posterior.to_dataframe()
 table["stress_mpa"] = table["tension_n"] / hanger.area_m2 / 1e6
 safety = 355 / table["stress_mpa"]
 print(f"stress {table['stress_mpa'].mean():.2f} MPa, safety {safety.quantile(0.05):.2f} at least")

@@ -7,8 +7,6 @@ the models that find the tension again), written as CSV, read, identified and up
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
-
 import shm
 from shm.read import write
 
@@ -29,16 +27,10 @@ with TemporaryDirectory() as folder:
     recording = shm.read(path)
 
 test = shm.identify(recording, hanger=hanger)
-for mode in test.test.modes[:3]:
-    print(f"{mode.plane} {mode.order}: {mode.frequency_hz:.4f} ± {mode.frequency_sd_hz:.4f} Hz")
+print(test.test.summary())
 
 posterior = shm.update(test, hanger, model="beam1", seed=1)
-low, high = np.quantile(posterior.tension_n, [0.05, 0.95])
-print(
-    f"tension {posterior.tension_n.mean() / 1e3:.1f} kN, 90 % from {low / 1e3:.1f} to "
-    f"{high / 1e3:.1f} kN; planted {truth_n / 1e3:.1f} kN; the same test would repeat it within "
-    f"{posterior.repeatability_sd_n / 1e3:.2f} kN"
-)
+print(posterior.summary())
 
 figure = shm.plot.frequency_response(test, hanger)
 

@@ -1,7 +1,8 @@
-"""Posteriors and modes for other programs: pandas, ArviZ (xarray, netCDF), CSV, JSON, npz.
+"""Posteriors, modes and causes for other programs: pandas, ArviZ (xarray, netCDF), CSV, JSON, npz.
 
-`samples` and `modes` are tables, `datatree` is what ArviZ reads, `write` makes a file. Units stand
-in the attributes of a DataTree and in the names of a table's columns.
+`samples`, `modes` and `causes` are tables, `datatree` is what ArviZ reads from a file and
+`inference_data` what it computes with, `write` makes a file. Units stand in the attributes of a
+DataTree and in the names of a table's columns.
 """
 
 from __future__ import annotations
@@ -15,10 +16,12 @@ import numpy as np
 
 from shm.documents import dump, posterior_document
 from shm.errors import UsageError
-from shm.export.tree import datatree, write_netcdf
-from shm.values import FloatArray, Hanger, ModalTest, Posterior
+from shm.export.tree import datatree, inference_data, write_netcdf
+from shm.values import Diagnosis, FloatArray, Hanger, ModalTest, Posterior
 
-__all__ = ["FORMATS", "check_format", "datatree", "modes", "samples", "write"]
+__all__ = [
+    "FORMATS", "causes", "check_format", "datatree", "inference_data", "modes", "samples", "write",
+]  # fmt: skip
 
 
 SAMPLES_SCHEMA = "shm.samples/1"
@@ -155,6 +158,30 @@ def modes(tests: Sequence[ModalTest]) -> DataFrame:
             "damping_sd": _numbers([mode.damping_sd for _, mode in rows]),
         }
     )
+
+
+def causes(diagnosis: Diagnosis) -> DataFrame:
+    """The causes of a diagnosis as a table, a row a cause, best first.
+
+    Columns: cause, at, probability, log_bayes_factor, log_fit, log_occam, group (NaN where the data
+    tell it from all others), method, then mean and standard deviation of each parameter in the unit
+    of its name, `mass_kg` and `sd_mass_kg`, NaN of a cause without it. What is left to 1 are no gap
+    and something unknown.
+
+    Example:
+        >>> shm.export.causes(diagnosis).nlargest(3, "probability")
+    """
+    from pandas import DataFrame
+
+    of_cause = ("at", "probability", "log_bayes_factor", "log_fit", "log_occam", "group", "method")
+    rows = []
+    for cause in diagnosis.causes:
+        row = {"cause": cause.effect} | {name: getattr(cause, name) for name in of_cause}
+        row["group"] = np.nan if cause.group is None else float(cause.group)
+        for each in cause.parameters:
+            row |= {each.name: each.mean, f"sd_{each.name}": each.sd}
+        rows.append(row)
+    return DataFrame(rows) if rows else DataFrame(columns=["cause", *of_cause])
 
 
 def _numbers(values: Sequence[float]) -> FloatArray:

@@ -11,6 +11,7 @@ What each draw of a posterior says of each measured frequency.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from shm import __version__
-from shm.errors import BadInput, UsageError
+from shm.errors import BadInput, UsageError, needing
 from shm.inference.field import FieldLikelihood
 from shm.inference.likelihood import Likelihood
 from shm.inference.options import silent
@@ -80,6 +81,24 @@ def datatree(
     tree = DataTree.from_dict({name: _dataset(group, named) for name, group in groups.items()})
     tree.attrs = _lineage(posterior)
     return tree
+
+
+def inference_data(
+    posterior: Posterior, tests: Sequence[ModalTest] = (), hanger: Hanger | None = None
+) -> Any:
+    """The `datatree` as the installed ArviZ computes with it: 0.x has a class of its own.
+
+    Raises UsageError where ArviZ is not installed, and as `datatree` does.
+
+    Example:
+        >>> arviz.summary(shm.export.inference_data(posterior))
+    """
+    with needing("arviz"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)  # ArviZ announces its next version at import
+        import arviz
+    tree = datatree(posterior, tests, hanger)
+    own = getattr(arviz, "InferenceData", None)
+    return tree if own is None else own.from_datatree(tree)
 
 
 def write_netcdf(tree: DataTree, path: Path) -> None:

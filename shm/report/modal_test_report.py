@@ -231,14 +231,20 @@ def details(sheet: ModalTestReport) -> tuple[Table, ...]:
 def modes(sheet: ModalTestReport) -> Table:
     return Table(
         "Modes",
-        ("plane", "order", "frequency, Hz", "sd, Hz", "damping, %", "sd, %", "amplitude, m/s²"),
-        tuple(_mode_row(mode) for mode in sheet.modes),
+        MODE_HEADINGS,
+        tuple(mode_row(mode) for mode in sheet.modes),
         note="sd: standard deviation. Amplitude: with which the mode rings right after a hit, at "
         "the sensor that moves most; as measured, without interval.",
     )
 
 
-def _mode_row(mode: Mode) -> tuple[str, ...]:
+MODE_HEADINGS = (
+    "plane", "order", "frequency, Hz", "sd, Hz", "damping, %", "sd, %", "amplitude, m/s²",
+)  # fmt: skip
+
+
+def mode_row(mode: Mode) -> tuple[str, ...]:
+    """One mode under `MODE_HEADINGS`."""
     places = min(6, max(3, formatting.decimals(2 * mode.frequency_sd_hz)))
     return (
         mode.plane,

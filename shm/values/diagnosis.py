@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, Plane
+from shm.values.showing import Shown, front, line, tension_words
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 Leads = Literal["cause", "no gap", "unexplained"]
 _AND = " + "
@@ -270,7 +274,7 @@ class Remainder:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(Shown):
     """Where a baseline and the measurements of a hanger differ, why, and what that changes.
 
     `causes` holds every effect that these data could show, best first, and the pairs that were
@@ -330,3 +334,14 @@ class Diagnosis:
         if self.leads != "cause":
             return None
         return max(self.causes, key=lambda cause: (self.claim(cause), cause.probability))
+
+    def __repr__(self) -> str:
+        leading, tension = self.leading, self.tension_after_n
+        said = self.leads if leading is None else effect_label(leading.effect, leading.at)
+        told = tension_words(tension.mean, tension.q05, tension.q95)
+        return line("Diagnosis", self.hanger, f"{said}, {told}")
+
+    def to_dataframe(self) -> DataFrame:
+        """The causes, a row a cause: the table of `shm.export.causes`."""
+        table: DataFrame = front().export.causes(self)
+        return table

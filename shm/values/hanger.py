@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from shm.values.kinds import NAN
+from shm.values.showing import Shown
 
 _ENDS_BELOW = 0.5  # judgement: so that a state at the limit does not come and go from test to test
 
@@ -141,7 +142,7 @@ class EffectPrior:
 
 
 @dataclass(frozen=True)
-class Hanger:
+class Hanger(Shown):
     """One hanger as its owner describes it: geometry, material, nominal tension.
 
     `diameter_m` is NaN where the section is not round. `bending_stiffness_factor` is the share of

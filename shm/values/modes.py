@@ -5,10 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, Plane, Verdict
 from shm.values.recording import AddedMass
+from shm.values.rounding import NINETY_PERCENT
+from shm.values.showing import Shown, front, line, tension_words
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True)
@@ -112,7 +117,7 @@ def printable(text: str, instead: str = "_") -> str:
 
 
 @dataclass(frozen=True)
-class ModalTest:
+class ModalTest(Shown):
     """What one hammer test says about a hanger: its identified modes and the conditions.
 
     `id` is of 1 to LONGEST_TEST_ID printable characters, else that is a ValueError: no document
@@ -135,6 +140,21 @@ class ModalTest:
     def __post_init__(self) -> None:
         if not is_test_id(self.id):
             raise ValueError(f"{self.id!r} is no id of a test; see as_test_id")
+
+    def __repr__(self) -> str:
+        found_hz = [mode.frequency_hz for mode in self.modes]
+        said = f"{len(found_hz)} modes"
+        if found_hz:
+            said += f", {min(found_hz):.3f} to {max(found_hz):.3f} Hz"
+        read_n, half_n = self.tension_read_n, NINETY_PERCENT * self.tension_read_sd_n
+        if math.isfinite(read_n):
+            said += f", read {tension_words(read_n, read_n - half_n, read_n + half_n)}"
+        return line(f"ModalTest {self.id}", self.hanger, said)
+
+    def to_dataframe(self) -> DataFrame:
+        """The modes, a row a mode: the table of `shm.export.modes`."""
+        table: DataFrame = front().export.modes([self])
+        return table
 
     @property
     def regular_modes(self) -> tuple[Mode, ...]:

@@ -5,14 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from shm.values.baseline_check import BaselineCheck
 from shm.values.force_units import force_unit
-from shm.values.hanger import Limits
+from shm.values.hanger import Hanger, Limits
 from shm.values.kinds import NAN, FloatArray, Plane
+from shm.values.modes import ModalTest
+from shm.values.showing import Shown, front, line, tension_words
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 ENOUGH_EFFECTIVE = 200
 """Effective draws from which on a 90 % interval's ends are right to 0.15 of its half width."""
@@ -85,7 +90,7 @@ class PredictedFrequency:
 
 
 @dataclass(frozen=True, eq=False)
-class Posterior:
+class Posterior(Shown):
     """Samples of one model class's parameters given modal tests, and its evidence.
 
     `samples` (samples, parameters) are equally weighted draws; `log_likelihood` (samples,).
@@ -210,6 +215,24 @@ class Posterior:
         """Samples of the tension, shape (samples,)."""
         return self.parameter("theta_F") * self.nominal_tension_n
 
+    def __repr__(self) -> str:
+        tension = Selection((self,), (1.0,)).averaged().tension_n
+        said = f"{self.model}, {tension_words(tension.mean, tension.q05, tension.q95)}"
+        return line("Posterior", self.hanger, said)
+
+    def to_dataframe(self) -> DataFrame:
+        """The draws, a row a draw: the table of `shm.export.samples`."""
+        table: DataFrame = front().export.samples(self)
+        return table
+
+    def to_arviz(self, tests: Sequence[ModalTest] = (), hanger: Hanger | None = None) -> Any:
+        """What ArviZ computes with: see `shm.export.inference_data` for the arguments.
+
+        Example:
+            >>> arviz.summary(posterior.to_arviz())
+        """
+        return front().export.inference_data(self, tests, hanger)
+
 
 @dataclass(frozen=True)
 class Averaged:
@@ -230,7 +253,7 @@ class Averaged:
 
 
 @dataclass(frozen=True, eq=False)
-class Selection:
+class Selection(Shown):
     """Model classes compared on the same tests, most probable first."""
 
     posteriors: tuple[Posterior, ...]

@@ -45,6 +45,8 @@ SIGNATURES = {
     "plot.shapes": "(test, hanger)",
     "plot.gap": "(diagnosis, hanger)",
     "plot.causes": "(diagnosis, hanger)",
+    "export.causes": "(diagnosis)",
+    "export.inference_data": "(posterior, tests=(), hanger=None)",
     "export.samples": "(posterior)",
     "export.modes": "(tests)",
     "export.datatree": "(posterior, tests=(), hanger=None)",

@@ -202,11 +202,11 @@ def test_a_diagnosis_tells_both_tensions_in_that_unit(tension_n: float, unit: st
 def test_a_notebook_shows_that_unit(season: HangerReport, tension_n: float, unit: str) -> None:
     data = of_size(season, tension_n)
     assert data.selection is not None
-    shown = notebook.posterior_html(data.posterior)
+    shown = notebook.sheet(data.posterior).html
     (row,) = re.findall(r"<tr><td>tension</td>.*?</tr>", shown)
     assert f"tension in {unit}" in row
     assert not NOTHING.search(row)
-    assert f"<th>tension, {unit}</th>" in notebook.selection_html(data.selection)
-    (nominal,) = re.findall(r"nominal tension</td><td>([^<]*)", notebook.hanger_html(data.hanger))
+    assert f"<th>tension, {unit}</th>" in notebook.sheet(data.selection).html
+    (nominal,) = re.findall(r"nominal tension</td><td>([^<]*)", notebook.sheet(data.hanger).html)
     assert nominal.endswith(f" {unit}")
     assert not NOTHING.search(nominal)

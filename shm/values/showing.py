@@ -1,0 +1,59 @@
+"""How a value shows itself to a researcher: one line, a summary, a notebook's table.
+
+The line is made here. Summaries and tables are made floors above, which values may not import: as
+`shm.values` is loaded, the front of the package gives itself to `hand_over_to`, and it loads what
+is asked for then.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+
+class Shown:
+    """A value that a person can read."""
+
+    def summary(self) -> str:
+        """What it says, as plain text in the words and the rounding of the report.
+
+        Example:
+            >>> print(posterior.summary())
+        """
+        return str(front().notebook.sheet(self).text)
+
+    def _repr_html_(self) -> str:
+        return str(front().notebook.sheet(self).html)
+
+
+_front: Any = None
+
+
+def hand_over_to(package: Any) -> None:
+    """Tells values of the package whose `notebook` and `export` show them."""
+    global _front
+    _front = package
+
+
+def front() -> Any:
+    """The package that was told."""
+    return _front
+
+
+def line(what: str, hanger: int | None, said: str) -> str:
+    """`<Posterior of hanger 3: 654 kN (90 % credible interval 640 to 671 kN)>`."""
+    whose = "" if hanger is None else f" of hanger {hanger}"
+    return f"<{what}{whose}: {said}>"
+
+
+def tension_words(mean_n: float, low_n: float, high_n: float) -> str:
+    """`654 kN (90 % credible interval 640 to 671 kN)`; the mean alone without an interval."""
+    from shm.values.force_units import force_unit
+    from shm.values.posterior import Averaged, Summary
+    from shm.values.stated_tension import stated
+
+    if not math.isfinite(mean_n):
+        return "tension not known"
+    if not math.isfinite(high_n - low_n):
+        return force_unit(mean_n).told(mean_n)
+    return stated(Averaged(Summary(mean_n, math.nan, low_n, math.nan, high_n), math.nan)).headline

@@ -1,0 +1,90 @@
+"""Values in a researcher's hand: a line, a summary, tables for pandas, draws for ArviZ."""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from dataclasses import replace
+
+import pytest
+
+import shm
+from shm.errors import UsageError
+from shm.report.diagnosis_summary import verdict
+from shm.report.formatting import tension
+from shm.report.intervals import Interval
+from shm.values.force_units import force_unit
+from tests.helpers.diagnoses import a_diagnosis
+
+
+def test_a_line_says_what_whose_and_the_tension_as_the_report_rounds_it(
+    posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
+) -> None:
+    stated = tension(Interval.of_samples(posterior.tension_n), force_unit(711e3))
+    told = stated.replace("90 % interval", "90 % credible interval")
+    told = re.sub(r" kN \((.*interval)", r" kN (\1", told)
+    assert repr(posterior) == f"<Posterior of hanger 3: beam1, {told}>"
+    assert re.fullmatch(
+        r"<ModalTest t1 of hanger 3: 8 modes, \d+\.\d{3} to \d+\.\d{3} Hz>", repr(test_of_711_kn)
+    )
+    read = replace(test_of_711_kn, tension_read_n=700e3, tension_read_sd_n=10e3)
+    assert repr(read).endswith("read 700 kN (90 % credible interval 684 to 716 kN)>")
+    assert re.fullmatch(
+        r"<Diagnosis of hanger 3: point mass, .* kN \(90 % credible .* kN\)>", repr(a_diagnosis())
+    )
+
+
+def test_what_is_not_known_is_said() -> None:
+    unknown = replace(a_diagnosis().tension_after_n, mean=math.nan)
+    assert "tension not known" in repr(replace(a_diagnosis(), tension_after_n=unknown))
+    alone = shm.ModalTest("a", ())
+    assert repr(alone) == "<ModalTest a: 0 modes>"
+    assert "time not recorded, temperature not recorded" in alone.summary()
+
+
+def test_a_summary_is_in_the_words_of_the_report(
+    posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
+) -> None:
+    doubted = replace(posterior, description_off_sd=5.0)
+    diagnosis = a_diagnosis()
+    for value in (posterior, test_of_711_kn, diagnosis):
+        text = value.summary()
+        assert not re.search(r"\bnan\b|None|\binf\b|<|[ ]$", text, re.MULTILINE)
+    assert doubted.faults[0] in " ".join(doubted.summary().split())
+    assert verdict(diagnosis) in " ".join(diagnosis.summary().split())
+    assert len(test_of_711_kn.summary().splitlines()) == 2 + len(test_of_711_kn.modes)
+
+
+def test_tables_have_a_row_a_draw_a_mode_a_cause(
+    posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
+) -> None:
+    assert list(posterior.to_dataframe()["tension_n"]) == list(posterior.tension_n)
+    modes = test_of_711_kn.to_dataframe()
+    assert list(modes["frequency_hz"]) == [mode.frequency_hz for mode in test_of_711_kn.modes]
+    diagnosis = a_diagnosis()
+    causes = diagnosis.to_dataframe().set_index("cause")
+    assert list(causes.index) == [cause.effect for cause in diagnosis.causes]
+    assert causes.loc["point_mass", "mass_kg"] == 12.0
+    assert causes.loc["point_mass", "sd_mass_kg"] == 0.5
+    assert math.isnan(causes.loc["temperature_tension", "mass_kg"])
+    none = replace(diagnosis, causes=()).to_dataframe()
+    assert len(none) == 0
+    assert "probability" in none
+
+
+def test_arviz_computes_with_a_posterior(posterior: shm.Posterior) -> None:
+    data = posterior.to_arviz()
+    import arviz
+
+    found = arviz.summary(data, var_names=["tension_n"], kind="stats", round_to="none")
+    assert found.loc["tension_n", "mean"] == pytest.approx(posterior.tension_n.mean())
+    assert data["posterior"]["tension_n"].attrs["units"] == "N"
+
+
+def test_without_arviz_it_says_what_to_install(
+    posterior: shm.Posterior, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "arviz", None)
+    with pytest.raises(UsageError, match=r"arviz is not installed.*pip install 'shm\[arviz\]'"):
+        posterior.to_arviz()
