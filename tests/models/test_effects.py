@@ -40,6 +40,8 @@ DESIGN = [
     "sensor_misalignment",
     "skewed_principal_axes",
     "timebase",
+    "section_size",
+    "partial_mass",
 ]
 PLACES_M = (1.2, 3.6, 5.1, 8.3)
 RICH = Survey(("t1", "t2", "t3"), PLANES, PLACES_M, True, (2.0, 12.0, 22.0), (0.5, 1.0), ())

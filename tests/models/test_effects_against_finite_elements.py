@@ -56,6 +56,8 @@ VALUES = {
     "sensor_misalignment": {"angle_deg": 8.0},
     "skewed_principal_axes": {"log10_k": 7.2, "angle_deg": 25.0},
     "timebase": {"clock_error": 0.002},
+    "section_size": {"diameter_change": 0.03},
+    "partial_mass": {"mass_change": 0.05, "x_m": 3.0, "extent_m": 6.0},
 }
 CASES = [(name, at) for name in PLANTED for at in choices(name, PLACES, ("t1",), round_bar=False)]
 STRONG = {
@@ -78,6 +80,8 @@ STRONG = {
     "sensor_misalignment": {"angle_deg": -50.0},
     "skewed_principal_axes": {"log10_k": 6.0, "angle_deg": -70.0},
     "timebase": {"clock_error": -0.04},
+    "section_size": {"diameter_change": -0.12},
+    "partial_mass": {"mass_change": 0.9, "x_m": 9.5, "extent_m": 7.0},
 }
 
 # Where the general model's functions are too few for the highest orders, measured on refined

@@ -161,6 +161,17 @@ def test_section_lost_everywhere_is_a_thinner_bar() -> None:
     np.testing.assert_allclose(found, exact("beam1", thinner), rtol=1e-6)
 
 
+def test_another_diameter_is_the_bar_of_that_diameter() -> None:
+    """Mass goes with the square of the diameter, EI with its fourth power."""
+    thicker = replace(
+        ROD,
+        second_moment_m4=1.04**4 * ROD.second_moment_m4,
+        mass_per_length_kg_m=1.04**2 * ROD.mass_per_length_kg_m,
+    )
+    found = frequencies("section_size", values=(0.04,))
+    np.testing.assert_allclose(found, exact("beam1", thicker), rtol=1e-6)
+
+
 def test_stiff_zones_at_both_ends_raise_all_frequencies_less_than_rigid_ones() -> None:
     """Rigid zones that could not move at all would leave a shorter clamped bar."""
     found = frequencies("stiff_end_zones", "both ends", (0.4, 50.0))

@@ -231,10 +231,13 @@ def test_a_slipping_joint_is_the_stated_one_at_the_reference_level(hanger: Hange
     np.testing.assert_allclose(hard, frequencies(hanger, softer, own_laws=False), rtol=1e-9)
 
 
-def test_corrosion_without_edges_takes_as_much_mass(hanger: Hanger) -> None:
-    """A taut string in its first mode at midspan feels the lost mass alone, to first order."""
+@pytest.mark.parametrize(
+    ("name", "size"), [("section_loss", "loss"), ("partial_mass", "mass_change")]
+)
+def test_what_has_no_edges_takes_or_adds_as_much_mass(hanger: Hanger, name: str, size: str) -> None:
+    """A taut string in its first mode at midspan feels the mass alone, to first order."""
     taut = HangerState(1e9, 0, 0, 0, 0)
-    worn = replace(LOSS, values={"loss": 0.1, "x_m": 6.0, "extent_m": 0.4})
+    worn = PlantedEffect(name, "everywhere", {size: 0.1, "x_m": 6.0, "extent_m": 0.4})
     plain = frequencies(hanger, state=taut)[0, 0]
     own, text = (
         frequencies(hanger, worn, own_laws=law, state=taut)[0, 0] / plain - 1

@@ -19,8 +19,18 @@ from shm.models.effects.of_ends import (
     SupportMotion,
     TranslationalEndFlexibility,
 )
-from shm.models.effects.of_mass import DistributedMass, SensorMass, UnknownPointMass
-from shm.models.effects.of_section import BendingStiffness, SectionLoss, ShearAndRotaryInertia
+from shm.models.effects.of_mass import (
+    DistributedMass,
+    PartialMass,
+    SensorMass,
+    UnknownPointMass,
+)
+from shm.models.effects.of_section import (
+    BendingStiffness,
+    SectionLoss,
+    SectionSize,
+    ShearAndRotaryInertia,
+)
 from shm.models.effects.of_sensors import SensorMisalignment, SkewedPrincipalAxes, Timebase
 from shm.models.effects.of_tension import (
     GeometricHardening,
@@ -63,6 +73,8 @@ _MEMBERS: tuple[Effect, ...] = (
     SensorMisalignment(),
     SkewedPrincipalAxes(),
     Timebase(),
+    SectionSize(),
+    PartialMass(),
 )
 
 EFFECTS: dict[str, Effect] = members_with_plug_ins(

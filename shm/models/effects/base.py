@@ -13,6 +13,8 @@ from shm.values import AddedMass, FloatArray, Hanger, Plane
 
 GRADUAL = (0.6, 1.0, 1.4)
 """Reaches of three steps that stand for one gradual edge."""
+STEEP = (0.8, 1.0, 1.2)
+"""Half as gradual."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ class IntermediateSupport(Effect):
     phrase = "an intermediate support of {stiffness_n_m} at {x_m}"
     source = "Grossi and Albarracín (2003), Eigenfrequencies of generally restrained beams."
     seen_by = ("frequencies of low orders", "the other plane", "shapes")
-    imitated_by = ("sag", "support_motion", "section_loss", "point_mass")
+    imitated_by = ("sag", "support_motion", "section_loss", "point_mass", "partial_mass")
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return places.planes(survey)

@@ -158,6 +158,7 @@ class EffectiveLength(Effect):
         "bending_stiffness",
         "stiff_end_zones",
         "rotational_end_flexibility",
+        "section_size",
     )
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
@@ -206,7 +207,12 @@ class StiffEndZones(Effect):
     phrase = "end zones of {zone_m} with a bending stiffness of {stiffness_ratio}"
     source = "Jang and Bert (1989), Free vibration of stepped beams: exact and numerical solutions."
     seen_by = ("frequencies", "shapes near the ends")
-    imitated_by = ("effective_length", "bending_stiffness", "shear_and_rotary_inertia")
+    imitated_by = (
+        "effective_length",
+        "bending_stiffness",
+        "shear_and_rotary_inertia",
+        "section_size",
+    )
     other_laws = (
         "the stiffness falls gradually, as in a socket that tapers",
         "the compliance rises gradually, as in a socket that is cut to a cone",

@@ -8,9 +8,9 @@ import numpy as np
 
 from shm.models.base import Conditions
 from shm.models.effects import places, scales
-from shm.models.effects.base import Effect, OverTime, Parameter, Survey, Variant
-from shm.models.hanger.physical import PhysicalHanger, PointMass
-from shm.values import FloatArray, Hanger
+from shm.models.effects.base import GRADUAL, STEEP, Effect, OverTime, Parameter, Survey, Variant
+from shm.models.hanger.physical import PhysicalHanger, PointMass, Zone
+from shm.values import NAN, FloatArray, Hanger
 
 
 class DistributedMass(Effect):
@@ -24,7 +24,14 @@ class DistributedMass(Effect):
         "Atmospheric icing of structures."
     )
     seen_by = ("frequencies", "a known mass")
-    imitated_by = ("timebase", "bending_stiffness", "effective_length", "stiff_end_zones")
+    imitated_by = (
+        "timebase",
+        "bending_stiffness",
+        "effective_length",
+        "stiff_end_zones",
+        "section_size",
+        "partial_mass",
+    )
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         size = Parameter(
@@ -77,6 +84,7 @@ class UnknownPointMass(Effect):
         "intermediate_support",
         "section_loss",
         "sensor_mass",
+        "partial_mass",
     )
     other_laws = ("it turns with the bar, with a radius of gyration of 0.1 m",)
 
@@ -106,6 +114,70 @@ class UnknownPointMass(Effect):
             return replace(physical, masses=(*physical.masses, PointMass(x_m, mass_kg)))
         halves = [PointMass(x_m + side * GYRATION_M, mass_kg / 2) for side in (-1, 1)]
         return replace(physical, masses=(*physical.masses, *halves))
+
+
+class PartialMass(Effect):
+    """Over a part of its length the bar carries more mass: ice, grout, a pipe or sleeve round it.
+
+    It bends as before: what is put on does not stiffen it.
+    """
+
+    name = "partial_mass"
+    title = "More mass over a stretch"
+    phrase = "a mass per length {mass_change} higher around {x_m}, over {extent_m}"
+    source = (
+        "Chen (1963), On the vibration of beams or rods carrying a concentrated mass; ISO "
+        "12494:2001, Atmospheric icing of structures."
+    )
+    seen_by = ("frequencies of many orders", "shapes")
+    imitated_by = ("distributed_mass", "point_mass", "section_loss", "intermediate_support")
+    other_laws = (
+        "the mass begins and ends gradually, over three fifths of its extent at each end",
+        "the mass begins and ends gradually, over three tenths of its extent at each end",
+    )
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "mass_change",
+            "fraction",
+            0.005,
+            1.0,
+            0.0,
+            "0.5 to 100 % of the mass there: from a wrapping to a grouted pipe or thick ice.",
+            spread="logarithmic",
+        )
+        extent = Parameter(
+            "extent_m",
+            "m",
+            0.05 * hanger.length_m,
+            0.8 * hanger.length_m,
+            NAN,
+            "5 to 80 % of the length: shorter is a point mass, longer is mass all along.",
+            spread="logarithmic",
+        )
+        return size, places.place_along(hanger), extent
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        change, middle_m, extent_m = values.T
+        reaches = {1: GRADUAL, 2: STEEP}.get(variant.law, (1.0,))
+        one = np.ones_like(change)
+        zones = tuple(
+            Zone(
+                start_m=middle_m - reach * extent_m / 2,
+                end_m=middle_m + reach * extent_m / 2,
+                stiffness_factor=one,
+                mass_factor=(1 + change) ** (1 / len(reaches)),
+            )
+            for reach in reaches
+        )
+        return replace(physical, zones=physical.zones + zones)
 
 
 class SensorMass(Effect):

@@ -9,7 +9,7 @@ import numpy as np
 
 from shm.models.base import Conditions
 from shm.models.effects import places
-from shm.models.effects.base import GRADUAL, Effect, OverTime, Parameter, Survey, Variant
+from shm.models.effects.base import GRADUAL, STEEP, Effect, OverTime, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger, Zone
 from shm.values import NAN, FloatArray, Hanger
 
@@ -41,6 +41,7 @@ class BendingStiffness(Effect):
         "effective_length",
         "stiff_end_zones",
         "rotational_end_flexibility",
+        "section_size",
     )
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
@@ -75,8 +76,56 @@ class BendingStiffness(Effect):
         return replace(physical, bending_stiffness_n_m2=physical.bending_stiffness_n_m2 * factor)
 
 
-_STEEP = (0.8, 1.0, 1.2)
-"""Half as gradual: three steps stand for a slope that is a half wider than they span."""
+class SectionSize(Effect):
+    """The whole hanger has another section than described: a wrong diameter, another bar or strand.
+
+    Area and mass go with the square of the diameter, bending stiffness and rotary inertia with its
+    fourth power. Where no diameter is known it is that of a round section of the same area.
+    """
+
+    name = "section_size"
+    title = "Another diameter"
+    phrase = "a diameter {diameter_change:larger|smaller} than described"
+    source = "EN 10060:2003, Hot rolled round steel bars for general purposes."
+    seen_by = ("frequencies of many orders", "a measured diameter")
+    imitated_by = (
+        "distributed_mass",
+        "bending_stiffness",
+        "timebase",
+        "effective_length",
+        "stiff_end_zones",
+    )
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        size = Parameter(
+            "diameter_change",
+            "fraction",
+            0.003,
+            0.15,
+            0.0,
+            "0.3 to 15 %, either way: from a rolling tolerance to the next bar but one.",
+            spread="logarithmic",
+            signed=True,
+            most=0.9,
+        )
+        return (size,)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        area = (1 + values[:, 0]) ** 2
+        return replace(
+            physical,
+            mass_per_length_kg_m=physical.mass_per_length_kg_m * area,
+            bending_stiffness_n_m2=physical.bending_stiffness_n_m2 * area[:, None] ** 2,
+            shear_compliance_1_n=physical.shear_compliance_1_n / area,
+            rotary_inertia_kg_m=physical.rotary_inertia_kg_m * area**2,
+        )
 
 
 class SectionLoss(Effect):
@@ -99,7 +148,7 @@ class SectionLoss(Effect):
         "natural frequencies."
     )
     seen_by = ("frequencies of many orders", "shapes")
-    imitated_by = ("intermediate_support", "point_mass", "stiff_end_zones")
+    imitated_by = ("intermediate_support", "point_mass", "stiff_end_zones", "partial_mass")
     other_laws = (
         "the loss begins and ends gradually, over three fifths of its extent at each end",
         "pits reach into the section: the stiffness falls as the area, not as its square",
@@ -137,7 +186,7 @@ class SectionLoss(Effect):
         hanger: Hanger,
     ) -> PhysicalHanger:
         loss, middle_m, extent_m = values.T
-        reaches = {1: GRADUAL, 3: _STEEP}.get(variant.law, (1.0,))
+        reaches = {1: GRADUAL, 3: STEEP}.get(variant.law, (1.0,))
         power = 1 if variant.law == 2 else 2
         left = (1 - loss) ** (1 / len(reaches))
         zones = tuple(

@@ -36,6 +36,7 @@ class Timebase(Effect):
         "effective_length",
         "stiff_end_zones",
         "temperature_tension",
+        "section_size",
     )
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:

@@ -71,6 +71,8 @@ _ALL = (
     ),
     Plantable("skewed_principal_axes", _AT_ENDS, ends.skew_ranges, ends.skew),
     Plantable("timebase", ("all tests", "test"), conditions.clock_ranges, conditions.clock),
+    Plantable("section_size", _EVERYWHERE, along.size_ranges, along.size),
+    Plantable("partial_mass", _EVERYWHERE, along.coat_ranges, along.coat),
 )
 PLANTED = {each.name: each for each in _ALL}
 

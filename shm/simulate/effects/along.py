@@ -66,6 +66,40 @@ def loss(bar: Bar, values: Values, scene: Scene) -> Bar:
     return replace(bar, stretches=(*bar.stretches, worn))
 
 
+def size_ranges(hanger: Hanger, where: Where) -> dict[str, Range]:
+    return {"diameter_change": Range(0.003, 0.15, 0.0, logarithmic=True, signed=True)}
+
+
+def size(bar: Bar, values: Values, scene: Scene) -> Bar:
+    """Another bar than drawn: mass as the diameter squared, stiffness as its fourth power."""
+    ratio = 1 + values["diameter_change"]
+    own = bar.bending_stiffness_n_m2
+    return replace(
+        bar,
+        mass_per_length_kg_m=bar.mass_per_length_kg_m * ratio**2,
+        bending_stiffness_n_m2=(own[0] * ratio**4, own[1] * ratio**4),
+        shear_compliance_1_n=bar.shear_compliance_1_n / ratio**2,
+        rotary_inertia_kg_m=bar.rotary_inertia_kg_m * ratio**4,
+    )
+
+
+def coat_ranges(hanger: Hanger, where: Where) -> dict[str, Range]:
+    return {
+        "mass_change": Range(0.005, 1.0, 0.0, logarithmic=True),
+        "x_m": Range(0.0, hanger.length_m),
+        "extent_m": Range(0.05 * hanger.length_m, 0.8 * hanger.length_m, logarithmic=True),
+    }
+
+
+def coat(bar: Bar, values: Values, scene: Scene) -> Bar:
+    """Ice, grout or a pipe over a part of the length; the bar bends as before."""
+    half = values["extent_m"] / 2
+    heavier = Stretch(
+        values["x_m"] - half, values["x_m"] + half, (1.0, 1.0), 1 + values["mass_change"]
+    )
+    return replace(bar, stretches=(*bar.stretches, heavier))
+
+
 def shear_ranges(hanger: Hanger, where: Where) -> dict[str, Range]:
     return {"share": Range(0.5, 1.5, 0.0)}
 

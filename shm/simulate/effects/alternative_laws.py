@@ -16,11 +16,15 @@ from shm.simulate.bar.description import Bar, Mass, PartTime, Profile, Ringing
 from shm.simulate.effects import along, ends
 from shm.simulate.effects.along import in_planes
 from shm.simulate.effects.base import Scene
+from shm.values import FloatArray
 
 Values = Mapping[str, float]
 
 # Each only has to differ from the catalogue's law and to be possible: the functions say how.
 _LOSS_POINTS, _TAPER_POINTS = 25, 9  # technical: of piecewise linear profiles
+# Flanks of one cosine, half an extent long, keep the volume
+_PLACES = np.linspace(-0.75, 0.75, _LOSS_POINTS)
+_WITHOUT_EDGES = (1 + np.cos(np.pi * ((np.abs(_PLACES) - 0.25) / 0.5).clip(0, 1))) / 2
 _PITS = 1.9  # judgement: between 1, a loss at the skin of a tube, and 2, a thinner bar
 _FULL, _TAPER = 0.6, 0.8  # 0.6 + 0.8/2 = 1: the compliance of a zone with an edge; judgement else
 _CLAMP_WIDTH, _CLAMP_RADIUS = 0.15, 0.10  # judgement: m, of a clamp about a bar of 0.13 m
@@ -32,19 +36,27 @@ _SECOND_MODE = (6.0, 2.76)
 def loss(bar: Bar, values: Values, scene: Scene) -> Bar:
     """Corrosion without edges: half of the loss at the stated ends, all of it in the inner half.
 
-    Flanks of one cosine, half an extent long, keep the volume lost. Bending stiffness goes with the
-    area to the power of 1.9, not 2 as in a thinner bar: pits reach into the section, and what is
-    missing at 0.97 of the radius counts 0.95 of what is missing at the skin.
+    Bending stiffness goes with the area to the power of 1.9, not 2 as in a thinner bar: pits reach
+    into the section, and what is missing at 0.97 of the radius counts 0.95 of what is missing at
+    the skin.
     """
-    place = np.linspace(-0.75, 0.75, _LOSS_POINTS)
-    flank = ((np.abs(place) - 0.25) / 0.5).clip(0, 1)
-    left = 1 - values["loss"] * (1 + np.cos(np.pi * flank)) / 2
-    worn = Profile(
-        tuple(float(each) for each in values["x_m"] + place * values["extent_m"]),
-        tuple((float(each), float(each)) for each in left**_PITS),
-        tuple(float(each) for each in left),
+    left = 1 - values["loss"] * _WITHOUT_EDGES
+    return _along(bar, values, left**_PITS, left)
+
+
+def coat(bar: Bar, values: Values, scene: Scene) -> Bar:
+    """Ice or grout without edges, as `loss` is."""
+    heavier = 1 + values["mass_change"] * _WITHOUT_EDGES
+    return _along(bar, values, np.ones_like(heavier), heavier)
+
+
+def _along(bar: Bar, values: Values, stiffness: FloatArray, mass: FloatArray) -> Bar:
+    profile = Profile(
+        tuple(float(each) for each in values["x_m"] + _PLACES * values["extent_m"]),
+        tuple((float(each), float(each)) for each in stiffness),
+        tuple(float(each) for each in mass),
     )
-    return replace(bar, profiles=(*bar.profiles, worn))
+    return replace(bar, profiles=(*bar.profiles, profile))
 
 
 def zone(bar: Bar, values: Values, scene: Scene) -> Bar:
@@ -138,6 +150,7 @@ def sag(bar: Bar, values: Values, scene: Scene) -> Bar:
 
 LAWS: dict[str, Callable[[Bar, Values, Scene], Bar]] = {
     "section_loss": loss,
+    "partial_mass": coat,
     "stiff_end_zones": zone,
     "point_mass": clamp,
     "joint_softening": joint,
