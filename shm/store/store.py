@@ -30,7 +30,8 @@ class Store(Database):
     `tests` what was identified from them; `posteriors` what was computed from tests, with
     selections, diagnoses and adoptions; `watch` what it said after each test, and its baselines;
     `alerts` those that were raised, and their deliveries; `silences` when no hook is told;
-    `streams` what permanent sensors said; `people` who signs in by name; `upkeep` tokens, copies, backups and the healing of rows.
+    `streams` what permanent sensors said; `people` who signs in by name;
+    `upkeep` tokens, copies, backups and the healing of rows.
     """
 
     def __init__(self, engine: Engine):

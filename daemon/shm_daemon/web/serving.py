@@ -186,5 +186,6 @@ def refuse_unguarded(workspace: Workspace, address: Address) -> None:
             return
     raise UsageError(
         f"{address.host} can be reached by others, and no token is in force.",
-        remedy="Make one with `shm token create NAME`, add a user with `shm user add NAME`, or listen on 127.0.0.1.",
+        remedy="Make one with `shm token create NAME`, add a user with `shm user add NAME`, or "
+        "listen on 127.0.0.1.",
     )
