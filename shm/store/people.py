@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
 from functools import cache
+from typing import Any
 
 import argon2
 import sqlalchemy as sa
@@ -148,5 +149,5 @@ def _checksum(secret: str) -> str:
     return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def _user(row: sa.Row[tuple[object, ...]]) -> User:
+def _user(row: sa.Row[Any]) -> User:
     return User(row.id, row.name, Role(row.role), row.made_at, row.removed_at)
