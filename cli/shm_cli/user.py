@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import rich_click as click
 
 from shm_cli.common import json_option, opened_store, show, show_table, table
@@ -101,9 +103,8 @@ def password(ctx: click.Context, name: str, as_json: bool) -> None:
 
 def _asked() -> str:
     """Never an argument: those stand in the list of processes and the shell's history."""
-    stdin = click.get_text_stream("stdin")
-    if not stdin.isatty():
-        return stdin.readline().rstrip("\r\n")
+    if not sys.stdin.isatty():
+        return sys.stdin.readline().rstrip("\r\n")
     return str(click.prompt("Password", hide_input=True, confirmation_prompt=True, err=True))
 
 
