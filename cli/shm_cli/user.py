@@ -11,7 +11,7 @@ from shm_cli.common import json_option, opened_store, show, show_table, table
 
 @click.group()
 def command() -> None:
-    """People who may sign in to the dashboard, by name and password.
+    """People who may sign in to the dashboard.
 
     \b
     Example: shm user list
