@@ -34,6 +34,8 @@ NUMBERED = (
     "tokens",
     "resolutions",
     "silences",
+    "users",
+    "sessions",
 )
 """Tables of which no row is ever taken out, but for damaged ones of `drifts` and `watches` (see
 `forget`). The order is that of the bits: new ones come last."""

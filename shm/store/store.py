@@ -1,4 +1,4 @@
-"""The store: one database, its verbs in eight repositories by what they are about."""
+"""The store: one database, its verbs in nine repositories by what they are about."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from sqlalchemy.engine import Engine
 from shm.errors import NothingThere
 from shm.store import schema
 from shm.store.database import Database, make_engine
+from shm.store.people import People
 from shm.store.stored_alerts import Alerts
 from shm.store.stored_posteriors import Posteriors
 from shm.store.stored_recordings import Recordings
@@ -29,7 +30,8 @@ class Store(Database):
     `tests` what was identified from them; `posteriors` what was computed from tests, with
     selections, diagnoses and adoptions; `watch` what it said after each test, and its baselines;
     `alerts` those that were raised, and their deliveries; `silences` when no hook is told;
-    `streams` what permanent sensors said; `upkeep` tokens, copies, backups and the healing of rows.
+    `streams` what permanent sensors said; `people` who signs in by name;
+    `upkeep` tokens, copies, backups and the healing of rows.
     """
 
     def __init__(self, engine: Engine):
@@ -41,6 +43,7 @@ class Store(Database):
         self.alerts = Alerts(engine)
         self.silences = Silences(engine)
         self.streams = Streams(engine)
+        self.people = People(engine)
         self.upkeep = Upkeep(engine)
 
     @classmethod

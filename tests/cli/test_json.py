@@ -62,6 +62,7 @@ READING = (
     "status",
     "status --of 1",
     "token list",
+    "user list",
 )
 
 

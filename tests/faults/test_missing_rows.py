@@ -37,7 +37,10 @@ MAY_GO = (
 )  # fmt: skip
 """Made again by themselves, or taken out after some time: a row of these is not missed."""
 
-LAST = ("acknowledgements", "archive_copies", "diagnoses", "events", "silences", "tokens")
+LAST = (
+    "acknowledgements", "archive_copies", "diagnoses", "events", "sessions", "silences", "tokens",
+    "users",
+)  # fmt: skip
 """Of these the last row leaves no gap, and nothing else tells of it: what a person did."""
 
 ON_A_SERVER = ("drifts", "fingerprints", "resolutions", "steps", "watches")

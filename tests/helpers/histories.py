@@ -22,6 +22,7 @@ from shm.store import (
     Workspace,
 )
 from shm.store.checking import archived_names
+from shm.store.people import Role
 from shm.store.retention import copy_archive, removable, remove
 from shm.store.upkeep import Scope
 from shm.values import Fingerprint
@@ -165,6 +166,11 @@ def _decide(store: Store, clock: Clock) -> None:
 def _keep(workspace: Workspace, store: Store, clock: Clock, folder: Path) -> None:
     for name in ("gauge", "office"):
         store.upkeep.create_token(name, Scope.READ, clock())
+    password = "correct horse battery"
+    for name in ("Ann", "Bo"):
+        store.people.add(name, Role.READER, password, clock())
+    for _ in range(2):
+        assert store.people.sign_in("Ann", password, clock()) is not None
     for hanger in workspace.bridge.hangers:
         store.posteriors.save_summaries(hanger)
     copies = Archive(folder / "copies")

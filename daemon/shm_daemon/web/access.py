@@ -1,6 +1,6 @@
-"""Who may do what: tokens and their scopes.
+"""Who may do what: people and their roles, tokens and their scopes.
 
-A program sends its token in a header, a browser in the cookie that signing in gave it.
+A program sends its token in a header; a browser sends the cookie that signing in gave it.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ from fastapi import Depends, Request
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
 from shm.pipeline import utc_now
-from shm.store import Scope, StoredToken
+from shm.store import Scope
+from shm.store.people import SESSION, Role
 from shm_daemon.web.address import caller_of
 from shm_daemon.web.faults import Refused
 from shm_daemon.web.site import Site
 
 COOKIE = "shm_token"
-"""Holds the token of a person who has signed in at `/sign-in`."""
+"""Holds the session of a person, or the token, that has signed in at `/sign-in`."""
 _bearer = HTTPBearer(
     auto_error=False,
     description="`shm token create NAME --scope read|write` makes one. Reading from the machine "
@@ -32,10 +33,15 @@ _FORWARDED = ("forwarded", "x-forwarded-for", "x-forwarded-host", "x-real-ip")
 
 @dataclass(frozen=True)
 class Visitor:
-    """Who asks: the name of the token, empty for this machine without one."""
+    """Who asks: the name of the person or token, empty for this machine without one."""
 
     name: str
-    may_write: bool = False
+    role: Role = Role.READER
+    is_person: bool = False
+
+    @property
+    def may_write(self) -> bool:
+        return self.role.may(Role.OPERATOR)
 
 
 def site_of(request: Request) -> Site:
@@ -55,22 +61,23 @@ def reading(request: Request, site: AtSite, credentials: Credentials) -> Visitor
     `frame.page` shows who it is.
     """
     if credentials is not None:
-        found = _visitor(request, site, credentials.credentials, Scope.READ)
+        found = _visitor(request, site, credentials.credentials, Role.READER)
     elif _is_at_home(request, site):
-        found = _at_home(request, site)
+        found = _at_home(site, request.cookies.get(COOKIE))
     else:
-        found = _visitor(request, site, _cookie(request, "Reading needs a token here."), Scope.READ)
+        secret = _cookie(request, "Reading needs a token here.")
+        found = _visitor(request, site, secret, Role.READER)
     request.state.visitor = found
     return found
 
 
 def writing(request: Request, site: AtSite, credentials: Credentials) -> Visitor:
-    """Lets in who may write: only with a token, from wherever."""
+    """Lets in who may write: only signed in or with a token."""
     if credentials is not None:
-        return _visitor(request, site, credentials.credentials, Scope.WRITE)
+        return _visitor(request, site, credentials.credentials, Role.OPERATOR)
     token = _cookie(request, "Writing needs a token.")
     refuse_foreign(request)
-    return _visitor(request, site, token, Scope.WRITE)
+    return _visitor(request, site, token, Role.OPERATOR)
 
 
 Reader = Annotated[Visitor, Depends(reading)]
@@ -88,10 +95,31 @@ def refuse_foreign(request: Request) -> None:
         raise Refused(403, "This was sent by a page of another site.", "Send it from our page.")
 
 
-def token_in_force(request: Request, site: Site, secret: str) -> StoredToken:
-    """The token of this secret; raises Refused where it is wrong or revoked, or where too many of
-    those came from the same address.
+def visitor_in_force(request: Request, site: Site, secret: str) -> Visitor:
+    """Whose token or session this is; raises Refused where it is wrong or has ended, or where too
+    many of those came from the same address.
     """
+    caller = _unless_throttled(request, site, secret)
+    found = _found(site, secret)
+    if found is None:
+        site.wrong_tokens.note_wrong(caller)
+        raise _nobody("This token is wrong or revoked.")
+    site.wrong_tokens.note_right(secret)
+    return found
+
+
+def session_of(request: Request, site: Site, name: str, password: str) -> str:
+    """The secret of a new session of a person; raises Refused as `visitor_in_force` does."""
+    caller = _unless_throttled(request, site, "")
+    secret = site.store.people.sign_in(name, password, utc_now())
+    if secret is None:
+        site.wrong_tokens.note_wrong(caller)
+        raise _nobody("Name or password is wrong.")
+    return secret
+
+
+def _unless_throttled(request: Request, site: Site, secret: str) -> str:
+    """The address that asks; raises Refused where too much that is wrong came from there."""
     forwarded = request.headers.get("x-forwarded-for", "")
     peer = request.client.host if request.client else ""
     caller = caller_of(peer, forwarded, site.workspace.settings.web_proxies)
@@ -99,34 +127,42 @@ def token_in_force(request: Request, site: Site, secret: str) -> StoredToken:
     if wait_s > 0:
         raise Refused(
             429,
-            "Too many wrong tokens came from this address.",
-            f"Try again in {wait_s:.0f} s, with a token that is in force.",
+            "Too many wrong tokens or passwords came from this address.",
+            f"Try again in {wait_s:.0f} s, with one that is in force.",
             {"Retry-After": f"{math.ceil(wait_s)}"},
         )
+    return caller
+
+
+def _found(site: Site, secret: str) -> Visitor | None:
+    if secret.startswith(SESSION):
+        user = site.store.people.user_of(secret, utc_now())
+        return None if user is None else Visitor(user.name, user.role, is_person=True)
     token = site.store.upkeep.token_of(secret, utc_now())
     if token is None:
-        site.wrong_tokens.note_wrong(caller)
-        raise _nobody("This token is wrong or revoked.")
-    site.wrong_tokens.note_right(secret)
-    return token
+        return None
+    return Visitor(token.name, Role.OPERATOR if Scope.WRITE in token.scopes else Role.READER)
 
 
-def _visitor(request: Request, site: Site, secret: str, scope: Scope) -> Visitor:
-    token = token_in_force(request, site, secret)
-    if scope not in token.scopes:
+def _visitor(request: Request, site: Site, secret: str, needed: Role) -> Visitor:
+    """The one place where a role is held against what a route needs."""
+    found = visitor_in_force(request, site, secret)
+    if found.role.may(needed):
+        return found
+    if found.is_person:
         raise Refused(
-            403,
-            f"The token {token.name} may not {scope}.",
-            f"Make one that may: `shm token create NAME --scope {scope}`.",
+            403, f"A {found.role} may not do this.", f"It takes the role {needed}: ask an engineer."
         )
-    return Visitor(token.name, Scope.WRITE in token.scopes)
+    raise Refused(
+        403,
+        f"The token {found.name} may not write.",
+        "Make one that may: `shm token create NAME --scope write`.",
+    )
 
 
-def _at_home(request: Request, site: Site) -> Visitor:
+def _at_home(site: Site, secret: str | None) -> Visitor:
     """Here reading needs no token: a cookie that is out of date takes nothing away."""
-    secret = request.cookies.get(COOKIE)
-    token = site.store.upkeep.token_of(secret, utc_now()) if secret else None
-    return Visitor(token.name, Scope.WRITE in token.scopes) if token else Visitor("")
+    return (_found(site, secret) if secret else None) or Visitor("")
 
 
 def _cookie(request: Request, otherwise: str) -> str:

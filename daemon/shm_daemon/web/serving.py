@@ -180,9 +180,12 @@ def refuse_unguarded(workspace: Workspace, address: Address) -> None:
     if address.is_loopback:
         return
     with workspace.store() as store:
-        if any(token.revoked_at is None for token in store.upkeep.list_tokens()):
+        in_force = [each.revoked_at is None for each in store.upkeep.list_tokens()]
+        in_force += [each.removed_at is None for each in store.people.list_all()]
+        if any(in_force):
             return
     raise UsageError(
         f"{address.host} can be reached by others, and no token is in force.",
-        remedy="Make one with `shm token create NAME`, or listen on 127.0.0.1.",
+        remedy="Make one with `shm token create NAME`, add a user with `shm user add NAME`, or "
+        "listen on 127.0.0.1.",
     )

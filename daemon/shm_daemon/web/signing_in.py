@@ -1,4 +1,6 @@
-"""Signing in: a person gives a token once, and the browser keeps it where no script can read it."""
+"""Signing in: a person gives name and password, or a token, once; the browser keeps a secret where
+no script can read it.
+"""
 
 from __future__ import annotations
 
@@ -8,31 +10,40 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import RedirectResponse
 from starlette.concurrency import run_in_threadpool
 
-from shm_daemon.web.access import COOKIE, AtSite, refuse_foreign, token_in_force
+from shm.pipeline import utc_now
+from shm.store.people import SESSION, SIGNED_IN_FOR
+from shm_daemon.web.access import (
+    COOKIE,
+    AtSite,
+    refuse_foreign,
+    session_of,
+    visitor_in_force,
+)
 from shm_daemon.web.faults import Refused
 from shm_daemon.web.frame import page
 from shm_daemon.web.middleware import is_https
+from shm_daemon.web.site import Site
 
 router = APIRouter(include_in_schema=False)
 
-_KEPT_S = 30 * 86400  # judgement: a month; the token behind it can be revoked at any time
+_KEPT_S = int(SIGNED_IN_FOR.total_seconds())
 _LONGEST_FORM_BYTES = 8192  # technical: a token and the address to go on to have some hundreds
 
 
 @router.get("/sign-in")
 def sign_in_page(request: Request, next: str = "/") -> Response:
-    """Asks for a token."""
+    """Asks for name and password, or for a token."""
     return _ask(request, next)
 
 
 @router.post("/sign-in")
 async def sign_in(request: Request, site: AtSite) -> Response:
-    """Gives the cookie to who has a token in force; revoking the token takes effect at once."""
+    """Gives the cookie to who signs in; removing the user or revoking the token ends it at once."""
     refuse_foreign(request)
     told = await _form(request)
-    secret, wanted = told.get("token", "").strip(), told.get("next", "/")
+    wanted = told.get("next", "/")
     try:
-        await run_in_threadpool(token_in_force, request, site, secret)
+        secret = await run_in_threadpool(_secret, request, site, told)
     except Refused as refused:
         return _ask(request, wanted, refused.status_code, refused.detail)
     answer = RedirectResponse(_ours(wanted), 303)
@@ -48,12 +59,24 @@ async def sign_in(request: Request, site: AtSite) -> Response:
 
 
 @router.post("/sign-out")
-def sign_out(request: Request) -> Response:
-    """Takes the cookie back."""
+def sign_out(request: Request, site: AtSite) -> Response:
+    """Ends the session and takes the cookie back."""
     refuse_foreign(request)
+    secret = request.cookies.get(COOKIE, "")
+    if secret.startswith(SESSION):
+        site.store.people.sign_out(secret, utc_now())
     answer = RedirectResponse("/sign-in", 303)
     answer.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=is_https(request.scope))
     return answer
+
+
+def _secret(request: Request, site: Site, told: dict[str, str]) -> str:
+    """What the cookie is to hold; raises Refused."""
+    if "name" in told:
+        return session_of(request, site, told["name"].strip(), told.get("password", ""))
+    secret = told.get("token", "").strip()
+    visitor_in_force(request, site, secret)
+    return secret
 
 
 def _ask(request: Request, wanted: str, status: int = 200, message: str = "") -> Response:

@@ -54,10 +54,10 @@ class WrongTokens:
             self._wrong[network] = (began, times + 1)
             while len(self._wrong) > _ADDRESSES_KEPT:
                 self._wrong.popitem(last=False)
-        log.warning("a token from %s is wrong or revoked", address)
+        log.warning("a token or password from %s is wrong or revoked", address)
         if times + 1 == MOST_WRONG:
             log.warning(
-                "%d wrong tokens came from %s within %.0f s: it has to wait",
+                "%d wrong tokens or passwords came from %s within %.0f s: it has to wait",
                 MOST_WRONG, address, WITHIN_S,
             )  # fmt: skip
 

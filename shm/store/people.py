@@ -1,0 +1,153 @@
+"""People who sign in by name: their roles, passwords, and the browsers they have signed in with."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from enum import StrEnum
+from functools import cache
+from typing import Any
+
+import argon2
+import sqlalchemy as sa
+
+from shm.errors import NothingThere, UsageError
+from shm.store.database import Repository, insert
+from shm.store.people_tables import sessions, users
+
+SIGNED_IN_FOR = timedelta(days=30)  # judgement: a month; removing the user ends it at once
+SESSION = "session_"
+"""What the secret of a session begins with; that of a token begins otherwise."""
+_SHORTEST, _LONGEST = 15, 1024  # NIST SP 800-63B-4, 3.1.1.2, of a password alone; technical: memory
+_LONGEST_NAME = 255  # technical: what a column and a line of a table take
+_SECRET_BYTES = 32  # 256 bits: nobody guesses it
+
+
+class Role(StrEnum):
+    """What a person may do; each may what the one before may."""
+
+    READER = "reader"
+    OPERATOR = "operator"
+    ENGINEER = "engineer"
+
+    def may(self, needed: Role) -> bool:
+        """Whether this role may do what `needed` may."""
+        order = list(Role)
+        return order.index(self) >= order.index(needed)
+
+
+@dataclass(frozen=True)
+class User:
+    """A person who may sign in, or once might."""
+
+    id: int
+    name: str
+    role: Role
+    made_at: datetime
+    removed_at: datetime | None = None
+
+
+class People(Repository):
+    """Users, and the sessions of their browsers."""
+
+    def add(self, name: str, role: Role, password: str, at: datetime) -> None:
+        """Lets a person sign in; raises UsageError where the name is taken or the password poor."""
+        if not name.strip() or len(name) > _LONGEST_NAME or not name.isprintable():
+            raise UsageError("the name of a user is a short text.", remedy="Give the person's.")
+        values = {"name": name, "role": role, "password_hash": _hashed(password), "made_at": at}
+        with self.writing() as connection:
+            if connection.execute(_in_force.where(users.c.name == name)).first() is not None:
+                raise UsageError(
+                    f"there is a user {name} already.",
+                    remedy=f"Take another name, or remove it: `shm user remove {name}`.",
+                )
+            insert(connection, users, values)
+
+    def remove(self, name: str, at: datetime) -> None:
+        """Ends a user and all sessions from now on; raises NothingThere where there is none."""
+        self._change(name, at, {"removed_at": at})
+
+    def set_password(self, name: str, password: str, at: datetime) -> None:
+        """Gives a new password and ends all sessions; raises NothingThere or UsageError."""
+        self._change(name, at, {"password_hash": _hashed(password)})
+
+    def list_all(self) -> tuple[User, ...]:
+        """All users, those removed too, as they were made."""
+        with self.reading() as connection:
+            rows = connection.execute(sa.select(users).order_by(users.c.id)).all()
+        return tuple(_user(row) for row in rows)
+
+    def sign_in(self, name: str, password: str, at: datetime) -> str | None:
+        """The secret of a new session; None where name or password is wrong.
+
+        A name that is not there takes as long as a wrong password: the time tells nothing.
+        """
+        with self.reading() as connection:
+            row = connection.execute(_in_force.where(users.c.name == name)).first()
+        kept = _nobodys() if row is None else row.password_hash
+        try:
+            argon2.PasswordHasher().verify(kept, password[:_LONGEST])
+        except argon2.exceptions.VerificationError:
+            return None
+        if row is None:
+            return None
+        secret = SESSION + secrets.token_urlsafe(_SECRET_BYTES)
+        values = {"user_id": row.id, "secret_sha256": _checksum(secret), "began_at": at}
+        with self.writing() as connection:
+            insert(connection, sessions, values)
+        return secret
+
+    def user_of(self, secret: str, at: datetime) -> User | None:
+        """Whose session this is; None where it has ended or never was."""
+        query = _in_force.join(sessions, sessions.c.user_id == users.c.id).where(
+            sessions.c.secret_sha256 == _checksum(secret),
+            sessions.c.ended_at.is_(None),
+            sessions.c.began_at > at - SIGNED_IN_FOR,
+        )
+        with self.reading() as connection:
+            row = connection.execute(query).first()
+        return None if row is None else _user(row)
+
+    def sign_out(self, secret: str, at: datetime) -> None:
+        """Ends a session where there is one."""
+        one = sa.update(sessions).where(sessions.c.secret_sha256 == _checksum(secret))
+        with self.writing() as connection:
+            connection.execute(one.where(sessions.c.ended_at.is_(None)).values(ended_at=at))
+
+    def _change(self, name: str, at: datetime, values: dict[str, object]) -> None:
+        with self.writing() as connection:
+            row = connection.execute(_in_force.where(users.c.name == name)).first()
+            if row is None:
+                raise NothingThere(f"there is no user {name}.", remedy="See `shm user list`.")
+            connection.execute(sa.update(users).where(users.c.id == row.id).values(**values))
+            own = sa.update(sessions).where(sessions.c.user_id == row.id)
+            connection.execute(own.where(sessions.c.ended_at.is_(None)).values(ended_at=at))
+
+
+_in_force = sa.select(users).where(users.c.removed_at.is_(None))
+
+
+def _hashed(password: str) -> str:
+    if not _SHORTEST <= len(password) <= _LONGEST:
+        raise UsageError(
+            f"a password has {_SHORTEST} to {_LONGEST} characters.",
+            remedy="Take four or five words that do not belong together.",
+        )
+    return argon2.PasswordHasher().hash(password)
+
+
+@cache
+def _nobodys() -> str:
+    """The hash of a password that nobody has."""
+    return argon2.PasswordHasher().hash(secrets.token_urlsafe(_SECRET_BYTES))
+
+
+def _checksum(secret: str) -> str:
+    """A secret is 256 random bits: a plain checksum of it cannot be searched for."""
+    return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _user(row: sa.Row[Any]) -> User:
+    return User(row.id, row.name, Role(row.role), row.made_at, row.removed_at)

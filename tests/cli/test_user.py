@@ -1,0 +1,63 @@
+"""`shm user`: people who may sign in, what is refused, and how to go on from there."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from shm.store import Workspace
+from tests.cli.conftest import Ended, Shm
+
+PASSWORD = "correct horse battery"
+
+
+@pytest.fixture
+def user(shm: Shm, empty: Workspace, monkeypatch: pytest.MonkeyPatch) -> Shm:
+    def call(*words: object, password: str = "") -> Ended:
+        monkeypatch.setattr("sys.stdin", io.StringIO(f"{password}\n"))
+        return shm("--workspace", empty.folder, "user", *words)
+
+    return call
+
+
+def test_a_user_is_made_listed_without_a_secret_and_removed(user: Shm) -> None:
+    made = user("add", "M. Huber", "--role", "engineer", "--json", password=PASSWORD)
+    assert made.document == {"name": "M. Huber", "role": "engineer"}
+    listed = user("list", "--json")
+    (one,) = listed.document["users"]
+    assert (one["name"], one["role"], one["removed_at"]) == ("M. Huber", "engineer", None)
+    assert "argon2" not in listed.out
+    assert user("remove", "M. Huber").code == 0
+    assert user("list", "--json").document["users"][0]["removed_at"]
+    assert user("add", "M. Huber", password=PASSWORD).code == 0
+
+
+def test_the_password_that_stdin_gives_is_the_one_that_signs_in(
+    user: Shm, empty: Workspace
+) -> None:
+    user("add", "a", password=PASSWORD)
+    assert user("password", "a", password="four other long words").code == 0
+    with empty.store() as store:
+        at = store.people.list_all()[0].made_at
+        assert store.people.sign_in("a", PASSWORD, at) is None
+        assert store.people.sign_in("a", "four other long words", at)
+
+
+@pytest.mark.parametrize(
+    ("words", "password", "code", "said"),
+    [
+        ("add b", "short", 2, "four or five words"),
+        ("add a", PASSWORD, 2, "shm user remove a"),
+        ("password a", "short", 2, "four or five words"),
+        ("password b", PASSWORD, 4, "shm user list"),
+        ("remove b", "", 4, "shm user list"),
+    ],
+)
+def test_what_cannot_be_done_says_how_to_go_on(
+    user: Shm, words: str, password: str, code: int, said: str
+) -> None:
+    user("add", "a", password=PASSWORD)
+    refused = user(*words.split(), password=password)
+    assert refused.code == code
+    assert said in " ".join(refused.err.split())

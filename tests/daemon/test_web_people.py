@@ -1,0 +1,91 @@
+"""People who sign in by name: what each role may, and that every route asks for one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import httpx
+import pytest
+from fastapi.routing import APIRoute
+
+from shm.errors import UsageError
+from shm.pipeline import utc_now
+from shm.store import Workspace
+from shm.store.people import Role
+from shm_daemon.web.access import reading, writing
+from shm_daemon.web.address import Address
+from shm_daemon.web.app import load_pages
+from shm_daemon.web.site import MOST_WRONG, Description, Site
+from tests.helpers.web_servers import served
+
+PASSWORD = "correct horse battery"
+OPEN = {"/health", "/sign-in", "/sign-out"}
+UPLOAD = "/api/recordings?name=x.csv"
+
+
+@pytest.fixture
+def browser(workspace: Workspace) -> Iterator[httpx.Client]:
+    with workspace.store() as store:
+        for role in Role:
+            store.people.add(role, role, PASSWORD, utc_now())
+    with served(workspace, Address("0.0.0.0")) as site, site.client(Origin=site.url) as client:
+        yield client
+
+
+def sign_in(client: httpx.Client, name: str, password: str = PASSWORD) -> int:
+    return client.post("/sign-in", data={"name": name, "password": password}).status_code
+
+
+@pytest.mark.parametrize(
+    ("role", "upload"), [("reader", 403), ("operator", 202), ("engineer", 202)]
+)
+def test_a_role_opens_what_it_may_until_the_person_signs_out(
+    browser: httpx.Client, role: str, upload: int
+) -> None:
+    assert sign_in(browser, role) == 303
+    kept = dict(browser.cookies)
+    assert browser.get("/api/status").status_code == 200
+    assert browser.post(UPLOAD, content=b"x").status_code == upload
+    browser.post("/sign-out")
+    browser.cookies.update(kept)
+    assert browser.get("/api/status").status_code == 401
+
+
+def test_a_removed_user_is_out_at_once_and_wrong_passwords_are_throttled(
+    browser: httpx.Client, workspace: Workspace
+) -> None:
+    sign_in(browser, "operator")
+    with workspace.store() as store:
+        store.people.remove("operator", utc_now())
+    assert browser.get("/api/status").status_code == 401
+    told = [sign_in(browser, "reader", "wrong") for _ in range(MOST_WRONG)]
+    assert set(told[:-1]) == {401}
+    assert sign_in(browser, "reader") == 429
+
+
+def test_a_short_password_and_a_name_twice_are_refused(workspace: Workspace) -> None:
+    with workspace.store() as store:
+        with pytest.raises(UsageError, match="15 to"):
+            store.people.add("a", Role.READER, "short", utc_now())
+        store.people.add("a", Role.READER, PASSWORD, utc_now())
+        with pytest.raises(UsageError, match="already"):
+            store.people.add("a", Role.READER, PASSWORD, utc_now())
+
+
+def test_every_route_asks_who_it_is_and_what_changes_something_asks_for_an_operator(
+    workspace: Workspace,
+) -> None:
+    pages = load_pages(Site(Description(workspace), Address()))
+    try:
+        routers = [getattr(each, "original_router", each) for each in pages.app.routes]
+        found = [route for each in routers for route in getattr(each, "routes", [each])]
+        routes = [each for each in found if isinstance(each, APIRoute)]
+        assert len(routes) > 20
+        for route in routes:
+            if route.path in OPEN or route.path.startswith("/static"):
+                continue
+            asked = {each.call for each in route.dependant.dependencies}
+            needed = reading if route.methods <= {"GET", "HEAD"} else writing
+            assert needed in asked, route.path
+    finally:
+        pages.close()
