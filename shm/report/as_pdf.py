@@ -30,6 +30,7 @@ from reportlab.platypus import (
     Frame,
     Image,
     KeepTogether,
+    PageBreak,
     PageTemplate,
     Paragraph,
     Spacer,
@@ -168,18 +169,49 @@ def _flowables(paper: Paper) -> list[Flowable]:
     figures, tables = count(1), count(1)
     colour = colours.STATUS_COLOURS[paper.style]
     state = f' <font color="{colour}" size="12">● {escape(paper.status)}</font>'
-    return [
-        Paragraph(escape(paper.above), _LABEL),
-        Paragraph(escape(paper.title) + (state if paper.status else ""), _TITLE),
-        *(
+    body, appendix = (
+        [
             each
             for part in paper.parts
+            if part.is_appendix is is_appendix
             for each in _part(
                 part, colours.STATUS_COLOURS[part.style or paper.style], figures, tables
             )
-        ),
+        ]
+        for is_appendix in (False, True)
+    )
+    signature = [_signature()] if paper.is_signed else []
+    return [
+        Paragraph(escape(paper.above), _LABEL),
+        Paragraph(escape(paper.title) + (state if paper.status else ""), _TITLE),
+        *body,
+        *signature,
+        *([PageBreak(), *appendix] if appendix else []),
         Paragraph(escape(paper.foot), _NOTE),
     ]
+
+
+def _signature() -> Flowable:
+    """Lines for the names of who answers for the report."""
+    words = ("Prepared by", "Checked by", "Date")
+    room = WIDTH / len(words)
+    rules = [("LINEABOVE", (n, 0), (n, 0), 0.6, _QUIET) for n in (0, 2, 4)]
+    cells = [
+        Paragraph(words[0], _LABEL),
+        "",
+        Paragraph(words[1], _LABEL),
+        "",
+        Paragraph(words[2], _LABEL),
+    ]
+    gap = 6 * mm
+    return KeepTogether(
+        [
+            Spacer(1, 14 * mm),
+            SetTable(
+                [cells], [room - gap, 1.5 * gap, room - gap, 1.5 * gap, room - gap], style=rules
+            ),
+        ]
+    )
 
 
 def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> list[Flowable]:

@@ -28,6 +28,11 @@ def summary(data: HangerReport) -> str:
     return f"{message(data).words} {details(data)}"
 
 
+def why(data: HangerReport) -> str:
+    """What stands beside state and action: the tension, and its change."""
+    return f"{_tension(data)} {_against_baseline(data)}"
+
+
 def details(data: HangerReport) -> str:
     """Why, and how sure: what the report says after state and action."""
     said = message(data)

@@ -17,6 +17,7 @@ from shm.report.shifts import shift_cells, shift_table
 from shm.report.temperatures import temperature_table
 from shm.values import Alert, Hanger, Mode, Posterior, PredictedFrequency
 from shm.values.force_units import ForceUnit, force_unit
+from shm.values.stated_tension import stated
 from shm.watch.change_words import factor
 
 
@@ -28,6 +29,26 @@ def numbers(data: HangerReport) -> tuple[Table, ...]:
 def origins(data: HangerReport) -> tuple[Table, ...]:
     """What it was found from."""
     return filled(origin(data), settings(data.settings))
+
+
+def results(data: HangerReport) -> Table:
+    """What a reader takes away: tension, repeatability, baseline, shifts."""
+    unit, said = data.tension_unit, stated(data.averaged, data.tension_unit)
+    rows = [("tension, absolute", said.tension, said.interval, "", "")]
+    if said.repeatability:
+        rows.append(("its repeatability (sd)", said.repeatability, "", "", ""))
+    if (before := data.baseline_tension_n) is not None:
+        each = before.in_unit(unit)
+        mean, span = f"{formatting.mean(each)} {unit.name}", f"{formatting.span(each)} {unit.name}"
+        rows.append(("tension of the baseline, absolute", mean, span, "", ""))
+    shifts = [shift_cells(row) for row in data.drifts]
+    rows += [(f"shift of {what}", *rest) for what, *rest in shifts]
+    return Table(
+        "Results of the latest test",
+        ("quantity", "value", "90 % credible interval", "threshold", "probability beyond it"),
+        tuple(rows),
+        note="Shifts are from the baseline, temperature-compensated.",
+    )
 
 
 def tension(data: HangerReport) -> Table:
@@ -70,7 +91,7 @@ def drift(data: HangerReport) -> Table:
         ("quantity", "shift", "90 % interval", "threshold", "probability beyond it"),
         tuple(shift_cells(row) for row in data.drifts),
         note="If there is a shift at all: tension in percent, stiffness as how many times what it "
-        f"was, the swing with the temperature taken out. {data.drift_watch}".strip(),
+        f"was, temperature-compensated. {data.drift_watch}".strip(),
     )
 
 

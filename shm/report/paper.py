@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from string import ascii_uppercase
 from typing import TYPE_CHECKING
 
 from shm.report import formatting
@@ -63,7 +64,8 @@ class Part:
 
     `lead` begins the summary and is stressed. `figures` are drawn where a renderer asks for them:
     a terminal does not, and loads nothing that draws. `status` and `style` are those of an answer
-    of its own, as the paper's are of the whole; without a `style` it has the paper's.
+    of its own, as the paper's are of the whole; without a `style` it has the paper's. The first
+    appendix begins a page.
     """
 
     title: str
@@ -77,6 +79,7 @@ class Part:
     status: str = ""
     style: str = ""
     remarks_title: str = "What to mind about these data"
+    is_appendix: bool = False
 
     @property
     def headline(self) -> str:
@@ -89,13 +92,22 @@ class Part:
         return " ".join(word for word in (self.lead, self.summary) if word)
 
 
+def appendices(*parts: Part) -> tuple[Part, ...]:
+    """The parts as `Appendix A: ...`, `Appendix B: ...`."""
+    lettered = zip(ascii_uppercase, parts, strict=False)
+    return tuple(
+        replace(part, title=f"Appendix {letter}: {part.title}", is_appendix=True)
+        for letter, part in lettered
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Paper:
     """One document: `status` is the state in a word, `style` its name among the page's styles.
 
     The first part says all in short. `bridge` and `period` are empty where the title says them or
-    there is none; `generated_at` is None and `version` empty where nobody says. `closing` ends it:
-    what holds throughout.
+    there is none; an engineer puts a name to one that `is_signed`. `generated_at` is None and
+    `version` empty where nobody says. `closing` ends it: what holds throughout.
     """
 
     title: str
@@ -107,6 +119,7 @@ class Paper:
     period: str = ""
     generated_at: datetime | None = None
     version: str = ""
+    is_signed: bool = False
 
     @property
     def above(self) -> str:

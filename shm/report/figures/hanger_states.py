@@ -147,7 +147,7 @@ def _caption(data: StatesOverTime) -> str:
         "what each test says by itself with its own 90 % interval, hollow where it was taken as an "
         "outlier, triangles where it lies out of view. Solid: the state from the tests up to each, "
         "with its 90 % band; dashed orange: from all tests. Dashed green: baseline; dash-dotted: "
-        "thresholds. Upright spans: when a called change began, with 90 % probability. At the "
+        "thresholds. Upright spans: when a detected change began, with 90 % probability. At the "
         "bottom: temperature of the tests."
     )
 
@@ -157,7 +157,7 @@ def _alt(data: StatesOverTime) -> str:
     called = [f"{change.words}, begun by {change.began_by:%Y-%m-%d}" for change in data.changes]
     return (
         f"States over {len(data.times)} tests, at last: {'; '.join(last)}. "
-        f"Changes called: {'; '.join(called) or 'none'}."
+        f"Changes detected: {'; '.join(called) or 'none'}."
     )
 
 

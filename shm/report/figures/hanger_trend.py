@@ -84,11 +84,18 @@ def specify(course: Course) -> Specification | None:
     shown, when = time_axes.part(bounds, chosen, scale), _picked(course.times, chosen.tolist())
     names = [course.names[place] for place in chosen.tolist()]
     marks = [
-        *(_state(course, scale) or time_axes.band(when, shown, "blue")),
-        time_axes.single_tests(when, shown, names, "quiet" if course.state else "blue"),
+        *_state(course, scale),
+        time_axes.single_tests(
+            when,
+            shown,
+            names,
+            "quiet" if course.state else "blue",
+            "test, absolute interval" if _has_repeats(course) else "test by itself",
+        ),
         *_levels(course, scale),
         *_alerts(course, scale),
         *_deeds(course),
+        *_repeats(course, chosen.tolist(), scale),
         *time_axes.changes(course.changes or (), course.times),
     ]
     axis = Axis(label=f"tension ({course.unit.name})", range=_range(course, scale))
@@ -106,6 +113,30 @@ def _state(course: Course, scale: float) -> list[Mark]:
     chosen = time_axes.places(band.middle, band.low, band.high)
     when = _picked(course.state_times, chosen.tolist())
     return time_axes.band(when, time_axes.part(band, chosen, scale), "blue", "state, 90 % band")
+
+
+def _has_repeats(course: Course) -> bool:
+    return course.state is None and any(e.repeatability_sd is not None for e in course.tensions_n)
+
+
+def _repeats(course: Course, chosen: list[int], scale: float) -> list[Mark]:
+    """The interval in which the same test would repeat, within the absolute one."""
+    if not _has_repeats(course):
+        return []
+    inner = [
+        Interval.normal(
+            each.mean, math.nan if each.repeatability_sd is None else each.repeatability_sd
+        )
+        for each in (course.tensions_n[place] for place in chosen)
+    ]
+    bounds = time_axes.part(time_axes.bounds_of(inner), np.arange(len(inner)), scale)
+    return [
+        Points(
+            x=_picked(course.times, chosen), y=bounds.middle, low=bounds.low, high=bounds.high,
+            colour="orange", size=5.5, filled=False,
+            name="90 % repeatability", texts=time_axes.spans(bounds),
+        )
+    ]  # fmt: skip
 
 
 def _levels(course: Course, scale: float) -> list[Mark]:
@@ -170,9 +201,15 @@ def caption(course: Course) -> str:
 
 def _tests(course: Course) -> str:
     if course.state is None:
-        return "Tension by each test: mean and 90 % credible band."
+        repeats = (
+            " Capped orange bars: where the same test would fall again with 90 % probability "
+            "(repeatability), by which tests are compared."
+            if _has_repeats(course)
+            else ""
+        )
+        return f"Tension by each test. Thin bars: 90 % credible interval, absolute.{repeats}"
     at = (
-        f" at {course.reference_temperature_c:.1f} °C, the swing with the temperature taken out"
+        f" at {course.reference_temperature_c:.1f} °C, temperature-compensated"
         if math.isfinite(course.reference_temperature_c)
         else ""
     )
@@ -194,7 +231,7 @@ def _lines(course: Course) -> str:
 def _marks(course: Course) -> str:
     told = [
         "triangles: alerts" if course.alerts else "",
-        "upright spans: when a called change began, with 90 % probability"
+        "upright spans: when a detected change began, with 90 % probability"
         if course.changes
         else "",
         "at the foot: what was set or adopted" if course.deeds else "",
@@ -211,7 +248,7 @@ def alt(course: Course) -> str:
         for place in (0, -1)
     )
     called = (
-        f" Changes called: {'; '.join(change.words for change in course.changes) or 'none'}."
+        f" Changes detected: {'; '.join(change.words for change in course.changes) or 'none'}."
         if course.changes is not None
         else ""
     )
