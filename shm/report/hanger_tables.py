@@ -34,7 +34,7 @@ def origins(data: HangerReport) -> tuple[Table, ...]:
 def results(data: HangerReport) -> Table:
     """What a reader takes away: tension, repeatability, baseline, shifts."""
     unit, said = data.tension_unit, stated(data.averaged, data.tension_unit)
-    rows = [("tension, absolute", said.tension, said.interval, "", "")]
+    rows: list[tuple[str, ...]] = [("tension, absolute", said.tension, said.interval, "", "")]
     if said.repeatability:
         rows.append(("its repeatability (sd)", said.repeatability, "", "", ""))
     if (before := data.baseline_tension_n) is not None:
