@@ -11,7 +11,7 @@ from shm.report import formatting
 from shm.report.bridge_report import pattern_json
 from shm.report.contents import DiagnosisSheet, HangerReport, message, of_nominal, status
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_part
-from shm.report.hanger_summary import advice, details, is_found, summary, tension_change, why
+from shm.report.hanger_summary import advice, further, is_found, summary, tension_change, why
 from shm.report.hanger_tables import numbers, origins, results
 from shm.report.paper import CREDIBLE, Fact, Paper, Part, appendices
 from shm.report.period import period_json
@@ -36,7 +36,7 @@ def hanger_paper(data: HangerReport) -> Paper:
             Part("In short", lead=message(data).words, summary=why(data), facts=facts(data)),
             Part("Results", figures=lambda: _figures(data, TREND), tables=(results(data),)),
             Part("Fit of the model", figures=lambda: _figures(data, FIT)),
-            Part("Details", paragraphs=[details(data)]),
+            Part("Details", paragraphs=[further(data)]),
             *appendices(
                 Part("Figures", figures=lambda: _figures(data, FURTHER)),
                 Part("Numbers", tables=numbers(data)),

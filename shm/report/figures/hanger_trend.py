@@ -27,6 +27,7 @@ from shm.report.intervals import Interval
 from shm.report.states import CalledChange, QuantityOverTime
 from shm.values import FloatArray
 from shm.values.force_units import ForceUnit, force_unit
+from shm.values.stated_tension import averaged_now
 from shm.watch.history import Band as Bounds
 
 _AT_FOOT = 0.03  # layout: of the height, where signs of what people did stand
@@ -49,7 +50,7 @@ class Course:
     """The tension of a hanger over time: n tests in N, and what is known beside them.
 
     `alerts` say by the place of a test why it raised one. `state` is at `state_times`; `changes`
-    are those that were called, None where that is not known. `remark` ends the caption.
+    are those that were detected, None where that is not known. `remark` ends the caption.
     """
 
     times: Sequence[datetime]
@@ -207,14 +208,14 @@ def _tests(course: Course) -> str:
             if _has_repeats(course)
             else ""
         )
-        return f"Tension by each test. Thin bars: 90 % credible interval, absolute.{repeats}"
+        return f"Tension by each test, averaged over the model classes. Thin bars: 90 % credible interval, absolute.{repeats}"
     at = (
         f" at {course.reference_temperature_c:.1f} °C, temperature-compensated"
         if math.isfinite(course.reference_temperature_c)
         else ""
     )
     return (
-        "Dots: the tension by each test alone, as it was that day, with its 90 % interval. Line "
+        "Dots: the tension by each test alone, averaged over the model classes, as it was that day, with its 90 % interval. Line "
         f"and band: the state from all tests up to each{at}, with its 90 % credible band."
     )
 
@@ -256,6 +257,12 @@ def alt(course: Course) -> str:
     return f"Tension over {count}, {first} at first, {last} at last.{called}"
 
 
+def _baseline_n(data: HangerReport) -> float | None:
+    if data.baseline is None:
+        return None
+    return averaged_now(data.baseline, data.selection).tension_n.mean
+
+
 def _course(data: HangerReport) -> Course:
     rows = time_axes.dated(data)
     alerted = {alert.test: alert.message for alert in data.alerts}
@@ -266,7 +273,7 @@ def _course(data: HangerReport) -> Course:
         names=[row.row.test for row in rows],
         tensions_n=[row.row.tension_n for row in rows],
         nominal_n=data.hanger.nominal_tension_n,
-        baseline_n=float(data.baseline.tension_n.mean()) if data.baseline else None,
+        baseline_n=_baseline_n(data),
         reach=data.hanger.thresholds.tension_shift_fraction,
         alerts={i: alerted[r.row.test] for i, r in enumerate(rows) if r.row.test in alerted},
         remark=left,
