@@ -180,8 +180,9 @@ def _flowables(paper: Paper) -> list[Flowable]:
         ]
         for is_appendix in (False, True)
     )
-    signature = [_signature()] if paper.is_signed else []
+    signature = [_signature(paper)] if paper.is_signed else []
     return [
+        *_logo(paper),
         Paragraph(escape(paper.above), _LABEL),
         Paragraph(escape(paper.title) + (state if paper.status else ""), _TITLE),
         *body,
@@ -191,18 +192,25 @@ def _flowables(paper: Paper) -> list[Flowable]:
     ]
 
 
-def _signature() -> Flowable:
-    """Lines for the names of who answers for the report."""
-    words = ("Prepared by", "Checked by", "Date")
-    room = WIDTH / len(words)
+def _logo(paper: Paper) -> list[Flowable]:
+    """At the right of the first head, as high as its two lines."""
+    logo = paper.logo
+    if not logo.content:
+        return []
+    scale = min(12 * mm / logo.height, 60 * mm / logo.width)
+    size = (scale * logo.width, scale * logo.height)
+    return [Image(io.BytesIO(logo.content), *size, hAlign="RIGHT")]
+
+
+def _signature(paper: Paper) -> Flowable:
+    """Lines for those who answer for the report, with their names where they are given."""
+    signed = paper.signatures
+    room = WIDTH / len(signed)
     rules = [("LINEABOVE", (n, 0), (n, 0), 0.6, _QUIET) for n in (0, 2, 4)]
-    cells = [
-        Paragraph(words[0], _LABEL),
-        "",
-        Paragraph(words[1], _LABEL),
-        "",
-        Paragraph(words[2], _LABEL),
-    ]
+    first, second, last = (
+        Paragraph(f"{word}<br/>{escape(name)}" if name else word, _LABEL) for word, name in signed
+    )
+    cells = [first, "", second, "", last]
     gap = 6 * mm
     return KeepTogether(
         [

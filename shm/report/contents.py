@@ -41,6 +41,7 @@ from shm.values import (
     Summary,
 )
 from shm.values.force_units import ForceUnit, force_unit
+from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 from shm.values.stated_tension import averaged_now, selection_now
 from shm.watch import end_stiffness
 from shm.watch.neighbours import BridgePattern
@@ -53,8 +54,9 @@ if TYPE_CHECKING:  # `shm status` lists hangers and identifies nothing
 class TrendRow:
     """One test in the history of a hanger.
 
-    `tension_n` is averaged over the model classes, as the headline is. `stiffness` holds log10 of the end stiffness of each plane in N m/rad, as the watch compares
-    it: the common stiffness of both ends, which frequencies alone cannot tell apart.
+    `tension_n` is averaged over the model classes, as the headline is. `stiffness` holds log10 of
+    the end stiffness of each plane in N m/rad, as the watch compares it: the common stiffness of
+    both ends, which frequencies alone cannot tell apart.
     """
 
     test: str
@@ -162,6 +164,7 @@ class HangerReport:
     standing: tuple[Alert, ...] = ()
     notes: tuple[str, ...] = ()
     quiet_for: timedelta | None = None
+    letterhead: Letterhead = NO_LETTERHEAD
 
     @property
     def is_called(self) -> bool:

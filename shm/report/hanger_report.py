@@ -45,6 +45,7 @@ def hanger_paper(data: HangerReport) -> Paper:
             ),
         ),
         is_signed=True,
+        letterhead=data.letterhead,
         generated_at=data.generated_at,
         version=data.version,
         closing=f"{CREDIBLE}; times are UTC.",

@@ -142,7 +142,8 @@ def _against_nominal(data: HangerReport) -> str:
     half, off = share.width / 2, share.mean - 1
     if abs(off) <= half:
         return f"The tension agrees with the nominal one ({rounded_percent(off, half, '+')})."
-    return f"The tension is {rounded_percent(abs(off), half)} {'above' if off > 0 else 'below'} nominal."
+    size, side = rounded_percent(abs(off), half), "above" if off > 0 else "below"
+    return f"The tension is {size} {side} nominal."
 
 
 def _against_baseline(data: HangerReport) -> str:

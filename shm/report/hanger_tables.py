@@ -50,8 +50,8 @@ def results(data: HangerReport) -> Table:
         "Results of the latest test",
         ("quantity", "value", "90 % credible interval", "threshold", "probability beyond it"),
         tuple(rows),
-        note="Temperature-compensated shifts from the baseline, if there is any: tension in percent, "
-        f"stiffness as how many times what it was. {data.drift_watch}".strip(),
+        note="Temperature-compensated shifts from the baseline, if there is any: tension in "
+        f"percent, stiffness as how many times what it was. {data.drift_watch}".strip(),
     )
 
 
@@ -88,7 +88,8 @@ def frequencies(data: HangerReport) -> Table:
     return Table(
         "Frequencies",
         (
-            "plane", "mode", "measured, Hz", "sd, Hz", "predicted, Hz", "90 % credible interval, Hz",
+            "plane", "mode", "measured, Hz", "sd, Hz", "predicted, Hz",
+            "90 % credible interval, Hz",
             "off, % (90 % interval)",
         ),
         (

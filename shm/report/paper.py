@@ -8,10 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import cached_property
 from string import ascii_uppercase
 from typing import TYPE_CHECKING
 
 from shm.report import formatting
+from shm.report.logo import Logo, read_logo
+from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 
 if TYPE_CHECKING:
     from shm.report.figures.illustration import Illustration
@@ -120,12 +123,25 @@ class Paper:
     generated_at: datetime | None = None
     version: str = ""
     is_signed: bool = False
+    letterhead: Letterhead = NO_LETTERHEAD
 
     @property
     def above(self) -> str:
         """`Arch bridge, period 2026-03-01 to 2026-05-25`: what stands above the title."""
         period = f"period {self.period}" if self.period else ""
-        return ", ".join(word for word in (self.bridge, period) if word)
+        said = (self.letterhead.organisation, self.bridge, period)
+        return ", ".join(word for word in said if word)
+
+    @cached_property
+    def logo(self) -> Logo:
+        """Of the head, with what is wrong with it."""
+        return read_logo(self.letterhead.logo)
+
+    @property
+    def signatures(self) -> tuple[tuple[str, str], ...]:
+        """Who answers for it: the words, and the name as far as it is given."""
+        by = self.letterhead
+        return (("Prepared by", by.prepared_by), ("Checked by", by.checked_by), ("Date", ""))
 
     @property
     def name(self) -> str:
@@ -146,4 +162,5 @@ class Paper:
     @property
     def foot(self) -> str:
         """The last line: when it was made, by which version, what holds throughout."""
-        return f"{self.made}. {self.closing}" if self.made else self.closing
+        said = (self.made, self.logo.fault, self.closing)
+        return ". ".join(each for each in said if each)

@@ -31,7 +31,17 @@ from shm_daemon.web.faults import handle_faults
 from shm_daemon.web.frame import prepare_templates
 from shm_daemon.web.front import Pages
 from shm_daemon.web.metrics import Exposition
-from shm_daemon.web.pages import alerts, bridge, hanger, health, one_test, sensors, static, upload
+from shm_daemon.web.pages import (
+    alerts,
+    bridge,
+    downloads,
+    hanger,
+    health,
+    one_test,
+    sensors,
+    static,
+    upload,
+)
 from shm_daemon.web.site import Site
 
 _described = APIRouter(include_in_schema=False)
@@ -74,6 +84,7 @@ def load_pages(site: Site) -> Pages:
         one_test,
         hanger_numbers,
         hanger,
+        downloads,
     ):
         app.include_router(part.router)
     app.include_router(_described)

@@ -1,4 +1,4 @@
-"""States over time: what each test says, what is known of tension and springs, what was detected."""
+"""States over time: what each test says, what is known of tension and springs, changes."""
 
 from __future__ import annotations
 

@@ -208,14 +208,18 @@ def _tests(course: Course) -> str:
             if _has_repeats(course)
             else ""
         )
-        return f"Tension by each test, averaged over the model classes. Thin bars: 90 % credible interval, absolute.{repeats}"
+        return (
+            "Tension by each test, averaged over the model classes. Thin bars: 90 % credible "
+            f"interval, absolute.{repeats}"
+        )
     at = (
         f" at {course.reference_temperature_c:.1f} °C, temperature-compensated"
         if math.isfinite(course.reference_temperature_c)
         else ""
     )
     return (
-        "Dots: the tension by each test alone, averaged over the model classes, as it was that day, with its 90 % interval. Line "
+        "Dots: the tension by each test alone, averaged over the model classes, as it was that "
+        "day, with its 90 % interval. Line "
         f"and band: the state from all tests up to each{at}, with its 90 % credible band."
     )
 
