@@ -12,10 +12,12 @@ from typing import Any
 
 from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, hook_of
+from shm.bridge.letterhead import letterhead_of
 from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table
 from shm.errors import BadInput
 from shm.values import Hanger
+from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 from shm.values.stream import Stream
 
 
@@ -45,6 +47,7 @@ class Bridge:
     built: date | None = None
     structures: tuple[Hanger, ...] = ()
     streams: tuple[Stream, ...] = ()
+    letterhead: Letterhead = NO_LETTERHEAD
 
     @property
     def escalation_s(self) -> dict[str, float]:
@@ -110,6 +113,7 @@ def load_bridge(path: Path) -> Bridge:
         built=_built(document.get("bridge", {}), path),
         structures=structures,
         streams=streams,
+        letterhead=letterhead_of(document, path),
     )
 
 

@@ -114,6 +114,7 @@ def hanger_now(
     silences = store.silences.list_current(generated_at)
     return HangerReport(
         bridge=workspace.bridge.name,
+        letterhead=workspace.bridge.letterhead,
         hanger=hanger,
         tests=(latest.test,),
         posterior=posterior,

@@ -30,6 +30,7 @@ from reportlab.platypus import (
     Frame,
     Image,
     KeepTogether,
+    PageBreak,
     PageTemplate,
     Paragraph,
     Spacer,
@@ -168,18 +169,57 @@ def _flowables(paper: Paper) -> list[Flowable]:
     figures, tables = count(1), count(1)
     colour = colours.STATUS_COLOURS[paper.style]
     state = f' <font color="{colour}" size="12">● {escape(paper.status)}</font>'
-    return [
-        Paragraph(escape(paper.above), _LABEL),
-        Paragraph(escape(paper.title) + (state if paper.status else ""), _TITLE),
-        *(
+    body, appendix = (
+        [
             each
             for part in paper.parts
+            if part.is_appendix is is_appendix
             for each in _part(
                 part, colours.STATUS_COLOURS[part.style or paper.style], figures, tables
             )
-        ),
+        ]
+        for is_appendix in (False, True)
+    )
+    signature = [_signature(paper)] if paper.is_signed else []
+    return [
+        *_logo(paper),
+        Paragraph(escape(paper.above), _LABEL),
+        Paragraph(escape(paper.title) + (state if paper.status else ""), _TITLE),
+        *body,
+        *signature,
+        *([PageBreak(), *appendix] if appendix else []),
         Paragraph(escape(paper.foot), _NOTE),
     ]
+
+
+def _logo(paper: Paper) -> list[Flowable]:
+    """At the right of the first head, as high as its two lines."""
+    logo = paper.logo
+    if not logo.content:
+        return []
+    scale = min(12 * mm / logo.height, 60 * mm / logo.width)
+    size = (scale * logo.width, scale * logo.height)
+    return [Image(io.BytesIO(logo.content), *size, hAlign="RIGHT")]
+
+
+def _signature(paper: Paper) -> Flowable:
+    """Lines for those who answer for the report, with their names where they are given."""
+    signed = paper.signatures
+    room = WIDTH / len(signed)
+    rules = [("LINEABOVE", (n, 0), (n, 0), 0.6, _QUIET) for n in (0, 2, 4)]
+    first, second, last = (
+        Paragraph(f"{word}<br/>{escape(name)}" if name else word, _LABEL) for word, name in signed
+    )
+    cells = [first, "", second, "", last]
+    gap = 6 * mm
+    return KeepTogether(
+        [
+            Spacer(1, 14 * mm),
+            SetTable(
+                [cells], [room - gap, 1.5 * gap, room - gap, 1.5 * gap, room - gap], style=rules
+            ),
+        ]
+    )
 
 
 def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> list[Flowable]:

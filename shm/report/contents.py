@@ -41,6 +41,7 @@ from shm.values import (
     Summary,
 )
 from shm.values.force_units import ForceUnit, force_unit
+from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 from shm.values.stated_tension import averaged_now, selection_now
 from shm.watch import end_stiffness
 from shm.watch.neighbours import BridgePattern
@@ -53,8 +54,9 @@ if TYPE_CHECKING:  # `shm status` lists hangers and identifies nothing
 class TrendRow:
     """One test in the history of a hanger.
 
-    `stiffness` holds log10 of the end stiffness of each plane in N m/rad, as the watch compares
-    it: the common stiffness of both ends, which frequencies alone cannot tell apart.
+    `tension_n` is averaged over the model classes, as the headline is. `stiffness` holds log10 of
+    the end stiffness of each plane in N m/rad, as the watch compares it: the common stiffness of
+    both ends, which frequencies alone cannot tell apart.
     """
 
     test: str
@@ -65,12 +67,14 @@ class TrendRow:
     temperature_c: float = NAN
 
 
-def trend_row(posterior: Posterior, test: ModalTest, hanger: Hanger) -> TrendRow:
-    """The row of one test of `hanger` and its posterior."""
+def trend_row(
+    posterior: Posterior, test: ModalTest, hanger: Hanger, selection: Selection | None = None
+) -> TrendRow:
+    """The row of one test of `hanger` and its posterior, averaged over the classes compared."""
     return TrendRow(
         test=test.id,
         model=posterior.model,
-        tension_n=Interval.of_samples(posterior.tension_n).repeating(posterior.repeatability_sd_n),
+        tension_n=Interval.of_averaged(averaged_now(posterior, selection)),
         stiffness={
             name: Interval.of_samples(samples)
             for name, samples in end_stiffness(posterior, hanger).items()
@@ -92,8 +96,6 @@ class Numbers(Protocol):
     @property
     def temperature_c(self) -> float: ...
     @property
-    def tension_n(self) -> Summary: ...
-    @property
     def averaged(self) -> Averaged: ...
     @property
     def stiffness(self) -> Mapping[str, Summary]: ...
@@ -104,7 +106,7 @@ def trend_row_of(kept: Numbers) -> TrendRow:
     return TrendRow(
         test=kept.test,
         model=kept.model,
-        tension_n=Interval.of_summary(kept.tension_n).repeating(kept.averaged.repeatability_sd_n),
+        tension_n=Interval.of_averaged(kept.averaged),
         stiffness={name: Interval.of_summary(each) for name, each in kept.stiffness.items()},
         time=kept.taken_at,
         temperature_c=kept.temperature_c,
@@ -162,6 +164,7 @@ class HangerReport:
     standing: tuple[Alert, ...] = ()
     notes: tuple[str, ...] = ()
     quiet_for: timedelta | None = None
+    letterhead: Letterhead = NO_LETTERHEAD
 
     @property
     def is_called(self) -> bool:

@@ -81,7 +81,7 @@ def rounded_tension(tension_n: float, unit: ForceUnit) -> str:
 
 def tension_headings(unit: ForceUnit) -> tuple[str, str]:
     """Of the columns that `mean` and `span` of tensions stand in."""
-    return f"tension, {unit.name}", f"90 % interval, {unit.name}"
+    return f"tension, {unit.name}", f"90 % credible interval, {unit.name}"
 
 
 def span(interval: Interval, signed: bool = False) -> str:

@@ -11,9 +11,9 @@ from shm.report import formatting
 from shm.report.bridge_report import pattern_json
 from shm.report.contents import DiagnosisSheet, HangerReport, message, of_nominal, status
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_part
-from shm.report.hanger_summary import advice, details, is_found, summary, tension_change
-from shm.report.hanger_tables import numbers, origins
-from shm.report.paper import CREDIBLE, Fact, Paper, Part
+from shm.report.hanger_summary import advice, further, is_found, summary, tension_change, why
+from shm.report.hanger_tables import numbers, origins, results
+from shm.report.paper import CREDIBLE, Fact, Paper, Part, appendices
 from shm.report.period import period_json
 from shm.report.temperatures import temperature_documents
 from shm.values import FrequencyResponse
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def hanger_paper(data: HangerReport) -> Paper:
-    """Summary, figures, numbers, gap diagnosis, origin."""
+    """Two pages: state, action, trend, fit, results; all else is an appendix."""
     state = status(data)
     return Paper(
         title=formatting.hanger_name(data.hanger.id, data.hanger.name),
@@ -33,12 +33,19 @@ def hanger_paper(data: HangerReport) -> Paper:
         status=state.value,
         style=state.name.lower(),
         parts=(
-            Part("In short", lead=message(data).words, summary=details(data), facts=facts(data)),
-            Part("Figures", figures=lambda: _figures(data)),
-            Part("Numbers", tables=numbers(data)),
-            gap_part(data),
-            Part("Origin", tables=origins(data)),
+            Part("In short", lead=message(data).words, summary=why(data), facts=facts(data)),
+            Part("Results", figures=lambda: _figures(data, TREND), tables=(results(data),)),
+            Part("Fit of the model", figures=lambda: _figures(data, FIT)),
+            Part("Details", paragraphs=[further(data)]),
+            *appendices(
+                Part("Figures", figures=lambda: _figures(data, FURTHER)),
+                Part("Numbers", tables=numbers(data)),
+                gap_part(data),
+                Part("Origin", tables=origins(data)),
+            ),
         ),
+        is_signed=True,
+        letterhead=data.letterhead,
         generated_at=data.generated_at,
         version=data.version,
         closing=f"{CREDIBLE}; times are UTC.",
@@ -53,10 +60,14 @@ def gap_part(data: HangerReport) -> Part:
     return Part("Gap diagnosis", paragraphs=[*watched, how_to_diagnose(data)])
 
 
-def _figures(data: HangerReport) -> Sequence[Illustration]:
+TREND, FIT = frozenset({"trend"}), frozenset({"frequencies"})
+FURTHER = frozenset({"drift", "tension", "response", "stiffness"})
+
+
+def _figures(data: HangerReport, names: frozenset[str]) -> Sequence[Illustration]:
     from shm.report.figures.every_figure import hanger_figures
 
-    return hanger_figures(data)
+    return hanger_figures(data, names)
 
 
 def diagnosed(data: HangerReport) -> DiagnosisSheet | None:

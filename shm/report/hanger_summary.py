@@ -28,10 +28,25 @@ def summary(data: HangerReport) -> str:
     return f"{message(data).words} {details(data)}"
 
 
+def why(data: HangerReport) -> str:
+    """What stands beside state and action: the tension, and its change."""
+    return f"{_tension(data)} {_against_baseline(data)}"
+
+
 def details(data: HangerReport) -> str:
-    """Why, and how sure: what the report says after state and action."""
+    """Why, and how sure: all that is said after state and action."""
+    return " ".join(_sentences(data))
+
+
+def further(data: HangerReport) -> str:
+    """The details without what `why` says."""
+    said = (_tension(data), _against_baseline(data))
+    return " ".join(each for each in _sentences(data) if each not in said)
+
+
+def _sentences(data: HangerReport) -> tuple[str, ...]:
     said = message(data)
-    sentences = (
+    found = (
         *said.beyond_lead(data.warnings),
         outdated_baseline.redescribed(data),
         outdated_baseline.discarded(data),
@@ -51,7 +66,7 @@ def details(data: HangerReport) -> str:
         _gap(data),
         *_further_advice(data),
     )
-    return " ".join(sentence for sentence in sentences if sentence)
+    return tuple(each for each in found if each)
 
 
 def advice(data: HangerReport) -> tuple[str, ...]:
@@ -126,8 +141,9 @@ def _against_nominal(data: HangerReport) -> str:
     share = data.tension_n.scaled(1 / nominal)
     half, off = share.width / 2, share.mean - 1
     if abs(off) <= half:
-        return f"That agrees with the nominal tension ({rounded_percent(off, half, '+')})."
-    return f"That is {rounded_percent(abs(off), half)} {'above' if off > 0 else 'below'} nominal."
+        return f"The tension agrees with the nominal one ({rounded_percent(off, half, '+')})."
+    size, side = rounded_percent(abs(off), half), "above" if off > 0 else "below"
+    return f"The tension is {size} {side} nominal."
 
 
 def _against_baseline(data: HangerReport) -> str:

@@ -7,16 +7,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from shm.report import formatting
-from shm.report.contents import HangerReport, TrendRow, of_nominal
-from shm.report.hanger_summary import counted_tests, misfits_percent, tension_change
+from shm.report.contents import HangerReport, TrendRow
+from shm.report.hanger_summary import counted_tests, misfits_percent
 from shm.report.intervals import Interval
 from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Table, filled
 from shm.report.quality_table import quality_table
 from shm.report.shifts import shift_cells, shift_table
 from shm.report.temperatures import temperature_table
-from shm.values import Alert, Hanger, Mode, Posterior, PredictedFrequency
+from shm.values import Alert, Mode, Posterior, PredictedFrequency
 from shm.values.force_units import ForceUnit, force_unit
+from shm.values.stated_tension import stated
 from shm.watch.change_words import factor
 
 
@@ -30,47 +31,27 @@ def origins(data: HangerReport) -> tuple[Table, ...]:
     return filled(origin(data), settings(data.settings))
 
 
-def tension(data: HangerReport) -> Table:
-    unit = data.tension_unit
-    rows = [_tension_row("now", data.tension_n, data.hanger, unit)]
-    if data.baseline_tension_n is not None:
-        rows.append(_tension_row("baseline", data.baseline_tension_n, data.hanger, unit))
-    if (fraction := tension_change(data)) is not None:
-        change = fraction.scaled(100)
-        rows.append(
-            (
-                "change since baseline", f"{formatting.mean(change, True)} %",
-                f"{formatting.span(change, True)} %", "",
-            )
-        )  # fmt: skip
-    nominal_n = data.hanger.nominal_tension_n
-    if nominal_n > 0:
+def results(data: HangerReport) -> Table:
+    """What a reader takes away: tension, repeatability, baseline, shifts."""
+    unit, said = data.tension_unit, stated(data.averaged, data.tension_unit)
+    rows: list[tuple[str, ...]] = [("tension, absolute", said.tension, said.interval, "", "")]
+    if said.repeatability:
+        rows.append(("its repeatability (sd)", said.repeatability, "", "", ""))
+    if (before := data.baseline_tension_n) is not None:
+        each = before.in_unit(unit)
+        mean, span = f"{formatting.mean(each)} {unit.name}", f"{formatting.span(each)} {unit.name}"
+        rows.append(("tension of the baseline, absolute", mean, span, "", ""))
+    if (nominal_n := data.hanger.nominal_tension_n) > 0:
         nominal = f"{unit.of(nominal_n):.{unit.decimals(nominal_n)}f} {unit.name}"
-        rows.append(("nominal (as designed)", nominal, "given, no interval", "100 %"))
+        rows.append(("nominal (as designed)", nominal, "given, no interval", "", ""))
+    shifts = [shift_cells(row) for row in data.drifts]
+    rows += [(f"shift of {what}", *rest) for what, *rest in shifts]
     return Table(
-        "Tension", ("tension", "mean", "90 % interval", "of nominal (90 % interval)"), tuple(rows)
-    )
-
-
-def _tension_row(
-    label: str, tension_n: Interval, hanger: Hanger, unit: ForceUnit
-) -> tuple[str, ...]:
-    tension, share = tension_n.in_unit(unit), of_nominal(tension_n, hanger)
-    return (
-        label,
-        f"{formatting.mean(tension)} {unit.name}",
-        f"{formatting.span(tension)} {unit.name}",
-        f"{formatting.with_span(share)} %" if share else "no nominal",
-    )
-
-
-def drift(data: HangerReport) -> Table:
-    return Table(
-        "Shift since the baseline",
-        ("quantity", "shift", "90 % interval", "threshold", "probability beyond it"),
-        tuple(shift_cells(row) for row in data.drifts),
-        note="If there is a shift at all: tension in percent, stiffness as how many times what it "
-        f"was, the swing with the temperature taken out. {data.drift_watch}".strip(),
+        "Results of the latest test",
+        ("quantity", "value", "90 % credible interval", "threshold", "probability beyond it"),
+        tuple(rows),
+        note="Temperature-compensated shifts from the baseline, if there is any: tension in "
+        f"percent, stiffness as how many times what it was. {data.drift_watch}".strip(),
     )
 
 
@@ -107,7 +88,8 @@ def frequencies(data: HangerReport) -> Table:
     return Table(
         "Frequencies",
         (
-            "plane", "mode", "measured, Hz", "sd, Hz", "predicted, Hz", "90 % interval, Hz",
+            "plane", "mode", "measured, Hz", "sd, Hz", "predicted, Hz",
+            "90 % credible interval, Hz",
             "off, % (90 % interval)",
         ),
         (
@@ -163,7 +145,7 @@ def parameters(data: HangerReport) -> Table:
     posterior = data.posterior
     return Table(
         f"Parameters of the model class {formatting.model_class(posterior.model)}",
-        ("name", "meaning", "mean", "90 % interval", "most probable"),
+        ("name", "meaning", "mean", "90 % credible interval", "most probable"),
         tuple(_parameter_row(posterior, name) for name in posterior.names),
         note="Ratios and fractions have no unit; of the most probable set the interval is that of "
         "its row.",
@@ -275,6 +257,7 @@ def history(data: HangerReport) -> Table:
         f"Tests{within}, latest first",
         ("time", "test", "temperature", "model", *formatting.tension_headings(unit)),
         tuple(_history_row(row, unit) for row in reversed(data.trend)),
+        note="Tension averaged over the model classes; model: the class selected.",
         hidden_note=_EARLIER,
     ).shortened(_ROWS_SHOWN)
 
@@ -307,9 +290,7 @@ def _alert_row(row: Alert, acknowledged: Mapping[str, str]) -> tuple[str, ...]:
 
 
 _NUMBERS: tuple[Callable[[HangerReport], Table], ...] = (
-    tension,
     period,
-    drift,
     alerts,
     neighbours,
     temperatures,

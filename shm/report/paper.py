@@ -8,9 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import cached_property
+from string import ascii_uppercase
 from typing import TYPE_CHECKING
 
 from shm.report import formatting
+from shm.report.logo import Logo, read_logo
+from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 
 if TYPE_CHECKING:
     from shm.report.figures.illustration import Illustration
@@ -63,7 +67,8 @@ class Part:
 
     `lead` begins the summary and is stressed. `figures` are drawn where a renderer asks for them:
     a terminal does not, and loads nothing that draws. `status` and `style` are those of an answer
-    of its own, as the paper's are of the whole; without a `style` it has the paper's.
+    of its own, as the paper's are of the whole; without a `style` it has the paper's. The first
+    appendix begins a page.
     """
 
     title: str
@@ -77,6 +82,7 @@ class Part:
     status: str = ""
     style: str = ""
     remarks_title: str = "What to mind about these data"
+    is_appendix: bool = False
 
     @property
     def headline(self) -> str:
@@ -89,13 +95,22 @@ class Part:
         return " ".join(word for word in (self.lead, self.summary) if word)
 
 
+def appendices(*parts: Part) -> tuple[Part, ...]:
+    """The parts as `Appendix A: ...`, `Appendix B: ...`."""
+    lettered = zip(ascii_uppercase, parts, strict=False)
+    return tuple(
+        replace(part, title=f"Appendix {letter}: {part.title}", is_appendix=True)
+        for letter, part in lettered
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Paper:
     """One document: `status` is the state in a word, `style` its name among the page's styles.
 
     The first part says all in short. `bridge` and `period` are empty where the title says them or
-    there is none; `generated_at` is None and `version` empty where nobody says. `closing` ends it:
-    what holds throughout.
+    there is none; an engineer puts a name to one that `is_signed`. `generated_at` is None and
+    `version` empty where nobody says. `closing` ends it: what holds throughout.
     """
 
     title: str
@@ -107,12 +122,26 @@ class Paper:
     period: str = ""
     generated_at: datetime | None = None
     version: str = ""
+    is_signed: bool = False
+    letterhead: Letterhead = NO_LETTERHEAD
 
     @property
     def above(self) -> str:
         """`Arch bridge, period 2026-03-01 to 2026-05-25`: what stands above the title."""
         period = f"period {self.period}" if self.period else ""
-        return ", ".join(word for word in (self.bridge, period) if word)
+        said = (self.letterhead.organisation, self.bridge, period)
+        return ", ".join(word for word in said if word)
+
+    @cached_property
+    def logo(self) -> Logo:
+        """Of the head, with what is wrong with it."""
+        return read_logo(self.letterhead.logo)
+
+    @property
+    def signatures(self) -> tuple[tuple[str, str], ...]:
+        """Who answers for it: the words, and the name as far as it is given."""
+        by = self.letterhead
+        return (("Prepared by", by.prepared_by), ("Checked by", by.checked_by), ("Date", ""))
 
     @property
     def name(self) -> str:
@@ -133,4 +162,5 @@ class Paper:
     @property
     def foot(self) -> str:
         """The last line: when it was made, by which version, what holds throughout."""
-        return f"{self.made}. {self.closing}" if self.made else self.closing
+        said = (self.made, self.logo.fault, self.closing)
+        return ". ".join(each for each in said if each)

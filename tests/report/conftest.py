@@ -102,11 +102,14 @@ def season(hanger: Hanger) -> HangerReport:
         Drift(3, "t009", time, "transverse_end_stiffness", 8.2, 8.15, -0.05, 0.4, 0.5, 0.22),
     )
     rival = make_posterior("t009", "beam1", 690e3, 99)
+    compared = Selection((posteriors[-1], rival), (0.982, 0.018))
     return HangerReport(
         bridge="Arch bridge", hanger=hanger, tests=tests, posterior=posteriors[-1],
         generated_at=START + timedelta(days=130), version="0.1.0",
-        trend=tuple(trend_row(p, t, hanger) for p, t in zip(posteriors, tests, strict=True)),
-        baseline=posteriors[0], selection=Selection((posteriors[-1], rival), (0.982, 0.018)),
+        trend=tuple(
+            trend_row(p, t, hanger, compared) for p, t in zip(posteriors, tests, strict=True)
+        ),
+        baseline=posteriors[0], selection=compared,
         drifts=drifts,
         alerts=(Alert("3-t009", 3, "t009", time, "tension fell by 7.2 %", drifts[:1]),),
         frequency_response=make_response(),

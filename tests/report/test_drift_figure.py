@@ -88,7 +88,7 @@ def test_without_temperatures_there_is_no_strip(data: StatesOverTime) -> None:
 def test_the_legend_names_all_that_is_drawn(data: StatesOverTime) -> None:
     figure = drawn(data)
     assert {text.get_text() for text in figure.legends[0].get_texts()} == {
-        "90 % band", "filtered", "smoothed", "test by itself", "taken as outlier",
+        "90 % band", "estimate to date", "retrospective", "test by itself", "taken as outlier",
         "test out of view", "baseline", "threshold", "change began",
     }  # fmt: skip
 
@@ -111,7 +111,7 @@ def test_a_quantity_that_no_test_sees_has_its_state_but_no_dots(data: StatesOver
     unseen = Band(*[np.full(TESTS, np.nan)] * 3)
     blind = replace(data.quantities[1], read=unseen)
     axes = drawn(replace(data, quantities=(data.quantities[0], blind))).axes[1]
-    assert "filtered" in named(axes)
+    assert "estimate to date" in named(axes)
     assert "test by itself" not in named(axes)
 
 
@@ -164,7 +164,7 @@ def test_caption_and_alternative_text_say_what_is_seen(data: StatesOverTime) -> 
     assert "sudden: tension -3.9 %, begun by 2025-07-14" in alt
     unknown = replace(data, reference_temperature_c=float("nan"), changes=())
     assert "nan" not in STATES.caption(unknown) + STATES.alt(unknown)
-    assert STATES.alt(unknown).endswith("Changes called: none.")
+    assert STATES.alt(unknown).endswith("Changes detected: none.")
 
 
 @pytest.mark.parametrize(

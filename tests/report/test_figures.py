@@ -104,11 +104,11 @@ def test_the_trend_marks_the_alerted_test_at_its_tension(
 def test_the_thresholds_stand_either_side_of_the_baseline(
     drawn: dict[str, Illustration], season: HangerReport
 ) -> None:
-    assert season.baseline is not None
+    assert season.baseline_tension_n is not None
     (axes,) = drawn["trend"].figure.axes
     named = [line for line in axes.lines if line.get_label() in ("baseline", "threshold")]
     levels = [float(np.asarray(line.get_ydata())[0]) for line in named]
-    baseline = season.baseline.tension_n.mean() / 1e3
+    baseline = season.baseline_tension_n.mean / 1e3
     assert levels == pytest.approx([baseline, baseline * 1.05, baseline * 0.95])
 
 
@@ -207,3 +207,8 @@ def test_reports_do_without_pyplot_and_its_global_figures() -> None:
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0
+
+
+def test_the_trend_ends_at_the_headline(season: HangerReport) -> None:
+    assert season.trend[-1].tension_n == season.tension_n
+    assert season.baseline_tension_n == season.trend[0].tension_n

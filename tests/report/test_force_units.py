@@ -22,7 +22,7 @@ from shm.report.figures.gap_before_and_after import GAP_TENSION
 from shm.report.figures.hanger_states import STATES
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_status import Status
-from shm.report.hanger_tables import history, models, tension
+from shm.report.hanger_tables import history, models, results
 from shm.report.intervals import Interval
 from shm.report.shifts import shift_unit
 from shm.report.states import QuantityOverTime, StatesOverTime
@@ -106,7 +106,7 @@ def test_a_report_tells_every_tension_in_that_unit(
         assert {each for _, each in found} == {unit}
         assert not [value for value, _ in found if NOTHING.fullmatch(value)]
         assert f"tension, {unit}" in told
-    for table, columns in ((history(data), (4, 5)), (models(data), (4, 5)), (tension(data), (1,))):
+    for table, columns in ((history(data), (4, 5)), (models(data), (4, 5)), (results(data), (1,))):
         cells = [row[column] for row in table.rows for column in columns]
         assert not [cell for cell in cells if NOTHING.search(cell)], cells
     assert hanger_json(data)["trend"][-1]["tension_n"]["mean"] == pytest.approx(tension_n)

@@ -50,7 +50,7 @@ def test_it_has_a_title_properties_an_outline_and_a_language(content: bytes, par
     assert b"/Title (Hanger 3, Arch bridge)" in content
     assert b"/CreationDate (D:20260908100000Z)" in content
     assert b"/Lang (en)" in content
-    for heading in (b"In short", b"Figures", b"Numbers", b"Gap diagnosis", b"Origin"):
+    for heading in (b"In short", b"Results", b"Appendix A: Figures", b"Appendix D: Origin"):
         assert b"/Title (" + heading + b")" in content
     assert "Alert" in parsed.words
 
@@ -81,7 +81,7 @@ def test_a_long_table_goes_on_under_repeated_headings(
 ) -> None:
     long = replace(bare, trend=season.trend * 12)
     pages = Pdf.parse(as_pdf(hanger_paper(long))).pages
-    with_heading = [page for page in pages if "90 % interval, kN" in page and "beam2" in page]
+    with_heading = [page for page in pages if "credible interval, kN" in page and "beam2" in page]
     assert len([page for page in with_heading if "t004" in page]) >= 2
 
 
@@ -124,7 +124,7 @@ def test_a_table_of_one_column_is_set(cell: str, marks: tuple[str, ...]) -> None
 def test_the_gap_has_the_colour_of_its_own_answer_as_on_the_page(season: HangerReport) -> None:
     calm = replace(season.drifts[0], probability=0.01)
     paper = hanger_paper(replace(season, drifts=(calm,), diagnosis=UNEXPLAINED))
-    (gap,) = [part for part in paper.parts if part.title == "Gap diagnosis"]
+    (gap,) = [part for part in paper.parts if part.title.endswith("Gap diagnosis")]
     assert (paper.style, gap.style) == ("steady", "alert")
 
 

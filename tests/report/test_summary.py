@@ -25,7 +25,7 @@ def test_the_summary_gives_tension_with_interval_against_nominal_and_baseline(
     told = summary(season)
     assert told.startswith("Hanger 3: tension fell by 7.2 ± 2.0 %, beyond its threshold. Repeat")
     assert "Its tension is 651 ± 15 kN by test t009 of 2026-09-04." in told
-    assert "That is 8.4 ± 2.2 % below nominal." in told
+    assert "The tension is 8.4 ± 2.2 % below nominal." in told
     assert "Against the baseline of test t000 it is -7.2 ± 2.0 %." in told
 
 
@@ -180,7 +180,7 @@ def test_the_paragraph_reads_so_from_beginning_to_end(
         "Hanger 3: tension fell by 7.2 ± 2.0 %, beyond its threshold. Repeat the hammer test "
         "today and decide on traffic until then; if the loss stays, inspect its anchorages "
         "and the rod, and compare the hangers beside it (`shm drift bridge`). Its tension is "
-        "651 ± 15 kN by test t009 of 2026-09-04. That is 8.4 ± 2.2 % below nominal. Against "
+        "651 ± 15 kN by test t009 of 2026-09-04. The tension is 8.4 ± 2.2 % below nominal. Against "
         "the baseline of test t000 it is -7.2 ± 2.0 %. The model class is beam2, the most "
         "probable (beside beam1). It predicts 12 measured frequencies to 0.4 % (root mean "
         "square). What the plain class beam1 would leave unexplained was diagnosed on 5 "
@@ -192,7 +192,7 @@ def test_the_paragraph_reads_so_from_beginning_to_end(
     assert summary(bare) == (
         "Hanger 3: tension 711 ± 14 kN by its first test. Choose a warmer or colder day at "
         "the next planned test, so that the baseline covers temperature. Its tension is 711 ± "
-        "14 kN by test only. That agrees with the nominal tension (+0.0 ± 2.0 %). "
+        "14 kN by test only. The tension agrees with the nominal one (+0.0 ± 2.0 %). "
         "There is no earlier test to compare with: this one is the baseline. The model class "
         "is beam1. It predicts one measured frequency to 0.34 % (root mean square). Each lies "
         "within its 90 % interval: the model explains what was measured. Record the "

@@ -15,8 +15,6 @@ from shm.report.paper import Table
 from shm.values import Mode, PredictedFrequency
 
 WHOLE = [
-    "Tension",
-    "Shift since the baseline",
     "Alerts, latest first",
     "Frequencies",
     "Model classes",

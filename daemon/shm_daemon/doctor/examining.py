@@ -29,6 +29,7 @@ from shm.errors import ShmError
 from shm.models import competing_names
 from shm.read import sandbox
 from shm.report.formatting import counted
+from shm.report.logo import read_logo
 from shm.settings import Settings
 from shm.store import Workspace
 from shm.store.rows import Delivery, DeliveryState, Silence
@@ -74,6 +75,15 @@ def check_hooks(workspace: Workspace) -> Iterator[Finding]:
             yield from _secrecy(workspace, hook)
     finally:
         notifier.close()
+
+
+def check_logo(workspace: Workspace) -> Iterator[Finding]:
+    """Whether the logo of the reports can be read; nothing where none is named."""
+    path = workspace.bridge.letterhead.logo
+    if why := read_logo(path).fault:
+        yield warning("logo", f"reports are made w{why[1:]}", f"Put it at {path}.")
+    elif path:
+        yield ok("logo", path.name)
 
 
 def check_deliveries(examined: Examined) -> Iterator[Finding]:
@@ -176,6 +186,7 @@ def examine(folder: Path, now: datetime) -> tuple[Finding, ...]:
     findings += _found("models", partial(check_models, workspace))
     findings += _found("extras", partial(check_extras, workspace))
     findings += _found("confinement", check_confinement)
+    findings += _found("logo", partial(check_logo, workspace))
     findings += _found("hooks", partial(check_hooks, workspace))
     return (*findings, *_of_store(workspace, now))
 

@@ -35,6 +35,7 @@ from shm_daemon.web.pages import (
     alerts,
     bridge,
     comparison,
+    downloads,
     hanger,
     health,
     one_test,
@@ -85,6 +86,7 @@ def load_pages(site: Site) -> Pages:
         one_test,
         hanger_numbers,
         hanger,
+        downloads,
     ):
         app.include_router(part.router)
     app.include_router(_described)

@@ -47,7 +47,7 @@ class TestLine:
         """Temperature, model, tension and its interval."""
         if self.point is None:
             return ("", f"on its way: {self.row.stage.value}", "", "")
-        tension = Interval.of_summary(self.point.tension_n).in_unit(self.unit)
+        tension = Interval.of_averaged(self.point.averaged).in_unit(self.unit)
         known = math.isfinite(self.point.temperature_c)
         return (
             formatting.temperature(self.point.temperature_c) if known else "not recorded",

@@ -31,7 +31,6 @@ _MARKS: tuple[tuple[str, Symbol], ...] = (
 )
 MOST = len(_MARKS)
 """Hangers in one figure: more could not be told apart by colour and symbol."""
-_PERCENT = 100.0
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ def specify(courses: Sequence[Course]) -> Specification:
 def _marks(course: Course, colour: str, symbol: Symbol) -> list[Mark]:
     bounds = bounds_of(course.shifts)
     chosen = places(bounds.middle, bounds.low, bounds.high)
-    shown = part(bounds, chosen, _PERCENT)
+    shown = part(bounds, chosen, 100)  # in percent
     when = [course.times[place] for place in chosen.tolist()]
     texts = [
         f"{course.name}, {course.tests[place]}: {_words(course.shifts[place])}"

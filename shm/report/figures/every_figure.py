@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
+
 from shm.report.contents import BridgeReport, DiagnosisSheet, HangerReport, ModalTestReport
 from shm.report.figures.along_the_bridge import SHIFTS, TENSIONS
 from shm.report.figures.gap_before_and_after import BEFORE_AND_AFTER, GAP_TENSION
@@ -46,11 +48,12 @@ OF_BRIDGE_DIAGNOSIS: tuple[Member[BridgeDiagnosis], ...] = (SHARED,)
 OF_TRIAL: tuple[Member[TrialScore], ...] = (
     DETECTION, CONFUSION, RELIABILITY, LOG_SCORE, LEFT_OUT, TENSION_ERRORS, COVERAGE, HELD_OUT
 )  # fmt: skip
+_NAMES = frozenset(each.name for each in OF_HANGER)
 
 
-def hanger_figures(data: HangerReport) -> tuple[Illustration, ...]:
-    """Those that the report of a hanger has the data for, in reading order."""
-    return drawn(OF_HANGER, data)
+def hanger_figures(data: HangerReport, names: Container[str] = _NAMES) -> tuple[Illustration, ...]:
+    """Those of these `names` that the report of a hanger has the data for, in reading order."""
+    return drawn([each for each in OF_HANGER if each.name in names], data)
 
 
 def bridge_figures(data: BridgeReport) -> tuple[Illustration, ...]:

@@ -1,4 +1,4 @@
-"""States over time: what each test says, what is known of tension and springs, what was called."""
+"""States over time: what each test says, what is known of tension and springs, changes."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ from shm.watch.history import Band as Bounds
 
 _TENSION_INCHES, _STIFFNESS_INCHES, _TEMPERATURE_INCHES = 2.3, 1.5, 0.75
 _REST_INCHES = 0.9
+_TENSION_TITLE = "tension by the selected model class: estimate to date and retrospective"
 _LEAST_TESTS = 2
 """One test alone has no course: its numbers stand elsewhere."""
 
@@ -65,8 +66,15 @@ def _panel(data: StatesOverTime, quantity: QuantityOverTime) -> Panel:
         *changes,
         Band(low=filtered.low, high=filtered.high, opacity=0.22, name="90 % band", **look),
         *_readings(data, read, low, high),
-        Line(y=filtered.middle, width=1.5, name="filtered", **look),
-        Line(x=times, y=smoothed.middle, colour="orange", width=1.4, dash="dash", name="smoothed"),
+        Line(y=filtered.middle, width=1.5, name="estimate to date", **look),
+        Line(
+            x=times,
+            y=smoothed.middle,
+            colour="orange",
+            width=1.4,
+            dash="dash",
+            name="retrospective",
+        ),
         time_axes.level(baseline, "baseline", "green", "dash"),
         *(
             time_axes.level(each, "threshold", "red", "dashdot")
@@ -77,7 +85,7 @@ def _panel(data: StatesOverTime, quantity: QuantityOverTime) -> Panel:
     label = f"tension ({unit})" if is_tension else f"log10 of\n{unit}"
     return Panel(
         y=Axis(label=label, range=(low, high)), marks=marks,
-        title="" if is_tension else quantity.title, title_side="left",
+        title=_TENSION_TITLE if is_tension else quantity.title, title_side="left",
         height=_TENSION_INCHES if is_tension else _STIFFNESS_INCHES,
     )  # fmt: skip
 
@@ -147,7 +155,7 @@ def _caption(data: StatesOverTime) -> str:
         "what each test says by itself with its own 90 % interval, hollow where it was taken as an "
         "outlier, triangles where it lies out of view. Solid: the state from the tests up to each, "
         "with its 90 % band; dashed orange: from all tests. Dashed green: baseline; dash-dotted: "
-        "thresholds. Upright spans: when a called change began, with 90 % probability. At the "
+        "thresholds. Upright spans: when a detected change began, with 90 % probability. At the "
         "bottom: temperature of the tests."
     )
 
@@ -157,7 +165,7 @@ def _alt(data: StatesOverTime) -> str:
     called = [f"{change.words}, begun by {change.began_by:%Y-%m-%d}" for change in data.changes]
     return (
         f"States over {len(data.times)} tests, at last: {'; '.join(last)}. "
-        f"Changes called: {'; '.join(called) or 'none'}."
+        f"Changes detected: {'; '.join(called) or 'none'}."
     )
 
 

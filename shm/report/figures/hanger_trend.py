@@ -27,6 +27,7 @@ from shm.report.intervals import Interval
 from shm.report.states import CalledChange, QuantityOverTime
 from shm.values import FloatArray
 from shm.values.force_units import ForceUnit, force_unit
+from shm.values.stated_tension import averaged_now
 from shm.watch.history import Band as Bounds
 
 _AT_FOOT = 0.03  # layout: of the height, where signs of what people did stand
@@ -49,7 +50,7 @@ class Course:
     """The tension of a hanger over time: n tests in N, and what is known beside them.
 
     `alerts` say by the place of a test why it raised one. `state` is at `state_times`; `changes`
-    are those that were called, None where that is not known. `remark` ends the caption.
+    are those that were detected, None where that is not known. `remark` ends the caption.
     """
 
     times: Sequence[datetime]
@@ -84,11 +85,18 @@ def specify(course: Course) -> Specification | None:
     shown, when = time_axes.part(bounds, chosen, scale), _picked(course.times, chosen.tolist())
     names = [course.names[place] for place in chosen.tolist()]
     marks = [
-        *(_state(course, scale) or time_axes.band(when, shown, "blue")),
-        time_axes.single_tests(when, shown, names, "quiet" if course.state else "blue"),
+        *_state(course, scale),
+        time_axes.single_tests(
+            when,
+            shown,
+            names,
+            "quiet" if course.state else "blue",
+            "test, absolute interval" if _has_repeats(course) else "test by itself",
+        ),
         *_levels(course, scale),
         *_alerts(course, scale),
         *_deeds(course),
+        *_repeats(course, chosen.tolist(), scale),
         *time_axes.changes(course.changes or (), course.times),
     ]
     axis = Axis(label=f"tension ({course.unit.name})", range=_range(course, scale))
@@ -106,6 +114,30 @@ def _state(course: Course, scale: float) -> list[Mark]:
     chosen = time_axes.places(band.middle, band.low, band.high)
     when = _picked(course.state_times, chosen.tolist())
     return time_axes.band(when, time_axes.part(band, chosen, scale), "blue", "state, 90 % band")
+
+
+def _has_repeats(course: Course) -> bool:
+    return course.state is None and any(e.repeatability_sd is not None for e in course.tensions_n)
+
+
+def _repeats(course: Course, chosen: list[int], scale: float) -> list[Mark]:
+    """The interval in which the same test would repeat, within the absolute one."""
+    if not _has_repeats(course):
+        return []
+    inner = [
+        Interval.normal(
+            each.mean, math.nan if each.repeatability_sd is None else each.repeatability_sd
+        )
+        for each in (course.tensions_n[place] for place in chosen)
+    ]
+    bounds = time_axes.part(time_axes.bounds_of(inner), np.arange(len(inner)), scale)
+    return [
+        Points(
+            x=_picked(course.times, chosen), y=bounds.middle, low=bounds.low, high=bounds.high,
+            colour="orange", size=5.5, filled=False,
+            name="90 % repeatability", texts=time_axes.spans(bounds),
+        )
+    ]  # fmt: skip
 
 
 def _levels(course: Course, scale: float) -> list[Mark]:
@@ -170,14 +202,24 @@ def caption(course: Course) -> str:
 
 def _tests(course: Course) -> str:
     if course.state is None:
-        return "Tension by each test: mean and 90 % credible band."
+        repeats = (
+            " Capped orange bars: where the same test would fall again with 90 % probability "
+            "(repeatability), by which tests are compared."
+            if _has_repeats(course)
+            else ""
+        )
+        return (
+            "Tension by each test, averaged over the model classes. Thin bars: 90 % credible "
+            f"interval, absolute.{repeats}"
+        )
     at = (
-        f" at {course.reference_temperature_c:.1f} °C, the swing with the temperature taken out"
+        f" at {course.reference_temperature_c:.1f} °C, temperature-compensated"
         if math.isfinite(course.reference_temperature_c)
         else ""
     )
     return (
-        "Dots: the tension by each test alone, as it was that day, with its 90 % interval. Line "
+        "Dots: the tension by each test alone, averaged over the model classes, as it was that "
+        "day, with its 90 % interval. Line "
         f"and band: the state from all tests up to each{at}, with its 90 % credible band."
     )
 
@@ -194,7 +236,7 @@ def _lines(course: Course) -> str:
 def _marks(course: Course) -> str:
     told = [
         "triangles: alerts" if course.alerts else "",
-        "upright spans: when a called change began, with 90 % probability"
+        "upright spans: when a detected change began, with 90 % probability"
         if course.changes
         else "",
         "at the foot: what was set or adopted" if course.deeds else "",
@@ -211,12 +253,18 @@ def alt(course: Course) -> str:
         for place in (0, -1)
     )
     called = (
-        f" Changes called: {'; '.join(change.words for change in course.changes) or 'none'}."
+        f" Changes detected: {'; '.join(change.words for change in course.changes) or 'none'}."
         if course.changes is not None
         else ""
     )
     count = formatting.counted(len(course.times), "test")
     return f"Tension over {count}, {first} at first, {last} at last.{called}"
+
+
+def _baseline_n(data: HangerReport) -> float | None:
+    if data.baseline is None:
+        return None
+    return averaged_now(data.baseline, data.selection).tension_n.mean
 
 
 def _course(data: HangerReport) -> Course:
@@ -229,7 +277,7 @@ def _course(data: HangerReport) -> Course:
         names=[row.row.test for row in rows],
         tensions_n=[row.row.tension_n for row in rows],
         nominal_n=data.hanger.nominal_tension_n,
-        baseline_n=float(data.baseline.tension_n.mean()) if data.baseline else None,
+        baseline_n=_baseline_n(data),
         reach=data.hanger.thresholds.tension_shift_fraction,
         alerts={i: alerted[r.row.test] for i, r in enumerate(rows) if r.row.test in alerted},
         remark=left,

@@ -13,7 +13,7 @@ from shm.report.figures import hanger_stiffness, hanger_trend
 from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked
 from shm.report.figures.time_axes import bounds_of, part, places, single_tests, thinned_words
 from shm.report.intervals import Interval
-from shm.report.states import CalledChange, called_words
+from shm.report.states import CalledChange, QuantityOverTime, called_words
 from shm.store import EventKind, TrendPoint
 from shm.values.force_units import ForceUnit, force_unit
 from shm_daemon.web.hanger_figures.member import HangerFigure
@@ -30,18 +30,18 @@ _HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {
 def _course(view: HangerView) -> hanger_trend.Course:
     """All that the figure shows; without the state over time where that is still worked out."""
     states, at = view.states, {point.time: place for place, point in enumerate(view.trend)}
-    found = [] if states is None else [q for q in states.quantities if q.is_tension]
+    baseline, state = view.baseline, _averaged_state(view)
     raised = [e for e in view.events if e.kind is EventKind.ALERT and e.at in at]
     changes = [call.watched.change for call in view.calls]
     return hanger_trend.Course(
         times=[point.time for point in view.trend],
         names=[point.test for point in view.trend],
-        tensions_n=[Interval.of_summary(point.tension_n) for point in view.trend],
+        tensions_n=[Interval.of_averaged(point.averaged) for point in view.trend],
         nominal_n=view.hanger.nominal_tension_n,
-        baseline_n=view.baseline.tension_n.mean if view.baseline else None,
+        baseline_n=baseline.averaged.tension_n.mean if baseline else None,
         reach=view.hanger.thresholds.tension_shift_fraction,
         alerts={at[event.at]: event.why for event in raised},
-        state=found[0] if found else None,
+        state=state,
         state_times=states.times if states else (),
         reference_temperature_c=states.reference_temperature_c if states else math.nan,
         changes=[CalledChange(c.began_after, c.began_by, called_words(c)) for c in changes],
@@ -53,6 +53,20 @@ def _course(view: HangerView) -> hanger_trend.Course:
         ],
         remark=_remark(view),
     )
+
+
+def _averaged_state(view: HangerView) -> QuantityOverTime | None:
+    """The state of the tension, of one model class, at the level of the average over classes.
+
+    Of a change all classes say the same share; the band compares tests, so it moves along.
+    """
+    states, baseline = view.states, view.baseline
+    found = [] if states is None else [q for q in states.quantities if q.is_tension]
+    if not found or baseline is None:
+        return None
+    ratio = baseline.averaged.tension_n.mean / baseline.tension_n.mean
+    whole = np.arange(len(found[0].filtered.middle))
+    return replace(found[0], filtered=part(found[0].filtered, whole, ratio))
 
 
 def _remark(view: HangerView) -> str:
@@ -132,7 +146,7 @@ STIFFNESS = HangerFigure(
 
 def tension_unit(points: Sequence[TrendPoint]) -> ForceUnit:
     """The one unit of the tensions of a hanger's tests."""
-    return force_unit(*(point.tension_n.mean for point in points))
+    return force_unit(*(point.averaged.tension_n.mean for point in points))
 
 
 def _with_temperature(view: HangerView) -> list[TrendPoint]:
@@ -143,7 +157,7 @@ def _with_temperature(view: HangerView) -> list[TrendPoint]:
 def _over_temperature(view: HangerView) -> Specification:
     """Thinned by tension and temperature where there are very many."""
     known, unit = _with_temperature(view), tension_unit(view.trend)
-    bounds = bounds_of([Interval.of_summary(point.tension_n) for point in known])
+    bounds = bounds_of([Interval.of_averaged(point.averaged) for point in known])
     temperatures = np.array([point.temperature_c for point in known])
     chosen = places(bounds.middle, temperatures)
     shown = part(bounds, chosen, 1 / unit.newtons)
@@ -177,7 +191,8 @@ def _caption_of_temperature(view: HangerView) -> str:
 def _alt_of_temperature(view: HangerView) -> str:
     known = _with_temperature(view)
     temperatures = [point.temperature_c for point in known]
-    means_n, unit = [point.tension_n.mean for point in known], tension_unit(view.trend)
+    means_n = [point.averaged.tension_n.mean for point in known]
+    unit = tension_unit(view.trend)
     low, high = (
         f"{unit.of(each):.{unit.decimals(each)}f}" for each in (min(means_n), max(means_n))
     )

@@ -44,8 +44,7 @@ _EVENTS = {
     EventKind.ACKNOWLEDGED: "alert acknowledged",
 }
 _TABLES = (
-    hanger_tables.tension,
-    hanger_tables.drift,
+    hanger_tables.results,
     hanger_tables.frequencies,
     hanger_tables.parameters,
     hanger_tables.models,
