@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,7 +14,7 @@ from shm_cli import select, thesis, validate
 from shm_cli.validation import beam_solutions, formulas, frequencies
 
 ROOT = Path(__file__).parents[2]
-ITEMS = tomllib.loads(thesis.CHECKLIST_FILE.read_text(encoding="utf-8"))["item"]
+ITEMS = thesis.checklist()
 CLAMPED_FORMULAS = ("Zui, first order", "Zui, second order", "Ren")
 COMMANDS = sorted({item["where"] for item in ITEMS if item["where"].startswith("shm validate")})
 OTHERS = [item["where"] for item in ITEMS if item["where"].startswith("shm select")]

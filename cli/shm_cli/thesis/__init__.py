@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
@@ -44,3 +45,9 @@ EVALUATION_TIME = {
 
 OTHER_NOMINAL_TENSION_N = 835e3
 """Section 3.1.1: of the transverse direction; the longitudinal gave the description's 711 kN."""
+
+
+def checklist() -> list[dict[str, str]]:
+    """Every item of the thesis: `of` it, `what` it is, `where` ours is."""
+    items: list[dict[str, str]] = tomllib.loads(CHECKLIST_FILE.read_text(encoding="utf-8"))["item"]
+    return items
