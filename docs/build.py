@@ -1,7 +1,8 @@
 """Makes the generated pages: commands, settings, effects, and the tables of other pages.
 
-The pages of commands, settings and effects are built here and not kept in the repository: `shm VERB
---help`, `shm settings` and `shm gap effects` say the same.
+The pages of commands, settings, effects and the thesis are built here and not kept in the
+repository: `shm VERB --help`, `shm settings`, `shm gap effects` and `shm validate --list` say the
+same.
 
 python docs/build.py --quick    # what follows from the code alone; `make docs` does this first
 python docs/build.py            # the computed tables too (`make tables`): validation, gap, README
@@ -28,6 +29,7 @@ from docs.filling import fill_in
 from docs.gap_page import hanger_3_table
 from docs.house import house
 from shm.models.registry import MODELS
+from shm_cli import thesis
 from shm_cli.common import markdown
 from shm_cli.effects import effects_page
 from shm_cli.main import VERBS, cli
@@ -68,6 +70,21 @@ def _command(command: click.Command, name: str, parent: click.Context) -> str:
 def _prose(text: str) -> str:
     cleaned = re.sub(r"^\s*\x08\s*\n", "", inspect.cleandoc(text), flags=re.MULTILINE)
     return re.sub(r"Example: (.+)", r"Example: `\1`", cleaned)
+
+
+def thesis_page() -> str:
+    """docs/thesis.md: every item of the thesis and where ours stands."""
+    said = "# The thesis, item by item\n\nMade by `make docs`; `shm validate --list` says the same."
+    rows = [(each["of"], each["what"], _linked(each["where"])) for each in thesis.checklist()]
+    return f"{said}\n\n{markdown(('of the thesis', 'what', 'ours'), rows)}\n"
+
+
+def _linked(where: str) -> str:
+    """A command as code, a page as a link, a reason as it stands."""
+    if where.startswith("shm "):
+        return f"`{where}`"
+    page = where.removeprefix("docs/")
+    return f"[{page}]({page})" if where.startswith("docs/") else where
 
 
 def classes_table() -> str:
@@ -115,6 +132,7 @@ def main() -> None:
     (DOCS / "commands.md").write_text(commands_page(), encoding="utf-8")
     (DOCS / "settings.md").write_text(settings_page(), encoding="utf-8")
     (DOCS / "effects.md").write_text(effects_page(), encoding="utf-8")
+    (DOCS / "thesis.md").write_text(thesis_page(), encoding="utf-8")
     fill_in(DOCS / "physics.md", "classes", classes_table())
     fill_in(DOCS / "api.md", "examples", examples())
     fill_in(DOCS.parent / "CONTRIBUTING.md", "house", house())
@@ -124,7 +142,7 @@ def main() -> None:
     validation_page.write([*map(frequencies.cells, tables)], [*map(selection.cells, chosen)])
     fill_in(DOCS / "gap.md", "hanger 3", hanger_3_table())
     latest = [row for row in chosen if (row.printing, row.repeat) == ("table 1.1", 10)]
-    short = markdown(selection.HEADS[2:-1], [selection.cells(row)[2:-1] for row in latest])
+    short = markdown(selection.HEADS[2:-4], [selection.cells(row)[2:-4] for row in latest])
     fill_in(DOCS.parent / "README.md", "selection", short)
 
 

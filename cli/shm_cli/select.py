@@ -8,6 +8,7 @@ import numpy as np
 import rich_click as click
 
 from shm.documents import selection_document
+from shm.errors import UsageError
 from shm.inference import select
 from shm.models import applicable, build, competing_names
 from shm.settings import load_settings
@@ -50,6 +51,12 @@ from shm_cli.update import (
     shell_complete=completion.models,
     help="Classes, separated by commas.",
 )
+@click.option(
+    "--prior",
+    "class_priors",
+    metavar="CLASS=P,...",
+    help="How probable each class is beforehand, such as beam1=0.25,beam2=0.75.",
+)
 @hanger_option()
 @hanger_file_option
 @seed_option
@@ -64,6 +71,7 @@ def command(
     ctx: click.Context,
     modes_file: Path | None,
     models: str | None,
+    class_priors: str | None,
     hanger_id: int | None,
     hanger_file: Path | None,
     seed: int,
@@ -76,14 +84,15 @@ def command(
 ) -> None:
     """Compare model classes by their evidence.
 
-    The classes are equally probable beforehand; those that do not apply to the hanger are left out
-    and say why. The tests come from MODES.json, or are the latest of a hanger of the workspace,
-    which brings the classes that it has adopted.
+    The classes are equally probable beforehand, unless --prior says otherwise; those that do not
+    apply to the hanger are left out and say why. The tests come from MODES.json, or are the latest
+    of a hanger of the workspace, which brings the classes that it has adopted.
 
     \b
     Example: shm select hanger3.modes.json --hanger-file H.toml --models beam1,beam2
     """
     options = update_options(samples, seed, repeat, method, priors)
+    stated = None if class_priors is None else _stated_priors(class_priors)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
     names = _names(ctx, models, None if hanger_file else hanger.id)
     _, not_applicable = applicable(hanger, names)
@@ -92,7 +101,7 @@ def command(
     tell_irregular(tests)
     with progress_bar("updating") as progress:
         options = calibrated(options, calibrated_by, hanger, chosen, progress)
-        selection = select(tests, chosen, options, progress)
+        selection = select(tests, chosen, options, progress, stated)
     tell_poor_fit(selection.selected)
     if as_json:
         document = selection_document(selection, hanger.limits)
@@ -112,6 +121,18 @@ def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tup
     with opened_store(ctx) as (workspace, store):
         adopted = [each.adoption.model for each in store.posteriors.list_adoptions(hanger_id)]
     return tuple(dict.fromkeys([*workspace.settings.model_names, *adopted]))
+
+
+def _stated_priors(text: str) -> dict[str, float]:
+    """beam1=0.25,beam2=0.75 as numbers by class."""
+    pairs = [part.partition("=") for part in text.split(",")]
+    try:
+        return {name.strip(): float(value) for name, _, value in pairs}
+    except ValueError as error:
+        raise UsageError(
+            f"--prior {text}: not one number a class.",
+            remedy="Write beam1=0.25,beam2=0.75, say.",
+        ) from error
 
 
 def show_selection(selection: Selection, limits: Limits | None = None) -> None:

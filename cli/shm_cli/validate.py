@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -163,7 +162,7 @@ def _show_formulas(seed: int, as_json: bool) -> None:
 
 
 def _show_list(as_json: bool) -> None:
-    items = tomllib.loads(thesis.CHECKLIST_FILE.read_text(encoding="utf-8"))["item"]
+    items = thesis.checklist()
     if as_json:
         show(items)
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -133,34 +133,55 @@ def select(
     models: Sequence[Model],
     options: UpdateOptions | None = None,
     progress: Progress = silent,
+    class_priors: Mapping[str, float] | None = None,
 ) -> Selection:
     """The posteriors of all `models`, most probable first.
 
-    Before any data they are equally probable; with the priors of a description, a class that holds
-    its ends fast is as probable as all ends being stiffer than the springs of other classes reach.
+    Before any data they are as probable as `class_priors` says of each by name, in any scale.
+    Without it, equally; with the priors of a description, a class that holds its ends fast is then
+    as probable as all ends being stiffer than the springs of other classes reach.
     Expensive classes come last and start from the likeliest of the cheap ones. Thesis (4.15) to
-    (4.17). Raises UsageError where no model is given, BadInput as `update` does.
+    (4.17). Raises UsageError where no model is given or `class_priors` are not of these,
+    BadInput as `update` does.
     """
     if not models:
         raise UsageError("no model class to select from.", remedy="Name at least one.")
+    if class_priors is not None:
+        _check_priors(class_priors, [model.name for model in models])
     cheap = [update(tests, m, options, progress) for m in models if not m.expensive]
     best = max(cheap, key=lambda posterior: posterior.log_evidence, default=None)
     costly = [update(tests, m, options, progress, best) for m in models if m.expensive]
     found = [*cheap, *costly]
-    chances = class_probabilities(found, models, tests)
+    chances = class_probabilities(found, models, tests, class_priors)
     order = np.argsort([-chances[each.model] for each in found], kind="stable")
     chosen = tuple(found[k] for k in order)
     return Selection(chosen, tuple(chances[each.model] for each in chosen))
 
 
 def class_probabilities(
-    posteriors: Sequence[Posterior], models: Sequence[Model], tests: Sequence[ModalTest]
+    posteriors: Sequence[Posterior],
+    models: Sequence[Model],
+    tests: Sequence[ModalTest],
+    class_priors: Mapping[str, float] | None = None,
 ) -> dict[str, float]:
     """The probability of each class, by name, of its posterior's evidence and before any data."""
-    prior = {model.name: _log_prior(model, tests) for model in models}
+    if class_priors is None:
+        prior = {model.name: _log_prior(model, tests) for model in models}
+    else:
+        prior = {name: float(np.log(stated)) for name, stated in class_priors.items()}
     log = np.array([each.log_evidence + prior[each.model] for each in posteriors])
     weights = normalised(log)
     return {each.model: float(w) for each, w in zip(posteriors, weights, strict=True)}
+
+
+def _check_priors(class_priors: Mapping[str, float], names: Sequence[str]) -> None:
+    odd = sorted(set(names) ^ set(class_priors))
+    odd += [name for name, stated in class_priors.items() if not 0 < stated < np.inf]
+    if odd:
+        raise UsageError(
+            f"prior of {', '.join(odd)}: each class compared needs one above 0, no other has one.",
+            remedy=f"Give them of {', '.join(names)}, or none at all.",
+        )
 
 
 def _log_prior(model: Model, tests: Sequence[ModalTest]) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,13 +10,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from shm_cli import thesis, validate
+from shm_cli import select, thesis, validate
 from shm_cli.validation import beam_solutions, formulas, frequencies
 
 ROOT = Path(__file__).parents[2]
-ITEMS = tomllib.loads(thesis.CHECKLIST_FILE.read_text(encoding="utf-8"))["item"]
+ITEMS = thesis.checklist()
 CLAMPED_FORMULAS = ("Zui, first order", "Zui, second order", "Ren")
-COMMANDS = sorted({item["where"] for item in ITEMS if item["where"].startswith("shm ")})
+COMMANDS = sorted({item["where"] for item in ITEMS if item["where"].startswith("shm validate")})
+OTHERS = [item["where"] for item in ITEMS if item["where"].startswith("shm select")]
 
 
 def test_every_page_of_it_exists() -> None:
@@ -30,6 +30,12 @@ def test_every_command_of_it_is_one_of_validate() -> None:
     known = {f"shm validate --figure {number}" for number in beam_solutions.FIGURES}
     known |= {f"shm validate --table {number}" for number in frequencies.TABLES}
     assert known | {"shm validate --formulas"} == set(COMMANDS)
+
+
+def test_every_other_command_of_it_has_that_option() -> None:
+    options = {option for parameter in select.command.params for option in parameter.opts}
+    assert OTHERS
+    assert {each.split()[2] for each in OTHERS} <= options
 
 
 # The beams are solved in a second; the solids' tables are compared in test_validate.py.

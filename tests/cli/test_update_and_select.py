@@ -133,6 +133,15 @@ def test_select_ranks_the_models_and_their_probabilities_add_to_one(
     assert sum(model["probability"] for model in document["models"]) == pytest.approx(1)
 
 
+def test_priors_of_classes_may_be_stated(shm: Shm, modes_file: Path, hanger_file: Path) -> None:
+    asked = ("select", modes_file, "--hanger-file", hanger_file, "--models", "beam1,beam2", *QUICK)
+    sure = shm(*asked, "--prior", "beam1=1,beam2=1e-99", "--json").document
+    assert {each["model"]: each["probability"] for each in sure["models"]}["beam1"] > 0.99
+    for wrong in ("beam1", "beam1=1", "beam1=1,beam2=x"):
+        ended = shm(*asked, "--prior", wrong)
+        assert (ended.code, "prior" in ended.err) == (2, True), ended.err
+
+
 def test_the_tables_name_units_and_intervals(shm: Shm, modes_file: Path, hanger_file: Path) -> None:
     updated = shm("update", modes_file, "--hanger-file", hanger_file, "--model", "beam1", *QUICK)
     assert "tension (kN)" in updated.out

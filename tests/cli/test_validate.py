@@ -39,7 +39,7 @@ def test_fixed_ends_that_beat_springs_are_a_miss() -> None:
     evidence = {"beam1": -20.0, "beam2": -20.5, "solid0": -30.0, "solid1": -17.0, "solid2": -16.0}
     chosen = [
         selection.SelectionRow(
-            printing, repeat, model, 0.2, value, 0.01, 0, 0, 711, 700, 720, 0, 0, {}
+            printing, repeat, model, 0.2, value, 0.01, 0, 0, 711, 700, 720, 0, 0, {}, 711, 9
         )
         for printing in thesis.PRINTINGS
         for repeat in (1, 10)
@@ -47,6 +47,17 @@ def test_fixed_ends_that_beat_springs_are_a_miss() -> None:
     ]
     assert selection.misses(chosen)[0] == "table 1.1, N_D = 1: beam1 beats beam2"
     assert len(selection.misses(chosen)) == 4
+
+
+def test_a_tension_stands_beside_both_nominal_ones_and_the_time() -> None:
+    row = selection.SelectionRow(
+        "table A.4", 10, "beam2", 1, -53.6, 0.03, 0, -18.3, 802, 798, 841, 0.15, -0.04,
+        {"theta_F": 1.2}, 711, 14.4,
+    )  # fmt: skip
+    by_head = dict(zip(selection.HEADS, selection.cells(row), strict=True))
+    assert by_head["to 711 / 835 kN"] == "+13% / -4%"
+    assert by_head["most probable, to 711 / 835 kN"] == "+20% / +2%"
+    assert (by_head["time"], by_head["thesis, time"]) == ("14 s", "5 min")
 
 
 def test_markdown_has_a_line_a_row(rows) -> None:

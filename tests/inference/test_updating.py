@@ -10,7 +10,7 @@ import pytest
 from scipy.special import gammaincc, gammaln, logsumexp
 
 from shm.errors import BadInput, UsageError
-from shm.inference import UpdateOptions, select, update
+from shm.inference import UpdateOptions, class_probabilities, select, update
 from shm.inference.likelihood import Likelihood
 from shm.inference.outcome import _at_bounds
 from shm.models import THESIS, Model, build
@@ -216,6 +216,18 @@ def test_selection_ranks_by_evidence_and_its_probabilities_add_to_one() -> None:
     assert sum(selection.probabilities) == pytest.approx(1)
     ratio = selection.probabilities[0] / selection.probabilities[1]
     assert np.log(ratio) == pytest.approx(first.log_evidence - second.log_evidence)
+
+
+def test_stated_priors_of_classes_multiply_the_ratio_of_their_evidence() -> None:
+    models = [build(name, HANGER_3, THESIS) for name in ("beam1", "beam2")]
+    found = [Mock(model="beam1", log_evidence=-20.0), Mock(model="beam2", log_evidence=-21.0)]
+    test = [modal_test(TABLE_1_1)]
+    chances = class_probabilities(found, models, test, {"beam1": 30.0, "beam2": 10.0})
+    assert chances["beam1"] / chances["beam2"] == pytest.approx(3 * np.e)
+    assert sum(chances.values()) == pytest.approx(1)
+    for odd in ({"beam1": 1.0}, {"beam1": 1.0, "beam2": 0.0}, {"beam1": 1, "beam2": 1, "s1": 1}):
+        with pytest.raises(UsageError, match="prior of"):
+            select(test, models, class_priors=odd)
 
 
 def test_progress_is_heard_from_start_to_end() -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from docs import validation_page
 from shm.settings import TABLE
+from shm_cli import thesis
 from shm_cli.main import run
 from tests.helpers.command_lines import commands
 from tests.helpers.pages import BUILT, DOCS, PAGES, ROOT, links, name_of
@@ -28,6 +29,13 @@ def build() -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def test_the_page_of_the_thesis_has_every_item_and_links_its_pages(build: ModuleType) -> None:
+    page = build.thesis_page()
+    assert page.count("\n| ") == len(thesis.checklist()) + 1
+    assert "[trials/validation.md](trials/validation.md)" in page
+    assert "`shm validate --table 3.1`" in page
 
 
 def test_the_page_and_the_command_of_settings_name_every_one(

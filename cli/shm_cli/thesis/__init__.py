@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
@@ -32,3 +33,21 @@ DEVIATION_FROM_NOMINAL = {
     "solid2": 0.01,
 }
 """Table 6.1: most probable tension over nominal tension, less 1."""
+
+EVALUATION_TIME = {
+    "beam1": "5 min",
+    "beam2": "5 min",
+    "solid0": "24 h",
+    "solid1": "36 h",
+    "solid2": "48 h",
+}
+"""Table 6.1, on a machine that it does not name."""
+
+OTHER_NOMINAL_TENSION_N = 835e3
+"""Section 3.1.1: of the transverse direction; the longitudinal gave the description's 711 kN."""
+
+
+def checklist() -> list[dict[str, str]]:
+    """Every item of the thesis: `of` it, `what` it is, `where` ours is."""
+    items: list[dict[str, str]] = tomllib.loads(CHECKLIST_FILE.read_text(encoding="utf-8"))["item"]
+    return items

@@ -37,6 +37,22 @@ class SelectionRow:
     deviation_from_nominal: float
     thesis_deviation: float
     most_probable: dict[str, float]
+    nominal_tension_kn: float
+    seconds: float
+
+    @property
+    def deviations(self) -> str:
+        """Of the mean tension, from both nominal tensions of the thesis."""
+        return self._from_both(self.tension_kn)
+
+    @property
+    def most_probable_deviations(self) -> str:
+        """The same of the most probable tension: table 6.1 does not say which it means."""
+        return self._from_both(self.most_probable["theta_F"] * self.nominal_tension_kn)
+
+    def _from_both(self, tension_kn: float) -> str:
+        other = thesis.OTHER_NOMINAL_TENSION_N / 1e3
+        return f"{tension_kn / self.nominal_tension_kn - 1:+.0%} / {tension_kn / other - 1:+.0%}"
 
 
 def compared(
@@ -93,12 +109,15 @@ def _row(
         deviation_from_nominal=mean / posterior.nominal_tension_n - 1,
         thesis_deviation=thesis.DEVIATION_FROM_NOMINAL[posterior.model],
         most_probable=dict(zip(posterior.names, map(float, posterior.most_probable), strict=True)),
+        nominal_tension_kn=posterior.nominal_tension_n / 1e3,
+        seconds=posterior.seconds,
     )
 
 
 HEADS = (
     "measured", "N_D", "class", "probability", "log evidence", "to best", "thesis, to best",
-    "tension (kN), 90 % interval", "to nominal", "thesis", "most probable",
+    "tension (kN), 90 % interval", "to 711 / 835 kN", "thesis",
+    "most probable, to 711 / 835 kN", "time", "thesis, time", "most probable",
 )  # fmt: skip
 
 
@@ -113,8 +132,11 @@ def cells(row: SelectionRow) -> tuple[str, ...]:
         f"{row.log_bayes_factor:.1f}",
         f"{row.thesis_log_bayes_factor:.1f}",
         f"{row.tension_kn:.0f} ({row.tension_q05_kn:.0f} to {row.tension_q95_kn:.0f})",
-        f"{row.deviation_from_nominal:+.0%}",
+        row.deviations,
         f"{row.thesis_deviation:+.0%}",
+        row.most_probable_deviations,
+        f"{row.seconds:.0f} s",
+        thesis.EVALUATION_TIME[row.model],
         ", ".join(f"{name} {value:.3g}" for name, value in row.most_probable.items()),
     )
 
