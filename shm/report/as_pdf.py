@@ -206,7 +206,10 @@ def _signature(paper: Paper) -> Flowable:
     """Lines for those who answer for the report, with their names where they are given."""
     signed = paper.signatures
     room = WIDTH / len(signed)
-    rules = [("LINEABOVE", (n, 0), (n, 0), 0.6, _QUIET) for n in (0, 2, 4)]
+    rules: list[tuple[object, ...]] = [
+        ("LINEABOVE", (n, 0), (n, 0), 0.6, _QUIET) for n in (0, 2, 4)
+    ]
+    rules.append(("VALIGN", (0, 0), (-1, -1), "TOP"))
     first, second, last = (
         Paragraph(f"{word}<br/>{escape(name)}" if name else word, _LABEL) for word, name in signed
     )

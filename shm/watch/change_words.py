@@ -154,8 +154,9 @@ def undetected_words(latest: Change) -> str:
             "Something changed since the baseline, by less than the watch is to tell: no first "
             "frequency, and no plane's mean, moved by enough."
         )
-    share = f"{100 * latest.evidence_years / latest.limit_years:.2g}"
+    share = 100 * latest.evidence_years / latest.limit_years
+    known = f"{share:.2g} %" if share >= 1 else "less than 1 %"
     return (
         "No change was detected since the baseline: the evidence for one is "
-        f"{share} % of what it takes."
+        f"{known} of what a detection takes."
     )
