@@ -29,8 +29,23 @@ def summary(data: HangerReport) -> str:
 
 
 def why(data: HangerReport) -> str:
-    """What stands beside state and action: the tension, and its change."""
-    return f"{_tension(data)} {_against_baseline(data)}"
+    """What stands beside state and action: every doubt, the tension, and its change."""
+    return " ".join(_why(data))
+
+
+def _why(data: HangerReport) -> tuple[str, ...]:
+    return (*_doubts(data), _tension(data), _against_baseline(data))
+
+
+def _doubts(data: HangerReport) -> tuple[str, ...]:
+    """What must not wait until the details: warnings, an outdated baseline, caveats."""
+    found = (
+        *message(data).beyond_lead(data.warnings),
+        outdated_baseline.redescribed(data),
+        outdated_baseline.discarded(data),
+        *data.averaged.caveats,
+    )
+    return tuple(each for each in found if each)
 
 
 def details(data: HangerReport) -> str:
@@ -40,17 +55,13 @@ def details(data: HangerReport) -> str:
 
 def further(data: HangerReport) -> str:
     """The details without what `why` says."""
-    said = (_tension(data), _against_baseline(data))
+    said = _why(data)
     return " ".join(each for each in _sentences(data) if each not in said)
 
 
 def _sentences(data: HangerReport) -> tuple[str, ...]:
-    said = message(data)
     found = (
-        *said.beyond_lead(data.warnings),
-        outdated_baseline.redescribed(data),
-        outdated_baseline.discarded(data),
-        *data.averaged.caveats,
+        *_doubts(data),
         _tension(data),
         *_repeats_and_limits(data),
         _against_nominal(data),

@@ -79,7 +79,7 @@ def test_a_diagnosis_of_a_workspace_is_kept_for_the_report(shm: Shm, tmp_path: P
     assert len(ended.document["tests"]) == 2
     kept = shm(*at, "report", "--hanger", 3, "--json").document["diagnosis"]
     assert kept == ended.document
-    assert "\nGap diagnosis: " in shm(*at, "report", "--hanger", 3).out
+    assert "Gap diagnosis: " in shm(*at, "report", "--hanger", 3).out
 
 
 def test_a_hanger_without_tests_is_nothing_there(shm: Shm, bridge: Workspace) -> None:
