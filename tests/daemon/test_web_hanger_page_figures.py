@@ -116,17 +116,15 @@ def trace(document: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def test_a_short_trend_is_drawn_whole() -> None:
-    dots = trace(drawn(a_view(30), TREND), "test by itself")
+    dots = trace(drawn(a_view(30), TREND), "test, absolute interval")
     assert len(dots["x"]) == 30
 
 
 @pytest.mark.parametrize(("tension_n", "unit"), [(5.4, "N"), (20e3, "kN"), (12e6, "MN")])
 def test_tensions_are_drawn_in_the_unit_that_fits_them(tension_n: float, unit: str) -> None:
-    points = [
-        replace(a_point(number), tension_n=summed_up(tension_n, 0.01 * tension_n))
-        for number in range(5)
-    ]
-    baseline = replace(BASELINE, tension_n=summed_up(tension_n, 0.01 * tension_n))
+    averaged = Averaged(summed_up(tension_n, 0.01 * tension_n), 0.001 * tension_n)
+    points = [replace(a_point(number), averaged=averaged) for number in range(5)]
+    baseline = replace(BASELINE, averaged=averaged)
     view = a_view(5, trend=tuple(points), baseline=baseline)
     for figure in (TREND, TEMPERATURE):
         document = drawn(view, figure)
@@ -143,7 +141,7 @@ def test_a_long_trend_is_thinned_and_keeps_its_extremes_and_its_alerts() -> None
     event = HangerEvent(alerted.time, EventKind.ALERT, "", "tension fell", 1)
     view = a_view(8 * MOST_POINTS, events=(event,))
     document = drawn(view, TREND)
-    dots = trace(document, "test by itself")
+    dots = trace(document, "test, absolute interval")
     assert len(dots["x"]) <= 1.05 * MOST_POINTS
     assert min(dots["y"]) == 500.0
     names = [text.split(":")[0] for text in dots["text"]]
