@@ -95,7 +95,7 @@ def content(browser: Browser) -> Iterator[None]:
 def signed_in(browser: Browser, site: Site) -> Browser:
     page = browser.open(f"{site.url}/sign-in?next=/upload")
     page.get_by_label("Token").fill(site.served.write_token)
-    page.get_by_role("button", name="Sign in").click()
+    page.get_by_role("button", name="Sign in with the token").click()
     expect(page.get_by_role("heading", level=1)).to_have_text("Upload recordings")
     expect(page.get_by_role("banner")).to_contain_text("write")
     return browser
