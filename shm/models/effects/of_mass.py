@@ -9,7 +9,7 @@ import numpy as np
 from shm.models.base import Conditions
 from shm.models.effects import places, scales
 from shm.models.effects.base import GRADUAL, STEEP, Effect, OverTime, Parameter, Survey, Variant
-from shm.models.hanger.physical import PhysicalHanger, PointMass, Zone
+from shm.models.hanger.physical import PhysicalHanger, PointMass
 from shm.values import NAN, FloatArray, Hanger
 
 
@@ -167,16 +167,8 @@ class PartialMass(Effect):
     ) -> PhysicalHanger:
         change, middle_m, extent_m = values.T
         reaches = {1: GRADUAL, 2: STEEP}.get(variant.law, (1.0,))
-        one = np.ones_like(change)
-        zones = tuple(
-            Zone(
-                start_m=middle_m - reach * extent_m / 2,
-                end_m=middle_m + reach * extent_m / 2,
-                stiffness_factor=one,
-                mass_factor=(1 + change) ** (1 / len(reaches)),
-            )
-            for reach in reaches
-        )
+        put_on = (1 + change) ** (1 / len(reaches))
+        zones = places.nested_zones(middle_m, extent_m, reaches, np.ones_like(change), put_on)
         return replace(physical, zones=physical.zones + zones)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from shm.models.base import Conditions
 from shm.models.effects import places
 from shm.models.effects.base import GRADUAL, STEEP, Effect, OverTime, Parameter, Survey, Variant
-from shm.models.hanger.physical import PhysicalHanger, Zone
+from shm.models.hanger.physical import PhysicalHanger
 from shm.values import NAN, FloatArray, Hanger
 
 
@@ -189,15 +189,7 @@ class SectionLoss(Effect):
         reaches = {1: GRADUAL, 3: STEEP}.get(variant.law, (1.0,))
         power = 1 if variant.law == 2 else 2
         left = (1 - loss) ** (1 / len(reaches))
-        zones = tuple(
-            Zone(
-                start_m=middle_m - reach * extent_m / 2,
-                end_m=middle_m + reach * extent_m / 2,
-                stiffness_factor=left**power,
-                mass_factor=left,
-            )
-            for reach in reaches
-        )
+        zones = places.nested_zones(middle_m, extent_m, reaches, left**power, left)
         return replace(physical, zones=physical.zones + zones)
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from shm.models.effects.base import Parameter, Survey, Variant
-from shm.values import NAN, PLANES, Hanger
+from shm.models.hanger.physical import Zone
+from shm.values import NAN, PLANES, FloatArray, Hanger
 
 _ENDS = (("deck end", (0,)), ("arch end", (1,)), ("both ends", (0, 1)))
 
@@ -69,4 +72,26 @@ def place_along(hanger: Hanger) -> Parameter:
         "Nobody knows where along the hanger: every place is as likely.",
         least=0.0,
         most=hanger.length_m,
+    )
+
+
+def nested_zones(
+    middle_m: FloatArray,
+    extent_m: FloatArray,
+    reaches: Sequence[float],
+    stiffness_factor: FloatArray,
+    mass_factor: FloatArray,
+) -> tuple[Zone, ...]:
+    """A stretch that begins and ends in steps: one zone a share of its extent, about one middle.
+
+    Arrays (draws,); where zones overlap their factors multiply.
+    """
+    return tuple(
+        Zone(
+            start_m=middle_m - reach * extent_m / 2,
+            end_m=middle_m + reach * extent_m / 2,
+            stiffness_factor=stiffness_factor,
+            mass_factor=mass_factor,
+        )
+        for reach in reaches
     )
