@@ -38,7 +38,7 @@ def hanger_paper(data: HangerReport) -> Paper:
             Part("Fit of the model", figures=lambda: _figures(data, FIT)),
             Part("Details", paragraphs=[further(data)]),
             *appendices(
-                Part("Figures", figures=lambda: _figures(data, FURTHER)),
+                Part("Figures", figures=lambda: _further_figures(data)),
                 Part("Numbers", tables=numbers(data)),
                 gap_part(data),
                 Part("Origin", tables=origins(data)),
@@ -61,13 +61,19 @@ def gap_part(data: HangerReport) -> Part:
 
 
 TREND, FIT = frozenset({"trend"}), frozenset({"frequencies"})
-FURTHER = frozenset({"drift", "tension", "response", "stiffness"})
 
 
 def _figures(data: HangerReport, names: frozenset[str]) -> Sequence[Illustration]:
     from shm.report.figures.every_figure import hanger_figures
 
     return hanger_figures(data, names)
+
+
+def _further_figures(data: HangerReport) -> Sequence[Illustration]:
+    """All that do not lead: a new figure is among them by itself."""
+    from shm.report.figures.every_figure import OF_HANGER_NAMES, hanger_figures
+
+    return hanger_figures(data, OF_HANGER_NAMES - TREND - FIT)
 
 
 def diagnosed(data: HangerReport) -> DiagnosisSheet | None:

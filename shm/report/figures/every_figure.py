@@ -48,10 +48,12 @@ OF_BRIDGE_DIAGNOSIS: tuple[Member[BridgeDiagnosis], ...] = (SHARED,)
 OF_TRIAL: tuple[Member[TrialScore], ...] = (
     DETECTION, CONFUSION, RELIABILITY, LOG_SCORE, LEFT_OUT, TENSION_ERRORS, COVERAGE, HELD_OUT
 )  # fmt: skip
-_NAMES = frozenset(each.name for each in OF_HANGER)
+OF_HANGER_NAMES = frozenset(each.name for each in OF_HANGER)
 
 
-def hanger_figures(data: HangerReport, names: Container[str] = _NAMES) -> tuple[Illustration, ...]:
+def hanger_figures(
+    data: HangerReport, names: Container[str] = OF_HANGER_NAMES
+) -> tuple[Illustration, ...]:
     """Those of these `names` that the report of a hanger has the data for, in reading order."""
     return drawn([each for each in OF_HANGER if each.name in names], data)
 
