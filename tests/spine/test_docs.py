@@ -103,7 +103,6 @@ def test_links_lead_to_files_of_the_repository(page: Path) -> None:
 @pytest.mark.parametrize(
     ("page", "name", "word", "times"),
     [
-        ("README.md", "selection", "solid2", 1),
         ("docs/trials/validation.md", "selection", "| solid2", 2),
         ("docs/trials/validation.md", "frequencies", "| A.5", 3),
     ],
