@@ -46,6 +46,11 @@ def test_every_page_names_bridge_hanger_version_and_its_number(parsed: Pdf) -> N
     assert any(f"({len(parsed.pages)})".encode() in body for body in total)
 
 
+def test_two_pages_lead_and_all_else_is_appendix(parsed: Pdf) -> None:
+    appendix = [n for n, page in enumerate(parsed.pages, 1) if "Appendix A" in page]
+    assert appendix[0] <= 3
+
+
 def test_it_has_a_title_properties_an_outline_and_a_language(content: bytes, parsed: Pdf) -> None:
     assert b"/Title (Hanger 3, Arch bridge)" in content
     assert b"/CreationDate (D:20260908100000Z)" in content

@@ -7,6 +7,8 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
+from shm_daemon.web.models import AveragedTension
+
 
 class Numbers(BaseModel):
     """Posterior samples in numbers; `q05` and `q95` bound 90 % of them."""
@@ -25,7 +27,8 @@ class TrendPoint(BaseModel):
     time: datetime
     temperature_c: float | None
     model: str
-    tension_n: Numbers
+    tension_n: Numbers = Field(description="By the class in force alone.")
+    averaged: AveragedTension = Field(description="What figures and tables show.")
     stiffness: dict[str, Numbers]
 
 
@@ -82,7 +85,8 @@ class TestState(BaseModel):
     stage: str
     temperature_c: float | None
     model: str | None
-    tension_n: Numbers | None
+    tension_n: Numbers | None = Field(description="By the class in force alone.")
+    averaged: AveragedTension | None = Field(description="What tables show.")
     page: str = Field(description="The address of its page.")
 
 

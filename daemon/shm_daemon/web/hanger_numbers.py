@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import JSONResponse
 
+from shm.documents import averaged_document
 from shm.errors import NothingThere
 from shm.report.states import QuantityOverTime, StatesOverTime, called_words
 from shm.store import StoredWatch, TrendPoint
@@ -127,6 +128,7 @@ def _point(point: TrendPoint) -> dict[str, Any]:
         "temperature_c": point.temperature_c,
         "model": point.model,
         "tension_n": vars(point.tension_n),
+        "averaged": averaged_document(point.averaged),
         "stiffness": {name: vars(numbers) for name, numbers in point.stiffness.items()},
     }
 
@@ -167,5 +169,6 @@ def _test(line: TestLine) -> dict[str, Any]:
         "temperature_c": plain(point.temperature_c) if point else None,
         "model": point.model if point else None,
         "tension_n": vars(point.tension_n) if point else None,
+        "averaged": plain(averaged_document(point.averaged)) if point else None,
         "page": line.address,
     }
