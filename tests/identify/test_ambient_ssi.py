@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pyoma2.functions.gen import example_data
 from scipy.signal import lfilter
 
 from shm.identify import IDENTIFIERS, IdentifyOptions
@@ -55,3 +56,13 @@ def test_a_steady_tone_is_no_damped_mode_and_does_not_go_unseen(tone_hz: float) 
     limit = "damping ratio not between 0 and 0.05"
     assert near or sum(d.count for d in finding.dropped if d.reason == limit) > 0
     assert len(finding.modes) - len(near) == len(FREQUENCIES_HZ)
+
+
+def test_the_published_frame_gives_all_its_five_modes() -> None:
+    """pyOMA2's example: white noise on five storeys, whose first mode hardly accelerates."""
+    motion, _, (truth_hz, *_) = example_data()
+    parts = tuple(np.array_split(motion.T, PARTS, axis=1))
+    points = tuple(ResponsePoint(str(floor), "transverse", floor) for floor in range(5))
+    measurement = Measurement("frame", points, parts, 100.0, None)
+    found = IDENTIFIERS["ssi"](measurement, IdentifyOptions(0.3, 20.0))
+    assert [mode.frequency_hz for mode in found.modes] == pytest.approx(truth_hz, rel=0.01)

@@ -64,6 +64,10 @@ larger model makes of noise."""
 _BLOCK_ROWS_ALONE = 320
 """A single channel tells close modes apart by time alone: it needs more lags."""
 _REFERENCES = 4  # judgement: two planes, and two modes that are close in each
+_REFERENCES_AMBIENT = 8
+"""Of what nobody hit, the channels' mixture by energy loses a low mode, whose accelerations are
+small: the first of five of pyOMA2's example (4 references find four modes, 5 all). judgement: more
+than eight channels are seldom of one set-up."""
 _MAX_ORDER = 120  # judgement: two each of the 30 modes a plane that a long hanger has below 100 Hz
 _FEW_ORDERS = 40
 """Where nobody hit, models that are far larger than what moves follow the chance in it: a structure
@@ -91,7 +95,7 @@ def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Fin
             max_frequency_sd=_NOBODY_HIT * options.max_frequency_sd,
             ambient_s=samples / measurement.sampling_rate_hz,
         )
-    mixed = references(measurement.decays)
+    mixed = references(measurement.decays, _REFERENCES_AMBIENT if nobody_hit else _REFERENCES)
     rows = block_rows(measurement, options)
     matrices = [hankel(decay, mixed @ decay, rows) for decay in measurement.decays]
     if nobody_hit:
@@ -171,14 +175,14 @@ class _Size:
         return list(range(self.max_order, 0, -step))[::-1]
 
 
-def references(responses: Sequence[FloatArray]) -> FloatArray:
-    """Rows (references, channels) that mix the channels into the few that carry most energy."""
+def references(responses: Sequence[FloatArray], most: int = _REFERENCES) -> FloatArray:
+    """Rows (references, channels) that mix the channels into the `most` that carry most energy."""
     channels = len(responses[0])
-    if channels <= _REFERENCES:
+    if channels <= most:
         return np.eye(channels)
     covariance = np.sum([response @ response.T for response in responses], axis=0)
     _, vectors = np.linalg.eigh(covariance)
-    return np.asarray(vectors[:, -_REFERENCES:].T)
+    return np.asarray(vectors[:, -most:].T)
 
 
 def _repeated(measurement: Measurement) -> bool:
