@@ -17,10 +17,10 @@ State-space models of rising order are cut from the sum. Leaving out a hit need 
 decomposition: the Hankel matrix without it, times the leading right singular vectors of the whole
 one, spans the same columns but for terms of second order.
 
-The one door to pyOMA2: its Hankel matrices, kept quiet.
+The one door to pyOMA2, for the Hankel matrix with input, kept quiet.
 
-Importing pyOMA2 turns numpy's warnings off, attaches a log handler, mutes matplotlib's logger and
-draws progress bars on standard error; all four are undone here. Only `pyoma2.functions.ssi` is
+Importing pyOMA2 turns numpy's warnings off, attaches a log handler and mutes matplotlib's logger;
+all three are undone here. Only `pyoma2.functions.ssi` is
 imported: the rest of the package brings pandas and scikit-learn.
 """
 
@@ -30,9 +30,9 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import Any
 
 import numpy as np
+import scipy
 
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Finding, Measurement
@@ -271,17 +271,12 @@ with np.errstate():
     from pyoma2.functions import ssi
 
 
-def _no_progress_bar(*bounds: int, **_: Any) -> Iterator[int]:
-    return iter(range(*bounds))
-
-
 def _silence() -> None:
     logger = logging.getLogger("pyoma2")
     for handler in list(logger.handlers):
         logger.removeHandler(handler)
     logger.setLevel(logging.WARNING)
     logging.getLogger("matplotlib").setLevel(_MATPLOTLIB_LEVEL)
-    setattr(ssi, "trange", _no_progress_bar)  # noqa: B010
 
 
 _silence()
@@ -292,10 +287,26 @@ def hankel(response: FloatArray, reference: FloatArray, block_rows: int) -> Floa
 
     `response` (channels, samples) and `reference` (references, samples) give a matrix of shape
     (channels * block_rows, references * block_rows). For a free decay it is exact, and it leaves
-    out lag zero, hence white noise.
+    out lag zero, hence white noise. As pyOMA2's method `cov`, but the sums at all lags are made
+    once, by Fourier transform: from one block column to the next they lose a sample and gain one.
     """
-    matrix, _ = ssi.build_hank(response, reference, block_rows, "cov")
-    return np.asarray(matrix * response.shape[1], dtype=np.float64)
+    channels, samples = response.shape
+    count = samples - 2 * block_rows + 1
+    lines = scipy.fft.next_fast_len(samples, real=True)
+    begun = np.fft.rfft(reference[:, :count], lines).conj()
+    sums = np.fft.irfft(np.fft.rfft(response, lines)[:, np.newaxis] * begun, lines)
+    sums = sums[..., 1 : 2 * block_rows]
+    matrix = np.empty((block_rows, channels, block_rows, len(reference)))
+    for at, column in enumerate(reversed(range(block_rows))):
+        matrix[:, :, column] = np.moveaxis(sums[..., column : column + block_rows], -1, 0)
+        if column:
+            lags = column + block_rows - 1
+            lost, gained = (
+                response[:, np.newaxis, k + 1 : k + 1 + lags] * reference[:, k, np.newaxis]
+                for k in (at, at + count)
+            )
+            sums = sums[..., :lags] + gained - lost
+    return matrix.reshape(channels * block_rows, -1) * (samples / count)
 
 
 def hankel_with_input(
