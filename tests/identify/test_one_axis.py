@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import FoundMode, Tone
-from shm.identify.mode_ordering.placement import LEAST_MARGIN, Placement, placed
+from shm.identify.mode_ordering.order import LEAST_MARGIN
+from shm.identify.mode_ordering.placement import Placement, placed
 from shm.simulate.elements import plane_modes
 from shm.values import NAN, PLANES, Hanger, ResponsePoint
 from tests.identify.test_non_bending_modes import HANGER, PLACES, STATE, hanger_modes

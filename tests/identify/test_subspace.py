@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.identify.estimation.poles import collinearity, poles_of, real_shape
-from shm.identify.estimation.ssi import hankel, realise
+from shm.identify.estimation.ssi import hankel, hankel_with_input, realised
 
 RATE_HZ = 256.0
 
@@ -25,8 +25,8 @@ def test_pyoma2_is_kept_quiet() -> None:
     script = (
         "import logging, sys, numpy as np; before = np.geterr();"
         "import shm.identify.estimation.ssi as s;"
-        "h = s.hankel(np.random.default_rng(0).normal(size=(2, 400)), np.ones((1, 400)), 20);"
-        "s.realise(h, 20, 8);"
+        "y, force = np.random.default_rng(0).normal(size=(2, 400)), np.ones((1, 400));"
+        "s.hankel_with_input(y, y, force, 20);"
         "assert np.geterr() == before; assert not logging.getLogger('pyoma2').handlers;"
         "assert logging.getLogger('matplotlib').level == 0;"
         "assert not {'pandas', 'sklearn', 'matplotlib'} & set(sys.modules)"
@@ -39,7 +39,7 @@ def test_pyoma2_is_kept_quiet() -> None:
 
 def test_its_log_records_below_a_warning_go_nowhere(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.INFO):
-        hankel(_decay(), _decay(), 10)
+        hankel_with_input(_decay(), _decay(), _decay()[:1], 10)
     assert not caplog.records
 
 
@@ -50,6 +50,15 @@ def test_the_hankel_matrix_of_one_decay_has_rank_two() -> None:
     assert np.linalg.matrix_rank(matrix, tol=1e-8 * np.linalg.norm(matrix)) == 2
 
 
+def test_it_is_the_sum_of_products_of_what_comes_and_what_was() -> None:
+    rng = np.random.default_rng(1)
+    response, rows = rng.normal(size=(3, 90)), 8
+    coming = np.vstack([response[:, rows + i : 90 - rows + 1 + i] for i in range(rows)])
+    past = np.vstack([response[:2, rows - 1 - j : 90 - rows - j] for j in range(rows)])
+    expected = coming @ past.T * 90 / (90 - 2 * rows + 1)
+    np.testing.assert_allclose(hankel(response, response[:2], rows), expected, atol=1e-11)
+
+
 def test_it_is_a_sum_over_time_so_that_long_decays_weigh_more() -> None:
     decay = np.ones((1, 200))
     assert hankel(decay, decay, 5) == pytest.approx(200 * np.ones((5, 5)))
@@ -57,8 +66,9 @@ def test_it_is_a_sum_over_time_so_that_long_decays_weigh_more() -> None:
 
 def test_a_realisation_returns_the_pole_and_the_shape_that_made_the_decay() -> None:
     decay = _decay(20.0, 0.004)
-    _, states, outputs = realise(hankel(decay, decay, 30), 30, 2)
-    poles = poles_of(states[1], outputs[1], RATE_HZ)
+    left, values, _ = np.linalg.svd(hankel(decay, decay, 30), full_matrices=False)
+    ((state, output),) = realised(left[:, :2] * np.sqrt(values[:2]), 30, [2])
+    poles = poles_of(state, output, RATE_HZ)
     assert poles.frequency_hz == pytest.approx([20.0], rel=1e-9)
     assert poles.damping_ratio == pytest.approx([0.004], rel=1e-6)
     np.testing.assert_allclose(real_shape(poles.shapes[:, 0]), [1.0, 0.4, -0.7], atol=1e-9)

@@ -17,10 +17,10 @@ State-space models of rising order are cut from the sum. Leaving out a hit need 
 decomposition: the Hankel matrix without it, times the leading right singular vectors of the whole
 one, spans the same columns but for terms of second order.
 
-The one door to pyOMA2: two functions of its `ssi` module, kept quiet.
+The one door to pyOMA2, for the Hankel matrix with input, kept quiet.
 
-Importing pyOMA2 turns numpy's warnings off, attaches a log handler, mutes matplotlib's logger and
-draws progress bars on standard error; all four are undone here. Only `pyoma2.functions.ssi` is
+Importing pyOMA2 turns numpy's warnings off, attaches a log handler and mutes matplotlib's logger;
+all three are undone here. Only `pyoma2.functions.ssi` is
 imported: the rest of the package brings pandas and scikit-learn.
 """
 
@@ -30,9 +30,9 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import Any
 
 import numpy as np
+import scipy
 
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Finding, Measurement
@@ -213,59 +213,66 @@ def modes_of_hankel(
     `shift_hz` is what their frequencies lie below the true ones.
     """
     total = np.sum(matrices, axis=0)
-    max_order = _max_order(total, rows, options.max_order or _MAX_ORDER)
+    left, values, right = np.linalg.svd(total, full_matrices=False)
+    max_order = _max_order(total.shape, values, rows, options.max_order or _MAX_ORDER)
     if max_order < _LEAST_ORDER:
         return nothing_moves(len(matrices))
     size = _Size(rows, max_order, measurement.sampling_rate_hz, shift_hz)
-    observability, sets = _models(total, size, size.orders)
-    without_each = _models_without_each_hit(matrices, _right_basis(total, observability), size)
+    sets = _models(left, values, size, size.orders)
+    without_each = _models_without_each_hit(matrices, right[:max_order].T, size)
     seconds = max(decay.shape[1] for decay in measurement.decays) / size.sampling_rate_hz
     return stabilised(sets, without_each, seconds, options)
 
 
-def _max_order(matrix: FloatArray, rows: int, most: int) -> int:
-    """The highest even order up to `most` that the matrix has the size and numerical rank for."""
-    values = np.linalg.svd(matrix, compute_uv=False)
+def _max_order(shape: tuple[int, int], values: FloatArray, rows: int, most: int) -> int:
+    """The highest even order up to `most` that a matrix has the size and numerical rank for."""
     rank = int(np.sum(values > _RANK_TOLERANCE * values[0]))
-    shifted_rows = matrix.shape[0] // rows * (rows - 1)
-    largest = min(most, rank, shifted_rows // 2, matrix.shape[1])
+    shifted_rows = shape[0] // rows * (rows - 1)
+    largest = min(most, rank, shifted_rows // 2, shape[1])
     return int(largest // 2 * 2)
 
 
 def _models(
-    matrix: FloatArray, size: _Size, orders: Sequence[int]
-) -> tuple[FloatArray, list[PoleSet]]:
-    """Observability matrix, and the poles of each of `orders`."""
-    observability, states, outputs = realise(matrix, size.block_rows, size.max_order)
-    rate, shift_hz = size.sampling_rate_hz, size.shift_hz
-    return observability, [
-        poles_of(states[n // 2], outputs[n // 2], rate, shift_hz) for n in orders
+    left: FloatArray, values: FloatArray, size: _Size, orders: Sequence[int]
+) -> list[PoleSet]:
+    """The poles of each of `orders`, from a Hankel matrix' left singular vectors and values."""
+    observability = left[:, : size.max_order] * np.sqrt(values[: size.max_order])
+    return [
+        poles_of(state, output, size.sampling_rate_hz, size.shift_hz)
+        for state, output in realised(observability, size.block_rows, orders)
     ]
 
 
-def _right_basis(matrix: FloatArray, observability: FloatArray) -> FloatArray:
-    """Leading right singular vectors, (columns, order); the observability matrix is U sqrt(S)."""
-    values = np.sum(observability**2, axis=0)
-    return np.asarray(matrix.T @ observability / values**1.5)
+def realised(
+    observability: FloatArray, block_rows: int, orders: Sequence[int]
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """State and output matrices of each of `orders`, all from one QR decomposition.
+
+    M. Doehler and L. Mevel, Mech. Syst. Signal Process. 38 (2013): the least squares of each order
+    are the first rows and columns of those of the highest.
+    """
+    channels = len(observability) // block_rows
+    basis, upper = np.linalg.qr(observability[:-channels])
+    shifted = basis.T @ observability[channels:]
+    for n in orders:
+        yield np.linalg.solve(upper[:n, :n], shifted[:n, :n]), observability[:channels, :n]
 
 
 def _models_without_each_hit(
     matrices: Sequence[FloatArray], basis: FloatArray, size: _Size
 ) -> list[list[PoleSet]]:
+    """Of the columns that `basis`, the whole matrix' right singular vectors, combines."""
     if len(matrices) < 2:
         return []
     projected = [matrix @ basis for matrix in matrices]
     total = np.sum(projected, axis=0)
     orders = final_orders(size.orders)
-    return [_models(total - part, size, orders)[1] for part in projected]
+    parts = (np.linalg.svd(total - part, full_matrices=False)[:2] for part in projected)
+    return [_models(*part, size, orders) for part in parts]
 
 
 with np.errstate():
     from pyoma2.functions import ssi
-
-
-def _no_progress_bar(*bounds: int, **_: Any) -> Iterator[int]:
-    return iter(range(*bounds))
 
 
 def _silence() -> None:
@@ -274,7 +281,6 @@ def _silence() -> None:
         logger.removeHandler(handler)
     logger.setLevel(logging.WARNING)
     logging.getLogger("matplotlib").setLevel(_MATPLOTLIB_LEVEL)
-    setattr(ssi, "trange", _no_progress_bar)  # noqa: B010
 
 
 _silence()
@@ -285,10 +291,26 @@ def hankel(response: FloatArray, reference: FloatArray, block_rows: int) -> Floa
 
     `response` (channels, samples) and `reference` (references, samples) give a matrix of shape
     (channels * block_rows, references * block_rows). For a free decay it is exact, and it leaves
-    out lag zero, hence white noise.
+    out lag zero, hence white noise. As pyOMA2's method `cov`, but the sums at all lags are made
+    once, by Fourier transform: from one block column to the next they lose a sample and gain one.
     """
-    matrix, _ = ssi.build_hank(response, reference, block_rows, "cov")
-    return np.asarray(matrix * response.shape[1], dtype=np.float64)
+    channels, samples = response.shape
+    count = samples - 2 * block_rows + 1
+    lines = scipy.fft.next_fast_len(samples, real=True)
+    begun = np.fft.rfft(reference[:, :count], lines).conj()
+    sums = np.fft.irfft(np.fft.rfft(response, lines)[:, np.newaxis] * begun, lines)
+    sums = sums[..., 1 : 2 * block_rows]
+    matrix = np.empty((block_rows, channels, block_rows, len(reference)))
+    for at, column in enumerate(reversed(range(block_rows))):
+        matrix[:, :, column] = np.moveaxis(sums[..., column : column + block_rows], -1, 0)
+        if column:
+            lags = column + block_rows - 1
+            lost, gained = (
+                response[:, np.newaxis, k + 1 : k + 1 + lags] * reference[:, k, np.newaxis]
+                for k in (at, at + count)
+            )
+            sums = sums[..., :lags] + gained - lost
+    return matrix.reshape(channels * block_rows, -1) * (samples / count)
 
 
 def hankel_with_input(
@@ -301,11 +323,3 @@ def hankel_with_input(
     """
     matrix, _ = ssi.build_hank(response, reference, block_rows, "IOcov", U=force)
     return np.asarray(matrix * response.shape[1], dtype=np.float64)
-
-
-def realise(
-    matrix: FloatArray, block_rows: int, max_order: int
-) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
-    """Observability matrix (rows, max_order); state and output matrices of orders 0, 2, 4, ..."""
-    observability, states, outputs, _ = ssi.SSI_fast(matrix, block_rows, max_order, step=2)
-    return np.asarray(observability, dtype=np.float64), list(states), list(outputs)

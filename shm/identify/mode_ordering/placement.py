@@ -11,6 +11,7 @@ import numpy as np
 
 from shm.identify.contract import FoundMode, Tone
 from shm.identify.mode_ordering.alignment import PlaneModes
+from shm.identify.mode_ordering.bar_fit import borne_out
 from shm.identify.mode_ordering.both_planes import blurred, pair_note, with_both_planes
 from shm.identify.mode_ordering.non_bending_modes import (
     askew_mode,
@@ -21,7 +22,7 @@ from shm.identify.mode_ordering.non_bending_modes import (
     without_tones,
 )
 from shm.identify.mode_ordering.one_axis import own_series
-from shm.identify.mode_ordering.order import Expected, Numbering, assign_orders
+from shm.identify.mode_ordering.order import LEAST_MARGIN, Expected, Numbering, assign_orders
 from shm.identify.mode_ordering.planes import (
     planes_of,
     principal_angle,
@@ -71,9 +72,6 @@ class _Candidate:
 _Ordered: TypeAlias = tuple[_Candidate, int, bool]
 """Candidate, order, and whether that is off the beam of the others."""
 
-LEAST_MARGIN = 6.0
-"""Of costs, by which another order is 20 times less likely: in 112 tests of
-tests/worlds/recordings.py all of the wrong orders were below, and 4 of 107 right ones."""
 _LEAST_BY_PATTERN = 5
 """judgement: level, tension and two end springs fit four frequencies of any order."""
 
@@ -155,7 +153,10 @@ def _numbered(
         # Of what nobody described two series are no more likely than one: it may be no bar.
         (group,) = [each for each in groups if each] or [[]]
         return _on_one_axis(group, length_m, expected)
-    numbering = assign_orders([_plane_modes(group, length_m) for group in groups], expected)
+    planes = [_plane_modes(group, length_m) for group in groups]
+    numbering = assign_orders(planes, expected)
+    if expected:
+        numbering = borne_out(planes, expected, numbering)
     every = [
         (candidate, order, irregular and order == 1, margin)
         for group, orders, irregular, margins in zip(

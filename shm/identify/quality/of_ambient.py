@@ -47,10 +47,11 @@ def signal_to_noise(inspection: Inspection) -> QualityCheck | None:
     """The median height of the modes' peaks over the spectrum beside them, in dB."""
     if not _ambient(inspection) or inspection.finding is None or not inspection.finding.modes:
         return None
-    heights = []
-    for mode in inspection.finding.modes:
-        spectra = [_spectrum(m) for m in inspection.measurements]
-        heights.append(max(_height_db(f, power, mode.frequency_hz) for f, power in spectra))
+    spectra = [_spectrum(m) for m in inspection.measurements]
+    heights = [
+        max(_height_db(f, power, mode.frequency_hz) for f, power in spectra)
+        for mode in inspection.finding.modes
+    ]
     value = float(np.median(heights))
     found = f"the modes' peaks stand {value:.0f} dB above the spectrum beside them"
     if value >= _LEAST_DB:
