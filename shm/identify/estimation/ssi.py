@@ -17,11 +17,11 @@ State-space models of rising order are cut from the sum. Leaving out a hit need 
 decomposition: the Hankel matrix without it, times the leading right singular vectors of the whole
 one, spans the same columns but for terms of second order.
 
-The one door to pyOMA2: two functions of its `ssi` module, kept quiet.
+The one door to pyOMA2: its Hankel matrices, kept quiet.
 
-Importing pyOMA2 turns numpy's warnings off, attaches a log handler, mutes matplotlib's logger and
-draws progress bars on standard error; all four are undone here. Only `pyoma2.functions.ssi` is
-imported: the rest of the package brings pandas and scikit-learn.
+Importing pyOMA2 turns numpy's warnings off, attaches a log handler and mutes matplotlib's logger;
+all three are undone here. Only `pyoma2.functions.ssi` is imported: the rest of the package brings
+pandas and scikit-learn.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import Any
 
 import numpy as np
 
@@ -209,59 +208,51 @@ def modes_of_hankel(
     `shift_hz` is what their frequencies lie below the true ones.
     """
     total = np.sum(matrices, axis=0)
-    max_order = _max_order(total, rows, options.max_order or _MAX_ORDER)
+    left, values, right = np.linalg.svd(total, full_matrices=False)
+    max_order = _max_order(values, len(total), rows, options.max_order or _MAX_ORDER)
     if max_order < _LEAST_ORDER:
         return nothing_moves(len(matrices))
     size = _Size(rows, max_order, measurement.sampling_rate_hz, shift_hz)
-    observability, sets = _models(total, size, size.orders)
-    without_each = _models_without_each_hit(matrices, _right_basis(total, observability), size)
+    sets = _models(left, values, size, size.orders)
+    without_each = _models_without_each_hit(matrices, right[:max_order].T, size)
     seconds = max(decay.shape[1] for decay in measurement.decays) / size.sampling_rate_hz
     return stabilised(sets, without_each, seconds, options)
 
 
-def _max_order(matrix: FloatArray, rows: int, most: int) -> int:
-    """The highest even order up to `most` that the matrix has the size and numerical rank for."""
-    values = np.linalg.svd(matrix, compute_uv=False)
+def _max_order(values: FloatArray, height: int, rows: int, most: int) -> int:
+    """The highest even order up to `most` that a matrix of `height` with these singular values has
+    the size and numerical rank for."""
     rank = int(np.sum(values > _RANK_TOLERANCE * values[0]))
-    shifted_rows = matrix.shape[0] // rows * (rows - 1)
-    largest = min(most, rank, shifted_rows // 2, matrix.shape[1])
-    return int(largest // 2 * 2)
+    shifted_rows = height // rows * (rows - 1)
+    return int(min(most, rank, shifted_rows // 2) // 2 * 2)
 
 
 def _models(
-    matrix: FloatArray, size: _Size, orders: Sequence[int]
-) -> tuple[FloatArray, list[PoleSet]]:
-    """Observability matrix, and the poles of each of `orders`."""
-    observability, states, outputs = realise(matrix, size.block_rows, size.max_order)
+    left: FloatArray, values: FloatArray, size: _Size, orders: Sequence[int]
+) -> list[PoleSet]:
+    """The poles of each of `orders` of the matrix with these left singular vectors and values."""
     rate, shift_hz = size.sampling_rate_hz, size.shift_hz
-    return observability, [
-        poles_of(states[n // 2], outputs[n // 2], rate, shift_hz) for n in orders
+    return [
+        poles_of(state, output, rate, shift_hz)
+        for state, output in realise(left, values, size.block_rows, orders)
     ]
-
-
-def _right_basis(matrix: FloatArray, observability: FloatArray) -> FloatArray:
-    """Leading right singular vectors, (columns, order); the observability matrix is U sqrt(S)."""
-    values = np.sum(observability**2, axis=0)
-    return np.asarray(matrix.T @ observability / values**1.5)
 
 
 def _models_without_each_hit(
     matrices: Sequence[FloatArray], basis: FloatArray, size: _Size
 ) -> list[list[PoleSet]]:
+    """`basis` (columns, order) holds the leading right singular vectors of the sum."""
     if len(matrices) < 2:
         return []
     projected = [matrix @ basis for matrix in matrices]
     total = np.sum(projected, axis=0)
     orders = final_orders(size.orders)
-    return [_models(total - part, size, orders)[1] for part in projected]
+    parts = (np.linalg.svd(total - part, full_matrices=False)[:2] for part in projected)
+    return [_models(left, values, size, orders) for left, values in parts]
 
 
 with np.errstate():
     from pyoma2.functions import ssi
-
-
-def _no_progress_bar(*bounds: int, **_: Any) -> Iterator[int]:
-    return iter(range(*bounds))
 
 
 def _silence() -> None:
@@ -270,7 +261,6 @@ def _silence() -> None:
         logger.removeHandler(handler)
     logger.setLevel(logging.WARNING)
     logging.getLogger("matplotlib").setLevel(_MATPLOTLIB_LEVEL)
-    setattr(ssi, "trange", _no_progress_bar)  # noqa: B010
 
 
 _silence()
@@ -300,8 +290,17 @@ def hankel_with_input(
 
 
 def realise(
-    matrix: FloatArray, block_rows: int, max_order: int
-) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
-    """Observability matrix (rows, max_order); state and output matrices of orders 0, 2, 4, ..."""
-    observability, states, outputs, _ = ssi.SSI_fast(matrix, block_rows, max_order, step=2)
-    return np.asarray(observability, dtype=np.float64), list(states), list(outputs)
+    left: FloatArray, values: FloatArray, block_rows: int, orders: Sequence[int]
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """State and output matrices of each of `orders`, from the left singular vectors and values.
+
+    One decomposition serves all orders: the inverse of a triangle's
+    leading block is the leading block of its inverse.
+    """
+    most = max(orders)
+    observability = left[:, :most] * np.sqrt(values[:most])
+    channels = len(observability) // block_rows
+    orthogonal, triangle = np.linalg.qr(observability[:-channels])
+    inverse, shifted = np.linalg.inv(triangle), orthogonal.T @ observability[channels:]
+    for n in orders:
+        yield inverse[:n, :n] @ shifted[:n, :n], observability[:channels, :n]
