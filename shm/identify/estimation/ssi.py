@@ -29,7 +29,8 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import cache, reduce
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -78,7 +79,6 @@ _COARSE_FROM = 60  # judgement: thirty orders or so tell what stays, and more on
 _LEAST_ORDER = 2  # one mode
 _RANK_TOLERANCE = 1e-17
 """Singular values below this share of the first are zero but for rounding."""
-_MATPLOTLIB_LEVEL = logging.getLogger("matplotlib").level
 
 
 def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Finding:
@@ -256,24 +256,23 @@ def _models_without_each_hit(
     return [_models(total - part, size, orders)[1] for part in projected]
 
 
-with np.errstate():
-    from pyoma2.functions import ssi
-
-
 def _no_progress_bar(*bounds: int, **_: Any) -> Iterator[int]:
     return iter(range(*bounds))
 
 
-def _silence() -> None:
+@cache
+def _pyoma2() -> ModuleType:
+    """The `ssi` module, loaded where it is called: it brings `scipy.linalg`."""
+    matplotlib_level = logging.getLogger("matplotlib").level
+    with np.errstate():
+        from pyoma2.functions import ssi
     logger = logging.getLogger("pyoma2")
     for handler in list(logger.handlers):
         logger.removeHandler(handler)
     logger.setLevel(logging.WARNING)
-    logging.getLogger("matplotlib").setLevel(_MATPLOTLIB_LEVEL)
+    logging.getLogger("matplotlib").setLevel(matplotlib_level)
     setattr(ssi, "trange", _no_progress_bar)  # noqa: B010
-
-
-_silence()
+    return ssi
 
 
 def hankel(response: FloatArray, reference: FloatArray, block_rows: int) -> FloatArray:
@@ -283,7 +282,7 @@ def hankel(response: FloatArray, reference: FloatArray, block_rows: int) -> Floa
     (channels * block_rows, references * block_rows). For a free decay it is exact, and it leaves
     out lag zero, hence white noise.
     """
-    matrix, _ = ssi.build_hank(response, reference, block_rows, "cov")
+    matrix, _ = _pyoma2().build_hank(response, reference, block_rows, "cov")
     return np.asarray(matrix * response.shape[1], dtype=np.float64)
 
 
@@ -295,7 +294,7 @@ def hankel_with_input(
     Its least squares are scaled by the force's own size; as future responses and past references
     enter both with the share of a direction that the force has, weak ones do no harm.
     """
-    matrix, _ = ssi.build_hank(response, reference, block_rows, "IOcov", U=force)
+    matrix, _ = _pyoma2().build_hank(response, reference, block_rows, "IOcov", U=force)
     return np.asarray(matrix * response.shape[1], dtype=np.float64)
 
 
@@ -303,5 +302,5 @@ def realise(
     matrix: FloatArray, block_rows: int, max_order: int
 ) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
     """Observability matrix (rows, max_order); state and output matrices of orders 0, 2, 4, ..."""
-    observability, states, outputs, _ = ssi.SSI_fast(matrix, block_rows, max_order, step=2)
+    observability, states, outputs, _ = _pyoma2().SSI_fast(matrix, block_rows, max_order, step=2)
     return np.asarray(observability, dtype=np.float64), list(states), list(outputs)
