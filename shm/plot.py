@@ -11,9 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import TypeVar
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, TypeVar
 
 from shm import __version__
 from shm.errors import NothingThere, UsageError
@@ -32,6 +30,9 @@ from shm.report.figures.modal_test_spectra import Shown
 from shm.report.figures.modal_test_stabilisation import FIGURE as STABILISATION
 from shm.report.figures.parameter_pairs import FIGURE as PAIRS
 from shm.values import Diagnosis, Hanger, ModalTest, Posterior
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = [
     "causes",

@@ -1,13 +1,16 @@
-"""Packaged files, found inside the wheel or beside the package; threads and memory of a process."""
+"""Packaged files, found inside the wheel or beside the package; threads and memory of a process;
+names of a package that are loaded when they are asked for."""
 
 from __future__ import annotations
 
 import ctypes
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 KILLING = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 """What operators, the kernel without memory and its helpers send; nothing that a parser does."""
@@ -32,6 +35,17 @@ def default_config() -> Path:
 def unit_file(name: str) -> Path:
     """A unit of systemd, such as the daemon's `shm.service`."""
     return _locate(f"config/{name}")
+
+
+def when_asked(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
+    """The `__getattr__` of a package whose names stand in the modules `homes`, by name."""
+
+    def __getattr__(name: str) -> Any:
+        if name not in homes:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return getattr(import_module(homes[name]), name)
+
+    return __getattr__
 
 
 def one_thread_a_process() -> None:

@@ -34,7 +34,6 @@ from shm.errors import NothingThere, UsageError
 from shm.inference import METHODS, NOISE_FLOOR, UpdateOptions
 from shm.models import PRIORS, THESIS
 from shm.modes_document import load_modes
-from shm.plausibility.bars import Known, doubt_of
 from shm.values import Hanger, ModalTest
 from shm_cli import completion
 from shm_cli.parameter_types import Words
@@ -305,6 +304,8 @@ def told_doubts(
 
     On stderr, or with the answer where they do not stand `apart` from it.
     """
+    from shm.plausibility.bars import Known, doubt_of
+
     doubts = {test.id: doubt_of(test, Known(hanger), []) for test in tests}
     said = tuple(f"Doubtful: test {id_}. {doubt.text}" for id_, doubt in doubts.items() if doubt)
     for each in said:

@@ -15,7 +15,6 @@ import rich_click as click
 
 from shm.errors import StoreBusy, UsageError
 from shm.pipeline import utc_now
-from shm.plausibility import FIRST_DAY
 from shm.store import Decision, Hold, Stage, Store, StoredAlert, Withdrawal, Workspace
 from shm.store.holding import discarded_reason, taking_back
 from shm_cli.common import paragraph, show
@@ -112,6 +111,8 @@ def _refuse_without_reason(store: Store, recording_id: int, decision: Decision, 
 
 def _refuse_impossible(time: datetime | None, built: date | None) -> None:
     """The day of no recording, whatever a person says."""
+    from shm.plausibility import FIRST_DAY
+
     first = max(FIRST_DAY, built or FIRST_DAY)
     if time is not None and time.date() < first:
         why = "the bridge was built" if first == built else "any recording"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import sys
 import warnings
 from collections.abc import Sequence
@@ -91,6 +93,7 @@ class Verbs(click.RichGroup):
         if _LISTING in ctx.meta:
             return click.RichCommand(name=cmd_name, help=VERBS[cmd_name].summary)
         command: click.Command = import_module(VERBS[cmd_name].module).command
+        gc.enable()
         _take_workspace(command)
         return command
 
@@ -150,6 +153,10 @@ def _use_workspace(ctx: click.Context, option: click.Parameter, folder: str | No
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs the command line and exits with the code of the contract."""
+    # Modules are no garbage: looking through them, while they load and at the end, takes a fifth
+    # of the time of `shm status`.
+    gc.disable()
+    atexit.register(gc.freeze)
     one_thread_a_process()
     warnings.showwarning = _warn
     arguments = sys.argv[1:] if arguments is None else list(arguments)

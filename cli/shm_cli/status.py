@@ -281,20 +281,20 @@ def _hangers(
     workspace: Workspace, store: Store, open_alerts: Mapping[int, int], held: Mapping[int, int]
 ) -> list[dict[str, Any]]:
     models, latest, rows = store.posteriors.selected_models(), store.tests.latest(), []
-    damage = {each.hanger: str(each) for each in store.upkeep.known_damage()}
+    known_damage = (*store.upkeep.known_damage(), *store.watch.damaged_baselines().values())
+    damage = {each.hanger: str(each) for each in known_damage}
+    baselines = store.watch.baselines_in_force(workspace.bridge.hangers)
     watches = of_readable(store.watch.latest, {})
     lines = {each.hanger.id: each for each in hanger_lines(workspace, store, utc_now())}
     for hanger in workspace.bridge.hangers:
-        found, baseline, watch, adopted = latest.get(hanger.id), None, None, []
-        of_baseline: Sequence[StoredTest] = ()
+        found, baseline = latest.get(hanger.id), baselines.get(hanger.id)
+        watch, adopted = None, []
         try:
-            baseline = store.watch.baseline(hanger.id)
-            of_baseline = store.tests.of_baseline(baseline) if baseline else ()
             adopted = [each.adoption.model for each in store.posteriors.list_adoptions(hanger.id)]
             watch = _gap_watch(store, hanger.id) if adopted else None
         except DamagedRow as error:
             damage[hanger.id] = str(error)
-        check = baseline.posterior.baseline_check if baseline else None
+        check = baseline.check if baseline else None
         names, reasons = applicable(hanger, [*workspace.settings.model_names, *adopted])
         rows.append(
             {
@@ -306,7 +306,7 @@ def _hangers(
                 "competing": list(names),
                 "not_applicable": reasons,
                 "baseline_set_at": baseline.set_at if baseline else None,
-                "baseline_since": min((test.time for test in of_baseline), default=None),
+                "baseline_since": baseline.begins_at if baseline else None,
                 "creep_per_year": creep_document(
                     watches[hanger.id].watched.creep_per_year if hanger.id in watches else None
                 ),

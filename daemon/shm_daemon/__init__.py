@@ -6,8 +6,9 @@ without loop and hooks.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from shm.resources import when_asked
 
 if TYPE_CHECKING:
     from shm_daemon.execution import process_pool as process_pool
@@ -17,16 +18,11 @@ if TYPE_CHECKING:
     from shm_daemon.wakeup import Wakeup as Wakeup
 
 _HOMES = {
-    "Wakeup": "wakeup",
-    "HookFailed": "hooks",
-    "HookNotifier": "hooks",
-    "process_pool": "execution",
-    "run": "loop",
+    "Wakeup": "shm_daemon.wakeup",
+    "HookFailed": "shm_daemon.hooks",
+    "HookNotifier": "shm_daemon.hooks",
+    "process_pool": "shm_daemon.execution",
+    "run": "shm_daemon.loop",
 }
 __all__ = sorted(_HOMES)
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"shm_daemon.{_HOMES[name]}"), name)
+__getattr__ = when_asked(__name__, _HOMES)

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc
+import scipy
 
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.groups import SAME_BELOW, grouped
@@ -236,7 +236,7 @@ def _p_value(problem: SimulatorProblem, fit: Fit) -> float:
     nodes = problem.nodes()
     weight = np.exp([each.log_weight for each in nodes])
     squares = [float(np.sum(residual**2 / np.diag(n.covariance.frequency))) for n in nodes]
-    return float(weight @ chdtrc(freedom, squares) / weight.sum())
+    return float(weight @ scipy.special.chdtrc(freedom, squares) / weight.sum())
 
 
 def _cause(

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.errors import UsageError
 from shm.gap.calibration import CALIBRATION
@@ -118,9 +118,11 @@ def jointly(
     started = time.perf_counter() if started is None else started
     tried, families = _tried(patients), kin(patients)
     nameless = [unknown(patients, each, Own.of(patients)).log_evidence for each in families]
-    unknowns = float(logsumexp(nameless)) + np.log(SHARED * (1 - _KNOWN) / len(families))
+    unknowns = float(scipy.special.logsumexp(nameless)) + np.log(
+        SHARED * (1 - _KNOWN) / len(families)
+    )
     mimics = [each.log_weight + _log_mimic_odds(patients, each) for each in tried]
-    whole = float(logsumexp([np.log(1 - SHARED), unknowns, *mimics, *_logs(tried)]))
+    whole = float(scipy.special.logsumexp([np.log(1 - SHARED), unknowns, *mimics, *_logs(tried)]))
     by_effect: dict[str, list[_Weighed]] = {}
     for each in sorted(tried, key=lambda each: -each.log_weight):
         by_effect.setdefault(each.place[0], []).append(each)
@@ -130,7 +132,7 @@ def jointly(
         baseline=options.baseline,
         hangers=tuple(each.hanger.id for each in patients),
         each_for_itself_probability=float(np.exp(np.log(1 - SHARED) - whole)),
-        unknown_probability=float(np.exp(logsumexp([unknowns, *mimics]) - whole)),
+        unknown_probability=float(np.exp(scipy.special.logsumexp([unknowns, *mimics]) - whole)),
         causes=tuple(causes),
         groups=groups,
         tensions=_tensions(patients, tried, whole, np.random.default_rng(options.seed)),
@@ -184,7 +186,7 @@ def _log_mimic_odds(patients: Sequence[Patient], tried: _Weighed) -> float:
 def _cause(patients: Sequence[Patient], tried: Sequence[_Weighed], whole: float) -> SharedCause:
     """An effect, by what was tried of it: wherever it acts and whoever shares it, best first."""
     best, log = tried[0], np.array(_logs(tried))
-    share = np.exp(log - logsumexp(log))
+    share = np.exp(log - scipy.special.logsumexp(log))
     chance = np.zeros(len(patients))
     for each, part in zip(tried, share, strict=True):
         chance[list(each.shared.kin.members)] += part * each.shared.member
@@ -199,8 +201,8 @@ def _cause(patients: Sequence[Patient], tried: Sequence[_Weighed], whole: float)
     return SharedCause(
         effect=best.place[0],
         at=best.place[1],
-        probability=float(np.exp(logsumexp(log) - whole)),
-        log_bayes_factor=float(logsumexp(log) - np.log(prior)),
+        probability=float(np.exp(scipy.special.logsumexp(log) - whole)),
+        log_bayes_factor=float(scipy.special.logsumexp(log) - np.log(prior)),
         likeness=best.shared.kin.likeness,
         family=tuple(patients[index].hanger.id for index in family),
         members=tuple(

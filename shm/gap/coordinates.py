@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+import scipy
 
 from shm.models.effects import Parameter
 from shm.values import FloatArray, IntArray, Scatter
@@ -75,12 +75,14 @@ class Branch:
 
     def z(self, w: FloatArray) -> FloatArray:
         """Coordinates z (n, d) of branch coordinates w (n, d)."""
-        magnitude = -ndtri((ndtr(-w) / 2).clip(_EDGE, 0.5))
+        magnitude = -scipy.special.ndtri((scipy.special.ndtr(-w) / 2).clip(_EDGE, 0.5))
         return np.where(self.signs == 0, w, self.signs * magnitude)
 
     def w(self, z: FloatArray) -> FloatArray:
         """The inverse of `z`, for points of this branch."""
-        magnitude = -ndtri((2 * ndtr(-np.abs(z))).clip(_EDGE, 1 - _EDGE))
+        magnitude = -scipy.special.ndtri(
+            (2 * scipy.special.ndtr(-np.abs(z))).clip(_EDGE, 1 - _EDGE)
+        )
         return np.where(self.signs == 0, z, magnitude)
 
     def stretch(self, w: FloatArray) -> FloatArray:
@@ -137,7 +139,7 @@ class Coordinates:
 
     def theta(self, z: FloatArray) -> FloatArray:
         """Parameters (n, d) in their units at z (n, d)."""
-        share = ndtr(z).clip(_EDGE, 1 - _EDGE)
+        share = scipy.special.ndtr(z).clip(_EDGE, 1 - _EDGE)
         columns = [
             each.value(column) for each, column in zip(self.parameters, share.T, strict=True)
         ]
@@ -148,7 +150,7 @@ class Coordinates:
     def z(self, theta: FloatArray) -> FloatArray:
         """The inverse of `theta`; what lies outside of a prior comes to its nearest end."""
         share = [each.share(column) for each, column in zip(self.parameters, theta.T, strict=True)]
-        z = np.asarray(ndtri(np.stack(share, axis=1).clip(_INSIDE, 1 - _INSIDE)))
+        z = np.asarray(scipy.special.ndtri(np.stack(share, axis=1).clip(_INSIDE, 1 - _INSIDE)))
         z[:, self._made] = theta[:, self._made] / self._scatter
         return z
 
@@ -200,7 +202,7 @@ class Pair:
 
     def give(self, w: FloatArray) -> FloatArray:
         """How much an end gives way, from 0 to 1."""
-        stiffness = self.lower + (self.upper - self.lower) * ndtr(w)
+        stiffness = self.lower + (self.upper - self.lower) * scipy.special.ndtr(w)
         return np.asarray(1 / (1 + np.exp(np.log(10) * (stiffness - self.own))))
 
     def log_slope(self, w: FloatArray) -> FloatArray:
@@ -212,7 +214,11 @@ class Pair:
         """The w of a spring that gives so much."""
         stiffness = self.own + np.log(1 / give - 1) / np.log(10)
         share = (stiffness - self.lower) / (self.upper - self.lower)
-        return np.asarray(ndtri(share.clip(ndtr(-_FARTHEST), ndtr(_FARTHEST))))
+        return np.asarray(
+            scipy.special.ndtri(
+                share.clip(scipy.special.ndtr(-_FARTHEST), scipy.special.ndtr(_FARTHEST))
+            )
+        )
 
 
 class Straight:

@@ -17,7 +17,7 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.model_probabilities import Family
@@ -83,7 +83,11 @@ def _log_rising(observations: Observations) -> float:
         _log_density(value, fixed + own**2 * of_both + size**2 * pattern)
         for own, size, pattern in product(_OF_BOTH, _RISES, patterns)
     ]
-    return float(logsumexp(rising) - logsumexp(steady) - np.log(len(_RISES) * len(patterns)))
+    return float(
+        scipy.special.logsumexp(rising)
+        - scipy.special.logsumexp(steady)
+        - np.log(len(_RISES) * len(patterns))
+    )
 
 
 def _log_density(value: FloatArray, covariance: FloatArray) -> float:

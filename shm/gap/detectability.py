@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from scipy.special import logsumexp
 
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.coordinates import DEVIATIONS, Coordinates, is_place
@@ -88,7 +87,7 @@ class Scan:
     def log_evidence(self) -> float:
         """Of the visible sizes, with shifts taken as linear in the size: rough."""
         weight = np.where(self._counted, self.weight, 0.0)
-        return float(logsumexp(self.marginal.log_mean, b=weight / weight.sum()))
+        return float(scipy.special.logsumexp(self.marginal.log_mean, b=weight / weight.sum()))
 
     @property
     def _counted(self) -> BoolArray:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.errors import BadInput
 from shm.gap.contract import Fit, Hypothesis, Peak
@@ -123,7 +123,7 @@ def _fit(landscape: Landscape, found: list[Optimum], rng: np.random.Generator) -
         model_error=chosen.model_error,
         draws=_draws(found, rng),
         log_fit=float(landscape.likelihood.log(best.residual[None])[0]),
-        log_evidence=float(logsumexp(log)),
+        log_evidence=float(scipy.special.logsumexp(log)),
         log_evidence_sd=0.0,
         method="normal",
         peaks=tuple(
@@ -135,7 +135,7 @@ def _fit(landscape: Landscape, found: list[Optimum], rng: np.random.Generator) -
 def _draws(found: list[Optimum], rng: np.random.Generator) -> FloatArray:
     """Equal draws z (n, d) of the normal distributions on all optima."""
     log = np.array([each.log_evidence for each in found])
-    counts = rng.multinomial(_DRAWS, np.exp(log - logsumexp(log)))
+    counts = rng.multinomial(_DRAWS, np.exp(log - scipy.special.logsumexp(log)))
     return np.vstack(
         [
             each.branch.z(each.w + scattered(each.curvature, count, rng))

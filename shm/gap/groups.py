@@ -7,8 +7,7 @@ from dataclasses import replace
 from itertools import combinations, product
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from shm.gap.contract import Fit, NoiseNode
 from shm.gap.coordinates import Branch
@@ -68,7 +67,9 @@ def grouped(
             continue
         pairs = product(causes[i], causes[j])
         links[i, j] = any(expected_log_bayes_factor(*pair) < SAME_BELOW for pair in pairs)
-    count, label = connected_components(csr_array(links), directed=False)
+    count, label = scipy.sparse.csgraph.connected_components(
+        scipy.sparse.csr_array(links), directed=False
+    )
     members = [tuple(int(i) for i in np.flatnonzero(label == k)) for k in range(count)]
     return tuple(sorted(group for group in members if len(group) > 1))
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.gap.contract import Fit
 from shm.gap.coordinates import Branch, Straight
@@ -87,7 +87,7 @@ def sampled(
     return replace(
         fit,
         draws=rng.permutation(sampler.scattered(settled.take(rows), rng)),
-        log_evidence=float(logsumexp(final.log_weights) - np.log(final.draws)),
+        log_evidence=float(scipy.special.logsumexp(final.log_weights) - np.log(final.draws)),
         log_evidence_sd=float(_UNSEEN * np.sqrt(max(share, 0.0))),
         method="sampled",
         effective=_effective(final),
@@ -258,7 +258,7 @@ class Conditional:
         node, rows = log.argmax(axis=0), np.arange(len(z))
         chosen = step[node, rows].clip(-LONGEST_STEP, LONGEST_STEP)
         return _View(
-            np.asarray(logsumexp(log, axis=0)),
+            np.asarray(scipy.special.logsumexp(log, axis=0)),
             np.where(finite, gain[node, rows], 0.0),
             chosen,
             node,

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.gap.calibration import CALIBRATION, Share
 from shm.gap.contract import Covariance, Design, Fit, Hypothesis, NoiseNode
@@ -85,8 +85,8 @@ def by_its_laws(problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Gen
         weight, mimic = np.log([share for share, _ in ways]).T + evidence
     draws = [_scattered(about, each, rng) for _, each in off]
     return ByLaws(
-        gain=float(logsumexp(weight) - exact.log_evidence),
-        mimic=float(logsumexp(mimic) - exact.log_evidence),
+        gain=float(scipy.special.logsumexp(weight) - exact.log_evidence),
+        mimic=float(scipy.special.logsumexp(mimic) - exact.log_evidence),
         fit=about,
         draws=mixed([fit.draws, *draws], normalised(weight), rng),
         log_evidences=evidence,
@@ -163,7 +163,9 @@ def _scattered(fit: Fit, linear: _Linear, rng: np.random.Generator) -> FloatArra
 
 def _shown(share: Share, exact: _Linear, off: Sequence[tuple[Share, _Linear]]) -> bool:
     """Whether the data show that an exact law is off."""
-    allowed = logsumexp([np.log(share.own) + each.log_evidence for share, each in off])
+    allowed = scipy.special.logsumexp(
+        [np.log(share.own) + each.log_evidence for share, each in off]
+    )
     return bool(allowed > np.log(share.own) + exact.log_evidence + SHOWN)
 
 

@@ -11,9 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
-from scipy.special import logsumexp
+import scipy
 
 from shm.gap.contract import Covariance, NoiseNode
 from shm.values import FloatArray, IntArray
@@ -120,7 +118,7 @@ class Likelihood:
 
     def log(self, residual: FloatArray) -> FloatArray:
         """Log likelihood (n,)."""
-        return np.asarray(logsumexp(self.by_node(residual), axis=1))
+        return np.asarray(scipy.special.logsumexp(self.by_node(residual), axis=1))
 
     def gram(self, columns: FloatArray) -> FloatArray:
         """X' C^-1 X (n, nodes, c, c) of columns X (n, data, c)."""
@@ -159,8 +157,8 @@ class Likelihood:
 
 def _rows(covariances: FloatArray) -> list[IntArray]:
     """Rows of the blocks that no covariance connects, those of one length together."""
-    linked = csr_array((covariances != 0).any(axis=0))
-    count, label = connected_components(linked, directed=False)
+    linked = scipy.sparse.csr_array((covariances != 0).any(axis=0))
+    count, label = scipy.sparse.csgraph.connected_components(linked, directed=False)
     members = [np.flatnonzero(label == k) for k in range(count)]
     lengths = sorted({len(rows) for rows in members})
     return [np.array([m for m in members if len(m) == length]) for length in lengths]

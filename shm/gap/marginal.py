@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.likelihood import Likelihood
@@ -79,14 +79,14 @@ def marginal(
     peaks = products.height[:, None] + scales * products.cross - scales**2 * own / 2
     best = peaks.argmax(axis=0)
     scale = scales[best, nodes]
-    log_peak = np.asarray(logsumexp(peaks, axis=0))
+    log_peak = np.asarray(scipy.special.logsumexp(peaks, axis=0))
     width = np.sqrt(2 * np.pi / own[best, nodes]) / scale
     residual, shifts = products.solved[best, :, 0], products.solved[best, :, 1 + nodes]
     usual = _nominal(problem, likelihood, peaks.max(axis=1))
     return Marginal(
         whole=np.sqrt(products.whole[usual]),
         visible=np.sqrt(products.shift[usual]),
-        log_likelihood=np.asarray(logsumexp(plain, axis=0)),
+        log_likelihood=np.asarray(scipy.special.logsumexp(plain, axis=0)),
         scale=scale,
         log_peak=log_peak,
         log_mean=log_peak + np.log(np.minimum(width / _CELL, 1.0)),

@@ -22,7 +22,7 @@ from functools import cache
 from itertools import combinations
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Fit, Hypothesis, Method
@@ -170,7 +170,7 @@ def undetected_share(candidates: Sequence[Family], chances: FloatArray) -> Float
     if not cause.any() or chances[cause].sum() >= least:
         return chances
     speaks = np.array([each.log_evidence + each.log_prior for each in candidates])
-    share = np.exp(np.where(cause, speaks - logsumexp(speaks[cause]), -np.inf))
+    share = np.exp(np.where(cause, speaks - scipy.special.logsumexp(speaks[cause]), -np.inf))
     left = (chances[unknown | cause].sum() - least) / chances[unknown].sum()
     return np.asarray(np.where(cause, least * share, chances * np.where(unknown, left, 1)))
 
@@ -188,7 +188,7 @@ def _family(members: Sequence[ScoredHypothesis], variants: dict[str, int]) -> Fa
     evidence = [each.log_evidence for each in ordered]
     mimic = [e.log_evidence if e.log_mimic is None else e.log_mimic for e in ordered]
     log_evidence, log_mimic = (
-        float(logsumexp(each) - np.log(possible)) for each in (evidence, mimic)
+        float(scipy.special.logsumexp(each) - np.log(possible)) for each in (evidence, mimic)
     )
     log_prior = float(np.log(_prior(hypothesis, len(variants))))
     odds = _mimic_odds(hypothesis, variants)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+import scipy
 
 from shm.gap.contract import Design, Fit, Observations
 from shm.gap.experiment_design import Proposal, proposals, sensors_wanted, with_sensors
@@ -192,11 +192,11 @@ def divergence(one: Foresight, other: Foresight) -> float:
 
     The log Bayes factor to expect in favour of `one` where it is true.
     """
-    factor = cho_factor(other.covariance, lower=True)
+    factor = scipy.linalg.cho_factor(other.covariance, lower=True)
     apart = one.mean - other.mean
-    trace = np.trace(cho_solve(factor, one.covariance))
+    trace = np.trace(scipy.linalg.cho_solve(factor, one.covariance))
     logs = 2 * np.log(np.diag(factor[0])).sum() - np.linalg.slogdet(one.covariance)[1]
-    return float((trace + apart @ cho_solve(factor, apart) - len(apart) + logs) / 2)
+    return float((trace + apart @ scipy.linalg.cho_solve(factor, apart) - len(apart) + logs) / 2)
 
 
 def _roots(covariance: FloatArray) -> FloatArray:

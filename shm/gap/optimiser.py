@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.gap.coordinates import Branch
 from shm.gap.objective import Landscape, Views
@@ -212,7 +212,7 @@ def _downhill(landscape: Landscape, views: Views) -> _Downhill:
     log = landscape.likelihood.by_node(views.residual)
     log = np.where(np.isfinite(log), log, NEVER)
     gram = landscape.likelihood.gram(columns)
-    probability = np.exp(log - logsumexp(log, axis=1, keepdims=True))
+    probability = np.exp(log - scipy.special.logsumexp(log, axis=1, keepdims=True))
     mean = np.einsum("mk,mkij->mij", probability, gram)
     pulls = gram[..., :-1, -1]
     spread = pulls - mean[:, None, :-1, -1]
@@ -230,7 +230,7 @@ def _profile(landscape: Landscape, views: Views, gram: FloatArray, log: FloatArr
     linear = landscape.coordinates.linear
     columns = np.append(linear, gram.shape[-1] - 1)
     _, gain = _linear_step(gram[:, :, columns[:, None], columns], views.w[:, linear])
-    return np.asarray(logsumexp(log + gain, axis=1) + log_normal(views.w))
+    return np.asarray(scipy.special.logsumexp(log + gain, axis=1) + log_normal(views.w))
 
 
 def _promising(walkers: _Walkers, done: list[Optimum]) -> BoolArray:

@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from scipy.special import expit, logsumexp
 
 from shm.gap.attribution import Attribution
 from shm.gap.contract import Fit, Hypothesis
@@ -138,8 +137,10 @@ def _suspect(
     gross = np.array([c.log_weight + s.gross for c, s in zip(plain, seen, strict=True)])
     ordinary = np.array([c.log_weight + s.ordinary for c, s in zip(plain, seen, strict=True)])
     unknown = [each.log_weight for each in candidates if each.fit.hypothesis.flexible]
-    rivals = logsumexp([*unknown, logsumexp(ordinary, axis=0).max()])
-    odds = logsumexp(gross, axis=0) - np.maximum(logsumexp(ordinary, axis=0), rivals)
+    rivals = scipy.special.logsumexp([*unknown, scipy.special.logsumexp(ordinary, axis=0).max()])
+    odds = scipy.special.logsumexp(gross, axis=0) - np.maximum(
+        scipy.special.logsumexp(ordinary, axis=0), rivals
+    )
     best = int(odds.argmax())
     leader = int(gross[:, best].argmax())
     gain = max(0.0, float(gross[leader, best] - plain[leader].log_weight))
@@ -175,8 +176,8 @@ def _judged(
         )
         allowed = full.log_evidence + _gain(whole, base_of_whole, full, rng)
         ordinary.append(each.log_prior + max(_ordinary(whole, full, row, float(tails)), allowed))
-    odds = float(logsumexp(gross) - logsumexp(ordinary))
-    return float(expit(odds)), kept
+    odds = float(scipy.special.logsumexp(gross) - scipy.special.logsumexp(ordinary))
+    return float(scipy.special.expit(odds)), kept
 
 
 def _gain(problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Generator) -> float:
@@ -253,7 +254,7 @@ class LeftOut:
     @property
     def expected(self) -> tuple[FloatArray, FloatArray]:
         """Mean and standard deviation (r,) of the deviations, over the possibilities."""
-        weight = np.exp(self.log_rest - logsumexp(self.log_rest, axis=0))
+        weight = np.exp(self.log_rest - scipy.special.logsumexp(self.log_rest, axis=0))
         mean = (weight * self.deviation).sum(axis=0)
         square = (weight * (self.sd**2 + self.deviation**2)).sum(axis=0)
         return mean, np.sqrt(square - mean**2)
@@ -261,11 +262,14 @@ class LeftOut:
     def given_rest(self, log_density: FloatArray) -> FloatArray:
         """Log of the mean density (r,), the possibilities weighed by all other data."""
         rest = self.log_rest
-        return np.asarray(logsumexp(rest + log_density, axis=0) - logsumexp(rest, axis=0))
+        return np.asarray(
+            scipy.special.logsumexp(rest + log_density, axis=0)
+            - scipy.special.logsumexp(rest, axis=0)
+        )
 
     def _relative(self, log_density: FloatArray) -> FloatArray:
-        whole = logsumexp(self.log_all)
-        return np.asarray(logsumexp(self.log_rest + log_density, axis=0) - whole)
+        whole = scipy.special.logsumexp(self.log_all)
+        return np.asarray(scipy.special.logsumexp(self.log_rest + log_density, axis=0) - whole)
 
 
 def log_gross(deviation: FloatArray) -> FloatArray:

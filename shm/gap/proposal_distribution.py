@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.gap.contract import Peak
 from shm.gap.coordinates import Branch, Straight
@@ -92,7 +92,7 @@ class Proposal:
         for branch in branches:
             own = [each for each in peaks if np.array_equal(each.signs[columns], branch.signs)]
             log = np.array([each.log_evidence for each in own])
-            log_shares.append(logsumexp(log) if own else -np.inf)
+            log_shares.append(scipy.special.logsumexp(log) if own else -np.inf)
             parts = [part for each in own for part in _about(each, columns, straight)]
             log = np.repeat(log, len(parts) // max(len(own), 1))
             mixtures.append(TMixture(parts, normalised(log)) if own else None)
@@ -145,7 +145,7 @@ def _about(peak: Peak, columns: IntArray, straight: Straight) -> list[Normal]:
 
 
 def _total(log_weight: FloatArray) -> float:
-    return float(logsumexp(log_weight)) if len(log_weight) else -np.inf
+    return float(scipy.special.logsumexp(log_weight)) if len(log_weight) else -np.inf
 
 
 def _refitted(
@@ -170,7 +170,7 @@ def _refitted(
         np.log(share) + TMixture([part], np.ones(1)).log_density(w)
         for part, share in zip(mixture.parts, mixture.shares, strict=True)
     ]
-    owned = weights * np.exp(log - logsumexp(log, axis=0))
+    owned = weights * np.exp(log - scipy.special.logsumexp(log, axis=0))
     kept = owned.sum(axis=1) > _LEAST_SHARE * weights.sum()
     parts = [_moved(part, w, own) for part, own in zip(mixture.parts, owned, strict=True)]
     chosen = [part for part, keep in zip(parts, kept, strict=True) if keep] or parts

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.gap.attribution import Attribution
 from shm.gap.contract import Fit, Hypothesis
@@ -133,7 +133,7 @@ class _Evidence:
         return np.asarray(self._none + (self.g / (1 + self.g) * gained - paid) / 2)
 
     def log(self, chosen: Sequence[int]) -> float:
-        return float(logsumexp(self.by_node(chosen)))
+        return float(scipy.special.logsumexp(self.by_node(chosen)))
 
     def coefficients(self, chosen: Sequence[int]) -> tuple[FloatArray, FloatArray]:
         """Of the terms (chosen,), with standard deviations, at the likeliest scatter."""

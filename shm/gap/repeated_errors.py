@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
-from scipy.linalg import block_diag
+import scipy
 
 from shm.gap.contract import Design, Observations
 from shm.models.hanger import PhysicalHanger, Zone, solve
@@ -60,7 +60,9 @@ class Repeated:
     @property
     def loads(self) -> FloatArray:
         """Of all data (data, k): section and readings move no shape, sensors no frequency."""
-        return np.asarray(block_diag(np.hstack([self.section, self.readings]), self.sensors))
+        return np.asarray(
+            scipy.linalg.block_diag(np.hstack([self.section, self.readings]), self.sensors)
+        )
 
     @property
     def frequency(self) -> FloatArray:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress
 from shm.gap.detectability import Scan
@@ -315,8 +315,8 @@ class Search:
         log = plain + [each.gain for each in found]
         return replace(
             self._tried(found[int(log.argmax())].fit),
-            log_evidence=float(logsumexp(log)),
-            log_mimic=float(logsumexp(plain + [each.mimic for each in found])),
+            log_evidence=float(scipy.special.logsumexp(log)),
+            log_mimic=float(scipy.special.logsumexp(plain + [each.mimic for each in found])),
             draws=mixed([each.draws for each in found], normalised(log), self.rng),
         )
 

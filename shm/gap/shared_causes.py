@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp, ndtr
+import scipy
 
 from shm.gap.kin import LEAST, Kin
 from shm.gap.shared_evidence import Evidence, Faint, Patient, Place
@@ -130,7 +130,7 @@ def _said(
     reach, signs, low = evidence.reach, len(np.unique(sign)), float(x.min())
     count = len(x) // signs
     density = normal[_on_grid(evidence, low, count)].mean(axis=0)
-    unseen = ndtr((reach.lower - x[:, None]) / SCATTERS)
+    unseen = scipy.special.ndtr((reach.lower - x[:, None]) / SCATTERS)
     ratio = _smooth(evidence.faint, x, sign)
     below = np.tensordot((ratio - 1) * (x < reach.lower) * _STEP, normal, axes=1)
     seen = evidence.bayes_factor * reach.width * signs * density
@@ -181,11 +181,13 @@ def shared(found: Sizes, family: Kin, own: Own) -> Shared:
         log_all.append(two_at_least(np.log1p(-part) + own_log, odds) + others)
         member.append(odds / (1 + odds))
     log = np.array(log_all) + log_prior[:, None]
-    total = logsumexp(log)
+    total = scipy.special.logsumexp(log)
     weight = np.exp(log - total)
     one = np.ones((len(rows), 1))
     alone = [two_at_least(np.log1p(-p) * one, p / (1 - p) * one) for p in _SHARES]
-    log_evidence = total - np.log(len(_NOTHING_OWN)) - logsumexp(alone) - own.log_evidence
+    log_evidence = (
+        total - np.log(len(_NOTHING_OWN)) - scipy.special.logsumexp(alone) - own.log_evidence
+    )
     there = np.array([(weight[k] * each) for k, each in enumerate(member)]).sum(axis=0)
     there_with = there / present
     return Shared(
@@ -223,4 +225,4 @@ def _log(value: FloatArray) -> FloatArray:
 
 
 def _log_mean(log: FloatArray) -> float:
-    return float(logsumexp(log) - np.log(len(log)))
+    return float(scipy.special.logsumexp(log) - np.log(len(log)))

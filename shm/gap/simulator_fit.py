@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp, softmax
+import scipy
 
 from shm.gap.contract import Fit, Hypothesis, NoiseNode
 from shm.gap.likelihood import Likelihood
@@ -63,7 +63,7 @@ class _Target:
     def curvature(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Gauss and Newton's Hessian (d, d) and the gradient (d,) of the log posterior."""
         residual, slopes = self.slopes(z)
-        share = softmax(self.likelihood.by_node(residual[None])[0])
+        share = scipy.special.softmax(self.likelihood.by_node(residual[None])[0])
         products = self.likelihood.gram(np.column_stack([slopes, residual])[None])[0]
         mean = np.einsum("k,kij->ij", share, products)
         return mean[:-1, :-1] + np.eye(len(z)), mean[:-1, -1] - z
@@ -92,7 +92,7 @@ def fitted(
         hypothesis, best.z, best.covariance, problem.value - residual, slopes, node.covariance, 0.0,
         draws=pool.batch.z[systematic(weights, _KEPT, rng)],
         log_fit=float(target.likelihood.log(residual[None])[0]),
-        log_evidence=float(logsumexp(pool.log_weights) - np.log(pool.draws)),
+        log_evidence=float(scipy.special.logsumexp(pool.log_weights) - np.log(pool.draws)),
         log_evidence_sd=float(np.sqrt(max(1 / count - 1 / pool.draws, 0.0))),
         method="sampled", effective=count,
     )  # fmt: skip
@@ -162,7 +162,7 @@ def _sampled(
     """Draws about the peaks, until enough are effective; the last proposals fit their own draws."""
     parts = [Normal(each.z, wide**2 * each.covariance) for each in peaks for wide in _WIDTHS]
     log = np.array([each.log for each in peaks for _ in _WIDTHS])
-    first = proposal = TMixture(parts, np.maximum(softmax(log), 0.02))
+    first = proposal = TMixture(parts, np.maximum(scipy.special.softmax(log), 0.02))
     pool: Pool[TMixture, _Points] = Pool(_log_density)
     for _ in range(_ROUNDS):
         z = proposal.draw(_ROUND, rng)

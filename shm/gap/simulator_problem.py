@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from scipy.special import ndtr
+import scipy
 
 from shm.errors import BadInput, UsageError
 from shm.gap.contract import Covariance, Hypothesis, NoiseNode
@@ -61,9 +61,9 @@ class Prior:
         """The parameter at standard normal coordinates of any shape."""
         match self.spread:
             case "uniform":
-                return np.asarray(self.a + (self.b - self.a) * ndtr(z))
+                return np.asarray(self.a + (self.b - self.a) * scipy.special.ndtr(z))
             case "logarithmic":
-                return np.asarray(self.a * (self.b / self.a) ** ndtr(z))
+                return np.asarray(self.a * (self.b / self.a) ** scipy.special.ndtr(z))
             case "normal":
                 return np.asarray(self.a + self.b * z)
             case "lognormal":

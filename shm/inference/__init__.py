@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from shm.inference.ensemble import refresh
+from typing import TYPE_CHECKING
+
 from shm.inference.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, UpdateOptions
-from shm.inference.textbook import BiasedEvidenceWarning
-from shm.inference.updating import class_probabilities, select, update
+from shm.resources import when_asked
+
+if TYPE_CHECKING:
+    from shm.inference.ensemble import refresh
+    from shm.inference.textbook import BiasedEvidenceWarning
+    from shm.inference.updating import class_probabilities, select, update
 
 __all__ = [
     "METHODS",
@@ -19,3 +24,14 @@ __all__ = [
     "select",
     "update",
 ]
+
+if not TYPE_CHECKING:
+    # Every command has the options of an update, and few make one.
+    __getattr__ = when_asked(
+        __name__,
+        {
+            "refresh": "shm.inference.ensemble",
+            "BiasedEvidenceWarning": "shm.inference.textbook",
+            **dict.fromkeys(("class_probabilities", "select", "update"), "shm.inference.updating"),
+        },
+    )

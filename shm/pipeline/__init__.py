@@ -4,10 +4,10 @@
 wait, and `flow` begins them, keeps their results and refuses what fails.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from shm.pipeline.clock import Clock, utc_now
+from shm.resources import when_asked
 
 if TYPE_CHECKING:
     from shm.pipeline.flow import Flow
@@ -16,12 +16,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Clock", "DeliveryRefused", "Flow", "Notifier", "Sharing", "utc_now"]
 
-_HOME = {"DeliveryRefused": "jobs", "Flow": "flow", "Notifier": "jobs", "Sharing": "intake"}
-
 if not TYPE_CHECKING:
-
-    def __getattr__(name: str) -> Any:
-        """The flow brings all readers with it: who only asks the time does without."""
-        if name not in _HOME:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(f"shm.pipeline.{_HOME[name]}"), name)
+    # The flow brings all readers with it: who only asks the time does without.
+    __getattr__ = when_asked(
+        __name__,
+        {
+            "DeliveryRefused": "shm.pipeline.jobs",
+            "Flow": "shm.pipeline.flow",
+            "Notifier": "shm.pipeline.jobs",
+            "Sharing": "shm.pipeline.intake",
+        },
+    )

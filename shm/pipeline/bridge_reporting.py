@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
+from typing import TYPE_CHECKING
 
 import shm
 from shm.errors import DamagedRow, NothingThere
@@ -29,7 +30,9 @@ from shm.store import (
 from shm.store.checksums import of_readable
 from shm.store.stored_silences import silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, WatchedTest
-from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern, shifts_of
+
+if TYPE_CHECKING:
+    from shm.watch.neighbours import BridgePattern, HangerShift
 
 
 def bridge_report(
@@ -224,11 +227,16 @@ def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:
 
     Raises NothingThere where fewer than three of them can be compared.
     """
+    # It is loaded where it is sought: who lists the hangers does without.
+    from shm.watch.neighbours import bridge_pattern
+
     return bridge_pattern(hanger_shifts(store, order), order)
 
 
 def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]:
     """The latest known shift of each hanger that has one, in their `order` along the bridge."""
+    from shm.watch.neighbours import shifts_of
+
     latest, before_c = of_readable(store.watch.latest, {}), store.watch.baseline_temperatures()
     compared = [latest[hanger] for hanger in order if hanger in latest]
     drifts = {each.hanger: _known_drifts(store, each) for each in compared}

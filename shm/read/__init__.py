@@ -9,16 +9,16 @@ These verbs work in the caller's process, for a person's own files; whatever com
 through `shm.read.sandbox`.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from shm.read.base import Format, Peek, PeekChannel
-from shm.read.bundles import bundle, holds_test
-from shm.read.limits import Limits
-from shm.read.sidecar import sidecar_path
+from shm.resources import when_asked
 
 if TYPE_CHECKING:
+    from shm.read.base import Format, Peek, PeekChannel
+    from shm.read.bundles import bundle, holds_test
+    from shm.read.limits import Limits
     from shm.read.registry import FORMATS, peek, read, write
+    from shm.read.sidecar import sidecar_path
     from shm.read.whole_test import peek_test, read_test
 
 __all__ = [
@@ -37,15 +37,16 @@ __all__ = [
     "write",
 ]
 
-_HOME = {
-    **dict.fromkeys(("FORMATS", "peek", "read", "write"), "registry"),
-    **dict.fromkeys(("peek_test", "read_test"), "whole_test"),
-}
-
 if not TYPE_CHECKING:
-
-    def __getattr__(name: str) -> Any:
-        """The formats bring their libraries: who only looks for a file's sidecar does without."""
-        if name not in _HOME:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(f"shm.read.{_HOME[name]}"), name)
+    # The formats bring their libraries: who only looks for a file's sidecar does without.
+    __getattr__ = when_asked(
+        __name__,
+        {
+            **dict.fromkeys(("Format", "Peek", "PeekChannel"), "shm.read.base"),
+            **dict.fromkeys(("bundle", "holds_test"), "shm.read.bundles"),
+            "Limits": "shm.read.limits",
+            **dict.fromkeys(("FORMATS", "peek", "read", "write"), "shm.read.registry"),
+            "sidecar_path": "shm.read.sidecar",
+            **dict.fromkeys(("peek_test", "read_test"), "shm.read.whole_test"),
+        },
+    )

@@ -9,6 +9,7 @@ from datetime import datetime, timedelta
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
+from shm.models import end_stiffness
 from shm.report.hanger_status import (
     BridgeMessage,
     HangerMessage,
@@ -43,11 +44,10 @@ from shm.values import (
 from shm.values.force_units import ForceUnit, force_unit
 from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 from shm.values.stated_tension import averaged_now, selection_now
-from shm.watch import end_stiffness
-from shm.watch.neighbours import BridgePattern
 
 if TYPE_CHECKING:  # `shm status` lists hangers and identifies nothing
     from shm.identify import Dropped, Hit, Identification
+    from shm.watch.neighbours import BridgePattern
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,10 +19,12 @@ from shm.values import (
     TemperatureCoefficient,
     WatchedQuantity,
 )
-from shm.watch import Watched
 from shm.watch.change_words import group_words, is_stiffness, probable_groups, quantity_words
 from shm.watch.history import Band, StateHistory
 from shm.watch.state import StateOptions, set_free, states
+
+if TYPE_CHECKING:
+    from shm.watch import Watched
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import diags_array
-from scipy.sparse.linalg import eigsh
+import scipy
 
 from shm.errors import UsageError
 from shm.simulate.bar.description import Piece, pieces_of
@@ -83,7 +82,7 @@ def plane_modes(
     free = np.delete(np.arange(2 * len(nodes)), _held(2 * len(nodes), springs))
     diagonal = np.zeros(stiffness.shape[0])
     diagonal[[1, -1]] = [0.0 if math.isinf(spring) else spring for spring in springs]
-    stiffness = stiffness + diags_array(diagonal)
+    stiffness = stiffness + scipy.sparse.diags_array(diagonal)
     squares, vectors = _lowest(stiffness[free][:, free], mass[free][:, free], modes)
     full = np.zeros((2 * len(nodes), modes))
     full[free] = vectors
@@ -154,7 +153,7 @@ def _held(unknowns: int, springs: tuple[float, float]) -> list[int]:
 def _lowest(stiffness: Any, mass: Any, modes: int) -> tuple[FloatArray, FloatArray]:
     """The lowest squares of angular frequency (modes,) and mass-normalised vectors."""
     start = np.ones(stiffness.shape[0])  # a fixed start, so that the same input gives the same bits
-    squares, vectors = eigsh(stiffness, k=modes, M=mass, sigma=0.0, v0=start)
+    squares, vectors = scipy.sparse.linalg.eigsh(stiffness, k=modes, M=mass, sigma=0.0, v0=start)
     order = np.argsort(squares)
     squares, vectors = squares[order], vectors[:, order]
     if squares[0] <= 0:

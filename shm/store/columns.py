@@ -126,12 +126,12 @@ def index_in_force(name: str, *columns: str) -> sa.Index:
     """An index of what is in force."""
     # `superseded_at` stands behind the samples or the frequency response of a row, which may be a
     # hundred pages of the file: an index of what is in force spares reading past them.
-    where = sa.text("superseded_at IS NULL")
-    return sa.Index(name, *columns, sqlite_where=where, postgresql_where=where)
+    return sa.Index(name, *columns, sqlite_where=sa.text("superseded_at IS NULL"))
 
 
 def unique_where(condition: str, table: str, *columns: str) -> sa.Index:
     """Unique among rows in which `condition` is empty."""
+    # In PostgreSQL, too: the migrations make them there. Said here it would load that dialect.
     where = sa.text(f"{condition} IS NULL")
     name = f"uq_{table}_{'_'.join(columns)}"
-    return sa.Index(name, *columns, unique=True, sqlite_where=where, postgresql_where=where)
+    return sa.Index(name, *columns, unique=True, sqlite_where=where)

@@ -92,7 +92,7 @@ class BaselineGlance(Numbers):
     """A baseline in force with its posterior in numbers; see `Baseline`.
 
     `temperature_c` is the mean of its tests, NaN where none has one; `check` is None of a baseline
-    that a former version made.
+    that a former version made; `begins_at` is when the first of its tests was made.
     """
 
     id: int
@@ -105,6 +105,7 @@ class BaselineGlance(Numbers):
     tests: tuple[str, ...]
     temperature_c: float
     check: BaselineCheck | None = None
+    begins_at: datetime | None = None
 
 
 @dataclass(frozen=True)

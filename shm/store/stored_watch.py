@@ -12,15 +12,21 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.errors import StoreBusy
+from shm.errors import DamagedRow, StoreBusy
 from shm.store.blobs import change_from, watch_document, watch_from
-from shm.store.checksums import decoding, loads, whole
+from shm.store.checksums import damaged, decoding, loads, whole
 from shm.store.columns import Number
 from shm.store.database import Repository, insert
 from shm.store.files import in_force
 from shm.store.list_rows import BaselineGlance, WatchedName
 from shm.store.outbox import raise_alert, resolve
-from shm.store.queries import baseline_in_force, baselines_now, compared_with, read_baseline
+from shm.store.queries import (
+    baseline_in_force,
+    baselines_now,
+    compared_with,
+    plain_tests,
+    read_baseline,
+)
 from shm.store.results import all_at, insert_baseline, insert_posterior, move
 from shm.store.rows import (
     Acknowledgement,
@@ -38,6 +44,7 @@ from shm.store.tables import (
     baselines,
     drifts,
     posterior_tests,
+    posteriors,
     resolutions,
     tests,
     watch_states,
@@ -127,6 +134,24 @@ class Watch(Repository):
         """The baseline in force of each hanger that has one, in numbers, by hanger."""
         with self.reading() as connection:
             return baselines_in_numbers(connection, hangers)
+
+    def damaged_baselines(self) -> dict[int, DamagedRow]:
+        """By hanger, what is damaged of its baseline in force: a test of it, or the posterior."""
+        made = sa.select(baselines.c.posterior_id).where(baselines.c.id.in_(baselines_now()))
+        of_made = sa.select(posterior_tests.c.test_id).where(
+            posterior_tests.c.posterior_id.in_(made)
+        )
+        asked: dict[sa.Table, sa.Select[Any]] = {
+            tests: plain_tests.where(tests.c.id.in_(of_made)),
+            posteriors: sa.select(posteriors).where(posteriors.c.id.in_(made)),
+        }
+        with self.reading() as connection:
+            return {
+                row.hanger: damaged(table, row.id, row.hanger)
+                for table, query in asked.items()
+                for row in connection.execute(query)
+                if not whole(table, row)
+            }
 
     def baseline_temperatures(self) -> dict[int, float]:
         """Mean temperature of the tests of each baseline in force, by hanger; NaN where unknown."""

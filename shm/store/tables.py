@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import sqlalchemy as sa
 
 from shm.store.columns import (
@@ -385,9 +383,8 @@ APART = {"tests": "frequency_response"}
 
 # Of all else in the row. Empty in a row that was written in this transaction: an update empties it,
 # and what commits fills it in. The index holds those that are empty alone.
-_empty: dict[str, Any] = {
-    f"{n}_where": sa.text("checksum IS NULL") for n in ("sqlite", "postgresql")
-}
 for _table in metadata.tables.values():
     _table.append_column(sa.Column("checksum", sa.BigInteger, onupdate=sa.null()))
-    sa.Index(f"ix_{_table.name}_unsealed", _table.c.checksum, **_empty)
+    sa.Index(
+        f"ix_{_table.name}_unsealed", _table.c.checksum, sqlite_where=sa.text("checksum IS NULL")
+    )

@@ -316,8 +316,9 @@ def _point(row: Row[Any], numbers: Numbers) -> TrendPoint:
 
 
 def _made_of(connection: Connection, ids: Sequence[int]) -> defaultdict[int, list[Row[Any]]]:
-    """The names and temperatures of the tests of each posterior, by time."""
-    columns = (posterior_tests.c.posterior_id, tests.c.name, tests.c.temperature_c)
+    """The names, times and temperatures of the tests of each posterior, by time."""
+    of_test = tests.c.name, tests.c.time, tests.c.temperature_c
+    columns = (posterior_tests.c.posterior_id, *of_test)
     query: sa.Select[Any] = sa.select(*columns).join(tests)
     query = query.where(posterior_tests.c.posterior_id.in_(ids))
     found = defaultdict[int, list[Row[Any]]](list)
@@ -335,6 +336,7 @@ def _baseline(row: Row[Any], made_of: Sequence[Row[Any]], numbers: Numbers) -> B
         tests=tuple(each.name for each in made_of),
         temperature_c=fmean(temperatures_c) if temperatures_c else NAN,
         check=_check(row.document),
+        begins_at=min((each.time for each in made_of), default=None),
         **vars(numbers),
     )
 

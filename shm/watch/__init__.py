@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from shm.models import end_stiffness
-from shm.watch.frequency_watch import WatchedFrequencies, watch_frequencies
-from shm.watch.gap import gap_percent, has_grown, joined, watch_gap
-from shm.watch.options import WatchOptions
-from shm.watch.watching import (
-    DatedTest,
-    Newest,
-    Watched,
-    watch_hanger,
-    watch_newest,
-)
+from typing import TYPE_CHECKING
+
+from shm.resources import when_asked
+
+if TYPE_CHECKING:
+    from shm.models import end_stiffness
+    from shm.watch.frequency_watch import WatchedFrequencies, watch_frequencies
+    from shm.watch.gap import gap_percent, has_grown, joined, watch_gap
+    from shm.watch.options import WatchOptions
+    from shm.watch.watching import DatedTest, Newest, Watched, watch_hanger, watch_newest
 
 __all__ = [
     "DatedTest",
@@ -29,3 +28,21 @@ __all__ = [
     "watch_hanger",
     "watch_newest",
 ]
+
+if not TYPE_CHECKING:
+    # The engine is large: who only words what it found, as `shm status` does, does without.
+    __getattr__ = when_asked(
+        __name__,
+        {
+            "end_stiffness": "shm.models",
+            **dict.fromkeys(
+                ("WatchedFrequencies", "watch_frequencies"), "shm.watch.frequency_watch"
+            ),
+            **dict.fromkeys(("gap_percent", "has_grown", "joined", "watch_gap"), "shm.watch.gap"),
+            "WatchOptions": "shm.watch.options",
+            **dict.fromkeys(
+                ("DatedTest", "Newest", "Watched", "watch_hanger", "watch_newest"),
+                "shm.watch.watching",
+            ),
+        },
+    )

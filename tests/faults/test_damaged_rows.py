@@ -104,6 +104,16 @@ def test_one_damaged_posterior_stops_its_hanger_alone_and_says_so(
         assert store.upkeep.known_damage() == ()
 
 
+@pytest.mark.parametrize(("table", "column"), [("posteriors", "samples"), ("tests", "document")])
+def test_status_tells_a_damaged_baseline_before_a_test_meets_it(
+    bridge: Workspace, capsys: pytest.CaptureFixture[str], table: str, column: str
+) -> None:
+    damage(bridge, table, column, 1)
+    assert run(["--workspace", str(bridge.folder), "status"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"hanger 3 stands still: row 1 of {table} of hanger 3 is damaged" in said
+
+
 def baseline_tension_n(workspace: Workspace) -> FloatArray:
     with workspace.store() as store:
         baseline = store.watch.baseline(3)

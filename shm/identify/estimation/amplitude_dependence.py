@@ -19,8 +19,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.special import ndtri, stdtrit
 
 from shm.identify.contract import Finding, FoundMode, Measurement
 from shm.identify.estimation.repeats import LEAST_HITS
@@ -376,4 +376,4 @@ def _by_ring_downs(
 
 def _widening(freedom: int) -> float:
     """Student's 95 % quantile over the normal one."""
-    return float(stdtrit(freedom, 0.95) / ndtri(0.95))
+    return float(scipy.special.stdtrit(freedom, 0.95) / scipy.special.ndtri(0.95))

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
+import scipy
 
 from shm.identify.contract import Dropped, FoundMode
 from shm.identify.estimation.candidates import Candidate, Pole, continued
@@ -300,7 +300,7 @@ def _beside(sds: FloatArray, index: int) -> float:
 
 
 def _widening(hits: int) -> float:
-    return float(stdtrit(hits - 1, 0.95) / ndtri(0.95))
+    return float(scipy.special.stdtrit(hits - 1, 0.95) / scipy.special.ndtri(0.95))
 
 
 def frequency_sd(frequency_hz: float, estimates_hz: FloatArray) -> float:

@@ -29,7 +29,8 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import cache, reduce
+from types import ModuleType
 
 import numpy as np
 import scipy
@@ -82,7 +83,6 @@ _COARSE_FROM = 60  # judgement: thirty orders or so tell what stays, and more on
 _LEAST_ORDER = 2  # one mode
 _RANK_TOLERANCE = 1e-17
 """Singular values below this share of the first are zero but for rounding."""
-_MATPLOTLIB_LEVEL = logging.getLogger("matplotlib").level
 
 
 def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Finding:
@@ -271,19 +271,18 @@ def _models_without_each_hit(
     return [_models(*part, size, orders) for part in parts]
 
 
-with np.errstate():
-    from pyoma2.functions import ssi
-
-
-def _silence() -> None:
+@cache
+def _pyoma2() -> ModuleType:
+    """The `ssi` module, loaded where it is called: it brings `scipy.linalg`."""
+    matplotlib_level = logging.getLogger("matplotlib").level
+    with np.errstate():
+        from pyoma2.functions import ssi
     logger = logging.getLogger("pyoma2")
     for handler in list(logger.handlers):
         logger.removeHandler(handler)
     logger.setLevel(logging.WARNING)
-    logging.getLogger("matplotlib").setLevel(_MATPLOTLIB_LEVEL)
-
-
-_silence()
+    logging.getLogger("matplotlib").setLevel(matplotlib_level)
+    return ssi
 
 
 def hankel(response: FloatArray, reference: FloatArray, block_rows: int) -> FloatArray:
@@ -321,5 +320,5 @@ def hankel_with_input(
     Its least squares are scaled by the force's own size; as future responses and past references
     enter both with the share of a direction that the force has, weak ones do no harm.
     """
-    matrix, _ = ssi.build_hank(response, reference, block_rows, "IOcov", U=force)
+    matrix, _ = _pyoma2().build_hank(response, reference, block_rows, "IOcov", U=force)
     return np.asarray(matrix * response.shape[1], dtype=np.float64)

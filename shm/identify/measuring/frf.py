@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.fft import next_fast_len, rfft
 
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES, HitRecord
 from shm.values import ComplexArray, FloatArray
@@ -81,7 +81,7 @@ def averaged_response(
     The force window keeps the pulse and fades out after it.
     """
     window = window or common_window(hits, sampling_rate_hz, band_high_hz)
-    transform_length = next_fast_len(window.length, real=True)
+    transform_length = scipy.fft.next_fast_len(window.length, real=True)
     spacing_hz = sampling_rate_hz / transform_length
     lines = 1 + int(min(BAND_MARGIN * band_high_hz, sampling_rate_hz / 2) / spacing_hz)
     spectra = np.array(
@@ -127,7 +127,7 @@ def _spectra(
     rows[0] *= faded
     if math.isfinite(window.time_constant_s):
         rows *= np.exp(-np.arange(window.length) / (window.time_constant_s * sampling_rate_hz))
-    return np.asarray(rfft(rows, n=transform_length, axis=1))
+    return np.asarray(scipy.fft.rfft(rows, n=transform_length, axis=1))
 
 
 def _force_window(length: int, keep: int) -> FloatArray:

@@ -13,9 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.linalg import solve
-from scipy.ndimage import median_filter
 
 from shm.identify.measuring.frf import RATE_OVER_BAND
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
@@ -326,7 +325,7 @@ def _rule(parts: Sequence[FloatArray]) -> FloatArray:
     past, now = rows[:, :-1], rows[:, -1]
     square = past.T @ past
     square += _RIDGE * float(np.trace(square)) / _ORDER * np.eye(_ORDER)
-    weights = solve(square, past.T @ now, assume_a="pos")
+    weights = scipy.linalg.solve(square, past.T @ now, assume_a="pos")
     return np.concatenate(([1.0], -weights[::-1]))
 
 
@@ -336,7 +335,7 @@ def _worst(part: FloatArray, rule: FloatArray) -> float:
     error = np.abs(np.convolve(part, rule, mode="valid"))
     peaks = error[: len(error) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).max(axis=1)
     width = min(_AROUND, len(peaks))
-    around = median_filter(peaks, width)
+    around = scipy.ndimage.median_filter(peaks, width)
     usual = around.copy()
     late = width // 2 + 1
     usual[late:] = np.minimum(around[late:], around[:-late])

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from scipy.ndimage import maximum_filter1d
 
 from shm.identify.measuring.frf import RATE_OVER_BAND
 from shm.identify.measuring.hits import (
@@ -39,7 +38,9 @@ def find_unforced(
     power, step = _power(accelerations, sampling_rate_hz, band_hz)
     rise = _rises(power, sampling_rate_hz / step)
     width = int(_WINDOW_SECONDS * sampling_rate_hz / step)
-    tops = np.flatnonzero((rise == maximum_filter1d(rise, 2 * width + 1)) & (rise > _RISE))
+    tops = np.flatnonzero(
+        (rise == scipy.ndimage.maximum_filter1d(rise, 2 * width + 1)) & (rise > _RISE)
+    )
     # The window that follows holds the blow, where the fast motion is largest.
     onsets = [(top + int(np.argmax(power[top : top + width + 2]))) * step for top in tops.tolist()]
     groups: list[list[int]] = []
@@ -89,5 +90,5 @@ def _rises(power: FloatArray, rate_hz: float) -> FloatArray:
     after = np.concatenate((mean, np.zeros(window - 1)))
     before = np.concatenate((np.full(window, usual), mean[: len(power) - window]))
     reach = max(1, int(_BEFORE_SECONDS * rate_hz))
-    largest = maximum_filter1d(before, reach, origin=(reach - 1) // 2)
+    largest = scipy.ndimage.maximum_filter1d(before, reach, origin=(reach - 1) // 2)
     return after / np.maximum(largest, np.finfo(float).tiny)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
-from scipy.linalg import eigh
+import scipy
 
 from shm.identify.mode_ordering.alignment import (
     HIGHEST_ORDER,
@@ -235,7 +235,7 @@ def turnbuckle_shift(hanger: Hanger) -> tuple[float, ...]:
     squares = (pattern.alpha[tension, _SPRING] * pattern.beta[tension, _SPRING]) ** 2
     mass = np.eye(len(shape)) + (shape * added_mass) @ shape.T / _SECTIONS
     stiffness = np.diag(squares) + (curvature * added_stiffness) @ curvature.T / _SECTIONS
-    moved = eigh(stiffness, mass, eigvals_only=True)
+    moved = scipy.linalg.eigh(stiffness, mass, eigvals_only=True)
     return tuple((np.log(np.maximum(moved, squares / 4) / squares) / 2).tolist())
 
 

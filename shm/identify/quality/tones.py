@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len, rfft, rfftfreq
-from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 
 from shm.identify.contract import Hit, Measurement, Tone
 from shm.identify.measuring.frf import LEAST_SAMPLES, RATE_OVER_BAND
@@ -113,17 +112,19 @@ def _candidates(parts: Stretches, options: IdentifyOptions) -> list[float]:
     for part in parts.later:
         gated[:, part.first : part.first + part.signals.shape[1]] = part.signals
     # A quarter of a line off, a tone is still steady over the whole record.
-    length = next_fast_len(max(4 * parts.samples, _LEAST_TRANSFORM), real=True)
-    frequency = rfftfreq(length, 1 / parts.rate_hz)
+    length = scipy.fft.next_fast_len(max(4 * parts.samples, _LEAST_TRANSFORM), real=True)
+    frequency = scipy.fft.rfftfreq(length, 1 / parts.rate_hz)
     lines = (frequency >= options.band_low_hz) & (frequency <= options.band_high_hz)
-    spectra = rfft(gated, n=length, axis=1)[:, lines]
+    spectra = scipy.fft.rfft(gated, n=length, axis=1)[:, lines]
     power = np.abs(spectra) ** 2
     floor = np.maximum(np.median(power, axis=1, keepdims=True), np.finfo(float).tiny)
     power = np.sum(power / floor, axis=0)
     shortest = min(part.signals.shape[1] for part in parts.later)
     width = int(min(_FLOOR_WIDTHS * length / shortest, len(power))) | 1
-    floor = np.minimum(median_filter(power, _FLOOR_LINES), median_filter(power, width))
-    peaks = (power == maximum_filter1d(power, 9)) & (power > _PROMINENCE * floor)
+    floor = np.minimum(
+        scipy.ndimage.median_filter(power, _FLOOR_LINES), scipy.ndimage.median_filter(power, width)
+    )
+    peaks = (power == scipy.ndimage.maximum_filter1d(power, 9)) & (power > _PROMINENCE * floor)
     places = np.flatnonzero(peaks & _may_be_there_before(spectra, length, lines, parts, options))
     strongest = places[np.argsort(-power[places])][:_MOST_CANDIDATES]
     tops = frequency[lines][strongest] + frequency[1] * _beside(power, strongest)
@@ -140,10 +141,12 @@ def _may_be_there_before(
     if parts.before is None:
         return np.ones(spectra.shape[1], dtype=bool)
     mean = spectra * 2 / sum(part.weight for part in parts.later)
-    before = rfft(parts.before.signals, n=length, axis=1)[:, lines] * 2 / parts.before.weight
+    before = (
+        scipy.fft.rfft(parts.before.signals, n=length, axis=1)[:, lines] * 2 / parts.before.weight
+    )
     change = np.sum(np.abs(before - mean) ** 2, axis=0)
     there = change < _MAY_BE_SAME_BEFORE * np.sum(np.abs(mean) ** 2, axis=0)
-    frequency = rfftfreq(length, 1 / parts.rate_hz)[lines]
+    frequency = scipy.fft.rfftfreq(length, 1 / parts.rate_hz)[lines]
     for _, low, high in options.disturbance_bands:
         there |= (frequency >= low) & (frequency <= high)
     return np.asarray(there)
@@ -292,7 +295,7 @@ def _size(hit: Hit) -> float:
 
 def _smoothed(values: FloatArray, samples: int) -> FloatArray:
     """Running means over as many samples as are thinned to one."""
-    return np.asarray(uniform_filter1d(values, samples)) if samples > 1 else values
+    return np.asarray(scipy.ndimage.uniform_filter1d(values, samples)) if samples > 1 else values
 
 
 def _spans(starts: Sequence[int], margin: int, samples: int) -> list[tuple[int, int]]:

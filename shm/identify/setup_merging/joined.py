@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from scipy.special import ndtri, stdtrit
 
 from shm.identify.contract import Dropped, Finding, FoundMode, Measurement, Poles
 from shm.identify.estimation.candidates import FAR
@@ -230,7 +229,7 @@ def _between(values: FloatArray, own: FloatArray) -> float:
 
 
 def _widening(count: int) -> float:
-    return float(stdtrit(count - 1, 0.95) / ndtri(0.95))
+    return float(scipy.special.stdtrit(count - 1, 0.95) / scipy.special.ndtri(0.95))
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from shm.errors import BadInput
 from shm.identify.contract import FoundMode, Measurement
@@ -208,10 +207,10 @@ def hang_together(known: BoolArray) -> bool:
     """
     rows, columns = known.shape
     places = np.nonzero(known)
-    graph = csr_array(
+    graph = scipy.sparse.csr_array(
         (np.ones(len(places[0])), (places[0], rows + places[1])), shape=2 * (rows + columns,)
     )
-    return bool(connected_components(graph, directed=False)[0] == 1)
+    return bool(scipy.sparse.csgraph.connected_components(graph, directed=False)[0] == 1)
 
 
 def factors(products: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from shm.report import colours, formatting
 from shm.report.contents import HangerReport
 from shm.report.figures import style
 from shm.report.figures.illustration import Member
 from shm.values.force_units import ForceUnit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _NEAR = 1.5
 """How far from the samples a line may lie to be in view, in widths of the samples' range."""

@@ -10,13 +10,13 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Generic, TypeVar
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from shm.report.colours import PALETTE
-from shm.report.figures import with_matplotlib
 from shm.report.figures.specification import Specification
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Data = TypeVar("Data")
 DOTS_PER_INCH = 150
@@ -37,7 +37,12 @@ class Member(Generic[Data]):
     def figure(self, data: Data) -> Figure | None:
         """The figure on paper."""
         found = self.draw(data)
-        return with_matplotlib.draw(found) if isinstance(found, Specification) else found
+        if not isinstance(found, Specification):
+            return found
+        # What draws is loaded where something is drawn: it takes a third of a second.
+        from shm.report.figures.with_matplotlib import draw
+
+        return draw(found)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure, FigureBase
-from matplotlib.legend import Legend
+from typing import TYPE_CHECKING
 
 from shm.report import colours
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, FigureBase
+    from matplotlib.legend import Legend
 
 WIDTH_INCHES = 7.4
 _SMALL = 9.0
@@ -19,6 +21,8 @@ TINY = 7.5
 
 def new_figure(height_inches: float = 3.4) -> Figure:
     """An empty figure of the page's width, with no pyplot behind it."""
+    from matplotlib.figure import Figure
+
     return Figure(figsize=(WIDTH_INCHES, height_inches), layout="constrained", facecolor="none")
 
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_array
+import scipy
 
 from shm.simulate.bar.description import Bar
 from shm.values import FloatArray, IntArray
@@ -229,4 +229,6 @@ def assembled(elements: FloatArray) -> Any:
     unknowns = 2 * np.arange(count)[:, None] + np.arange(4)
     rows = np.broadcast_to(unknowns[:, :, None], elements.shape).ravel()
     columns = np.broadcast_to(unknowns[:, None, :], elements.shape).ravel()
-    return csc_array((elements.ravel(), (rows, columns)), shape=(2 * count + 2, 2 * count + 2))
+    return scipy.sparse.csc_array(
+        (elements.ravel(), (rows, columns)), shape=(2 * count + 2, 2 * count + 2)
+    )

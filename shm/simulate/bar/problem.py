@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+import scipy
 
 from shm.errors import UsageError
 from shm.simulate.bar.description import Attached, Bar, BarEnd
@@ -65,11 +64,11 @@ def solved(bar: Bar, mesh: Mesh, planes: Sequence[int], modes: int) -> Solved:
     matrices = [_matrices(bar, mesh, plane) for plane in planes]
     mass = _diagonal_blocks([each[1] for each in matrices])
     stiffness = turn.T @ _diagonal_blocks([each[0] for each in matrices]) @ turn
-    stiffness = tied(stiffness + diags_array(springs), turn, others)
+    stiffness = tied(stiffness + scipy.sparse.diags_array(springs), turn, others)
     sags = turn.T @ _sags(bar, mesh, planes)
     if bar.sags_as_it_bends and np.any(sags):
         sags = _as_it_bends(bar, mesh, stiffness, turn, sags)
-    reduced_mass = turn.T @ mass @ turn + diags_array(weights)
+    reduced_mass = turn.T @ mass @ turn + scipy.sparse.diags_array(weights)
     squares, vectors = _lowest(stiffness, reduced_mass, sags, modes)
     first = len(vectors) - len(others.masses_kg)
     full = (turn @ vectors).reshape(len(planes), len(mesh.nodes_m), 2, modes)
@@ -117,7 +116,7 @@ def _diagonal_blocks(blocks: Sequence[Any]) -> Any:
     rows = np.concatenate([size * i + each.row for i, each in enumerate(coordinates)])
     columns = np.concatenate([size * i + each.col for i, each in enumerate(coordinates)])
     values = np.concatenate([each.data for each in coordinates])
-    return csc_array((values, (rows, columns)), shape=(2 * size, 2 * size))
+    return scipy.sparse.csc_array((values, (rows, columns)), shape=(2 * size, 2 * size))
 
 
 def _joints(end: BarEnd, index: int, planes: Sequence[int]) -> list[_Joint]:
@@ -165,7 +164,7 @@ def _unknowns(
             shares.append(np.ones(1))
     entries = (np.concatenate(rows), np.concatenate(columns))
     shape = (a_plane * len(planes), first + len(others.masses_kg))
-    turn = csc_array((np.concatenate(shares), entries), shape=shape)
+    turn = scipy.sparse.csc_array((np.concatenate(shares), entries), shape=shape)
     stiff = np.array([joint.stiffness_n_m_rad for joint in joints])
     return (
         turn,
@@ -196,7 +195,7 @@ def _as_it_bends(bar: Bar, mesh: Mesh, stiffness: Any, turn: Any, sags: FloatArr
 
     Moved by that shape it stretches as much as a string does whose motion has the same area.
     """
-    bent = splu(stiffness.tocsc()).solve(sags)
+    bent = scipy.sparse.linalg.splu(stiffness.tocsc()).solve(sags)
     tight = turn.T @ _tightened(bar, mesh, turn @ bent)
     stretch, area = np.sum(bent * tight, axis=0), np.sum(bent * sags, axis=0)
     return np.asarray(tight * np.divide(area, stretch, out=np.zeros_like(area), where=stretch > 0))
@@ -221,7 +220,7 @@ def _lowest(
     stiffness: Any, mass: Any, sags: FloatArray, modes: int
 ) -> tuple[FloatArray, FloatArray]:
     """The lowest squares (modes,) and mass-normalised vectors of stiffness + sags sags^T."""
-    factor = splu(stiffness.tocsc())
+    factor = scipy.sparse.linalg.splu(stiffness.tocsc())
     lifted = factor.solve(sags)
     core = np.linalg.inv(np.eye(sags.shape[1]) + sags.T @ lifted)
 
@@ -230,9 +229,11 @@ def _lowest(
         return np.asarray(plain - lifted @ (core @ (sags.T @ plain)))
 
     solve = with_sags if np.any(sags) else factor.solve
-    inverse = LinearOperator(stiffness.shape, matvec=solve, dtype=float)
+    inverse = scipy.sparse.linalg.LinearOperator(stiffness.shape, matvec=solve, dtype=float)
     start = np.ones(stiffness.shape[0])  # a fixed start, so that the same input gives the same bits
-    squares, vectors = eigsh(stiffness, k=modes, M=mass, sigma=0.0, OPinv=inverse, v0=start)
+    squares, vectors = scipy.sparse.linalg.eigsh(
+        stiffness, k=modes, M=mass, sigma=0.0, OPinv=inverse, v0=start
+    )
     order = np.argsort(squares)
     squares, vectors = squares[order], vectors[:, order]
     if not squares[0] > 0:
@@ -330,6 +331,6 @@ def tied(stiffness: Any, turn: Any, others: Others) -> Any:
         on_bar[list(tie.freedoms)] = tie.shares
         apart = turn.T @ on_bar
         apart[[first + own for own in tie.others]] -= 1
-        column = csc_array(apart[:, None])
+        column = scipy.sparse.csc_array(apart[:, None])
         stiffness = stiffness + tie.spring_n_m * (column @ column.T)
     return stiffness
