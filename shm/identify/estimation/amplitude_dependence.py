@@ -93,7 +93,8 @@ class _Course:
 
 @dataclass(frozen=True)
 class _Fit:
-    """`left` is the relative change of the frequency that is left where the ring-downs end."""
+    """`left` is the relative change of the frequency that is left where the ring-downs end,
+    `damping_off` by how much the amplitude's own fall says another damping ratio."""
 
     shift_hz: float
     shift_sd_hz: float
@@ -102,6 +103,7 @@ class _Fit:
     left: float
     misfit: float
     freedom: int
+    damping_off: float = 0.0
 
     @property
     def is_sure(self) -> bool:
@@ -145,6 +147,10 @@ def _with_slope(mode: FoundMode, fit: _Fit | None, expected: float, usual: float
     its own phase says nothing."""
     slope = (fit.slope, fit.slope_sd) if fit is not None else (NAN, NAN)
     known = replace(mode, amplitude_slope=slope[0], amplitude_slope_sd=slope[1])
+    if usual or (fit is not None and fit.is_sure):
+        # A line that is as broad as the frequency moves looks damped by as much.
+        off = usual if fit is None or abs(fit.slope) > MOST_SLOPE else fit.damping_off
+        known = replace(known, damping_sd=math.hypot(mode.damping_sd, off))
     prior_hz = usual * mode.frequency_hz
     if fit is not None and not usual and abs(fit.shift_hz) > _ALONE * mode.frequency_hz:
         return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, fit.shift_hz))
@@ -241,8 +247,9 @@ def _fits(
     if fit is None:
         return None
     off = [math.log(size[-1] / size[0]) / (time_s[-1] - time_s[0]) for time_s, _, _, size in rows]
-    unlike_hz = _UNLIKE * abs(float(np.median(off))) / (2 * math.pi)
-    return replace(fit, shift_sd_hz=math.hypot(fit.shift_sd_hz, unlike_hz))
+    unlike_hz = abs(float(np.median(off))) / (2 * math.pi)
+    shift_sd_hz = math.hypot(fit.shift_sd_hz, _UNLIKE * unlike_hz)
+    return replace(fit, shift_sd_hz=shift_sd_hz, damping_off=unlike_hz / mode.frequency_hz)
 
 
 def _averaged(laws: Sequence[_Fit]) -> _Fit | None:
