@@ -87,7 +87,7 @@ def shapes_at(places_m: list[float], gains: list[float], said_m: list[float]) ->
         Mode("transverse", order, 5.0 * order, shape=tuple(
             ShapePoint(x_m, float(value))
             for x_m, value in zip(
-                said_m, gains * mode_shape(xi, 8.0, 8.0, order, np.array(places_m) / 12), strict=True
+                said_m, gains * mode_shape(xi, 8, 8, order, np.array(places_m) / 12), strict=True
             )
         ))
         for order in range(1, 7)
