@@ -25,6 +25,7 @@ from shm.identify.mode_ordering.directions import directions
 from shm.identify.mode_ordering.placement import Placement, placed
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
+from shm.identify.quality.of_sensors import sensor_gain, sensor_places
 from shm.identify.setup_merging.calm_part import LEFT_OUT, calmed, level_left_at
 from shm.identify.setup_merging.hit_directions import alike, sharpened, together
 from shm.identify.setup_merging.joined import Joined, joined
@@ -115,10 +116,21 @@ def identify(
         poles=found.finding.poles,
         notes=(*placement.notes, *noted, *_few_hits(measurements), *_no_force(measurements)),
         window_time_constant_s=measurements[0].window_time_constant_s,
-        quality=(*quality, *([placement.check] if placement.check else [])),
+        quality=(*quality, *_of_placed(measurements, found, placement, hanger)),
         set_aside=placement.set_aside,
         fit=fitted(measurements, found.apart, options) if level_left == 1 else None,
     )
+
+
+def _of_placed(
+    measurements: Sequence[Measurement], found: Joined, placement: Placement, hanger: Hanger | None
+) -> list[QualityCheck]:
+    """What numbered modes say of their numbers and of the sensors."""
+    checks = [placement.check]
+    if hanger and hanger.as_hanger:
+        checks.append(sensor_gain(measurements, found.apart, placement.modes, hanger))
+        checks.append(sensor_places(placement.modes, hanger))
+    return [check for check in checks if check is not None]
 
 
 def _once_calm(

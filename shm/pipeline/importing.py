@@ -289,10 +289,10 @@ def _number(value: object) -> float:
 def _open(columns: Sequence[SurveyedColumn]) -> list[SurveyedColumn]:
     """Columns that may be a force or an acceleration, of which nothing says in what unit."""
     has = {column.quantity for column in columns}
-    unclear = [c for c in columns if c.quantity is None and c.unit != "(answered)"]
+    unclear = [c for c in columns if not (c.quantity and c.unit) and c.unit != "(answered)"]
     in_volts = [c for c in unclear if words.volts_of(c.unit) is not None]
     plain = [c for c in unclear if c.unit.lower() in _ASKED_UNITS or _is_in_doubt(c)]
-    named = [c for c in plain if c.meant is not None]
+    named = [c for c in plain if c.quantity or c.meant]
     if "acceleration" not in has and not named and not in_volts:
         named = plain
     return [c for c in columns if c in in_volts or c in named]

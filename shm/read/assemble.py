@@ -151,7 +151,10 @@ def _channel(header: Header, name: str, raw: FloatArray, path: Path) -> Channel:
         values = raw * (unit.si if math.isnan(calibration) else unit.si * calibration)
     refuse_implausible(values, name, path)
     full_scale = header.full_scale(name) * unit.si
-    return Channel(name, quantity, values, header.plane(name), header.x_m(name), full_scale)
+    return Channel(
+        name, quantity, values, header.plane(name), header.x_m(name), full_scale,
+        header.says(name, "unit"),
+    )  # fmt: skip
 
 
 def _peek_channel(header: Header, name: str, problems: list[str]) -> PeekChannel:

@@ -152,7 +152,7 @@ def recording_text(recording: Recording) -> str:
     known = {
         "sampling_rate_hz": _number(recording.sampling_rate_hz),
         **_places(channels),
-        "unit": ", ".join(SI[channel.quantity] for channel in channels),
+        "unit": ", ".join(SI[c.quantity] if c.states_unit else "" for c in channels),
         "full_scale": _list([channel.full_scale for channel in channels]),
     }
     names = [channel.name for channel in channels]

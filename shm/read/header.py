@@ -151,7 +151,7 @@ class Header:
 
     def accelerance_si(self, name: str) -> float:
         """Factor of a frequency response to m/s^2/N, by its unit; 1 where none is given."""
-        text = self.unit_text(name) if self._says(name, "unit") else ACCELERANCE
+        text = self.unit_text(name) if self.says(name, "unit") else ACCELERANCE
         factor = accelerance_si(text, "")
         if factor is None or unit_of(text) is not None:
             raise self.channels[name]["unit"].refusal(
@@ -163,7 +163,7 @@ class Header:
 
     def calibration(self, name: str) -> float:
         """Units of `unit` per recorded unit, NaN where the values are recorded in `unit`."""
-        if not self._says(name, "calibration"):
+        if not self.says(name, "calibration"):
             return NAN
         entry = self.channels[name]["calibration"]
         factor = _number(entry, "calibration", _FACTOR_REMEDY, name)
@@ -173,7 +173,7 @@ class Header:
 
     def full_scale(self, name: str) -> float:
         """The largest value that can be recorded, in `unit`; NaN where nobody says."""
-        if not self._says(name, "full_scale"):
+        if not self.says(name, "full_scale"):
             return NAN
         entry = self.channels[name]["full_scale"]
         largest = _number(entry, "full_scale", _SCALE_REMEDY, name)
@@ -183,9 +183,10 @@ class Header:
 
     def leaves_out(self, name: str) -> bool:
         """Whether a channel is not to be used."""
-        return self._says(name, "leave_out") and says_yes(self.channels[name]["leave_out"])
+        return self.says(name, "leave_out") and says_yes(self.channels[name]["leave_out"])
 
-    def _says(self, name: str, key: str) -> bool:
+    def says(self, name: str, key: str) -> bool:
+        """Whether anything is given for a key of a channel."""
         entry = self.channels[name].get(key)
         return entry is not None and bool(entry.text)
 

@@ -24,6 +24,7 @@ class Channel:
     """One sensor of a recording; `values` has shape (samples,), in N or m/s^2, NaN where bad.
 
     `full_scale` is the largest value that sensor and logger can record, NaN where nobody says.
+    `states_unit` is false where neither file nor sidecar says a unit, so that SI was assumed.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Channel:
     plane: Plane | None = None
     x_m: float = NAN
     full_scale: float = NAN
+    states_unit: bool = True
 
 
 @dataclass(frozen=True, eq=False)

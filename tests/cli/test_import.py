@@ -85,6 +85,24 @@ def test_the_second_file_of_a_logger_needs_nothing(
     ]
 
 
+def test_a_unit_that_the_file_does_not_state_is_asked_for(
+    shm: Shm, workspace: Workspace, tmp_path: Path
+) -> None:
+    """Names such as force mean newtons in nobody's file for certain."""
+    bare = tmp_path / "bare.csv"
+    rows = "".join(f"{n % 7},{n % 5}\n" for n in range(100))
+    bare.write_text(f"# sampling_rate_hz: 512\nforce,acc_1\n{rows}")
+    said = ("import", bare, "--hanger", 3, "--place", "2.5", "--plane", "transverse")
+    asked = shm("--workspace", workspace.folder, *said)
+    assert asked.code == 3
+    assert "In what unit is force recorded" in asked.err
+    units = ("--unit", "force=N", "--unit", "acc_1=g")
+    assert shm("--workspace", workspace.folder, *said, *units).code == 0
+    found = read(workspace.spool / "bare.csv")
+    assert isinstance(found, Recording)
+    assert all(channel.states_unit for channel in found.channels)
+
+
 def test_a_recording_is_looked_at_as_it_would_be_taken_in(
     shm: Shm, workspace: Workspace, tmp_path: Path
 ) -> None:

@@ -36,10 +36,18 @@ from tests.identify.signals import (
 
 def test_a_sound_test_has_nothing_to_remark() -> None:
     figures = assess(inspection(SOUND))
-    unasked = 6  # a second identifier, a window, a single hit, and three where nobody hit
+    unasked = 7  # unstated units, a second identifier, a window, a single hit, three of no hits
     assert [figure.verdict for figure in figures] == (len(CHECKS) - unasked) * ["good"]
     assert all(not figure.remedy for figure in figures)
     assert refusal(figures, "test.csv") is None
+
+
+def test_channels_whose_unit_nobody_states_are_named() -> None:
+    force, *others = SOUND.channels
+    bare = replace(SOUND, channels=(replace(force, states_unit=False), *others))
+    found = check_of("units", bare)
+    assert found.verdict == "warning"
+    assert f"unit of {force.name}: N" in found.found
 
 
 def test_a_hit_struck_twice_is_told_with_its_second() -> None:

@@ -11,8 +11,10 @@ from shm.errors import BadInput, NotIdentifiable
 from shm.identify import Identification, IdentifyOptions, identify
 from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.directions import directions
+from shm.identify.quality.of_sensors import sensor_places
+from shm.models.tensioned_beam import mode_shape
 from shm.simulate import HammerPlan, HangerState, hammer_test
-from shm.values import NAN, PLANES, Recording, ResponsePoint
+from shm.values import NAN, PLANES, Mode, QualityCheck, Recording, ResponsePoint, ShapePoint
 from tests.helpers.hangers import HANGER_3
 
 HANGER = replace(HANGER_3, plate=None)
@@ -57,6 +59,60 @@ def test_a_place_off_the_hanger_is_refused_with_its_channel(record: Recording) -
         with pytest.raises(BadInput, match=f"{x_m:g} m from the deck end") as raised:
             identified(with_places(record, 2.5, 2.5, x_m, x_m))
         assert raised.value.channel == "acc_3"
+
+
+def check_of(name: str, record: Recording) -> QualityCheck:
+    return next(check for check in identified(record).quality if check.name == name)
+
+
+def test_a_sound_test_moves_as_the_described_mass_lets_it(record: Recording) -> None:
+    gain, places = check_of("gain", record), check_of("places", record)
+    assert (gain.verdict, places.verdict) == ("good", "good")
+    assert gain.value == pytest.approx(1, abs=0.1)
+
+
+def test_accelerations_in_g_under_the_name_of_m_s2_are_noticed(record: Recording) -> None:
+    force, *others = record.channels
+    in_g = tuple(replace(c, values=c.values / 9.81) for c in others)
+    check = check_of("gain", replace(record, channels=(force, *in_g)))
+    assert check.verdict == "warning"
+    assert check.value == pytest.approx(1 / 9.81, rel=0.1)
+    assert "accelerations in g" in check.found
+
+
+def shapes_at(places_m: list[float], gains: list[float], said_m: list[float]) -> list[Mode]:
+    """Six modes of a hanger, seen by sensors of other gains and at other places than is said."""
+    xi = HANGER.length_m * np.sqrt(HANGER.nominal_tension_n / HANGER.bending_stiffness_n_m2)
+    return [
+        Mode("transverse", order, 5.0 * order, shape=tuple(
+            ShapePoint(x_m, float(value))
+            for x_m, value in zip(
+                said_m, gains * mode_shape(xi, 8, 8, order, np.array(places_m) / 12), strict=True
+            )
+        ))
+        for order in range(1, 7)
+    ]  # fmt: skip
+
+
+PLACES = [1.2, 2.0, 3.1]
+
+
+@pytest.mark.parametrize(
+    ("true_m", "gains", "found"),
+    [
+        (PLACES, [1, 1, 1], "are those of the described"),
+        (PLACES, [0.4, 1, 1], "the sensor at 1.2 m reads 2.5 times too little"),
+        (PLACES, [1, 1, -1], "the sensor at 3.1 m reads 1 times too much with the wrong sign"),
+        ([1.6, 2.0, 3.1], [1, 1, 1], "the sensor said to be at 1.2 m is at 1.6 m"),
+    ],
+)
+def test_one_gain_or_place_that_is_wrong_is_named(
+    true_m: list[float], gains: list[float], found: str
+) -> None:
+    check = sensor_places(shapes_at(true_m, gains, PLACES), HANGER)
+    assert check is not None
+    assert found in check.found
+    assert check.verdict == ("good" if "are those" in found else "warning")
 
 
 def turned(degrees: float, amplitude: float = 1.0) -> list[FoundMode]:

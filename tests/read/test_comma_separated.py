@@ -116,6 +116,7 @@ def test_one_plane_holds_for_all_accelerations(tmp_path: Path) -> None:
 def test_names_say_what_is_measured_where_no_unit_does(tmp_path: Path) -> None:
     found = recorded(tmp_path, f"# sampling_rate_hz: 512\n{NAMES}\n{ROWS}")
     assert [c.quantity for c in found.channels] == ["force", "acceleration", "acceleration"]
+    assert not any(c.states_unit for c in found.channels)
     assert found.hanger is None
     assert found.time is None
     assert math.isnan(found.temperature_c)

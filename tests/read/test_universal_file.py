@@ -114,9 +114,12 @@ def test_units_become_si_and_negative_directions_turn_the_sign(tmp_path: Path) -
 
 
 def test_the_type_says_what_is_measured_where_no_unit_does(tmp_path: Path) -> None:
-    found = read(uff(tmp_path, time_set("NONE", 13, 1, 1), time_set("NONE", 12, 2, 1)))
+    path = uff(tmp_path, time_set("NONE", 13, 1, 1), time_set("m/s2", 12, 2, 1))
+    found = read(path)
     assert isinstance(found, Recording)
-    assert [c.quantity for c in found.channels] == ["force", "acceleration"]
+    assert [(c.quantity, c.states_unit) for c in found.channels] == [
+        ("force", False), ("acceleration", True),
+    ]  # fmt: skip
 
 
 def test_the_date_of_the_run_is_read_as_utc(tmp_path: Path) -> None:

@@ -128,14 +128,14 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
         for mode, fit in zip(found.modes, fits, strict=True)
         if fit is not None and fit.is_sure
     ]
-    known = [fit for fit in fits if fit is not None]
     # Where several depend on amplitude, the others will too, by about as much.
-    several = len(sure) > _SOME * len(known)
+    several = len(sure) > _SOME * sum(fit is not None for fit in fits)
     usual = float(np.sqrt(np.mean(np.square(sure)))) if several else 0.0
     # A joint that slips lowers all frequencies, stretching raises all.
     expected = float(np.median(sure)) if several else 0.0
     modes = tuple(
-        _with_slope(mode, fit, expected, usual) for mode, fit in zip(found.modes, fits, strict=True)
+        _unlike(_with_slope(mode, fit, expected, usual), index, courses, mode)
+        for index, (mode, fit) in enumerate(zip(found.modes, fits, strict=True))
     )
     return replace(found, modes=modes)
 
@@ -145,6 +145,9 @@ def _with_slope(mode: FoundMode, fit: _Fit | None, expected: float, usual: float
     its own phase says nothing."""
     slope = (fit.slope, fit.slope_sd) if fit is not None else (NAN, NAN)
     known = replace(mode, amplitude_slope=slope[0], amplitude_slope_sd=slope[1])
+    if fit is None or abs(fit.slope) > MOST_SLOPE:
+        # A line that is as broad as the frequency moves looks damped by as much.
+        known = replace(known, damping_sd=math.hypot(mode.damping_sd, usual))
     prior_hz = usual * mode.frequency_hz
     if fit is not None and not usual and abs(fit.shift_hz) > _ALONE * mode.frequency_hz:
         return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, fit.shift_hz))
@@ -240,9 +243,35 @@ def _fits(
     fit = _averaged([law for law in laws if law is not None])
     if fit is None:
         return None
+    return replace(fit, shift_sd_hz=math.hypot(fit.shift_sd_hz, _UNLIKE * _unlike_hz(rows)))
+
+
+def _unlike_hz(rows: Sequence[_Row]) -> float:
+    """By how much the amplitudes fall otherwise than the pole says."""
     off = [math.log(size[-1] / size[0]) / (time_s[-1] - time_s[0]) for time_s, _, _, size in rows]
-    unlike_hz = _UNLIKE * abs(float(np.median(off))) / (2 * math.pi)
-    return replace(fit, shift_sd_hz=math.hypot(fit.shift_sd_hz, unlike_hz))
+    return abs(float(np.median(off))) / (2 * math.pi)
+
+
+def _unlike(
+    mode: FoundMode, index: int, courses: Sequence[_Course], as_found: FoundMode
+) -> FoundMode:
+    """Less sure where its amplitudes fall otherwise than it says, as after a start that was clipped
+    before the logger's filter rounded it."""
+    decay = 2 * math.pi * as_found.frequency_hz * as_found.damping_ratio
+    late = [_from_largest(course, index, decay) for course in courses]
+    seen = [row for course in late if (row := _phases(course, index, decay)) is not None]
+    off_hz = _unlike_hz(seen) if seen else 0.0
+    return replace(
+        mode,
+        damping_sd=math.hypot(mode.damping_sd, off_hz / mode.frequency_hz),
+        frequency_sd_hz=math.hypot(mode.frequency_sd_hz, _UNLIKE * off_hz),
+    )
+
+
+def _from_largest(course: _Course, index: int, decay: float) -> _Course:
+    now = np.abs(course.motion[:, index]) * np.exp(-decay * course.middle_s)
+    first = int(np.argmax(now[: max(1, len(now) // 2)]))
+    return _Course(course.middle_s[first:], course.motion[first:], course.sd[first:])
 
 
 def _averaged(laws: Sequence[_Fit]) -> _Fit | None:
@@ -278,8 +307,7 @@ def _phases(course: _Course, index: int, decay: float) -> _Row | None:
     last = int(np.argmin(clear)) if not np.all(clear) else len(clear)
     if last < 4:
         return None
-    phase = np.unwrap(np.angle(motion[:last]))
-    size = np.abs(motion[:last])
+    phase, size = np.unwrap(np.angle(motion[:last])), np.abs(motion[:last])
     sd = np.maximum(sd[:last] / np.maximum(size, _TINY), _PHASE_SD)
     smooth = np.polynomial.Polynomial.fit(course.middle_s[:last], np.log(size), 2, w=1 / sd)
     return course.middle_s[:last], phase, sd, np.exp(smooth(course.middle_s[:last]))
@@ -344,15 +372,9 @@ def _fit(mode: FoundMode, rows: Sequence[_Grown]) -> _Fit | None:
     spread = np.sqrt(np.diag(inverse) * max(1.0, misfit / freedom)) * _widening(freedom) * _OVERLAP
     spread = np.fmax(spread, _by_ring_downs(weighted, left_over, inverse, rows))
     shift_hz, slope = solved[count:].tolist()
-    return _Fit(
-        shift_hz,
-        float(spread[count]),
-        slope,
-        math.hypot(float(spread[count + 1]), _SLOPE_ERROR * slope),
-        slope * float(np.median([row[4] for row in rows])),
-        misfit,
-        freedom,
-    )
+    left = slope * float(np.median([row[4] for row in rows]))
+    slope_sd = math.hypot(float(spread[count + 1]), _SLOPE_ERROR * slope)
+    return _Fit(shift_hz, float(spread[count]), slope, slope_sd, left, misfit, freedom)
 
 
 def _by_ring_downs(

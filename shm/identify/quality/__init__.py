@@ -18,6 +18,7 @@ __all__ = ["CHECKS", "Check", "Inspection", "assess", "refusal", "tones"]
 CHECKS: tuple[Check, ...] = (
     of_hits.hits_used,
     of_hits.double_hits,
+    of_signals.units,
     of_signals.clipping,
     of_signals.recorded_window,
     of_signals.cable,

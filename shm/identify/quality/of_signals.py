@@ -48,6 +48,20 @@ _STRETCH_S = 0.5
 _LEAST_STRETCH_S = 0.1
 
 
+def units(inspection: Inspection) -> QualityCheck | None:
+    """Channels whose unit nothing states; None where all do."""
+    channels = [channel for record in inspection.records for channel in record.channels]
+    silent = sorted({channel.name for channel in channels if not channel.states_unit})
+    if not silent:
+        return None
+    return QualityCheck(
+        "units", "warning", float(len(silent)), 0.0, "",
+        f"neither file nor sidecar states the unit of {listed(silent)}: N and m/s2 were assumed",
+        "State the unit of each channel in the file's sidecar, or once for this logger by "
+        "`shm import FILE`.",
+    )  # fmt: skip
+
+
 def clipping(inspection: Inspection) -> QualityCheck | None:
     """How many hits have a clipped signal.
 

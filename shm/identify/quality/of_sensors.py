@@ -1,0 +1,226 @@
+"""Whether the sensors move as the described hanger does: right unit, gain and place?
+
+A hit's residue is the shape at the sensor times that at the hammer, each for unit modal mass. Away
+from its ends a hanger of mass M has the shape sqrt(2/M) sin(beta s + theta), whatever tension and
+ends, so that a unit that is off by 9.81 shows. Of several places each mode's shape tells whether
+one reads too much or too little, or is elsewhere: that one change mends all modes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shm.identify.contract import FoundMode, Measurement
+from shm.identify.mode_ordering.alignment import HIGHEST_ORDER, tensioned_beam_pattern
+from shm.identify.setup_merging.modal_participation import ringing
+from shm.values import PLANES, FloatArray, Hanger, IntArray, Mode, Plane, QualityCheck
+
+LARGEST_FACTOR = 2.0
+"""Of motion over force."""
+_LEAST_SHAPE = 0.3  # judgement, of the largest: nearer to a node a decimetre counts for too much
+_LEAST_ENTRIES = 3  # a median that one mode cannot make
+_SAME_MODE = 0.005  # judgement: set-ups see one mode as far apart
+_LARGEST_SLOPE = 1e-3  # with 3e-3 the motion came out 2.3 times too small, with 1e-3 at most 1.5
+LARGEST_MISFIT = 0.005
+"""1 - MAC of the shapes, mean over the modes of a plane. Of 76 planes of sound tests, of
+tests/worlds/recordings.py and of tests/benchmarks/right_signals.py, 18 were above, and none was
+mended by as much as `_LEAST_MOVE_M` or `_LEAST_FACTOR`."""
+_TYPICAL = 0.6  # judgement: of that, in the median mode; one mode that is misnumbered is no sensor
+_LEAST_PLACES, _LEAST_MODES = 2, 3
+_EXPLAINED = 0.2  # judgement: of the misfit, what one wrong sensor may leave of it
+_LEAST_MOVE_M, _LEAST_FACTOR = 0.25, 1.3  # judgement: less moves no order and no tension
+_NEARLY = 2.0  # judgement: another place explains it nearly as well
+_FACTORS = np.concatenate([np.geomspace(1 / 30, 30, 103), -np.geomspace(1 / 30, 30, 103)])
+_PLACES = np.linspace(0.005, 0.995, 199)
+
+
+@dataclass(frozen=True)
+class _Wrong:
+    """One sensor's factor or place that would mend the shapes, and what misfit it leaves."""
+
+    misfit: float
+    is_large: bool
+    text: str
+
+
+def sensor_gain(
+    measurements: Sequence[Measurement],
+    found: Sequence[Sequence[FoundMode]],
+    modes: Sequence[Mode],
+    hanger: Hanger,
+) -> QualityCheck | None:
+    """Motion for the force over that of the described mass; None where it cannot be told.
+
+    `found` are the modes of each set-up, `modes` those with an order. Of frequencies that change
+    much with amplitude the residues are too small.
+    """
+    if any(m.depends_on_amplitude and abs(m.amplitude_slope) > _LARGEST_SLOPE for m in modes):
+        return None
+    factors = [
+        factor
+        for measurement, own in zip(measurements, found, strict=True)
+        if measurement.driven and own
+        for factor in _factors(measurement, own, modes, hanger)
+    ]
+    if not factors:
+        return None
+    value = float(np.median(factors))
+    times, side = max(value, 1 / value), "more" if value > 1 else "less"
+    told = (
+        f"the hanger moves {times:.2g} times {side} for the force than its described mass lets it"
+    )
+    if times < LARGEST_FACTOR:
+        return QualityCheck("gain", "good", value, LARGEST_FACTOR, "", told)
+    cause = ", as accelerations in g do under the name m/s2" if 7 < 1 / value < 14 else ""
+    return QualityCheck(
+        "gain", "warning", value, LARGEST_FACTOR, "", told + cause,
+        "Check unit and sensitivity of hammer and accelerometers, the hammer's place, and the "
+        "described section and length.",
+    )  # fmt: skip
+
+
+def _factors(
+    measurement: Measurement, found: Sequence[FoundMode], modes: Sequence[Mode], hanger: Hanger
+) -> FloatArray:
+    """What each hit moves over what the described hanger would, both planes together."""
+    hammer = measurement.hammer
+    if hammer is None or not np.isfinite(hammer.x_m):
+        return np.empty(0)
+    residue = np.abs(ringing(measurement, found).residue)
+    measured = {point.plane for point in measurement.points}
+    squares = []
+    for plane in PLANES:
+        rows = [n for n, p in enumerate(measurement.points) if p.plane == plane and p.x_m == p.x_m]
+        own = list(_numbered(found, modes, plane))
+        if not rows or not own or (len(measured) == 1 and hammer.plane not in measured):
+            continue  # a hit across the only plane that is measured moves little in it
+        at, orders = (np.array(each) for each in zip(*own, strict=True))
+        places_m = [measurement.points[row].x_m for row in rows]
+        part = residue[:, rows][:, :, at]
+        squares.append(_ratio(part, orders, [*places_m, hammer.x_m], hanger) ** 2)
+    total = np.sqrt(np.nansum(squares, axis=0)) if squares else np.empty(0)
+    return np.asarray(total[total > 0])
+
+
+def _numbered(
+    found: Sequence[FoundMode], modes: Sequence[Mode], plane: Plane
+) -> Iterator[tuple[int, int]]:
+    """Of each found mode of a plane, its index and its order."""
+    for mode in modes:
+        away = [abs(each.frequency_hz / mode.frequency_hz - 1) for each in found]
+        if mode.plane == plane and mode.order <= HIGHEST_ORDER and min(away) < _SAME_MODE:
+            yield int(np.argmin(away)), mode.order
+
+
+def _ratio(
+    residue: FloatArray, orders: IntArray, places_m: Sequence[float], hanger: Hanger
+) -> FloatArray:
+    """Median ratio of residues (hits, points, modes) to the described ones, a hit each.
+
+    The hammer's is the last of the places. Of all end springs those whose ratios agree best.
+    """
+    best, least = np.full(len(residue), np.nan), np.inf
+    for shape in _shapes(np.array(places_m), orders, hanger):
+        at_sensor, at_hammer = np.abs(shape[:, :-1].T), np.abs(shape[:, -1])
+        near = (at_sensor > _LEAST_SHAPE) & (at_hammer > _LEAST_SHAPE)
+        if near.sum() < _LEAST_ENTRIES:
+            continue
+        mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
+        ratio = np.maximum((residue / (2 / mass_kg * at_sensor * at_hammer))[:, near], 1e-9)
+        middle = np.median(ratio, axis=1)
+        spread = float(np.nanmedian(np.abs(np.log(ratio / middle[:, np.newaxis]))))
+        if spread < least:
+            best, least = middle, spread
+    return np.asarray(best)
+
+
+def _shapes(places_m: FloatArray, orders: IntArray, hanger: Hanger) -> FloatArray:
+    """Shapes of the described hanger over end springs: (springs, modes, places)."""
+    pattern = tensioned_beam_pattern()
+    xi = hanger.length_m * np.sqrt(hanger.nominal_tension_n / hanger.bending_stiffness_n_m2)
+    tension = np.array([np.argmin(np.abs(pattern.log_xi - np.log(xi)))])
+    return np.asarray(pattern.shapes(places_m / hanger.length_m, tension)[0][:, orders - 1])
+
+
+def sensor_places(modes: Sequence[Mode], hanger: Hanger) -> QualityCheck | None:
+    """Whether one sensor's factor or place spoils the shapes; None where they do not tell, as those
+    of a bar with turnbuckles, which bend otherwise by as much as a wrong place does."""
+    if hanger.turnbuckles:
+        return None
+    results = [
+        found
+        for plane in PLANES
+        if (found := _in_plane([m for m in modes if m.plane == plane], plane, hanger)) is not None
+    ]
+    return max(results, key=lambda check: (check.verdict != "good", check.value), default=None)
+
+
+def _in_plane(modes: Sequence[Mode], plane: Plane, hanger: Hanger) -> QualityCheck | None:
+    modes = [mode for mode in modes if mode.order <= HIGHEST_ORDER]
+    values = np.array([[point.value for point in mode.shape] for mode in modes])
+    if len(modes) < _LEAST_MODES or values.shape[1] < _LEAST_PLACES:
+        return None
+    seen = np.isfinite(values).all(axis=0)
+    places_m = np.array([point.x_m for point in modes[0].shape])[seen]
+    if len(places_m) < _LEAST_PLACES:
+        return None
+    orders = np.array([mode.order for mode in modes])
+    misfit, typical, wrong = _explained(values[:, seen], places_m, orders, hanger)
+    best = min(wrong, key=lambda each: each.misfit)
+    if misfit < LARGEST_MISFIT or not best.is_large:
+        told = "the sensors' shapes are those of the described hanger"
+        return QualityCheck("places", "good", misfit, LARGEST_MISFIT, "", told)
+    in_most = typical >= _TYPICAL * LARGEST_MISFIT
+    if not in_most or best.misfit > _EXPLAINED * misfit:
+        return None  # the hanger is not as described, or more than one sensor is wrong
+    alike = [each for each in wrong if each.misfit < _NEARLY * best.misfit]
+    told = " or ".join(each.text for each in sorted(alike, key=lambda each: each.misfit)[:3])
+    return QualityCheck(
+        "places", "warning", misfit, LARGEST_MISFIT, "",
+        f"{len(modes)} {plane} modes fit the described hanger if {told}",
+        "Check place, unit, sensitivity and sign of that sensor.",
+    )  # fmt: skip
+
+
+def _explained(
+    values: FloatArray, places_m: FloatArray, orders: IntArray, hanger: Hanger
+) -> tuple[float, float, list[_Wrong]]:
+    """The misfit of shapes (modes, places), its mean and its median over the modes, and of each
+    place what its factor or its place mends."""
+    every = np.concatenate([places_m, _PLACES * hanger.length_m])
+    shapes = _shapes(every, orders, hanger)
+    own, elsewhere = shapes[:, :, : len(places_m)], shapes[:, :, len(places_m) :]
+    wrong = []
+    for n, x_m in enumerate(places_m):
+        scaled = np.repeat(values[np.newaxis], len(_FACTORS), axis=0)
+        scaled[:, :, n] *= _FACTORS[:, np.newaxis]
+        left = np.min([_misfits(scaled, shape).mean(axis=-1) for shape in own], axis=0)
+        wrong.append(_mended_by_factor(float(left.min()), x_m, _FACTORS[int(np.argmin(left))]))
+        moved = np.repeat(own[np.newaxis], len(_PLACES), axis=0)
+        moved[:, :, :, n] = elsewhere.transpose(2, 0, 1)
+        left = _misfits(values, moved).mean(axis=-1).min(axis=1)
+        there_m = float(every[len(places_m) + int(np.argmin(left))])
+        text = f"the sensor said to be at {x_m:.3g} m is at {there_m:.1f} m"
+        wrong.append(_Wrong(float(left.min()), abs(there_m - x_m) > _LEAST_MOVE_M, text))
+    least = min((_misfits(values, shape) for shape in own), key=np.mean)
+    return float(np.mean(least)), float(np.median(least)), wrong
+
+
+def _mended_by_factor(misfit: float, x_m: float, factor: float) -> _Wrong:
+    times = float(max(abs(factor), 1 / abs(factor)))
+    side, turned = (
+        "little" if abs(factor) > 1 else "much",
+        " with the wrong sign" if factor < 0 else "",
+    )
+    text = f"the sensor at {x_m:.3g} m reads {times:.2g} times too {side}{turned}"
+    return _Wrong(misfit, times > _LEAST_FACTOR or bool(factor < 0), text)
+
+
+def _misfits(values: FloatArray, shapes: FloatArray) -> FloatArray:
+    """1 - MAC of each mode (..., modes); both (..., modes, places)."""
+    product = np.sum(values * shapes, axis=-1) ** 2
+    norms = np.sum(values**2, axis=-1) * np.sum(shapes**2, axis=-1)
+    return np.asarray(1 - product / np.maximum(norms, 1e-300))
