@@ -8,7 +8,7 @@ What an owner says of the gap diagnosis: ranges of effects, and how exactly the 
 from __future__ import annotations
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
@@ -32,13 +32,17 @@ _SECTION = ("area_m2", "second_moment_m4", "mass_per_length_kg_m")
 _OPTIONAL = (
     "name", "diameter_m", "density_kg_m3", "poissons_ratio", "bending_stiffness_factor", "models",
     "plate", "turnbuckle", "thresholds", "scatter", "effects", "supports", "kind", "family",
-    "limits", "fittings_m",
+    "limits", "fittings_m", "length_by",
 )  # fmt: skip
 _KNOWN = {*_REQUIRED, *_SECTION, *_OPTIONAL}
 _LARGEST_POISSONS_RATIO = 0.499
 _LEAST_FACTOR = 1e-6
 _SOFTEST_PA, _STIFFEST_PA = 1e6, 2e12
 """Rubber, and twice a diamond: what lies beyond was written in another unit."""
+
+_FORK_DIAMETERS, _NODE_SHARE = 4.0, 0.03
+"""Judgement: a fork, from pin to bar, takes up to four diameters, a node plate with half a chord
+up to 3 % of the length; how much of it swings is open."""
 
 # Judgement: from ten false calls a year, which nobody reads, to none in the life of all bridges.
 _FALSE_CALL_YEARS = (0.1, 1e6)
@@ -61,6 +65,8 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
             f"a section of {max(diameter, math.sqrt(area)):g} m is no hanger of {length_m:g} m",
             "Give lengths and diameters in m, areas in m2.",
         )
+    fittings_m, plate = _fittings(table, length_m), _plate(table.table("plate"), length_m, diameter)
+    open_ends = plate is None and not any(fittings_m)
     return Hanger(
         id=table.value(
             "id", int, "is not a whole number", "Give id = 1, 2, 3, ...", holds=lambda id_: id_ >= 0
@@ -76,17 +82,36 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         diameter_m=diameter,
         poissons_ratio=table.fraction("poissons_ratio", 0.3, 0.0, _LARGEST_POISSONS_RATIO),
         bending_stiffness_factor=table.fraction("bending_stiffness_factor", 1.0, _LEAST_FACTOR, 1),
-        plate=_plate(table.table("plate"), length_m, diameter),
+        plate=plate,
         turnbuckles=_turnbuckles(table.tables("turnbuckle"), length_m),
         models=_models(table),
-        scatter=scatter_of(table.table("scatter")),
+        scatter=_scatter(table, length_m, area, open_ends),
         effect_priors=effect_priors_of(table.table("effects")),
         supports=supports_of(table.table("supports")),
         kind=_kind(table),
         family=str(values.get("family", "")),
         limits=_limits(table.table("limits")),
-        fittings_m=_fittings(table, length_m),
+        fittings_m=fittings_m,
     )
+
+
+def _scatter(table: Table, length_m: float, area_m2: float, open_ends: bool) -> Scatter:
+    """As stated; where nothing is said of ends, the way of taping tells how well the length that
+    swings is known."""
+    scatter = scatter_of(table.table("scatter"))
+    by = table.value(
+        "length_by",
+        Literal["faces", "pins", "nodes"],
+        "is no way to tape a hanger",
+        'Write "faces" (free bar between its fittings), "pins" or "nodes" (system lines).',
+        "faces",
+    )
+    if by == "faces" or not open_ends or math.isfinite(scatter.effective_length):
+        return scatter
+    fork_m = _FORK_DIAMETERS * math.sqrt(4 * area_m2 / math.pi)
+    takes = fork_m / length_m if by == "pins" else _NODE_SHARE
+    # Root mean square of what two ends take, each evenly from nothing to all.
+    return replace(scatter, effective_length=math.sqrt(7 / 6) * takes)
 
 
 def structure_of(values: dict[str, Any], path: Path) -> Hanger:

@@ -107,7 +107,7 @@ class Coordinates:
         self.parameters = tuple(parameters)
         self._made = slice(baseline, baseline + DEVIATIONS)
         self._scatter = np.array(
-            [scatter.section, scatter.density, scatter.length, scatter.modulus]
+            [scatter.section, scatter.density, scatter.swinging_length, scatter.modulus]
         )
         self.names = tuple(parameter.name for parameter in parameters)
 

@@ -37,7 +37,7 @@ _LEAST_RATIO = 1.2  # of levels, as `shm.models.effects` asks
 
 def with_damping(observations: Observations, kinds: Sequence[Family]) -> tuple[Family, ...]:
     """Families with what damping says of each, the likeliest first."""
-    rising = _log_rising(observations)
+    rising = log_rising(observations)
     told = [(kind, _odds(rising, kind.best.hypothesis)) for kind in kinds]
     found = [
         replace(kind, log_evidence=kind.log_evidence + odds, log_mimic=kind.log_mimic + odds)
@@ -51,18 +51,18 @@ def log_odds(observations: Observations, hypothesis: Hypothesis) -> float:
 
     Of something unknown no one knows whether it takes energy: both are as likely.
     """
-    return _odds(_log_rising(observations), hypothesis)
+    return _odds(log_rising(observations), hypothesis)
 
 
-def _odds(log_rising: float, hypothesis: Hypothesis) -> float:
+def _odds(rising: float, hypothesis: Hypothesis) -> float:
     rises = any(EFFECTS[name].dissipates for name in hypothesis.names)
     if not (rises or hypothesis.flexible):
         return 0.0
-    odds = float(np.clip(log_rising, -MOST, MOST))
+    odds = float(np.clip(rising, -MOST, MOST))
     return odds if rises else float(np.logaddexp(odds, 0.0) - np.log(2))
 
 
-def _log_rising(observations: Observations) -> float:
+def log_rising(observations: Observations) -> float:
     """Log Bayes factor of a damping that rises with the level; 0 where the tests cannot tell."""
     design, damping = observations.design, observations.damping
     known = np.flatnonzero(np.isfinite(damping).all(axis=1))

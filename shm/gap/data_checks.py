@@ -7,15 +7,26 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
+from statistics import median
 
 from shm.errors import BadInput
 from shm.gap.few_frequencies import told_of_few
 from shm.values import PLANES, Hanger, ModalTest, Mode, Outlier
+from shm.values.modes import MOST_SLOPE
 
 # Judgement: 4.5 are rare and no proof (`shm.gap.outliers`); among some hundred pairs six never are.
 _CONTRADICTION_SD = 6.0
 # Judgement: no thermometer on a bar, and no hand with a hammer, is more alike from test to test.
+SURE_COMMON_SDS = 3.0  # judgement: by chance one test in 370
 _SAME_TEMPERATURE_K, _SAME_LEVEL = 2.0, 1.1
+
+
+_OF_A_MODE = ("plane", "order", "frequency_hz", "frequency_sd_hz", "damping_ratio", "shape")
+_OF_A_TEST = ("temperature_c", "amplitude", "added_mass", "tension_read_n")
+_UNITS = {2 * math.pi: "rad/s", 60.0: "rpm", 1e-3: "kHz"}
+_SAME_UNIT = 1.8
+"""Factor. Judgement: a tension of a third to three times the nominal one; ends do less. What is as
+near to another unit calls for a tension beyond the prior."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +44,9 @@ def usable(tests: Sequence[ModalTest], hanger: Hanger) -> Usable:
     or have masses or sensors beyond its ends.
     """
     _refuse(tests, hanger)
-    kept, remarks = [], []
+    unit = _other_unit(tests, hanger)
+    tests, copied = _without_copies(tests)
+    kept, remarks = [], [each for each in (unit, copied) if each]
     for test in tests:
         doubtful = _doubtful(test)
         remarks += [f"Test {test.id}: {reason}" for reason in doubtful.values()]
@@ -65,6 +78,54 @@ def _refuse(tests: Sequence[ModalTest], hanger: Hanger) -> None:
                     f"(0 to {hanger.length_m:g} m).",
                     remedy="Measure x_m from the deck end, in m.",
                 )
+
+
+def _other_unit(tests: Sequence[ModalTest], hanger: Hanger) -> str:
+    """What the frequencies look like where they are not in Hz, by a bar half pinned, half clamped
+    at the nominal tension."""
+    pairs = []
+    for mode in (mode for test in tests for mode in test.modes if mode.frequency_hz > 0):
+        wave = math.pi * (mode.order + 0.25) / hanger.length_m
+        pull_n = hanger.nominal_tension_n + hanger.bending_stiffness_n_m2 * wave**2
+        expected_hz = wave / (2 * math.pi) * math.sqrt(pull_n / hanger.mass_per_length_kg_m)
+        pairs.append((math.log(mode.frequency_hz), math.log(expected_hz)))
+    if not pairs:
+        return ""
+    away = {
+        unit: median(abs(f - e - math.log(by)) for f, e in pairs) for by, unit in _UNITS.items()
+    }
+    away["s (periods)"] = median(abs(f + e) for f, e in pairs)
+    unit = min(away, key=lambda each: away[each])
+    ratio = math.exp(median(f - e for f, e in pairs))
+    if away[unit] > math.log(_SAME_UNIT) or abs(math.log(ratio)) < 2 * math.log(_SAME_UNIT):
+        return ""
+    return (
+        f"The frequencies look given in {unit}, not in Hz: they are {ratio:.2g} times those of the "
+        "description at its nominal tension. Give them in Hz and diagnose again."
+    )
+
+
+def _without_copies(tests: Sequence[ModalTest]) -> tuple[list[ModalTest], str]:
+    """The tests, of those that hold the same numbers the first only, with a remark."""
+    kept: dict[str, ModalTest] = {}
+    copies: list[str] = []
+    for test in tests:
+        # As text, for unknown numbers are no equal numbers.
+        numbers = repr([*map(_numbers, test.modes), *_numbers(test)])
+        if numbers in kept:
+            copies.append(f"{test.id} (as {kept[numbers].id})")
+        kept.setdefault(numbers, test)
+    if not copies:
+        return list(tests), ""
+    return list(kept.values()), (
+        f"The same numbers to the last digit as another test: {', '.join(copies)}. Copies say "
+        "nothing new; each is counted once."
+    )
+
+
+def _numbers(of: ModalTest | Mode) -> list[object]:
+    names = _OF_A_MODE if isinstance(of, Mode) else _OF_A_TEST
+    return [getattr(of, name) for name in names]
 
 
 def _places(test: ModalTest) -> Iterator[tuple[str, float]]:
@@ -170,10 +231,31 @@ def _without_shape_sd(tests: Sequence[ModalTest]) -> str:
     )
 
 
+def common_slope(tests: Sequence[ModalTest]) -> tuple[float, float]:
+    """The weighted mean of all modes' `amplitude_slope`, and its standard deviation; inf of none.
+
+    What slips lowers all frequencies, a guide or stretching raises all: together they tell more
+    surely than each.
+    """
+    known = [m for t in tests for m in t.modes if abs(m.amplitude_slope) < MOST_SLOPE]
+    weight = sum(m.amplitude_slope_sd**-2 for m in known if m.amplitude_slope_sd > 0)
+    if not weight:
+        return 0.0, math.inf
+    each = (m.amplitude_slope / m.amplitude_slope_sd**2 for m in known if m.amplitude_slope_sd > 0)
+    return sum(each) / weight, weight**-0.5
+
+
 def _amplitude(tests: Sequence[ModalTest]) -> str:
     changing = [m for test in tests for m in test.modes if m.depends_on_amplitude]
     if not changing:
-        return ""
+        slope, sd = common_slope(tests)
+        if abs(slope) <= SURE_COMMON_SDS * sd:
+            return ""
+        return (
+            f"Something depends on amplitude: all frequencies together are {100 * abs(slope):.2g} "
+            f"% {'lower' if slope < 0 else 'higher'} at that of a hit than at small amplitude "
+            f"({abs(slope) / sd:.0f} standard deviations), though none is surely so by itself."
+        )
     most = max((mode.amplitude_slope for mode in changing), key=abs)
     side = "lower" if most < 0 else "higher"
     which = f"{len(changing)} frequencies depend" if len(changing) > 1 else "One frequency depends"
@@ -190,8 +272,14 @@ def _rattling(tests: Sequence[ModalTest]) -> str:
     return (
         f"Above a level of {min(test.rattles_above for test in told):.2g} the hanger does not ring "
         f"as a bar does ({_listed([test.id for test in told])}): something knocks, such as a guide "
-        "with play, slips or opens. The frequencies are those of smaller swings."
+        f"with play, slips or opens. {_whose(told)}"
     )
+
+
+def _whose(tests: Sequence[ModalTest]) -> str:
+    if all(test.amplitude <= test.rattles_above for test in tests):
+        return "The frequencies are those of smaller swings."
+    return "The frequencies are means over ring-downs: test again with softer hits."
 
 
 def _contradictions(tests: Sequence[ModalTest]) -> list[str]:

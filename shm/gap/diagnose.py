@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.gap.alone import rattling, with_what_acts
+from shm.gap.alone import with_dynamics
 from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress, silent
 from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
@@ -86,7 +86,7 @@ def examined(
     rng = np.random.default_rng(options.seed)
     clear = cleared(whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done))
     problem = clear.problem
-    attribution = with_what_acts(clear.attribution, rattling(found.tests))
+    attribution, dynamic = with_dynamics(clear.attribution, found.tests, whole.observations)
     progress("shrinkage", _ATTRIBUTION)
     answer, before = answered(attribution), attribution.baseline
     after = attribution.leading.best.fit if attribution.leading else None
@@ -117,6 +117,7 @@ def examined(
         next_measurements=following,
         remarks=(
             *_states(problem, before, after, after_n),
+            *dynamic,
             *_on_the_way(found, clear, aside, doubted, after or before),
         ),
         seed=options.seed,

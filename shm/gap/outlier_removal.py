@@ -181,31 +181,48 @@ Shifts = tuple[int, ...]
 def misnumbered(problem: GapProblem, attribution: Attribution) -> tuple[str, ...]:
     """A remark where the baseline explains the modes far better under other orders, else none.
 
-    Tried are orders one higher or lower, of either plane or both. A remainder, which costs time,
-    is tried only with those that the baseline alone fits better than the orders as they are.
+    Tried are orders one higher or lower, all or from one mode on, and one mode that is none of the
+    hanger's, of either plane or both. A remainder, which costs time, is tried only with those that
+    the baseline alone fits better than the orders as they are.
     """
     if attribution.leads == "no gap":
         return ()
     rng = np.random.default_rng(0)  # for the draws of fits, which are not used
+    least = attribution.baseline.log_evidence
     found = [
-        (_evidence(other, rng), shifts, other)
-        for shifts, other in _renumbered(problem)
-        if baseline_fit(other, rng).log_evidence > attribution.baseline.log_evidence
+        (_evidence(each.problem, rng) + each.log_dropped, each)
+        for each in (*_shifted(problem), *_from_one_on(problem))
+        if baseline_fit(each.problem, rng).log_evidence + each.log_dropped > least
     ]
     if not found:
         return ()
-    log_evidence, shifts, other = max(found, key=lambda each: each[0])
+    log_evidence, best = max(found, key=lambda each: each[0])
     if log_evidence < max(each.log_evidence for each in attribution.tried) + FAR_BETTER:
         return ()
     return (
-        f"The orders look wrong: were {_told(shifts)}, the baseline alone would fit better than "
-        f"any cause does now{_tension(other, rng)}. Was the lowest mode missed, or one counted "
-        f"that is none? If so, number them anew and diagnose again.",
+        f"The orders look wrong: were {best.told}, the baseline alone would fit better than "
+        f"any cause does now{_tension(best.problem, rng)}. {best.asked} If so, number them anew "
+        f"and diagnose again.",
     )
 
 
-def _renumbered(problem: GapProblem) -> Iterator[tuple[Shifts, GapProblem]]:
-    """The same frequencies with other orders in either plane or both."""
+@dataclass(frozen=True, eq=False)
+class _Numbering:
+    """The same frequencies by other orders, `dropped` of them taken for none of the hanger's."""
+
+    told: str
+    problem: GapProblem
+    asked: str = "Was the lowest mode missed, or one counted that is none?"
+    dropped: int = 0
+
+    @property
+    def log_dropped(self) -> float:
+        """A frequency of something else may lie anywhere within two decades, here."""
+        return -self.dropped * float(np.log(np.log(100.0)))
+
+
+def _shifted(problem: GapProblem) -> Iterator[_Numbering]:
+    """All modes of either plane, or of both, numbered one higher or lower."""
     design = problem.design
     planes = np.unique(design.frequency_plane)
     for chosen in product(_SHIFTS, repeat=len(planes)):
@@ -213,10 +230,38 @@ def _renumbered(problem: GapProblem) -> Iterator[tuple[Shifts, GapProblem]]:
         shifts[planes] = chosen
         order = design.frequency_order + shifts[design.frequency_plane]
         if shifts.any() and order.min() > 0:
-            observations = replace(
-                problem.observations, design=replace(design, frequency_order=order)
+            yield _Numbering(_told(tuple(shifts)), _numbered(problem, order))
+
+
+def _from_one_on(problem: GapProblem) -> Iterator[_Numbering]:
+    """One mode missed between the others, or one counted that is none; in one plane or both."""
+    design = problem.design
+    planes = np.unique(design.frequency_plane).tolist()
+    for these in [[plane] for plane in planes] + ([planes] if len(planes) > 1 else []):
+        inside = np.isin(design.frequency_plane, these)
+        own = "both planes'" if len(these) > 1 else f"the {PLANES[these[0]]}"
+        for first in np.unique(design.frequency_order[inside]).tolist():
+            above = inside & (design.frequency_order > first)
+            if not above.any():
+                continue
+            up = _numbered(problem, design.frequency_order + above)
+            asked = f"Was a mode missed between {first} and {first + 1}?"
+            yield _Numbering(f"{own} modes above {first} numbered one higher", up, asked)
+            kept = ~(inside & (design.frequency_order == first))
+            down = _numbered(problem.part(kept), (design.frequency_order - above)[kept])
+            yield _Numbering(
+                f"{own} mode {first} left out and those above numbered one lower",
+                down,
+                "Is that mode a damper's, the deck's or another neighbour's?",
+                int(np.sum(~kept)),
             )
-            yield tuple(shifts), GapProblem(problem.hanger, problem.baseline, observations)
+
+
+def _numbered(problem: GapProblem, order: IntArray) -> GapProblem:
+    design = replace(problem.design, frequency_order=order)
+    return GapProblem(
+        problem.hanger, problem.baseline, replace(problem.observations, design=design)
+    )
 
 
 def _evidence(problem: GapProblem, rng: np.random.Generator) -> float:

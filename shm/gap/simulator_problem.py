@@ -173,7 +173,7 @@ class SimulatorProblem:
         for key, members in rows.items():
             found = self._called(predict, theta, dict(key), len(z))
             for i in members:
-                predicted[:, i] = _observable(found, readings[i], effect)
+                predicted[:, i] = _observable(found, readings[i], effect, len(z))
         if len(z) and not np.isfinite(predicted).any():
             name = f"effect {effect.name}" if effect else "simulator"
             raise BadInput(
@@ -186,9 +186,11 @@ class SimulatorProblem:
         self, predict: Predict, theta: dict[str, FloatArray], condition: Condition, count: int
     ) -> Mapping[str, Any]:
         if self.simulator.vectorised:
-            return predict(dict(theta), condition)
+            return _mapping(_of_arrays(predict, dict(theta), condition))
         each = [
-            predict({name: float(values[row]) for name, values in theta.items()}, condition)
+            _mapping(
+                predict({name: float(values[row]) for name, values in theta.items()}, condition)
+            )
             for row in range(count)
         ]
         return {name: np.array([one[name] for one in each]) for name in each[0]}
@@ -245,8 +247,27 @@ def _node(covariance: FloatArray, log_weight: float) -> NoiseNode:
     return NoiseNode(Covariance(covariance, np.empty(0), np.empty((0, 0))), float(log_weight), 0.0)
 
 
+def _of_arrays(predict: Predict, theta: dict[str, Any], condition: Condition) -> object:
+    try:
+        return predict(theta, condition)
+    except TypeError as error:
+        raise UsageError(
+            f"the simulator fails on arrays: {error}.",
+            remedy="Compute with numpy, or leave out vectorised=True.",
+        ) from error
+
+
+def _mapping(found: object) -> Mapping[str, Any]:
+    if not isinstance(found, Mapping):
+        raise UsageError(
+            f"the simulator returned {type(found).__name__}, not observables by their names.",
+            remedy='Return a dictionary, such as {"force_n": value}.',
+        )
+    return found
+
+
 def _observable(
-    found: Mapping[str, Any], reading: Reading, effect: SimulatorEffect | None
+    found: Mapping[str, Any], reading: Reading, effect: SimulatorEffect | None, count: int
 ) -> FloatArray:
     if reading.observable not in found:
         of = f"effect {effect.name}" if effect else "the simulator"
@@ -254,4 +275,10 @@ def _observable(
             f"{of} predicts no {reading.observable!r} at {dict(reading.condition)}.",
             remedy=f"It gives {', '.join(found)}: return every observable that was read.",
         )
-    return np.asarray(found[reading.observable], dtype=float)
+    values = np.asarray(found[reading.observable], dtype=float)
+    if values.shape not in ((), (count,)):
+        raise UsageError(
+            f"{reading.observable!r} came with shape {values.shape}, of {count} parameter sets.",
+            remedy="Return one number for each set, in their order.",
+        )
+    return values

@@ -26,7 +26,7 @@ from shm.identify.mode_ordering.placement import Placement, placed
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
 from shm.identify.quality.of_sensors import sensor_gain, sensor_places
-from shm.identify.setup_merging.calm_part import LEFT_OUT, calmed, level_left_at
+from shm.identify.setup_merging.calm_part import LEFT_OUT, calmed, free_below, level_left_at
 from shm.identify.setup_merging.hit_directions import alike, sharpened, together
 from shm.identify.setup_merging.joined import Joined, joined
 from shm.identify.setup_merging.modal_participation import fitted
@@ -104,12 +104,20 @@ def identify(
         if calm is None:
             raise _nothing_found(records[0].source, found.finding, placement)
         placement, level_left, noted = calm
+        free = level_left
+    else:
+        free = free_below(measurements, placement.modes)
+        noted = (*noted, *_strange(free))
     hits = sorted(
         (hit for measurement in measurements for hit in measurement.hits),
         key=lambda hit: (hit.record, hit.start),
     )
+    amplitude = _amplitude(hits, options)
     return Identification(
-        test=_test(test_id, records, placement.modes, _amplitude(hits, options), level_left),
+        test=replace(
+            _test(test_id, records, placement.modes, level_left * amplitude),
+            rattles_above=free * amplitude if free < 1 else NAN,
+        ),
         frequency_response=joined_response(measurements),
         hits=tuple(hits),
         dropped=_all_dropped(measurements, found.finding),
@@ -158,6 +166,15 @@ def _once_calm(
         "as a bar; something knocks (a guide with play), slips or opens while it swings far"
     )
     return placement, level_left_at(measurements, left_out), (note,)
+
+
+def _strange(free: float) -> tuple[str, ...]:
+    if free >= 1:
+        return ()
+    return (
+        f"until {free:.0%} of their level is left, ring-downs are no sum of the modes: something "
+        "knocks (a guide with play), slips or opens while the hanger swings far",
+    )
 
 
 def _cross_check(measurements: Sequence[Measurement], options: IdentifyOptions) -> Finding | None:
@@ -231,10 +248,8 @@ def _test(
     records: Sequence[Recording | FrequencyResponse],
     modes: tuple[Mode, ...],
     amplitude: float,
-    level_left: float,
 ) -> ModalTest:
-    """The test with the earliest time and the mean temperature of its records; below 1 `level_left`
-    is what its frequencies' level is of that of its hits."""
+    """The test with the earliest time and the mean temperature of its records."""
     temperatures = [r.temperature_c for r in records if not math.isnan(r.temperature_c)]
     return ModalTest(
         id=as_test_id(test_id),
@@ -242,8 +257,7 @@ def _test(
         hanger=next((r.hanger for r in records if r.hanger is not None), None),
         time=min((r.time for r in records if r.time is not None), default=None),
         temperature_c=float(np.mean(temperatures)) if temperatures else NAN,
-        amplitude=level_left * amplitude,
-        rattles_above=level_left * amplitude if level_left < 1 else NAN,
+        amplitude=amplitude,
         added_mass=next((r.added_mass for r in records if r.added_mass is not None), None),
     )
 

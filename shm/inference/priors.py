@@ -100,8 +100,7 @@ class Deviations:
         scatter = model.hanger.scatter
         sds = {SECTION: scatter.section, DENSITY: scatter.density, MODULUS: scatter.modulus}
         if not model.length_is_open:
-            effective = scatter.effective_length if math.isfinite(scatter.effective_length) else 0.0
-            sds[LENGTH] = math.hypot(scatter.length, effective)
+            sds[LENGTH] = scatter.swinging_length
         stated = model.is_strand and math.isfinite(scatter.bending_factor)
         taught = calibration is not None and BENDING in calibration.names
         if stated or (model.is_strand and taught):

@@ -105,9 +105,7 @@ class AsMade(Model):
         if plate is not None and self.length_is_open:
             # Plates hold the rod somewhere between their necks and their end faces.
             return 1 - 2 * plate.length_m / self.hanger.length_m, 1.0
-        scatter = self.hanger.scatter
-        stated = scatter.effective_length
-        most = _MOST_SD * math.hypot(scatter.length, stated if math.isfinite(stated) else 0.0)
+        most = _MOST_SD * self.hanger.scatter.swinging_length
         return max(1 - most, 0.5), 1 + most
 
     def stiffness_mass_length(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -266,7 +266,9 @@ class Deviation(Parameter):
 def deviations_of(hanger: Hanger) -> tuple[Deviation, ...]:
     """Of section, density, length and modulus, as fractions."""
     reason = "scatter of manufacture, as the hanger's description states it"
-    sds = [(name, getattr(hanger.scatter, name)) for name in DEVIATIONS]
+    made = hanger.scatter
+    sizes = (made.section, made.density, made.swinging_length, made.modulus)
+    sds = list(zip(DEVIATIONS, sizes, strict=True))
     return tuple(Deviation(name, "fraction", -sd, sd, 0.0, reason) for name, sd in sds)
 
 

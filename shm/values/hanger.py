@@ -91,6 +91,12 @@ class Scatter:
     sensor_place_m: float = 0.01
     sensor_turn_deg: float = 1.5
 
+    @property
+    def swinging_length(self) -> float:
+        """By which the length that swings may differ from the taped one, the tape's error in it."""
+        stated = self.effective_length
+        return math.hypot(self.length, stated if math.isfinite(stated) else 0.0)
+
 
 @dataclass(frozen=True)
 class Limits:

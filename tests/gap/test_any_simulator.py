@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -15,6 +16,7 @@ from shm.gap.contract import Hypothesis
 from shm.gap.simulator_fit import fitted
 from shm.gap.simulator_problem import (
     Condition,
+    Predict,
     Prior,
     Reading,
     Simulator,
@@ -93,6 +95,21 @@ def test_a_textbook_system_gives_up_its_cause(
     two = [each for each in simulator.effects if each.name == true] + rivals[:1]
     assert diagnose_simulator(replace(simulator, effects=two), readings).named == (true,)
     assert diagnose_simulator(replace(simulator, effects=rivals[-1:]), readings).named == ()
+
+
+@pytest.mark.parametrize(
+    ("predict", "said"),
+    [
+        (lambda p, at: p["slope"] * at["x"], "not observables by their names"),
+        (lambda p, at: {"y": math.exp(p["slope"])}, "leave out vectorised=True"),
+        (lambda p, at: {"y": np.zeros(3)}, "one number for each set"),
+    ],
+)
+def test_a_function_that_takes_no_arrays_is_refused_with_a_remedy(
+    predict: Predict, said: str
+) -> None:
+    with pytest.raises(UsageError, match=said):
+        diagnose_simulator(replace(LINE, predict=predict, vectorised=True), READINGS)
 
 
 def test_what_cannot_be_is_refused_with_a_remedy() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -12,6 +13,7 @@ from shm.values import NAN, AddedMass, Hanger, ModalTest, Mode, Plane, Scatter, 
 
 HANGER = Hanger(3, 12.0, 200e9, 0.01327, 1.402e-5, 103.5, 711e3)
 FREQUENCIES = (5.6, 13.5, 24.6, 39.1, 57.1, 78.6)
+AGAIN = tuple(1.00001 * hz for hz in FREQUENCIES)  # no two measurements agree to the last digit
 
 
 def _test(
@@ -27,10 +29,33 @@ def _test(
 
 
 def test_good_tests_call_for_no_remark_and_lose_no_mode() -> None:
-    tests = (_test("t1"), _test("t2"))
+    tests = (_test("t1"), _test("t2", AGAIN))
     found = usable(tests, HANGER)
     assert found.tests == tests
     assert found.remarks == ()
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"),
+    [("rad/s", 2 * math.pi), ("rpm", 60.0), ("kHz", 1e-3), ("s (periods)", None)],
+)
+def test_frequencies_in_another_unit_are_recognised(unit: str, factor: float | None) -> None:
+    given = tuple(factor * hz if factor else 1 / hz for hz in FREQUENCIES)
+    try:
+        said = usable([_test("t1", given)], HANGER).remarks[0]
+    except BadInput as refused:  # of periods, which fall as orders rise
+        said = str(refused)
+    assert f"look given in {unit}, not in Hz" in said
+    for tension_n in (0.4 * 711e3, 2.5 * 711e3):
+        assert not usable([_test()], replace(HANGER, nominal_tension_n=tension_n)).remarks
+
+
+def test_copies_of_a_test_count_once() -> None:
+    tests = [_test(f"t{number}") for number in range(6)]
+    found = usable(tests, HANGER)
+    assert found.tests == (tests[0],)
+    assert "t5 (as t0)" in found.remarks[0]
+    assert len(usable([tests[0], replace(tests[1], temperature_c=20.0)], HANGER).tests) == 2
 
 
 def test_one_mode_only_is_said_with_what_it_does() -> None:
@@ -64,7 +89,8 @@ def test_one_mode_at_several_tensions_read_shows_a_gap_by_how_it_rises() -> None
     (remark,) = usable([one, other], HANGER).remarks
     assert "a gap shows only where the frequencies do not change as the tensions" in remark
     assert "tension alone" not in remark
-    (remark,) = usable([one, replace(other, tension_read_n=7e5)], HANGER).remarks
+    again = replace(_test("t2", AGAIN), modes=_test("t2", AGAIN).modes[:1], tension_read_n=7e5)
+    (remark,) = usable([one, again], HANGER).remarks
     assert "tension alone can follow" in remark
 
 
@@ -76,7 +102,9 @@ def test_an_irregular_mode_is_used_and_said() -> None:
     (remark,) = found.remarks
     assert remark.startswith("Well off the beam that the other modes follow is transverse 1 of tes")
     assert "(5.6 Hz): the diagnosis takes it, `shm update` leaves it out" in remark
-    (remark,) = usable([test, replace(test, id="t2")], HANGER).remarks
+    other = _test("t2", AGAIN)
+    other = replace(other, modes=(replace(other.modes[0], irregular=True), *other.modes[1:]))
+    (remark,) = usable([test, other], HANGER).remarks
     assert "follow are transverse 1 of test t1 (5.6 Hz), transverse 1 of test t2" in remark
 
 

@@ -80,6 +80,33 @@ def test_a_gap_does_not_hide_wrong_orders() -> None:
     assert "both planes numbered one higher" in remark
 
 
+def _remark_of(tests: list[ModalTest]) -> str:
+    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    return "".join(misnumbered(problem, attributed(problem, OPTIONS, np.random.default_rng(1))))
+
+
+def test_a_mode_missed_in_the_middle_is_said() -> None:
+    """Orders 1, 2, 4, 5, 6 numbered 1 to 5, in the plane that was measured."""
+    (test, *_) = _numbered({})
+    modes = [m for m in test.modes if m.plane == "transverse" and m.order != 3]
+    modes = [replace(mode, order=n) for n, mode in enumerate(modes, 1)]
+    remark = _remark_of([replace(test, modes=tuple(modes))])
+    assert "the transverse modes above 2 numbered one higher" in remark
+    assert "missed between 2 and 3" in remark
+    four = [replace(test, modes=tuple(modes[:4]))]
+    assert "the transverse modes above 2 numbered one higher" in _remark_of(four)
+
+
+def test_a_mode_that_is_a_dampers_own_is_said() -> None:
+    (test, *_) = _numbered({})
+    modes = [m for m in test.modes if m.plane == "transverse"]
+    own = replace(modes[1], frequency_hz=1.2 * modes[1].frequency_hz)
+    modes = [replace(mode, order=n) for n, mode in enumerate([*modes[:2], own, *modes[2:]], 1)]
+    remark = _remark_of([replace(test, modes=tuple(modes))])
+    assert "the transverse mode 3 left out and those above numbered one lower" in remark
+    assert "damper" in remark
+
+
 def test_of_right_orders_nothing_is_said() -> None:
     assert _remark({}) == ""
     assert _remark({}, CLAMP) == ""

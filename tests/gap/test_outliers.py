@@ -198,3 +198,26 @@ def test_a_hanger_that_knocks_while_it_swings_far_is_not_called_sound() -> None:
     assert knocks.leads == "unexplained"
     assert knocks.no_gap_probability < 0.05
     assert any("something knocks" in remark for remark in knocks.remarks)
+
+
+def _with(test: ModalTest, name: str, **given: float) -> ModalTest:
+    return replace(test, id=name, modes=tuple(replace(mode, **given) for mode in test.modes))  # type: ignore[arg-type]
+
+
+def test_what_changes_within_a_test_contradicts_no_gap_whatever_the_frequencies() -> None:
+    """Modes found at full level though ring-downs begin astray, slopes that are sure together only,
+    and damping that rises with the level."""
+    (test,) = measured()
+    few = GapOptions(without=all_but("point_mass"))
+    soft = _with(test, "t2", damping_ratio=1e-3, damping_sd=5e-5)
+    lossy = [replace(m, damping_ratio=1e-3 * (1 + m.order), damping_sd=5e-5) for m in test.modes]
+    hard = replace(test, modes=tuple(lossy))
+    cases = {
+        "means over ring-downs": [replace(test, amplitude=1.0, rattles_above=0.4)],
+        "depends on amplitude": [_with(test, "t1", amplitude_slope=2e-4, amplitude_slope_sd=2e-4)],
+        "Damping rises": [replace(hard, amplitude=1.0), replace(soft, amplitude=0.2)],
+    }
+    for said, tests in cases.items():
+        found = diagnose(tests, PLAIN, few)
+        assert found.leads != "no gap", said
+        assert any(said in remark for remark in found.remarks), said

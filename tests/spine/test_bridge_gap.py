@@ -9,7 +9,7 @@ import pytest
 from shm.bridge import load_hanger
 from shm.errors import BadInput
 from shm.models.effects import check_effect_priors
-from shm.values import EffectPrior, Hanger, Scatter
+from shm.values import NAN, EffectPrior, Hanger, Scatter
 
 ROUND = """
 [[hanger]]
@@ -48,6 +48,18 @@ def test_ranges_of_effects_are_read_in_the_order_of_the_file(tmp_path: Path) -> 
 def test_scatter_that_is_left_out_is_the_usual_one(tmp_path: Path) -> None:
     hanger = loaded(tmp_path, "[hanger.scatter]\nsection = 0.01\nlength = 0\n")
     assert repr(hanger.scatter) == repr(Scatter(section=0.01, length=0.0))
+
+
+@pytest.mark.parametrize(("by", "sd"), [("faces", NAN), ("pins", 0.0468), ("nodes", 0.0324)])
+def test_how_a_length_was_taped_says_how_well_the_swinging_one_is_known(
+    by: str, sd: float, tmp_path: Path
+) -> None:
+    hanger = loaded(tmp_path, f'length_by = "{by}"\n')
+    assert hanger.scatter.effective_length == pytest.approx(sd, rel=0.01, nan_ok=True)
+    stated = loaded(tmp_path, f'length_by = "{by}"\n[hanger.scatter]\neffective_length = 0.01\n')
+    assert stated.scatter.effective_length == 0.01
+    with pytest.raises(BadInput, match="no way to tape a hanger"):
+        loaded(tmp_path, 'length_by = "eye"\n')
 
 
 def test_the_manuals_example_is_read_and_allowed(tmp_path: Path) -> None:
