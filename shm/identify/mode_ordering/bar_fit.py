@@ -112,7 +112,7 @@ def _fitted(planes: Sequence[PlaneModes], orders: Orders, expected: Expected) ->
     plane_of = np.repeat(np.arange(len(planes)), [len(own) for own in orders])
 
     def off(at: FloatArray) -> FloatArray:
-        return log_hz - at[0] - log_frequency(at[1], at[2:][plane_of], number)
+        return np.asarray(log_hz - at[0] - log_frequency(at[1], at[2:][plane_of], number))
 
     def misfit(at: FloatArray) -> FloatArray:
         unit = at[0] - expected.log_unit
