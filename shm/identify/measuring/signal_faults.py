@@ -316,11 +316,11 @@ def surprise(ring_downs: Sequence[FloatArray]) -> FloatArray:
     long_enough = [part for part in ring_downs if len(part) >= 2 * _ORDER]
     if not long_enough:
         return np.full(len(ring_downs), np.nan)
-    rule = _rule(long_enough)
+    rule = prediction_rule(long_enough)
     return np.array([_worst(part, rule) for part in ring_downs])
 
 
-def _rule(parts: Sequence[FloatArray]) -> FloatArray:
+def prediction_rule(parts: Sequence[FloatArray]) -> FloatArray:
     """Coefficients (1 + order,) that annihilate the parts, by least squares over all of them."""
     rows = np.vstack([sliding_window_view(part[:_FIT_SAMPLES], _ORDER + 1) for part in parts])
     past, now = rows[:, :-1], rows[:, -1]

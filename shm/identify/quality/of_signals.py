@@ -134,7 +134,7 @@ def recorded_window(inspection: Inspection) -> QualityCheck | None:
         return None
     return QualityCheck(
         "window", "warning", rate, 0.0, "1/s",
-        f"the hammer's noise falls by {rate:.2g}/s after each hit, as an exponential window of "
+        f"the sensors' noise falls by {rate:.2g}/s after each hit, as an exponential window of "
         f"{1 / rate:.2g} s makes it: damping ratios are too high by up to {rate:.2g}/(2 pi f)",
         "Switch off the analyser's exponential window, or export the time records without it.",
     )  # fmt: skip
