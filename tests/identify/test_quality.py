@@ -61,6 +61,18 @@ def test_a_hit_struck_twice_is_told_with_its_second() -> None:
     assert "8.5 s" in found.found
 
 
+@pytest.mark.parametrize(("hits", "verdict"), [((1,), "warning"), ((0, 1, 2), "refused")])
+def test_samples_that_are_lost_are_told_from_a_knock(hits: tuple[int, ...], verdict: str) -> None:
+    """Seven samples are missing in all channels: the motion jumps to what it would be later."""
+    kept = np.ones(SOUND.samples, bool)
+    for hit in hits:
+        kept[hit * SLOT + FIRST + 3000 + 40 * hit :][:7] = False
+    cut = tuple(replace(c, values=c.values[kept]) for c in SOUND.channels)
+    found = check_of("drop-outs", replace(SOUND, channels=cut))
+    assert found.verdict == verdict
+    assert found.value == len(hits)
+
+
 def test_clipped_ring_downs_are_told() -> None:
     limit = 0.3 * float(np.abs(SOUND.channels[1].values).max())
     found = check_of("clipping", changed("acc_1", lambda v: np.clip(v, -limit, limit, out=v)))

@@ -1,4 +1,4 @@
-"""An analyser's exponential window on time records is recognised by the hammer's noise."""
+"""An analyser's exponential window on time records is recognised by the sensors' noise."""
 
 from __future__ import annotations
 
@@ -14,19 +14,22 @@ from tests.identify.signals import hanger_modes, recording
 RATE_HZ, SLOT_S, CONSTANT_S = 512.0, 8.0, 2.5
 
 
-def _windowed(made: Recording) -> Recording:
+def _windowed(made: Recording, quantities: tuple[str, ...]) -> Recording:
     since_s = np.maximum(np.arange(made.samples) / RATE_HZ - 0.3, 0.0) % SLOT_S
     window = np.exp(-since_s / CONSTANT_S)
-    return replace(
-        made, channels=tuple(replace(c, values=c.values * window) for c in made.channels)
+    channels = (
+        replace(c, values=c.values * window) if c.quantity in quantities else c
+        for c in made.channels
     )
+    return replace(made, channels=tuple(channels))
 
 
-def test_a_window_is_named_and_widens_the_damping() -> None:
+@pytest.mark.parametrize("quantities", [("force", "acceleration"), ("acceleration",)])
+def test_a_window_is_named_and_widens_the_damping(quantities: tuple[str, ...]) -> None:
     made = recording(hanger_modes(), hits=4, seconds=SLOT_S, rate_hz=RATE_HZ, noise=1e-3)
     found, plain = (
         identify([each], IdentifyOptions(2.0, 50.0), test_id="t")
-        for each in (_windowed(made), made)
+        for each in (_windowed(made, quantities), made)
     )
     assert not [check for check in plain.quality if check.name == "window"]
     (check,) = [check for check in found.quality if check.name == "window"]

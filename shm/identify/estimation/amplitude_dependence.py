@@ -255,8 +255,7 @@ def _unlike_hz(rows: Sequence[_Row]) -> float:
 def _unlike(
     mode: FoundMode, index: int, courses: Sequence[_Course], as_found: FoundMode
 ) -> FoundMode:
-    """Less sure where its amplitudes fall otherwise than it says, as after a start that was clipped
-    before the logger's filter rounded it."""
+    """Less sure where its amplitudes fall otherwise than it says, as after a clipped start."""
     decay = 2 * math.pi * as_found.frequency_hz * as_found.damping_ratio
     late = [_from_largest(course, index, decay) for course in courses]
     seen = [row for course in late if (row := _phases(course, index, decay)) is not None]

@@ -17,6 +17,7 @@ from shm.identify.measuring.signal_faults import (
     DEAD,
     FROZEN,
     HITS_NOT_SHOWN,
+    LOST,
     NOT_A_NUMBER,
     SILENT,
     WANDERS,
@@ -134,7 +135,7 @@ def recorded_window(inspection: Inspection) -> QualityCheck | None:
         return None
     return QualityCheck(
         "window", "warning", rate, 0.0, "1/s",
-        f"the hammer's noise falls by {rate:.2g}/s after each hit, as an exponential window of "
+        f"the sensors' noise falls by {rate:.2g}/s after each hit, as an exponential window of "
         f"{1 / rate:.2g} s makes it: damping ratios are too high by up to {rate:.2g}/(2 pi f)",
         "Switch off the analyser's exponential window, or export the time records without it.",
     )  # fmt: skip
@@ -153,14 +154,17 @@ def cable(inspection: Inspection) -> QualityCheck | None:
 
 
 def drop_outs(inspection: Inspection) -> QualityCheck | None:
-    """How many hits and channels were left out for missing or repeated samples."""
-    return fault_count(
-        inspection,
-        "drop-outs",
-        (NOT_A_NUMBER, FROZEN),
-        "no sample is missing",
-        "Check the logger's memory card or radio link and its load, and repeat these hits.",
-    )
+    """How many hits and channels were left out for missing, lost or repeated samples.
+
+    Refused where most ring-downs have lost samples: the others' clock is not to be believed.
+    """
+    remedy = "Check the logger's memory card or radio link and its load, and repeat these hits."
+    lost, hits = hits_for(inspection, (LOST,)), hits_of(inspection)
+    if 2 * len(lost) > len(hits):
+        found = f"samples are lost in {len(lost)} of {len(hits)} ring-downs: no frequency is right"
+        return QualityCheck("drop-outs", "refused", float(len(lost)), 0.0, "", found, remedy)
+    reasons = (NOT_A_NUMBER, FROZEN, LOST)
+    return fault_count(inspection, "drop-outs", reasons, "no sample is missing", remedy)
 
 
 def noise(inspection: Inspection) -> QualityCheck | None:
