@@ -57,7 +57,8 @@ class Format:
     `recognises` judges the first bytes of a file; `write` is None of a format that is only read;
     `may_be_gzipped` says whether NAME.csv.gz is read too; `holds_responses` is False of one that
     holds time records alone, `names_channels` of one whose channels have numbers, or names of its
-    own. `table` gives all columns of a file, None where it holds no time records.
+    own. `table` gives all columns of a file, None where it holds no time records. `library` is what
+    it loads where a file is read.
     """
 
     name: str
@@ -70,6 +71,7 @@ class Format:
     holds_responses: bool = True
     names_channels: bool = True
     table: Callable[[Path], LoggerTable | None] | None = None
+    library: str = ""
 
 
 def names_in(described: Recording | FrequencyResponse) -> list[str]:

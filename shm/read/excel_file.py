@@ -137,4 +137,5 @@ FORMAT = Format(
     peek=_peek,
     read=_read,
     table=_table,
+    library="openpyxl",
 )

@@ -82,6 +82,7 @@ FORMAT = Format(
     peek=peeker(_opened, _NAME),
     read=reader(_opened),
     table=tabler(_opened, _NAME),
+    library="scipy.io",
 )
 
 

@@ -186,4 +186,5 @@ FORMAT = Format(
     holds_responses=False,
     names_channels=False,
     table=table_of,
+    library="pymseed",
 )

@@ -101,6 +101,13 @@ def _suffixes() -> list[str]:
     return [suffix for known in FORMATS for suffix in known.suffixes]
 
 
+def libraries_for(path: Path) -> tuple[str, ...]:
+    """What reading a file loads, by its suffix; an archive may hold any format."""
+    claimed = _format_of_suffix(_unpacked_name(path))
+    formats = FORMATS if holds_test(path) else (claimed,) if claimed else ()
+    return tuple(each.library for each in formats if each.library)
+
+
 def write_single(recording: Recording, path: Path) -> None:
     """Writes an .npz file, not compressed: its size tells the numbers of samples and channels."""
     write(replace(recording, channels=tuple(map(_single, recording.channels))), path)

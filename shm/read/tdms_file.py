@@ -105,4 +105,5 @@ FORMAT = Format(
     peek=peeker(_opened, _NAME),
     read=reader(_opened),
     table=tabler(_opened, _NAME),
+    library="nptdms",
 )

@@ -12,6 +12,7 @@ import os
 import signal
 import socket
 import struct
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
@@ -24,6 +25,7 @@ from shm.modes_document import modes_document
 from shm.read.content import unpacking_in
 from shm.read.limits import Limits, limited, limits, too_large
 from shm.read.modal_sets import foreign_modes
+from shm.read.registry import libraries_for
 from shm.read.sandbox.confinement import Confinement, confine, pythons_own
 from shm.read.sandbox.protocol import BEGUN, LARGEST_HEADER, encoded, refusal_as_value
 from shm.read.sandbox.reading_process import ARRAYS_AT_ONCE, WALL_SECONDS
@@ -38,11 +40,6 @@ def serve() -> None:
     """Answers requests until the asking process is gone."""
     requests = socket.socket(fileno=0)
     pythons_own()  # found once, for all children
-    for library in ("scipy.io", "openpyxl"):  # likewise: else each would load it within its limits
-        import_module(library)
-    for extra in ("nptdms", "pymseed"):
-        with suppress(ImportError):
-            import_module(extra)
     gc.freeze()
     with suppress(ConnectionError):  # it was killed meanwhile
         requests.sendall(b"+")
@@ -50,12 +47,22 @@ def serve() -> None:
             message, descriptors, _, _ = socket.recv_fds(requests, _LARGEST_REQUEST, 1)
             if not message:
                 return
+            _load_for(message)
             child = os.fork()
             if child == 0:
                 _read_and_end(requests, message, descriptors[0])
             os.close(descriptors[0])
             _, status = os.waitpid(child, 0)
             requests.sendall(struct.pack("i", os.waitstatus_to_exitcode(status)))
+
+
+def _load_for(message: bytes) -> None:
+    """Loads what reads a file once, for all children: else each would do so within its limits."""
+    for library in libraries_for(Path(json.loads(message)["path"])):
+        if library not in sys.modules:
+            with suppress(ImportError):  # the child says so, with what to do
+                import_module(library)
+            gc.freeze()
 
 
 def _read_and_end(requests: socket.socket, message: bytes, out: int) -> None:
