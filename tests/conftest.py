@@ -11,7 +11,11 @@ from pathlib import Path
 import pytest
 
 from tests.helpers.postgres import Databases, postgresql_server
-from tests.helpers.quick_stores import copy_new_stores, share_compiled_statements
+from tests.helpers.quick_stores import (
+    copy_new_stores,
+    share_compiled_statements,
+    wait_for_no_disk,
+)
 
 os.environ.pop("COLUMNS", None)  # the processes of pytest-xdist set it, a single one does not
 gc.disable()  # until all tests are collected: what collecting makes stays, a seventh of its time
@@ -43,6 +47,7 @@ def quick_stores(tmp_path_factory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         copy_new_stores(patch, tmp_path_factory.mktemp("template"))
         share_compiled_statements(patch)
+        wait_for_no_disk(patch)
         yield
 
 

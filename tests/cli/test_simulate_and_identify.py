@@ -16,6 +16,7 @@ from shm.read import read
 from shm.values import Recording
 from shm_cli.main import run
 from tests.cli.conftest import Shm
+from tests.helpers.painting import unpaint
 
 SHORT = ("--hits", "3", "--seconds", "8")
 
@@ -60,8 +61,9 @@ def test_the_document_can_be_written_to_a_file_beside_the_table(
 
 
 def test_a_page_and_figures_let_a_person_check_the_modes(
-    shm: Shm, recording: Path, hanger_file: Path, tmp_path: Path
+    shm: Shm, recording: Path, hanger_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    unpaint(monkeypatch)
     page, figures = tmp_path / "sheet.html", tmp_path / "figures"
     ask = ("--hanger-file", hanger_file, "--html", page)
     ended = shm("identify", recording, *ask, "--figures", figures, "--json")

@@ -1,13 +1,15 @@
-"""What hundreds of new stores of one process need not do anew: run the migrations, compile SQL.
+"""What hundreds of new stores of one process need not do: run the migrations, compile SQL, sync.
 
-Both are the same each time: a new file is copied from one that the migrations made in this process,
-and a statement that one store compiled serves the others.
+The first two are the same each time: a new file is copied from one that the migrations made in this
+process, and a statement that one store compiled serves the others. And no power fails here: who
+cuts it begins processes of its own (`tests/helpers/power.py`).
 """
 
 from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sqlalchemy.dialects.postgresql.psycopg import PGDialect_psycopg
@@ -18,6 +20,7 @@ from sqlalchemy.util import LRUCache
 from shm.store import database, schema
 
 _upgrade, _create_engine = schema.upgrade, database.sa.create_engine
+AS_SHIPPED = database._EVENTS["sqlite"]
 
 
 def copy_new_stores(patch: pytest.MonkeyPatch, folder: Path) -> None:
@@ -60,3 +63,14 @@ def share_compiled_statements(patch: pytest.MonkeyPatch) -> None:
     for dialect in (PGDialect_psycopg, SQLiteDialect_pysqlite):
         patch.setattr(dialect, "__hash__", lambda self: hash(type(self)))
         patch.setattr(dialect, "__eq__", lambda self, other: type(self) is type(other))
+
+
+def wait_for_no_disk(patch: pytest.MonkeyPatch) -> None:
+    """A commit of a file is left to the system: it outlasts a killed process all the same."""
+    configure, begin = AS_SHIPPED
+
+    def unsynced(connection: Any, record: Any) -> None:
+        configure(connection, record)
+        connection.execute("PRAGMA synchronous = OFF")
+
+    patch.setitem(database._EVENTS, "sqlite", (unsynced, begin))

@@ -12,6 +12,7 @@ import sqlalchemy as sa
 from shm.errors import StoreBusy, StoreError
 from shm.store import Stage, Store, database
 from tests.helpers.nouns import NOW, a_file
+from tests.helpers.quick_stores import AS_SHIPPED
 
 
 def test_many_writers_never_find_the_store_locked(store: Store) -> None:
@@ -94,8 +95,9 @@ def test_a_reference_to_nothing_is_refused(store: Store) -> None:
     assert caught.value.retry_after_s is None
 
 
-def test_commits_outlast_a_power_cut(file_store: Store) -> None:
-    with file_store.engine.connect() as connection:
+def test_commits_outlast_a_power_cut(sqlite: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(database._EVENTS, "sqlite", AS_SHIPPED)
+    with Store.open(sqlite) as store, store.engine.connect() as connection:
         assert connection.exec_driver_sql("PRAGMA journal_mode").scalar() == "wal"
         assert connection.exec_driver_sql("PRAGMA synchronous").scalar() == 2
 
