@@ -192,6 +192,7 @@ def misnumbered(problem: GapProblem, attribution: Attribution) -> tuple[str, ...
     found = [
         (_evidence(each.problem, rng) + each.log_dropped, each)
         for each in (*_shifted(problem), *_from_one_on(problem))
+        if each.problem.near_misfit < problem.near_misfit  # a fit costs forty times as much
         if baseline_fit(each.problem, rng).log_evidence + each.log_dropped > least
     ]
     if not found:

@@ -166,15 +166,25 @@ class GapProblem:
         """The data (data,) that the baseline near the measured ones predicts of a design."""
         return np.asarray(self.predict(Hypothesis(), self._near, design)[0])
 
-    @cached_property
+    @property
+    def near_misfit(self) -> float:
+        """By how much the baseline near the data misses the frequencies, root mean square."""
+        return self._nearest[1]
+
+    @property
     def _near(self) -> FloatArray:
         """A point z (1, d) of the baseline at the tension that fits the frequencies best."""
+        return self._nearest[0]
+
+    @cached_property
+    def _nearest(self) -> tuple[FloatArray, float]:
         coordinates = self.coordinates(Hypothesis())
         z = np.zeros((len(_TENSIONS), coordinates.dimension))
         z[:, coordinates.tension] = np.array(_TENSIONS)[:, None]
         count = self.design.frequencies
         apart = (self.predict(Hypothesis(), z) - self.observations.value)[:, :count]
-        return z[[int(np.sum(apart**2, axis=1).argmin())]]
+        misfit = np.sqrt(np.mean(apart**2, axis=1))
+        return z[[int(misfit.argmin())]], float(misfit.min())
 
     def part(self, rows: BoolArray | IntArray) -> GapProblem:
         """The same problem on some of the frequencies; a mode's shape goes with its frequency.

@@ -86,15 +86,13 @@ def _remark_of(tests: list[ModalTest]) -> str:
 
 
 def test_a_mode_missed_in_the_middle_is_said() -> None:
-    """Orders 1, 2, 4, 5, 6 numbered 1 to 5, in the plane that was measured."""
+    """Orders 1, 2, 4, 5 numbered 1 to 4, in the plane that was measured."""
     (test, *_) = _numbered({})
     modes = [m for m in test.modes if m.plane == "transverse" and m.order != 3]
-    modes = [replace(mode, order=n) for n, mode in enumerate(modes, 1)]
+    modes = [replace(mode, order=n) for n, mode in enumerate(modes[:4], 1)]
     remark = _remark_of([replace(test, modes=tuple(modes))])
     assert "the transverse modes above 2 numbered one higher" in remark
     assert "missed between 2 and 3" in remark
-    four = [replace(test, modes=tuple(modes[:4]))]
-    assert "the transverse modes above 2 numbered one higher" in _remark_of(four)
 
 
 def test_a_mode_that_is_a_dampers_own_is_said() -> None:
