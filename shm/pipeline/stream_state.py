@@ -146,7 +146,7 @@ def against_hammer(store: Store, stream: Stream) -> AmbientBias:
     tests = [
         each.test
         for each in store.tests.list_all(stream.hanger)
-        if each.test.id != f"{stream.name}-{each.time:%Y-%m-%d}"  # a day of the stream itself
+        if not each.test.id.startswith(f"{stream.name}-{each.time:%Y-%m-%d}")  # a day of its own
     ]
     times = [test.time for test in tests if test.time is not None]
     near = (

@@ -95,8 +95,11 @@ def pool_stream(
     kept: bytes | None,
     false_call_years: float,
     events: Sequence[StreamEvent] = (),
+    *,
+    is_watched: bool = True,
 ) -> Pooled:
-    """The windows of a period as one; an hour goes on to the watch, a day becomes a test.
+    """The windows of a period as one; an hour goes on to the watch where it `is_watched`, a day
+    becomes a test.
 
     An alert is led by that of `events` which was at the time of its change.
     """
@@ -105,7 +108,7 @@ def pool_stream(
         return Pooled(None)
     if period == "day":
         return Pooled(reading, test=as_modal_test(reading))
-    if period != "hour" or not hanger.is_modelled:
+    if period != "hour" or not is_watched or not hanger.is_modelled:
         return Pooled(reading)
     own = hanger.thresholds.false_call_years
     options = StreamOptions(limit_years=false_call_years if own is None else own)

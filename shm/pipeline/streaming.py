@@ -1,9 +1,10 @@
 """Streams of permanent sensors brought forward: windows, readings, what the watch says of them.
 
 Ten minutes are read as soon as they have come, each stream in order and apart from the others; an
-hour, six hours and a day are pooled once their windows are done. What computes runs on the
-executor. A window and how far its stream has come are one transaction, and so are a reading, the
-watch's state after it and its alert: this may be killed at any instant and simply goes on.
+hour, six hours and a day are pooled once their windows are done. Where windows came late, theirs
+are pooled anew, and the watch goes back to before them. What computes runs on the executor. A
+window and how far its stream has come are one transaction, and so are a reading, the watch's state
+after it and its alert: this may be killed at any instant and simply goes on.
 """
 
 from __future__ import annotations
@@ -19,25 +20,23 @@ from functools import partial
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
-from shm.documents import dump, format_time
-from shm.modes_document import modes_document
+from shm.documents import format_time
 from shm.pipeline.clock import Clock, utc_now
-from shm.pipeline.ending import told_by_other
-from shm.read.atomic import replace_text
+from shm.pipeline.stream_days import baseline_of, hand_on_day, is_told_already
 from shm.store import Store, Workspace
-from shm.store.archive import MODES_SUFFIX, nothing
+from shm.store.archive import nothing
 from shm.store.ring import ring_of
 from shm.store.ring_files import PERIOD
-from shm.values import Alert, ModalTest, Posterior
 from shm.values.stream import (
     PERIODS,
     Period,
-    PooledReading,
     Stream,
     StreamEvent,
     Window,
     WindowReading,
+    period_start,
 )
+from shm.watch.stream_state import gone_back
 
 if TYPE_CHECKING:
     from shm.pipeline.stream_steps import Pooled, WindowFound
@@ -47,7 +46,6 @@ WINDOW = PERIOD  # what is sealed as one is read as one
 _KEPT_BEFORE_ALERT = timedelta(hours=24)
 """Of raw samples, for good: what changed within a day is told within a day."""
 _AGAIN = timedelta(minutes=1)  # judgement: a machine without memory or disk is given a minute
-_OWN_DAYS = 7  # judgement: by then every class has been selected and the watch has learnt
 _OFFSETS = 144  # windows of a day, with which a sensor's offset is compared
 _WHOLE = 0.98  # judgement: of ten minutes; a chunk that lacks seconds is not waited for
 _PATIENCE = timedelta(minutes=20)  # judgement: a logger that sends each quarter of an hour
@@ -88,6 +86,8 @@ class Streaming:
         self._running: dict[str, _Running] = {}
         self._done: dict[str, datetime] = {}
         self._pooled: dict[tuple[str, Period], datetime] = {}
+        self._changed: dict[str, datetime] = {}
+        self._settled: dict[str, datetime] = {}
         self._not_before: dict[str, datetime] = {}
         self._offsets: defaultdict[str, deque[Mapping[str, float]]] = defaultdict(
             lambda: deque(maxlen=_OFFSETS)
@@ -156,7 +156,9 @@ class Streaming:
     def _begin(self, stream: Stream) -> None:
         """The next step of a stream, if there is one: pools come before further windows."""
         if stream.name not in self._known:
-            self._recall(stream.name)
+            self._recall(stream)
+        if stream.name in self._changed and not self._late[stream.name]:
+            self._go_back(stream, self._changed.pop(stream.name))
         done = self._done.get(stream.name)
         if done is not None:
             for period, length in PERIODS.items():
@@ -168,14 +170,47 @@ class Streaming:
         if start is not None:
             self._begin_window(stream, start)
 
-    def _recall(self, name: str) -> None:
-        """How far the stream had come, and what was sealed since."""
+    def _recall(self, stream: Stream) -> None:
+        """How far the stream had come, what was sealed since, and what came late."""
+        name = stream.name
         self._known.add(name)
         done = self.store.streams.progress(name)
+        settings = self.workspace.settings
+        kept_hours = min(settings.late_hours, 24 * settings.window_days)
+        since = self.clock() - timedelta(hours=kept_hours)
+        changed = self.store.streams.first_unpooled(name, since)
+        if changed is not None:
+            self._changed[name] = changed
+        last = self.store.streams.last_pooled(name, "hour")
+        watched = self.store.streams.watch_time(stream.hanger)
+        if last is not None and watched is not None and watched <= last:
+            self._pooled[name, "hour"] = watched
+            self._settled[name] = last + PERIODS["hour"]
         if done is not None:
             self._done[name] = done
-        for start in self.ring.periods(name, done or _EVER):
-            self._note(name, start)
+        begin = _EVER if done is None else min(done, since)
+        read = self.store.streams.window_starts(name, begin)
+        for start in self.ring.periods(name, begin):
+            if start not in read:
+                self._note(name, start)
+
+    def _go_back(self, stream: Stream, changed: datetime) -> None:
+        """What windows that came late belong to is pooled next, from the earliest of them on.
+
+        The watch goes on from how it was before them; further back than its states are kept, they
+        are pooled and not watched.
+        """
+        name, streams = stream.name, self.store.streams
+        starts = {each: period_start(changed, length) for each, length in PERIODS.items()}
+        watched, newest = streams.watch_time(stream.hanger), streams.watch_state(stream.hanger)
+        before = streams.watch_before(stream.hanger, starts["hour"])
+        if watched and newest and before and starts["hour"] < watched:
+            streams.go_back(stream.hanger, before[0], gone_back(before[1], newest))
+            starts["hour"] = before[0]
+            self._settled[name] = max(watched, self._settled.get(name, watched))
+        for period, start in starts.items():
+            former = self._pooled.get((name, period), start)
+            self._pooled[name, period] = min(former, start)
 
     def _next_window(self, name: str) -> datetime | None:
         """The next ten minutes that are whole, or not waited for any more; late ones last."""
@@ -218,12 +253,22 @@ class Streaming:
         key = stream.name, period
         start = self._pooled.get(key) or self._pooled_until(stream, period, length)
         while start is not None and start + length <= done:
-            if self._windows(stream, start, length):
+            if self._is_due(stream, period, start):
                 break
             start += length
         if start is not None:
             self._pooled[key] = start
         return start if start is not None and start + length <= done else None
+
+    def _is_due(self, stream: Stream, period: Period, start: datetime) -> bool:
+        """Whether it has windows and is not pooled, or is an hour yet to be watched."""
+        end = start + PERIODS[period]
+        known = self.store.streams.list_pooled(stream.hanger, period, start, end)
+        if any(each.stream == stream.name for each in known):
+            watched = self.store.streams.watch_time(stream.hanger)
+            if period != "hour" or watched is None or start < watched:
+                return False
+        return bool(self._windows(stream, start, PERIODS[period]))
 
     def _pooled_until(self, stream: Stream, period: Period, length: timedelta) -> datetime | None:
         """The end of the last reading of a period; the first window's period where none is."""
@@ -231,7 +276,7 @@ class Streaming:
         if last is not None:
             return last + length
         first = self.store.streams.first_window(stream.name)
-        return None if first is None else _floor(first, length)
+        return None if first is None else period_start(first, length)
 
     def _windows(
         self, stream: Stream, start: datetime, length: timedelta
@@ -243,6 +288,7 @@ class Streaming:
         from shm.pipeline.stream_steps import pool_stream
 
         hanger = self.workspace.bridge.tested(stream.hanger)
+        watched = self.store.streams.watch_time(stream.hanger)
         self._submit(
             stream.name,
             partial(
@@ -251,10 +297,11 @@ class Streaming:
                 period,
                 start,
                 hanger,
-                self._baseline(stream),
+                baseline_of(self.store, stream),
                 self.store.streams.watch_state(stream.hanger) if period == "hour" else None,
                 self.workspace.settings.false_call_years,
                 self._recent_events(stream, start) if period == "hour" else (),
+                is_watched=period == "hour" and (watched is None or start >= watched),
             ),
             partial(self._keep_pooled, stream, period, start),
             partial(self._give_up_pool, stream, period, start),
@@ -262,20 +309,6 @@ class Streaming:
 
     def _recent_events(self, stream: Stream, start: datetime) -> tuple[StreamEvent, ...]:
         return self.store.streams.list_events(stream.name, start - _LOOKED_BACK)
-
-    def _baseline(self, stream: Stream) -> Posterior | None:
-        """The baseline of the hanger, unless it is of the stream's own first days: another model
-        would let the watch learn anew what it has half learnt.
-        """
-        found = self.store.watch.baseline(stream.hanger)
-        if found is None:
-            return None
-        first = self.store.streams.first_day(stream.name)
-        if first is None:
-            return found.posterior
-        days = (first + n * PERIODS["day"] for n in range(_OWN_DAYS))
-        own = {f"{stream.name}-{day:%Y-%m-%d}" for day in days}
-        return None if own.issuperset(found.posterior.tests) else found.posterior
 
     def _submit(
         self,
@@ -312,8 +345,10 @@ class Streaming:
     def _save(self, reading: WindowReading) -> None:
         window = reading.window
         self.store.streams.save_window(reading)
-        done = self._done.get(window.stream, _EVER)
-        self._done[window.stream] = max(done, window.start + WINDOW)
+        name, done = window.stream, self._done.get(window.stream, _EVER)
+        if window.start < done:
+            self._changed[name] = min(window.start, self._changed.get(name, window.start))
+        self._done[name] = max(done, window.start + WINDOW)
 
     def _give_up_window(self, stream: Stream, start: datetime, error: BaseException) -> None:
         """Said in the window's own row: what one window holds must not stop its stream."""
@@ -323,22 +358,24 @@ class Streaming:
         self._save(WindowReading(window, (), "none", why))
 
     def _keep_pooled(self, stream: Stream, period: Period, start: datetime, found: Pooled) -> None:
-        self._pooled[stream.name, period] = start + PERIODS[period]
+        self._pooled[stream.name, period] = end = start + PERIODS[period]
         if found.reading is None:
             return
         for event in found.events:
             self.store.streams.save_event(event)
         if found.test is not None:
-            self._hand_on(found.test, found.reading)
+            hand_on_day(self.workspace, self.store, found.test, self.clock())
+        is_told = found.alert is None
         if found.alert is not None:
-            end = start + PERIODS[period]
+            again = end <= self._settled.get(stream.name, _EVER)
+            is_told = is_told_already(self.store, found.alert, of_stream=again)
             why = f"alert {found.alert.key}"
             self.ring.keep(stream.name, end - _KEPT_BEFORE_ALERT, end, why)
         hooks = [hook.name for hook in self.workspace.bridge.hooks]
         raised = self.store.streams.save_pooled(
             found.reading,
             found.kept or None,
-            None if found.alert is None or self._is_told(found.alert) else found.alert,
+            None if is_told else found.alert,
             hooks,
             self.clock(),
             found.ended,
@@ -346,26 +383,7 @@ class Streaming:
         if raised is not None:
             log.warning("alert %s: %s", raised.alert.key, raised.alert.message)
 
-    def _is_told(self, alert: Alert) -> bool:
-        """Whether a hammer test, or a day as one, was first to tell it."""
-        first = told_by_other(alert, self.store.alerts.list_all(alert.hanger), of_stream=False)
-        if first is not None:
-            log.info("alert %s is that of %s", alert.key, first.alert.key)
-        return first is not None
-
-    def _hand_on(self, test: ModalTest, reading: PooledReading) -> None:
-        """A day as a modal test into the spool, which takes the same bytes once."""
-        path = self.workspace.spool / f"{test.id}{MODES_SUFFIX}"
-        replace_text(path, dump(modes_document([test])))
-        log.info("day of stream %s: %s", reading.stream, path.name)
-
     def _give_up_pool(
         self, stream: Stream, period: Period, start: datetime, error: BaseException
     ) -> None:
         self._pooled[stream.name, period] = start + PERIODS[period]
-
-
-def _floor(at: datetime, length: timedelta) -> datetime:
-    """The beginning of the stretch of that length, counted from midnight, that holds a moment."""
-    midnight = at.astimezone(UTC).replace(hour=0, minute=0, second=0, microsecond=0)
-    return midnight + (at - midnight) // length * length

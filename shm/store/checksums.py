@@ -160,6 +160,7 @@ HEALING: Mapping[str, str] = {
     "summaries": "Nothing is lost: `shm db upgrade` makes it again.",
     "watch_states": "Nothing is lost: the next test makes it again.",
     "stream_watch": "Nothing is lost: the next readings make it again.",
+    "stream_watch_days": "Nothing is lost: the next days make it again.",
 }
 """What to do about a damaged row, by table; of all others a backup is the only source.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+from bisect import bisect_left, insort
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, timedelta
@@ -14,7 +15,7 @@ import numpy as np
 from shm.documents import Misfit, dump, value_of
 from shm.read.atomic import replace_text
 from shm.read.chunk_document import BY_TIME
-from shm.read.ring_segment import ChunkKey
+from shm.read.ring_segment import ChunkKey, microseconds
 from shm.store.ring_files import PERIOD
 from shm.store.ring_pieces import slack_s
 from shm.values.stream import Chunk, StreamEvent, StreamEventKind
@@ -46,7 +47,8 @@ class PassedChunk:
 class StreamState:
     """What is known of a stream: its last chunk, since when its samples have been counted without
     a break and how long they say that is, and of each ten minutes how many seconds of samples
-    count, and how many are kept apart, being of a time that was there before.
+    count, how many are kept apart, being of a time that was there before, and which are the least
+    and the greatest number of a chunk that belongs there.
     """
 
     last: PassedChunk | None = None
@@ -54,6 +56,7 @@ class StreamState:
     counted_s: float = 0.0
     received_s: dict[str, float] = field(default_factory=dict)
     apart_s: dict[str, float] = field(default_factory=dict)
+    numbers: dict[str, tuple[int, int]] = field(default_factory=dict)
 
 
 def load_state(path: Path) -> StreamState:
@@ -114,6 +117,47 @@ def notice_overlap(
     )
     end = max(chunk.end for chunk, _ in found)
     return [_event(first.stream, "overlap", first.start, end, said)]
+
+
+def misplaced(
+    new: Iterable[ChunkKey], beside: Iterable[ChunkKey], numbers: Mapping[datetime, tuple[int, int]]
+) -> dict[ChunkKey, tuple[int, int]]:
+    """Which new chunks have a number that does not belong between those around them in time, as of
+    a clock that stepped into a gap, and these two. Of those around only what came before tells;
+    `numbers` are the least and the greatest of ten minutes. Where a session began anew, none does.
+    """
+    by_arrival = sorted({*new, *beside}, key=lambda key: (key.arrived_us, key.sequence))
+    ends = [(at + n * PERIOD, each[n]) for at, each in numbers.items() for n in (0, 1)]
+    around = sorted((microseconds(time), number) for time, number in ends)
+    asked, found = set(new), {}
+    for key in by_arrival:
+        if key.sequence >= BY_TIME:
+            continue
+        place = bisect_left(around, (key.start_us, key.sequence))
+        if 0 < place < len(around):
+            before, behind = around[place - 1][1], around[place][1]
+            if before < behind and not before < key.sequence < behind:
+                if key in asked:
+                    found[key] = before, behind
+                continue
+        insort(around, (key.start_us, key.sequence))
+    return found
+
+
+def notice_misplaced(
+    stream: str, found: Mapping[ChunkKey, tuple[int, int]], chunks: Mapping[ChunkKey, Chunk]
+) -> list[StreamEvent]:
+    """Chunks that are stamped into a gap which is not theirs, as one event."""
+    if not found:
+        return []
+    ours = [chunks[key] for key in sorted(found)]
+    before, behind = found[min(found)]
+    whose = " to ".join(dict.fromkeys(str(each.sequence) for each in (ours[0], ours[-1])))
+    said = (
+        f"chunk {whose} is stamped between chunks {before} and {behind}, where its number does not "
+        "belong: the clock stepped into a gap, and these samples are of another time"
+    )
+    return [_event(stream, "clock step", ours[0].start, max(c.end for c in ours), said)]
 
 
 def notice_missing(new: Mapping[ChunkKey, Chunk]) -> list[StreamEvent]:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shm.documents import format_time
+from shm.documents import format_time, parse_time
 from shm.errors import BadInput
 from shm.read.atomic import replace_file
 from shm.read.ring_segment import ChunkKey, microseconds, time_of, write_segment
@@ -27,7 +27,9 @@ from shm.store.ring_notices import (
     PassedChunk,
     StreamState,
     load_state,
+    misplaced,
     notice,
+    notice_misplaced,
     notice_missing,
     notice_overlap,
     notice_told,
@@ -38,6 +40,7 @@ from shm.values.stream import Chunk, StreamEvent
 
 _QUIET = timedelta(seconds=10)  # technical: a segment is not written anew for each late chunk
 _RECEIVED_KEPT = timedelta(hours=25)  # of the share that was lost in a day
+_NUMBERS_KEPT = timedelta(hours=97)  # of what comes as late as `late_hours` has it
 
 Note = Callable[[StreamEvent], object]
 
@@ -55,7 +58,8 @@ def seal_stream(folder: StreamFolder, now: datetime, note: Note) -> list[datetim
     state, sealed = load_state(path), []
     for start, own in finished:
         near = _near(waiting, start)
-        state, has_new = _seal(folder, start, own, near, state, note)
+        beside = [each.key for each in waiting]
+        state, has_new = _seal(folder, start, own, near, beside, state, note)
         if has_new:
             sealed.append(start)
     oldest = format_time(now - _RECEIVED_KEPT) or ""
@@ -63,7 +67,9 @@ def seal_stream(folder: StreamFolder, now: datetime, note: Note) -> list[datetim
         {k: s for k, s in known.items() if k >= oldest}
         for known in (state.received_s, state.apart_s)
     )
-    save_state(path, replace(state, received_s=received_s, apart_s=apart_s))
+    oldest = format_time(now - _NUMBERS_KEPT) or ""
+    numbers = {k: each for k, each in state.numbers.items() if k >= oldest}
+    save_state(path, replace(state, received_s=received_s, apart_s=apart_s, numbers=numbers))
     return sealed
 
 
@@ -96,6 +102,7 @@ def _seal(
     start: datetime,
     waiting: Sequence[WaitingChunk],
     near: Sequence[WaitingChunk],
+    beside: Sequence[ChunkKey],
     state: StreamState,
     note: Note,
 ) -> tuple[StreamState, bool]:
@@ -113,12 +120,28 @@ def _seal(
     layout = lay_out(found)
     events += notice_overlap(chunks, layout.covered) + notice_missing(chunks)
     events += notice_told(chunks)
+    others = {parse_time(k): each for k, each in state.numbers.items()}
+    others.pop(start, None)
+    free = chunks.keys() - layout.covered.keys()  # of those that overlap it is said already
+    strays = misplaced(free, [*found, *beside], others)
+    events += notice_misplaced(folder.folder.name, strays, chunks)
     for event in events:
         note(event)
     _write_all(folder, {k: c for k, c in found.items() if period_of(k.start_us) == start}, new)
     for each in waiting:
         each.path.unlink(missing_ok=True)  # what was damaged is set aside already
+    own = [k.sequence for k in found if period_of(k.start_us) == start and k not in strays]
+    state = _with_numbers(state, format_time(start) or "", own)
     return _counting(state, start, layout, found), bool(new)
+
+
+def _with_numbers(state: StreamState, name: str, own: Sequence[int]) -> StreamState:
+    """With the least and the greatest number of a chunk of ten minutes."""
+    known = state.numbers.get(name)
+    if not own and known is None:
+        return state
+    of = (*own, *(known or ()))
+    return replace(state, numbers={**state.numbers, name: (min(of), max(of))})
 
 
 def _doubled(found: Mapping[ChunkKey, Chunk], new: Set[ChunkKey]) -> list[ChunkKey]:

@@ -21,16 +21,27 @@ from shm.store.stream_tables import (
     stream_events,
     stream_progress,
     stream_watch,
+    stream_watch_days,
     stream_windows,
 )
 from shm.store.tables import alerts
 from shm.values import Alert, Plane, ShapePoint
 from shm.values.modes import Mode
-from shm.values.stream import PERIODS, Period, PooledReading, StreamEvent, WindowReading
+from shm.values.stream import (
+    PERIODS,
+    Period,
+    PooledReading,
+    StreamEvent,
+    Window,
+    WindowReading,
+    period_start,
+)
 
 HOURS_KEPT = timedelta(days=800)
 """Readings of an hour and of six: two summers and two winters, and a month to look at them."""
 
+_DAYS_BACK = 10
+"""States of the watch, a day apart: twice the default of `late_hours`. Judgement."""
 _LATEST = 36
 """Windows of a train-free night: a mode that traffic hides for some hours is not forgotten."""
 _EVENT = tuple(field.name for field in fields(StreamEvent))
@@ -42,12 +53,16 @@ class Streams(Repository):
     """What permanent sensors said."""
 
     def save_window(self, reading: WindowReading) -> None:
-        """Keeps what a window said, in the place of what it said before, and that it is done."""
+        """Keeps what a window said, in the place of what it said before, and that it is done.
+
+        What was pooled without it goes: until it is pooled anew, that it lacks tells so.
+        """
         window = reading.window
         row = {"stream": window.stream, "hanger": window.hanger, "start": window.start}
         row |= {"has_modes": bool(reading.modes), "document": _document(reading)}
         with self.writing() as connection:
             _replace(connection, stream_windows, row, "stream", "start")
+            connection.execute(sa.delete(pooled_readings).where(_pooled_with(window)))
             _advance(connection, window.stream, window.start + timedelta(seconds=window.duration_s))
 
     def list_windows(
@@ -93,13 +108,44 @@ class Streams(Repository):
         )
         return self._moment(query)
 
-    def first_day(self, stream: str) -> datetime | None:
-        """When the first reading of a day of a stream began; None where there is none."""
-        table = pooled_readings
-        query = sa.select(sa.func.min(table.c.start)).where(
-            table.c.stream == stream, table.c.period == "day"
+    def window_starts(self, stream: str, since: datetime) -> frozenset[datetime]:
+        """When the windows of a stream began that are done, from a time on."""
+        table = stream_windows
+        query = sa.select(table.c.start).where(table.c.stream == stream, table.c.start >= since)
+        with self.reading() as connection:
+            return frozenset(connection.scalars(query))
+
+    def first_unpooled(self, stream: str, since: datetime) -> datetime | None:
+        """The first window with modes from `since` on of which, though later hours are pooled, its
+        own hour, six hours or day is not.
+        """
+        table, windows = pooled_readings, stream_windows
+        of_windows = sa.select(windows.c.start).where(
+            windows.c.stream == stream, windows.c.has_modes, windows.c.start >= since
         )
-        return self._moment(query)
+        starts: dict[str, set[datetime]] = {period: set() for period in PERIODS}
+        with self.reading() as connection:
+            for row in connection.execute(
+                sa.select(table.c.period, table.c.start).where(
+                    table.c.stream == stream, table.c.start >= since - PERIODS["day"]
+                )
+            ):
+                starts[row.period].add(row.start)
+            found = connection.scalars(of_windows.order_by(windows.c.start)).all()
+        start: datetime
+        for start in found:
+            for period, length in PERIODS.items():
+                own = period_start(start, length)
+                if own not in starts[period] and own < max(starts[period], default=own):
+                    return start
+        return None
+
+    def first_day(self, stream: str) -> datetime | None:
+        """When the first day of a stream began of which anything is pooled; None without any."""
+        table = pooled_readings
+        query = sa.select(sa.func.min(table.c.start)).where(table.c.stream == stream)
+        first = self._moment(query)
+        return None if first is None else period_start(first, PERIODS["day"])
 
     def last_pooled(self, stream: str, period: Period) -> datetime | None:
         """When the latest reading of a period began; None where there is none."""
@@ -132,6 +178,7 @@ class Streams(Repository):
             if kept is not None:
                 state = {"hanger": reading.hanger, "reading_time": end, "content": kept}
                 _replace(connection, stream_watch, state, "hanger")
+                _keep_day(connection, state)
             of_keys = sa.select(alerts.c.id).where(alerts.c.key.in_(ended)).order_by(alerts.c.id)
             for alert_id in connection.scalars(of_keys).all() if ended else ():
                 resolve(connection, alert_id, "shm", _OVER, at or end)
@@ -148,6 +195,28 @@ class Streams(Repository):
         query = sa.select(table).where(table.c.hanger == hanger, table.c.period == period, *within)
         return self._values(table, query.order_by(table.c.start, table.c.id), PooledReading)
 
+    def watch_time(self, hanger: int) -> datetime | None:
+        """Up to when the watch of a hanger has seen readings; None where there is none."""
+        table = stream_watch
+        return self._moment(sa.select(table.c.reading_time).where(table.c.hanger == hanger))
+
+    def watch_before(self, hanger: int, until: datetime) -> tuple[datetime, bytes] | None:
+        """The watch of a hanger as it was at its last kept time up to `until`, and that time."""
+        table = stream_watch_days
+        own = sa.select(table).where(table.c.hanger == hanger, table.c.reading_time <= until)
+        with self.reading() as connection:
+            rows = connection.execute(own.order_by(table.c.reading_time.desc())).all()
+        return next(((r.reading_time, r.content) for r in rows if whole(table, r)), None)
+
+    def go_back(self, hanger: int, to: datetime, content: bytes) -> None:
+        """The watch of a hanger goes on from a state of before."""
+        days = stream_watch_days
+        state = {"hanger": hanger, "reading_time": to, "content": content}
+        later = (days.c.hanger == hanger, days.c.reading_time > to)
+        with self.writing() as connection:
+            _replace(connection, stream_watch, state, "hanger")
+            connection.execute(sa.delete(days).where(*later))
+
     def watch_state(self, hanger: int) -> bytes | None:
         """What the watch of a hanger goes on from; None where there is nothing, or only damage."""
         query = sa.select(stream_watch).where(stream_watch.c.hanger == hanger)
@@ -158,7 +227,8 @@ class Streams(Repository):
     def forget_watch(self, hanger: int) -> None:
         """Drops what the watch of a hanger would go on from."""
         with self.writing() as connection:
-            connection.execute(sa.delete(stream_watch).where(stream_watch.c.hanger == hanger))
+            for table in (stream_watch, stream_watch_days):
+                connection.execute(sa.delete(table).where(table.c.hanger == hanger))
 
     def save_event(self, event: StreamEvent) -> None:
         """Notes something once; what was noted already is not noted again."""
@@ -243,6 +313,29 @@ def _replace(connection: Connection, table: sa.Table, row: dict[str, Any], *keys
     former = (table.c[key] == row[key] for key in keys)
     connection.execute(sa.delete(table).where(*former))
     connection.execute(sa.insert(table).values(row))
+
+
+def _pooled_with(window: Window) -> sa.ColumnElement[bool]:
+    """The readings that a window is, or would be, pooled to."""
+    table = pooled_readings
+    any_of = (
+        (table.c.period == period) & (table.c.start == period_start(window.start, length))
+        for period, length in PERIODS.items()
+    )
+    return (table.c.stream == window.stream) & sa.or_(*any_of)
+
+
+def _keep_day(connection: Connection, state: dict[str, Any]) -> None:
+    """A state of the watch as one to go back to, where the last such is a day old."""
+    table = stream_watch_days
+    own, time = table.c.hanger == state["hanger"], state["reading_time"]
+    query = sa.select(table.c.reading_time).where(own).order_by(table.c.reading_time.desc())
+    known = connection.scalars(query).all()
+    if known and time < known[0] + PERIODS["day"]:
+        return
+    connection.execute(sa.insert(table).values(state))
+    for old in known[_DAYS_BACK - 1 :]:
+        connection.execute(sa.delete(table).where(own, table.c.reading_time == old))
 
 
 def _advance(connection: Connection, stream: str, until: datetime) -> None:

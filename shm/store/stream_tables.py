@@ -57,6 +57,15 @@ stream_watch = sa.Table(
     sa.Column("content", sa.LargeBinary, nullable=False),
 )
 
+# The same as it was about a day apart, for hours that come late.
+stream_watch_days = sa.Table(
+    "stream_watch_days",
+    metadata,
+    sa.Column("hanger", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("reading_time", UtcTime, primary_key=True),
+    sa.Column("content", sa.LargeBinary, nullable=False),
+)
+
 # Up to when the windows of a stream are done.
 stream_progress = sa.Table(
     "stream_progress",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -28,6 +28,12 @@ PERIODS: Mapping[Period, timedelta] = {  # as their names say
     "six hours": timedelta(hours=6),
     "day": timedelta(days=1),
 }
+
+
+def period_start(at: datetime, length: timedelta) -> datetime:
+    """The beginning of the stretch of that length, counted from midnight, that holds a moment."""
+    midnight = at.astimezone(UTC).replace(hour=0, minute=0, second=0, microsecond=0)
+    return midnight + (at - midnight) // length * length
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,8 @@ class StreamState:
     newest readings' modes with the conditions taken off, `ring_day` their days, `old` (n,) the mean
     of those before. Shifts count from `zero`, compensated ones from `compensated_zero`; a change
     that was told moved the tension by `called_shift` from `called_from` on, 0 where none stands.
-    So many hours the planes were exchanged.
+    So many hours the planes were exchanged. Up to `settled_day` readings are gone over again: no
+    alert ends before.
     """
 
     key: str
@@ -69,6 +70,7 @@ class StreamState:
     told: AlertState = field(default_factory=AlertState)
     standing: tuple[str, ...] = ()
     exchanged_hours: int = 0
+    settled_day: float = 0.0
 
     @classmethod
     def begun(cls, key: str, start: datetime, table: ModeTable) -> StreamState:
@@ -137,8 +139,19 @@ class StreamState:
 
 _SCALARS = (
     "key", "known_day", "zero", "compensated_zero", "readings", "is_learning", "called_from",
-    "called_shift", "standing", "exchanged_hours",
+    "called_shift", "standing", "exchanged_hours", "settled_day",
 )  # fmt: skip
+
+
+def gone_back(earlier: bytes, newest: bytes) -> bytes:
+    """An earlier state, from which to go over the readings up to the newest again, with those that
+    came late. What stands by now stands until then: it is not told and not ended twice.
+    """
+    state, last = StreamState.from_bytes(earlier), StreamState.from_bytes(newest)
+    ahead = (last.start - state.start).total_seconds() / 86400
+    settled = max(state.settled_day, ahead + last.bank.day, ahead + last.settled_day)
+    standing = tuple(dict.fromkeys((*state.standing, *last.standing)))
+    return replace(state, settled_day=settled, standing=standing).to_bytes()
 
 
 def as_mounted(

@@ -215,7 +215,8 @@ class StreamWatch:
         told, alert = after(state.told, test, self.hanger)
         told = replace(told, called=told.called[-_CALLS_KEPT:])
         standing = (*state.standing, alert.key) if alert else state.standing
-        ended = standing if alert is None and not told.beyond and not told.called else ()
+        stands = alert or told.beyond or told.called or state.bank.day < state.settled_day
+        ended = () if stands else standing
         state = replace(state, told=told, standing=() if ended else standing)
         if ended:
             state = replace(state, called_shift=0.0)

@@ -379,6 +379,25 @@ def test_a_clock_that_jumps_is_noted_and_jitter_is_not(logger: Logger) -> None:
     assert lengths == [18_000, 12_000]
 
 
+@pytest.mark.parametrize("hole", [(2, 8), (4, 35)])
+@pytest.mark.parametrize("seals", [False, True])
+def test_a_clock_that_steps_into_a_gap_is_noted(
+    logger: Logger, hole: tuple[int, int], seals: bool
+) -> None:
+    """By numbers: those that are the gap's own fill it, those of a later time are noted."""
+    first, last = hole
+    logger.send(*minutes(*range(first), *range(last, 40)), seals=seals)
+    back = timedelta(minutes=40 - first)
+    stepped = [replace(each, start=each.start - back) for each in minutes(41, 42, 43)]
+    logger.send(*stepped[:2], seals=seals)
+    logger.send(*stepped[2:], *minutes(last - 1))
+    told = [each.detail for each in logger.events if "does not belong" in each.detail]
+    numbers = {int(n) for each in told for n in each.partition(" is ")[0].split()[1::2]}
+    assert numbers >= {41, 43}
+    assert all(f"between chunks {first - 1} and" in each for each in told)
+    assert not any(f"chunk {last - 1} is" in each for each in told)
+
+
 def test_a_clock_that_drifts_is_noted(logger: Logger) -> None:
     """250 ppm more samples than the stamps say."""
     start = NOW

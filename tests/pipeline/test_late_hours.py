@@ -1,0 +1,159 @@
+"""Hours that come late are pooled and watched in their place; what they owe is told once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shm.models.tensioned_beam import frequencies_hz
+from shm.pipeline import stream_steps
+from shm.pipeline.stream_days import hand_on_day
+from shm.pipeline.streaming import Streaming
+from shm.store import Store, Workspace
+from shm.values import Mode
+from shm.values.stream import PooledReading, Window, WindowReading
+from shm.watch.stream_watch import StreamState, watch_reading
+from tests.helpers.flows import Clock, ingest
+from tests.helpers.live_streams import drain, with_live_streams
+from tests.helpers.workspaces import make_workspace
+
+FIRST = datetime(2026, 6, 1, tzinfo=UTC)
+HOUR = timedelta(hours=1)
+LOST = 84  # the hour from which 5 % of the tension are gone, amid those that come late
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
+    """A stream whose windows, one an hour, are made up: three exact modes a plane, and noise."""
+    made = with_live_streams(make_workspace(tmp_path / "bridge"))
+    hanger, stream = made.bridge.hangers[0], made.bridge.streams[0]
+
+    def window(start: datetime) -> stream_steps.WindowFound:
+        hour = (start - FIRST) // HOUR
+        draw = np.random.default_rng(hour)
+        tension_n = hanger.nominal_tension_n * (0.95 if hour >= LOST else 1.0)
+        each = (hanger.length_m, tension_n, hanger.bending_stiffness_n_m2)
+        springs = (hanger.mass_per_length_kg_m, 3e5, 3e5)
+        hz = frequencies_hz(*map(np.asarray, (*each, *springs)), modes=3)
+        noisy = {p: hz * (1 + 2e-4 * draw.normal(size=3)) for p in ("transverse", "longitudinal")}
+        modes = tuple(
+            Mode(plane, order, float(own), 2e-4 * float(own))
+            for plane, found in noisy.items()
+            for order, own in enumerate(found, 1)
+        )
+        kept = Window(stream.name, hanger.id, start, 600.0, "wind", 0.02, temperature_c=10.0)
+        return stream_steps.WindowFound(WindowReading(kept, modes, "tracked"), (), {})
+
+    starts: list[datetime] = []
+    real = Streaming._begin_window
+    monkeypatch.setattr(
+        Streaming,
+        "_begin_window",
+        lambda self, stream, start: (starts.append(start), real(self, stream, start))[1],
+    )
+    monkeypatch.setattr(stream_steps, "read_stream_window", lambda *_: window(starts[-1]))
+    return made
+
+
+@pytest.fixture
+def working(workspace: Workspace) -> Iterator[tuple[Streaming, Store, Clock]]:
+    clock = Clock(FIRST + timedelta(days=6))
+    with workspace.store() as store, ThreadPoolExecutor(1) as threads:
+        streaming = Streaming(workspace, store, threads, clock=clock)
+        yield streaming, store, clock
+        streaming.close()
+
+
+def come(working: tuple[Streaming, Store, Clock], *hours: int) -> None:
+    streaming, _, clock = working
+    name = streaming.workspace.bridge.streams[0].name
+    streaming.note_sealed([(name, FIRST + hour * HOUR) for hour in hours])
+    drain(streaming, clock)
+
+
+def hours_of(store: Store) -> tuple[PooledReading, ...]:
+    return store.streams.list_pooled(3, "hour", FIRST, FIRST + timedelta(days=9))
+
+
+def in_order(workspace: Workspace, readings: tuple[PooledReading, ...]) -> list[Any]:
+    kept, found = None, []
+    for reading in readings:
+        found.append(watch_reading(None, reading, workspace.bridge.hangers[0], kept))
+        kept = found[-1].kept
+    return found
+
+
+def test_what_was_offline_is_watched_in_its_place_and_its_alert_raised_once(
+    workspace: Workspace, working: tuple[Streaming, Store, Clock]
+) -> None:
+    _, store, _ = working
+    come(working, *range(80))
+    come(working, 100, 101)  # live again; the store of the logger follows, its middle first
+    assert not store.alerts.list_all()
+    come(working, *range(85, 99), 83, 82, 81, 80, 84, 99)
+
+    readings = hours_of(store)
+    assert [each.start for each in readings] == [FIRST + n * HOUR for n in range(101)]
+    (raised,) = store.alerts.list_all()
+    assert FIRST + LOST * HOUR < raised.alert.time < FIRST + (LOST + 8) * HOUR
+    come(working, *range(102, 110))
+    assert len(store.alerts.list_all()) == 1
+    assert not store.alerts.list_all(standing=False)
+
+    readings = hours_of(store)
+    found = in_order(workspace, readings)
+    assert [each.compensated_shift for each in found[72:]] == pytest.approx(
+        [each.compensated_shift for each in readings[72:]], nan_ok=True
+    )
+    assert [each.alert.key for each in found if each.alert] == [raised.alert.key]
+    kept = store.streams.watch_state(3)
+    assert kept is not None
+    state = StreamState.from_bytes(kept)
+    assert replace(state, settled_day=0.0).to_bytes() == found[-1].kept
+    days = sorted(path.name for path in workspace.spool.glob("*.modes.json"))
+    assert days == [f"hanger03-2026-06-{day:02d}.modes.json" for day in range(1, 5)]
+
+
+def test_whoever_comes_next_ends_what_late_hours_began(
+    workspace: Workspace, working: tuple[Streaming, Store, Clock]
+) -> None:
+    streaming, store, clock = working
+    come(working, *range(10), *range(14, 20))
+    name = workspace.bridge.streams[0].name
+    streaming.note_sealed([(name, FIRST + hour * HOUR) for hour in range(10, 14)])
+    for _ in range(6):  # the watch has gone back, and is killed on its way
+        streaming.advance()
+        for running in streaming.under_way:
+            running.exception(timeout=60)
+    assert len(hours_of(store)) < 19
+
+    with ThreadPoolExecutor(1) as threads:
+        drain(Streaming(workspace, store, threads, clock=clock), clock)
+    readings = hours_of(store)
+    kept = store.streams.watch_state(3)
+    assert kept is not None
+    assert len(readings) == 19
+    assert StreamState.from_bytes(kept).readings == 19
+    assert readings[-1].learning == in_order(workspace, readings)[-1].learning
+
+
+def test_the_whole_day_takes_the_place_of_what_was_known_of_it(workspace: Workspace) -> None:
+    from shm.monitor import as_modal_test
+
+    with workspace.store() as store:
+        for day, hz in ((0, 2.0), (1, 2.0), (1, 2.0), (1, 2.001)):
+            modes = tuple(Mode("transverse", n, hz * n, 1e-3) for n in (1, 2, 3))
+            reading = PooledReading(
+                "hanger03", 3, FIRST + day * 24 * HOUR, "day", modes, 9, 0, 0.02, 10.0, 4.0
+            )
+            hand_on_day(workspace, store, as_modal_test(reading), FIRST + timedelta(days=2))
+            ingest(workspace)
+        found = [each.test.modes[0].frequency_hz for each in store.tests.list_all(3)]
+    assert found == [2.0, 2.001]
