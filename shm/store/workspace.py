@@ -15,6 +15,7 @@ from shm.resources import default_config
 from shm.settings import Settings, commented, load_settings
 from shm.store.active import ActiveLock, Wait, active, holder
 from shm.store.archive import Archive, Quarantine
+from shm.store.audit import Actor
 from shm.store.location import has_password
 from shm.store.store import Store
 
@@ -24,12 +25,16 @@ FOLDERS = ("spool", "archive", "quarantine")
 
 @dataclass(frozen=True)
 class Workspace:
-    """A workspace as its `bridge.toml` describes it; `flags` are settings given for this run."""
+    """A workspace as its `bridge.toml` describes it; `flags` are settings given for this run.
+
+    The changes of an `actor` are noted as theirs.
+    """
 
     folder: Path
     bridge: Bridge
     settings: Settings
     flags: Mapping[str, object]
+    actor: Actor | None = None
 
     @classmethod
     def open(cls, folder: str | Path, flags: Mapping[str, object] | None = None) -> Self:
@@ -104,7 +109,8 @@ class Workspace:
 
     def store(self) -> Store:
         """Opens the store; raises NothingThere, SchemaOutdated or StoreError."""
-        return Store.open(self.location)
+        opened = Store.open(self.location)
+        return opened.acting_as(self.actor) if self.actor else opened
 
     @contextmanager
     def lock(self, wait: Wait | None = None) -> Iterator[ActiveLock]:

@@ -33,6 +33,7 @@ from shm_daemon.web.front import Pages
 from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.pages import (
     alerts,
+    audit,
     bridge,
     comparison,
     downloads,
@@ -87,6 +88,7 @@ def load_pages(site: Site) -> Pages:
         hanger_numbers,
         hanger,
         downloads,
+        audit,
     ):
         app.include_router(part.router)
     app.include_router(_described)
