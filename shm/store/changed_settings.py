@@ -7,11 +7,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
 import sqlalchemy as sa
 
 from shm.store.audit import note
-from shm.store.checksums import loads
+from shm.store.checksums import decoding, loads, readable
 from shm.store.database import Repository, insert
 from shm.store.people_tables import changed_settings
 
@@ -25,6 +26,16 @@ class ChangedSetting:
     at: datetime
     who: str
 
+    def __str__(self) -> str:
+        return (
+            f"{self.key.replace('.', ' ')} = {self.value} instead of what bridge.toml says, by "
+            f"{self.who} on {self.at:%Y-%m-%d}"
+        )
+
+    def is_of(self, hanger: int) -> bool:
+        """Whether it changes a hanger, or all of them."""
+        return self.key.startswith(("settings.", f"hanger.{hanger}."))
+
 
 class ChangedSettings(Repository):
     """Settings that the dashboard has changed; the newest row of a key holds."""
@@ -37,14 +48,20 @@ class ChangedSettings(Repository):
             detail = "back to bridge.toml" if value is None else str(value)
             note(connection, at, "setting changed", key.replace(".", " "), detail, who)
 
+    def newest(self) -> int:
+        """The number of the last change; 0 where there was none."""
+        with self.reading() as connection:
+            return connection.scalar(sa.select(sa.func.max(changed_settings.c.id))) or 0
+
     def list_current(self) -> Mapping[str, ChangedSetting]:
         """What holds instead of `bridge.toml`, by its key."""
         newest = sa.select(sa.func.max(changed_settings.c.id)).group_by(changed_settings.c.key)
         query = sa.select(changed_settings).where(changed_settings.c.id.in_(newest))
         with self.reading() as connection:
             rows = connection.execute(query.order_by(changed_settings.c.key)).all()
-        return {
-            row.key: ChangedSetting(row.key, loads(row.document), row.at, row.who)
-            for row in rows
-            if row.document is not None
-        }
+        return {each.key: each for each in readable(rows, _changed) if each.value is not None}
+
+
+def _changed(row: sa.Row[Any]) -> ChangedSetting:
+    with decoding(changed_settings, row):
+        return ChangedSetting(row.key, loads(row.document), row.at, row.who)

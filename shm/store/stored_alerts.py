@@ -112,7 +112,7 @@ class Alerts(Deliveries):
             if found.acknowledgement is None:
                 noted = Acknowledgement(alert_id, who, why, at)
                 insert(connection, acknowledgements, vars(noted))
-            note(connection, at, "alert resolved", _named(found), why, who)
+            note(connection, at, "alert resolved", _said_of(found), why, who)
             return alert_in(connection, alert_id)
 
     def acknowledge(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
@@ -130,7 +130,7 @@ class Alerts(Deliveries):
                 )
             noted = Acknowledgement(alert_id, who, why, at)
             insert(connection, acknowledgements, vars(noted))
-            note(connection, at, "alert acknowledged", _named(alert), why, who)
+            note(connection, at, "alert acknowledged", _said_of(alert), why, who)
         return replace(alert, acknowledgement=noted)
 
     def counts(self) -> tuple[int, int]:
@@ -244,5 +244,5 @@ def _named(table: sa.Table, at: str, who: str, why: str) -> sa.Select[Any]:
     return sa.select(table.c.id, *(table.c[name].label(label) for label, name in named.items()))
 
 
-def _named(stored: StoredAlert) -> str:
+def _said_of(stored: StoredAlert) -> str:
     return f"alert {stored.id}, hanger {stored.alert.hanger}"

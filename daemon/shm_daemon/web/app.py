@@ -41,8 +41,10 @@ from shm_daemon.web.pages import (
     health,
     one_test,
     sensors,
+    settings,
     static,
     upload,
+    users,
 )
 from shm_daemon.web.site import Site
 
@@ -89,6 +91,8 @@ def load_pages(site: Site) -> Pages:
         hanger,
         downloads,
         audit,
+        settings,
+        users,
     ):
         app.include_router(part.router)
     app.include_router(_described)

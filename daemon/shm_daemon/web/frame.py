@@ -34,7 +34,7 @@ NAVIGATION = (
     ("/operation", "Operation"),
 )
 
-FOR_ENGINEERS = (("/audit", "Audit log"),)
+FOR_ENGINEERS = (("/settings", "Settings"), ("/users", "Users"), ("/audit", "Audit log"))
 
 
 def page(request: Request, template: str, *, status: int = 200, **content: Any) -> HTMLResponse:
