@@ -9,6 +9,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -250,8 +251,10 @@ def table(title: str, *columns: str) -> Table:
 def open_workspace(ctx: click.Context, **flags: object) -> Workspace:
     """The workspace of the command; `flags` are settings given on the command line."""
     from shm.store import Workspace
+    from shm.store.audit import COMMAND_LINE, Actor
 
-    return Workspace.open(ctx.obj, flags)
+    opened = Workspace.open(ctx.obj, flags)
+    return replace(opened, actor=Actor(getpass.getuser(), COMMAND_LINE))
 
 
 def is_workspace(ctx: click.Context) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import rich_click as click
@@ -54,7 +55,7 @@ def command(
     tls = {"--certificate": certificate, "--key": key}
     if not web and any(tls.values()):
         raise UsageError("--certificate and --key are for --web.", remedy="Give --web as well.")
-    workspace = open_workspace(ctx, workers=workers)
+    workspace = replace(open_workspace(ctx, workers=workers), actor=None)
     if as_unit:
         words = [
             "daemon",

@@ -141,6 +141,8 @@ def _show(document: dict[str, Any]) -> None:
     show_table(made)
     for said in _told_of_held(document["held"]):
         click.echo(said)
+    for said in document["changed_settings"]:
+        click.echo(paragraph(f"changed on the page Settings: {said}"))
 
 
 def _told_of_structure(row: Mapping[str, Any]) -> str:
@@ -237,6 +239,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         ],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
+        "changed_settings": [str(each) for each in store.settings.list_current().values()],
         "structures": _structures(workspace, store, open_at),
         "hangers": _hangers(workspace, store, open_at, Counter(hold.hanger for hold in held)),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import rich_click as click
@@ -42,7 +43,7 @@ def command(
     from shm_daemon.web.address import Address
     from shm_daemon.web.serving import leaving, serve
 
-    workspace, address = open_workspace(ctx), Address(host, port)
+    workspace, address = replace(open_workspace(ctx), actor=None), Address(host, port)
     if as_unit:
         files = {"--certificate": certificate, "--key": key}
         words = ["web", *serving_words(host, port, files)]

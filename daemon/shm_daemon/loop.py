@@ -170,7 +170,7 @@ class Daemon:
         self._tracker = FileStabilityTracker(settings.spool_stable_seconds, time.monotonic)
         self._longest_wait_s = longest_wait_s()
         self._scan_at = 0.0
-        self._described_at = _modified_ns(flow.workspace)
+        self._described_at = _modified_ns(flow.workspace), flow.workspace.newest_change
         self._once, self._failure = False, ""
         folders = flow.workspace.spool, flow.workspace.archive.folder
         self._devices = {folder: _device(folder) for folder in folders}
@@ -305,11 +305,12 @@ class Daemon:
                 )
 
     def _heed_description(self) -> None:
-        """Takes a changed `bridge.toml` over; a wrong one leaves the last good one in force."""
-        modified = _modified_ns(self._flow.workspace)
-        if modified == self._described_at:
+        """Takes a changed `bridge.toml` or setting over; a wrong one leaves the last in force."""
+        workspace = self._flow.workspace
+        described = _modified_ns(workspace), self._flow.store.settings.newest()
+        if described == self._described_at:
             return
-        self._described_at = modified
+        self._described_at = described
         try:
             self._flow.use(self._flow.workspace.reopened())
             self._streaming.use(self._flow.workspace)
@@ -317,7 +318,7 @@ class Daemon:
         except ShmError as error:
             log.error("bridge.toml is not taken over: %s", error)
         else:
-            log.info("bridge.toml has changed and is taken over")
+            log.info("bridge.toml or a setting has changed and is taken over")
 
 
 def _device(folder: Path) -> int | None:

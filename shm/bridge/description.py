@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date, datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
+from shm.bridge.changes import overlaid
 from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, hook_of
 from shm.bridge.letterhead import letterhead_of
@@ -35,7 +37,8 @@ class Bridge:
     """What `bridge.toml` says; `built` is None where it does not say.
 
     `structures` are those without a model, of which frequencies alone are watched: a deck, a pylon.
-    Their numbers are none of a hanger.
+    Their numbers are none of a hanger. `as_in_file` is the bridge without what the page Settings
+    has changed; None where it has changed nothing.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Bridge:
     structures: tuple[Hanger, ...] = ()
     streams: tuple[Stream, ...] = ()
     letterhead: Letterhead = NO_LETTERHEAD
+    as_in_file: Bridge | None = None
 
     @property
     def escalation_s(self) -> dict[str, float]:
@@ -91,9 +95,23 @@ class Bridge:
         )
 
 
-def load_bridge(path: Path) -> Bridge:
-    """Reads and checks `bridge.toml`; raises BadInput naming the table and key at fault."""
-    document = _parse(path)
+def load_bridge(path: Path, changed: Mapping[str, object] = MappingProxyType({})) -> Bridge:
+    """Reads and checks `bridge.toml`, in which values of `changed` hold instead: see `overlaid`.
+
+    Raises BadInput naming the table and key at fault.
+    """
+    if not changed:
+        return _described(_parse(path), path)
+    plain = _described(_parse(path), path)
+    try:
+        return replace(_described(overlaid(_parse(path), changed), path), as_in_file=plain)
+    except BadInput as error:
+        raise BadInput(
+            error.message, remedy=f"{error.remedy} It was changed on the page Settings."
+        ) from error
+
+
+def _described(document: dict[str, Any], path: Path) -> Bridge:
     hangers = tuple(hanger_of(table, path) for table in _tables(document, "hanger", path))
     structures = tuple(structure_of(table, path) for table in _tables(document, "structure", path))
     _refuse_doubles([each.id for each in (*hangers, *structures)], "hanger id", path)

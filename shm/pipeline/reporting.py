@@ -137,7 +137,14 @@ def hanger_now(
             hanger,
         ),
         lineage={**test_lineage(store, latest), **_baseline_words(baseline)},
-        settings=settings_words(workspace.settings),
+        settings={
+            **settings_words(workspace.settings),
+            **{
+                f"changed: {each.key}": str(each)
+                for each in store.settings.list_current().values()
+                if each.is_of(hanger.id)
+            },
+        },
         redescribed=redescribed(hanger, in_force),
         discarded=discarded_of(store, in_force),
         warnings=warnings_of(workspace, store, [hanger]).get(hanger.id, ()),

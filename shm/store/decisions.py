@@ -14,6 +14,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError, sentence
+from shm.store.audit import note
 from shm.store.checksums import loads
 from shm.store.database import Repository, insert
 from shm.store.files import (
@@ -210,7 +211,10 @@ class Decisions(Repository):
         Raises NothingThere, and UsageError where the recording has not come so far.
         """
         with self.writing() as connection:
-            return reprocess(connection, recording_id, stage, at, test)
+            made = reprocess(connection, recording_id, stage, at, test)
+            subject = test or by_id(connection, recording_id).file_name
+            note(connection, at, "recording done again", subject, f"from {stage}")
+            return made
 
 
 def _let_count(
@@ -278,6 +282,7 @@ def _decide_unheld(
     made = {"decision": decision, "decided_at": at, "who": who, "why": why, "time": time}
     insert(connection, holds, {**row, **made})
     write_event(connection, at, str(decision), recording.id, recording.file_name, message)
+    note(connection, at, f"recording {decision}", f"{recording.file_name}: {names}", why, who)
     return holds_of(connection, recording.id)[-1]
 
 

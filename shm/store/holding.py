@@ -13,6 +13,7 @@ from sqlalchemy.engine import Connection, Row
 from shm.documents import value_of
 from shm.errors import NothingThere, UsageError, sentence
 from shm.modes_document import test_document
+from shm.store.audit import note
 from shm.store.blobs import pack, test_from_document, unpack
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
@@ -284,6 +285,7 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
     if notice is not None:
         resolve(connection, notice, who, told, at)
     write_event(connection, at, str(hold.decision), hold.recording_id, hold.file_name, told)
+    note(connection, at, f"recording {hold.decision}", hold.file_name, why, who)
     return replace(hold, decided_at=at, who=who, why=why)
 
 

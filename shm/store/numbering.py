@@ -36,6 +36,8 @@ NUMBERED = (
     "silences",
     "users",
     "sessions",
+    "audit",
+    "changed_settings",
 )
 """Tables of which no row is ever taken out, but for damaged ones of `drifts` and `watches` (see
 `forget`). The order is that of the bits: new ones come last."""

@@ -12,8 +12,10 @@ from typing import Any
 
 import argon2
 import sqlalchemy as sa
+from sqlalchemy.engine import Connection
 
 from shm.errors import NothingThere, UsageError
+from shm.store.audit import note
 from shm.store.database import Repository, insert
 from shm.store.people_tables import sessions, users
 
@@ -64,14 +66,19 @@ class People(Repository):
                     remedy=f"Take another name, or remove it: `shm user remove {name}`.",
                 )
             insert(connection, users, values)
+            note(connection, at, "user added", f"user {name}", role)
 
     def remove(self, name: str, at: datetime) -> None:
         """Ends a user and all sessions from now on; raises NothingThere where there is none."""
-        self._change(name, at, {"removed_at": at})
+        self._change(name, at, "user removed", {"removed_at": at})
 
     def set_password(self, name: str, password: str, at: datetime) -> None:
         """Gives a new password and ends all sessions; raises NothingThere or UsageError."""
-        self._change(name, at, {"password_hash": _hashed(password)})
+        self._change(name, at, "password set", {"password_hash": _hashed(password)})
+
+    def set_role(self, name: str, role: Role, at: datetime) -> None:
+        """Changes what a user may and ends all sessions; raises NothingThere or UsageError."""
+        self._change(name, at, "role changed", {"role": role}, role)
 
     def list_all(self) -> tuple[User, ...]:
         """All users, those removed too, as they were made."""
@@ -116,17 +123,32 @@ class People(Repository):
         with self.writing() as connection:
             connection.execute(one.where(sessions.c.ended_at.is_(None)).values(ended_at=at))
 
-    def _change(self, name: str, at: datetime, values: dict[str, object]) -> None:
+    def _change(
+        self, name: str, at: datetime, action: str, values: dict[str, object], detail: str = ""
+    ) -> None:
+        ends_engineer = "removed_at" in values or values.get("role", "engineer") != Role.ENGINEER
         with self.writing() as connection:
             row = connection.execute(_in_force.where(users.c.name == name)).first()
             if row is None:
                 raise NothingThere(f"there is no user {name}.", remedy="See `shm user list`.")
+            if row.role == Role.ENGINEER and ends_engineer:
+                _refuse_last(connection, row.id)
             connection.execute(sa.update(users).where(users.c.id == row.id).values(**values))
             own = sa.update(sessions).where(sessions.c.user_id == row.id)
             connection.execute(own.where(sessions.c.ended_at.is_(None)).values(ended_at=at))
+            note(connection, at, action, f"user {name}", detail)
 
 
 _in_force = sa.select(users).where(users.c.removed_at.is_(None))
+
+
+def _refuse_last(connection: Connection, id_: int) -> None:
+    """Raises UsageError where no other engineer is left: nobody could let anybody in any more."""
+    others = _in_force.where(users.c.role == Role.ENGINEER, users.c.id != id_)
+    if connection.execute(others).first() is None:
+        raise UsageError(
+            "this is the last engineer.", remedy="Make another user an engineer before."
+        )
 
 
 def _hashed(password: str) -> str:

@@ -1,10 +1,10 @@
-"""The tables of people; `tables` completes them and holds the rules for changes."""
+"""The tables of people and of what they change; `tables` completes them and holds the rules."""
 
 from __future__ import annotations
 
 import sqlalchemy as sa
 
-from shm.store.columns import UtcTime, identity, metadata, reference, unique_where
+from shm.store.columns import Document, UtcTime, identity, metadata, reference, unique_where
 
 # Who may sign in by name. Of a password only its salted, slow hash is kept.
 users = sa.Table(
@@ -28,4 +28,30 @@ sessions = sa.Table(
     sa.Column("secret_sha256", sa.String(64), nullable=False, unique=True),
     sa.Column("began_at", UtcTime, nullable=False),
     sa.Column("ended_at", UtcTime),
+)
+
+# Who changed what. `via` is the way it came: page, API, command line.
+audit = sa.Table(
+    "audit",
+    metadata,
+    identity(),
+    sa.Column("at", UtcTime, nullable=False),
+    sa.Column("who", sa.Text, nullable=False),
+    sa.Column("via", sa.String(16), nullable=False),
+    sa.Column("action", sa.String(64), nullable=False),
+    sa.Column("subject", sa.Text, nullable=False),
+    sa.Column("detail", sa.Text, nullable=False),
+)
+
+# What the settings page says beside `bridge.toml`. The newest row of a key holds; one without a
+# document gives the key back to `bridge.toml`.
+changed_settings = sa.Table(
+    "changed_settings",
+    metadata,
+    identity(),
+    sa.Column("key", sa.String(255), nullable=False),
+    sa.Column("document", Document),
+    sa.Column("at", UtcTime, nullable=False),
+    sa.Column("who", sa.Text, nullable=False),
+    sa.Index(None, "key"),
 )

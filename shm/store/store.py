@@ -1,4 +1,4 @@
-"""The store: one database, its verbs in nine repositories by what they are about."""
+"""The store: one database, its verbs in repositories by what they are about."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from sqlalchemy.engine import Engine
 
 from shm.errors import NothingThere
 from shm.store import schema
+from shm.store.audit import Actor, Audit, acting_as
+from shm.store.changed_settings import ChangedSettings
 from shm.store.database import Database, make_engine
 from shm.store.people import People
 from shm.store.stored_alerts import Alerts
@@ -30,7 +32,8 @@ class Store(Database):
     `tests` what was identified from them; `posteriors` what was computed from tests, with
     selections, diagnoses and adoptions; `watch` what it said after each test, and its baselines;
     `alerts` those that were raised, and their deliveries; `silences` when no hook is told;
-    `streams` what permanent sensors said; `people` who signs in by name;
+    `streams` what permanent sensors said; `people` who signs in by name; `audit` who
+    changed what; `settings` what the dashboard says beside `bridge.toml`;
     `upkeep` tokens, copies, backups and the healing of rows.
     """
 
@@ -44,6 +47,8 @@ class Store(Database):
         self.silences = Silences(engine)
         self.streams = Streams(engine)
         self.people = People(engine)
+        self.audit = Audit(engine)
+        self.settings = ChangedSettings(engine)
         self.upkeep = Upkeep(engine)
 
     @classmethod
@@ -62,6 +67,10 @@ class Store(Database):
         """Brings an existing store to the present schema."""
         _must_exist(location)
         _ready(location, schema.upgrade).dispose()
+
+    def acting_as(self, actor: Actor) -> Self:
+        """The same open store, where changes are noted as an actor's; not to be closed."""
+        return type(self)(acting_as(self.engine, actor))
 
     def __enter__(self) -> Self:
         return self

@@ -11,6 +11,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere, UsageError
+from shm.store.audit import note
 from shm.store.database import insert
 from shm.store.deliveries import Deliveries, alert_in
 from shm.store.list_rows import AlertRow, DeliveryRow, EventKind, HangerEvent
@@ -111,6 +112,7 @@ class Alerts(Deliveries):
             if found.acknowledgement is None:
                 noted = Acknowledgement(alert_id, who, why, at)
                 insert(connection, acknowledgements, vars(noted))
+            note(connection, at, "alert resolved", _said_of(found), why, who)
             return alert_in(connection, alert_id)
 
     def acknowledge(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
@@ -128,6 +130,7 @@ class Alerts(Deliveries):
                 )
             noted = Acknowledgement(alert_id, who, why, at)
             insert(connection, acknowledgements, vars(noted))
+            note(connection, at, "alert acknowledged", _said_of(alert), why, who)
         return replace(alert, acknowledgement=noted)
 
     def counts(self) -> tuple[int, int]:
@@ -239,3 +242,7 @@ def _of(hanger: int, table: sa.Table, query: sa.Select[Any]) -> sa.Select[Any]:
 def _named(table: sa.Table, at: str, who: str, why: str) -> sa.Select[Any]:
     named = {"at": at, "who": who, "why": why}
     return sa.select(table.c.id, *(table.c[name].label(label) for label, name in named.items()))
+
+
+def _said_of(stored: StoredAlert) -> str:
+    return f"alert {stored.id}, hanger {stored.alert.hanger}"

@@ -13,6 +13,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.diagnosis_document import diagnosis_document, diagnosis_of
 from shm.errors import NothingThere, StoreBusy, UsageError
+from shm.store.audit import note
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
 from shm.store.files import in_force
@@ -213,6 +214,8 @@ class Posteriors(Trends):
                 "adopted_at": at,
             }
             id_ = insert(connection, adoptions, {**vars(adoption), **kept})
+            subject, who = f"hanger {hanger}, {model}", adoption.who
+            note(connection, at, "class adopted", subject, adoption.why, who)
         return StoredAdoption(id_, adoption, at)
 
     def drop_adoption(self, adoption_id: int, why: str, who: str, at: datetime) -> StoredAdoption:
@@ -232,6 +235,8 @@ class Posteriors(Trends):
                 )
             changed = sa.update(adoptions).where(adoptions.c.id == adoption_id)
             connection.execute(changed.values(**undoing))
+            subject = f"hanger {row.hanger}, {row.model}"
+            note(connection, at, "adoption dropped", subject, why, who)
             return _adoption(connection.execute(by_id).one())
 
     def list_adoptions(

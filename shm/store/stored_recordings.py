@@ -12,6 +12,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere, UsageError
+from shm.store.audit import note
 from shm.store.checksums import readable
 from shm.store.database import insert
 from shm.store.decisions import Decisions
@@ -64,6 +65,7 @@ class Recordings(Decisions):
             else:
                 row_id = known.id
                 _notice(connection, known, file, outcome, at)
+            note(connection, at, "recording taken in", file.file_name, str(outcome))
             return Receipt(outcome, recording_from(by_id(connection, row_id)))
 
     def refuse(

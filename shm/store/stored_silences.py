@@ -9,6 +9,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Row
 
 from shm.errors import NothingThere, UsageError
+from shm.store.audit import note
 from shm.store.database import Repository, insert
 from shm.store.rows import Silence
 from shm.store.tables import silences
@@ -42,7 +43,9 @@ class Silences(Repository):
         made = Silence(0, hanger, starts_at, ends_at, is_maintenance, who, why, at)
         values = {name: value for name, value in vars(made).items() if name != "id"}
         with self.writing() as connection:
-            return self._one(insert(connection, silences, {**values, "ended_who": None}), made)
+            number = insert(connection, silences, {**values, "ended_who": None})
+            note(connection, at, "silence made", _named(number, hanger), why, who)
+            return self._one(number, made)
 
     def end(self, silence_id: int, who: str, at: datetime) -> Silence:
         """Ends a silence before its time; raises NothingThere, or UsageError where it is over."""
@@ -59,6 +62,7 @@ class Silences(Repository):
             ended = {"ended_at": at, "ended_who": who}
             one = sa.update(silences).where(silences.c.id == silence_id)
             connection.execute(one.values(**ended))
+            note(connection, at, "silence ended", _named(silence_id, found.hanger), who=who)
             return self._one(silence_id, found, at, who)
 
     def list_all(self) -> tuple[Silence, ...]:
@@ -85,6 +89,10 @@ def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> 
     while ends := [each.until for each in silences if each.covers(hanger, until)]:
         until = max(ends)
     return None if until == at else until
+
+
+def _named(number: int, hanger: int | None) -> str:
+    return f"silence {number}, " + ("all hangers" if hanger is None else f"hanger {hanger}")
 
 
 def _silence(row: Row[tuple[object, ...]]) -> Silence:

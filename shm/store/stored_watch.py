@@ -13,6 +13,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import DamagedRow, StoreBusy
+from shm.store.audit import note
 from shm.store.blobs import change_from, watch_document, watch_from
 from shm.store.checksums import damaged, decoding, loads, whole
 from shm.store.columns import Number
@@ -205,6 +206,7 @@ class Watch(Repository):
                 if explained is not None and alert_id not in acknowledged:
                     noted = Acknowledgement(alert_id, who, f"explained by: {why}", at)
                     insert(connection, acknowledgements, vars(noted))
+            note(connection, at, "baseline set", f"hanger {hanger}", why, who)
         return Baseline(id_, hanger, posterior, at, who, why, since)
 
     def list_watched(

@@ -17,6 +17,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import DamagedRow, NothingThere, UsageError
 from shm.store.archive import Archive
+from shm.store.audit import note
 from shm.store.damage import damaged_ids, damaged_rows, drop_rows, overwrite
 from shm.store.database import Repository, insert
 from shm.store.files import write_event
@@ -110,6 +111,7 @@ class Upkeep(Repository):
                 )
             values = {"name": name, "token_sha256": _hashed(secret), "created_at": at}
             insert(connection, tokens, {**values, "scopes": ",".join(scopes)})
+            note(connection, at, "token made", f"token {name}", f"may {scope}")
         return secret
 
     def list_tokens(self) -> tuple[StoredToken, ...]:
@@ -130,6 +132,7 @@ class Upkeep(Repository):
                 raise NothingThere(
                     f"no token named {name} is in force.", remedy="See `shm token list`."
                 )
+            note(connection, at, "token revoked", f"token {name}")
 
     def token_of(self, secret: str, at: datetime) -> StoredToken | None:
         """The token in force with this secret, and a note that it was used; None where none has.
@@ -174,6 +177,7 @@ class Upkeep(Repository):
         name = recording.file.file_name
         with self.writing() as connection:
             write_event(connection, at, _REMOVED, recording.id, name, copy_folder)
+            note(connection, at, "raw file removed", name, f"copied to {copy_folder}")
 
     def removed_to(self) -> dict[int, str]:
         """Recordings whose raw files were taken out of the archive: where their copies lie."""

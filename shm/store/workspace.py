@@ -6,15 +6,17 @@ import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Self
 
 from shm.bridge import Bridge, load_bridge
-from shm.errors import BadInput, UsageError
+from shm.errors import BadInput, ShmError, UsageError
 from shm.resources import default_config
 from shm.settings import Settings, commented, load_settings
 from shm.store.active import ActiveLock, Wait, active, holder
 from shm.store.archive import Archive, Quarantine
+from shm.store.audit import Actor
 from shm.store.location import has_password
 from shm.store.store import Store
 
@@ -24,12 +26,18 @@ FOLDERS = ("spool", "archive", "quarantine")
 
 @dataclass(frozen=True)
 class Workspace:
-    """A workspace as its `bridge.toml` describes it; `flags` are settings given for this run."""
+    """A workspace as its `bridge.toml` describes it; `flags` are settings given for this run.
+
+    The changes of an `actor` are noted as theirs. `newest_change` is the number of the last setting
+    changed on a page that was heeded; None where the store could not be asked.
+    """
 
     folder: Path
     bridge: Bridge
     settings: Settings
     flags: Mapping[str, object]
+    actor: Actor | None = None
+    newest_change: int | None = None
 
     @classmethod
     def open(cls, folder: str | Path, flags: Mapping[str, object] | None = None) -> Self:
@@ -44,7 +52,12 @@ class Workspace:
         """The same, but folders that are missing stay missing: for one who only looks."""
         folder = Path(folder).resolve()
         bridge = load_bridge(folder / "bridge.toml")
-        return cls(folder, bridge, _settings(bridge, flags), dict(flags or {}))
+        settings = _settings(bridge, flags)
+        newest, changed = changed_in(_location(folder, settings))
+        if changed:
+            bridge = load_bridge(folder / "bridge.toml", changed)
+            settings = _settings(bridge, flags)
+        return cls(folder, bridge, settings, dict(flags or {}), newest_change=newest)
 
     @classmethod
     def initialise(cls, folder: str | Path, config: Path | None = None) -> Self:
@@ -67,6 +80,18 @@ class Workspace:
             with target.open("a", encoding="utf-8") as file:
                 file.write(commented())
         return cls.open(folder)
+
+    def change_setting(
+        self, store: Store, key: str, value: float | None, at: datetime, who: str
+    ) -> None:
+        """Has a value hold instead of what `bridge.toml` says; None gives the key back to it.
+
+        Raises BadInput, as for `bridge.toml`, where it cannot hold; then nothing is changed.
+        """
+        current = {name: each.value for name, each in store.settings.list_current().items()}
+        wanted = {name: each for name, each in {**current, key: value}.items() if each is not None}
+        _settings(load_bridge(self.folder / "bridge.toml", wanted), self.flags)
+        store.settings.change(key, value, who, at)
 
     def reopened(self) -> Self:
         """The same workspace as its `bridge.toml` describes it now."""
@@ -104,7 +129,8 @@ class Workspace:
 
     def store(self) -> Store:
         """Opens the store; raises NothingThere, SchemaOutdated or StoreError."""
-        return Store.open(self.location)
+        opened = Store.open(self.location)
+        return opened.acting_as(self.actor) if self.actor else opened
 
     @contextmanager
     def lock(self, wait: Wait | None = None) -> Iterator[ActiveLock]:
@@ -124,6 +150,19 @@ class Workspace:
     @property
     def _lock_file(self) -> Path:
         return self.folder / "shm.lock"
+
+
+def changed_in(location: str | Path) -> tuple[int | None, Mapping[str, object]]:
+    """The number of the newest change of a setting, and what holds instead of `bridge.toml`.
+
+    None where there is no store that says: whoever needs the store is told by the store itself.
+    """
+    try:
+        with Store.open(location) as store:
+            current = store.settings.list_current()
+            return store.settings.newest(), {key: each.value for key, each in current.items()}
+    except ShmError:
+        return None, {}
 
 
 def _settings(bridge: Bridge, flags: Mapping[str, object] | None) -> Settings:

@@ -63,6 +63,7 @@ READING = (
     "status --of 1",
     "token list",
     "user list",
+    "audit",
 )
 
 

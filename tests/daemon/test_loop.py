@@ -349,3 +349,14 @@ def test_a_missing_store_is_told(workspace: Workspace) -> None:
     workspace.database.unlink()
     with pytest.raises(ShmError, match="shm init"):
         run_once(workspace)
+
+
+def test_a_setting_changed_on_a_page_is_taken_over(
+    workspace: Workspace, serve: Callable[..., Wakeup], caplog: pytest.LogCaptureFixture
+) -> None:
+    serve()
+    until(lambda: "watching" in caplog.text)
+    key = "hanger.3.thresholds.alert_probability"
+    with workspace.store() as store:
+        workspace.change_setting(store, key, 0.9, utc_now(), "anna")
+    until(lambda: "a setting has changed and is taken over" in caplog.text)

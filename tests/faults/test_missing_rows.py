@@ -38,8 +38,8 @@ MAY_GO = (
 """Made again by themselves, or taken out after some time: a row of these is not missed."""
 
 LAST = (
-    "acknowledgements", "archive_copies", "diagnoses", "events", "sessions", "silences", "tokens",
-    "users",
+    "acknowledgements", "archive_copies", "audit", "changed_settings", "diagnoses", "events",
+    "sessions", "silences", "tokens", "users",
 )  # fmt: skip
 """Of these the last row leaves no gap, and nothing else tells of it: what a person did."""
 

@@ -171,6 +171,8 @@ def _keep(workspace: Workspace, store: Store, clock: Clock, folder: Path) -> Non
         store.people.add(name, Role.READER, password, clock())
     for _ in range(2):
         assert store.people.sign_in("Ann", password, clock()) is not None
+    for level in (0.9, None):
+        store.settings.change("hanger.3.thresholds.alert_probability", level, "Ann", clock())
     for hanger in workspace.bridge.hangers:
         store.posteriors.save_summaries(hanger)
     copies = Archive(folder / "copies")

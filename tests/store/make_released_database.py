@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np
 
 from shm.store import Adoption, HeldTest, IdentifiedTest, Judged, Lineage, Stage, Store
+from shm.store.people import Role
 from shm.store.tables import SCHEMA
 from shm.values import Doubt, Fingerprint, Selection
 from tests.helpers.diagnoses import a_diagnosis
@@ -78,6 +79,8 @@ def fill(store: Store) -> None:
     _update_again(store)
     _hold(store)
     fill_streams(store)
+    store.people.add("engineer", Role.ENGINEER, "correct horse battery", NOW)
+    store.settings.change("hanger.3.thresholds.alert_probability", 0.9, "engineer", NOW)
 
 
 def _hold(store: Store) -> None:

@@ -35,6 +35,7 @@ from shm.store import Workspace
 from shm.store.rows import Delivery, DeliveryState, Silence
 from shm.store.stored_silences import silenced_until
 from shm.store.workspace import FOLDERS
+from shm_daemon.doctor.check_settings import check_changed_settings
 from shm_daemon.doctor.check_streams import check_streams
 from shm_daemon.doctor.checks import (
     WAITS_LONG,
@@ -165,6 +166,7 @@ _CHECKS: Sequence[tuple[str, Check]] = (
     ("deliveries", check_deliveries),
     ("hangers", check_hangers),
     ("streams", check_streams),
+    ("settings", check_changed_settings),
 )
 _REPORT = "This is a fault of shm; please report it."
 

@@ -6,7 +6,7 @@ A program sends its token in a header; a browser sends the cookie that signing i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 from urllib.parse import urlsplit
 
@@ -15,6 +15,7 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
 from shm.pipeline import utc_now
 from shm.store import Scope
+from shm.store.audit import Actor
 from shm.store.people import SESSION, Role
 from shm_daemon.web.address import caller_of
 from shm_daemon.web.faults import Refused
@@ -28,6 +29,8 @@ _bearer = HTTPBearer(
     "itself needs none while the interface listens there only. A browser that has signed in sends "
     "a cookie instead.",
 )
+_BY_HEADER = "Send the header `Authorization: Bearer TOKEN`; `shm token create` makes one."
+API, PAGE = "API", "page"
 _FORWARDED = ("forwarded", "x-forwarded-for", "x-forwarded-host", "x-real-ip")
 
 
@@ -38,10 +41,20 @@ class Visitor:
     name: str
     role: Role = Role.READER
     is_person: bool = False
+    via: str = API
 
     @property
     def may_write(self) -> bool:
         return self.role.may(Role.OPERATOR)
+
+    @property
+    def is_engineer(self) -> bool:
+        return self.role.may(Role.ENGINEER)
+
+    @property
+    def actor(self) -> Actor:
+        """Whose their changes are, in the audit log."""
+        return Actor(self.name if self.is_person else f"token {self.name}", self.via)
 
 
 def site_of(request: Request) -> Site:
@@ -65,8 +78,7 @@ def reading(request: Request, site: AtSite, credentials: Credentials) -> Visitor
     elif _is_at_home(request, site):
         found = _at_home(site, request.cookies.get(COOKIE))
     else:
-        secret = _cookie(request, "Reading needs a token here.")
-        found = _visitor(request, site, secret, Role.READER)
+        found = _signed_in(request, site, "Reading needs a user or a token here.", Role.READER)
     request.state.visitor = found
     return found
 
@@ -75,13 +87,19 @@ def writing(request: Request, site: AtSite, credentials: Credentials) -> Visitor
     """Lets in who may write: only signed in or with a token."""
     if credentials is not None:
         return _visitor(request, site, credentials.credentials, Role.OPERATOR)
-    token = _cookie(request, "Writing needs a token.")
-    refuse_foreign(request)
-    return _visitor(request, site, token, Role.OPERATOR)
+    return _signed_in(request, site, "Writing needs a user or a token.", Role.OPERATOR)
+
+
+def engineering(request: Request, site: AtSite) -> Visitor:
+    """Lets in engineers, in a browser: no token is one."""
+    found = _signed_in(request, site, "This needs an engineer.", Role.ENGINEER)
+    request.state.visitor = found
+    return found
 
 
 Reader = Annotated[Visitor, Depends(reading)]
 Writer = Annotated[Visitor, Depends(writing)]
+Engineer = Annotated[Visitor, Depends(engineering)]
 
 
 def refuse_foreign(request: Request) -> None:
@@ -103,9 +121,17 @@ def visitor_in_force(request: Request, site: Site, secret: str) -> Visitor:
     found = _found(site, secret)
     if found is None:
         site.wrong_tokens.note_wrong(caller)
-        raise _nobody("This token is wrong or revoked.")
+        if secret.startswith(SESSION):
+            raise _nobody("You are not signed in any more.", "Sign in again at /sign-in.")
+        raise _nobody("This token is wrong or revoked.", _BY_HEADER)
     site.wrong_tokens.note_right(secret)
     return found
+
+
+def is_signed_in(request: Request, site: Site) -> bool:
+    """Whether the browser's cookie is in force."""
+    secret = request.cookies.get(COOKIE)
+    return bool(secret) and _found(site, secret or "") is not None
 
 
 def session_of(request: Request, site: Site, name: str, password: str) -> str:
@@ -114,7 +140,11 @@ def session_of(request: Request, site: Site, name: str, password: str) -> str:
     secret = site.store.people.sign_in(name, password, utc_now())
     if secret is None:
         site.wrong_tokens.note_wrong(caller)
-        raise _nobody("Name or password is wrong.")
+        raise _nobody(
+            "Name or password is wrong.",
+            "An engineer can give you another password. A program signs in with no password: it "
+            "sends a token.",
+        )
     return secret
 
 
@@ -153,6 +183,8 @@ def _visitor(request: Request, site: Site, secret: str, needed: Role) -> Visitor
         raise Refused(
             403, f"A {found.role} may not do this.", f"It takes the role {needed}: ask an engineer."
         )
+    if needed is Role.ENGINEER:
+        raise Refused(403, "A token may not do this.", "Sign in as an engineer, by your name.")
     raise Refused(
         403,
         f"The token {found.name} may not write.",
@@ -165,11 +197,14 @@ def _at_home(site: Site, secret: str | None) -> Visitor:
     return (_found(site, secret) if secret else None) or Visitor("")
 
 
-def _cookie(request: Request, otherwise: str) -> str:
+def _signed_in(request: Request, site: Site, otherwise: str, needed: Role) -> Visitor:
+    """Who has signed in with this browser; `otherwise` is said where nobody has."""
     secret = request.cookies.get(COOKIE)
     if not secret:
-        raise _nobody(otherwise)
-    return secret
+        raise _nobody(otherwise, f"Sign in at /sign-in. A program: {_BY_HEADER}")
+    if request.method not in ("GET", "HEAD"):
+        refuse_foreign(request)
+    return replace(_visitor(request, site, secret, needed), via=PAGE)
 
 
 def _is_at_home(request: Request, site: Site) -> bool:
@@ -177,10 +212,5 @@ def _is_at_home(request: Request, site: Site) -> bool:
     return site.address.is_loopback and not any(name in request.headers for name in _FORWARDED)
 
 
-def _nobody(message: str) -> Refused:
-    return Refused(
-        401,
-        message,
-        "Send the header `Authorization: Bearer TOKEN`; `shm token create` makes one.",
-        {"WWW-Authenticate": "Bearer"},
-    )
+def _nobody(message: str, remedy: str) -> Refused:
+    return Refused(401, message, remedy, {"WWW-Authenticate": "Bearer"})

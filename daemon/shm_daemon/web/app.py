@@ -33,6 +33,7 @@ from shm_daemon.web.front import Pages
 from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.pages import (
     alerts,
+    audit,
     bridge,
     comparison,
     downloads,
@@ -40,8 +41,10 @@ from shm_daemon.web.pages import (
     health,
     one_test,
     sensors,
+    settings,
     static,
     upload,
+    users,
 )
 from shm_daemon.web.site import Site
 
@@ -87,6 +90,9 @@ def load_pages(site: Site) -> Pages:
         hanger_numbers,
         hanger,
         downloads,
+        audit,
+        settings,
+        users,
     ):
         app.include_router(part.router)
     app.include_router(_described)

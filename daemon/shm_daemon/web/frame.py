@@ -34,6 +34,8 @@ NAVIGATION = (
     ("/operation", "Operation"),
 )
 
+FOR_ENGINEERS = (("/settings", "Settings"), ("/users", "Users"), ("/audit", "Audit log"))
+
 
 def page(request: Request, template: str, *, status: int = 200, **content: Any) -> HTMLResponse:
     """A page in the frame; `content` is what its template needs.
@@ -108,6 +110,7 @@ def _environment() -> Environment:
         asset=asset,
         moment=formatting.moment,
         navigation=NAVIGATION,
+        for_engineers=FOR_ENGINEERS,
         plotly_address=plotly_address,
         palette=" ".join(f"{name}={colour}" for name, colour in PALETTE.items()),
         version=shm.__version__,

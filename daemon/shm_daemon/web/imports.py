@@ -16,6 +16,7 @@ from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 
 from shm.errors import BadInput, UsageError
+from shm.pipeline import utc_now
 from shm.pipeline.import_answers import answer_to, import_document
 from shm.pipeline.importing import Answers, Import, Question, keep_profile, look_into, understand
 from shm.store import Workspace
@@ -83,7 +84,7 @@ class ImportLook(BaseModel):
 async def import_file(
     request: Request,
     site: AtSite,
-    _: Writer,
+    writer: Writer,
     name: Annotated[str, Query(min_length=1, max_length=255)],
     said: Annotated[
         str | None,
@@ -105,7 +106,11 @@ async def import_file(
     file = await run_in_threadpool(Incoming, workspace.spool, workspace.settings.max_file_bytes)
     try:
         await receive_body(request, file, workspace.settings.max_file_bytes)
-        return await run_in_threadpool(_looked, file, landing_name(name), workspace, said)
+        looked = await run_in_threadpool(_looked, file, landing_name(name), workspace, said)
+        if looked.sha256 is not None:
+            audit = site.store.acting_as(writer.actor).audit
+            await run_in_threadpool(audit.note, utc_now(), "recording uploaded", name)
+        return looked
     finally:
         await run_in_threadpool(file.close)
 

@@ -14,6 +14,7 @@ from starlette.requests import ClientDisconnect
 
 from shm.documents import parse_time
 from shm.errors import BadInput, NothingThere
+from shm.pipeline import utc_now
 from shm.store import Stage, Store, StoredRecording
 from shm.store.archive import refuse_oversize
 from shm_daemon.landing import Incoming, Landed, landing_name
@@ -91,7 +92,7 @@ def described_by(
 async def upload(
     request: Request,
     site: AtSite,
-    _: Writer,
+    writer: Writer,
     described: Annotated[dict[str, object], Depends(described_by)],
     name: Annotated[
         str, Query(min_length=1, max_length=255, description="The name of the file, with suffix.")
@@ -116,7 +117,8 @@ async def upload(
         landed = await run_in_threadpool(_land, file, name, described, x_content_sha256)
     finally:
         await run_in_threadpool(file.close)
-    outcome = await run_in_threadpool(_outcome, site.store, landed)
+    store = site.store.acting_as(writer.actor)
+    outcome = await run_in_threadpool(_outcome, store, landed)
     status_url = f"{UPLOADS}/{landed.sha256}"
     return Uploaded(
         sha256=landed.sha256,
@@ -221,6 +223,7 @@ def _land(
 
 
 def _outcome(store: Store, landed: Landed) -> Any:
+    store.audit.note(utc_now(), "recording uploaded", landed.path.name)
     known = store.recordings.with_checksum(landed.sha256)
     if known is None:
         return "new"

@@ -15,24 +15,28 @@ from shm.store.people import SESSION, SIGNED_IN_FOR
 from shm_daemon.web.access import (
     COOKIE,
     AtSite,
+    is_signed_in,
     refuse_foreign,
     session_of,
     visitor_in_force,
 )
 from shm_daemon.web.faults import Refused
-from shm_daemon.web.frame import page
+from shm_daemon.web.frame import for_a_person, page
 from shm_daemon.web.middleware import is_https
 from shm_daemon.web.site import Site
 
 router = APIRouter(include_in_schema=False)
 
 _KEPT_S = int(SIGNED_IN_FOR.total_seconds())
+_MOST_FIELDS = 10  # technical: the longest of our forms has five
 _LONGEST_FORM_BYTES = 8192  # technical: a token and the address to go on to have some hundreds
 
 
 @router.get("/sign-in")
-def sign_in_page(request: Request, next: str = "/") -> Response:
-    """Asks for name and password, or for a token."""
+def sign_in_page(request: Request, site: AtSite, next: str = "/") -> Response:
+    """Asks for name and password, or for a token; who has signed in already goes on."""
+    if is_signed_in(request, site):
+        return RedirectResponse(_ours(next), 303)
     return _ask(request, next)
 
 
@@ -40,11 +44,13 @@ def sign_in_page(request: Request, next: str = "/") -> Response:
 async def sign_in(request: Request, site: AtSite) -> Response:
     """Gives the cookie to who signs in; removing the user or revoking the token ends it at once."""
     refuse_foreign(request)
-    told = await _form(request)
+    told = await form_of(request)
     wanted = told.get("next", "/")
     try:
         secret = await run_in_threadpool(_secret, request, site, told)
     except Refused as refused:
+        if not for_a_person(request):
+            raise
         return _ask(request, wanted, refused.status_code, refused.detail)
     answer = RedirectResponse(_ours(wanted), 303)
     answer.set_cookie(
@@ -95,12 +101,12 @@ def _ours(wanted: str) -> str:
     return wanted if plain and not wanted.startswith("//") and "\\" not in wanted else "/"
 
 
-async def _form(request: Request) -> dict[str, str]:
+async def form_of(request: Request) -> dict[str, str]:
     """The fields of a form, each once; raises Refused where there is far more than a token."""
     body = bytearray()
     async for piece in request.stream():
         body += piece
         if len(body) > _LONGEST_FORM_BYTES:
             raise Refused(413, "This is more than a token.", "Paste the token alone.")
-    fields = parse_qs(body.decode("utf-8", "replace"), max_num_fields=5)
+    fields = parse_qs(body.decode("utf-8", "replace"), max_num_fields=_MOST_FIELDS)
     return {name: values[-1] for name, values in fields.items()}

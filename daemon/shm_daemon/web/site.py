@@ -86,6 +86,11 @@ class Description:
         self._fault: ShmError | None = None
         self._lock = threading.Lock()
 
+    def forget(self) -> None:
+        """Has it read again: a setting was changed."""
+        with self._lock:
+            self._described_at = -1
+
     def now(self) -> tuple[Workspace, ShmError | None]:
         """As it is described now or, where that has a fault, as it last was; and the fault."""
         with self._lock:
@@ -123,6 +128,10 @@ class Site:
     def fault(self) -> ShmError | None:
         """What is wrong with `bridge.toml` as it is now."""
         return self._description.now()[1]
+
+    def forget_description(self) -> None:
+        """Has the description read again: a setting was changed."""
+        self._description.forget()
 
     @property
     def store(self) -> Store:

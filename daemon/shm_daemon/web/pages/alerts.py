@@ -168,7 +168,7 @@ def acknowledge(
     """Notes on the record that somebody has seen an alert to its end: once an alert."""
     by = writer.name if writer.is_person else f"token {writer.name}"
     who = writer.name if told.who is None else f"{told.who} ({by})"
-    site.store.alerts.acknowledge(alert_id, who, told.why, utc_now())
+    site.store.acting_as(writer.actor).alerts.acknowledge(alert_id, who, told.why, utc_now())
     return alert_documents([site.store.alerts.row(alert_id)], site)[0]
 
 

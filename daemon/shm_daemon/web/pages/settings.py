@@ -1,0 +1,176 @@
+"""The page where engineers set limits, thresholds and when hooks are told, beside `bridge.toml`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import RedirectResponse
+from starlette.concurrency import run_in_threadpool
+
+from shm.bridge import Bridge
+from shm.bridge.changes import HANGER_KEYS, HOOK_KEYS, SETTING_KEYS
+from shm.errors import BadInput
+from shm.pipeline import utc_now
+from shm.report import formatting
+from shm.settings import TABLE, Settings, load_settings
+from shm.store.changed_settings import ChangedSetting
+from shm.values import Hanger
+from shm_daemon.web.access import AtSite, Engineer
+from shm_daemon.web.faults import Refused
+from shm_daemon.web.frame import page
+from shm_daemon.web.models import LARGEST_NUMBER
+from shm_daemon.web.signing_in import form_of
+from shm_daemon.web.site import Site
+
+router = APIRouter(include_in_schema=False)
+
+_MEANINGS = {
+    "thresholds.tension_shift_fraction": "shift of tension that matters, as a fraction",
+    "thresholds.stiffness_shift_decades": "shift of end stiffness that matters, in decades",
+    "thresholds.alert_probability": "how probable such a shift must be for an alert",
+    "thresholds.false_call_years": "mean time between false alarms of this hanger, in years",
+    "limits.tension_max_n": "overloaded above, in N",
+    "limits.tension_min_n": "slack below, in N",
+    "escalation_after_seconds": "told only of what nobody has acknowledged after, in s",
+    **{row.name: f"{row.help}{f', in {row.unit}' if row.unit else ''}" for row in TABLE},
+}
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One value that can be set: its key, what it means, what the file says and what holds."""
+
+    key: str
+    label: str
+    in_file: str
+    in_force: str
+    changed: ChangedSetting | None
+
+
+@router.get("/settings")
+def settings_page(
+    request: Request,
+    site: AtSite,
+    _: Engineer,
+    hanger: Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)] = None,
+) -> Response:
+    """The bridge's settings and hooks, and the thresholds and limits of one hanger."""
+    return _page(request, site, hanger)
+
+
+@router.post("/settings")
+async def change(request: Request, site: AtSite, engineer: Engineer) -> Response:
+    """Sets one value, or gives it back to `bridge.toml`."""
+    told = await form_of(request)
+    key, hanger = told.get("key", ""), _hanger_of(told.get("key", ""))
+    try:
+        await run_in_threadpool(_change, site, engineer, key, told)
+    except BadInput as error:
+        said = f"{error.message} {error.remedy}"
+        return await run_in_threadpool(_page, request, site, hanger, said, 422)
+    address = "/settings" if hanger is None else f"/settings?hanger={hanger}#hanger"
+    return RedirectResponse(address, 303)
+
+
+def _change(site: Site, engineer: Engineer, key: str, told: dict[str, str]) -> None:
+    workspace, store = site.workspace, site.store.acting_as(engineer.actor)
+    if key not in {row.key for row in _all_rows(workspace.bridge, workspace.settings)}:
+        raise Refused(404, f"{key!r} is none of the settings of this page.", "See bridge.toml.")
+    value = None if told.get("action") == "back" else _number(told.get("value", ""))
+    workspace.change_setting(store, key, value, utc_now(), engineer.name)
+    site.forget_description()
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise BadInput(f"{text!r} is not a number.", remedy="Write one, with a decimal point.")
+    return value
+
+
+def _page(
+    request: Request, site: Site, hanger: int | None, message: str = "", status: int = 200
+) -> Response:
+    workspace = site.workspace
+    bridge, changed = workspace.bridge, site.store.settings.list_current()
+    known = [each for each in bridge.watched if each.id == hanger]
+    groups = [
+        ("Bridge", "bridge", list(_of_settings(bridge, workspace.settings, changed))),
+        ("Hooks", "hooks", list(_of_hooks(bridge, changed))),
+    ]
+    for each in known:
+        name = formatting.hanger_name(each.id, each.name)
+        groups.insert(0, (name, "hanger", list(_of_hanger(bridge, each, changed))))
+    return page(
+        request,
+        "settings.html.j2",
+        status=status,
+        message=message,
+        groups=groups,
+        hangers=[(h.id, formatting.hanger_name(h.id, h.name)) for h in bridge.watched],
+        hanger=hanger,
+        changed=tuple(changed.values()),
+    )
+
+
+def _all_rows(bridge: Bridge, settings: Settings) -> Iterator[_Row]:
+    yield from _of_settings(bridge, settings, {})
+    yield from _of_hooks(bridge, {})
+    for each in bridge.watched:
+        yield from _of_hanger(bridge, each, {})
+
+
+def _of_settings(
+    bridge: Bridge, settings: Settings, changed: Mapping[str, ChangedSetting]
+) -> Iterator[_Row]:
+    in_file = load_settings((bridge.as_in_file or bridge).settings_table, source=bridge.source)
+    for name in SETTING_KEYS:
+        values = getattr(in_file, name), getattr(settings, name)
+        yield _row(f"settings.{name}", name, values, changed)
+
+
+def _of_hooks(bridge: Bridge, changed: Mapping[str, ChangedSetting]) -> Iterator[_Row]:
+    for ours, in_file in zip(bridge.hooks, (bridge.as_in_file or bridge).hooks, strict=True):
+        for name in HOOK_KEYS:
+            values = getattr(in_file, name), getattr(ours, name)
+            yield _row(f"hook.{ours.name}.{name}", name, values, changed, f"{ours.name}: ")
+
+
+def _of_hanger(
+    bridge: Bridge, hanger: Hanger, changed: Mapping[str, ChangedSetting]
+) -> Iterator[_Row]:
+    in_file = (bridge.as_in_file or bridge).tested(hanger.id)
+    for key in HANGER_KEYS:
+        table, name = key.split(".")
+        if table == "limits" and hanger.kind == "any":
+            continue  # a structure has no tension
+        values = getattr(getattr(in_file, table), name), getattr(getattr(hanger, table), name)
+        yield _row(f"hanger.{hanger.id}.{key}", key, values, changed)
+
+
+def _row(
+    key: str,
+    name: str,
+    values: tuple[float | None, float | None],
+    changed: Mapping[str, ChangedSetting],
+    before: str = "",
+) -> _Row:
+    in_file, in_force = map(_said, values)
+    return _Row(key, before + _MEANINGS[name], in_file, in_force, changed.get(key))
+
+
+def _said(value: float | None) -> str:
+    return "not set" if value is None or math.isnan(value) else f"{value:.10g}"
+
+
+def _hanger_of(key: str) -> int | None:
+    kind, _, rest = key.partition(".")
+    number = rest.partition(".")[0]
+    return int(number) if kind == "hanger" and number.isdecimal() and len(number) < 10 else None

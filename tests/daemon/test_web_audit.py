@@ -1,0 +1,100 @@
+"""The audit log: each way in leaves a row with who came, and only engineers read it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import httpx
+import pytest
+
+from shm.errors import NothingThere
+from shm.pipeline import utc_now
+from shm.store import Scope, Workspace
+from shm.store.audit import Actor
+from shm.store.people import Role
+from shm_cli.main import run
+from tests.daemon.test_web_people import PASSWORD, UPLOAD, sign_in
+from tests.helpers.web_servers import Served, served
+
+
+@pytest.fixture
+def site(workspace: Workspace) -> Iterator[Served]:
+    with workspace.store() as store:
+        for role in Role:
+            anna = store.acting_as(Actor("anna", "page"))
+            anna.people.add(role, role, PASSWORD, utc_now())
+    with served(workspace) as site:
+        yield site
+
+
+@pytest.fixture
+def browser(site: Served) -> Iterator[httpx.Client]:
+    with site.client(Origin=site.url) as client:
+        yield client
+
+
+def newest(workspace: Workspace) -> tuple[str, ...]:
+    with workspace.store() as store:
+        (row,) = store.audit.list_rows(limit=1)
+    return row.who, row.via, row.action, row.subject
+
+
+def test_what_page_api_and_command_line_change_is_noted_with_who_did_it(
+    site: Served,
+    browser: httpx.Client,
+    workspace: Workspace,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    sign_in(browser, "operator")
+    browser.post(UPLOAD, content=b"x")
+    assert newest(workspace) == ("operator", "page", "recording uploaded", "x.csv")
+    with site.client(site.write_token) as program:
+        program.post(UPLOAD, content=b"y")
+    assert newest(workspace)[:3] == ("token write", "API", "recording uploaded")
+    monkeypatch.setattr("getpass.getuser", lambda: "huber")
+    at = ["--workspace", str(workspace.folder)]
+    silence = ("alerts", "silence", "--hanger", "3", "--until", "2099-01-01", "--why", "paint")
+    assert run([*at, *silence]) == 0
+    assert newest(workspace) == ("huber", "command line", "silence made", "silence 1, hanger 3")
+    capsys.readouterr()
+    assert run([*at, "audit", "--json", "--limit", "1"]) == 0
+    assert json.loads(capsys.readouterr().out)["changes"][0]["detail"] == "paint"
+
+
+def test_a_change_that_fails_leaves_no_row_and_what_shm_does_by_itself_none(
+    workspace: Workspace,
+) -> None:
+    with workspace.store() as store:
+        anna = store.acting_as(Actor("anna", "page"))
+        with pytest.raises(NothingThere, match="no token"):
+            anna.upkeep.revoke_token("none such", utc_now())
+        store.upkeep.create_token("made by nobody", Scope.READ, utc_now())
+        assert store.audit.list_rows() == ()
+
+
+def test_only_an_engineer_reads_it(browser: httpx.Client, site: Served) -> None:
+    assert browser.get("/audit").status_code == 401
+    sign_in(browser, "operator")
+    assert browser.get("/audit").status_code == 403
+    assert 'href="/audit"' not in browser.get("/operation").text
+    with site.client(site.write_token) as program:
+        assert program.get("/audit").status_code == 401
+    sign_in(browser, "engineer")
+    assert "user added" in browser.get("/audit").text
+    assert 'href="/audit"' in browser.get("/operation").text
+
+
+def test_who_is_signed_in_need_not_sign_in_and_each_is_told_what_to_do(
+    browser: httpx.Client, site: Served
+) -> None:
+    wrong = browser.post("/sign-in", data={"name": "reader", "password": "wrong"})
+    assert wrong.status_code == 401
+    assert "password" in wrong.json()["remedy"]
+    assert "Bearer" not in wrong.json()["remedy"]
+    with site.client("wrong") as program:
+        assert "Bearer" in program.get("/api/status").json()["remedy"]
+    sign_in(browser, "reader")
+    gone_on = browser.get("/sign-in?next=/alerts")
+    assert (gone_on.status_code, gone_on.headers["location"]) == (303, "/alerts")

@@ -1,0 +1,116 @@
+"""Settings and users changed in the page: what holds, what is refused, who is told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import httpx
+import pytest
+
+from shm.bridge.changes import overlaid
+from shm.pipeline import utc_now
+from shm.store import Workspace
+from shm.store.people import Role
+from shm_cli.main import run
+from shm_daemon.doctor import examine
+from tests.daemon.test_web_people import PASSWORD, sign_in
+from tests.helpers.web_servers import served
+
+LEVEL = "hanger.3.thresholds.alert_probability"
+
+
+@pytest.fixture
+def browser(workspace: Workspace) -> Iterator[httpx.Client]:
+    with workspace.store() as store:
+        for role in Role:
+            store.people.add(role, role, PASSWORD, utc_now())
+    with served(workspace) as site, site.client(Origin=site.url, Accept="text/html") as client:
+        sign_in(client, "engineer")
+        yield client
+
+
+def put(client: httpx.Client, key: str, value: str, action: str = "set") -> httpx.Response:
+    return client.post("/settings", data={"key": key, "value": value, "action": action})
+
+
+def level(workspace: Workspace) -> float:
+    return workspace.reopened().bridge.hanger(3).thresholds.alert_probability
+
+
+def test_a_threshold_holds_from_now_on_and_goes_back_to_the_file(
+    browser: httpx.Client, workspace: Workspace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    in_file = level(workspace)
+    assert put(browser, LEVEL, "0.9").status_code == 303
+    assert level(workspace) == 0.9
+    shown = browser.get("/settings?hanger=3").text
+    assert f"bridge.toml: {in_file:g} · set by engineer" in shown
+    told = "hanger 3 thresholds alert_probability = 0.9 instead of"
+    assert any(told in each.found for each in examine(workspace.folder, utc_now()))
+    assert run(["--workspace", str(workspace.folder), "status"]) == 0
+    assert told in " ".join(capsys.readouterr().out.split())
+    with workspace.store() as store:
+        (row,) = store.audit.list_rows(limit=1)
+    assert (row.who, row.via, row.action, row.detail) == (
+        "engineer", "page", "setting changed", "0.9",
+    )  # fmt: skip
+    put(browser, LEVEL, "", "back")
+    assert level(workspace) == in_file
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        (LEVEL, "1.5", "alert_probability must lie below 1"),
+        (LEVEL, "much", "is not a number"),
+        ("hanger.3.limits.tension_max_n", "-1", "is not a positive number"),
+        ("settings.false_call_years", "0", "false_call_years"),
+    ],
+)
+def test_what_bridge_toml_would_refuse_is_refused_with_its_words(
+    browser: httpx.Client, workspace: Workspace, key: str, value: str, said: str
+) -> None:
+    answer = put(browser, key, value)
+    assert answer.status_code == 422
+    assert said in answer.text
+    assert workspace.reopened().bridge.as_in_file is None
+
+
+def test_no_page_changes_what_runs_on_the_computer(browser: httpx.Client) -> None:
+    for key in ("hook.mail.command", "settings.store", "hanger.3.length_m", "hanger.77.limits"):
+        assert put(browser, key, "1").status_code == 404
+    sign_in(browser, "operator")
+    assert put(browser, LEVEL, "0.9").status_code == 403
+
+
+def test_changes_of_what_the_file_describes_no_more_do_nothing() -> None:
+    document = {"hook": [{"name": "a.b"}], "hanger": [{"id": 3}]}
+    changed = {"hook.a.b.escalation_after_seconds": 60.0, "hanger.4.limits.tension_max_n": 1.0}
+    assert overlaid(document, changed) == {
+        "hook": [{"name": "a.b", "escalation_after_seconds": 60.0}],
+        "hanger": [{"id": 3}],
+    }
+
+
+def test_an_engineer_lets_people_in_and_out_but_never_ends_the_last_engineer(
+    browser: httpx.Client, workspace: Workspace
+) -> None:
+    def ask(action: str, name: str, **more: str) -> httpx.Response:
+        return browser.post("/users", data={"action": action, "name": name, **more})
+
+    for action in ("remove", "role"):
+        refused = ask(action, "engineer", role="reader")
+        assert refused.status_code == 409
+        assert "the last engineer" in refused.text
+    assert ask("add", "eva", role="engineer", password="short").status_code == 409
+    assert ask("add", "eva", role="engineer", password=PASSWORD).status_code == 303
+    assert ask("role", "reader", role="operator").status_code == 303
+    assert ask("password", "reader", password=PASSWORD + "!").status_code == 303
+    assert ask("remove", "operator").status_code == 303
+    with workspace.store() as store:
+        found = {each.name: each.role for each in store.people.list_all() if not each.removed_at}
+        noted = [row.action for row in store.audit.list_rows(limit=4)]
+    assert found == {"reader": "operator", "engineer": "engineer", "eva": "engineer"}
+    assert noted == ["user removed", "password set", "role changed", "user added"]
+    assert ask("remove", "engineer").status_code == 303
+    assert browser.get("/users").status_code == 401
