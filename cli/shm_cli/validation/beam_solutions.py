@@ -7,6 +7,7 @@ its curves; so each point is held against the thesis's own equation, the determi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -15,7 +16,8 @@ import numpy as np
 from shm.models.tensioned_beam import wave_numbers
 from shm.report.figures.against_a_parameter import Curves, specify
 from shm.report.figures.specification import Specification
-from shm.values import FloatArray
+from shm.values import FloatArray, Hanger
+from shm_cli.validation.figure import Figure
 
 MODES = 7  # as many as the thesis draws
 _POINTS = 400  # technical: a smooth line
@@ -105,6 +107,20 @@ class Solutions:
         return specify(
             [Curves(self.figure.title, self.xi, self.values)], "ξ = L √(T/EI)", f"{name}ₙ"
         )
+
+
+def shown(hanger: Hanger, tell: Callable[[str, float], None], number: str) -> Figure:
+    """One of `FIGURES`, which are of no hanger."""
+    found = solutions(FIGURES[number])
+    return Figure(
+        found.figure.title,
+        ("xi", *(f"{found.figure.quantity}_{n}" for n in range(1, MODES + 1))),
+        [(f"{xi:.1f}", *(f"{value:.4f}" for value in row)) for xi, row in found.rows()],
+        found.statement,
+        found.document(),
+        found.specification(),
+        missed=found.statement if found.difference > LIMIT else "",
+    )
 
 
 def solutions(figure: Drawn, points: int = _POINTS) -> Solutions:

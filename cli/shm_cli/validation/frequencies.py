@@ -5,20 +5,21 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from shm.models import THESIS, build
 from shm.models.solid.classes import SolidModel
-from shm.values import FloatArray, Hanger
+from shm.values import PLANES, FloatArray, Hanger, Plane
 from shm_cli import thesis
 
 # Of the thesis's tables A.1 to A.7: modes, springs of a class.
-_MODES = 6
+MODES = 6
 _SPRINGS = {"solid1": 8, "solid2": 4}
 
-_STIFFEST_SOLVED = 1e13  # numerical: a clamp; table A.4 goes on to 1e26 with the same frequencies
+STIFFEST_SOLVED = 1e13  # numerical: a clamp; table A.4 goes on to 1e26 with the same frequencies
 
 _EVEN_FROM_N_M = 1e7  # found: from here the printed x and y agree to 0.1 %
 
@@ -35,7 +36,8 @@ class FrequencyRow:
     """One column of a table: transverse frequencies of modes 1 to 6, ours and the printed ones.
 
     `limit_percent` is the mark that `difference_percent` has to keep; NaN where the difference is
-    only stated.
+    only stated. `unknowns` and `seconds` are those of a mesh whose size is told, `spring_n_m` the
+    stiffness that varies; NaN elsewhere. `thesis_time` is that of the thesis's meshes.
     """
 
     table: str
@@ -45,6 +47,11 @@ class FrequencyRow:
     printed_hz: tuple[float, ...]
     difference_percent: float
     limit_percent: float
+    plane: Plane = "transverse"
+    spring_n_m: float = np.nan
+    unknowns: float = np.nan
+    seconds: float = np.nan
+    thesis_time: str = ""
 
     @property
     def missed(self) -> bool:
@@ -67,7 +74,7 @@ def compared(
 def _fixed_ends(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
     nominal = np.array([[1.0]])
     for name, table, limit in (("s1", "A.1", 0.3), ("s2", "A.2", np.nan), ("solid0", "A.3", 0.3)):
-        found = build(name, hanger, THESIS).reference_frequencies_hz(nominal, _MODES)[0, 0]
+        found = build(name, hanger, THESIS).reference_frequencies_hz(nominal, MODES)[0, 0]
         yield _row(table, name, "711 kN", found, tables[name]["converged"], limit)
 
 
@@ -75,7 +82,7 @@ def _held_faces(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow
     """Tables 3.1 to 3.3. Our elements have displacements only, as the thesis's C3D10 have, and our
     face is held or sprung as a whole: of part of its nodes held the difference is only stated."""
     model = build("solid0", hanger, THESIS)
-    ours = model.reference_frequencies_hz(np.array([[1.0]]), _MODES)[0, 0]
+    ours = model.reference_frequencies_hz(np.array([[1.0]]), MODES)[0, 0]
     held = tables["rotational"]["ends_held"]
     yield _row("3.1", "solid0", "with and without rotations held", ours, held, 0.3)
     for key, printed in tables["fixed_nodes"].items():
@@ -84,8 +91,8 @@ def _held_faces(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow
             "whole face" if whole else f"{key.removeprefix('nodes_')} nodes; ours whole face"
         )
         yield _row("3.2", "solid0", condition, ours, printed, 0.3 if whole else np.nan)
-    stiff = np.array([[1.0, *[np.log10(_STIFFEST_SOLVED)] * _SPRINGS["solid1"]]])
-    sprung = build("solid1", hanger, THESIS).reference_frequencies_hz(stiff, _MODES)[0, 0]
+    stiff = np.array([[1.0, *[np.log10(STIFFEST_SOLVED)] * _SPRINGS["solid1"]]])
+    sprung = build("solid1", hanger, THESIS).reference_frequencies_hz(stiff, MODES)[0, 0]
     printed = tables["rotational"]["stiff_springs"]
     yield _row("3.3", "solid1", "stiff springs, with and without rotations", sprung, printed, 1.5)
 
@@ -104,7 +111,7 @@ def _table_a_2_explained(hanger: Hanger, tables: dict[str, Any]) -> Iterator[Fre
         nominal_tension_n=hanger.nominal_tension_n * area / hanger.area_m2,
     )
     theta = np.array([[1.0, 1 - 2 * plate_m / hanger.length_m]])
-    euler = build("beam1", faceted, THESIS).frequencies_hz(theta, _MODES)[0, 0]
+    euler = build("beam1", faceted, THESIS).frequencies_hz(theta, MODES)[0, 0]
     shear = _solid_over_beam(hanger, theta)
     condition = f"section of {corners} corners, same stress"
     yield _row("A.2", "s2", condition, euler * shear, tables["s2"]["converged"], 0.3)
@@ -112,23 +119,23 @@ def _table_a_2_explained(hanger: Hanger, tables: dict[str, Any]) -> Iterator[Fre
 
 def _solid_over_beam(hanger: Hanger, theta: FloatArray) -> FloatArray:
     """What shear and rotary inertia take off the clamped beam's frequencies."""
-    solid = build("s2", hanger, THESIS).reference_frequencies_hz(theta[:, :1], _MODES)[0, 0]
-    return np.asarray(solid / build("beam1", hanger, THESIS).frequencies_hz(theta, _MODES)[0, 0])
+    solid = build("s2", hanger, THESIS).reference_frequencies_hz(theta[:, :1], MODES)[0, 0]
+    return np.asarray(solid / build("beam1", hanger, THESIS).frequencies_hz(theta, MODES)[0, 0])
 
 
 def _springs(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
     for name, table in (("solid1", "A.4"), ("solid2", "A.5")):
-        stiffness = {key: min(float(key[1:]), _STIFFEST_SOLVED) for key in tables[name]}
+        stiffness = {key: min(float(key[1:]), STIFFEST_SOLVED) for key in tables[name]}
         theta = np.array([[1.0, *[np.log10(k)] * _SPRINGS[name]] for k in stiffness.values()])
-        found = build(name, hanger, THESIS).reference_frequencies_hz(theta, _MODES)
-        for key, ours in zip(stiffness, found[:, 0], strict=True):
-            condition = f"k = {float(key[1:]):.0e} N/m"
-            yield _row(table, name, condition, ours, tables[name][key], 1.5)
-        for (key, value), ours in zip(stiffness.items(), found[:, 1], strict=True):
-            # Softer, the printed y leaves the printed x by up to 1.6 %, for equal springs.
-            limit = 1.5 if value >= _EVEN_FROM_N_M else np.nan
-            condition = f"k = {float(key[1:]):.0e} N/m, y"
-            yield _row(table, name, condition, ours, tables[f"{name}_y"][key], limit)
+        found = build(name, hanger, THESIS).reference_frequencies_hz(theta, MODES)
+        for place, plane in enumerate(PLANES):
+            for (key, value), ours in zip(stiffness.items(), found[:, place], strict=True):
+                # Softer, the printed y leaves the printed x by up to 1.6 %, for equal springs.
+                kept = not place or value >= _EVEN_FROM_N_M
+                condition = f"k = {float(key[1:]):.0e} N/m{', y' * place}"
+                printed = tables[f"{name}{'_y' * place}"][key]
+                row = _row(table, name, condition, ours, printed, 1.5 if kept else np.nan)
+                yield replace(row, plane=plane, spring_n_m=value)
 
 
 def _meshes(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
@@ -136,9 +143,15 @@ def _meshes(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
     for name, table in (("s1", "A.1"), ("s2", "A.2"), ("solid0", "A.3")):
         model = build(name, hanger, THESIS)
         assert isinstance(model, SolidModel)
-        for unknowns, ours in model.convergence_hz(_RODS, _MODES):
+        times = tables[name]["seconds"]
+        thesis_time = f"{times[0]:g} to {times[-1]:g} s"
+        began = perf_counter()
+        for unknowns, ours in model.convergence_hz(_RODS, MODES):
+            seconds = perf_counter() - began
             condition = f"our mesh of {unknowns} unknowns"
-            yield _row(table, name, condition, ours, tables[name]["converged"], np.nan)
+            row = _row(table, name, condition, ours, tables[name]["converged"], np.nan)
+            yield replace(row, unknowns=unknowns, seconds=seconds, thesis_time=thesis_time)
+            began = perf_counter()
 
 
 def _clamped_beams(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:
@@ -149,9 +162,9 @@ def _clamped_beams(hanger: Hanger, tables: dict[str, Any]) -> Iterator[Frequency
         carried_n = _TENSIONS_OF_BEAM_TABLES_N[key]
         for tension_n, limit in ((hanger.nominal_tension_n, np.nan), (carried_n, 0.1)):
             theta = np.array([[tension_n / hanger.nominal_tension_n, length_m / hanger.length_m]])
-            ours = model.frequencies_hz(theta, _MODES)[0, 0]
-            kept = [m for m in range(_MODES) if (key, m) not in _MISPRINT or np.isnan(limit)]
-            left_out = "" if len(kept) == _MODES else ", mode 3 left out as a misprint"
+            ours = model.frequencies_hz(theta, MODES)[0, 0]
+            kept = [m for m in range(MODES) if (key, m) not in _MISPRINT or np.isnan(limit)]
+            left_out = "" if len(kept) == MODES else ", mode 3 left out as a misprint"
             condition = f"{tension_n / 1e3:.0f} kN{left_out}"
             yield _row(table, "beam1", condition, ours, printed, limit, kept)
 
@@ -199,6 +212,14 @@ def cells(row: FrequencyRow) -> tuple[str, ...]:
         f"{row.difference_percent:.2f} %",
         mark,
     )
+
+
+TIMED_HEADS = (*HEADS, "time", "thesis, time")
+
+
+def timed_cells(row: FrequencyRow) -> tuple[str, ...]:
+    """The row as texts under `TIMED_HEADS`: ours was measured as it ran, on this machine."""
+    return (*cells(row), f"{row.seconds:.1f} s" if row.thesis_time else "", row.thesis_time)
 
 
 def misses(rows: list[FrequencyRow]) -> list[str]:
