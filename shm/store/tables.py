@@ -21,7 +21,7 @@ from shm.store.columns import metadata as metadata
 from shm.store.people_tables import users as _of_people  # noqa: F401 - all are there
 from shm.store.stream_tables import stream_windows as _of_streams  # noqa: F401 - all are there
 
-SCHEMA = "0012"
+SCHEMA = "0013"
 
 _OF_TESTS = ("hanger", "time", "stage", "name", "taken_at", "temperature_c")
 
