@@ -54,7 +54,7 @@ def signal_doubts(
 ) -> tuple[SignalDoubt, ...]:
     """What is doubtful of the records of one test; none where nobody hit.
 
-    g for m/s^2, a factor of 9.81, passes: no frequency and no tension depends on it.
+    g for m/s^2, a factor of 9.81, holds no test: no tension depends on it; the check `gain` warns.
     """
     found: dict[tuple[str, str], SignalDoubt] = {}
     for record in records:
