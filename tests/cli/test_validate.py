@@ -11,7 +11,6 @@ from shm_cli import thesis
 from shm_cli.common import markdown
 from shm_cli.validation import frequencies, selection
 
-
 OF_SPRINGS = {"A.4", "A.5"}
 
 
