@@ -110,7 +110,8 @@ class Flow:
         selected = self.store.posteriors.selected_models()
         for hanger in workspace.bridge.hangers:
             competing(hanger, workspace.settings, {})
-            competing(hanger, workspace.settings, selected)
+            if hanger.id in selected:
+                competing(hanger, workspace.settings, selected)
         self.workspace = workspace
         self.jobs = Jobs(workspace, self.store, self.clock)
 

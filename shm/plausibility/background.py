@@ -142,7 +142,7 @@ def _signs(row: FloatArray, starts: Sequence[int]) -> BoolArray:
     near = np.ones(before.shape[:2], dtype=bool)
     for _ in range(_ROUNDS):
         filter_ = np.append(-_prediction(before[near]), 1.0)
-        error = before @ filter_
+        error = np.array([np.correlate(part, filter_, "valid") for part in parts])
         local = np.sqrt(scipy.ndimage.uniform_filter1d(error**2, _LOCAL, axis=1))
         floor = float(np.quantile(local, _FLOOR))
         near = local < _NEAR * floor

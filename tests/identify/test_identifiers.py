@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -23,6 +24,17 @@ every_identifier = pytest.mark.parametrize("identify", IDENTIFIERS.values(), ids
 
 def _measured(modes: list[Planted], **keywords: object) -> Measurement:
     return measurement_of_recordings([recording(modes, **keywords)], OPTIONS)  # type: ignore[arg-type]
+
+
+@cache
+def _of_three_hits() -> Measurement:
+    return _measured(hanger_modes(), noise=0.02, hits=3)
+
+
+@cache
+def _found(identify: Identifier) -> Finding:
+    """What an identifier finds in them."""
+    return identify(_of_three_hits(), OPTIONS)
 
 
 def _sensing(record: Recording, values: Sequence[FloatArray]) -> Recording:
@@ -176,9 +188,8 @@ def test_every_pole_is_in_a_mode_or_counted_with_its_reason(name: str) -> None:
 
 @every_identifier
 def test_what_differs_between_tests_is_added_to_each_frequency(identify: Identifier) -> None:
-    measurement = _measured(hanger_modes(), noise=0.05, hits=3)
-    alone = identify(measurement, OPTIONS).modes
-    allowed = identify(measurement, replace(OPTIONS, frequency_allowance=0.0003)).modes
+    alone = _found(identify).modes
+    allowed = identify(_of_three_hits(), replace(OPTIONS, frequency_allowance=0.0003)).modes
     for one, other in zip(alone, allowed, strict=True):
         expected = np.hypot(one.frequency_sd_hz, 0.0003 * one.frequency_hz)
         assert other.frequency_sd_hz == pytest.approx(expected, rel=1e-9)
@@ -205,7 +216,7 @@ def test_many_channels_are_no_harder_than_few(identify: Identifier) -> None:
 
 @every_identifier
 def test_the_diagram_marks_the_poles_of_the_modes_as_stable(identify: Identifier) -> None:
-    finding = identify(_measured(hanger_modes(), noise=0.02, hits=3), OPTIONS)
+    finding = _found(identify)
     poles = finding.poles
     assert len(poles.order) == len(poles.frequency_hz) == len(poles.damping_ratio)
     for frequency in _frequencies(finding):
@@ -215,9 +226,8 @@ def test_the_diagram_marks_the_poles_of_the_modes_as_stable(identify: Identifier
 
 @every_identifier
 def test_the_same_measurement_gives_the_same_modes(identify: Identifier) -> None:
-    measurement = _measured(hanger_modes(), noise=0.02, hits=2)
-    one, other = (identify(measurement, OPTIONS) for _ in range(2))
-    assert _frequencies(one) == _frequencies(other)
+    again = identify(_measured(hanger_modes(), noise=0.02, hits=3), OPTIONS)
+    assert _frequencies(again) == _frequencies(_found(identify))
 
 
 def test_the_size_of_the_model_may_be_stated() -> None:
