@@ -29,9 +29,9 @@ _PARTS, _FITTED_FROM = 8, 2
 _LEAST_ASTRAY, _MOST_ASTRAY, _GROWTH = 0.05, 1.5, 12.0
 """Of the swing in the first eighth, what is not foretold, and how often that is what the later part
 leaves. Of 97 awkward records with three hits and more (tests/worlds/recordings.py, seeds 7000 to
-7006) one was astray, with sidebands; of bars of tests/benchmarks/gap_dynamics.py both with a loose
-guide that show modes at full level (seeds 400 to 407), of three sound ones none. Above
-`_MOST_ASTRAY` the extrapolation fails."""
+7006) one was astray, with sidebands; of bars of tests/benchmarks/gap_dynamics.py with a guide that
+show modes at full level five of six (seeds 400 to 407, 500 to 507), of three sound ones none. Above
+`_MOST_ASTRAY` the extrapolation fails, as it did of the sixth."""
 _CALM = 2.0  # judgement: of what the later part leaves; noise alone scatters by less
 _UNSURE = 0.3  # judgement: of a damping without standard deviation
 
