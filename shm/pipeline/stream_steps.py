@@ -15,6 +15,7 @@ from shm.monitor import as_modal_test, offsets, pooled, read_window, sensor_faul
 from shm.values import Alert, Hanger, ModalTest, Mode, Posterior
 from shm.values.stream import Period, Piece, PooledReading, Stream, StreamEvent, WindowReading
 from shm.watch.stream_hints import led_by
+from shm.watch.stream_state import windows_as_mounted
 from shm.watch.stream_watch import StreamOptions, watch_reading
 
 _LINES = 200  # technical: of a spectrogram, as many as a panel has pixels
@@ -99,10 +100,12 @@ def pool_stream(
     is_watched: bool = True,
 ) -> Pooled:
     """The windows of a period as one; an hour goes on to the watch where it `is_watched`, a day
-    becomes a test.
+    becomes a test, in the planes in which the watch has learnt its modes.
 
     An alert is led by that of `events` which was at the time of its change.
     """
+    if period != "hour":  # of an hour the watch tells whether its planes are exchanged
+        readings = windows_as_mounted(kept, readings)
     reading = pooled(readings, period, start)
     if reading is None:
         return Pooled(None)

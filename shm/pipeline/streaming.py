@@ -298,7 +298,7 @@ class Streaming:
                 start,
                 hanger,
                 baseline_of(self.store, stream),
-                self.store.streams.watch_state(stream.hanger) if period == "hour" else None,
+                self.store.streams.watch_state(stream.hanger),
                 self.workspace.settings.false_call_years,
                 self._recent_events(stream, start) if period == "hour" else (),
                 is_watched=period == "hour" and (watched is None or start >= watched),

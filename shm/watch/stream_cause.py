@@ -3,17 +3,22 @@
 A tension moves each mode by its sensitivity, springs the lower ones of a stiff bar more, a time
 base all alike, a sensor those of its plane, each as it likes. The hypotheses are compared by their
 evidence; each leaves room for one mode that goes astray by itself.
+
+How soft the ends are, the modes of a taut bar hardly tell: they are tried from soft to stiff. With
+u = (alpha^2 + xi^2)^(1/2) of a mode and xi = L sqrt(T/EI), a spring k in EI/L shortens the bar by
+L/u k/(k + u), so that a decade of it moves ln f by ln(10) k/(k + u)^2; k/xi and u/xi serve.
+Tension has d ln f / d ln T = s = xi^2 / (2 u^2). Soft ends move the modes as the tension does.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.values import PLANES, FloatArray, Moved
+from shm.values import PLANES, BoolArray, FloatArray, Moved
 from shm.watch.stream_reading import ModeTable, planes_of
 
 TIME_BASE = "timebase"
@@ -31,7 +36,9 @@ _SENSOR_SD = 1e-3
 _ALIKE = 20.0  # a log Bayes factor of 3, as `Moved.alike` has it
 _DAY_SD = 3e-4  # of ln f: joints that slip by another level, each mode by its own. Judgement
 MODEL_OFF = 0.2  # judgement: of bending's share in a sensitivity, and of springs'
+_APART = 0.5  # judgement: of a loosened end, between planes
 _EACH_OFF = 0.05  # judgement: likewise, of each mode by itself
+_SOFTNESS = (0.1, 0.3, 1.0, 3.0, 10.0)  # technical: of springs, k/xi; half a decade each
 _LEFT_SD = 1e-3  # of ln T: what the conditions leave while something else changes
 _ASTRAY_SD, _ASTRAY = 0.03, 0.02  # judgement: how far and how often a single mode goes astray
 # Judgement: tensions, ends in both planes, ends in one, a time base, one plane's sensors, others.
@@ -102,8 +109,7 @@ def cause_of(moved: FloatArray, table: ModeTable, readings: FloatArray) -> Cause
     )
     # Hours do not average out what a mode keeps for a day.
     y, variance = moved[known], sub.spread + _DAY_SD**2
-    patterns = _patterns(sub, y)
-    fits = [_fit(y, variance, each) for each in patterns]
+    patterns, fits = _best_of_each(_patterns(sub, y), y, variance)
     log_each = np.array([fit[0] for fit in fits])
     chance = np.exp(log_each - log_each.max())
     chance = chance / chance.sum()
@@ -126,18 +132,38 @@ def cause_of(moved: FloatArray, table: ModeTable, readings: FloatArray) -> Cause
     return Cause(patterns[best].name, total, moved, size, patterns[best].plane)
 
 
+def _best_of_each(
+    patterns: Sequence[_Pattern], y: FloatArray, variance: FloatArray
+) -> tuple[list[_Pattern], list[tuple[float, float, float]]]:
+    """Of variants of one hypothesis the likeliest, with the mean evidence of all."""
+    found: dict[tuple[str, str], list[tuple[tuple[float, float, float], _Pattern]]] = {}
+    for each in patterns:
+        found.setdefault((each.name, each.plane), []).append((_fit(y, variance, each), each))
+    best = []
+    for variants in found.values():
+        (_, *size), pattern = max(variants, key=lambda each: each[0][0])
+        log = float(np.logaddexp.reduce([fit[0] for fit, _ in variants])) - math.log(len(variants))
+        best.append((pattern, (log, size[0], size[1])))
+    return [each for each, _ in best], [fit for _, fit in best]
+
+
+def _ends(table: ModeTable) -> list[FloatArray]:
+    """What a decade of an end's spring moves ln f by (n,), as the table has it and from soft to
+    stiff."""
+    s = np.clip(table.tension, 0.01, 0.499)
+    order = np.array([each for _, each in table.modes])
+    xi = float(np.median(math.pi * order * np.sqrt(s / (0.5 - s))))
+    u = np.sqrt(0.5 / s)
+    return [table.ends, *(math.log(10) / xi * k / (k + u) ** 2 for k in _SOFTNESS)]
+
+
 def _patterns(table: ModeTable, y: FloatArray) -> list[_Pattern]:
     """All hypotheses; the larger a change, the more it is off by what the patterns are off."""
-    s, e, n = table.tension, table.ends, len(table.tension)
+    s, n = table.tension, len(table.tension)
     left, none = _LEFT_SD * s[:, None], np.zeros(n)
     bent = (0.5 - s) * abs(float(s @ y) / float(s @ s))
-    loose = e * abs(float(e @ y) / float(e @ e))
-    order = np.array([each for _, each in table.modes])
-    tilt = (order - order.mean()) / max(order.max() - 1, 1)
-    of_ends = np.column_stack([_DECADES_SD * e, MODEL_OFF * loose * tilt, left])
     found = [
         _Pattern("tension", np.column_stack([_TENSION_SD * s, MODEL_OFF * bent]), _EACH_OFF * bent),
-        _Pattern("ends", of_ends, _EACH_OFF * loose),
         _Pattern(TIME_BASE, np.column_stack([np.full(n, _BASE_SD), left]), none),
         _Pattern(_UNEXPLAINED, left, np.full(n, _MODE_SD)),
     ]
@@ -146,12 +172,28 @@ def _patterns(table: ModeTable, y: FloatArray) -> list[_Pattern]:
     if len(planes) > 1 and set(other) <= set(table.modes):
         swapped = table.level[[table.modes.index(each) for each in other]] - table.level
         found.append(_Pattern(SWAPPED, left, none, mean=swapped))
+    for e in _ends(table):
+        found += _loosened(e, y, table, planes)
     for plane, own in planes.items() if len(planes) > 1 else ():
-        of_end = of_ends * np.column_stack([own, own, np.ones(n)])
-        found += [
-            _Pattern("end", of_end, _EACH_OFF * loose * own, plane),
-            _Pattern(_SENSOR, left, np.where(own, _SENSOR_SD, 0.0), plane),
-        ]
+        found.append(_Pattern(_SENSOR, left, np.where(own, _SENSOR_SD, 0.0), plane))
+    return found
+
+
+def _loosened(
+    e: FloatArray, y: FloatArray, table: ModeTable, planes: Mapping[str, BoolArray]
+) -> list[_Pattern]:
+    """Ends in both planes, in each by its own, or in one, that move ln f by `e` a decade."""
+    loose = e * abs(float(e @ y) / float(e @ e))
+    order = np.array([each for _, each in table.modes])
+    tilt = (order - order.mean()) / max(order.max() - 1, 1)
+    each = _EACH_OFF * (np.abs(loose).max() - np.abs(loose))  # as of a tension: off a string
+    left, off = _LEFT_SD * table.tension, MODEL_OFF * loose * tilt
+    apart = [loose * (own - own.mean()) for own in planes.values()][:1]
+    both = np.column_stack([_DECADES_SD * e, off, left, *(_APART * part for part in apart)])
+    found = [_Pattern("ends", both, each)]
+    for plane, own in planes.items() if len(planes) > 1 else ():
+        of_end = np.column_stack([_DECADES_SD * e * own, off * own, left])
+        found.append(_Pattern("end", of_end, each * own, plane))
     return found
 
 
@@ -167,8 +209,12 @@ def _fit(y: FloatArray, variance: FloatArray, pattern: _Pattern) -> tuple[float,
         np.arange(len(both)) > 0, math.log(_ASTRAY), 0.0
     )
     best = int(log_each.argmax())
-    prior = _PRIORS[pattern.name] / (2 if pattern.plane else 1)
-    return float(np.logaddexp.reduce(log_each)) + math.log(prior), both[best][1], both[best][2]
+    evidence = float(np.logaddexp.reduce(log_each))
+    return evidence + math.log(_prior(pattern)), both[best][1], both[best][2]
+
+
+def _prior(pattern: _Pattern) -> float:
+    return _PRIORS[pattern.name] / (2 if pattern.plane else 1)
 
 
 def _normal(y: FloatArray, variance: FloatArray, columns: FloatArray) -> tuple[float, float, float]:
@@ -187,10 +233,11 @@ def _moved_quantities(
 ) -> tuple[Moved, ...]:
     """What may have moved, in the words that alerts have for it; the likeliest first."""
     order = np.argsort(-chance)
+    bayes = chance / [_prior(each) for each in patterns]
     alike = tuple(
         name
         for i in order[1:]
-        if chance[i] > chance[order[0]] / _ALIKE
+        if bayes[i] > bayes[order[0]] / _ALIKE
         for name in _names(patterns[i])[:1]
     )
     found: dict[str, Moved] = {}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from datetime import datetime
 from itertools import pairwise
@@ -17,7 +18,7 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.values import NAN, FloatArray, Mode
-from shm.values.stream import PooledReading
+from shm.values.stream import PooledReading, WindowReading
 from shm.watch.alert_state import AlertState
 from shm.watch.stream_filter import FEATURES, Bank
 from shm.watch.stream_reading import ModeTable, SeenReading, exchanged
@@ -165,6 +166,22 @@ def as_mounted(
     else:
         hours = hours - 1 if hours > HOURS_EXCHANGED + 1 else 0
     return replace(state, exchanged_hours=hours), exchanged(modes) if hours else modes
+
+
+def windows_as_mounted(
+    kept: bytes | None, readings: Sequence[WindowReading]
+) -> Sequence[WindowReading]:
+    """The windows with each mode in the plane that was always its own, by what the watch knows."""
+    state = None if kept is None else StreamState.from_bytes(kept)
+    if state is None or state.is_learning:
+        return readings
+    table, zero = state.table, state.zero
+    return [
+        replace(each, modes=exchanged(each.modes))
+        if table.are_exchanged(each.modes, zero)
+        else each
+        for each in readings
+    ]
 
 
 def warmth(state: StreamState) -> float:

@@ -13,10 +13,12 @@ import pytest
 from shm.errors import BadInput
 from shm.models.tensioned_beam import frequencies_hz
 from shm.values import FloatArray, Hanger, ModalTest, Mode, Thresholds
-from shm.values.stream import PooledReading, StreamEvent
+from shm.values.stream import PooledReading, StreamEvent, Window, WindowReading
 from shm.watch.ambient_hammer import ambient_bias
+from shm.watch.stream_cause import cause_of
 from shm.watch.stream_hints import led_by
 from shm.watch.stream_reading import ModeTable, exchanged, sensitivities
+from shm.watch.stream_state import windows_as_mounted
 from shm.watch.stream_watch import (
     StreamOptions,
     StreamState,
@@ -188,6 +190,11 @@ def test_planes_that_are_exchanged_are_told_as_such_within_hours(lacking: int) -
     assert event.kind == "swapped"
     assert event.end <= START + timedelta(hours=504)
     assert abs(found[-1].compensated_shift) < 0.002
+    window = Window("north", 7, START, 600.0, "wind", 0.02)
+    (right,) = windows_as_mounted(
+        state.to_bytes(), [WindowReading(window, off[-1].modes, "tracked")]
+    )
+    assert right.modes == exchanged(off[-1].modes)
     shift, sd = daily_shift(state.to_bytes(), off[6:])
     assert abs(shift) < 4 * sd < 0.01
 
@@ -220,6 +227,19 @@ def test_a_loosened_end_is_told_as_one() -> None:
     assert "end stiffness" in told.message
     assert told.change is not None
     assert told.change.moved[0].quantity == "transverse_end_stiffness"
+
+
+def test_where_ends_and_tension_cannot_be_told_apart_both_are_named() -> None:
+    """Of 60 % of the stiffness of all ends of a taut bar, and of 2 % of its tension."""
+    hz = zip(MODES, np.exp(BASE).tolist(), strict=True)
+    table = ModeTable.of(None, HANGER, [Mode(*own, each, 2e-4 * each) for own, each in hz])
+    seen = np.full(10, 24.0)
+
+    first = cause_of(log_hz(600e3, 0.4 * K) - BASE, table, seen).moved[0]
+    assert "end_stiffness" in " ".join((first.quantity, *first.alike))
+    first = cause_of(log_hz(588e3) - BASE, table, seen).moved[0]
+    assert first.quantity == "tension"
+    assert first.shift_mean == pytest.approx(math.log(0.98), abs=0.003)
 
 
 def test_without_a_thermometer_it_is_careful_and_goes_on() -> None:
