@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from shm.errors import ShmError, StoreBusy, StoreError
-from shm.pipeline import Flow, Sharing
+from shm.pipeline import Flow, Sharing, utc_now
 from shm.settings import Settings
 from shm.store import Archive, Delivery, DeliveryState, Stage, Workspace
 from shm.store.checking import check_store
