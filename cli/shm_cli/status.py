@@ -66,6 +66,8 @@ def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
         show(document)
         return
     _show(document)
+    for said in document["changed_settings"]:
+        click.echo(paragraph(f"changed on the page Settings: {said}"))
     for row in document["hangers"]:
         if row["urgency"] != "none" and row["tests"]:
             said = " ".join((row["state"], row["action"], *row["notes"]))
@@ -141,8 +143,6 @@ def _show(document: dict[str, Any]) -> None:
     show_table(made)
     for said in _told_of_held(document["held"]):
         click.echo(said)
-    for said in document["changed_settings"]:
-        click.echo(paragraph(f"changed on the page Settings: {said}"))
 
 
 def _told_of_structure(row: Mapping[str, Any]) -> str:

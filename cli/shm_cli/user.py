@@ -25,7 +25,7 @@ def command() -> None:
     type=click.Choice(["reader", "operator", "engineer"]),
     default="reader",
     show_default=True,
-    help="An operator also uploads and acknowledges, and so may an engineer.",
+    help="An operator also uploads and acknowledges, an engineer also sets limits and users.",
 )
 @json_option
 @click.pass_context
@@ -72,7 +72,7 @@ def list_users(ctx: click.Context, as_json: bool) -> None:
 @json_option
 @click.pass_context
 def remove(ctx: click.Context, name: str, as_json: bool) -> None:
-    """End a user, in all browsers at once.
+    """End a user, in all browsers at once; the last engineer only after another is made.
 
     \b
     Example: shm user remove 'M. Huber'

@@ -100,15 +100,11 @@ def load_bridge(path: Path, changed: Mapping[str, object] = MappingProxyType({})
 
     Raises BadInput naming the table and key at fault.
     """
+    document = _parse(path)
+    plain = _described(document, path)
     if not changed:
-        return _described(_parse(path), path)
-    plain = _described(_parse(path), path)
-    try:
-        return replace(_described(overlaid(_parse(path), changed), path), as_in_file=plain)
-    except BadInput as error:
-        raise BadInput(
-            error.message, remedy=f"{error.remedy} It was changed on the page Settings."
-        ) from error
+        return plain
+    return replace(_described(overlaid(document, changed), path), as_in_file=plain)
 
 
 def _described(document: dict[str, Any], path: Path) -> Bridge:

@@ -137,14 +137,7 @@ def hanger_now(
             hanger,
         ),
         lineage={**test_lineage(store, latest), **_baseline_words(baseline)},
-        settings={
-            **settings_words(workspace.settings),
-            **{
-                f"changed: {each.key}": str(each)
-                for each in store.settings.list_current().values()
-                if each.is_of(hanger.id)
-            },
-        },
+        settings={**settings_words(workspace.settings), **_changed(store, hanger)},
         redescribed=redescribed(hanger, in_force),
         discarded=discarded_of(store, in_force),
         warnings=warnings_of(workspace, store, [hanger]).get(hanger.id, ()),
@@ -152,6 +145,12 @@ def hanger_now(
         notes=notes_of(standing, silences, hanger.id, generated_at),
         quiet_for=quiet_for(workspace, latest.time, generated_at),
     )
+
+
+def _changed(store: Store, hanger: Hanger) -> dict[str, str]:
+    """What holds of a hanger instead of what `bridge.toml` says."""
+    current = store.settings.list_current().values()
+    return {f"changed: {each.key}": str(each) for each in current if each.is_of(hanger.id)}
 
 
 def _trend(store: Store, hanger: Hanger, period: Period | None) -> tuple[TrendPoint, ...]:

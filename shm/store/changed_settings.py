@@ -22,15 +22,13 @@ class ChangedSetting:
     """The value of a key of `bridge.toml` that holds instead of what the file says."""
 
     key: str
-    value: object
+    value: float
     at: datetime
     who: str
 
     def __str__(self) -> str:
-        return (
-            f"{self.key.replace('.', ' ')} = {self.value} instead of what bridge.toml says, by "
-            f"{self.who} on {self.at:%Y-%m-%d}"
-        )
+        value, by = f"{self.value:.10g}", f"{self.who} on {self.at:%Y-%m-%d}"
+        return f"{self.key.replace('.', ' ')} = {value} instead of what bridge.toml says, by {by}"
 
     def is_of(self, hanger: int) -> bool:
         """Whether it changes a hanger, or all of them."""
@@ -40,12 +38,12 @@ class ChangedSetting:
 class ChangedSettings(Repository):
     """Settings that the dashboard has changed; the newest row of a key holds."""
 
-    def change(self, key: str, value: object, who: str, at: datetime) -> None:
+    def change(self, key: str, value: float | None, who: str, at: datetime) -> None:
         """Has `value` hold instead of what `bridge.toml` says; None gives the key back to it."""
         with self.writing() as connection:
             values = {"key": key, "document": value, "who": who, "at": at}
             insert(connection, changed_settings, values)
-            detail = "back to bridge.toml" if value is None else str(value)
+            detail = "back to bridge.toml" if value is None else f"{value:.10g}"
             note(connection, at, "setting changed", key.replace(".", " "), detail, who)
 
     def newest(self) -> int:

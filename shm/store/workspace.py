@@ -55,8 +55,7 @@ class Workspace:
         settings = _settings(bridge, flags)
         newest, changed = changed_in(_location(folder, settings))
         if changed:
-            bridge = load_bridge(folder / "bridge.toml", changed)
-            settings = _settings(bridge, flags)
+            bridge, settings = _with_changes(folder / "bridge.toml", changed, flags)
         return cls(folder, bridge, settings, dict(flags or {}), newest_change=newest)
 
     @classmethod
@@ -163,6 +162,21 @@ def changed_in(location: str | Path) -> tuple[int | None, Mapping[str, object]]:
             return store.settings.newest(), {key: each.value for key, each in current.items()}
     except ShmError:
         return None, {}
+
+
+def _with_changes(
+    path: Path, changed: Mapping[str, object], flags: Mapping[str, object] | None
+) -> tuple[Bridge, Settings]:
+    """What holds with what a page has changed; raises BadInput where it no longer fits the file."""
+    try:
+        bridge = load_bridge(path, changed)
+        return bridge, _settings(bridge, flags)
+    except BadInput as error:
+        raise BadInput(
+            error.message,
+            file=path,
+            remedy=f"{error.remedy} A page has changed it: {', '.join(changed)}.",
+        ) from error
 
 
 def _settings(bridge: Bridge, flags: Mapping[str, object] | None) -> Settings:

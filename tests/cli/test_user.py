@@ -22,11 +22,11 @@ def user(shm: Shm, empty: Workspace, monkeypatch: pytest.MonkeyPatch) -> Shm:
 
 
 def test_a_user_is_made_listed_without_a_secret_and_removed(user: Shm) -> None:
-    made = user("add", "M. Huber", "--role", "engineer", "--json", password=PASSWORD)
-    assert made.document == {"name": "M. Huber", "role": "engineer"}
+    made = user("add", "M. Huber", "--role", "operator", "--json", password=PASSWORD)
+    assert made.document == {"name": "M. Huber", "role": "operator"}
     listed = user("list", "--json")
     (one,) = listed.document["users"]
-    assert (one["name"], one["role"], one["removed_at"]) == ("M. Huber", "engineer", None)
+    assert (one["name"], one["role"], one["removed_at"]) == ("M. Huber", "operator", None)
     assert "argon2" not in listed.out
     assert user("remove", "M. Huber").code == 0
     assert user("list", "--json").document["users"][0]["removed_at"]

@@ -18,12 +18,14 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
+from shm.pipeline import utc_now
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
+from shm.store.people import Role
 from shm_daemon.web.address import test_page as page_of
 from shm_daemon.web.background_work import BackgroundWorker
-from shm_daemon.web.frame import NAVIGATION
+from shm_daemon.web.frame import FOR_ENGINEERS, NAVIGATION
 from tests.helpers.browsers import PHONE, Browser, a_browser, faults, undrawn_charts, width_px
 from tests.helpers.daemons import real_daemon
 from tests.helpers.flows import ingest
@@ -31,13 +33,14 @@ from tests.helpers.web_servers import Served, a_thread, served
 from tests.helpers.workspaces import START, make_workspace, write_loss, write_test
 
 RECORDED = "recorded"
+PASSWORD = "correct horse battery"
 PAGES = {
-    "sign-in": "/sign-in",
     "hanger": "/hangers/3",
     "tests": "/hangers/3/tests",
     "modes": page_of(3, "t1"),
     "recording": page_of(3, RECORDED),
-    **{name.lower(): address for address, name in NAVIGATION},
+    **{name.lower(): address for address, name in (*NAVIGATION, *FOR_ENGINEERS)},
+    "limits": "/settings?hanger=3",
 }
 CHARTS = {"hanger": 4, "recording": 6}
 PAPER, INK = "rgb(255, 255, 255)", "rgb(29, 35, 48)"
@@ -70,6 +73,7 @@ def site(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator
     write_recording(workspace)
     ingest(workspace)
     with workspace.store() as store:
+        store.people.add("Anna", Role.ENGINEER, PASSWORD, utc_now())
         assert {each.stage for each in store.recordings.list_all()} == {Stage.DONE}
         assert [each.test.id for each in store.tests.list_all(3)][-1] == RECORDED
     with pytest.MonkeyPatch.context() as patch:
@@ -94,10 +98,16 @@ def content(browser: Browser) -> Iterator[None]:
 @pytest.fixture(scope="module")
 def signed_in(browser: Browser, site: Site) -> Browser:
     page = browser.open(f"{site.url}/sign-in?next=/upload")
+    assert faults(page) == []
     page.get_by_label("Token").fill(site.served.write_token)
     page.get_by_role("button", name="Sign in with the token").click()
     expect(page.get_by_role("heading", level=1)).to_have_text("Upload recordings")
     expect(page.get_by_role("banner")).to_contain_text("write")
+    page.get_by_role("button", name="Sign out").click()
+    page.get_by_label("Name").fill("Anna")
+    page.get_by_label("Password").fill(PASSWORD)
+    page.get_by_role("button", name="Sign in", exact=True).click()
+    expect(page.get_by_role("banner")).to_contain_text("Anna")
     return browser
 
 

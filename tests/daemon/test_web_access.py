@@ -248,7 +248,7 @@ def test_a_name_is_free_again_after_its_token_was_revoked(workspace: Workspace) 
 
 def test_without_a_token_it_does_not_open_to_others(workspace: Workspace) -> None:
     refuse_unguarded(workspace, Address())
-    with pytest.raises(UsageError, match="no token is in force") as refused:
+    with pytest.raises(UsageError, match="nobody may sign in") as refused:
         refuse_unguarded(workspace, ELSEWHERE)
     assert "shm token create" in refused.value.remedy
     with workspace.store() as store:

@@ -41,7 +41,7 @@ def serve(
 ) -> None:
     """Serves a workspace until SIGTERM or SIGINT; `announce` is called once nothing forbids it.
 
-    Raises UsageError where others could reach it and no token is in force, and where the extra
+    Raises UsageError where others could reach it and nobody may sign in, and where the extra
     `[web]` is not installed; BadInput where the certificate cannot be used.
     """
     refuse_uninstalled()
@@ -176,7 +176,7 @@ def _allow_connections() -> None:
 
 
 def refuse_unguarded(workspace: Workspace, address: Address) -> None:
-    """Raises UsageError where others than this machine could come in and no token is in force."""
+    """Raises UsageError where others than this machine could come in and nobody may sign in."""
     if address.is_loopback:
         return
     with workspace.store() as store:
@@ -185,7 +185,8 @@ def refuse_unguarded(workspace: Workspace, address: Address) -> None:
         if any(in_force):
             return
     raise UsageError(
-        f"{address.host} can be reached by others, and no token is in force.",
-        remedy="Make one with `shm token create NAME`, add a user with `shm user add NAME`, or "
+        f"{address.host} can be reached by others, and nobody may sign in: there is no user and "
+        "no token.",
+        remedy="Add a user with `shm user add NAME`, make a token with `shm token create NAME`, or "
         "listen on 127.0.0.1.",
     )

@@ -46,6 +46,7 @@ class _Row:
 
     key: str
     label: str
+    name: str
     in_file: str
     in_force: str
     changed: ChangedSetting | None
@@ -163,7 +164,9 @@ def _row(
     before: str = "",
 ) -> _Row:
     in_file, in_force = map(_said, values)
-    return _Row(key, before + _MEANINGS[name], in_file, in_force, changed.get(key))
+    label = before + _MEANINGS[name]
+    label = label if before else label[0].upper() + label[1:]
+    return _Row(key, label, name.rpartition(".")[2], in_file, in_force, changed.get(key))
 
 
 def _said(value: float | None) -> str:
