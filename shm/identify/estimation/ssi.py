@@ -311,7 +311,7 @@ def hankel(response: FloatArray, reference: FloatArray, block_rows: int) -> Floa
                 for k in (at, at + count)
             )
             sums = sums[..., :lags] + gained - lost
-    return matrix.reshape(channels * block_rows, -1) * (samples / count)
+    return np.asarray(matrix.reshape(channels * block_rows, -1) * (samples / count))
 
 
 def hankel_with_input(
