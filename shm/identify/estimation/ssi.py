@@ -106,13 +106,9 @@ def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Fin
         found = completed(found, modes_of_hankel(matrices, rows, measurement, few))
     checked = len(measurement.decays) > 1 or len(measurement.points) >= _LEAST_POINTS
     timed = bool(measurement.hits) or nobody_hit
-    if not (timed and checked):
+    if _repeated(measurement) or not (timed and checked):
         return found
-    every = list(windows(measurement.sampling_rate_hz, options))
-    if _repeated(measurement):  # what is sure in the whole band need not be looked at again
-        unsure_hz = [entry.frequency_hz for entry in found.dropped]
-        every = [w for w in every if any(w.low_hz <= hz <= w.high_hz for hz in unsure_hz)]
-    return completed(found, through_windows(measurement, options, every)) if every else found
+    return completed(found, through_windows(measurement, options))
 
 
 def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOptions) -> Finding:
@@ -135,10 +131,9 @@ def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOpti
     return modes_of_hankel(matrices, rows, measurement, options)
 
 
-def through_windows(
-    measurement: Measurement, options: IdentifyOptions, every: Sequence[Window]
-) -> Finding:
+def through_windows(measurement: Measurement, options: IdentifyOptions) -> Finding:
     """The modes that each window of the band shows by itself."""
+    every = windows(measurement.sampling_rate_hz, options)
     return reduce(completed, (_in_window(window, measurement, options) for window in every))
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from shm.identify.mode_ordering.alignment import PlaneModes, log_frequency
+from shm.identify.mode_ordering.alignment import HIGHEST_ORDER, PlaneModes, log_frequency
 from shm.identify.mode_ordering.order import (
     LEAST_MARGIN,
     STRING_TOLERANCE,
@@ -105,7 +105,7 @@ def _fitted(planes: Sequence[PlaneModes], orders: Orders, expected: Expected) ->
     """The best bar: tension and stiffness are common, the springs each plane's own."""
     numbers = [np.array([order or np.nan for order in own], float) for own in orders]
     number = np.concatenate(numbers)
-    if np.nanmin(number) < 1:
+    if np.nanmin(number) < 1 or np.nanmax(number) > HIGHEST_ORDER:
         return _Bar(orders, np.inf, np.full(number.shape, np.nan))
     log_hz = np.concatenate([np.log(plane.frequency_hz) for plane in planes])
     if expected.shift:  # what turnbuckles do is taken off
@@ -124,12 +124,11 @@ def _fitted(planes: Sequence[PlaneModes], orders: Orders, expected: Expected) ->
         )
         return np.asarray(np.sign(every) * np.sqrt(heavy_tailed(every)))
 
-    start = [expected.log_unit, expected.log_xi, *(0.5 for _ in planes)]
-    free = [np.inf] * 2
+    springs = np.ones(len(planes))
     best = scipy.optimize.least_squares(
         misfit,
-        start,
-        bounds=([-np.inf, 0.0, *(0.0 for _ in planes)], [*free, *(1.0 for _ in planes)]),
+        np.array([expected.log_unit, expected.log_xi, *(springs / 2)]),
+        bounds=([-np.inf, 0.0, *(0 * springs)], [np.inf, np.inf, *springs]),
         method="dogbox",
     )
     return _Bar(orders, 2 * float(best.cost), off(best.x))
