@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.identify.estimation.poles import collinearity, poles_of, real_shape
-from shm.identify.estimation.ssi import hankel, realise
+from shm.identify.estimation.ssi import _pyoma2, hankel, realise
 
 RATE_HZ = 256.0
 
@@ -48,6 +48,15 @@ def test_the_hankel_matrix_of_one_decay_has_rank_two() -> None:
     matrix = hankel(decay, decay[:1], 30)
     assert matrix.shape == (90, 30)
     assert np.linalg.matrix_rank(matrix, tol=1e-8 * np.linalg.norm(matrix)) == 2
+
+
+def test_it_is_that_of_pyoma2() -> None:
+    """Of noise, and of a decay whose last part is a thousandth of its first."""
+    noise = np.random.default_rng(1).normal(size=(3, 700))
+    for signals in (noise, noise * np.exp(-np.arange(700) / 100)):
+        theirs, _ = _pyoma2().build_hank(signals, signals[:2], 40, "cov")
+        ours = hankel(signals, signals[:2], 40) / signals.shape[1]
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-14 * np.abs(theirs).max())
 
 
 def test_it_is_a_sum_over_time_so_that_long_decays_weigh_more() -> None:

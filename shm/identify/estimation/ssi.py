@@ -280,10 +280,25 @@ def hankel(response: FloatArray, reference: FloatArray, block_rows: int) -> Floa
 
     `response` (channels, samples) and `reference` (references, samples) give a matrix of shape
     (channels * block_rows, references * block_rows). For a free decay it is exact, and it leaves
-    out lag zero, hence white noise.
+    out lag zero, hence white noise. It is `build_hank` of pyOMA2 to rounding, without its product
+    of the size of all rows: a block is its neighbour down the antidiagonal, one sample later.
     """
-    matrix, _ = _pyoma2().build_hank(response, reference, block_rows, "cov")
-    return np.asarray(matrix * response.shape[1], dtype=np.float64)
+    channels, references, most = len(response), len(reference), block_rows - 1
+    samples = response.shape[1] - 2 * block_rows + 1
+    blocks = np.empty((block_rows, channels, block_rows, references))
+    future = response[:, block_rows:]
+    for back in range(block_rows):
+        first = most - back
+        past = reference[:, first : first + samples]
+        blocks[0, :, back] = future[:, :samples] @ past.T
+    gone = reference[:, :most][:, ::-1].T
+    come = reference[:, samples : samples + most][:, ::-1].T
+    for row in range(1, block_rows):
+        before, last = future[:, row - 1, None, None], future[:, row - 1 + samples, None, None]
+        blocks[row, :, :-1] = blocks[row - 1, :, 1:] + last * come - before * gone
+        blocks[row, :, -1] = future[:, row : row + samples] @ reference[:, :samples].T
+    matrix = blocks.reshape(block_rows * channels, block_rows * references)
+    return np.asarray(matrix / samples * response.shape[1], dtype=np.float64)
 
 
 def hankel_with_input(
