@@ -1,5 +1,7 @@
-"""Packaged files, found inside the wheel or beside the package; threads and memory of a process;
-names of a package that are loaded when they are asked for."""
+"""Packaged files, found inside the wheel or beside the package; threads and memory of a process.
+
+And names of a package that are loaded when they are asked for.
+"""
 
 from __future__ import annotations
 

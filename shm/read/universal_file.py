@@ -89,6 +89,7 @@ def _table(path: Path) -> LoggerTable | None:
 
 FORMAT = Format(
     name="UFF",
+    library="pyuff",
     suffixes=(".uff", ".unv", ".uf"),
     recognises=recognises,
     peek=_peek,

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyuff
 
 from shm.errors import BadInput
 from shm.read.content import bytes_of, plain_file
@@ -101,6 +100,8 @@ def refuse_cut_off(raw: bytes, path: Path) -> None:
 
 def save(path: Path, sets: Sequence[dict[str, Any]]) -> None:
     """Writes data sets to a new file, in ASCII (what pyuff writes as binary cannot be read)."""
+    import pyuff  # it is slow to load, and few files are of this format
+
     file = pyuff.UFF(str(path))
     file.write_sets(list(sets), mode="add")
 
@@ -120,6 +121,8 @@ def _content(file: Any, path: Path, raw: bytes, headers_only: bool) -> Content:
 
 def opened(plain: Path, path: Path) -> Any:
     """The file as pyuff has it; raises BadInput where its sets cannot be told apart."""
+    import pyuff
+
     try:
         return pyuff.UFF(str(plain))
     except Exception as error:
