@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from shm.inference.ensemble import refresh
+from shm.inference.likelihood import Sigma
 from shm.inference.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, UpdateOptions
 from shm.inference.textbook import BiasedEvidenceWarning
 from shm.inference.updating import class_probabilities, select, update
@@ -13,6 +14,7 @@ __all__ = [
     "TEXTBOOK",
     "BiasedEvidenceWarning",
     "Progress",
+    "Sigma",
     "UpdateOptions",
     "class_probabilities",
     "refresh",

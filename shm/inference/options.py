@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from shm.errors import UsageError
+from shm.inference.likelihood import Sigma
 from shm.inference.priors import Calibration
 
 Progress = Callable[[str, float], None]
@@ -24,6 +25,7 @@ def silent(label: str, fraction: float) -> None:
 class UpdateOptions:
     """How to update: posterior samples to keep, seed, how often the data set counts (N_D), method.
 
+    `sigma`: one model error of all modes, or one of each plane or mode, with the thesis's priors.
     `calibration` is what an earlier measured tension taught of the bar (`calibration_of`).
 
     Raises UsageError for a method that is not one of `METHODS`.
@@ -34,6 +36,7 @@ class UpdateOptions:
     repeat: int = 1
     method: str = NOISE_FLOOR
     calibration: Calibration | None = None
+    sigma: Sigma = "one"
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
