@@ -213,7 +213,7 @@ def practice(data: HangerReport) -> Table:
     said = stated(data.averaged, unit)
     rows.append(("ours, all modes", said.tension, said.interval, "as found", ""))
     heads = ("formula", *(f"{plane} ({unit.name})" for plane in PLANES), "ends", "leaves out")
-    note = "Each from one frequency; of ours, the tension and its interval. They only stand beside it."
+    note = "Each from one frequency; of ours, the tension and its interval."
     return Table(title, heads, tuple(rows), note)
 
 
