@@ -10,6 +10,8 @@ import rich_click as click
 
 from shm.errors import UsageError
 from shm.models import THESIS, Model, build
+from shm.models.solid.classes import SolidModel
+from shm.report.figures import deformed_solid, illustration
 from shm.report.figures.against_a_parameter import Curves, specify, write_png
 from shm.values import PLANES, FloatArray
 from shm_cli import completion
@@ -24,6 +26,7 @@ from shm_cli.common import (
     table,
 )
 
+_MOST_DRAWN = 20  # technical: a mesh of a second
 _MOST_POINTS = 10_000  # technical: a table that a person can still open, in seconds
 
 
@@ -35,7 +38,12 @@ _MOST_POINTS = 10_000  # technical: a table that a person can still open, in sec
     "--figure",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE.png",
-    help="Draw the frequencies of the --sweep here.",
+    help="Draw the frequencies of the --sweep here, or the --shape.",
+)
+@click.option(
+    "--shape",
+    metavar="PLANE:ORDER",
+    help="A mode of a solid class, drawn in space: transverse:2, say.",
 )
 @click.option("--modes", type=click.IntRange(1, 100), default=6, show_default=True)
 @hanger_option()
@@ -48,6 +56,7 @@ def command(
     settings: tuple[str, ...],
     sweep: str | None,
     figure: Path | None,
+    shape: str | None,
     modes: int,
     hanger_id: int | None,
     hanger_file: Path | None,
@@ -63,13 +72,18 @@ def command(
     \b
     Example: shm predict beam1 --hanger-file H.toml --set theta_F=1 --set theta_L=0.97
     Example: shm predict beam1 --hanger-file H.toml --sweep theta_F=0.5:2:50 --figure sweep.png
+    Example: shm predict solid0 --hanger-file H.toml --shape transverse:2 --figure mode.png
     """
-    if figure is not None and sweep is None:
+    if figure is not None and sweep is None and shape is None:
         raise UsageError("--figure draws a sweep.", remedy="Add --sweep theta_F=0.5:2:50, say.")
+    if shape is not None and (figure is None or sweep is not None):
+        raise UsageError("--shape is drawn.", remedy="Add --figure FILE.png, without --sweep.")
     chosen = build(model, one_hanger(ctx, hanger_file, hanger_id), THESIS)
     nominal = {name: 1.0 for name in chosen.parameter_names if name.startswith("theta_")}
     values = nominal | dict(_pair(setting) for setting in settings)
-    if sweep is None:
+    if shape is not None and figure is not None:
+        _draw_shape(chosen, values, shape, figure)
+    elif sweep is None:
         _show_one(chosen, values, modes, as_json)
     else:
         name, points = _range(sweep)
@@ -81,6 +95,22 @@ def command(
             ]
             write_png(specify(parts, name, "frequency (Hz)"), figure)
         _show_sweep(chosen, values, name, points, frequencies_hz, as_json)
+
+
+def _draw_shape(model: Model, values: dict[str, float], shape: str, path: Path) -> None:
+    plane, _, order = shape.partition(":")
+    if plane not in PLANES or not order.isdecimal() or not 1 <= int(order) <= _MOST_DRAWN:
+        raise UsageError(
+            f"--shape {shape!r} is not PLANE:ORDER, with an order from 1 to {_MOST_DRAWN}.",
+            remedy="Write --shape transverse:2, say.",
+        )
+    if not isinstance(model, SolidModel):
+        raise UsageError(
+            f"model class {model.name} is no solid: it has no surface.",
+            remedy="Take s1, s2, solid0, solid1 or solid2.",
+        )
+    corners, moved = model.surface(model.pack(values), PLANES[PLANES.index(plane)], int(order))
+    path.write_bytes(illustration.png(deformed_solid.draw(corners, moved)))
 
 
 def _show_one(model: Model, values: dict[str, float], modes: int, as_json: bool) -> None:

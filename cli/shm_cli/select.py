@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import rich_click as click
 
 from shm.documents import selection_document
 from shm.errors import UsageError
-from shm.inference import select
+from shm.inference import Sigma, select
 from shm.models import applicable, build, competing_names
 from shm.settings import load_settings
 from shm.values import Limits, Selection
@@ -57,6 +58,13 @@ from shm_cli.update import (
     metavar="CLASS=P,...",
     help="How probable each class is beforehand, such as beam1=0.25,beam2=0.75.",
 )
+@click.option(
+    "--sigma",
+    type=click.Choice(("one", "plane", "mode")),
+    default="one",
+    show_default=True,
+    help="One model error of all modes, or one of each plane or mode; with --priors thesis.",
+)
 @hanger_option()
 @hanger_file_option
 @seed_option
@@ -72,6 +80,7 @@ def command(
     modes_file: Path | None,
     models: str | None,
     class_priors: str | None,
+    sigma: Sigma,
     hanger_id: int | None,
     hanger_file: Path | None,
     seed: int,
@@ -90,8 +99,9 @@ def command(
 
     \b
     Example: shm select hanger3.modes.json --hanger-file H.toml --models beam1,beam2
+    Example: shm select hanger3.modes.json --hanger-file H.toml --priors thesis --sigma plane
     """
-    options = update_options(samples, seed, repeat, method, priors)
+    options = replace(update_options(samples, seed, repeat, method, priors), sigma=sigma)
     stated = None if class_priors is None else _stated_priors(class_priors)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
     names = _names(ctx, models, None if hanger_file else hanger.id)

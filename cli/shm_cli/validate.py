@@ -13,12 +13,22 @@ from shm.errors import GateNotMet, UsageError
 from shm.values import Hanger
 from shm_cli import thesis
 from shm_cli.common import json_option, markdown, progress_bar, seed_option, show, show_table, table
-from shm_cli.validation import beam_solutions, formulas, frequencies, selection, solid_figures
+from shm_cli.validation import (
+    beam_solutions,
+    formulas,
+    frequencies,
+    mode_shapes,
+    posterior_figures,
+    selection,
+    solid_figures,
+)
 from shm_cli.validation.figure import Figure
 
 FIGURES: dict[str, Callable[[Hanger, Callable[[str, float], None], str], Figure]] = {
     **dict.fromkeys(beam_solutions.FIGURES, beam_solutions.shown),
     **solid_figures.FIGURES,
+    **dict.fromkeys(posterior_figures.FIGURES, posterior_figures.shown),
+    **dict.fromkeys(mode_shapes.FIGURES, mode_shapes.shown),
 }
 """How each figure of the thesis is made, by its number."""
 

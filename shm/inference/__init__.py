@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from shm.inference.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, UpdateOptions
+from shm.inference.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, Sigma, UpdateOptions
 from shm.resources import when_asked
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ __all__ = [
     "TEXTBOOK",
     "BiasedEvidenceWarning",
     "Progress",
+    "Sigma",
     "UpdateOptions",
     "class_probabilities",
     "refresh",

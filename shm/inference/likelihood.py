@@ -11,11 +11,13 @@ standard deviation 1/sqrt(2 N) for N data: to the sampler the model error costs 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 import scipy
 
 from shm.errors import BadInput
+from shm.inference.options import Sigma
 from shm.models import Model
 from shm.models.base import Conditions
 from shm.values import PLANES, FloatArray, IntArray, ModalTest, Mode
@@ -53,6 +55,17 @@ class Likelihood:
         self._order = np.array([mode.order - 1 for mode in modes])
         self._constant = -np.log(self.frequency_hz).sum() - len(modes) / 2 * np.log(2 * np.pi)
         self._log_sigma, self._log_share = self._grid(_STEP_IN_SD)
+
+    def part(self, index: IntArray) -> Likelihood:
+        """That of some of the measurements, with a sigma of their own."""
+        own = copy(self)
+        own.__class__ = Likelihood
+        own.modes = [self.modes[place] for place in index]
+        own.frequency_hz = self.frequency_hz[index]
+        own.identification_error = self.identification_error[index]
+        own._constant = -np.log(own.frequency_hz).sum() - len(index) / 2 * np.log(2 * np.pi)
+        own._log_sigma, own._log_share = own._grid(_STEP_IN_SD)
+        return own
 
     @property
     def highest_order(self) -> int:
@@ -129,6 +142,41 @@ class Likelihood:
         share[[0, -1]] -= np.log(2)
         share[0] = np.logaddexp(share[0], lowest)
         return nodes, share
+
+
+class GroupedLikelihood(Likelihood):
+    """A model error of its own for each plane, or each mode: thesis (4.7) to (4.12).
+
+    Each is uniform on [0, 1] and integrated out by itself, so that the marginal likelihood is a
+    product over the groups. What the rest of the sampler calls sigma is their root mean square
+    over the modes; `joint` stands for the parameters alone.
+    """
+
+    def __init__(self, tests: Sequence[ModalTest], repeat: int, sigma: Sigma):
+        super().__init__(tests, repeat)
+        keys = [(mode.plane, mode.order if sigma == "mode" else 0) for mode in self.modes]
+        self._groups = [np.flatnonzero([key == own for key in keys]) for own in dict.fromkeys(keys)]
+        self._parts = [Likelihood.part(self, own) for own in self._groups]
+
+    def marginal(self, predicted: FloatArray, floor: float = 0.0) -> FloatArray:
+        parts = zip(self._parts, self._groups, strict=True)
+        terms = [part.marginal(predicted[:, own], floor) for part, own in parts]
+        return np.asarray(np.sum(terms, axis=0))
+
+    def joint(self, predicted: FloatArray, sigma: FloatArray) -> FloatArray:
+        return self.marginal(predicted)
+
+    def draw_sigma(self, predicted: FloatArray, rng: np.random.Generator) -> FloatArray:
+        parts = zip(self._parts, self._groups, strict=True)
+        return self._mean([part.draw_sigma(predicted[:, own], rng) for part, own in parts])
+
+    def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
+        parts = zip(self._parts, self._groups, strict=True)
+        return self._mean([part.likeliest_sigma(predicted[:, own]) for part, own in parts])
+
+    def _mean(self, sigmas: Sequence[FloatArray]) -> FloatArray:
+        weights = [len(own) for own in self._groups]
+        return np.asarray(np.sqrt(np.average(np.square(sigmas), axis=0, weights=weights)))
 
 
 def conditions_of(tests: Sequence[ModalTest], model: Model) -> list[Conditions]:

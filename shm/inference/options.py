@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from shm.errors import UsageError
 from shm.inference.priors import Calibration
@@ -15,6 +16,9 @@ TEXTBOOK = "textbook"
 METHODS = (NOISE_FLOOR, TEXTBOOK)
 """From the prior to the posterior by a falling noise floor, or by a rising power."""
 
+Sigma = Literal["one", "plane", "mode"]
+"""Whose model error it is: of all modes, or of each group, thesis (4.7) to (4.12)."""
+
 
 def silent(label: str, fraction: float) -> None:
     """No progress is shown."""
@@ -24,6 +28,7 @@ def silent(label: str, fraction: float) -> None:
 class UpdateOptions:
     """How to update: posterior samples to keep, seed, how often the data set counts (N_D), method.
 
+    `sigma`: one model error of all modes, or one of each plane or mode, with the thesis's priors.
     `calibration` is what an earlier measured tension taught of the bar (`calibration_of`).
 
     Raises UsageError for a method that is not one of `METHODS`.
@@ -34,6 +39,7 @@ class UpdateOptions:
     repeat: int = 1
     method: str = NOISE_FLOOR
     calibration: Calibration | None = None
+    sigma: Sigma = "one"
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:

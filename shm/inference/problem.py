@@ -11,8 +11,8 @@ from shm.errors import UsageError
 from shm.inference.coordinates import Coordinates
 from shm.inference.described import DescribedCoordinates
 from shm.inference.field import FieldLikelihood
-from shm.inference.likelihood import Likelihood
-from shm.inference.options import Progress
+from shm.inference.likelihood import GroupedLikelihood, Likelihood
+from shm.inference.options import Progress, Sigma
 from shm.inference.priors import Calibration, reading_of
 from shm.models import THESIS, AsMade, Model
 from shm.models.as_made import TENSION
@@ -81,6 +81,7 @@ class Problem:
         repeat: int,
         progress: Progress,
         calibration: Calibration | None = None,
+        sigma: Sigma = "one",
     ) -> Problem:
         """The problem of `tests`, each of which the model can describe, the model made ready.
 
@@ -88,7 +89,7 @@ class Problem:
         """
         for test in tests:
             model.refuse(test)
-        problem = cls(model, _likelihood(tests, model, repeat, calibration), calibration)
+        problem = cls(model, _likelihood(tests, model, repeat, calibration, sigma), calibration)
         label = f"{model.name}: reduced basis"
         model.prepare(problem.likelihood.highest_order, lambda done: progress(label, done))
         return problem
@@ -134,10 +135,21 @@ class Problem:
 
 
 def _likelihood(
-    tests: Sequence[ModalTest], model: Model, repeat: int, calibration: Calibration | None
+    tests: Sequence[ModalTest],
+    model: Model,
+    repeat: int,
+    calibration: Calibration | None,
+    sigma: Sigma,
 ) -> Likelihood | FieldLikelihood:
     if model.priors == THESIS:
-        return Likelihood(tests, repeat)
+        if sigma == "one":
+            return Likelihood(tests, repeat)
+        return GroupedLikelihood(tests, repeat, sigma)
+    if sigma != "one":
+        raise UsageError(
+            f"a model error of each {sigma} is the thesis's: the noise of the field has its own.",
+            remedy="Leave sigma out, or take the priors of the thesis.",
+        )
     if repeat != 1:
         raise UsageError(
             f"a data set that counts {repeat} times is the thesis's: real tests count once.",

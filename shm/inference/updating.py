@@ -61,7 +61,11 @@ def update(
             "part in the noise of the field.",
             remedy="Leave the method out, or take the priors of the thesis.",
         )
-    problem = Problem.of(tests, model, options.repeat, progress, options.calibration)
+    if options.method == TEXTBOOK and options.sigma != "one":
+        raise UsageError(
+            "the textbook's sampler draws one model error.", remedy="Leave the method or sigma out."
+        )
+    problem = Problem.of(tests, model, options.repeat, progress, options.calibration, options.sigma)
     started = time.perf_counter()
     rng = np.random.default_rng(options.seed)
     progress(model.name, 0.0)

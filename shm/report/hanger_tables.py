@@ -6,6 +6,9 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+import numpy as np
+
+from shm.models.practice_formulas import FORMULAS
 from shm.report import formatting
 from shm.report.contents import HangerReport, TrendRow
 from shm.report.hanger_summary import counted_tests, misfits_percent
@@ -15,7 +18,7 @@ from shm.report.paper import Table, filled
 from shm.report.quality_table import quality_table
 from shm.report.shifts import shift_cells, shift_table
 from shm.report.temperatures import temperature_table
-from shm.values import Alert, Mode, Posterior, PredictedFrequency
+from shm.values import PLANES, WITHOUT_MODEL, Alert, Mode, Posterior, PredictedFrequency
 from shm.values.force_units import ForceUnit, force_unit
 from shm.values.stated_tension import stated
 from shm.watch.change_words import factor
@@ -191,6 +194,29 @@ def _model_row(posterior: Posterior, share: float, unit: ForceUnit) -> tuple[str
     )
 
 
+def practice(data: HangerReport) -> Table:
+    """Formulas of practice from the latest measured frequencies, beside ours."""
+    title = "Formulas of practice"
+    hanger, unit = data.hanger, data.tension_unit
+    bar = (hanger.length_m, hanger.mass_per_length_kg_m, hanger.bending_stiffness_n_m2)
+    measured = {(mode.plane, mode.order): mode.frequency_hz for mode in data.latest.modes}
+    if data.posterior.model == WITHOUT_MODEL or not np.isfinite(bar).all():
+        return Table(title, (), ())
+    rows = []
+    for each in FORMULAS:
+        found = [each.tension_n(measured.get((p, each.order), np.nan), *bar) for p in PLANES]
+        if np.isfinite(found).any():
+            told = [f"{unit.of(n):.0f}" if math.isfinite(n) else "unknown" for n in found]
+            rows.append((f"{each.name}, mode {each.order}", *told, each.ends, each.leaves_out))
+    if not rows:
+        return Table(title, (), ())
+    said = stated(data.averaged, unit)
+    rows.append(("ours, all modes", said.tension, said.interval, "as found", ""))
+    heads = ("formula", *(f"{plane} ({unit.name})" for plane in PLANES), "ends", "leaves out")
+    note = "Each from one frequency; of ours, the tension and its interval."
+    return Table(title, heads, tuple(rows), note)
+
+
 def period(data: HangerReport) -> Table:
     """The period's last test beside its first; empty where there is no period, or one test."""
     if data.period is None or len(data.trend) < 2:
@@ -297,6 +323,7 @@ _NUMBERS: tuple[Callable[[HangerReport], Table], ...] = (
     frequencies,
     quality,
     models,
+    practice,
     parameters,
     history,
 )

@@ -18,6 +18,7 @@ WHOLE = [
     "Alerts, latest first",
     "Frequencies",
     "Model classes",
+    "Formulas of practice",
     "Parameters of the model class beam2",
     "Tests, latest first",
     "Where these numbers come from",
@@ -122,3 +123,13 @@ def test_a_table_without_room_for_its_words_stands_as_lists() -> None:
     lines = [line.split() for line in laid_out(LONG, 34).splitlines()]
     assert ["mode", "transverse", "3"] in lines
     assert ["off,", "%", "-2.37"] in lines
+
+
+def test_formulas_of_practice_stand_beside_ours(season: HangerReport) -> None:
+    """The taut string by hand: T = 4 m (f L)^2."""
+    (made,) = [t for t in numbers(season) if t.title == "Formulas of practice"]
+    hanger = season.hanger
+    first = next(m for m in season.latest.modes if (m.plane, m.order) == ("transverse", 1))
+    string_n = 4 * hanger.mass_per_length_kg_m * (first.frequency_hz * hanger.length_m) ** 2
+    assert made.rows[0][:2] == ("taut string, mode 1", f"{season.tension_unit.of(string_n):.0f}")
+    assert made.rows[-1][0] == "ours, all modes"

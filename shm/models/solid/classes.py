@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -25,6 +26,7 @@ from shm.models.solid.geometry import (
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Plane
 
 _SPRING_BOUNDS = (5.0, 12.0)  # thesis 5.2
+_CELLS_A_WAVE = 12  # layout: a half wave of a drawn mode looks smooth
 _BLOCK = 500  # technical: matrices of some 10 MB at once
 _ROUND_WITHIN = 0.01  # tolerance of a rolled bar's area (EN 10060), as the default scatter
 
@@ -101,6 +103,24 @@ class SolidModel(Model):
         scale = np.copysign(np.abs(along(fine)).max(), along(from_deck))
         inside = (x_m >= ends[0]) & (x_m <= ends[1])
         return np.where(inside, along(depth) / scale, 0.0)
+
+    def surface(self, theta: FloatArray, plane: Plane, order: int) -> tuple[FloatArray, FloatArray]:
+        """Corners (facets, 4, 3) of the surface in m (x transverse, y longitudinal, z from the deck
+        end) and how the mode moves them, the largest by 1; by the full model."""
+        from shm.models.solid.assembly import surface_of_mode
+
+        asked = self.description()
+        fine = replace(asked.geometry.fineness, rod=_CELLS_A_WAVE * (order + 1))
+        geometry = replace(asked.geometry, fineness=fine)
+        point = self._points(theta[None], plane)[0]
+        corners, moved = surface_of_mode(geometry, asked.material, asked.support, point, order)
+        if plane == "longitudinal":
+            # Seen from the arch end and with the planes exchanged, the hanger is the same.
+            corners, moved = corners[..., [1, 0, 2]], moved[..., [1, 0, 2]]
+            corners[..., 2] = asked.geometry.length_m - corners[..., 2]
+            moved[..., 2] *= -1
+        corners[..., 2] += self._ends_m()[0]
+        return corners, moved
 
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         plate = self.hanger.plate

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import HangerReport
 from shm.report.figures.illustration import Member
-from shm.report.figures.specification import Axis, Bars, Panel, Points, Specification, limits
+from shm.report.figures.specification import Axis, Bars, Mark, Panel, Points, Specification, limits
 from shm.report.figures.style import WIDTH_INCHES
 from shm.values import FloatArray, Posterior
 from shm.values.force_units import force_unit
@@ -20,6 +21,13 @@ _MOST_SAMPLES = 250
 _MOST_PARAMETERS = 7
 _BINS = 16
 _MOST_TOLD = 3
+_ALONE_INCHES = 2.2
+_BY_DENSITY = {
+    "least dense quarter": "quiet",
+    "second": "blue",
+    "third": "green",
+    "densest quarter": "orange",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +63,36 @@ def specify(posterior: Posterior) -> Specification:
     ]
     height = min(WIDTH_INCHES, _PANEL_INCHES * len(columns))
     return Specification(rows=rows, height_inches=height, is_grid=True)
+
+
+def marginals(posterior: Posterior, names: Sequence[str]) -> Specification:
+    """A histogram of each of these parameters, side by side."""
+    columns = [_column(posterior, name) for name in names]
+    panels = [_histogram([each], 0) for each in columns]
+    return Specification(rows=[panels], height_inches=_ALONE_INCHES)
+
+
+def pair(posterior: Posterior, x_name: str, y_name: str) -> Specification:
+    """All draws of two parameters, coloured by their likelihood: under even priors, the posterior
+    density with the other parameters as drawn."""
+    x, y = _column(posterior, x_name), _column(posterior, y_name)
+    share = np.argsort(np.argsort(posterior.log_likelihood)) / len(x.samples)
+    bounds = np.linspace(0, 1, len(_BY_DENSITY) + 1)
+    clouds: list[Mark] = []
+    for place, (name, colour) in enumerate(_BY_DENSITY.items()):
+        own = (share >= bounds[place]) & (share < bounds[place + 1])
+        clouds.append(
+            Points(x=x.samples[own], y=y.samples[own], size=2.5, colour=colour, name=name)
+        )
+    best = Points(
+        x=[x.most_probable], y=[y.most_probable], symbol="cross", size=7, name="most probable"
+    )
+    panel = Panel(
+        x=Axis(label=x.label, range=x.range),
+        y=Axis(label=y.label, range=y.range),
+        marks=[*clouds, best],
+    )
+    return Specification(rows=[[panel]], height_inches=2 * _ALONE_INCHES, legend_columns=5)
 
 
 def _columns(posterior: Posterior) -> list[_Column]:

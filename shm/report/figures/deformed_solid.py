@@ -1,0 +1,52 @@
+"""A mode of a solid in space: its surface as it bends, coloured by how far it moves."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from shm.report import colours
+from shm.report.figures import style
+from shm.values import FloatArray
+
+# Layout: how much of the hanger's length the mode is drawn with, how much its section is swollen.
+_DRAWN_MOTION, _INCHES = 0.06, 3.4
+_SWOLLEN = 2.0
+
+
+def draw(corners: FloatArray, moved: FloatArray) -> Figure:
+    """Of facets (n, 4, 3) in m and their motion, the largest 1, as `SolidModel.surface` gives."""
+    # A part of matplotlib that ships no types.
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+
+    figure = style.new_figure(_INCHES)
+    axes = figure.add_subplot(projection="3d")
+    length = float(np.ptp(corners[..., 2]))
+    size = np.linalg.norm(moved, axis=-1).mean(axis=1)
+    shades = ScalarMappable(Normalize(0, 1), "viridis")
+    placed = corners * [_SWOLLEN, _SWOLLEN, 1] + _DRAWN_MOTION * length * moved
+    # The hanger lies along the page, its deck end on the left.
+    body = Poly3DCollection(placed[..., [2, 1, 0]], facecolors=shades.to_rgba(size), linewidths=0.1)
+    body.set_edgecolor((0, 0, 0, 0.25))
+    body.set_clip_on(False)
+    axes.add_collection3d(body)
+    reach = 1.2 * float(np.abs(placed[..., :2]).max())
+    axes.set(
+        xlim=(corners[..., 2].min(), corners[..., 2].max()),
+        ylim=(-reach, reach),
+        zlim=(-reach, reach),
+    )
+    axes.set_xlabel("from the deck end (m)", fontsize=style.TINY, color=colours.INK)
+    axes.set_box_aspect((4.2, 1, 1), zoom=1.6)
+    axes.view_init(elev=18, azim=-75)
+    axes.set_yticks([], labels=[])
+    axes.set_zticks([], labels=[])
+    axes.set_ylabel("y", fontsize=style.TINY, color=colours.INK, labelpad=-12)
+    axes.set_zlabel("x", fontsize=style.TINY, color=colours.INK, labelpad=-12)
+    axes.tick_params(labelsize=style.TINY, colors=colours.INK)
+    bar = figure.colorbar(shades, ax=axes, shrink=0.6, pad=0.1)
+    bar.set_label("displacement, largest 1", fontsize=style.TINY, color=colours.INK)
+    bar.ax.tick_params(labelsize=style.TINY, colors=colours.INK)
+    return figure
