@@ -12,7 +12,7 @@ from shm_cli.common import json_option, opened_store, show, show_table, table
 @json_option
 @click.pass_context
 def command(ctx: click.Context, limit: int | None, as_json: bool) -> None:
-    """Who changed what, by page, API or command line, the newest first.
+    """Who changed what, when and how: the newest first.
 
     What shm does by itself is not listed, nor what is edited in bridge.toml.
 

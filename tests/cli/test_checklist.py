@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 from shm_cli import select, thesis, validate
 from shm_cli.validation import formulas, frequencies
+from tests.helpers.nouns import a_posterior
 
 ROOT = Path(__file__).parents[2]
 ITEMS = thesis.checklist()
@@ -62,8 +63,9 @@ def test_the_list_names_every_item() -> None:
 
 def test_formulas_stand_beside_ours(monkeypatch: pytest.MonkeyPatch) -> None:
     """The sampler is left out: it is tested where it lives, and takes seconds a hanger."""
-    ours = SimpleNamespace(tension_n=np.array([700e3, 720e3]))
-    monkeypatch.setattr(formulas, "update", lambda *_: ours)
+    tension_n = np.array([700e3, 720e3])
+    ours = replace(a_posterior(), samples=tension_n[:, None], names=("theta_F",))
+    monkeypatch.setattr(formulas, "update", lambda *_: replace(ours, nominal_tension_n=1.0))
     result = CliRunner().invoke(validate.command, ["--formulas", "--json"])
     assert result.exit_code == 0, result.output
     clamped, springs = json.loads(result.output)[:2]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -68,8 +69,9 @@ def test_files_alone_are_diagnosed_as_document_page_and_figures(
 
 def test_a_diagnosis_of_a_workspace_is_kept_for_the_report(shm: Shm, tmp_path: Path) -> None:
     workspace = make_workspace(tmp_path / "bridge")
-    for name in ("t1", "t2", "t3"):
-        (workspace.spool / f"{name}.modes.json").write_text(dump(modes_document([measured(name)])))
+    for day, name in enumerate(("t1", "t2", "t3")):  # alike but for the warmth: no copies
+        test = replace(measured(name), temperature_c=12.0 + 0.1 * day)
+        (workspace.spool / f"{name}.modes.json").write_text(dump(modes_document([test])))
     ingest(workspace)
     at = ("--workspace", workspace.folder)
     before = shm(*at, "report", "--hanger", 3, "--json")
