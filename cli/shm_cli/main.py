@@ -54,8 +54,6 @@ VERBS: dict[str, Verb] = {
     "token": Verb("shm_cli.token", "Who may read and write over the network."),
     "user": Verb("shm_cli.user", "People who may sign in to the dashboard."),
     "audit": Verb("shm_cli.audit", "Who changed what, when and how: the newest first."),
-        "shm_cli.audit", "Who changed what, by page, API or command line, the newest first."
-    ),
     "identify": Verb("shm_cli.identify", "Modal parameters of recordings."),
     "predict": Verb("shm_cli.predict", "Frequencies of a model class for given parameters."),
     "update": Verb("shm_cli.update", "Posterior of tension and end stiffness."),
