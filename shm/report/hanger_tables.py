@@ -211,9 +211,9 @@ def practice(data: HangerReport) -> Table:
     if not rows:
         return Table(title, (), ())
     said = stated(data.averaged, unit)
-    rows.append(("ours, all modes", said.tension, said.interval, "as found", ""))
+    rows.append(("ours, all modes of both planes", said.tension, said.tension, "as found", ""))
     heads = ("formula", *(f"{plane} ({unit.name})" for plane in PLANES), "ends", "leaves out")
-    note = "Each from one frequency; of ours, the tension and its interval."
+    note = f"Each from one frequency. The 90 % interval of ours is {said.interval}."
     return Table(title, heads, tuple(rows), note)
 
 
