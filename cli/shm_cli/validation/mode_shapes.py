@@ -9,7 +9,8 @@ import numpy as np
 
 from shm.models import THESIS, build
 from shm.models.solid.classes import SolidModel
-from shm.report.figures import deformed_solid, illustration
+from shm.report.figures import illustration
+from shm.report.figures.deformed_solid import draw
 from shm.values import PLANES, FloatArray, Hanger, Plane
 from shm_cli.validation import frequencies
 from shm_cli.validation.figure import Figure
@@ -51,4 +52,4 @@ def shown(hanger: Hanger, tell: Callable[[str, float], None], number: str) -> Fi
 
 
 def _write(path: Path, corners: FloatArray, moved: FloatArray) -> None:
-    path.write_bytes(illustration.png(deformed_solid.draw(corners, moved)))
+    path.write_bytes(illustration.png(draw(corners, moved)))
