@@ -12,8 +12,8 @@ from shm.errors import UsageError
 from shm.models import THESIS, Model, build
 from shm.models.solid.classes import SolidModel
 from shm.report.figures import illustration
-from shm.report.figures.deformed_solid import draw
 from shm.report.figures.against_a_parameter import Curves, specify, write_png
+from shm.report.figures.deformed_solid import draw
 from shm.values import PLANES, FloatArray
 from shm_cli import completion
 from shm_cli.common import (
