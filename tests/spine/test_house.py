@@ -112,6 +112,16 @@ ROOMS = (
 )
 
 
+def _named(module: str, name: str) -> object:
+    """What `from module import name` gives, a module of a package too."""
+    found = importlib.import_module(module)
+    return (
+        getattr(found, name)
+        if hasattr(found, name)
+        else importlib.import_module(f"{module}.{name}")
+    )
+
+
 def _asked_of(room: str) -> dict[str, object]:
     """What the floors above import from the files of a room that gathers nothing in one place."""
     if hasattr(importlib.import_module(f"shm.{room}"), "__all__"):
@@ -123,7 +133,7 @@ def _asked_of(room: str) -> dict[str, object]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
     ]
     return {
-        alias.name: getattr(importlib.import_module(node.module), alias.name)
+        alias.name: _named(node.module, alias.name)
         for node in above
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(f"shm.{room}.")
         for alias in node.names
