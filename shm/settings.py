@@ -145,16 +145,20 @@ class Settings:
     )
     baseline_tests: int = _row(1, "", "how many first tests form the baseline", 1, 1000)
     false_call_years: float = _row(
-        100.0, "years", "mean time until a hanger that has not changed is called changed", 0.1, 1e6
+        100.0, "years", "mean time between false alarms of a hanger", 0.1, 1e6
     )
     hook_timeout_seconds: float = _row(30.0, "s", "a hook is ended after so long", 0.1, 3600)
-    hook_attempts: int = _row(16, "", "deliveries of one alert to one hook at most", 1, 1000)
+    hook_attempts: int = _row(16, "", "most attempts to deliver an alert to a hook", 1, 1000)
     hook_backoff_seconds: float = _row(
-        5.0, "s", "wait after a failed delivery, doubled each time", 0, 86400
+        5.0, "s", "wait after a failed delivery; each further wait is twice as long", 0, 86400
     )
     # Hangers of one bridge are hit one after the other and worked through some seconds each.
     alert_grouping_seconds: float = _row(
-        60.0, "s", "alike alerts of several hangers so close go as one message; 0: never", 0, 3600
+        60.0,
+        "s",
+        "alike alerts of several hangers within this time are one message; 0: never",
+        0,
+        3600,
     )
 
     web_hosts: str = _row(
