@@ -46,6 +46,7 @@ up to 3 % of the length; how much of it swings is open."""
 
 # Judgement: from ten false calls a year, which nobody reads, to none in the life of all bridges.
 _FALSE_CALL_YEARS = (0.1, 1e6)
+_MOST_DECADES = 4.0  # judgement: from a hinge to a clamp
 
 
 def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
@@ -197,8 +198,18 @@ def _thresholds(table: Table | None) -> Thresholds:
         return Thresholds()
     table.refuse_unknown(field.name for field in fields(Thresholds))
     values = {key: table.positive(key) for key in table.values}
-    if values.get("alert_probability", 0.5) >= 1:
-        raise table.refusal("alert_probability must lie below 1", "Give 0.95, say.")
+    if not 0.5 <= values.get("alert_probability", 0.5) < 1:
+        raise table.refusal("alert_probability must be at least 0.5 and below 1", "Give 0.95, say.")
+    if values.get("tension_shift_fraction", 0.5) >= 1:
+        raise table.refusal(
+            "tension_shift_fraction is a fraction of the tension, below 1",
+            "Give 0.05 for 5 %.",
+        )
+    if values.get("stiffness_shift_decades", 0.5) > _MOST_DECADES:
+        raise table.refusal(
+            f"stiffness_shift_decades is above {_MOST_DECADES:g}, which no end moves by",
+            "Give 0.5, a factor of 3.",
+        )
     if "false_call_years" in table:
         table.fraction("false_call_years", NAN, *_FALSE_CALL_YEARS)
     return Thresholds(**values)

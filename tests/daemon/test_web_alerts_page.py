@@ -93,7 +93,7 @@ def test_person_token_and_reason_go_on_the_record(writer: httpx.Client, alert: i
     assert again.status_code == 409
     assert "already" in again.json()["message"]
     page = writer.get("/alerts").text
-    assert "no alert is open" in page
+    assert "Somebody took note of every alert" in page
     assert "Ada &lt;b&gt; (token write)" in page
     assert "Nut tightened." in page
 

@@ -15,6 +15,7 @@ from shm.values import PLANES, FloatArray, Hanger, Plane
 from shm_cli.validation import frequencies
 from shm_cli.validation.figure import Figure
 
+# Thesis, appendix B: seven orders, x before y.
 FIGURES: dict[str, tuple[int, Plane]] = {
     f"B.{2 * order - 1 + place}": (order, plane)
     for order in range(1, 8)

@@ -22,6 +22,7 @@ from shm_cli import thesis
 from shm_cli.validation.figure import Figure
 
 Tell = Callable[[str, float], None]
+# As in the thesis, chapter 5: data and N_D; technical: draws enough for a marginal.
 _PRINTING, _REPEAT, _SAMPLES = "table 1.1", 10, 2000
 
 # Class and parameters by figure: one or more alone, "a/b" a against b, "" the frequencies. Of 5.24

@@ -181,7 +181,9 @@ def _visitor(request: Request, site: Site, secret: str, needed: Role) -> Visitor
         return found
     if found.is_person:
         raise Refused(
-            403, f"A {found.role} may not do this.", f"It takes the role {needed}: ask an engineer."
+            403,
+            f"The role {found.role} may not do this.",
+            f"It takes the role {needed}: ask an engineer.",
         )
     if needed is Role.ENGINEER:
         raise Refused(403, "A token may not do this.", "Sign in as an engineer, by your name.")

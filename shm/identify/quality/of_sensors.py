@@ -170,12 +170,16 @@ def _in_plane(modes: Sequence[Mode], plane: Plane, hanger: Hanger) -> QualityChe
     orders = np.array([mode.order for mode in modes])
     misfit, typical, wrong = _explained(values[:, seen], places_m, orders, hanger)
     best = min(wrong, key=lambda each: each.misfit)
-    if misfit < LARGEST_MISFIT or not best.is_large:
+    if misfit < LARGEST_MISFIT:
         told = "the sensors' shapes are those of the described hanger"
         return QualityCheck("places", "good", misfit, LARGEST_MISFIT, "", told)
     in_most = typical >= _TYPICAL * LARGEST_MISFIT
-    if not in_most or best.misfit > _EXPLAINED * misfit:
-        return None  # the hanger is not as described, or more than one sensor is wrong
+    if not in_most or not best.is_large or best.misfit > _EXPLAINED * misfit:
+        told = "the shapes are not those of the described hanger, and no one sensor explains it"
+        remedy = (
+            "Compare the sensors' places with the sheet: two may be exchanged, or one 0.2 m off."
+        )
+        return QualityCheck("places", "unknown", misfit, LARGEST_MISFIT, "", told, remedy)
     alike = [each for each in wrong if each.misfit < _NEARLY * best.misfit]
     told = " or ".join(each.text for each in sorted(alike, key=lambda each: each.misfit)[:3])
     return QualityCheck(

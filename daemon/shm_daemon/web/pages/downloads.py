@@ -121,7 +121,12 @@ def _row(point: TrendPoint) -> tuple[str, ...]:
     numbers = (known.mean, known.q05, known.q95, point.averaged.repeatability_sd_n)
     when = f"{point.taken_at:%Y-%m-%dT%H:%M:%SZ}" if point.taken_at else ""
     temperature = _cell(point.temperature_c)
-    return (point.test, when, temperature, point.model, *map(_cell, numbers))
+    return (_inert(point.test), when, temperature, point.model, *map(_cell, numbers))
+
+
+def _inert(name: str) -> str:
+    """No formula for a spreadsheet: a test is named by whoever uploads its file."""
+    return f"'{name}" if name.startswith(("=", "+", "-", "@")) else name
 
 
 def _cell(value: float) -> str:
