@@ -61,7 +61,8 @@ def test_a_threshold_holds_from_now_on_and_goes_back_to_the_file(
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
-        (LEVEL, "1.5", "alert_probability must lie below 1"),
+        (LEVEL, "1.5", "alert_probability must be at least 0.5 and below 1"),
+        ("hanger.3.thresholds.tension_shift_fraction", "5", "Give 0.05 for 5 %"),
         (LEVEL, "much", "is not a number"),
         ("hanger.3.limits.tension_max_n", "-1", "is not a positive number"),
         ("settings.false_call_years", "0", "false_call_years"),
