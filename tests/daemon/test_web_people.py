@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import httpx
 import pytest
@@ -16,6 +17,7 @@ from shm_daemon.web.access import engineering, reading, writing
 from shm_daemon.web.address import Address
 from shm_daemon.web.app import load_pages
 from shm_daemon.web.site import MOST_WRONG, Description, Site
+from tests.helpers.taken_in import with_a_slow_loss
 from tests.helpers.web_servers import served
 
 PASSWORD = "correct horse battery"
@@ -61,6 +63,17 @@ def test_a_removed_user_is_out_at_once_and_wrong_passwords_are_throttled(
     told = [sign_in(browser, "reader", "wrong") for _ in range(MOST_WRONG)]
     assert set(told[:-1]) == {401}
     assert sign_in(browser, "reader") == 429
+
+
+def test_a_user_takes_note_by_the_own_name_whatever_is_said(tmp_path: Path) -> None:
+    workspace = with_a_slow_loss(tmp_path / "bridge")
+    with workspace.store() as store:
+        store.people.add("Ada", Role.OPERATOR, PASSWORD, utc_now())
+    told = {"why": "seen", "who": "an engineer"}
+    with served(workspace, Address("0.0.0.0")) as site, site.client(Origin=site.url) as client:
+        sign_in(client, "Ada")
+        noted = client.post("/api/alerts/1/acknowledgement", json=told).json()
+    assert noted["acknowledged"]["who"] == "Ada"
 
 
 def test_a_short_password_and_a_name_twice_are_refused(workspace: Workspace) -> None:

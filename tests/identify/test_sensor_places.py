@@ -104,6 +104,7 @@ PLACES = [1.2, 2.0, 3.1]
         (PLACES, [0.4, 1, 1], "the sensor at 1.2 m reads 2.5 times too little"),
         (PLACES, [1, 1, -1], "the sensor at 3.1 m reads 1 times too much with the wrong sign"),
         ([1.6, 2.0, 3.1], [1, 1, 1], "the sensor said to be at 1.2 m is at 1.6 m"),
+        ([3.1, 2.0, 1.2], [1, 1, 1], "no one sensor explains it"),
     ],
 )
 def test_one_gain_or_place_that_is_wrong_is_named(

@@ -205,7 +205,8 @@ class Acknowledge(BaseModel):
 
     why: Written = Field(description="What came of it, for the record.")
     who: Written | None = Field(
-        default=None, description="The person; the name of the token is noted in any case."
+        default=None,
+        description="The person behind a token, which is noted too; a user has a name.",
     )
 
 

@@ -166,8 +166,8 @@ def acknowledge(
     told: Acknowledge,
 ) -> Any:
     """Notes on the record that somebody has seen an alert to its end: once an alert."""
-    by = writer.name if writer.is_person else f"token {writer.name}"
-    who = writer.name if told.who is None else f"{told.who} ({by})"
+    named = told.who is not None and not writer.is_person  # who signed in has a name
+    who = f"{told.who} (token {writer.name})" if named else writer.name
     site.store.acting_as(writer.actor).alerts.acknowledge(alert_id, who, told.why, utc_now())
     return alert_documents([site.store.alerts.row(alert_id)], site)[0]
 

@@ -13,7 +13,7 @@
     });
     const found = await answer.json();
     if (!answer.ok) throw new Error([found.message, found.remedy].filter(Boolean).join(" "));
-    localStorage.setItem(remembered, said.who);
+    if (said.who) localStorage.setItem(remembered, said.who);
     return found;
   }
 
@@ -46,7 +46,8 @@
 
   document.addEventListener("DOMContentLoaded", () => {
     for (const form of document.querySelectorAll("form.acknowledge")) {
-      form.elements.who.value = localStorage.getItem(remembered) ?? "";
+      // Who signed in by name is not asked for it.
+      if (form.elements.who) form.elements.who.value = localStorage.getItem(remembered) ?? "";
       form.addEventListener("submit", async (event) => {
         event.preventDefault();
         const button = form.querySelector("button");
