@@ -11,9 +11,8 @@ import rich_click as click
 from shm.errors import UsageError
 from shm.models import THESIS, Model, build
 from shm.models.solid.classes import SolidModel
-from shm.report.figures import illustration
+from shm.report.figures import deformed_solid
 from shm.report.figures.against_a_parameter import Curves, specify, write_png
-from shm.report.figures.deformed_solid import draw
 from shm.values import PLANES, FloatArray
 from shm_cli import completion
 from shm_cli.common import (
@@ -111,7 +110,7 @@ def _draw_shape(model: Model, values: dict[str, float], shape: str, path: Path) 
             remedy="Take s1, s2, solid0, solid1 or solid2.",
         )
     corners, moved = model.surface(model.pack(values), PLANES[PLANES.index(plane)], int(order))
-    path.write_bytes(illustration.png(draw(corners, moved)))
+    deformed_solid.write_png(corners, moved, path)
 
 
 def _show_one(model: Model, values: dict[str, float], modes: int, as_json: bool) -> None:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
 from shm.models import THESIS, build
 from shm.models.solid.classes import SolidModel
-from shm.report.figures import illustration
-from shm.report.figures.deformed_solid import draw
-from shm.values import PLANES, FloatArray, Hanger, Plane
+from shm.report.figures.deformed_solid import write_png
+from shm.values import PLANES, Hanger, Plane
 from shm_cli.validation import frequencies
 from shm_cli.validation.figure import Figure
 
@@ -48,9 +46,5 @@ def shown(hanger: Hanger, tell: Callable[[str, float], None], number: str) -> Fi
         [(f"{each['from_deck_m']:.1f}", f"{each['displacement']:+.3f}") for each in rows],
         "Class 1 at 711 kN, springs as stiff as a clamp. The largest displacement is 1.",
         {"figure": number, "order": order, "plane": plane, "frequency_hz": hz, "surface": rows},
-        draw=lambda path: _write(path, corners, moved),
+        draw=lambda path: write_png(corners, moved, path),
     )
-
-
-def _write(path: Path, corners: FloatArray, moved: FloatArray) -> None:
-    path.write_bytes(illustration.png(draw(corners, moved)))

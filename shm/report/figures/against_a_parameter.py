@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from shm.report.figures import illustration, with_matplotlib
+from shm.report.figures import illustration
 from shm.report.figures.specification import Axis, Line, Mark, Panel, Specification, limits
 from shm.values import FloatArray
 
@@ -43,7 +43,10 @@ def specify(parts: Sequence[Curves], x_label: str, y_label: str) -> Specificatio
 
 def write_png(figure: Specification, path: Path) -> None:
     """The figure on white."""
-    path.write_bytes(illustration.png(with_matplotlib.draw(figure)))
+    # What draws is loaded where something is drawn.
+    from shm.report.figures.with_matplotlib import draw
+
+    path.write_bytes(illustration.png(draw(figure)))
 
 
 def _lines(curves: Curves) -> list[Mark]:

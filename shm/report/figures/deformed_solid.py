@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 
 from shm.report import colours
-from shm.report.figures import style
+from shm.report.figures import illustration, style
 from shm.values import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Layout: how much of the hanger's length the mode is drawn with, how much its section is swollen.
 _DRAWN_MOTION, _INCHES = 0.06, 3.4
@@ -18,7 +21,9 @@ _SWOLLEN = 2.0
 
 def draw(corners: FloatArray, moved: FloatArray) -> Figure:
     """Of facets (n, 4, 3) in m and their motion, the largest 1, as `SolidModel.surface` gives."""
-    # A part of matplotlib that ships no types.
+    # What draws is loaded where something is drawn. The last is a part that ships no types.
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
     figure = style.new_figure(_INCHES)
@@ -50,3 +55,8 @@ def draw(corners: FloatArray, moved: FloatArray) -> Figure:
     bar.set_label("displacement, largest 1", fontsize=style.TINY, color=colours.INK)
     bar.ax.tick_params(labelsize=style.TINY, colors=colours.INK)
     return figure
+
+
+def write_png(corners: FloatArray, moved: FloatArray, path: Path) -> None:
+    """The figure of these on white."""
+    path.write_bytes(illustration.png(draw(corners, moved)))
