@@ -167,10 +167,9 @@ def test_an_alert_is_acknowledged_with_a_name_and_a_reason(signed_in: Browser, s
     before = page.locator("article.card.open").count()
     card = page.locator("article.card").last
     card.get_by_text("Acknowledge", exact=True).click()
-    card.get_by_label("Your name").fill("Anna Meier")
     card.get_by_label("What came of it").fill("A clamp had slipped; <set> right.")
     card.get_by_role("button").click()
-    expect(card).to_contain_text("Acknowledged by Anna Meier")
+    expect(card).to_contain_text("Acknowledged by Anna")
     expect(card).to_contain_text("A clamp had slipped; <set> right.")
     expect(card).to_be_focused()
     assert faults(page) == []
