@@ -1,6 +1,6 @@
 # Two commands do everything on a machine with Python 3.11+ and make:
 #   make demo   environment, install, the main job end to end
-#   make test   environment, install, lint, types, floors and all tests
+#   make test   environment, install, lint, types, floors and the tests
 PYTHON ?= python3
 BIN := .venv/bin
 UV := $(BIN)/uv pip install --quiet
@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Who has it set lets each process compile all that it imports anew: the tests begin hundreds.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo demo-live test test-arithmetic without-avx512 without-avx2 lint bench bench-peers docs tables lock clean
+.PHONY: demo demo-live test test-slow test-arithmetic without-avx512 without-avx2 lint bench bench-peers docs tables lock clean
 
 demo: .venv/runtime
 	$(BIN)/shm demo
@@ -20,17 +20,23 @@ demo: .venv/runtime
 demo-live: .venv/runtime
 	$(BIN)/shm demo --live --folder shm-demo-live
 
-# What takes one processor goes side by side: the types, and the numerics again. Then a third process,
-# because many tests wait for a daemon, a server or a browser; files go out in the order of their
-# names, because by their number of tests one with a single long test would come last, alone.
+# What takes one processor goes side by side: the types, and the quick numerics, which run on another
+# arithmetic only. Then a third process, because many tests wait for a daemon, a server or a browser;
+# files go out in the order of their names, because by their number of tests one with a single long
+# test would come last, alone.
 test: .venv/development
 	$(MAKE) --jobs 3 lint test-arithmetic
-	$(BIN)/python -m pytest --quiet --numprocesses 3 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest --quiet --numprocesses 3 --dist loadfile --no-loadscope-reorder \
+		$(QUICK:%=--ignore=%)
+
+# Before a release, and with `make bench`: the slow tests, which have a quicker kin in `make test`.
+test-slow: .venv/development
+	$(BIN)/python -m pytest --quiet --numprocesses 3 --dist loadfile --no-loadscope-reorder -m slow
 
 # numpy, OpenBLAS and the C library choose by the processor how many numbers they add at once and
 # whether they round between multiplying and adding: another processor gives other last digits, and
-# a test that stands on them passes on one machine alone. So the quick ones of the numerics run
-# again as on a processor without AVX2 and FMA, which differs most; as on one without AVX-512 alone,
+# a test that stands on them passes on one machine alone. So the quick ones of the numerics run as on
+# a processor without AVX2 and FMA, which differs most; as on this one and on one without AVX-512,
 # and the slow ones, with `make bench`. numpy warns, and a warning is an error here, of names that it
 # does not choose by; hence it is asked for them.
 CHOSEN_BY = $(shell $(BIN)/python -c "from numpy._core import _multiarray_umath as m; print(*m.__cpu_dispatch__)")
@@ -51,8 +57,8 @@ SLOW := $(SAMPLED) $(WATCHED) $(WORDS) $(patsubst %,tests/models/test_%.py,hange
 	$(patsubst %,tests/inference/test_%.py,conditions ensemble evidence sharp updating) \
 	$(patsubst %,tests/watch/test_%.py,bridge_drifts false_call_rate neighbours state \
 		watcher watching)
-NUMERICS := $(BIN)/python -m pytest --quiet \
-	tests/models tests/gap tests/inference tests/watch $(SLOW:%=--ignore=%)
+QUICK := $(filter-out $(SLOW),$(wildcard $(patsubst %,tests/%/test_*.py,models gap inference watch)))
+NUMERICS := $(BIN)/python -m pytest --quiet $(QUICK)
 
 test-arithmetic: without-avx2
 
@@ -68,8 +74,9 @@ lint: .venv/development
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: .venv/development
+bench: .venv/development test-slow
 	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile -m trial
+	$(NUMERICS)
 	$(MAKE) without-avx512
 	$(WITHOUT_AVX512) $(BIN)/python -m pytest --quiet $(SLOW)
 	$(WITHOUT_AVX2) $(BIN)/python -m pytest --quiet $(SLOW)

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.slow import few_of
+
 EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "docs" / "examples").glob("*.py"))
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("example", few_of(EXAMPLES, 3), ids=lambda path: path.stem)
 def test_an_example_runs_and_finds_the_known_truth(
     example: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -27,6 +27,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return copy
 
 
+@pytest.mark.slow
 def test_the_page_holds_words_marks_and_figures_that_exist(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     filled = text.split("<!-- blind trial -->")[1].split("<!-- /blind trial -->")[0]

@@ -16,6 +16,7 @@ from shm.store.tables import SCHEMA
 from tests.cli.conftest import Shm
 from tests.helpers.contents import held, quiet
 from tests.helpers.postgres import Databases
+from tests.helpers.slow import few_of
 from tests.store.test_server_upgrade import as_of
 
 RELEASED = sorted((Path(__file__).parents[1] / "store" / "data").glob("schema_*.db"))
@@ -30,7 +31,7 @@ def of_a_release(released: Path, empty: Workspace) -> Workspace:
     return empty
 
 
-@pytest.mark.parametrize("released", RELEASED, ids=lambda path: path.stem)
+@pytest.mark.parametrize("released", few_of(RELEASED, 3), ids=lambda path: path.stem)
 def test_a_file_of_every_schema_upgrades_twice_without_complaint(
     shm: Shm, empty: Workspace, released: Path
 ) -> None:
@@ -68,7 +69,7 @@ def content(database: Path) -> list[str]:
         return list(connection.iterdump())
 
 
-@pytest.mark.parametrize("released", OLDER, ids=lambda path: path.stem)
+@pytest.mark.parametrize("released", few_of(OLDER, 2), ids=lambda path: path.stem)
 def test_beside_a_daemon_nothing_is_upgraded_and_the_message_says_who_it_is(
     shm: Shm, empty: Workspace, released: Path
 ) -> None:

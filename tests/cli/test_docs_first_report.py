@@ -28,6 +28,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_page_leads_to_a_report_that_holds_the_planted_tension(
     shm: Shm, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

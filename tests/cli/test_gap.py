@@ -149,6 +149,7 @@ def test_weak_data_are_answered_first_and_their_weakness_said_next(
     assert ended.out.index("\n! ") < ended.out.index("CAUSES, LIKELIEST FIRST")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "words"),
     [("2nd-try.py", "no new effect"), ("sag.py", "no new effect"), ("play.py", "no law")],

@@ -100,6 +100,7 @@ def test_while_a_daemon_serves_the_workspace_ingest_says_what_to_do(
     assert "spool/" in ended.err
 
 
+@pytest.mark.slow
 def test_the_daemon_empties_the_spool_once_and_ends(empty: Workspace) -> None:
     write_test(empty.spool / "a.modes.json", empty)
     ended = shm_process("--workspace", empty.folder, "daemon", "--once")

@@ -13,6 +13,7 @@ from shm.report.figures.specification import Line, Points, Rule
 from shm_cli import thesis
 from shm_cli.validation import frequencies, solid_figures
 from shm_cli.validation.frequencies import FrequencyRow
+from tests.helpers.slow import few_of
 
 HANGER = load_hanger(thesis.HANGER_FILE)
 HZ = tuple(np.arange(1.0, 7.0))
@@ -36,7 +37,7 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(solid_figures, "_held_hz", lambda *_: held * 1.25)
 
 
-@pytest.mark.parametrize("number", solid_figures.FIGURES)
+@pytest.mark.parametrize("number", few_of(solid_figures.FIGURES, 3))
 def test_a_figure_has_its_panels_and_says_the_same_in_numbers(
     number: str, solved: None, tmp_path: Path
 ) -> None:

@@ -29,6 +29,7 @@ from shm_daemon.web.frame import FOR_ENGINEERS, NAVIGATION
 from tests.helpers.browsers import PHONE, Browser, a_browser, faults, undrawn_charts, width_px
 from tests.helpers.daemons import real_daemon
 from tests.helpers.flows import ingest
+from tests.helpers.slow import few_of
 from tests.helpers.web_servers import Served, a_thread, served
 from tests.helpers.workspaces import START, make_workspace, write_loss, write_test
 
@@ -111,7 +112,7 @@ def signed_in(browser: Browser, site: Site) -> Browser:
     return browser
 
 
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("name", few_of(PAGES, 3))
 def test_a_page_is_whole_for_everybody_by_day_and_night_on_desk_and_phone(
     signed_in: Browser, site: Site, name: str
 ) -> None:

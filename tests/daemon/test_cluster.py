@@ -81,6 +81,7 @@ def test_a_worker_that_came_later_is_asked_too() -> None:
         run_if_alike({**traits(), "numpy": "0.1"}, lambda: 7)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_does_not_answer_is_waited_for() -> None:
     with pytest.raises(ShmError, match="cannot be reached") as caught:
         Cluster("tcp://127.0.0.1:9").submit(os.getpid)
@@ -106,6 +107,7 @@ def _refuse() -> None:
     raise BadInput("odd.", line=3, remedy="Mend it.")
 
 
+@pytest.mark.slow
 def test_windows_of_a_stream_are_read_on_a_cluster_to_the_bit(
     tmp_path: Path, pool: Cluster
 ) -> None:

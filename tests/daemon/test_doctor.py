@@ -227,6 +227,7 @@ def test_files_that_wait_too_long_in_the_spool_are_told(workspace: Workspace) ->
     assert "broken.csv.part" in broken.found
 
 
+@pytest.mark.slow
 def test_raw_files_that_came_after_a_restored_backup_are_named_and_can_be_taken_in(
     workspace: Workspace, capsys: pytest.CaptureFixture[str]
 ) -> None:

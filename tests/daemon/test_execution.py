@@ -20,6 +20,7 @@ from shm.errors import BadInput, ShmError, WorkerDied
 from shm.resources import memory_of_machine
 from shm_daemon import execution
 from shm_daemon.execution import Workers, children_ended, process_pool
+from tests.helpers.slow import few_of
 
 
 @pytest.fixture
@@ -54,13 +55,16 @@ def test_a_crash_is_told_and_work_left_undone_is_ended_with_the_context() -> Non
 
 @pytest.mark.parametrize(
     ("step", "how", "from_outside"),
-    [
-        (partial(ctypes.string_at, 8), "SIGSEGV", False),
-        (os.abort, "SIGABRT", False),
-        (partial(os._exit, 3), "exit code 3", False),
-        (partial(signal.raise_signal, signal.SIGTERM), "SIGTERM", True),
-        (partial(signal.raise_signal, signal.SIGKILL), "SIGKILL", True),
-    ],
+    few_of(
+        [
+            (partial(ctypes.string_at, 8), "SIGSEGV", False),
+            (os.abort, "SIGABRT", False),
+            (partial(os._exit, 3), "exit code 3", False),
+            (partial(signal.raise_signal, signal.SIGTERM), "SIGTERM", True),
+            (partial(signal.raise_signal, signal.SIGKILL), "SIGKILL", True),
+        ],
+        2,
+    ),
 )
 def test_a_death_says_how_and_takes_no_neighbour_along(
     workers: Workers, step: partial[object], how: str, from_outside: bool
@@ -99,6 +103,7 @@ def _say_and_sleep(at_work: Path) -> None:
     time.sleep(0.5)
 
 
+@pytest.mark.slow
 def test_a_worker_killed_at_rest_costs_nothing(workers: Workers) -> None:
     for _ in range(3):
         os.kill(workers.submit(os.getpid).result(60), signal.SIGKILL)
@@ -140,6 +145,7 @@ def test_where_no_process_can_be_begun_no_file_is_to_blame(
     assert workers.submit_fresh(os.getpid).result(60)
 
 
+@pytest.mark.slow
 def test_where_each_process_ends_at_once_no_file_is_to_blame_and_none_is_begun_for_ever() -> None:
     with children_ended():
         workers = Workers(1, partial(os._exit, 1))

@@ -87,6 +87,7 @@ def test_files_dropped_while_it_runs_are_done(
     assert list(workspace.spool.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_open_files_do_not_grow_with_the_tests(
     workspace: Workspace, serve: Callable[..., Wakeup]
 ) -> None:

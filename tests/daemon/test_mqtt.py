@@ -123,6 +123,7 @@ def test_what_was_received_but_not_acknowledged_is_not_taken_twice(
         assert store.recordings.list_events() == ()
 
 
+@pytest.mark.slow
 def test_what_came_while_the_daemon_was_down_is_taken_in(bridge: Workspace, broker: Broker) -> None:
     with listening(bridge):
         pass
@@ -170,6 +171,7 @@ def test_too_large_a_message_is_laid_in_the_quarantine_with_its_reason(
     assert not reason.exists()  # it was acknowledged
 
 
+@pytest.mark.slow
 def test_a_store_that_is_out_holds_messages_up_and_loses_none(
     bridge: Workspace, broker: Broker, tmp_path: Path
 ) -> None:

@@ -145,6 +145,7 @@ def test_a_file_that_grows_while_it_is_copied_is_not_followed_beyond_what_was_ju
     assert copied <= 4
 
 
+@pytest.mark.slow
 def test_the_holes_of_a_permitted_file_stay_holes_and_its_bytes_the_same(tmp_path: Path) -> None:
     archive, path = Archive(tmp_path / "archive"), sparse(tmp_path / "a.csv", 200 << 20)
     archive.folder.mkdir()
@@ -158,6 +159,7 @@ def test_the_holes_of_a_permitted_file_stay_holes_and_its_bytes_the_same(tmp_pat
     assert copy.read_bytes() == path.read_bytes()
 
 
+@pytest.mark.slow
 def test_the_heart_beats_while_a_large_permitted_file_is_copied_and_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -70,6 +70,7 @@ def test_the_daemon_waits_while_its_server_is_away_and_goes_on(
     until(lambda: not (served.spool / "t1.modes.json").exists())
 
 
+@pytest.mark.slow
 def test_a_cut_of_its_connections_costs_the_daemon_nothing(
     served: Workspace, url: str, postgresql: Databases
 ) -> None:

@@ -84,6 +84,7 @@ def servers_of(workspace: Workspace) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="needs /proc")
 def test_a_web_interface_that_dies_comes_again_and_ends_with_its_daemon(
     workspace: Workspace,
@@ -117,6 +118,7 @@ def test_it_does_not_open_to_others_without_a_token(workspace: Workspace) -> Non
         pass
 
 
+@pytest.mark.slow
 def test_messages_outlast_killed_daemons_and_each_is_stored_once(tmp_path: Path) -> None:
     messages, kills = 8, 2
     with a_broker() as broker:

@@ -17,6 +17,7 @@ import pytest
 from shm.store import Workspace
 from shm_daemon.web import connections, front
 from shm_daemon.web.address import UPLOADS
+from tests.helpers.slow import few_of
 from tests.helpers.web_servers import Served, served
 
 MANY = 1000
@@ -69,7 +70,7 @@ def is_open(one: socket.socket) -> bool:
 
 
 @pytest.mark.parametrize("addresses", ADDRESSES.values(), ids=ADDRESSES)
-@pytest.mark.parametrize("said", [SILENT, DRIPPING_HEADERS, SLOW_BODY, SLOW_UPLOAD])
+@pytest.mark.parametrize("said", few_of([SILENT, DRIPPING_HEADERS, SLOW_BODY, SLOW_UPLOAD], 2))
 def test_health_and_metrics_answer_while_a_thousand_sockets_are_idle(
     site: Served, addresses: list[str], said: bytes
 ) -> None:
@@ -139,6 +140,7 @@ def test_an_upload_may_take_longer_than_the_deadline(
         assert client.post(f"{UPLOADS}?name=slow.csv", content=slowly()).status_code == 202
 
 
+@pytest.mark.slow
 def test_a_long_answer_may_be_taken_slowly_but_not_left(
     site: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -135,6 +135,7 @@ def test_tensions_are_drawn_in_the_unit_that_fits_them(tension_n: float, unit: s
     assert low < tension_n / {"N": 1.0, "kN": 1e3, "MN": 1e6}[unit] < high
 
 
+@pytest.mark.slow
 def test_a_long_trend_is_thinned_and_keeps_its_extremes_and_its_alerts() -> None:
     view = a_view(8 * MOST_POINTS)
     alerted = view.trend[4321]

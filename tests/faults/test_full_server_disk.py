@@ -25,6 +25,7 @@ from tests.helpers.workspaces import make_workspace
 FILES, MOMENTS, SEED = 3, 4, 20261125
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_at_any_write_or_commit_costs_nothing(
     postgresql: Databases, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

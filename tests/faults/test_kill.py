@@ -40,6 +40,7 @@ def test_kills_at_random_moments_lose_and_double_nothing(
     kill(make_workspace(tmp_path / "bridge"), undisturbed)
 
 
+@pytest.mark.slow
 def test_nor_do_they_where_the_store_is_a_server(
     tmp_path: Path, undisturbed: Workspace, postgresql: Databases
 ) -> None:

@@ -14,6 +14,7 @@ from tests.helpers.worker_killing import kill_workers, stage_counts
 from tests.helpers.workspaces import make_workspace
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="uses the process numbers of workers")
 def test_healthy_files_outlive_the_kills_of_their_workers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -110,6 +110,7 @@ def test_each_row_is_missed_but_for_those_that_leave_no_trace(made: Path) -> Non
     assert all(unseen[name] == [(tried[name],)] for name in LAST)
 
 
+@pytest.mark.slow
 def test_on_a_server_a_skipped_number_says_nothing(postgresql: Databases) -> None:
     with postgresql.store() as url:
         with Store.open(url) as store:

@@ -6,6 +6,8 @@ import random
 import time
 from pathlib import Path
 
+import pytest
+
 from shm.store import Stage, Workspace
 from shm.store.checking import check_archive, check_store
 from tests.helpers.contents import quiet
@@ -17,6 +19,7 @@ from tests.helpers.workspaces import make_workspace
 CRASHES, FILES, SEED = 3, 8, 20260501
 
 
+@pytest.mark.slow
 def test_a_server_that_crashes_again_and_again_loses_nothing(tmp_path: Path) -> None:
     """The daemon lives on: it waits for the server, and goes on where it stood."""
     rng = random.Random(SEED)

@@ -16,6 +16,7 @@ from tests.helpers.workspaces import make_workspace
 FILES = 4
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_a_worker_and_then_the_active_daemon_die_and_the_standby_ends_the_work(
     tmp_path: Path, postgresql: Databases

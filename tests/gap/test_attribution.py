@@ -68,6 +68,7 @@ def test_probabilities_add_to_one(effects: tuple[str, ...], known: tuple[str, ..
     assert total == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_two_planted_effects_are_named_as_a_pair() -> None:
     found, _ = _found("point_mass", "geometric_hardening")
     assert found.leading is not None
@@ -83,6 +84,7 @@ def test_an_effect_that_is_not_in_the_catalogue_is_unexplained() -> None:
     assert found.unexplained.hypothesis.flexible
 
 
+@pytest.mark.slow
 def test_effects_that_screening_gave_up_are_fitted_before_all_is_left_unexplained() -> None:
     """Of a bar half as stiff a scan about the described one sees little."""
     known = tuple(name for name in KNOWN if name != "point_mass")
@@ -109,6 +111,7 @@ def test_explanations_come_likeliest_first() -> None:
     assert chances == sorted(chances, reverse=True)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_answer() -> None:
     known = ("point_mass", "timebase")
     again = _found.__wrapped__("point_mass", known=known)[0]

@@ -133,6 +133,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_the_best_point_is_as_high_as_an_optimiser_of_others_climbs(name: str) -> None:
     bend, truth, last = CASES[name]
@@ -148,6 +149,7 @@ def test_the_best_point_is_as_high_as_an_optimiser_of_others_climbs(name: str) -
     assert best.log_posterior > other - 0.15  # of what a step promises, 0.02, the curvature errs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("first", [-2.5, -0.5, 0.5, 2.5])
 def test_every_point_found_is_a_top_from_whichever_start(name: str, first: float) -> None:

@@ -64,6 +64,7 @@ def test_all_probabilities_add_to_one(clamped_on: Diagnosis, untouched: Diagnosi
     assert probabilities(untouched) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_answer() -> None:
     one, again = (
         replace(diagnose(planted(CLAMP), PLAIN, CLAMPS_ALONE), seconds=0.0) for _ in range(2)
@@ -86,6 +87,7 @@ def test_an_effect_left_out_is_not_named_and_something_unknown_leads() -> None:
     assert found.unexplained_probability > 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("baseline", ["beam2", "s1"])
 def test_other_classes_may_be_the_baseline(baseline: str) -> None:
     plan = replace(ONE_TEST, modes=4)
@@ -97,6 +99,7 @@ def test_other_classes_may_be_the_baseline(baseline: str) -> None:
     assert probabilities(found) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_of_one_frequency_the_tension_is_as_wide_as_mass_and_length_are_known() -> None:
     """A string's tension goes with mass and length squared; the first mode bends as well."""
     (test,) = planted()
@@ -111,6 +114,7 @@ def test_of_one_frequency_the_tension_is_as_wide_as_mass_and_length_are_known() 
     assert found.places == ()
 
 
+@pytest.mark.slow
 def test_few_modes_are_answered_with_a_remark() -> None:
     (test,) = planted()
     found = diagnose([replace(test, modes=test.modes[:2])], PLAIN, FEW_EFFECTS)
@@ -129,6 +133,7 @@ def test_unknown_standard_deviations_are_estimated_and_said() -> None:
     assert found.model_error_percent > 0
 
 
+@pytest.mark.slow
 def test_two_tests_that_contradict_each_other_make_something_unknown_likely() -> None:
     (test,) = planted()
     moved = tuple(

@@ -20,6 +20,7 @@ from shm.models.effects import Parameter, Variant
 from shm.values import FloatArray, Scatter
 from tests.gap import linear_toy as toy
 from tests.helpers.gap_campaigns import campaign, problem_of
+from tests.helpers.slow import few_of
 
 BASELINE = Hypothesis()
 CHANGE = Parameter("change", "", -1.0, 1.0, 0.0, "")
@@ -113,12 +114,15 @@ def _recovered(
 
 @pytest.mark.parametrize(
     ("effect", "variant", "values"),
-    [
-        ("point_mass", Variant(), [12.0, 3.1]),
-        ("effective_length", DECK, [-0.3]),
-        ("bending_stiffness", Variant(), [0.25]),
-        ("rotational_end_flexibility", DECK, [6.8, 6.8]),
-    ],
+    few_of(
+        [
+            ("point_mass", Variant(), [12.0, 3.1]),
+            ("effective_length", DECK, [-0.3]),
+            ("bending_stiffness", Variant(), [0.25]),
+            ("rotational_end_flexibility", DECK, [6.8, 6.8]),
+        ],
+        2,
+    ),
 )
 def test_a_planted_effect_is_found_again_within_its_interval(
     effect: str, variant: Variant, values: list[float]

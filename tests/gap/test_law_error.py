@@ -67,6 +67,7 @@ def test_an_exact_law_pays_little_for_the_allowance() -> None:
     assert found.fit is before
 
 
+@pytest.mark.slow
 def test_what_is_exactly_an_effect_hardly_is_something_unknown_that_passes_for_it() -> None:
     exact, *_ = _by_laws("section_loss", False)
     wrong, *_ = _by_laws("point_mass", True)
@@ -81,6 +82,7 @@ def test_another_effect_is_not_excused_by_its_laws() -> None:
     assert mass.log_evidence + wrong.gain < corrosion.log_evidence + right.gain - 20
 
 
+@pytest.mark.slow
 def test_a_law_that_shifts_its_action_from_mode_to_mode_is_forgiven() -> None:
     """Modes that the catalogue leaves alone move as much as the others, by a tenth of these."""
     _, fit, problem = _by_laws("section_loss", False)

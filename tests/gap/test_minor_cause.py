@@ -73,6 +73,7 @@ def test_an_effect_that_was_not_worth_a_fit_gets_nothing(faint: Fits) -> None:
     assert found["point_mass"] == pytest.approx(0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("second", "variant"),
     [(LARGE, SMALL_VARIANT), (SWING, Variant())],

@@ -18,6 +18,7 @@ from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
 from shm.values import ModalTest
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
+from tests.helpers.slow import few_of
 
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 4.0, "x_m": 3.4})
 KNOWN = ("point_mass", "timebase")
@@ -56,17 +57,20 @@ def _remark(shifts: Mapping[str, int], *effects: PlantedEffect) -> str:
 
 @pytest.mark.parametrize(
     ("shifts", "said"),
-    [
-        (
-            {"transverse": -1, "longitudinal": -1},
-            "were the modes of both planes numbered one higher",
-        ),
-        ({"transverse": -1}, "were the transverse modes numbered one higher, the"),
-        (
-            {"transverse": 1, "longitudinal": -1},
-            "were the transverse modes numbered one lower and the longitudinal modes",
-        ),
-    ],
+    few_of(
+        [
+            (
+                {"transverse": -1, "longitudinal": -1},
+                "were the modes of both planes numbered one higher",
+            ),
+            ({"transverse": -1}, "were the transverse modes numbered one higher, the"),
+            (
+                {"transverse": 1, "longitudinal": -1},
+                "were the transverse modes numbered one lower and the longitudinal modes",
+            ),
+        ],
+        1,
+    ),
 )
 def test_wrong_orders_are_said_with_the_right_ones(shifts: dict[str, int], said: str) -> None:
     remark = _remark(shifts)
@@ -75,6 +79,7 @@ def test_wrong_orders_are_said_with_the_right_ones(shifts: dict[str, int], said:
     assert tension_kn == pytest.approx(711, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_gap_does_not_hide_wrong_orders() -> None:
     remark = _remark({"transverse": -1, "longitudinal": -1}, CLAMP)
     assert "both planes numbered one higher" in remark
@@ -95,6 +100,7 @@ def test_a_mode_missed_in_the_middle_is_said() -> None:
     assert "missed between 2 and 3" in remark
 
 
+@pytest.mark.slow
 def test_a_mode_that_is_a_dampers_own_is_said() -> None:
     (test, *_) = _numbered({})
     modes = [m for m in test.modes if m.plane == "transverse"]
@@ -110,6 +116,7 @@ def test_of_right_orders_nothing_is_said() -> None:
     assert _remark({}, CLAMP) == ""
 
 
+@pytest.mark.slow
 def test_a_diagnosis_says_so_among_the_first() -> None:
     """After what keeps the answer from being taken at its word: here a bound, a misfit."""
     found = diagnose(_numbered({"transverse": -1, "longitudinal": -1}), HANGER_3, OPTIONS)

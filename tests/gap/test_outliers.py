@@ -81,12 +81,14 @@ def test_what_is_set_aside_is_told_in_a_remark_and_kept_in_the_list_of_residuals
     assert one_wrong.shrinkage.rms_before_percent < 0.1
 
 
+@pytest.mark.slow
 def test_an_effect_that_moves_one_frequency_only_is_not_forgotten() -> None:
     found = diagnose(spoiled(measured(), "longitudinal", 1, 1.2), PLAIN, only("sag"))
     assert [(each.plane, each.order) for each in found.outliers] == [("longitudinal", 1)]
     assert "Should it prove right, sag (longitudinal) is the likeliest cause" in found.remarks[1]
 
 
+@pytest.mark.slow
 def test_an_effect_is_named_beside_a_wrong_frequency_and_loses_nothing_without_one() -> None:
     two = only("point_mass", "bending_stiffness")
     found = diagnose(spoiled(measured(CLAMP), "transverse", 5, 0.97), PLAIN, two)
@@ -96,6 +98,7 @@ def test_an_effect_is_named_beside_a_wrong_frequency_and_loses_nothing_without_o
     assert diagnose(measured(CLAMP), PLAIN, two).outliers == ()
 
 
+@pytest.mark.slow
 def test_an_effect_whose_law_is_off_at_one_mode_is_no_gross_error_there() -> None:
     moving = PlantedEffect(
         "support_motion",
@@ -204,6 +207,7 @@ def _with(test: ModalTest, name: str, **given: float) -> ModalTest:
     return replace(test, id=name, modes=tuple(replace(mode, **given) for mode in test.modes))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_what_changes_within_a_test_contradicts_no_gap_whatever_the_frequencies() -> None:
     """Modes found at full level though ring-downs begin astray, slopes that are sure together only,
     and damping that rises with the level."""

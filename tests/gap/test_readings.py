@@ -76,6 +76,7 @@ def test_a_readings_error_moves_all_modes_of_its_test_together() -> None:
         assert not loads[~own, test].any()
 
 
+@pytest.mark.slow
 def test_tensions_that_differ_between_tests_are_no_gap_where_they_were_read() -> None:
     """Four loadings, each read to 10 kN, of frequencies that are exact to 0.01 %."""
     rng = np.random.default_rng(3)

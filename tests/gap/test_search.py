@@ -273,6 +273,7 @@ def test_laws_are_allowed_for_where_an_effect_was_fitted(
             assert abs(each.log_evidence - before[h].log_evidence) < 1
 
 
+@pytest.mark.slow
 def test_what_lies_hopelessly_far_behind_keeps_the_letter_of_its_law(
     monkeypatch: pytest.MonkeyPatch, clamped: Search, steps: dict[str, list[ScoredHypothesis]]
 ) -> None:

@@ -286,6 +286,7 @@ def test_a_reading_makes_of_it_the_product_of_both_normals(unread: Posterior, of
     assert found.mean() == pytest.approx(mean, abs=5 * found.std() / np.sqrt(1000))
 
 
+@pytest.mark.slow
 def test_a_reading_to_a_thousandth_is_the_tension_whatever_the_class() -> None:
     read = 1.01 * ROD.nominal_tension_n
     test = a_test(tension_read_n=read, tension_read_sd_n=1e-3 * read)
@@ -332,6 +333,7 @@ def test_a_calibration_narrows_the_tension_of_the_next_test_and_moves_it(
     assert found.tension_n.mean() / ROD.nominal_tension_n == pytest.approx(1.02, abs=0.005)
 
 
+@pytest.mark.slow
 def test_a_calibration_of_one_class_serves_another(
     taught: Calibration, on_springs: Posterior
 ) -> None:
@@ -391,6 +393,7 @@ def test_an_update_of_the_bar_as_made_holds_the_tension_and_repeats_with_its_see
     assert again.effective_sample_size > 100
 
 
+@pytest.mark.slow
 def test_a_later_test_of_the_bar_as_made_is_refreshed_to_the_same_answer() -> None:
     model = build("beam2", ROD)
     known = update([a_test(modes=4, log10_k=7.0)], model, UpdateOptions(200))

@@ -333,6 +333,7 @@ def test_an_adoption_says_from_what_it_was_made(begun: Workspace) -> None:
     assert lineage != test.lineage
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("real_sampler")
 def test_adopting_with_the_real_sampler_closes_the_gap(
     begun: Workspace, monkeypatch: pytest.MonkeyPatch

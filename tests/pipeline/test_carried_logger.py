@@ -62,6 +62,7 @@ def test_modes_of_another_hanger_are_held_and_the_profile_is_named(workspace: Wo
     assert f"loggers/{profile.name} books all files of its logger to hanger 3" in doubt.why
 
 
+@pytest.mark.slow
 def test_a_profile_that_asks_each_time_books_no_file_by_itself(workspace: Workspace) -> None:
     imported(workspace, record(workspace.folder / "first.csv", workspace, 3), each_time=True)
     (profile,) = (workspace.folder / "loggers").iterdir()

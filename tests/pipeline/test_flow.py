@@ -332,6 +332,7 @@ def test_results_do_not_depend_on_order_or_executor(tmp_path: Path) -> None:
         np.testing.assert_array_equal(samples, found[1][name])
 
 
+@pytest.mark.slow
 def test_a_flow_ended_after_any_turn_goes_on_where_it_stood(workspace: Workspace) -> None:
     """As by `kill -9`: each flow takes few turns, what it had under way is lost with it."""
     write_loss(workspace.spool, workspace)
@@ -496,6 +497,7 @@ class Killed(ThreadPoolExecutor):
         return fn()
 
 
+@pytest.mark.slow
 def test_healthy_files_whose_workers_are_killed_by_turns_are_never_refused(
     workspace: Workspace,
 ) -> None:

@@ -284,6 +284,7 @@ def test_one_test_of_a_campaign_is_taken_out_and_stays_out(workspace: Workspace)
         assert check_store(store, quiet).troubles == ()
 
 
+@pytest.mark.slow
 def test_the_whole_counts_in_place_of_its_part(workspace: Workspace) -> None:
     """The whole that came after a part of it was called the copy, and could not count alone."""
     whole = a_recording()
@@ -462,6 +463,7 @@ def a_recording(seed: int = 1) -> Recording:
     return hammer_test(HANGER_3, state, QUICK_PLAN, rng, time=day(0), source="s")
 
 
+@pytest.mark.slow
 def test_one_impact_counts_once_in_whatever_format_it_comes_again(workspace: Workspace) -> None:
     """It confirmed itself: the watch calls a change at the second test that shows it."""
     first = a_recording()

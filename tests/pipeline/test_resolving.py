@@ -212,6 +212,7 @@ RAMP = (
 )
 
 
+@pytest.mark.slow
 def test_one_disturbed_visit_does_not_end_the_alert_of_a_loss_that_stands(
     bridge: Workspace,
 ) -> None:
@@ -261,6 +262,7 @@ def test_a_resolved_alert_whose_change_two_visits_show_again_rings_anew(
     assert "of two visits, show it again" in again.alert.message
 
 
+@pytest.mark.slow
 def test_a_resolved_alert_of_a_change_that_is_gone_stays_so(bridge: Workspace) -> None:
     postman = Postman()
     for day in (0, 30, 60, 90, 120, 150, 180):

@@ -103,6 +103,7 @@ def test_what_was_begun_and_not_kept_is_done_by_whoever_comes_next(workspace: Wo
         assert len(hours_of(store)) == 1
 
 
+@pytest.mark.slow
 def test_three_days_offline_are_caught_up_and_nothing_between_is_made_up(
     workspace: Workspace,
 ) -> None:

@@ -135,6 +135,7 @@ def states(workspace: Workspace, hook: str) -> set[str]:
 # ---------------------------------------------------------------- groups
 
 
+@pytest.mark.slow
 def test_fifty_hangers_that_move_alike_are_one_message_that_lists_all(
     bridge: Workspace, clock: Clock, inbox: Inbox
 ) -> None:
@@ -354,6 +355,7 @@ def test_a_hook_that_had_the_alert_late_hears_of_its_end_all_the_same(
     assert keys == ["hanger-7:h7-1", "hanger-7:h7-1", "hanger-7:h7-1:resolved"]
 
 
+@pytest.mark.slow
 def test_fifty_resolutions_are_one_message(bridge: Workspace, clock: Clock, inbox: Inbox) -> None:
     raise_on(bridge, clock, HANGERS)
     live(bridge, clock, inbox, 90.0, 30.0)

@@ -352,6 +352,7 @@ def test_the_numbers_are_those_of_the_kernels_headers(machine: str) -> None:
     assert not {int(known[name]) for name in NEVER if name in known} & {*plain}
 
 
+@pytest.mark.slow
 def test_hundreds_of_files_are_read_one_after_the_other(
     tmp_path: Path, recording: Recording
 ) -> None:

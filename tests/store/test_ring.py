@@ -324,6 +324,7 @@ def test_a_gap_is_noted_and_filled_by_what_comes_late(logger: Logger) -> None:
     assert np.array_equal(piece.values, samples(minutes(*range(30))))
 
 
+@pytest.mark.slow
 def test_three_days_offline_are_caught_up_in_any_order(logger: Logger) -> None:
     before, offline = minutes(0, 1, 2), minutes(*range(3, 3 * 1440, 40))
     after = minutes(3 * 1440)
@@ -398,6 +399,7 @@ def test_a_clock_that_steps_into_a_gap_is_noted(
     assert not any(f"chunk {last - 1} is" in each for each in told)
 
 
+@pytest.mark.slow
 def test_a_clock_that_drifts_is_noted(logger: Logger) -> None:
     """250 ppm more samples than the stamps say."""
     start = NOW

@@ -29,6 +29,7 @@ from shm.values.stated_tension import averaged_now
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import posterior as modelled
 from tests.helpers.nouns import NOW, a_file, a_posterior, a_test
+from tests.helpers.slow import few_of
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
 SPRUNG = [1.0, 0.98, 7.0, 7.4, 7.2, 7.1]
@@ -152,7 +153,7 @@ def rebaselined(store: Store) -> None:
 HAPPENINGS = (sent_back, sent_back_and_done_again, refused, adopted, undone, rebaselined)
 
 
-@pytest.mark.parametrize("happened", HAPPENINGS, ids=lambda each: each.__name__)
+@pytest.mark.parametrize("happened", few_of(HAPPENINGS, 5), ids=lambda each: each.__name__)
 def test_the_trend_is_what_the_history_says(
     store: Store, happened: Callable[[Store], None]
 ) -> None:

@@ -41,6 +41,7 @@ def bridge(seed: int, shifts: dict[int, float]) -> BridgePattern:
     return bridge_pattern(shifts_of(found, tuple(HANGERS)))
 
 
+@pytest.mark.slow
 def test_the_shifts_of_neighbours_that_took_up_half_a_percent_each_are_found() -> None:
     pattern = bridge(1, {LOSER: LOSS, **dict.fromkeys(NEIGHBOURS, GAIN)})
     rows = {row.hanger: row for row in pattern.rows}

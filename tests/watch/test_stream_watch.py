@@ -101,6 +101,7 @@ def test_it_learns_first_and_says_so() -> None:
     assert not any(each.alert for each in found)
 
 
+@pytest.mark.slow
 def test_nothing_is_told_where_nothing_changes() -> None:
     found, _ = watched(hours(24 * 40, seed=3))
 
@@ -266,6 +267,7 @@ def test_it_goes_on_from_bytes_as_it_would_have() -> None:
     assert StreamState.from_bytes(last.kept).bank.day == state.bank.day
 
 
+@pytest.mark.slow
 def test_what_is_kept_does_not_grow() -> None:
     watch, state, sizes = StreamWatch(None, HANGER, StreamOptions()), None, []
     for each in hours(24 * 50):

@@ -88,6 +88,7 @@ def test_a_pin_that_loosens_is_told_as_stiffness_of_its_plane() -> None:
     assert change.moved[0].quantity == "transverse_end_stiffness"
 
 
+@pytest.mark.slow
 def test_a_test_older_than_the_baseline_is_compared_with_it_all_the_same() -> None:
     posterior, tests = _baseline()
     old, since = _dated(tests[:1]), _dated(tests[1:])
