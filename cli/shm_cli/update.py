@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import rich_click as click
 
 from shm.documents import posterior_document, summary
@@ -89,7 +88,7 @@ def calibrated(
     return replace(options, calibration=calibration(Taught(posterior, own), hanger))
 
 
-_POOR_FIT = 0.05
+_POOR_FIT_PERCENT = 5.0
 """Model errors beyond it are blunders: clamped ends where springs are right cost some 2 %."""
 
 modes_argument = click.argument(
@@ -170,10 +169,10 @@ def tell_irregular(tests: Sequence[ModalTest]) -> None:
 
 def tell_poor_fit(posterior: Posterior) -> None:
     """Says on stderr where a class misses the frequencies as no class of this bar should."""
-    sigma = posterior.parameter("sigma")
-    if np.quantile(sigma, 0.05) > _POOR_FIT:
+    if posterior.misfit_percent > _POOR_FIT_PERCENT:
         click.echo(
-            f"Poor fit: {posterior.model} misses the frequencies by {100 * sigma.mean():.0f} %. Do "
+            f"Poor fit: {posterior.model} misses the frequencies by {posterior.misfit_percent:.0f} "
+            "% (root mean square). Do "
             "not trust its tension: look at the orders of the modes and at the hanger's "
             "description. For the cause: shm gap diagnose",
             err=True,

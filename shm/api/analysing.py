@@ -141,7 +141,8 @@ def select(
 ) -> Selection:
     """Model classes compared by their evidence, the most probable first.
 
-    The classes are equally probable beforehand, thesis (4.15) to (4.17). Without `models` they are
+    The classes are equally probable beforehand, thesis (4.15) to (4.17), but for clamped ones
+    beside one with springs unless the `priors` are the thesis's. Without `models` they are
     those of the setting `models` that apply to this hanger (`shm.models.applicable` says why
     another does not). `Selection.averaged(hanger.limits)` is the tension over all of them. The
     other options are those of `update`. Raises UsageError where one of `models` does not apply,

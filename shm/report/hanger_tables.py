@@ -175,8 +175,9 @@ def models(data: HangerReport) -> Table:
         "Model classes",
         ("model", "probability", "log evidence", "its sd", *formatting.tension_headings(unit)),
         tuple(_model_row(posterior, share, unit) for posterior, share in pairs),
-        note=f"Compared on {counted_tests(pairs[0][0].tests)}, all classes held equally probable "
-        "before. Evidence in natural logarithms, with the standard deviation of its sampling."
+        note=f"Compared on {counted_tests(pairs[0][0].tests)}. Before them all classes were "
+        "equally probable, clamped ones less so but with the thesis's priors. Evidence in natural "
+        "logarithms, with the standard deviation of its sampling."
         if pairs
         else "",
     )
