@@ -7,12 +7,14 @@ from pathlib import Path
 
 import httpx
 import pytest
+import sqlalchemy as sa
 from fastapi.routing import APIRoute
 
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Workspace
 from shm.store.people import Role
+from shm.store.people_tables import users
 from shm_daemon.web.access import engineering, reading, writing
 from shm_daemon.web.address import Address
 from shm_daemon.web.app import load_pages
@@ -83,6 +85,55 @@ def test_a_short_password_and_a_name_twice_are_refused(workspace: Workspace) -> 
         store.people.add("a", Role.READER, PASSWORD, utc_now())
         with pytest.raises(UsageError, match="already"):
             store.people.add("a", Role.READER, PASSWORD, utc_now())
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("an\u200bna", "invisible"),
+        ("anna\u2060", "invisible"),
+        ("an\tna", "invisible"),
+        ("an\u3164na", "invisible"),
+        ("\u0430nna", "Cyrillic and Latin"),
+        ("Ann\u0391", "Greek and Latin"),
+        ("\u00a0 ", "short text"),
+    ],
+)
+def test_a_name_that_can_pass_for_another_is_refused(
+    workspace: Workspace, name: str, said: str
+) -> None:
+    with workspace.store() as store, pytest.raises(UsageError, match=said):
+        store.people.add(name, Role.READER, PASSWORD, utc_now())
+
+
+@pytest.mark.parametrize(
+    "alike", ["jose\u0301  huber ", "JOS\u00c9 HUBER", "\uff2aos\u00e9\u00a0Huber"]
+)
+def test_a_name_is_taken_in_every_form_and_case_and_signs_in_so(
+    workspace: Workspace, alike: str
+) -> None:
+    with workspace.store() as store:
+        store.people.add(" Jose\u0301  Huber", Role.READER, PASSWORD, utc_now())
+        assert [each.name for each in store.people.list_all()] == ["Jos\u00e9 Huber"]
+        with pytest.raises(UsageError, match="there is a user Jos\u00e9 Huber already"):
+            store.people.add(alike, Role.READER, PASSWORD, utc_now())
+        assert store.people.sign_in(alike, PASSWORD, utc_now())
+        store.people.add("\u5c71\u7530\u30a8\u30ea\u3005", Role.READER, PASSWORD, utc_now())
+
+
+def test_names_that_an_older_release_took_keep_working(workspace: Workspace) -> None:
+    """Of two that are alike, the one that is written."""
+    with workspace.store() as store:
+        for old, name in (("one", "anna"), ("two", "Anna "), ("three", "Jose\u0301")):
+            store.people.add(old, Role.READER, PASSWORD + old, utc_now())
+            with store.people.writing() as connection:
+                connection.execute(sa.update(users).where(users.c.name == old).values(name=name))
+        assert store.people.sign_in("anna", PASSWORD + "one", utc_now())
+        assert store.people.sign_in("Anna ", PASSWORD + "two", utc_now())
+        assert store.people.sign_in("ANNA", PASSWORD + "one", utc_now()) is None
+        assert store.people.sign_in("Jos\u00e9", PASSWORD + "three", utc_now())
+        store.people.remove("Anna ", utc_now())
+        assert store.people.sign_in("ANNA", PASSWORD + "one", utc_now())
 
 
 def test_every_route_asks_who_it_is_and_what_changes_something_asks_for_an_operator(

@@ -135,8 +135,11 @@ def test_an_engineer_lets_people_in_and_out_but_never_ends_the_last_engineer(
     assert ask("remove", "operator").status_code == 303
     with workspace.store() as store:
         found = {each.name: each.role for each in store.people.list_all() if not each.removed_at}
-        noted = [row.action for row in store.audit.list_rows(limit=4)]
+        rows = store.audit.list_rows(limit=4)
     assert found == {"reader": "operator", "engineer": "engineer", "eva": "engineer"}
-    assert noted == ["user removed", "password set", "role changed", "user added"]
+    assert [row.action for row in rows] == [
+        "user removed", "password set", "role changed", "user added",
+    ]  # fmt: skip
+    assert rows[2].detail == "from reader to operator"
     assert ask("remove", "engineer").status_code == 303
     assert browser.get("/users").status_code == 401
