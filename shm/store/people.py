@@ -87,6 +87,18 @@ class People(Repository):
         """Gives a new password and ends all sessions; raises NothingThere or UsageError."""
         self._change(name, at, "password set", {"password_hash": _hashed(password)})
 
+    def change_password(
+        self, name: str, old: str, password: str, at: datetime, secret: str
+    ) -> bool:
+        """Changes one's own password and ends all sessions but that of `secret`; False where the
+        old one is wrong. Raises UsageError.
+        """
+        if self._whose(name, old) is None:
+            return False
+        values: dict[str, object] = {"password_hash": _hashed(password)}
+        self._change(name, at, "password changed", values, but=secret)
+        return True
+
     def set_role(self, name: str, role: Role, at: datetime) -> None:
         """Changes what a user may and ends all sessions; raises NothingThere or UsageError."""
         self._change(name, at, "role changed", {"role": role})
@@ -102,13 +114,7 @@ class People(Repository):
 
         A name that is not there takes as long as a wrong password: the time tells nothing.
         """
-        with self.reading() as connection:
-            row = _named(connection, name)
-        kept = _nobodys() if row is None else row.password_hash
-        try:
-            argon2.PasswordHasher().verify(kept, password[:_LONGEST])
-        except argon2.exceptions.VerificationError:
-            return None
+        row = self._whose(name, password)
         if row is None:
             return None
         secret = SESSION + secrets.token_urlsafe(_SECRET_BYTES)
@@ -134,7 +140,21 @@ class People(Repository):
         with self.writing() as connection:
             connection.execute(one.where(sessions.c.ended_at.is_(None)).values(ended_at=at))
 
-    def _change(self, name: str, at: datetime, action: str, values: dict[str, object]) -> None:
+    def _whose(self, name: str, password: str) -> sa.Row[Any] | None:
+        """The user in force of this name, with this password."""
+        with self.reading() as connection:
+            row = _named(connection, name)
+        try:
+            kept = _nobodys() if row is None else row.password_hash
+            argon2.PasswordHasher().verify(kept, password[:_LONGEST])
+        except argon2.exceptions.VerificationError:
+            return None
+        return row
+
+    def _change(
+        self, name: str, at: datetime, action: str, values: dict[str, object], but: str = ""
+    ) -> None:
+        """`but` is the secret of the one session that goes on."""
         ends_engineer = "removed_at" in values or values.get("role", "engineer") != Role.ENGINEER
         with self.writing() as connection:
             row = _named(connection, name)
@@ -143,7 +163,9 @@ class People(Repository):
             if row.role == Role.ENGINEER and ends_engineer:
                 _refuse_last(connection, row.id)
             connection.execute(sa.update(users).where(users.c.id == row.id).values(**values))
-            own = sa.update(sessions).where(sessions.c.user_id == row.id)
+            own = sa.update(sessions).where(
+                sessions.c.user_id == row.id, sessions.c.secret_sha256 != _checksum(but)
+            )
             connection.execute(own.where(sessions.c.ended_at.is_(None)).values(ended_at=at))
             detail = f"from {row.role} to {values['role']}" if "role" in values else ""
             note(connection, at, action, f"user {row.name}", detail)

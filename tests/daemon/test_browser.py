@@ -41,6 +41,7 @@ PAGES = {
     "recording": page_of(3, RECORDED),
     **{name.lower(): address for address, name in (*NAVIGATION, *FOR_ENGINEERS)},
     "limits": "/settings?hanger=3",
+    "password": "/password",
 }
 CHARTS = {"hanger": 4, "recording": 6}
 PAPER, INK = "rgb(255, 255, 255)", "rgb(29, 35, 48)"

@@ -128,6 +128,8 @@ def test_an_engineer_lets_people_in_and_out_but_never_ends_the_last_engineer(
         refused = ask(action, "engineer", role="reader")
         assert refused.status_code == 409
         assert "the last engineer" in refused.text
+    asked = browser.get("/users").text.partition("Remove<span")[2].partition("</details>")[0]
+    assert "Yes, remove reader</button>" in asked  # behind a summary to open first
     assert ask("add", "eva", role="engineer", password="short").status_code == 409
     assert ask("add", "eva", role="engineer", password=PASSWORD).status_code == 303
     assert ask("role", "reader", role="operator").status_code == 303
