@@ -28,12 +28,14 @@ async def change(request: Request, site: AtSite, person: Person) -> Response:
     told = await form_of(request)
     try:
         await run_in_threadpool(_change, request, site, person, told)
-    except (UsageError, Refused) as error:
-        is_refused = isinstance(error, Refused)
-        status, said = (error.status_code, error.detail) if is_refused else (409, error.message)
-        content = {"message": f"{said} {error.remedy}", "changed": False}
-        return await run_in_threadpool(page, request, "password.html.j2", status=status, **content)
-    return RedirectResponse("/password?changed=true", 303)
+    except UsageError as error:
+        status, said = 409, f"{error.message} {error.remedy}"
+    except Refused as error:
+        status, said = error.status_code, f"{error.detail} {error.remedy}"
+    else:
+        return RedirectResponse("/password?changed=true", 303)
+    content = {"message": said, "changed": False}
+    return await run_in_threadpool(page, request, "password.html.j2", status=status, **content)
 
 
 def _change(request: Request, site: Site, person: Person, told: dict[str, str]) -> None:
