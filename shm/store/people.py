@@ -70,8 +70,7 @@ class People(Repository):
         name = _fit(name)
         values = {"name": name, "role": role, "password_hash": _hashed(password), "made_at": at}
         with self.writing() as connection:
-            taken = _named(connection, name)
-            if taken is not None:
+            for taken in _alike(connection, name):
                 raise UsageError(
                     f"there is a user {taken.name} already.",
                     remedy=f"Take another name, or remove it: `shm user remove {taken.name}`.",
@@ -179,12 +178,16 @@ def same_name(name: str) -> str:
     return " ".join(unicodedata.normalize("NFKC", name).split()).casefold()
 
 
+def _alike(connection: Connection, name: str) -> list[sa.Row[Any]]:
+    rows = connection.execute(_in_force).all()
+    return [row for row in rows if same_name(row.name) == same_name(name)]
+
+
 def _named(connection: Connection, name: str) -> sa.Row[Any] | None:
     """The user in force who is meant: of names that differ only in form, as older releases took
     them, exactly the one that was written.
     """
-    rows = connection.execute(_in_force).all()
-    alike = [row for row in rows if same_name(row.name) == same_name(name)]
+    alike = _alike(connection, name)
     meant = [row for row in alike if row.name == name] or alike
     return meant[0] if len(meant) == 1 else None
 

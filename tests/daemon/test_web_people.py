@@ -178,6 +178,8 @@ def test_names_that_an_older_release_took_keep_working(workspace: Workspace) -> 
         assert store.people.sign_in("anna", PASSWORD + "one", utc_now())
         assert store.people.sign_in("Anna ", PASSWORD + "two", utc_now())
         assert store.people.sign_in("ANNA", PASSWORD + "one", utc_now()) is None
+        with pytest.raises(UsageError, match="already"):
+            store.people.add("ANNA", Role.READER, PASSWORD, utc_now())
         assert store.people.sign_in("Jos\u00e9", PASSWORD + "three", utc_now())
         store.people.remove("Anna ", utc_now())
         assert store.people.sign_in("ANNA", PASSWORD + "one", utc_now())
