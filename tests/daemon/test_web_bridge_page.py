@@ -100,7 +100,7 @@ def test_the_table_says_the_same(client: httpx.Client) -> None:
     assert len(text) == 2
     assert re.match(r"Hanger 3 5\d\d ± \d+ Alert today ", text[0])
     assert re.search(r"-(19|20|21)\.\d+ ± \d+\.\d+", text[0])
-    assert text[1].startswith("Hanger 4 next test no test yet")
+    assert text[1].startswith("Hanger 4 no test yet next test")
     assert "/alerts?hanger=3" in rows[0]
 
 
