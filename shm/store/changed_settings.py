@@ -10,7 +10,9 @@ from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
+from sqlalchemy.engine import Connection
 
+from shm.errors import UsageError
 from shm.store.audit import note
 from shm.store.checksums import decoding, loads, readable
 from shm.store.database import Repository, insert
@@ -25,6 +27,7 @@ class ChangedSetting:
     value: float
     at: datetime
     who: str
+    id: int = 0
 
     def __str__(self) -> str:
         value, by = f"{self.value:.10g}", f"{self.who} on {self.at:%Y-%m-%d}"
@@ -38,12 +41,30 @@ class ChangedSetting:
 class ChangedSettings(Repository):
     """Settings that the dashboard has changed; the newest row of a key holds."""
 
-    def change(self, key: str, value: float | None, who: str, at: datetime) -> None:
-        """Has `value` hold instead of what `bridge.toml` says; None gives the key back to it."""
+    def change(
+        self,
+        key: str,
+        value: float | None,
+        who: str,
+        at: datetime,
+        *,
+        based_on: int | None = None,
+        in_file: str = "not set",
+    ) -> None:
+        """Has `value` hold instead of what `bridge.toml` says (`in_file`); None gives the key back.
+
+        `based_on` is the number of the change that was in force when this was decided, 0 for the
+        file; raises UsageError where another is in force by now.
+        """
         with self.writing() as connection:
+            current = _current(connection, changed_settings.c.key == key).get(key)
+            if based_on not in (None, current.id if current else 0):
+                raise _overtaken(key, current, value, in_file)
             values = {"key": key, "document": value, "who": who, "at": at}
             insert(connection, changed_settings, values)
-            detail = "back to bridge.toml" if value is None else f"{value:.10g}"
+            before = in_file if current is None else f"{current.value:.10g}"
+            after = f"{in_file}, back to bridge.toml" if value is None else f"{value:.10g}"
+            detail = f"from {before} to {after}"
             note(connection, at, "setting changed", key.replace(".", " "), detail, who)
 
     def newest(self) -> int:
@@ -53,13 +74,30 @@ class ChangedSettings(Repository):
 
     def list_current(self) -> Mapping[str, ChangedSetting]:
         """What holds instead of `bridge.toml`, by its key."""
-        newest = sa.select(sa.func.max(changed_settings.c.id)).group_by(changed_settings.c.key)
-        query = sa.select(changed_settings).where(changed_settings.c.id.in_(newest))
         with self.reading() as connection:
-            rows = connection.execute(query.order_by(changed_settings.c.key)).all()
-        return {each.key: each for each in readable(rows, _changed) if each.value is not None}
+            return _current(connection)
+
+
+def _current(connection: Connection, *which: sa.ColumnElement[bool]) -> dict[str, ChangedSetting]:
+    newest = sa.select(sa.func.max(changed_settings.c.id)).group_by(changed_settings.c.key)
+    query = sa.select(changed_settings).where(changed_settings.c.id.in_(newest), *which)
+    rows = connection.execute(query.order_by(changed_settings.c.key)).all()
+    return {each.key: each for each in readable(rows, _changed) if each.value is not None}
 
 
 def _changed(row: sa.Row[Any]) -> ChangedSetting:
     with decoding(changed_settings, row):
-        return ChangedSetting(row.key, loads(row.document), row.at, row.who)
+        return ChangedSetting(row.key, loads(row.document), row.at, row.who, row.id)
+
+
+def _overtaken(
+    key: str, current: ChangedSetting | None, wanted: float | None, in_file: str
+) -> UsageError:
+    yours = "" if wanted is None else f", {wanted:.10g},"
+    found = f"back at {in_file}, as in bridge.toml"
+    if current is not None:
+        found = f"{current.value:.10g}, set by {current.who} at {current.at:%Y-%m-%d %H:%M} UTC"
+    return UsageError(
+        f"{key.replace('.', ' ')} was changed since you opened the page: it is {found}.",
+        remedy=f"Your change{yours} was not saved: make it again if it should still hold.",
+    )

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import secrets
+import unicodedata
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
@@ -25,6 +27,15 @@ SESSION = "session_"
 _SHORTEST, _LONGEST = 15, 1024  # NIST SP 800-63B-4, 3.1.1.2, of a password alone; technical: memory
 _LONGEST_NAME = 255  # technical: what a column and a line of a table take
 _SECRET_BYTES = 32  # 256 bits: nobody guesses it
+_UNSEEN = re.compile(
+    "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\u3164\ufe00-\ufe0f\uffa0"
+    "\U000e0100-\U000e01ef]"
+)
+"""Drawn as nothing though no control characters: Default_Ignorable_Code_Point of Unicode 15, and
+the empty pattern of Braille."""
+_CHINESE = {"CJK", "IDEOGRAPHIC"}
+_TOGETHER = (_CHINESE | {"HIRAGANA", "KATAKANA"}, _CHINESE | {"HANGUL"}, _CHINESE | {"BOPOMOFO"})
+"""Scripts in which one name is written: Unicode technical standard 39, 5.2, but without Latin."""
 
 
 class Role(StrEnum):
@@ -56,14 +67,13 @@ class People(Repository):
 
     def add(self, name: str, role: Role, password: str, at: datetime) -> None:
         """Lets a person sign in; raises UsageError where the name is taken or the password poor."""
-        if not name.strip() or len(name) > _LONGEST_NAME or not name.isprintable():
-            raise UsageError("the name of a user is a short text.", remedy="Give the person's.")
+        name = _fit(name)
         values = {"name": name, "role": role, "password_hash": _hashed(password), "made_at": at}
         with self.writing() as connection:
-            if connection.execute(_in_force.where(users.c.name == name)).first() is not None:
+            for taken in _alike(connection, name):
                 raise UsageError(
-                    f"there is a user {name} already.",
-                    remedy=f"Take another name, or remove it: `shm user remove {name}`.",
+                    f"there is a user {taken.name} already.",
+                    remedy=f"Take another name, or remove it: `shm user remove {taken.name}`.",
                 )
             insert(connection, users, values)
             note(connection, at, "user added", f"user {name}", role)
@@ -76,9 +86,21 @@ class People(Repository):
         """Gives a new password and ends all sessions; raises NothingThere or UsageError."""
         self._change(name, at, "password set", {"password_hash": _hashed(password)})
 
+    def change_password(
+        self, name: str, old: str, password: str, at: datetime, secret: str
+    ) -> bool:
+        """Changes one's own password and ends all sessions but that of `secret`; False where the
+        old one is wrong. Raises UsageError.
+        """
+        if self._whose(name, old) is None:
+            return False
+        values: dict[str, object] = {"password_hash": _hashed(password)}
+        self._change(name, at, "password changed", values, but=secret)
+        return True
+
     def set_role(self, name: str, role: Role, at: datetime) -> None:
         """Changes what a user may and ends all sessions; raises NothingThere or UsageError."""
-        self._change(name, at, "role changed", {"role": role}, role)
+        self._change(name, at, "role changed", {"role": role})
 
     def list_all(self) -> tuple[User, ...]:
         """All users, those removed too, as they were made."""
@@ -91,13 +113,7 @@ class People(Repository):
 
         A name that is not there takes as long as a wrong password: the time tells nothing.
         """
-        with self.reading() as connection:
-            row = connection.execute(_in_force.where(users.c.name == name)).first()
-        kept = _nobodys() if row is None else row.password_hash
-        try:
-            argon2.PasswordHasher().verify(kept, password[:_LONGEST])
-        except argon2.exceptions.VerificationError:
-            return None
+        row = self._whose(name, password)
         if row is None:
             return None
         secret = SESSION + secrets.token_urlsafe(_SECRET_BYTES)
@@ -123,23 +139,81 @@ class People(Repository):
         with self.writing() as connection:
             connection.execute(one.where(sessions.c.ended_at.is_(None)).values(ended_at=at))
 
+    def _whose(self, name: str, password: str) -> sa.Row[Any] | None:
+        """The user in force of this name, with this password."""
+        with self.reading() as connection:
+            row = _named(connection, name)
+        try:
+            kept = _nobodys() if row is None else row.password_hash
+            argon2.PasswordHasher().verify(kept, password[:_LONGEST])
+        except argon2.exceptions.VerificationError:
+            return None
+        return row
+
     def _change(
-        self, name: str, at: datetime, action: str, values: dict[str, object], detail: str = ""
+        self, name: str, at: datetime, action: str, values: dict[str, object], but: str = ""
     ) -> None:
+        """`but` is the secret of the one session that goes on."""
         ends_engineer = "removed_at" in values or values.get("role", "engineer") != Role.ENGINEER
         with self.writing() as connection:
-            row = connection.execute(_in_force.where(users.c.name == name)).first()
+            row = _named(connection, name)
             if row is None:
                 raise NothingThere(f"there is no user {name}.", remedy="See `shm user list`.")
             if row.role == Role.ENGINEER and ends_engineer:
                 _refuse_last(connection, row.id)
             connection.execute(sa.update(users).where(users.c.id == row.id).values(**values))
-            own = sa.update(sessions).where(sessions.c.user_id == row.id)
+            own = sa.update(sessions).where(
+                sessions.c.user_id == row.id, sessions.c.secret_sha256 != _checksum(but)
+            )
             connection.execute(own.where(sessions.c.ended_at.is_(None)).values(ended_at=at))
-            note(connection, at, action, f"user {name}", detail)
+            detail = f"from {row.role} to {values['role']}" if "role" in values else ""
+            note(connection, at, action, f"user {row.name}", detail)
 
 
 _in_force = sa.select(users).where(users.c.removed_at.is_(None))
+
+
+def same_name(name: str) -> str:
+    """What names have in common that read alike: Unicode form, spaces and case are left out."""
+    return " ".join(unicodedata.normalize("NFKC", name).split()).casefold()
+
+
+def _alike(connection: Connection, name: str) -> list[sa.Row[Any]]:
+    rows = connection.execute(_in_force).all()
+    return [row for row in rows if same_name(row.name) == same_name(name)]
+
+
+def _named(connection: Connection, name: str) -> sa.Row[Any] | None:
+    """The user in force who is meant: of names that differ only in form, as older releases took
+    them, exactly the one that was written.
+    """
+    alike = _alike(connection, name)
+    meant = [row for row in alike if row.name == name] or alike
+    return meant[0] if len(meant) == 1 else None
+
+
+def _fit(name: str) -> str:
+    """A name in one form; raises UsageError for one that can pass for another."""
+    made = " ".join(unicodedata.normalize("NFKC", name).split())
+    is_clear = all(unicodedata.category(each)[0] != "C" for each in name.strip())
+    if not made or len(made) > _LONGEST_NAME or not is_clear or _UNSEEN.search(name):
+        raise UsageError(
+            "the name of a user is a short text without invisible characters.",
+            remedy="Type the person's name.",
+        )
+    scripts = {
+        re.split("[ -]", unicodedata.name(each, "?"))[0] for each in made if _is_written(each)
+    }
+    if len(scripts) > 1 and not any(scripts <= together for together in _TOGETHER):
+        found = " and ".join(sorted(each.capitalize() for each in scripts))
+        raise UsageError(
+            f"the name mixes letters that look alike: {found}.", remedy="Type it in one script."
+        )
+    return made
+
+
+def _is_written(character: str) -> bool:
+    return character.isalnum() and not (character.isascii() and character.isdigit())
 
 
 def _refuse_last(connection: Connection, id_: int) -> None:

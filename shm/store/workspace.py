@@ -81,16 +81,25 @@ class Workspace:
         return cls.open(folder)
 
     def change_setting(
-        self, store: Store, key: str, value: float | None, at: datetime, who: str
+        self,
+        store: Store,
+        key: str,
+        value: float | None,
+        at: datetime,
+        who: str,
+        *,
+        based_on: int | None = None,
+        in_file: str = "not set",
     ) -> None:
         """Has a value hold instead of what `bridge.toml` says; None gives the key back to it.
 
-        Raises BadInput, as for `bridge.toml`, where it cannot hold; then nothing is changed.
+        Raises BadInput, as for `bridge.toml`, where it cannot hold, and UsageError where another
+        change than `based_on` is in force; then nothing is changed.
         """
         current = {name: each.value for name, each in store.settings.list_current().items()}
         wanted = {name: each for name, each in {**current, key: value}.items() if each is not None}
         _settings(load_bridge(self.folder / "bridge.toml", wanted), self.flags)
-        store.settings.change(key, value, who, at)
+        store.settings.change(key, value, who, at, based_on=based_on, in_file=in_file)
 
     def reopened(self) -> Self:
         """The same workspace as its `bridge.toml` describes it now."""

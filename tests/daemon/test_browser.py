@@ -22,6 +22,7 @@ from shm.pipeline import utc_now
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
+from shm.store.audit import Actor
 from shm.store.people import Role
 from shm_daemon.web.address import test_page as page_of
 from shm_daemon.web.background_work import BackgroundWorker
@@ -42,6 +43,7 @@ PAGES = {
     "recording": page_of(3, RECORDED),
     **{name.lower(): address for address, name in (*NAVIGATION, *FOR_ENGINEERS)},
     "limits": "/settings?hanger=3",
+    "password": "/password",
 }
 CHARTS = {"hanger": 4, "recording": 6}
 PAPER, INK = "rgb(255, 255, 255)", "rgb(29, 35, 48)"
@@ -177,6 +179,33 @@ def test_an_alert_is_acknowledged_with_a_name_and_a_reason(signed_in: Browser, s
     page.reload()
     expect(page.get_by_text("A clamp had slipped; <set> right.")).to_be_visible()
     assert page.locator("article.card.open").count() == before - 1
+
+
+def test_on_a_phone_what_matters_does_not_lie_off_to_the_side(
+    signed_in: Browser, site: Site
+) -> None:
+    page = signed_in.open(site.url)
+    page.set_viewport_size(PHONE)  # type: ignore[arg-type]
+    tension = page.locator("table.hangers th", has_text="tension").bounding_box()
+    assert tension
+    assert tension["x"] + tension["width"] <= PHONE["width"]
+    name = page.locator(".brand")
+    name.evaluate("each => { each.firstChild.textContent = 'Straßenbrücke'.repeat(20); }")
+    box = name.bounding_box()
+    assert box
+    assert box["height"] < 50  # two lines
+    assert width_px(page) == PHONE["width"]
+    with site.workspace.store() as store:
+        anna = store.acting_as(Actor("Anna", "page"))
+        anna.audit.note(utc_now(), "recording uploaded", "a_long_name.csv", "and words " * 9)
+    page.goto(f"{site.url}/audit")
+    assert page.locator(".scroll").evaluate("each => each.scrollWidth <= each.clientWidth")
+    page.goto(f"{site.url}/upload")
+    numbers = "hammer channel with a long name;lower accelerometer, across\n" + "0.1;0.2\n" * 999
+    file = {"name": "new logger.csv", "mimeType": "text/csv", "buffer": numbers.encode()}
+    page.get_by_label("Recordings of hammer tests").set_input_files(files=[file])  # type: ignore[list-item]
+    expect(page.locator("form.questions")).to_be_visible()
+    assert width_px(page) == PHONE["width"]
 
 
 def write_recording(workspace: Workspace) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
+import time
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,6 +16,7 @@ import numpy as np
 import pytest
 
 from shm.store import Workspace
+from shm_daemon.heartbeat import HEARTBEAT, beat, patience_s
 from shm_daemon.web import plotting
 from shm_daemon.web.address import Address
 from shm_daemon.web.frame import NAVIGATION
@@ -49,6 +52,17 @@ def test_a_page_can_be_used_by_keyboard_and_read_aloud(client: httpx.Client, pat
     assert text.count("<h1") == 1
     assert 'aria-current="page"' in text
     assert "nan" not in re.findall(r"[a-z]+", re.sub(r"<[^>]*>", " ", text).lower())
+
+
+def test_every_page_says_once_that_the_daemon_has_not_reported_for_long(tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path / "bridge")
+    beat(workspace)
+    with served(workspace) as site, site.client(**BROWSER) as client:
+        assert not any("daemon was last" in client.get(path).text for path in PAGES)
+        long_ago = time.time() - patience_s(workspace) - 120
+        os.utime(workspace.folder / HEARTBEAT, (long_ago, long_ago))
+        for path in PAGES:
+            assert client.get(path).text.count("The daemon was last seen 3 min ago.") == 1, path
 
 
 @pytest.mark.parametrize("path", PAGES)

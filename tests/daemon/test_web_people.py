@@ -7,13 +7,15 @@ from pathlib import Path
 
 import httpx
 import pytest
+import sqlalchemy as sa
 from fastapi.routing import APIRoute
 
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Workspace
 from shm.store.people import Role
-from shm_daemon.web.access import engineering, reading, writing
+from shm.store.people_tables import users
+from shm_daemon.web.access import engineering, reading, signed_in_person, writing
 from shm_daemon.web.address import Address
 from shm_daemon.web.app import load_pages
 from shm_daemon.web.site import MOST_WRONG, Description, Site
@@ -61,8 +63,19 @@ def test_a_removed_user_is_out_at_once_and_wrong_passwords_are_throttled(
         store.people.remove("operator", utc_now())
     assert browser.get("/api/status").status_code == 401
     told = [sign_in(browser, "reader", "wrong") for _ in range(MOST_WRONG)]
-    assert set(told[:-1]) == {401}
+    assert set(told) == {401}
     assert sign_in(browser, "reader") == 429
+
+
+def test_wrong_passwords_keep_out_neither_who_is_in_nor_others_of_the_same_address(
+    browser: httpx.Client,
+) -> None:
+    sign_in(browser, "operator")
+    for _ in range(MOST_WRONG + 4):
+        sign_in(browser, "reader", "wrong")
+    assert browser.get("/api/status").status_code == 200
+    browser.cookies.clear()
+    assert sign_in(browser, "engineer") == 303
 
 
 def test_a_user_takes_note_by_the_own_name_whatever_is_said(tmp_path: Path) -> None:
@@ -76,6 +89,42 @@ def test_a_user_takes_note_by_the_own_name_whatever_is_said(tmp_path: Path) -> N
     assert noted["acknowledged"]["who"] == "Ada"
 
 
+def test_a_person_changes_the_own_password_and_ends_all_other_sessions(
+    browser: httpx.Client, workspace: Workspace
+) -> None:
+    def change(old: str, new: str, again: str) -> httpx.Response:
+        told = {"old": old, "password": new, "again": again}
+        return browser.post("/password", data=told, headers={"Accept": "text/html"})
+
+    sign_in(browser, "reader")
+    elsewhere = dict(browser.cookies)
+    browser.cookies.clear()
+    sign_in(browser, "reader")
+    new = PASSWORD + "!"
+    assert 'href="/password"' in browser.get("/operation").text
+    assert change("wrong", new, new).status_code == 403
+    assert "passwords differ" in change(PASSWORD, new, "else").text
+    assert "15 to" in change(PASSWORD, "short", "short").text
+    assert change(PASSWORD, new, new).status_code == 303
+    assert browser.get("/password").status_code == 200
+    browser.cookies.update(elsewhere)
+    assert browser.get("/password").status_code == 401
+    browser.cookies.clear()
+    assert [sign_in(browser, "reader", each) for each in (PASSWORD, new)] == [401, 303]
+    with workspace.store() as store:
+        (row,) = store.audit.list_rows(limit=1)
+    assert (row.who, row.via, row.action, row.subject) == (
+        "reader", "page", "password changed", "user reader",
+    )  # fmt: skip
+    assert [change("wrong", new, new).status_code for _ in range(MOST_WRONG)][-1] == 429
+
+
+def test_a_token_has_no_password(workspace: Workspace) -> None:
+    with served(workspace) as site, site.client(Origin=site.url) as client:
+        client.post("/sign-in", data={"token": site.write_token})
+        assert client.get("/password").status_code == 403
+
+
 def test_a_short_password_and_a_name_twice_are_refused(workspace: Workspace) -> None:
     with workspace.store() as store:
         with pytest.raises(UsageError, match="15 to"):
@@ -83,6 +132,57 @@ def test_a_short_password_and_a_name_twice_are_refused(workspace: Workspace) -> 
         store.people.add("a", Role.READER, PASSWORD, utc_now())
         with pytest.raises(UsageError, match="already"):
             store.people.add("a", Role.READER, PASSWORD, utc_now())
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("an\u200bna", "invisible"),
+        ("anna\u2060", "invisible"),
+        ("an\tna", "invisible"),
+        ("an\u3164na", "invisible"),
+        ("\u0430nna", "Cyrillic and Latin"),
+        ("Ann\u0391", "Greek and Latin"),
+        ("\u00a0 ", "short text"),
+    ],
+)
+def test_a_name_that_can_pass_for_another_is_refused(
+    workspace: Workspace, name: str, said: str
+) -> None:
+    with workspace.store() as store, pytest.raises(UsageError, match=said):
+        store.people.add(name, Role.READER, PASSWORD, utc_now())
+
+
+@pytest.mark.parametrize(
+    "alike", ["jose\u0301  huber ", "JOS\u00c9 HUBER", "\uff2aos\u00e9\u00a0Huber"]
+)
+def test_a_name_is_taken_in_every_form_and_case_and_signs_in_so(
+    workspace: Workspace, alike: str
+) -> None:
+    with workspace.store() as store:
+        store.people.add(" Jose\u0301  Huber", Role.READER, PASSWORD, utc_now())
+        assert [each.name for each in store.people.list_all()] == ["Jos\u00e9 Huber"]
+        with pytest.raises(UsageError, match="there is a user Jos\u00e9 Huber already"):
+            store.people.add(alike, Role.READER, PASSWORD, utc_now())
+        assert store.people.sign_in(alike, PASSWORD, utc_now())
+        store.people.add("\u5c71\u7530\u30a8\u30ea\u3005", Role.READER, PASSWORD, utc_now())
+
+
+def test_names_that_an_older_release_took_keep_working(workspace: Workspace) -> None:
+    """Of two that are alike, the one that is written."""
+    with workspace.store() as store:
+        for old, name in (("one", "anna"), ("two", "Anna "), ("three", "Jose\u0301")):
+            store.people.add(old, Role.READER, PASSWORD + old, utc_now())
+            with store.people.writing() as connection:
+                connection.execute(sa.update(users).where(users.c.name == old).values(name=name))
+        assert store.people.sign_in("anna", PASSWORD + "one", utc_now())
+        assert store.people.sign_in("Anna ", PASSWORD + "two", utc_now())
+        assert store.people.sign_in("ANNA", PASSWORD + "one", utc_now()) is None
+        with pytest.raises(UsageError, match="already"):
+            store.people.add("ANNA", Role.READER, PASSWORD, utc_now())
+        assert store.people.sign_in("Jos\u00e9", PASSWORD + "three", utc_now())
+        store.people.remove("Anna ", utc_now())
+        assert store.people.sign_in("ANNA", PASSWORD + "one", utc_now())
 
 
 def test_every_route_asks_who_it_is_and_what_changes_something_asks_for_an_operator(
@@ -99,6 +199,6 @@ def test_every_route_asks_who_it_is_and_what_changes_something_asks_for_an_opera
                 continue
             asked = {each.call for each in route.dependant.dependencies}
             needed = reading if route.methods <= {"GET", "HEAD"} else writing
-            assert {needed, engineering} & asked, route.path
+            assert {needed, engineering, signed_in_person} & asked, route.path
     finally:
         pages.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import httpx
@@ -30,7 +31,15 @@ def browser(workspace: Workspace) -> Iterator[httpx.Client]:
 
 
 def put(client: httpx.Client, key: str, value: str, action: str = "set") -> httpx.Response:
-    return client.post("/settings", data={"key": key, "value": value, "action": action})
+    told = {"key": key, "value": value, "action": action, "based_on": based_on(client, key)}
+    return client.post("/settings", data=told)
+
+
+def based_on(client: httpx.Client, key: str) -> str:
+    """What the form of a page that is opened now carries."""
+    form = client.get("/settings?hanger=3").text.partition(f'name="key" value="{key}"')[2]
+    found = re.search('name="based_on" value="([0-9]+)"', form)
+    return found[1] if found else ""
 
 
 def level(workspace: Workspace) -> float:
@@ -52,10 +61,26 @@ def test_a_threshold_holds_from_now_on_and_goes_back_to_the_file(
     with workspace.store() as store:
         (row,) = store.audit.list_rows(limit=1)
     assert (row.who, row.via, row.action, row.detail) == (
-        "engineer", "page", "setting changed", "0.9",
+        "engineer", "page", "setting changed", f"from {in_file:g} to 0.9",
     )  # fmt: skip
     put(browser, LEVEL, "", "back")
     assert level(workspace) == in_file
+
+
+def test_who_saves_on_what_another_has_changed_meanwhile_is_shown_it_and_overwrites_nothing(
+    browser: httpx.Client, workspace: Workspace
+) -> None:
+    opened = based_on(browser, LEVEL)
+    assert put(browser, LEVEL, "0.9").status_code == 303
+    late = {"key": LEVEL, "value": "0.7", "action": "set", "based_on": opened}
+    refused = browser.post("/settings", data=late)
+    assert refused.status_code == 409
+    assert "it is 0.9, set by engineer at 20" in refused.text
+    assert "Your change, 0.7, was not saved" in refused.text
+    assert level(workspace) == 0.9
+    assert put(browser, LEVEL, "0.7").status_code == 303
+    with workspace.store() as store:
+        assert store.audit.list_rows(limit=1)[0].detail == "from 0.9 to 0.7"
 
 
 @pytest.mark.parametrize(
@@ -103,6 +128,8 @@ def test_an_engineer_lets_people_in_and_out_but_never_ends_the_last_engineer(
         refused = ask(action, "engineer", role="reader")
         assert refused.status_code == 409
         assert "the last engineer" in refused.text
+    asked = browser.get("/users").text.partition("Remove<span")[2].partition("</details>")[0]
+    assert "Yes, remove reader</button>" in asked  # behind a summary to open first
     assert ask("add", "eva", role="engineer", password="short").status_code == 409
     assert ask("add", "eva", role="engineer", password=PASSWORD).status_code == 303
     assert ask("role", "reader", role="operator").status_code == 303
@@ -110,8 +137,11 @@ def test_an_engineer_lets_people_in_and_out_but_never_ends_the_last_engineer(
     assert ask("remove", "operator").status_code == 303
     with workspace.store() as store:
         found = {each.name: each.role for each in store.people.list_all() if not each.removed_at}
-        noted = [row.action for row in store.audit.list_rows(limit=4)]
+        rows = store.audit.list_rows(limit=4)
     assert found == {"reader": "operator", "engineer": "engineer", "eva": "engineer"}
-    assert noted == ["user removed", "password set", "role changed", "user added"]
+    assert [row.action for row in rows] == [
+        "user removed", "password set", "role changed", "user added",
+    ]  # fmt: skip
+    assert rows[2].detail == "from reader to operator"
     assert ask("remove", "engineer").status_code == 303
     assert browser.get("/users").status_code == 401

@@ -10,7 +10,6 @@ import httpx
 import pytest
 
 from shm.store import Workspace
-from shm_daemon.heartbeat import beat
 from shm_daemon.web.access import COOKIE
 from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import Served, served
@@ -39,14 +38,6 @@ def test_files_are_offered_only_to_who_may_send_them(site: Served, writer: httpx
     page = writer.get("/upload").text
     assert 'type="file" id="files" multiple' in page
     assert '<option value="3">Hanger 3</option>' in page
-
-
-def test_it_says_whether_anybody_will_take_the_files(
-    workspace: Workspace, writer: httpx.Client
-) -> None:
-    assert "The daemon is not running." in writer.get("/upload").text
-    beat(workspace)
-    assert "The daemon is not running." not in writer.get("/upload").text
 
 
 def test_a_file_is_followed_until_it_is_a_test_or_its_reason_is_told(

@@ -97,9 +97,19 @@ def engineering(request: Request, site: AtSite) -> Visitor:
     return found
 
 
+def signed_in_person(request: Request, site: AtSite) -> Visitor:
+    """Lets in people who have signed in by name, whatever their role."""
+    found = _signed_in(request, site, "This needs a person.", Role.READER)
+    request.state.visitor = found
+    if not found.is_person:
+        raise Refused(403, "A token has no password.", "Sign in by your name.")
+    return found
+
+
 Reader = Annotated[Visitor, Depends(reading)]
 Writer = Annotated[Visitor, Depends(writing)]
 Engineer = Annotated[Visitor, Depends(engineering)]
+Person = Annotated[Visitor, Depends(signed_in_person)]
 
 
 def refuse_foreign(request: Request) -> None:
@@ -114,18 +124,17 @@ def refuse_foreign(request: Request) -> None:
 
 
 def visitor_in_force(request: Request, site: Site, secret: str) -> Visitor:
-    """Whose token or session this is; raises Refused where it is wrong or has ended, or where too
-    many of those came from the same address.
+    """Whose token or session this is; raises Refused where it is wrong or has ended.
+
+    One in force is never kept waiting, whatever came from the same address.
     """
-    caller = _unless_throttled(request, site, secret)
     found = _found(site, secret)
-    if found is None:
-        site.wrong_tokens.note_wrong(caller)
-        if secret.startswith(SESSION):
-            raise _nobody("You are not signed in any more.", "Sign in again at /sign-in.")
-        raise _nobody("This token is wrong or revoked.", _BY_HEADER)
-    site.wrong_tokens.note_right(secret)
-    return found
+    if found is not None:
+        return found
+    if secret.startswith(SESSION):
+        raise _nobody("You are not signed in any more.", "Sign in again at /sign-in.")
+    site.wrong_attempts.note_wrong(_unless_throttled(request, site))
+    raise _nobody("This token is wrong or revoked.", _BY_HEADER)
 
 
 def is_signed_in(request: Request, site: Site) -> bool:
@@ -135,11 +144,13 @@ def is_signed_in(request: Request, site: Site) -> bool:
 
 
 def session_of(request: Request, site: Site, name: str, password: str) -> str:
-    """The secret of a new session of a person; raises Refused as `visitor_in_force` does."""
-    caller = _unless_throttled(request, site, "")
+    """The secret of a new session of a person; raises Refused where name or password is wrong, or
+    too many were.
+    """
+    caller = _unless_throttled(request, site, name)
     secret = site.store.people.sign_in(name, password, utc_now())
     if secret is None:
-        site.wrong_tokens.note_wrong(caller)
+        site.wrong_attempts.note_wrong(caller, name)
         raise _nobody(
             "Name or password is wrong.",
             "An engineer can give you another password. A program signs in with no password: it "
@@ -148,12 +159,25 @@ def session_of(request: Request, site: Site, name: str, password: str) -> str:
     return secret
 
 
-def _unless_throttled(request: Request, site: Site, secret: str) -> str:
+def change_own_password(
+    request: Request, site: Site, person: Visitor, old: str, password: str
+) -> None:
+    """Raises UsageError where the new one is poor, Refused where the old one is wrong or too many
+    were. The browser that asks stays signed in.
+    """
+    caller = _unless_throttled(request, site, person.name)
+    people, secret = site.store.acting_as(person.actor).people, request.cookies.get(COOKIE, "")
+    if not people.change_password(person.name, old, password, utc_now(), secret):
+        site.wrong_attempts.note_wrong(caller, person.name)
+        raise Refused(403, "The old password is wrong.", "An engineer can give you another one.")
+
+
+def _unless_throttled(request: Request, site: Site, name: str | None = None) -> str:
     """The address that asks; raises Refused where too much that is wrong came from there."""
     forwarded = request.headers.get("x-forwarded-for", "")
     peer = request.client.host if request.client else ""
     caller = caller_of(peer, forwarded, site.workspace.settings.web_proxies)
-    wait_s = site.wrong_tokens.wait_s(caller, secret)
+    wait_s = site.wrong_attempts.wait_s(caller, name)
     if wait_s > 0:
         raise Refused(
             429,

@@ -40,6 +40,7 @@ from shm_daemon.web.pages import (
     hanger,
     health,
     one_test,
+    password,
     sensors,
     settings,
     static,
@@ -93,6 +94,7 @@ def load_pages(site: Site) -> Pages:
         audit,
         settings,
         users,
+        password,
     ):
         app.include_router(part.router)
     app.include_router(_described)

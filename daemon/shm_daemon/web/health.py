@@ -60,10 +60,18 @@ class Notice:
 def notices(site: Site) -> list[Notice]:
     """What limits the work, with its remedy; a page is shown whatever befalls this."""
     try:
-        return [*_of_description(site), *_of_strangers(site)]
+        return [*_of_daemon(site), *_of_description(site), *_of_strangers(site)]
     except Exception:
         log.exception("the notices of a page cannot be made")
         return []
+
+
+def _of_daemon(site: Site) -> list[Notice]:
+    silence = _silence(site)
+    if not silence:
+        return []
+    action = "Until it runs again (`shm daemon`), recordings wait and no alert is raised."
+    return [Notice(silence, action)]
 
 
 def _of_description(site: Site) -> list[Notice]:
@@ -124,12 +132,19 @@ def _spool(site: Site) -> list[str]:
     return ["The spool cannot be written."]
 
 
-def _daemon(site: Site) -> list[str]:
+def _silence(site: Site) -> str:
+    """That the daemon has not reported for longer than it may take; empty where it has."""
     ago = seconds_since_beat(site.workspace)
     if ago is None:
-        return ["The daemon has never run here."]
-    if ago > patience_s(site.workspace):
-        return [f"The daemon was last seen {told(timedelta(seconds=ago))} ago."]
+        return "The daemon has never run here."
+    is_late = ago > patience_s(site.workspace)
+    return f"The daemon was last seen {told(timedelta(seconds=ago))} ago." if is_late else ""
+
+
+def _daemon(site: Site) -> list[str]:
+    silence = _silence(site)
+    if silence:
+        return [silence]
     # Its words may name folders of the machine, and `/health` needs no token.
     failed = why_turn_failed(site.workspace)
     return ["The daemon's last turn failed; its log and `shm doctor` say why."] if failed else []

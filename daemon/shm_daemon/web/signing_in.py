@@ -79,7 +79,7 @@ def sign_out(request: Request, site: AtSite) -> Response:
 def _secret(request: Request, site: Site, told: dict[str, str]) -> str:
     """What the cookie is to hold; raises Refused."""
     if "name" in told:
-        return session_of(request, site, told["name"].strip(), told.get("password", ""))
+        return session_of(request, site, told["name"], told.get("password", ""))
     secret = told.get("token", "").strip()
     visitor_in_force(request, site, secret)
     return secret

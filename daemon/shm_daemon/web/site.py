@@ -5,7 +5,6 @@ Who comes with wrong tokens too often has to wait, and is named in the log.
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import threading
 import time
@@ -16,63 +15,61 @@ from typing import Any
 
 from shm.errors import NothingThere, ShmError, StoreError
 from shm.store import Store, Workspace
+from shm.store.people import same_name
 from shm_daemon.web.address import Address, network_of
 
 MOST_WRONG, WITHIN_S = 10, 60.0
 """A person mistypes a few; a program with an old token comes again and again."""
-_ADDRESSES_KEPT, _PROVEN_KEPT = 4096, 1024  # technical: below a megabyte of memory
+_MOST_PASSWORDS = 100  # technical: of all names at an address; each takes a core some 50 ms
+_COUNTS_KEPT = 4096  # technical: below a megabyte of memory
 
 
-class WrongTokens:
-    """How many have come lately, by address. May be used from many threads.
+class WrongAttempts:
+    """How many wrong passwords and tokens have come lately, by address. May be used from many
+    threads.
 
-    A token that was right before is let through from an address that has to wait: a logger with an
-    old token must not shut out its neighbours behind the same gateway. Memory is bounded: of many
-    addresses, those seen longest ago are forgotten.
+    Passwords count by user too: behind a proxy that names nobody all people have one address, and
+    who mistypes must not keep others out. Memory is bounded: the oldest counts are forgotten.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
         self._clock, self._lock = clock, threading.Lock()
-        self._wrong: OrderedDict[str, tuple[float, int]] = OrderedDict()
-        self._proven: OrderedDict[bytes, None] = OrderedDict()
+        self._wrong: OrderedDict[tuple[str, ...], tuple[float, int]] = OrderedDict()
 
-    def wait_s(self, address: str, secret: str) -> float:
-        """How long the address has to wait until this token is looked at; 0 where not at all."""
+    def wait_s(self, address: str, name: str | None = None) -> float:
+        """How long until a password of this user, or a token where there is no name, is looked at
+        from there; 0 where at once.
+        """
         with self._lock:
-            began, times = self._wrong.get(network_of(address), (0.0, 0))
-            if times < MOST_WRONG or _digest(secret) in self._proven:
-                return 0.0
-            return max(0.0, began + WITHIN_S - self._clock())
+            counts = [(self._wrong.get(key), most) for key, most in _counted(address, name)]
+            due = [found[0] + WITHIN_S for found, most in counts if found and found[1] >= most]
+        return max([0.0, *(at - self._clock() for at in due)])
 
-    def note_wrong(self, address: str) -> None:
-        """A token from there was wrong or revoked."""
-        network, now = network_of(address), self._clock()
-        with self._lock:
-            began, times = self._wrong.pop(network, (now, 0))
-            if now - began >= WITHIN_S:
-                began, times = now, 0
-            self._wrong[network] = (began, times + 1)
-            while len(self._wrong) > _ADDRESSES_KEPT:
-                self._wrong.popitem(last=False)
+    def note_wrong(self, address: str, name: str | None = None) -> None:
+        """A password of this user, or a token, was wrong."""
+        now = self._clock()
+        for key, most in _counted(address, name):
+            with self._lock:
+                began, times = self._wrong.pop(key, (now, 0))
+                if now - began >= WITHIN_S:
+                    began, times = now, 0
+                self._wrong[key] = (began, times + 1)
+                while len(self._wrong) > _COUNTS_KEPT:
+                    self._wrong.popitem(last=False)
+            if times + 1 == most:
+                log.warning(
+                    "%d wrong tokens or passwords came from %s within %.0f s: it has to wait",
+                    most, address, WITHIN_S,
+                )  # fmt: skip
         log.warning("a token or password from %s is wrong or revoked", address)
-        if times + 1 == MOST_WRONG:
-            log.warning(
-                "%d wrong tokens or passwords came from %s within %.0f s: it has to wait",
-                MOST_WRONG, address, WITHIN_S,
-            )  # fmt: skip
-
-    def note_right(self, secret: str) -> None:
-        """This token is in force."""
-        digest = _digest(secret)
-        with self._lock:
-            self._proven.pop(digest, None)
-            self._proven[digest] = None
-            while len(self._proven) > _PROVEN_KEPT:
-                self._proven.popitem(last=False)
 
 
-def _digest(secret: str) -> bytes:
-    return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).digest()
+def _counted(address: str, name: str | None) -> tuple[tuple[tuple[str, ...], int], ...]:
+    """What a wrong password or token counts for, and how many of those are let through."""
+    network = network_of(address)
+    if name is None:
+        return (((network, "token"), MOST_WRONG),)
+    return ((network, "user", same_name(name)), MOST_WRONG), ((network, "users"), _MOST_PASSWORDS)
 
 
 log = logging.getLogger(__name__)
@@ -111,7 +108,7 @@ class Site:
     def __init__(self, description: Description, address: Address):
         self.address = address
         self._description = description
-        self.wrong_tokens = WrongTokens()
+        self.wrong_attempts = WrongAttempts()
         self._store: Store | None = None
         self._lock = threading.Lock()
 

@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 
 from shm.bridge import Bridge
 from shm.bridge.changes import HANGER_KEYS, HOOK_KEYS, SETTING_KEYS
-from shm.errors import BadInput
+from shm.errors import BadInput, UsageError
 from shm.pipeline import utc_now
 from shm.report import formatting
 from shm.settings import TABLE, Settings, load_settings
@@ -70,19 +70,31 @@ async def change(request: Request, site: AtSite, engineer: Engineer) -> Response
     key, hanger = told.get("key", ""), _hanger_of(told.get("key", ""))
     try:
         await run_in_threadpool(_change, site, engineer, key, told)
-    except BadInput as error:
+    except (BadInput, UsageError) as error:
+        site.forget_description()  # somebody else's change, which it may not show yet
+        status = 409 if isinstance(error, UsageError) else 422
         said = f"{error.message} {error.remedy}"
-        return await run_in_threadpool(_page, request, site, hanger, said, 422)
+        return await run_in_threadpool(_page, request, site, hanger, said, status)
     address = "/settings" if hanger is None else f"/settings?hanger={hanger}#hanger"
     return RedirectResponse(address, 303)
 
 
 def _change(site: Site, engineer: Engineer, key: str, told: dict[str, str]) -> None:
     workspace, store = site.workspace, site.store.acting_as(engineer.actor)
-    if key not in {row.key for row in _all_rows(workspace.bridge, workspace.settings)}:
+    rows = {row.key: row for row in _all_rows(workspace.bridge, workspace.settings)}
+    if key not in rows:
         raise Refused(404, f"{key!r} is none of the settings of this page.", "See bridge.toml.")
     value = None if told.get("action") == "back" else _number(told.get("value", ""))
-    workspace.change_setting(store, key, value, utc_now(), engineer.name)
+    based_on = told.get("based_on", "")
+    workspace.change_setting(
+        store,
+        key,
+        value,
+        utc_now(),
+        engineer.name,
+        based_on=int(based_on) if based_on.isdecimal() else 0,
+        in_file=rows[key].in_file,
+    )
     site.forget_description()
 
 

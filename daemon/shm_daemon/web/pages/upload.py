@@ -5,7 +5,6 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 
 from shm.report import formatting
-from shm_daemon.heartbeat import patience_s, seconds_since_beat
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.frame import page
 
@@ -16,7 +15,6 @@ router = APIRouter(include_in_schema=False)
 def upload_page(request: Request, site: AtSite, _: Reader) -> Response:
     """Files go to `POST /api/recordings` one by one; `static/upload.js` follows each."""
     workspace = site.workspace
-    seen_s = seconds_since_beat(workspace)
     return page(
         request,
         "upload.html.j2",
@@ -24,7 +22,6 @@ def upload_page(request: Request, site: AtSite, _: Reader) -> Response:
             (each.id, formatting.hanger_name(each.id, each.name))
             for each in workspace.bridge.hangers
         ],
-        is_daemon_up=seen_s is not None and seen_s <= patience_s(workspace),
         max_mb=workspace.settings.max_file_bytes / 1e6,
         max_bytes=workspace.settings.max_file_bytes,
     )

@@ -37,7 +37,7 @@ async def change(request: Request, site: AtSite, engineer: Engineer) -> Response
 
 
 def _change(people: People, told: dict[str, str]) -> None:
-    name, password, at = told.get("name", "").strip(), told.get("password", ""), utc_now()
+    name, password, at = told.get("name", ""), told.get("password", ""), utc_now()
     role = next((each for each in Role if each == told.get("role", "")), None)
     match told.get("action", ""), role:
         case "add", Role():

@@ -99,16 +99,19 @@
   }
 
   function tableOf(found) {
-    const table = made("table");
+    const table = made("table", { className: "stacked" });
     const head = made("tr");
     for (const textContent of ["Column", "Unit", "Taken for", "Range", "Seen", "Over time"]) {
       head.append(made("th", { textContent, scope: "col" }));
     }
-    table.append(head);
+    table.createTHead().append(head);
+    const body = table.createTBody();
     for (const column of found.columns) {
       const line = made("tr");
-      for (const textContent of cells(column)) line.append(made("td", { textContent }));
-      table.append(line);
+      const [name, ...others] = cells(column);
+      line.append(made("th", { textContent: name, scope: "row" }));
+      for (const textContent of others) line.append(made("td", { textContent }));
+      body.append(line);
     }
     return table;
   }
@@ -120,7 +123,7 @@
       const box = made("form", { className: "questions" });
       const fields = found.questions.map((question, index) => {
         const id = `question-${row.number}-${index}`;
-        const input = made("input", { id, required: true });
+        const input = made("input", { id, type: "text", required: true });
         const line = made("div");
         line.append(made("label", { htmlFor: id, textContent: question.text }), input);
         box.append(line);
