@@ -35,6 +35,7 @@ from shm.pipeline.jobs import (
     Step,
     wait_after,
 )
+from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import competing, reason_document
 from shm.pipeline.rejudging import judge_changed
 from shm.read import sidecar_path
@@ -115,6 +116,7 @@ class Flow:
                 competing(hanger, workspace.settings, selected)
         self.workspace = workspace
         judge_changed(workspace, self.store, self.clock())
+        heed_limits(workspace, self.store, workspace.bridge.hangers, self.clock())
         self.jobs = Jobs(workspace, self.store, self.clock)
 
     def close(self) -> None:

@@ -15,6 +15,7 @@ from shm.models import DESCRIPTION, competing_names
 from shm.pipeline.clock import Clock
 from shm.pipeline.ending import told_by_other
 from shm.pipeline.judging import judge
+from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import WatchResult, registered, run_step
 from shm.pipeline.rejudging import settled
@@ -218,8 +219,7 @@ class Jobs:
 
         def keep(found: Selection) -> None:
             self.store.posteriors.save_selection(hanger.id, tests, found, lineage, self.clock())
-            if hanger.is_modelled:
-                self.store.posteriors.save_summaries(hanger)
+            self._summarise(hanger)
 
         return Step(run, keep)
 
@@ -239,10 +239,14 @@ class Jobs:
         def keep(found: Posterior) -> None:
             now, to_watch = self.clock(), not makes_baseline
             self.store.posteriors.save(test, found, lineage, now, to_watch=to_watch)
-            if hanger.is_modelled:
-                self.store.posteriors.save_summaries(hanger)
+            self._summarise(hanger)
 
         return Step(run, keep)
+
+    def _summarise(self, hanger: Hanger) -> None:
+        if hanger.is_modelled:
+            self.store.posteriors.save_summaries(hanger)
+            heed_limits(self.workspace, self.store, [hanger], self.clock())
 
     def taught(self, hanger: Hanger, before: datetime) -> Taught | None:
         """The last time before then that the hanger's own tension was read, else a sibling's."""

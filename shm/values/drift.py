@@ -341,6 +341,7 @@ AlertKind = Literal[
     "check the baseline",
     "gap",
     "held",
+    "limit",
     "test",
     "resolved",
 ]

@@ -54,8 +54,11 @@ def test_a_threshold_holds_from_now_on_and_goes_back_to_the_file(
     assert (row.who, row.via, row.action, row.detail) == (
         "engineer", "page", "setting changed", "0.9",
     )  # fmt: skip
+    assert "judged again as soon as the daemon runs: alert probability 0.9 instead of" in shown
     put(browser, LEVEL, "", "back")
     assert level(workspace) == in_file
+    shown = browser.get("/settings?hanger=3").text
+    assert "The stored tests are judged with the thresholds shown here." in shown
 
 
 @pytest.mark.parametrize(
