@@ -16,7 +16,7 @@ from dataclasses import replace
 from functools import partial
 
 from shm.store import StoredAlert
-from shm.values import Alert, Change, Drift, Hanger, Moved, Posterior, WatchedTest
+from shm.values import Alert, AlertKind, Change, Drift, Hanger, Moved, Posterior, WatchedTest
 from shm.values.drift import OF_ONE_VISIT
 
 SHM = "shm"
@@ -25,7 +25,7 @@ SHM = "shm"
 _HALF = 0.5  # judgement: of a shift, so much must be left of it
 _ODD = 0.5  # likelier than not: such a test agrees with nothing, and says nothing of a shift
 _SDS = 2.0  # by which two measurements of one change differ once in twenty times
-BEYOND = "beyond threshold"
+BEYOND: AlertKind = "beyond threshold"
 OF_CHANGES = {BEYOND, "sudden change", "slow drift"}
 _REPEAT = ("repeat the test",)
 _REPEATS = (_REPEAT, ("tests disagree",))

@@ -13,9 +13,9 @@ from math import isfinite
 from shm.pipeline.ending import SHM
 from shm.store import Store, StoredAlert, Workspace
 from shm.store.list_rows import TrendPoint
-from shm.values import Alert, Averaged, Hanger
+from shm.values import Alert, AlertKind, Averaged, Hanger
 
-_KIND = "limit"
+_KIND: AlertKind = "limit"
 
 
 def heed_limits(

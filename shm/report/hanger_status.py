@@ -361,8 +361,8 @@ def _off_limits(known: Known) -> Lead | None:
     hanger, tension = known.hanger, known.tension
     if tension is None:
         return None
-    if off := off_limits(hanger, tension):
-        return off
+    if beyond := off_limits(hanger, tension):
+        return beyond
     limits = hanger.limits
     nominal_n, kept = hanger.nominal_tension_n, tension.tension_n
     if not nominal_n > 0:

@@ -98,12 +98,6 @@ class Watch(WatchedAgain):
             move(connection, [test], Stage.WATCHED, at)
             return raised
 
-    def pass_over(self, test: StoredTest, at: datetime) -> None:
-        """A test within a maintenance window is compared with nothing."""
-        with self.writing() as connection:
-            if all_at(connection, [test], Stage.UPDATED):
-                move(connection, [test], Stage.WATCHED, at)
-
     def state(self, baseline: Baseline) -> KeptWatch | None:
         """What the watch goes on from at the next test that is compared with a baseline."""
         query = sa.select(watch_states).where(watch_states.c.baseline_id == baseline.id)

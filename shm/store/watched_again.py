@@ -1,4 +1,6 @@
-"""Tests that are compared with their baseline again, since what they are judged by has changed."""
+"""Tests that are compared with their baseline again, since what they are judged by has changed, or
+with none.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +13,13 @@ from shm.store.audit import note
 from shm.store.database import Repository
 from shm.store.files import in_force
 from shm.store.reprocessing import BEFORE, supersede_results
-from shm.store.results import move_numbers
+from shm.store.results import all_at, move, move_numbers
 from shm.store.rows import Baseline, Stage, StoredTest
 from shm.store.tables import tests, watch_states, watches
 
 
 class WatchedAgain(Repository):
-    """Sends watched tests back, and tells those that were watched before."""
+    """Sends watched tests back, tells those that were watched before, passes tests over."""
 
     def judge_again(self, hanger: int, baseline_id: int, why: str, at: datetime) -> int:
         """Sends back what was compared with a baseline, to be judged anew; how many tests."""
@@ -27,6 +29,12 @@ class WatchedAgain(Repository):
             if count:
                 note(connection, at, "tests judged again", f"hanger {hanger}", why, "shm")
             return count
+
+    def pass_over(self, test: StoredTest, at: datetime) -> None:
+        """A test within a maintenance window is compared with nothing."""
+        with self.writing() as connection:
+            if all_at(connection, [test], Stage.UPDATED):
+                move(connection, [test], Stage.WATCHED, at)
 
     def is_again(self, test: StoredTest, baseline: Baseline) -> bool:
         """Whether a test has been compared with a baseline before."""

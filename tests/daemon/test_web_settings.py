@@ -14,6 +14,7 @@ from shm.store.people import Role
 from shm_cli.main import run
 from shm_daemon.doctor import examine
 from tests.daemon.test_web_people import PASSWORD, sign_in
+from tests.helpers.outboxes import make_baseline, raise_alerts
 from tests.helpers.web_servers import served
 
 LEVEL = "hanger.3.thresholds.alert_probability"
@@ -54,11 +55,20 @@ def test_a_threshold_holds_from_now_on_and_goes_back_to_the_file(
     assert (row.who, row.via, row.action, row.detail) == (
         "engineer", "page", "setting changed", "0.9",
     )  # fmt: skip
-    assert "judged again as soon as the daemon runs: alert probability 0.9 instead of" in shown
     put(browser, LEVEL, "", "back")
     assert level(workspace) == in_file
+
+
+def test_the_page_says_whether_stored_tests_are_judged_with_what_it_shows(
+    browser: httpx.Client, workspace: Workspace
+) -> None:
+    make_baseline(workspace)
+    raise_alerts(workspace, [1], [])
     shown = browser.get("/settings?hanger=3").text
     assert "The stored tests are judged with the thresholds shown here." in shown
+    put(browser, "hanger.3.thresholds.tension_shift_fraction", "0.06")
+    shown = browser.get("/settings?hanger=3").text
+    assert "judged again as soon as the daemon runs: tension 0.06 instead of 0.05." in shown
 
 
 @pytest.mark.parametrize(
