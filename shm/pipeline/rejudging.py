@@ -111,10 +111,11 @@ def settled(
     closed = [each for each in resolved if _is_closed(each)]
     resolved = tuple(each for each in resolved if not _is_closed(each))
     if alert and is_again:
-        alert = _as_news(alert, closed, standing)
+        alert = _with_own_key(alert, closed)
     if is_again and not store.watch.is_last(test, baseline):
         known = [*standing, *_of_the_past(alert, resolved)]
-        return {}, alert and _news(alert, known)
+        alert = alert and _news(alert, known)
+        return _replaced(alert, standing), alert
     before = [each.watched for each in store.watch.list_recent(baseline, _RECENT_TESTS)]
     tests = sorted([*before, watched], key=lambda each: each.time)
 
@@ -137,7 +138,8 @@ def settled(
     if alert and alert.key not in {each.alert.key for each in (*standing, *resolved)}:
         left = [each for each in standing if each.id not in ended]
         past = _of_the_past(alert, resolved) if is_again else []
-        return ended, _news(alert, [*left, *past])
+        alert = _news(alert, [*left, *past])
+        return ended | (_replaced(alert, standing) if is_again else {}), alert
     return ended, seen_again(resolved, standing, tests, hanger, gap_stands=stands) or alert
 
 
@@ -185,15 +187,19 @@ def _is_closed(stored: StoredAlert) -> bool:
     return stored.resolution is not None and stored.resolution.why.startswith(_CLOSED)
 
 
-def _as_news(
-    alert: Alert, closed: Sequence[StoredAlert], standing: Sequence[StoredAlert]
-) -> Alert:
-    """Of a change that an alert which stands has told only what is new; under a key of its own
-    where other thresholds have closed one of the same."""
+def _with_own_key(alert: Alert, closed: Sequence[StoredAlert]) -> Alert:
+    """An alert that other thresholds have closed may be raised again: under another key."""
     same = [each.id for each in closed if each.alert.key.partition(":again-")[0] == alert.key]
-    key = f"{alert.key}:again-{max(same)}" if same else alert.key
-    known = BEYOND in alert.kinds and any(tells(each.alert, alert.change) for each in standing)
-    return replace(alert, key=key, kinds=(BEYOND,) if known else alert.kinds)
+    return replace(alert, key=f"{alert.key}:again-{max(same)}") if same else alert
+
+
+def _replaced(alert: Alert | None, standing: Sequence[StoredAlert]) -> dict[int, str]:
+    """What stands of a change that is now raised as beyond its threshold: one alert a loss."""
+    if alert is None or BEYOND not in alert.kinds:
+        return {}
+    told = [each for each in standing if set(each.alert.kinds) <= OF_CHANGES - {BEYOND}]
+    why = f"{_CLOSED}: another alert tells that it is beyond its threshold"
+    return {each.id: why for each in told if tells(each.alert, alert.change)}
 
 
 def _detected_still(

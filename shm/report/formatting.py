@@ -83,8 +83,8 @@ def tension_headings(unit: ForceUnit) -> tuple[str, str]:
 
 def span(interval: Interval, signed: bool = False) -> str:
     """`640 to 671`, for a table whose heading names the unit."""
-    half, sign = interval.width / 2, "+" if signed else ""
-    return f"{to_two_digits(interval.low, half, sign)} to {to_two_digits(interval.high, half, sign)}"
+    how = interval.width / 2, "+" if signed else ""
+    return f"{to_two_digits(interval.low, *how)} to {to_two_digits(interval.high, *how)}"
 
 
 def mean(interval: Interval, signed: bool = False) -> str:

@@ -220,7 +220,7 @@ def _model(data: HangerReport) -> str:
     )
     if _misses(data):
         off = f"{data.posterior.misfit_percent:.1f} % (root mean square)"
-        return f"{_chosen(data)}. It misses {count} by {off}: only an error of the model covers that."
+        return f"{_chosen(data)}. It misses {count} by {off}."
     rms = formatting.plain(_rms_percent(data), 2)
     return f"{_chosen(data)}. It predicts {count} to {rms} % (root mean square)."
 

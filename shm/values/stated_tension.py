@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, replace
 
 from shm.values.force_units import MOST_DECIMALS, ForceUnit, force_unit
-from shm.values.rounding import to_two_digits
 from shm.values.hanger import Limits
 from shm.values.posterior import Averaged, Posterior, Selection
+from shm.values.rounding import to_two_digits
 
 _LEAST_SAID = 0.01  # ten of a thousand draws: they tell a smaller probability to no digit
 
