@@ -16,7 +16,7 @@ from dataclasses import replace
 from functools import partial
 
 from shm.store import StoredAlert
-from shm.values import Alert, Drift, Hanger, Moved, Posterior, WatchedTest
+from shm.values import Alert, AlertKind, Change, Drift, Hanger, Moved, Posterior, WatchedTest
 from shm.values.drift import OF_ONE_VISIT
 
 SHM = "shm"
@@ -25,7 +25,8 @@ SHM = "shm"
 _HALF = 0.5  # judgement: of a shift, so much must be left of it
 _ODD = 0.5  # likelier than not: such a test agrees with nothing, and says nothing of a shift
 _SDS = 2.0  # by which two measurements of one change differ once in twenty times
-_OF_CHANGES = {"beyond threshold", "sudden change", "slow drift"}
+BEYOND: AlertKind = "beyond threshold"
+OF_CHANGES = {BEYOND, "sudden change", "slow drift"}
 _REPEAT = ("repeat the test",)
 _REPEATS = (_REPEAT, ("tests disagree",))
 
@@ -69,16 +70,31 @@ def why_over(
     return f"{both} do not show it any more"
 
 
-def is_told(alert: Alert, standing: Sequence[Alert]) -> bool:
-    """Whether alerts that stand tell already all that one says to be beyond its threshold.
+def is_told(alert: Alert, known: Sequence[Alert]) -> bool:
+    """Whether alerts that are known tell already all that one says.
 
-    The watch may have taken the first for over, by its own count of visits.
+    Done again, a test may call for the same loss by other rules or a test later; and the watch may
+    have taken the first for over, by its own count of visits.
     """
-    beyond = "beyond threshold"
-    if alert.kinds != (beyond,) or not alert.drifts:
+    kinds = set(alert.kinds)
+    if not kinds <= OF_CHANGES:
         return False
-    known = {each for one in standing if beyond in one.kinds for each in _conditions(one)}
-    return _conditions(alert) <= known
+    if BEYOND in kinds:
+        told = {each for one in known if BEYOND in one.kinds for each in conditions_of(one)}
+        if not alert.drifts or not conditions_of(alert) <= told:
+            return False
+    return kinds == {BEYOND} or any(tells(one, alert.change) for one in known)
+
+
+def tells(told: Alert, change: Change | None) -> bool:
+    """Whether an alert tells of a change: of the same way, begun before it was told."""
+    if change is None or not change.moved or not set(told.kinds) & OF_CHANGES:
+        return False
+    first = change.moved[0]
+    moved: list[Drift | Moved] = [*told.drifts, *(told.change.moved[:1] if told.change else ())]
+    return change.began_by <= told.time and any(
+        each.quantity == first.quantity and each.shift_mean * first.shift_mean > 0 for each in moved
+    )
 
 
 def told_by_other(
@@ -88,14 +104,14 @@ def told_by_other(
     the same event: the same quantity went the same way, by no more, before that was told. A test
     that fits none before it is what such a change leads to.
     """
-    if alert is None or not set(alert.kinds) <= {*_OF_CHANGES, *_REPEAT}:
+    if alert is None or not set(alert.kinds) <= {*OF_CHANGES, *_REPEAT}:
         return None
     own = _change_of(alert)
     for first in stored:
         told = _change_of(first.alert)
         if first.resolution or (first.baseline_id is None) != of_stream or told is None:
             continue
-        if not set(first.alert.kinds) & _OF_CHANGES:
+        if not set(first.alert.kinds) & OF_CHANGES:
             continue
         if alert.kinds == _REPEAT:
             return first
@@ -129,11 +145,11 @@ def seen_again(
     needs no other alert. Where a person has resolved one, only tests count that are dated later:
     those before are what was looked into. It must be as probable as an alert asks for.
     """
-    known = {each for stored in standing for each in _conditions(stored.alert)}
+    known = {each for stored in standing for each in conditions_of(stored.alert)}
     level = hanger.thresholds.alert_probability
     for stored in reversed(resolved):
         alert, end = stored.alert, stored.resolution
-        own = _conditions(alert)
+        own = conditions_of(alert)
         if end is None or own <= known:
             continue
         known |= own
@@ -201,7 +217,7 @@ def _left_of(alert: Alert, told: Drift, later: Drift | None) -> float:
     return max(half, later.probability if is_same_way else 0.0)
 
 
-def _conditions(alert: Alert) -> frozenset[tuple[str, float]]:
+def conditions_of(alert: Alert) -> frozenset[tuple[str, float]]:
     """What an alert is about, so that one of the same can be told; empty where none rings anew."""
     if "held" in alert.kinds or alert.kinds in _REPEATS:
         return frozenset()
@@ -228,11 +244,12 @@ def _anew(stored: StoredAlert, shown: Sequence[WatchedTest], hanger: Hanger) -> 
         time=test.time,
         drifts=drifts,
         tension=None,
-        message=f"{_message_anew(alert, drifts, test, hanger)} {again}",
+        message=f"{message_anew(alert, drifts, test, hanger)} {again}",
     )
 
 
-def _message_anew(alert: Alert, drifts: Sequence[Drift], test: WatchedTest, hanger: Hanger) -> str:
+def message_anew(alert: Alert, drifts: Sequence[Drift], test: WatchedTest, hanger: Hanger) -> str:
+    """What an alert says of what it told, as a later test has it."""
     if not drifts:
         return alert.message
     from shm.watch.alert_text import message_of  # it computes: not before it is needed

@@ -35,7 +35,9 @@ from shm.pipeline.jobs import (
     Step,
     wait_after,
 )
+from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import competing, reason_document
+from shm.pipeline.rejudging import judge_changed
 from shm.read import sidecar_path
 from shm.store import Death, Deaths, Delivery, Outcome, Receipt, Store, StoredAlert, Workspace
 from shm.store.archive import Meanwhile, nothing
@@ -113,6 +115,8 @@ class Flow:
             if hanger.id in selected:
                 competing(hanger, workspace.settings, selected)
         self.workspace = workspace
+        judge_changed(workspace, self.store, self.clock())
+        heed_limits(workspace, self.store, workspace.bridge.hangers, self.clock())
         self.jobs = Jobs(workspace, self.store, self.clock)
 
     def close(self) -> None:

@@ -13,16 +13,17 @@ from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline.clock import Clock
-from shm.pipeline.ending import gap_stands, is_told, seen_again, told_by_other, why_over
+from shm.pipeline.ending import told_by_other
 from shm.pipeline.judging import judge
+from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
-from shm.pipeline.registry import registered, run_step
+from shm.pipeline.registry import WatchResult, registered, run_step
+from shm.pipeline.rejudging import settled
 from shm.pipeline.remote_file import Opens, RemoteFile
 from shm.pipeline.telling import Terms, after_works, message_of, plan, works_before
 from shm.pipeline.watching import tests_beside, to_watch
 from shm.settings import Settings
 from shm.store import (
-    Baseline,
     Delivery,
     IdentifiedTest,
     KeptWatch,
@@ -34,13 +35,12 @@ from shm.store import (
     Workspace,
 )
 from shm.store.archive import nothing
-from shm.values import WITHOUT_MODEL, Alert, Hanger, Posterior, Selection, WatchedTest
+from shm.values import WITHOUT_MODEL, Alert, Hanger, Posterior, Selection
 from shm.values.stated_tension import averaged_now
 
 DELIVERIES = 16  # technical: threads that mostly wait for an answer
 _DELIVERIES_A_HOOK = 4  # technical: a quarter, so that a hook that hangs leaves room for three
 _LONGEST_S = 86400.0  # judgement: a hook mended within a day is told the day after at the latest
-_RECENT_TESTS = 64  # technical: two visits of so many tests each are none of hammer tests
 _DOUBLINGS = 32  # of any wait that may be set, so many are more than a day
 
 Notifier = Callable[[Hook, Alert], object]
@@ -219,8 +219,7 @@ class Jobs:
 
         def keep(found: Selection) -> None:
             self.store.posteriors.save_selection(hanger.id, tests, found, lineage, self.clock())
-            if hanger.is_modelled:
-                self.store.posteriors.save_summaries(hanger)
+            self._summarise(hanger)
 
         return Step(run, keep)
 
@@ -240,10 +239,14 @@ class Jobs:
         def keep(found: Posterior) -> None:
             now, to_watch = self.clock(), not makes_baseline
             self.store.posteriors.save(test, found, lineage, now, to_watch=to_watch)
-            if hanger.is_modelled:
-                self.store.posteriors.save_summaries(hanger)
+            self._summarise(hanger)
 
         return Step(run, keep)
+
+    def _summarise(self, hanger: Hanger) -> None:
+        if hanger.is_modelled:
+            self.store.posteriors.save_summaries(hanger)
+            heed_limits(self.workspace, self.store, [hanger], self.clock())
 
     def taught(self, hanger: Hanger, before: datetime) -> Taught | None:
         """The last time before then that the hanger's own tension was read, else a sibling's."""
@@ -290,7 +293,7 @@ class Jobs:
         of_test = (baseline, tests, current, hanger, limit_years, needed.kept, tension, beside)
         run = partial(run_step, registered().watch, *of_test)
 
-        def keep(found: tuple[WatchedTest, Alert | None, bytes] | None) -> object:
+        def keep(found: WatchResult | None) -> object:
             if found is None:  # the test still waits, to be watched from the baseline on
                 self.store.watch.forget_state(baseline)
                 return None
@@ -299,43 +302,14 @@ class Jobs:
                 earlier = [each.alert for each in self.store.alerts.list_all(hanger.id)]
                 works = works_before(alert, silences, earlier)
                 alert = alert if works is None else after_works(alert, works)
-            ended, alert = self._ended(hanger, baseline, watched, alert)
+            ended, alert = settled(self.store, hanger, baseline, test, (watched, alert, found[3]))
             first = told_by_other(alert, self.store.alerts.list_all(hanger.id), of_stream=True)
             rings, now = None if first else alert, self.clock()
             of_test = (test, baseline, watched, rings, hooks, now)
-            return self.store.watch.save(*of_test, state, ended, first)
+            level = hanger.thresholds.alert_probability
+            return self.store.watch.save(*of_test, state, ended, first, level)
 
         return Step(run, keep)
-
-    def _ended(
-        self, hanger: Hanger, baseline: Baseline, watched: WatchedTest, alert: Alert | None
-    ) -> tuple[dict[int, str], Alert | None]:
-        """Which alerts a test ends, and why; and the one to raise: that of the watch, unless one
-        that stands tells the same, or else a resolved one that is seen again."""
-        standing = self.store.alerts.list_all(hanger.id, baseline.id, standing=True)
-        resolved = self.store.alerts.list_all(hanger.id, baseline.id, standing=False)
-        if not standing and not resolved:
-            return {}, alert
-        before = [each.watched for each in self.store.watch.list_recent(baseline, _RECENT_TESTS)]
-        tests = sorted([*before, watched], key=lambda each: each.time)
-
-        def stands(test: WatchedTest) -> bool:
-            try:
-                current = self.store.posteriors.get(hanger.id, test.test)
-            except NothingThere:  # of a class that was dropped: not known to have ended
-                return True
-            return gap_stands(baseline.posterior, current)
-
-        ended = {
-            each.id: why
-            for each in standing
-            if (why := why_over(each.alert, tests, hanger, gap_stands=stands))
-        }
-        # The gap's alert has one key for good: what was raised before is raised no second time.
-        if alert and alert.key not in {each.alert.key for each in (*standing, *resolved)}:
-            left = [each.alert for each in standing if each.id not in ended]
-            return ended, None if is_told(alert, left) else alert
-        return ended, seen_again(resolved, standing, tests, hanger, gap_stands=stands) or alert
 
     def _deliver(self, notifier: Notifier, delivery: Delivery, message: Alert) -> Step:
         hooks = {hook.name: hook for hook in self.workspace.bridge.hooks}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, TypeAlias, TypeVar
 
 from shm.resources import give_back_memory
 
@@ -29,6 +29,11 @@ if TYPE_CHECKING:
         WatchedTest,
     )
     from shm.watch import DatedTest
+    from shm.watch.agreement import Way
+
+WatchResult: TypeAlias = "tuple[WatchedTest, Alert | None, bytes, frozenset[tuple[str, Way]]]"
+"""What the watch says, the alert that it calls for, what to keep, and what stands beyond its
+threshold."""
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -54,7 +59,7 @@ class Steps:
             Averaged | None,
             Beside | None,
         ],
-        tuple[WatchedTest, Alert | None, bytes] | None,
+        WatchResult | None,
     ]
 
 

@@ -15,6 +15,7 @@ from shm.inference import refresh, select, update
 from shm.models import build
 from shm.pipeline.calibrating import checked, options_of
 from shm.pipeline.lineage import Terms, competing, identify_settings, read_limits
+from shm.pipeline.registry import WatchResult
 from shm.pipeline.remote_file import Opens
 from shm.plausibility import fingerprint_of
 from shm.read.sandbox import Limits, load_modes, read_test
@@ -22,7 +23,6 @@ from shm.settings import Settings
 from shm.store import Baseline, IdentifiedTest, StoredRecording
 from shm.store.archive import MODES_SUFFIX, refuse_oversize
 from shm.values import (
-    Alert,
     Averaged,
     Beside,
     Hanger,
@@ -30,7 +30,6 @@ from shm.values import (
     Posterior,
     Recording,
     Selection,
-    WatchedTest,
 )
 from shm.watch import DatedTest, WatchOptions, joined, watch_gap, watch_newest
 from shm.watch.frequency_watch import measured_levels, watch_newest_frequencies
@@ -149,7 +148,7 @@ def watch_test(
     kept: bytes | None = None,
     tension: Averaged | None = None,
     beside: Beside | None = None,
-) -> tuple[WatchedTest, Alert | None, bytes] | None:
+) -> WatchResult | None:
     """What the watch says after a test, the alert that it calls for, and what to keep of it.
 
     The alert leads with the `tension` by the test.
@@ -179,4 +178,4 @@ def watch_test(
         alert = joined(alert, gap)
     # A new baseline makes a standing condition a new one.
     alert = alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}", tension=tension)
-    return found.test, alert, found.kept
+    return found.test, alert, found.kept, found.beyond

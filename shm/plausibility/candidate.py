@@ -67,13 +67,18 @@ class Check(Protocol):
     def __call__(self, candidate: Candidate) -> Doubt | None: ...
 
 
+_ORDERS_OF_TWO = 3  # two unknowns, and one mode that may speak against them
+
+
 def implied_shift(test: ModalTest, reference: Sequence[ModalTest], hanger: Hanger) -> float:
-    """By which fraction the tension differs from the reference's if it alone explains the modes.
+    """By which fraction the tension differs from the reference's, going by the modes.
 
     Least squares over the modes that both have, each with d ln f / d ln T of the described bar at
-    its nominal tension, ends clamped, or pinned where they are described so. A rough figure is all
-    that is wanted of a test that may be of another bar. NaN where they share no mode, or where the
-    bar carries no tension.
+    its nominal tension, ends clamped, or pinned where they are described so. From three orders on
+    the bending stiffness may differ, too: stiffer ends lift the high modes alone, and a tension by
+    itself would have to rise for that, though it has fallen. A rough figure is all that is wanted
+    of a test that may be of another bar. NaN where they share no mode, or where the bar carries no
+    tension.
     """
     change = _shared(test, reference)
     if not change or not hanger.nominal_tension_n > 0:
@@ -81,7 +86,11 @@ def implied_shift(test: ModalTest, reference: Sequence[ModalTest], hanger: Hange
     slopes = _slopes(hanger, max(order for _, order in change))
     gain = np.array([slopes[order - 1] for _, order in change])
     shift = np.array(list(change.values()))
-    return float(np.expm1(gain @ shift / (gain @ gain)))
+    if len({order for _, order in change}) < _ORDERS_OF_TWO:
+        return float(np.expm1(gain @ shift / (gain @ gain)))
+    # f^2 goes with a T + b EI, so both logarithmic slopes add up to a half.
+    both = np.column_stack([gain, 0.5 - gain])
+    return float(np.expm1(np.linalg.lstsq(both, shift, rcond=None)[0][0]))
 
 
 def _slopes(hanger: Hanger, modes: int) -> FloatArray:

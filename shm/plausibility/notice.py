@@ -86,7 +86,7 @@ def _loss(candidate: Candidate, others: Sequence[float], counted: Sequence[float
     shift = implied_shift(candidate.test, candidate.reference, hanger)
     if not abs(shift) >= limit:
         return ""
-    moved, side = ("lost", "below") if shift < 0 else ("gained", "above")
+    moved = "lost" if shift < 0 else "gained"
     held, counting = (
         sum(each * shift > 0 and abs(each) >= limit for each in shifts)
         for shifts in ((shift, *others), counted)
@@ -95,6 +95,7 @@ def _loss(candidate: Candidate, others: Sequence[float], counted: Sequence[float
     if counting:
         say = f"{held + counting} tests agree, {held} of them held"
     change = frequency_change(candidate.test, candidate.reference)
+    side = "below" if change < 0 else "above"
     return (
         f"Hanger {hanger.id} may have {moved} {100 * abs(shift):.0f} % of its tension: {say}. "
         "Repeat the test today, with the logger's clock set. "

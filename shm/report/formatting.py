@@ -12,7 +12,7 @@ from shm.report.intervals import Interval
 from shm.values import stated_tension
 from shm.values.diagnosis import joined
 from shm.values.force_units import ForceUnit
-from shm.values.rounding import rounded
+from shm.values.rounding import rounded, to_two_digits
 
 _LONGEST_NAME = 24  # layout: what a column of a table holds
 _ROTATIONAL_SPRINGS = {
@@ -49,11 +49,8 @@ def decimals(width: float) -> int:
 
 def with_interval(interval: Interval, unit: str) -> str:
     """`655 kN (90 % interval 640 to 671 kN)`."""
-    places, space = decimals(interval.width), unit and f" {unit}"
-    return (
-        f"{interval.mean:z.{places}f}{space} (90 % interval "
-        f"{interval.low:z.{places}f} to {interval.high:z.{places}f}{space})"
-    )
+    space = unit and f" {unit}"
+    return f"{mean(interval)}{space} (90 % interval {span(interval)}{space})"
 
 
 def tension(tension_n: Interval, unit: ForceUnit) -> str:
@@ -86,13 +83,13 @@ def tension_headings(unit: ForceUnit) -> tuple[str, str]:
 
 def span(interval: Interval, signed: bool = False) -> str:
     """`640 to 671`, for a table whose heading names the unit."""
-    places, sign = decimals(interval.width), "+" if signed else ""
-    return f"{interval.low:{sign}z.{places}f} to {interval.high:{sign}z.{places}f}"
+    how = interval.width / 2, "+" if signed else ""
+    return f"{to_two_digits(interval.low, *how)} to {to_two_digits(interval.high, *how)}"
 
 
 def mean(interval: Interval, signed: bool = False) -> str:
-    """The mean with the decimals that its interval deserves."""
-    return f"{interval.mean:{'+' if signed else ''}z.{decimals(interval.width)}f}"
+    """The mean to two significant digits of its interval's half width."""
+    return to_two_digits(interval.mean, interval.width / 2, "+" if signed else "")
 
 
 def with_span(interval: Interval, signed: bool = False) -> str:

@@ -27,7 +27,7 @@ WATCH_PROBABILITY = 0.5  # likelier than not
 # gives limits.
 OFF_NOMINAL = 0.15
 
-_DOUBTS = frozenset({"check the modes", "check the baseline"})
+_DOUBTS = frozenset({"check the modes", "check the baseline", "limit"})
 _BEYOND = "beyond threshold"
 _CHANGES = frozenset({_BEYOND, "sudden change", "slow drift"})
 
@@ -189,7 +189,11 @@ def hanger_message(known: Known) -> HangerMessage:
         return HangerMessage(status, _of_change(known), known.notes)
     if status is Status.CHECK:
         doubts = [Lead.of(each) for each in known.warnings]
-        doubts += [Lead.of(each.message) for each in reversed(known.standing)]
+        off = _off_limits(known)  # as it is now, where an alert says how it was
+        doubts += [
+            off if off and "limit" in each.kinds else Lead.of(each.message)
+            for each in reversed(known.standing)
+        ]
         return HangerMessage(status, _first(doubts), known.notes)
     status, lead = _quiet(known, status)
     return HangerMessage(status, lead, known.notes)
@@ -314,7 +318,7 @@ def _quiet(known: Known, status: Status) -> tuple[Status, Lead]:
         return Status.CHECK, off
     if status is Status.FIRST:
         return status, Lead(
-            f"{name}: tension {_tension(known)} by its first test.",
+            f"{name}: tension {_tension(known.tension)} by its first test.",
             f"Choose a warmer or colder day {NEXT_TEST}, so that the baseline covers temperature.",
         )
     drift = next((each for each in known.drifts if each.quantity == TENSION), None)
@@ -337,21 +341,29 @@ def _quiet(known: Known, status: Status) -> tuple[Status, Lead]:
     )
 
 
-def _off_limits(known: Known) -> Lead | None:
-    """That the tension is beyond the owner's limits; without limits, far off the nominal one."""
-    name, hanger, tension = f"Hanger {known.hanger.id}", known.hanger, known.tension
-    if tension is None:
-        return None
-    limits = hanger.limits
+def off_limits(hanger: Hanger, tension: Averaged) -> Lead | None:
+    """That the tension is beyond the owner's limits."""
     for probability, words, soon in (
         (tension.probability_slack, "below its lower limit", TODAY),
         (tension.probability_above_limit, "above its upper limit", WEEK),
     ):
         if probability > WATCH_PROBABILITY:
+            doubt = "" if probability >= hanger.thresholds.alert_probability else "probably "
             return Lead(
-                f"{name}: tension {_tension(known)} is probably {words}.",
+                f"Hanger {hanger.id}: tension {_tension(tension)} is {doubt}{words}.",
                 f"Repeat the hammer test {soon}, and compare the hanger with its design.",
             )
+    return None
+
+
+def _off_limits(known: Known) -> Lead | None:
+    """That the tension is beyond the owner's limits; without limits, far off the nominal one."""
+    hanger, tension = known.hanger, known.tension
+    if tension is None:
+        return None
+    if beyond := off_limits(hanger, tension):
+        return beyond
+    limits = hanger.limits
     nominal_n, kept = hanger.nominal_tension_n, tension.tension_n
     if not nominal_n > 0:
         return None
@@ -362,14 +374,14 @@ def _off_limits(known: Known) -> Lead | None:
     off = kept.mean / nominal_n - 1
     size = rounded_percent(abs(off), (high - low) / 2)
     return Lead(
-        f"{name}: tension is {size} {'above' if off > 0 else 'below'} nominal.",
+        f"Hanger {hanger.id}: tension is {size} {'above' if off > 0 else 'below'} nominal.",
         f"Compare it with the design {NEXT_TEST}, or give limits in bridge.toml.",
     )
 
 
-def _tension(known: Known) -> str:
+def _tension(tension: Averaged | None) -> str:
     """`654 ± 16 kN`, rounded by its interval."""
-    if known.tension is None:
+    if tension is None:
         return "not known"
-    interval = Interval.of_averaged(known.tension)
+    interval = Interval.of_averaged(tension)
     return formatting.with_half(interval, force_unit(interval.mean))

@@ -13,6 +13,7 @@ from shm.report.diagnosis_summary import next_step, verdict
 from shm.report.diagnosis_wording import AFTER, tension_of
 from shm.report.intervals import Interval
 from shm.values import TENSION, Diagnosis, PredictedFrequency
+from shm.values.posterior import MOST_MISFIT_PERCENT
 from shm.values.rounding import rounded_percent
 from shm.values.stated_tension import stated
 
@@ -217,6 +218,9 @@ def _model(data: HangerReport) -> str:
     count = (
         "one measured frequency" if len(misfits) == 1 else f"{len(misfits)} measured frequencies"
     )
+    if _misses(data):
+        off = f"{data.posterior.misfit_percent:.1f} % (root mean square)"
+        return f"{_chosen(data)}. It misses {count} by {off}."
     rms = formatting.plain(_rms_percent(data), 2)
     return f"{_chosen(data)}. It predicts {count} to {rms} % (root mean square)."
 
@@ -225,6 +229,12 @@ def _rms_percent(data: HangerReport) -> float:
     """Root mean square of the misfits; NaN where no mode was measured."""
     residuals = residuals_percent(data.predicted)
     return float(np.sqrt(np.mean(np.square(residuals)))) if residuals else math.nan
+
+
+def _misses(data: HangerReport) -> bool:
+    """Whether the class by itself is so far off that its posterior doubts the description: what it
+    predicts with the model's error learnt from the same modes fits them all the same."""
+    return data.posterior.misfit_percent > MOST_MISFIT_PERCENT
 
 
 def _gap(data: HangerReport) -> str:
@@ -237,7 +247,7 @@ def _gap(data: HangerReport) -> str:
 
 def _outside(data: HangerReport) -> str:
     """The modes that the model class misses by more than the uncertainty of both explains."""
-    misfits = misfits_percent(data)
+    misfits = [] if _misses(data) else misfits_percent(data)
     outside = [mode for mode, off in misfits if not off.low <= 0 <= off.high]
     if not misfits:
         return ""
@@ -314,7 +324,7 @@ def _width(data: HangerReport) -> str:
     if half <= threshold_fraction:
         return ""
     return (
-        f"The interval (half width {100 * half:.1f} %) is wider than the threshold of "
+        f"The tension is known to ± {100 * half:.1f} %, no better than the threshold of "
         f"{100 * threshold_fraction:.3g} %: identify more modes, or repeat the test, "
         f"to see smaller shifts."
     )
@@ -324,7 +334,7 @@ def _diagnose(data: HangerReport) -> str:
     """The next step against the gap between model and measurement."""
     if data.diagnosis is not None:
         return next_step(data.diagnosis)
-    if not _rms_percent(data) >= _WORTH_DIAGNOSING_PERCENT:
+    if not (_misses(data) or _rms_percent(data) >= _WORTH_DIAGNOSING_PERCENT):
         return ""
     return (
         "Learn what the model does not explain, and what that does to the tension "

@@ -42,10 +42,11 @@ from shm.store.holding import (
 )
 from shm.store.queries import WEIGHED
 from shm.store.recording_rows import Decision, HeldTest, Hold, Rerun
-from shm.store.reprocessing import BEFORE, of_baselines, reprocess, supersede_results
-from shm.store.results import advance_recordings, move_numbers
+from shm.store.reprocessing import of_baselines, reprocess, supersede_results
+from shm.store.results import advance_recordings
 from shm.store.rows import Stage
-from shm.store.tables import holds, recordings, tests, watch_states, watches
+from shm.store.tables import holds, recordings, tests, watches
+from shm.store.watched_again import send_back
 
 
 @dataclass(frozen=True)
@@ -300,18 +301,9 @@ def _watch_again(
     To be updated, where they learnt from a tension that was read. How many that are.
     """
     stage = Stage.UPDATED if weighed else Stage.WATCHED
-    ids = [row.id for row in chosen]
-    again: dict[int, int] = {}
+    ids, count = [row.id for row in chosen], 0
     for hanger in {row.hanger for row in chosen}:
         since = min(row.time for row in chosen if row.hanger == hanger)
-        later = (
-            sa.select(tests.c.id, tests.c.recording_id)
-            .join(watches)
-            .where(watches.c.hanger == hanger, watches.c.time >= since, in_force(watches))
-            .where(tests.c.stage == Stage.WATCHED, in_force(tests), tests.c.id.not_in(ids))
-        )
-        again |= {row.id: row.recording_id for row in connection.execute(later)}
-        connection.execute(sa.delete(watch_states).where(watch_states.c.hanger == hanger))
-    supersede_results(connection, list(again), stage, at)
-    move_numbers(connection, again, BEFORE[stage], at)
-    return len(again)
+        later = (watches.c.time >= since) & tests.c.id.not_in(ids)
+        count += send_back(connection, hanger, later, stage, at)
+    return count

@@ -242,12 +242,16 @@ class StoredAdoption:
 
 @dataclass(frozen=True, eq=False)
 class StoredWatch:
-    """What the watch said after a test, and the baseline it was compared with."""
+    """What the watch said after a test, and the baseline it was compared with.
+
+    `alert_probability` is by how much its alert was judged; NaN of a former version.
+    """
 
     id: int
     hanger: int
     baseline_id: int
     watched: WatchedTest
+    alert_probability: float = NAN
 
 
 @dataclass(frozen=True)

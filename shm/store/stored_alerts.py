@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from typing import Any
@@ -17,6 +18,7 @@ from shm.store.deliveries import Deliveries, alert_in
 from shm.store.list_rows import AlertRow, DeliveryRow, EventKind, HangerEvent
 from shm.store.outbox import (
     acknowledgement_of,
+    raise_alert,
     resolution_of,
     resolve,
     stored_alert,
@@ -36,6 +38,7 @@ from shm.store.tables import (
     deliveries,
     resolutions,
 )
+from shm.values import Alert
 
 _is_open = acknowledgements.c.id.is_(None) & resolutions.c.id.is_(None)
 """Of `stored_alerts`, and of whatever joins both tables: what `StoredAlert.is_open` says."""
@@ -114,6 +117,17 @@ class Alerts(Deliveries):
                 insert(connection, acknowledgements, vars(noted))
             note(connection, at, "alert resolved", _said_of(found), why, who)
             return alert_in(connection, alert_id)
+
+    def settle(
+        self, alert: Alert | None, hooks: Sequence[str], ended: Mapping[int, str], at: datetime
+    ) -> None:
+        """Ends alerts of these numbers, for these reasons, and raises one that no test's watch
+        raises."""
+        with self.writing() as connection:
+            for alert_id, why in ended.items():
+                resolve(connection, alert_id, "shm", why, at)
+            if alert is not None:
+                raise_alert(connection, None, None, alert, hooks, at)
 
     def acknowledge(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
         """Notes that somebody has seen an alert to its end; the alert with that note.

@@ -12,12 +12,13 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
+from shm.documents import number
 from shm.errors import DamagedRow, StoreBusy
 from shm.store.audit import note
 from shm.store.blobs import change_from, watch_document, watch_from
 from shm.store.checksums import damaged, decoding, loads, whole
 from shm.store.columns import Number
-from shm.store.database import Repository, insert
+from shm.store.database import insert
 from shm.store.files import in_force
 from shm.store.list_rows import BaselineGlance, WatchedName
 from shm.store.outbox import raise_alert, resolve
@@ -52,12 +53,13 @@ from shm.store.tables import (
     watches,
 )
 from shm.store.trends import baselines_in_numbers
-from shm.values import Alert, Change, Drift, Hanger, Posterior, WatchedTest
+from shm.store.watched_again import WatchedAgain
+from shm.values import NAN, Alert, Change, Drift, Hanger, Posterior, WatchedTest
 
 _DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")
 
 
-class Watch(Repository):
+class Watch(WatchedAgain):
     """What the watch said, and the baselines it compares with."""
 
     def save(
@@ -71,13 +73,14 @@ class Watch(Repository):
         state: KeptWatch | None = None,
         ended: Mapping[int, str] = MappingProxyType({}),
         first: StoredAlert | None = None,
+        level: float = NAN,
     ) -> StoredAlert | None:
         """Keeps what the watch made of a test; the alert where it is a new one, else None.
 
         An alert whose key was raised before is the same standing condition and is not raised again.
         `state` is what the watch goes on from at the next test. `ended` are the numbers of alerts
         whose condition this test ends, with the reason; `first` is the alert of a stream that has
-        told what this test shows, and which the test joins.
+        told what this test shows, and which the test joins; from `level` on an alert was wanted.
         """
         with self.writing() as connection:
             if not all_at(connection, [test], Stage.UPDATED):
@@ -87,20 +90,13 @@ class Watch(Repository):
             raised = None
             if alert is not None:
                 raised = raise_alert(connection, test.id, baseline.id, alert, hooks, at)
-            values = _watch_values(found, test, baseline, raised, first)
-            insert(connection, watches, values)
+            insert(connection, watches, _watch_values(found, test, baseline, raised, first, level))
             if state is not None:
                 _keep_state(connection, baseline, state)
             for alert_id, why in ended.items():
                 resolve(connection, alert_id, "shm", why, at)
             move(connection, [test], Stage.WATCHED, at)
             return raised
-
-    def pass_over(self, test: StoredTest, at: datetime) -> None:
-        """A test within a maintenance window is compared with nothing."""
-        with self.writing() as connection:
-            if all_at(connection, [test], Stage.UPDATED):
-                move(connection, [test], Stage.WATCHED, at)
 
     def state(self, baseline: Baseline) -> KeptWatch | None:
         """What the watch goes on from at the next test that is compared with a baseline."""
@@ -367,11 +363,13 @@ def _watch_values(
     baseline: Baseline,
     raised: StoredAlert | None,
     first: StoredAlert | None,
+    level: float,
 ) -> dict[str, Any]:
     # Names its shifts and its alert, so that one that is gone is missed.
     told = {
         "shifts": [drift.quantity for drift in found.drifts],
         "alert": None if raised is None else raised.id,
+        "alert_probability": level,
         **({} if first is None else {"joins": first.id}),
     }
     return {
@@ -386,8 +384,10 @@ def _watch_values(
 
 def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
     with decoding(watches, row, row.hanger):
-        found = watch_from(loads(row.document), row.test, row.time, shifts)
-        return StoredWatch(row.id, row.hanger, row.baseline_id, found)
+        document = loads(row.document)
+        found = watch_from(document, row.test, row.time, shifts)
+        level = number(document.get("alert_probability"))
+        return StoredWatch(row.id, row.hanger, row.baseline_id, found, level)
 
 
 def _called(hanger: int | None = None) -> tuple[sa.ColumnElement[bool], ...]:

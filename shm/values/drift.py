@@ -13,7 +13,7 @@ from shm.values.posterior import Averaged
 from shm.values.rounding import NINETY_PERCENT, rounded_percent
 
 if TYPE_CHECKING:
-    from shm.values import ModalTest
+    from shm.values import Hanger, ModalTest
 
 End = Literal["deck", "arch"]
 
@@ -70,6 +70,16 @@ def is_frequency(quantity: str) -> bool:
 def is_ratio(quantity: str) -> bool:
     """Whether shifts of a quantity are fractions of it: of the tension and frequencies they are."""
     return kind_of(quantity).is_ratio
+
+
+def threshold_of(quantity: str, hanger: Hanger) -> float:
+    """The shift of which its owner must know: a fraction of the tension, or decades."""
+    limits = hanger.thresholds
+    if quantity == TENSION:
+        return limits.tension_shift_fraction
+    if is_frequency(quantity):  # it goes with the root of a stiffness, as with a tension's
+        return limits.tension_shift_fraction / 2
+    return limits.stiffness_shift_decades
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,6 +341,7 @@ AlertKind = Literal[
     "check the baseline",
     "gap",
     "held",
+    "limit",
     "test",
     "resolved",
 ]

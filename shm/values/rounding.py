@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from shm.values.force_units import MOST_DECIMALS
+
 NINETY_PERCENT = 1.645  # sds on either side that hold 90 % of a normal law
 
 
@@ -16,6 +18,14 @@ def rounded(value: float, half: float, sign: str = "", most_decimals: int = 6) -
     value, half = round(value, places), round(half, places)
     shown = max(places, 0)
     return f"{value:{sign}z.{shown}f} ± {half:.{shown}f}"
+
+
+def to_two_digits(value: float, half: float, sign: str = "") -> str:
+    """`650`, `8.2`: a value to two significant digits of its interval's half width."""
+    if not (math.isfinite(half) and half > 0):
+        return f"{value:{sign}z.1f}"
+    places = min(MOST_DECIMALS, 1 - math.floor(math.log10(half)))
+    return f"{round(value, places):{sign}z.{max(places, 0)}f}"
 
 
 def rounded_percent(fraction: float, half: float, sign: str = "") -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from shm.values.force_units import MOST_DECIMALS, ForceUnit, force_unit
 from shm.values.hanger import Limits
 from shm.values.posterior import Averaged, Posterior, Selection
+from shm.values.rounding import to_two_digits
 
 _LEAST_SAID = 0.01  # ten of a thousand draws: they tell a smaller probability to no digit
 
@@ -83,11 +84,13 @@ def stated(averaged: Averaged, unit: ForceUnit | None = None) -> StatedTension:
     tension_n, sd_n = averaged.tension_n, averaged.repeatability_sd_n
     unit = unit or force_unit(tension_n.mean)
     low, mean, high = (unit.of(n) for n in (tension_n.q05, tension_n.mean, tension_n.q95))
-    places = decimals((high - low) / 2)
+    low_said, said, high_said = (
+        to_two_digits(each, (high - low) / 2) for each in (low, mean, high)
+    )
     repeats = unit.of(sd_n)
     return StatedTension(
-        f"{mean:.{places}f} {unit.name}",
-        f"{low:.{places}f} to {high:.{places}f} {unit.name}",
+        f"{said} {unit.name}",
+        f"{low_said} to {high_said} {unit.name}",
         f"{repeats:.{decimals(repeats)}f} {unit.name}" if math.isfinite(repeats) else "",
         _probability(averaged.probability_above_limit),
         _probability(averaged.probability_slack),

@@ -25,12 +25,13 @@ from typing import Literal
 import numpy as np
 
 from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, WatchedQuantity
+from shm.values.drift import threshold_of
 from shm.watch.alert_text import message_of_agreeing, short_name
 from shm.watch.options import WatchOptions
 from shm.watch.persistence import LARGE
 from shm.watch.quantities import shift_of, value_at
 from shm.watch.readings import Reader
-from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture, threshold_of
+from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
 
 CLEAR = 3.0
 """Standard deviations from the baseline, temperature and scatter included: one good test in 740
@@ -178,7 +179,7 @@ def _shown(
     """What a test shows of each quantity; None where that is not clear, or below its threshold."""
     found: list[Shown | None] = []
     for quantity, each in zip(reader.quantities, read_alone(reader, test, options), strict=True):
-        is_beyond = abs(shift_of(quantity, each.mean)) >= threshold_of(quantity, hanger)
+        is_beyond = abs(shift_of(quantity, each.mean)) >= threshold_of(quantity.name, hanger)
         is_clear = abs(each.mean) >= CLEAR * math.sqrt(each.variance)
         is_felt = each.moves >= _LEAST
         found.append(each if is_beyond and is_clear and is_felt else None)
@@ -247,7 +248,8 @@ def drift_of(
     """What tests `read` of a quantity, in the coordinate, as a shift from the baseline."""
     alone = np.ones(1)
     at = alone * read.mean, alone * read.sd
-    shift, threshold = shift_of_mixture(quantity, alone, *at), threshold_of(quantity, hanger)
+    shift = shift_of_mixture(quantity, alone, *at)
+    threshold = threshold_of(quantity.name, hanger)
     return Drift(
         hanger=hanger.id,
         test=newest[0].id,

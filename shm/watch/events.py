@@ -46,6 +46,10 @@ EVENT_KINDS = {
 """A small vocabulary: each word decides which alerts end; `--why` tells the rest."""
 
 
+_OF_OTHERS = {"gap", "held", "limit"}
+"""Alerts that are not against a baseline's tension and ends: no new baseline ends them."""
+
+
 def is_explained(alert: Alert, kind: EventKind, since: datetime) -> bool:
     """Whether an event of that time explains an alert of the watch.
 
@@ -56,11 +60,11 @@ def is_explained(alert: Alert, kind: EventKind, since: datetime) -> bool:
     if not kind.is_remedy and began_by < since:
         return False
     if kind.accepts:
-        return not {"gap", "held"} & set(alert.kinds)
+        return not _OF_OTHERS & set(alert.kinds)
     if "beyond threshold" in alert.kinds:
         return all(_is_of(each.quantity, kind) for each in alert.drifts)
     if alert.change is None:
-        return not {"gap", "held"} & set(alert.kinds)
+        return not _OF_OTHERS & set(alert.kinds)
     groups = probable_groups(alert.change)
     return any(all(_is_of(each.quantity, kind) for each in group) for group in groups)
 

@@ -167,7 +167,7 @@ def watch_newest_frequencies(
     alert = None
     for dated in later:
         now, alert = watch.after(now, dated)
-    return Newest(now.last, alert, watch.keep(now))
+    return Newest(now.last, alert, watch.keep(now), frozenset(now.told.beyond))
 
 
 def measured_levels(tests: Sequence[ModalTest], seed: int) -> Posterior:

@@ -38,7 +38,7 @@ def _words(mistaken: Sequence[RepeatedMistake]) -> tuple[str, str, str]:
 
 def _of_misfit(since: str) -> tuple[str, str, str]:
     return (
-        f"its modes have not fitted the baseline's since {since}, too many to be misnumbered.",
+        f"since {since} more of its modes miss the baseline's than one wrong number explains.",
         "At the next planned test, compare how the modes were numbered then and now, and "
         "look for new fittings.",
         "No tension and no end stiffness of the baseline's model explains them, so these tests "

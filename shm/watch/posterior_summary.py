@@ -25,11 +25,12 @@ from shm.values import (
     WatchedQuantity,
     is_ratio,
 )
+from shm.values.drift import threshold_of
 from shm.watch.change_point import LOG_SHARES, SIZES, STEP, Evidence
 from shm.watch.conditions import DAYS_PER_YEAR
 from shm.watch.options import WatchOptions
 from shm.watch.quantities import value_at
-from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture, threshold_of
+from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
 
 _ALIKE_NATS = 3.0  # 20 to 1: what is as likely is named beside
 _TAIL = 0.05  # 90 % lie between
@@ -316,7 +317,7 @@ def drifted(
             chosen = np.ones(1), np.zeros((1, q)), np.full((1, q), sd)
         shift = shift_of_mixture(quantity, chosen[0], chosen[1][:, j], chosen[2][:, j])
         moving = (all_sds[:, j] > 0) | (all_means[:, j] != 0)
-        threshold = threshold_of(quantity, subject.hanger)
+        threshold = threshold_of(quantity.name, subject.hanger)
         chance = beyond(
             quantity,
             (told * all_weights)[moving],

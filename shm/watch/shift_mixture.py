@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.values import TENSION, FloatArray, Hanger, WatchedQuantity, is_frequency, is_ratio
+from shm.values import FloatArray, WatchedQuantity, is_ratio
 from shm.watch.quantities import coordinate_of, shift_of
 
 # Technical: exact for polynomials of degree 13.
@@ -73,13 +73,3 @@ def _coordinate(quantity: WatchedQuantity, shift: float) -> float:
     if not min(quantity.values) < value < max(quantity.values):
         return math.copysign(math.inf, shift)
     return coordinate_of(quantity, value)
-
-
-def threshold_of(quantity: WatchedQuantity, hanger: Hanger) -> float:
-    """The shift of which its owner must know: a fraction of the tension, or decades."""
-    limits = hanger.thresholds
-    if quantity.name == TENSION:
-        return limits.tension_shift_fraction
-    if is_frequency(quantity.name):  # it goes with the root of a stiffness, as with a tension's
-        return limits.tension_shift_fraction / 2
-    return limits.stiffness_shift_decades

@@ -34,7 +34,7 @@ from shm.values import (
     RepeatedMistake,
     WatchedTest,
 )
-from shm.watch.agreement import agreement, way_of
+from shm.watch.agreement import Way, agreement, way_of
 from shm.watch.alert_state import AlertState, conditions, still, with_beyond
 from shm.watch.alert_text import message_of, message_of_odd, short_name
 from shm.watch.change_words import CAUSES, suspects
@@ -118,11 +118,15 @@ def kept_of(baseline: Posterior, tests: Sequence[DatedTest]) -> tuple[DatedTest,
 
 @dataclass(frozen=True, eq=False)
 class Newest:
-    """What the watch says after the newest test, the alert it calls for, and what to keep."""
+    """What the watch says after the newest test, the alert it calls for, and what to keep.
+
+    `beyond` is what stands beyond its threshold, and the way that it went.
+    """
 
     test: WatchedTest
     alert: Alert | None
     kept: bytes
+    beyond: frozenset[tuple[str, Way]]
 
 
 def watch_newest(
@@ -174,7 +178,8 @@ def watch_newest(
             two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
             alert, told = agreed, with_beyond(told, agreed.drifts, agreed.time)
             told = replace(told, agreed=told.agreed | two_told)
-    return Newest(found, alert, replace(state, told=told.to_text()).to_bytes())
+    kept = replace(state, told=told.to_text()).to_bytes()
+    return Newest(found, alert, kept, frozenset(told.beyond))
 
 
 def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> WatchOptions:

@@ -15,6 +15,7 @@ from shm.store.people import Role
 from shm_cli.main import run
 from shm_daemon.doctor import examine
 from tests.daemon.test_web_people import PASSWORD, sign_in
+from tests.helpers.outboxes import make_baseline, raise_alerts
 from tests.helpers.web_servers import served
 
 LEVEL = "hanger.3.thresholds.alert_probability"
@@ -81,6 +82,18 @@ def test_who_saves_on_what_another_has_changed_meanwhile_is_shown_it_and_overwri
     assert put(browser, LEVEL, "0.7").status_code == 303
     with workspace.store() as store:
         assert store.audit.list_rows(limit=1)[0].detail == "from 0.9 to 0.7"
+
+
+def test_the_page_says_whether_stored_tests_are_judged_with_what_it_shows(
+    browser: httpx.Client, workspace: Workspace
+) -> None:
+    make_baseline(workspace)
+    raise_alerts(workspace, [1], [])
+    shown = browser.get("/settings?hanger=3").text
+    assert "The stored tests are judged with the thresholds shown here." in shown
+    put(browser, "hanger.3.thresholds.tension_shift_fraction", "0.06")
+    shown = browser.get("/settings?hanger=3").text
+    assert "judged again as soon as the daemon runs: tension 0.06 instead of 0.05." in shown
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import pytest
 
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
-from shm.pipeline.ending import SHM, told_by_other, why_over
+from shm.pipeline.ending import SHM, is_told, told_by_other, why_over
 from shm.report.hanger_status import Status
 from shm.store import Stage, StoredAlert, Workspace
 from shm.store.missing import missing_rows
@@ -291,3 +291,20 @@ def test_that_a_test_is_to_be_repeated_ends_with_one_that_does_not_show_the_same
     with bridge.store() as store:
         assert store.alerts.list_all()[0].resolution is not None
         assert hanger_lines(bridge, store, utc_now())[0].status is Status.STEADY
+
+
+def test_a_loss_that_a_test_done_again_calls_by_another_rule_is_told_already() -> None:
+    told = replace(
+        an_alert("a", "t2"),
+        drifts=(a_drift(),),
+        kinds=("beyond threshold", "sudden change"),
+        change=a_change(),
+    )
+    later = replace(told, key="b", time=told.time + timedelta(days=9))
+    assert is_told(replace(later, kinds=("sudden change",)), [told])
+    assert is_told(replace(later, kinds=("beyond threshold",)), [told])
+    assert is_told(later, [told])
+    # What is new: that it is beyond its threshold; or a change that began after the first.
+    assert not is_told(later, [replace(told, kinds=("sudden change",))])
+    began = replace(a_change(), began_by=told.time + timedelta(days=2))
+    assert not is_told(replace(later, kinds=("sudden change",), change=began), [told])

@@ -8,6 +8,9 @@ import pytest
 
 from shm.report import formatting
 from shm.report.intervals import Interval
+from shm.values.force_units import force_unit
+
+KILONEWTON = force_unit(1e5)
 
 
 @pytest.mark.parametrize(
@@ -22,6 +25,12 @@ def test_an_interval_shows_as_many_decimals_as_its_width_deserves(
     interval: Interval, expected: str
 ) -> None:
     assert formatting.with_interval(interval, "kN") == expected
+
+
+def test_a_wide_interval_is_rounded_alike_in_tables_and_sentences() -> None:
+    wide = Interval(469.3e3, 317.2e3, 711.4e3)
+    assert formatting.with_half(wide, KILONEWTON) == "470 ± 200 kN"
+    assert formatting.tension(wide, KILONEWTON) == "470 kN (90 % interval 320 to 710 kN)"
 
 
 def test_a_width_that_is_not_known_gets_one_decimal() -> None:

@@ -105,7 +105,7 @@ def test_sampling_that_has_not_settled_is_said(season: HangerReport) -> None:
 def test_an_interval_wider_than_the_threshold_is_said(season: HangerReport, hanger: Hanger) -> None:
     sharp = replace(hanger, thresholds=Thresholds(tension_shift_fraction=0.01))
     assert any(
-        "wider than the threshold of 1 %" in t for t in advice(replace(season, hanger=sharp))
+        "no better than the threshold of 1 %" in t for t in advice(replace(season, hanger=sharp))
     )
 
 
@@ -141,6 +141,15 @@ def test_one_mode_of_many_may_lie_outside_by_chance(season: HangerReport) -> Non
 def test_more_modes_outside_than_chance_has_are_left_unexplained(season: HangerReport) -> None:
     told = summary(misfitted(season, [0.01] * 6 + [0.0] * 6, sd=0.001))
     assert "6 modes lie outside the 90 % interval: the model does not explain these" in told
+
+
+def test_a_class_that_misses_the_modes_is_not_said_to_explain_them(season: HangerReport) -> None:
+    fitted = misfitted(season, [0.0] * 12, sd=0.002)
+    told = summary(
+        replace(fitted, posterior=replace(fitted.posterior, misfit_percent=1.2)),
+    )
+    assert "It misses 12 measured frequencies by 1.2 % (root mean square)" in told
+    assert "explains what was measured" not in told
 
 
 def test_wide_intervals_are_not_praised_for_holding_a_large_misfit(season: HangerReport) -> None:

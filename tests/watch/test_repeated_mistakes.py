@@ -80,7 +80,7 @@ def test_tests_that_do_not_fit_the_baseline_are_one_notice_which_names_no_mode()
         alerts += [(number, alert)] if alert else []
     ((number, alert),) = alerts
     assert number == 2
-    assert "too many to be misnumbered" in alert.message
+    assert "more of its modes miss the baseline's than one wrong number" in alert.message
     assert "transverse" not in alert.message
 
 

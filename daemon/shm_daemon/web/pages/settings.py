@@ -15,6 +15,7 @@ from shm.bridge import Bridge
 from shm.bridge.changes import HANGER_KEYS, HOOK_KEYS, SETTING_KEYS
 from shm.errors import BadInput, UsageError
 from shm.pipeline import utc_now
+from shm.pipeline.rejudging import differences
 from shm.report import formatting
 from shm.settings import TABLE, Settings, load_settings
 from shm.store.changed_settings import ChangedSetting
@@ -113,7 +114,7 @@ def _page(
 ) -> Response:
     workspace = site.workspace
     bridge, changed = workspace.bridge, site.store.settings.list_current()
-    known = [each for each in bridge.watched if each.id == hanger]
+    known, judged = [each for each in bridge.watched if each.id == hanger], ""
     groups = [
         ("Bridge", "bridge", list(_of_settings(bridge, workspace.settings, changed))),
         ("Hooks", "hooks", list(_of_hooks(bridge, changed))),
@@ -121,6 +122,7 @@ def _page(
     for each in known:
         name = formatting.hanger_name(each.id, each.name)
         groups.insert(0, (name, "hanger", list(_of_hanger(bridge, each, changed))))
+        judged = _judged(site, each)
     return page(
         request,
         "settings.html.j2",
@@ -129,8 +131,19 @@ def _page(
         groups=groups,
         hangers=[(h.id, formatting.hanger_name(h.id, h.name)) for h in bridge.watched],
         hanger=hanger,
+        judged=judged,
         changed=tuple(changed.values()),
     )
+
+
+def _judged(site: Site, hanger: Hanger) -> str:
+    """Whether the stored tests of a hanger are judged with what is in force."""
+    latest = site.store.watch.latest().get(hanger.id)
+    if latest is None:
+        return ""
+    if others := "; ".join(differences(latest, hanger, site.workspace.settings)):
+        return f"The stored tests are judged again as soon as the daemon runs: {others}."
+    return "The stored tests are judged with the thresholds shown here."
 
 
 def _all_rows(bridge: Bridge, settings: Settings) -> Iterator[_Row]:

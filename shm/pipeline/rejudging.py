@@ -1,0 +1,226 @@
+"""What a watched test raises and ends; and tests that are judged again, since what their owner
+calls much has changed.
+
+A threshold judges the stored tests too: at once they are compared with their baseline again. A loss
+that only the new one calls is raised; an alert that no test is beyond any more is closed, and says
+why. What was told before is not told again.
+
+Nothing here imports what computes, so that the daemon itself begins quickly and stays small.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+from math import isnan
+
+from shm.errors import DamagedRow, NothingThere
+from shm.pipeline.ending import (
+    BEYOND,
+    OF_CHANGES,
+    SHM,
+    gap_stands,
+    is_told,
+    message_anew,
+    seen_again,
+    tells,
+    why_over,
+)
+from shm.settings import Settings
+from shm.store import Baseline, Store, StoredAlert, StoredTest, Workspace
+from shm.store.rows import StoredWatch
+from shm.values import Alert, Hanger, WatchedTest
+from shm.values.drift import threshold_of
+
+_RECENT_TESTS = 64  # technical: two visits of so many tests each are none of hammer tests
+_CLOSED = "judged again with the thresholds in force"
+
+log = logging.getLogger(__name__)
+
+
+def judge_changed(workspace: Workspace, store: Store, at: datetime) -> None:
+    """Sends back the tests of each hanger whose latest was judged with other thresholds."""
+    latest = _latest(store, at)
+    for hanger in workspace.bridge.watched:
+        if hanger.id not in latest:
+            continue
+        why = "; ".join(differences(latest[hanger.id], hanger, workspace.settings))
+        if why:
+            baseline_id = latest[hanger.id].baseline_id
+            count = store.watch.judge_again(hanger.id, baseline_id, why, at)
+            log.info("hanger %d: %d tests are judged again: %s", hanger.id, count, why)
+
+
+def differences(judged: StoredWatch, hanger: Hanger, settings: Settings) -> Iterator[str]:
+    """Which thresholds in force are others than those that a test was judged with."""
+    limits, watched = hanger.thresholds, judged.watched
+    own = limits.false_call_years
+    pairs = {
+        **{
+            each.quantity: (each.threshold, threshold_of(each.quantity, hanger))
+            for each in watched.drifts
+        },
+        "alert probability": (judged.alert_probability, limits.alert_probability),
+        "years between false alarms": (
+            watched.change.limit_years,
+            settings.false_call_years if own is None else own,
+        ),
+    }
+    for name, (then, now) in pairs.items():
+        if then != now and not isnan(then):
+            yield f"{name} {now:.6g} instead of {then:.6g}"
+
+
+def _latest(store: Store, at: datetime) -> dict[int, StoredWatch]:
+    """By hanger, but for those of which a row is damaged: that is noted, and they wait."""
+    damaged: list[int] = []
+    while True:
+        try:
+            return store.watch.latest(damaged)
+        except DamagedRow as error:
+            store.upkeep.note_damage(error, at)
+            if error.hanger is None or error.hanger in damaged:
+                return {}
+            damaged.append(error.hanger)
+
+
+def settled(
+    store: Store,
+    hanger: Hanger,
+    baseline: Baseline,
+    test: StoredTest,
+    found: tuple[WatchedTest, Alert | None, frozenset[tuple[str, str]]],
+) -> tuple[dict[int, str], Alert | None]:
+    """Which alerts a test ends, and why; and the one to raise: that of the watch, unless the same
+    was told, or else a resolved one that is seen again.
+
+    `found` is what the watch says, its alert, and what stands beyond its threshold. Of tests that
+    are done again only the last can end anything: those between are of the past.
+    """
+    watched, alert, beyond = found
+    standing = store.alerts.list_all(hanger.id, baseline.id, standing=True)
+    resolved = store.alerts.list_all(hanger.id, baseline.id, standing=False)
+    is_again = store.watch.is_again(test, baseline)
+    if alert and is_again:
+        said = f"{alert.message} Raised when the stored tests were judged again."
+        alert = replace(alert, message=said)
+    if not standing and not resolved:
+        return {}, alert
+    closed = [each for each in resolved if _is_closed(each)]
+    resolved = tuple(each for each in resolved if not _is_closed(each))
+    if alert and is_again:
+        alert = _with_own_key(alert, closed)
+    if is_again and not store.watch.is_last(test, baseline):
+        known = [*standing, *_of_the_past(alert, resolved)]
+        alert = alert and _news(alert, known)
+        return _replaced(alert, standing), alert
+    before = [each.watched for each in store.watch.list_recent(baseline, _RECENT_TESTS)]
+    tests = sorted([*before, watched], key=lambda each: each.time)
+
+    def stands(test: WatchedTest) -> bool:
+        try:
+            current = store.posteriors.get(hanger.id, test.test)
+        except NothingThere:  # of a class that was dropped: not known to have ended
+            return True
+        return gap_stands(baseline.posterior, current)
+
+    ended = {
+        each.id: why
+        for each in standing
+        if (why := why_over(each.alert, tests, hanger, gap_stands=stands))
+        or (is_again and (why := _why_closed(each.alert, tests, hanger, beyond)))
+    }
+    if is_again and any(each.change.called for each in tests):
+        alert = alert or _detected_still(standing, ended, watched, hanger)
+    # The gap's alert has one key for good: what was raised before is raised no second time.
+    if alert and alert.key not in {each.alert.key for each in (*standing, *resolved)}:
+        left = [each for each in standing if each.id not in ended]
+        past = _of_the_past(alert, resolved) if is_again else []
+        alert = _news(alert, [*left, *past])
+        return ended | (_replaced(alert, standing) if is_again else {}), alert
+    return ended, seen_again(resolved, standing, tests, hanger, gap_stands=stands) or alert
+
+
+def _news(alert: Alert, known: Sequence[StoredAlert]) -> Alert | None:
+    told = [each.alert for each in known]
+    return None if is_told(alert, told) else alert
+
+
+def _of_the_past(alert: Alert | None, resolved: Sequence[StoredAlert]) -> list[StoredAlert]:
+    """Resolved alerts that a test done again must not raise anew: a person has looked into it
+    since, or it was told of that test or a later one and has ended."""
+    return [
+        each
+        for each in resolved
+        if alert and (end := each.resolution)
+        if alert.time <= (each.alert.time if end.who == SHM else end.at)
+    ]
+
+
+def _why_closed(
+    alert: Alert,
+    tests: Sequence[WatchedTest],
+    hanger: Hanger,
+    beyond: frozenset[tuple[str, str]],
+) -> str:
+    """Why an alert would not have been raised by what is in force now; empty where it would."""
+    kinds = set(alert.kinds)
+    if not kinds <= OF_CHANGES:
+        return ""
+    if BEYOND not in kinds and any(each.change.called for each in tests):
+        return ""
+    told = {(each.quantity, "down" if each.shift_mean < 0 else "up") for each in alert.drifts}
+    if BEYOND in kinds and told & beyond:
+        return ""
+    limits = hanger.thresholds
+    return (
+        f"{_CLOSED} (tension {100 * limits.tension_shift_fraction:.3g} %, end stiffness "
+        f"{limits.stiffness_shift_decades:.3g} decades, probability "
+        f"{limits.alert_probability:.3g}): its tests are not beyond them"
+    )
+
+
+def _is_closed(stored: StoredAlert) -> bool:
+    """Whether other thresholds have closed an alert, not the hanger's tests or a person."""
+    return stored.resolution is not None and stored.resolution.why.startswith(_CLOSED)
+
+
+def _with_own_key(alert: Alert, closed: Sequence[StoredAlert]) -> Alert:
+    """An alert that other thresholds have closed may be raised again: under another key."""
+    same = [each.id for each in closed if each.alert.key.partition(":again-")[0] == alert.key]
+    return replace(alert, key=f"{alert.key}:again-{max(same)}") if same else alert
+
+
+def _replaced(alert: Alert | None, standing: Sequence[StoredAlert]) -> dict[int, str]:
+    """What stands of a change that is now raised as beyond its threshold: one alert a loss."""
+    if alert is None or BEYOND not in alert.kinds:
+        return {}
+    told = [each for each in standing if set(each.alert.kinds) <= OF_CHANGES - {BEYOND}]
+    why = f"{_CLOSED}: another alert tells that it is beyond its threshold"
+    return {each.id: why for each in told if tells(each.alert, alert.change)}
+
+
+def _detected_still(
+    standing: Sequence[StoredAlert], ended: Mapping[int, str], test: WatchedTest, hanger: Hanger
+) -> Alert | None:
+    """What is left of an alert that is not beyond its threshold any more: the change."""
+    for stored in standing:
+        alert, why = stored.alert, ended.get(stored.id, "")
+        if not why.startswith(_CLOSED) or alert.change is None or set(alert.kinds) == {BEYOND}:
+            continue
+        if any(tells(each.alert, alert.change) for each in standing if each.id not in ended):
+            continue
+        told = {each.quantity for each in alert.drifts}
+        drifts = tuple(each for each in test.drifts if each.quantity in told)
+        return replace(
+            alert,
+            key=f"{alert.key.partition(':again-')[0]}:again-{stored.id}",
+            test=test.test,
+            time=test.time,
+            drifts=drifts,
+            kinds=tuple(each for each in alert.kinds if each != BEYOND),
+            message=f"{message_anew(alert, drifts, test, hanger)} It replaces alert {stored.id}.",
+        )
+    return None

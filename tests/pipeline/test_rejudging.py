@@ -1,0 +1,85 @@
+"""A threshold judges the stored tests at once; one that is put back takes back its alert."""
+
+from __future__ import annotations
+
+import pytest
+
+from shm.store import Stage, StoredAlert, Workspace
+from shm.store.missing import missing_rows
+from tests.helpers.flows import Clock, Postman, a_flow, ingest
+from tests.helpers.workspaces import write_loss, write_slow_loss
+
+KEY = "hanger.3.thresholds.tension_shift_fraction"
+
+
+def changed(
+    workspace: Workspace, key: str, value: float | None, postman: Postman | None = None
+) -> tuple[StoredAlert, ...]:
+    """The alerts of changes after a setting has changed and the flow has gone on with it."""
+    with a_flow(workspace, clock=Clock(), notifier=postman) as flow:
+        workspace.change_setting(flow.store, key, value, flow.clock(), "Meier")
+        flow.use(workspace.reopened())
+        flow.drain()
+        with flow.store.engine.connect() as connection:
+            assert missing_rows(connection) == ()
+        counts = flow.store.recordings.stage_counts()
+        assert sum(counts.values()) == counts[Stage.DONE]
+        return tuple(
+            each
+            for each in flow.store.alerts.list_all()
+            if "repeat the test" not in each.alert.kinds
+        )
+
+
+@pytest.mark.parametrize("write", [write_loss, write_slow_loss])
+def test_a_lower_threshold_raises_at_once_and_put_back_closes_it(
+    workspace: Workspace, write: object
+) -> None:
+    assert callable(write)
+    write(workspace.spool, workspace)
+    with workspace.store() as store:
+        workspace.change_setting(store, KEY, 0.5, Clock()(), "Meier")
+    ingest(workspace.reopened())
+    postman = Postman()
+    before = {each.id for each in changed(workspace, KEY, 0.45) if not each.resolution}
+    *_, raised = changed(workspace, KEY, 0.05, postman)
+    assert raised.id not in before
+    assert "beyond threshold" in raised.alert.kinds
+    assert "judged again" in raised.alert.message
+    assert ("mail", raised.alert.key) in postman.told
+    after = changed(workspace, KEY, 0.5)
+    closed = {each.id: each.resolution for each in after}[raised.id]
+    assert closed is not None
+    assert closed.why.startswith("judged again with the thresholds in force (tension 50 %")
+    again = changed(workspace, KEY, 0.05)
+    standing = [each for each in again if not each.resolution and each.id not in before]
+    assert len(standing) == 1
+
+
+def test_of_a_loss_that_is_not_beyond_any_more_the_change_is_left(workspace: Workspace) -> None:
+    write_slow_loss(workspace.spool, workspace)
+    ingest(workspace)
+    first, left = changed(workspace, KEY, 0.3)
+    assert first.resolution is not None
+    assert left.resolution is None
+    assert left.alert.kinds == ("slow drift",)
+    assert "threshold" not in left.alert.message.partition("Details")[0]
+    for value, kinds in ((0.05, ("beyond threshold", "slow drift")), (0.3, ("slow drift",))):
+        (one,) = (each for each in changed(workspace, KEY, value) if not each.resolution)
+        assert one.alert.kinds == kinds
+
+
+def test_an_alert_that_the_new_threshold_calls_too_is_raised_once(workspace: Workspace) -> None:
+    write_slow_loss(workspace.spool, workspace)
+    ingest(workspace)
+    for value in (0.04, 0.06, 0.03):
+        (one,) = changed(workspace, KEY, value)
+        assert one.resolution is None
+    (one,) = changed(workspace, "settings.false_call_years", 90.0)
+    with a_flow(workspace.reopened()) as flow:
+        (judged,) = flow.store.watch.latest().values()
+        assert judged.watched.change.limit_years == 90.0
+        told = [
+            each for each in flow.store.audit.list_rows() if each.action == "tests judged again"
+        ]
+    assert len(told) == 4
