@@ -13,7 +13,6 @@ from shm.models.effects import EFFECTS
 from shm.simulate import CampaignPlan, HangerState, campaign
 from tests.helpers.hangers import HANGER_3
 
-
 SIMULATED = set(EFFECTS) - {"load_scale"}  # no simulated campaign reads a tension
 
 
