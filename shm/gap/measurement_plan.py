@@ -2,7 +2,7 @@
 
 What every explanation foresees of all measurements that could be made is one normal distribution
 of their data, given the old ones (`shm.gap.next_measurement`); so what a second measurement adds to
-a first one is counted once. Something unknown foresees what was left over either again in every
+a first one is counted once. Something unknown foresees that what was left over comes again in every
 test, or anew in each. Data drawn from each explanation by its probability tell how far, on average,
 the true one would get ahead of all others together.
 """
@@ -11,20 +11,35 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 import scipy
 
 from shm.gap.attribution import WITHIN_REACH, Attribution, Explanation
-from shm.gap.contract import Fit, Hypothesis
-from shm.gap.discrepancy import LARGEST_SHAPE
+from shm.gap.contract import Design, Fit, Hypothesis
+from shm.gap.discrepancy import (
+    FREQUENCY_SIZES,
+    LARGEST_FREQUENCY,
+    LARGEST_SHAPE,
+    SMOOTH_ORDERS,
+    sizes_of,
+)
 from shm.gap.experiment_design import Proposal, lift_off, proposals, together
 from shm.gap.model_probabilities import log_prior
-from shm.gap.next_measurement import NO_GAP, Errors, Foresight, foreseen, new_sensors
+from shm.gap.next_measurement import (
+    NO_GAP,
+    Errors,
+    Foresight,
+    Remainder,
+    foreseen,
+    new_sensors,
+    same_modes,
+)
 from shm.gap.problem import GapProblem
 from shm.inference.priors import UNKNOWN_READING_SD
 from shm.values import MEASUREMENT_HOURS, NAN, FloatArray, IntArray
-from shm.values.diagnosis import parted
+from shm.values.diagnosis import joined, parted
 
 UNKNOWN = "something unknown"
 ENOUGH = 0.95
@@ -32,7 +47,7 @@ ENOUGH = 0.95
 # Judgement: a fifth of a unit of log odds turns 0.5 into 0.55, and a list that a person reads.
 _WORTH_IT, _MOST_STEPS = 0.2, 6
 # Technical: a mean log odds to some 0.1; explanations and places of one that are still in the race.
-_DRAWS, _CONTENDERS, _PLACES, _AS_LIKELY = 64, 8, 3, 3.0
+_DRAWS, _CONTENDERS, _PLACES, _WAYS, _AS_LIKELY = 32, 8, 3, 12, 3.0
 
 
 @dataclass(frozen=True)
@@ -90,15 +105,22 @@ def chances(attribution: Attribution) -> dict[str, float]:
     Without what is kept for causes off the catalogue that pass for one of it, which no measurement
     of a plan changes.
     """
-    names = {NO_GAP: Hypothesis(), UNKNOWN: Hypothesis(flexible=True)}
-    names |= {each.effect: each.best.hypothesis for each in attribution.explanations}
-    none = attribution.baseline.log_evidence
-    ahead = {NO_GAP: 0.0, UNKNOWN: attribution.unexplained.log_evidence - none}
-    ahead |= {each.effect: each.log_bayes_factor for each in attribution.explanations}
     once = dict.fromkeys(attribution.search.variants, 1)
-    weights = np.array([ahead[name] + log_prior(names[name], once) for name in names])
-    share = np.exp(weights - scipy.special.logsumexp(weights))
-    return dict(zip(names, share.tolist(), strict=True))
+    weights = {NO_GAP: log_prior(Hypothesis(), once)}
+    for each in attribution.explanations:
+        weights[each.effect] = each.log_bayes_factor + log_prior(each.best.hypothesis, once)
+    for name, fit in _remainders(attribution).items():
+        ahead = fit.log_evidence - attribution.baseline.log_evidence
+        weights[name] = ahead + log_prior(fit.hypothesis, once)
+    total = scipy.special.logsumexp(list(weights.values()))
+    return {name: float(np.exp(weight - total)) for name, weight in weights.items()}
+
+
+def _remainders(attribution: Attribution) -> dict[str, Fit]:
+    """The fits with a remainder by their names, which say what known cause comes with it."""
+    fits = [each.fit for each in attribution.tried if each.fit and each.fit.hypothesis.flexible]
+    fits.sort(key=lambda fit: fit.log_evidence)
+    return {joined((*fit.hypothesis.names, UNKNOWN)): fit for fit in fits}
 
 
 def log_odds_of(probability: FloatArray | float) -> FloatArray:
@@ -140,15 +162,19 @@ class Race:
         ]
         reading_sd = UNKNOWN_READING_SD if lift_off(problem.design, problem.hanger) else NAN
         errors = Errors.of(problem.observations, fits[0][2][0][1])
+        errors = replace(errors, sensors=problem.sensors_of(design))
         first: Foresight | None = None
         contenders = []
         for name, probability, own in fits:
             ways = []
             for weight, fit in own:
-                for each in _errors(problem, fit, errors) if fit.hypothesis.flexible else (errors,):
+                flexible = fit.hypothesis.flexible
+                for share, each in (
+                    _unknown_ways(problem, fit, errors) if flexible else [(1.0, errors)]
+                ):
                     seen = foreseen(problem, fit, design, each, reading_sd)
                     first = first or seen
-                    ways.append((weight, seen.turned_to(first)))
+                    ways.append((weight * share, seen.turned_to(first)))
             total = sum(weight for weight, _ in ways)
             contenders.append(
                 Contender(name, probability, tuple((w / total, seen) for w, seen in ways))
@@ -218,7 +244,8 @@ def _unknown(fits: _Fits) -> bool:
 
 def _fits(attribution: Attribution) -> list[tuple[str, float, _Fits]]:
     """Name, probability and fits of the explanations in the race, the likeliest first."""
-    own = {NO_GAP: [(1.0, attribution.baseline)], UNKNOWN: [(1.0, attribution.unexplained)]}
+    own = {NO_GAP: [(1.0, attribution.baseline)]}
+    own |= {name: [(1.0, fit)] for name, fit in _remainders(attribution).items()}
     own |= {each.effect: _places(each) for each in attribution.explanations}
     found = [(name, chance, own[name]) for name, chance in chances(attribution).items()]
     able = sorted((each for each in found if each[2]), key=lambda each: -each[1])
@@ -250,12 +277,40 @@ def _offered(problem: GapProblem, fits: Sequence[Fit]) -> tuple[Proposal, ...]:
     return tuple({each.what: each for each in found}.values())
 
 
-def _errors(problem: GapProblem, fit: Fit, usual: Errors) -> tuple[Errors, Errors]:
-    """By which something unknown errs: what it left over comes again, or anew in each test."""
-    count = problem.design.frequencies
-    variance = np.diag(fit.noise.frequency) - usual.sd[:count] ** 2
-    size = float(np.sqrt(np.median(np.maximum(variance, 0.0))))
-    shape = np.maximum(usual.sd[count:], np.sqrt(fit.noise.shape))
-    unseen = float(np.sqrt(usual.unseen_shape * LARGEST_SHAPE))
-    wide = replace(usual, sd=np.append(usual.sd[:count], shape), unseen_shape=unseen)
-    return replace(wide, repeated=max(size, usual.repeated)), replace(wide, by_test=size)
+def _unknown_ways(problem: GapProblem, fit: Fit, usual: Errors) -> list[tuple[float, Errors]]:
+    """By which errors something unknown may go on, with weights.
+
+    As the engine takes it: over orders independent, smooth, or smooth and alike in both planes; the
+    same in every test or new in each; in frequencies alone, or in shapes too. Each counts by what
+    it makes of the data so far.
+    """
+    design, count = problem.design, problem.design.frequencies
+    left = (problem.observations.value - fit.predicted)[:count]
+    wide = replace(
+        usual,
+        sd=np.append(usual.sd[:count], np.maximum(usual.sd[count:], np.sqrt(fit.noise.shape))),
+        unseen_shape=float(np.sqrt(usual.unseen_shape * LARGEST_SHAPE)),
+    )
+    sizes = sizes_of(usual.sd[:count], LARGEST_FREQUENCY, FREQUENCY_SIZES)
+    ways = []
+    for size, pattern, by_test in product(sizes, _PATTERNS, (False, True)):
+        own = replace(usual, remainder=Remainder(float(size), pattern, by_test))
+        among = own.between(design, design, same=True) + problem.repeated.frequency
+        root = np.linalg.cholesky(among + np.diag(usual.sd[:count] ** 2))
+        away = np.linalg.solve(root, left)
+        log = -0.5 * float(away @ away) - float(np.log(np.diag(root)).sum())
+        ways += [(log, own), (log, replace(wide, remainder=own.remainder))]
+    ways.sort(key=lambda way: -way[0])
+    return [(float(np.exp(log - ways[0][0])), own) for log, own in ways[:_WAYS]]
+
+
+def _smooth(one: Design, other: Design) -> FloatArray:
+    return _alike(one, other) * (one.frequency_plane[:, None] == other.frequency_plane)
+
+
+def _alike(one: Design, other: Design) -> FloatArray:
+    apart = (one.frequency_order[:, None] - other.frequency_order) / SMOOTH_ORDERS
+    return np.asarray(np.exp(-(apart**2) / 2))
+
+
+_PATTERNS = (same_modes, _smooth, _alike)

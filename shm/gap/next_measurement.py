@@ -5,7 +5,7 @@ What a fit predicts of data not yet measured, and how far two such predictions d
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -159,26 +159,47 @@ class Foresight:
 class Errors:
     """What the data err by: `sd` (data,) independently, the frequencies by `repeated` as well.
 
-    The latter, a fraction, is the model error, the same for a mode in all tests; one of `by_test`
-    is new in each. Explanations that are compared are given the same errors, lest a difference in
-    errors pass for one in prediction. `unseen_shape` is what shapes err by where none was measured.
+    The latter, a fraction, is the model error, the same for a mode in all tests. Explanations that
+    are compared are given the same errors, lest a difference in errors pass for one in prediction.
+    Something unknown leaves a `remainder` beside them. `unseen_shape` is what shapes err by where
+    none was measured; `sensors` (S, k) are what errors of sensors do to the shapes of a new design,
+    None where those of the old ones stand for them.
     """
 
     sd: FloatArray
     repeated: float
-    by_test: float = 0.0
+    remainder: Remainder | None = None
     unseen_shape: float = _USUAL_SHAPE_SD
+    sensors: FloatArray | None = None
 
     @classmethod
     def of(cls, observations: Observations, fit: Fit) -> Errors:
         known = np.isfinite(observations.sd[: observations.design.frequencies])
         return cls(identification_sd(observations, fit), fit.model_error if known.any() else 0.0)
 
-    def among(self, design: Design) -> FloatArray:
-        """The covariance (F, F) of the frequencies of a design by what repeats in them."""
-        same_test = design.frequency_test[:, None] == design.frequency_test
-        variance = self.repeated**2 + self.by_test**2 * same_test
-        return np.asarray(variance * _same_modes(design, design))
+    def between(self, one: Design, other: Design, *, same: bool) -> FloatArray:
+        """The covariance (F of one, F of the other) by what repeats; of the `same` tests or not."""
+        found = self.repeated**2 * same_modes(one, other)
+        return found if self.remainder is None else found + self.remainder.between(one, other, same)
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What something unknown leaves over: `size` (a fraction), alike over orders as `pattern` says.
+
+    It comes again in every test, or is new in each (`by_test`).
+    """
+
+    size: float
+    pattern: Callable[[Design, Design], FloatArray]
+    by_test: bool
+
+    def between(self, one: Design, other: Design, same: bool) -> FloatArray:
+        """Its covariance (F of one, F of the other); of the `same` tests or not."""
+        found = self.size**2 * self.pattern(one, other)
+        if not self.by_test:
+            return np.asarray(found)
+        return np.asarray(same * found * (one.frequency_test[:, None] == other.frequency_test))
 
 
 def foreseen(
@@ -246,27 +267,29 @@ def _given_the_old(
     """Condition predictions `mean` (data,) and `spread` (data, d) on the errors of the old data."""
     observations = problem.observations
     old, new = observations.design.frequencies, design.frequencies
-    variance = errors.repeated**2
     was, will = problem.repeated, problem.section_of(design)
-    shared = variance * _same_modes(design, observations.design)
-    shared += will @ was.section.T
-    among_old = errors.among(observations.design) + was.frequency
+    shared = errors.between(design, observations.design, same=False) + will @ was.section.T
+    among_old = errors.between(observations.design, observations.design, same=True)
+    among_old += was.frequency
     gain = np.linalg.solve(among_old + np.diag(errors.sd[:old] ** 2), shared.T).T
     mean, spread = mean.copy(), spread.copy()
     mean[:new] += gain @ (observations.value - fit.predicted)[:old]
     spread[:new] -= gain @ (fit.slopes @ _roots(fit.covariance).T)[:old]
-    shapes = np.hypot(errors.sd[old:], np.linalg.norm(was.sensors, axis=1))
+    together = np.linalg.norm(was.sensors, axis=1) if errors.sensors is None else 0.0
+    shapes = np.hypot(errors.sd[old:], together)
     shape_sd = np.median(shapes) if shapes.size else errors.unseen_shape
     counts = [new, design.size - new, len(mean) - design.size]
     sd = np.repeat([np.median(errors.sd[:old]), shape_sd, reading_sd], counts)
     noise = np.diag(sd**2)
     read = problem.readings_of(design)
-    among_new = errors.among(design) + will @ will.T + read @ read.T
+    among_new = errors.between(design, design, same=True) + will @ will.T + read @ read.T
     noise[:new, :new] += among_new - gain @ shared.T
+    if errors.sensors is not None:
+        noise[new : design.size, new : design.size] += errors.sensors @ errors.sensors.T
     return Foresight(design, mean, spread @ spread.T + noise)
 
 
-def _same_modes(one: Design, other: Design) -> FloatArray:
+def same_modes(one: Design, other: Design) -> FloatArray:
     """(F of one, F of the other): 1 where two frequencies are of one plane and order."""
     planes = one.frequency_plane[:, None] == other.frequency_plane
     return np.asarray(planes & (one.frequency_order[:, None] == other.frequency_order), dtype=float)

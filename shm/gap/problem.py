@@ -165,6 +165,12 @@ class GapProblem:
         )
         return np.hstack([section, shared])
 
+    def sensors_of(self, design: Design) -> FloatArray:
+        """What errors of sensors do to the shapes of a new design: loads (S, k)."""
+        near = self._predicted_near(design)
+        as_if = Observations(design, near, np.ones_like(near))
+        return sensor_loads(as_if, self._predicted_near, self.hanger)[0]
+
     def _predicted_near(self, design: Design) -> FloatArray:
         """The data (data,) that the baseline near the measured ones predicts of a design."""
         return np.asarray(self.predict(Hypothesis(), self._near, design)[0])
