@@ -305,7 +305,8 @@ def _unknown_ways(problem: GapProblem, fit: Fit, usual: Errors) -> list[tuple[fl
 
 
 def _smooth(one: Design, other: Design) -> FloatArray:
-    return _alike(one, other) * (one.frequency_plane[:, None] == other.frequency_plane)
+    same_plane = one.frequency_plane[:, None] == other.frequency_plane
+    return np.asarray(_alike(one, other) * same_plane)
 
 
 def _alike(one: Design, other: Design) -> FloatArray:

@@ -202,7 +202,7 @@ class TensionEstimate:
 MEASUREMENT_HOURS: Mapping[str, float] = MappingProxyType(
     {
         "repeat": 1.0,
-        "level": 0.5,
+        "level": 1.0,
         "other plane": 1.0,
         "more modes": 1.0,
         "known mass": 2.0,
