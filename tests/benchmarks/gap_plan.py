@@ -63,7 +63,9 @@ ONE_PLANE = CampaignPlan(PLANES[:1], shapes=False, reality=REALITY)
 class OneTest(CampaignPlan):
     """One test, and a twin that holds the mean temperature at the reference."""
 
-    test: ModalTest = field(default_factory=lambda: ModalTest("t1", (), temperature_c=REFERENCE_C))
+    test: ModalTest = field(
+        default_factory=lambda: ModalTest("t1", (), None, None, REFERENCE_C, 1.0)
+    )
 
     def tests(self, hanger: Hanger) -> tuple[ModalTest, ...]:
         twin = replace(
