@@ -1,6 +1,6 @@
 """Does a planned measurement win the log odds that it promises, and does a plan need fewer tests?
 
-    python tests/benchmarks/gap_plan.py --cases 30 --seed 100 [--causes a,b] [--keep FILE]
+    python tests/benchmarks/gap_plan.py --cases 14 --seed 202 [--causes a,b] [--keep FILE]
 
 Simulated hangers with one cause of the catalogue, of 30 standard deviations in a full campaign,
 first measured as the field does: eight frequencies of one plane. Each is then measured on, test
