@@ -45,6 +45,7 @@ from shm_cli.common import (
     told_doubts,
 )
 from shm_cli.effects import effects
+from shm_cli.gap_plan import plan
 from shm_cli.parameter_types import NewFile
 
 _DEFAULT = GapOptions()
@@ -179,6 +180,7 @@ command.add_command(adopted)
 command.add_command(drop)
 command.add_command(blind)
 command.add_command(effects)
+command.add_command(plan)
 
 
 def _of_workspace(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from pathlib import Path
 from types import MappingProxyType
@@ -18,7 +18,7 @@ from shm.bridge.letterhead import letterhead_of
 from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table
 from shm.errors import BadInput
-from shm.values import Hanger
+from shm.values import MEASUREMENT_HOURS, Hanger
 from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 from shm.values.stream import Stream
 
@@ -37,7 +37,8 @@ class Bridge:
     """What `bridge.toml` says; `built` is None where it does not say.
 
     `structures` are those without a model, of which frequencies alone are watched: a deck, a pylon.
-    Their numbers are none of a hanger. `as_in_file` is the bridge without what the page Settings
+    Their numbers are none of a hanger. `measurement_hours` is what each kind of measurement costs.
+    `as_in_file` is the bridge without what the page Settings
     has changed; None where it has changed nothing.
     """
 
@@ -51,6 +52,7 @@ class Bridge:
     structures: tuple[Hanger, ...] = ()
     streams: tuple[Stream, ...] = ()
     letterhead: Letterhead = NO_LETTERHEAD
+    measurement_hours: Mapping[str, float] = field(default_factory=lambda: MEASUREMENT_HOURS)
     as_in_file: Bridge | None = None
 
     @property
@@ -128,6 +130,7 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
         structures=structures,
         streams=streams,
         letterhead=letterhead_of(document, path),
+        measurement_hours=_hours(document.get("measurement_hours", {}), path),
     )
 
 
@@ -191,6 +194,19 @@ def _built(values: dict[str, Any], path: Path) -> date | None:
         file=path,
         remedy="Write built = 1998-06-01, without quotation marks.",
     )
+
+
+def _hours(values: Any, path: Path) -> dict[str, float]:
+    """What measurements cost, the usual where the table does not say."""
+    if not isinstance(values, dict):
+        raise BadInput(
+            "measurement_hours must be a table.", file=path, remedy="Write [measurement_hours]."
+        )
+    table = Table(values, "[measurement_hours]", path)
+    keys = {re.sub(r"\W", "_", kind): kind for kind in MEASUREMENT_HOURS}
+    table.refuse_unknown(keys)
+    own = {kind: table.positive(key) for key, kind in keys.items() if key in table}
+    return {**MEASUREMENT_HOURS, **own}
 
 
 def _disturbance(values: dict[str, Any], path: Path) -> Disturbance:

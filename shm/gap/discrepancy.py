@@ -52,7 +52,7 @@ def flexible_nodes(
 def _kinds(observations: Observations) -> list[list[tuple[FloatArray, FloatArray]]]:
     """For each kind of remainder the variances that it may add to frequencies and shapes."""
     design = observations.design
-    sizes = _sizes(observations.sd[: design.frequencies], LARGEST_FREQUENCY, FREQUENCY_SIZES)
+    sizes = sizes_of(observations.sd[: design.frequencies], LARGEST_FREQUENCY, FREQUENCY_SIZES)
     shapes = _shape_remainders(observations)
     none = np.zeros((design.frequencies, design.frequencies)), np.zeros(len(design.shape_mode))
     in_frequencies, in_both = [], []
@@ -91,11 +91,12 @@ def _shape_remainders(observations: Observations) -> list[FloatArray]:
     if sd.size == 0:
         return []
     return [
-        np.asarray(size**2 * np.ones_like(sd)) for size in _sizes(sd, LARGEST_SHAPE, SHAPE_SIZES)
+        np.asarray(size**2 * np.ones_like(sd)) for size in sizes_of(sd, LARGEST_SHAPE, SHAPE_SIZES)
     ]
 
 
-def _sizes(sd: FloatArray, largest: float, count: int) -> FloatArray:
+def sizes_of(sd: FloatArray, largest: float, count: int) -> FloatArray:
+    """Sizes that a remainder may have, from what drowns in the errors."""
     known = sd[np.isfinite(sd)]
     typical = float(np.median(known)) if known.size else SD_UNKNOWN
     return np.geomspace(min(SMALLEST_SDS * typical, largest / 2), largest, count)

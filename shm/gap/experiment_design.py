@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,6 +85,52 @@ def like_the_present(design: Design, conditions: Conditions | None = None) -> De
     """A test with all modes and sensors of the present ones, under middling conditions."""
     modes = _modes(design)
     return _test(design, modes, _present_shapes(design, modes), conditions)
+
+
+def lift_off(design: Design, hanger: Hanger) -> tuple[Proposal, ...]:
+    """The present test with the tension read beside it; none where it is known or there is none."""
+    if not hanger.nominal_tension_n or np.isfinite(hanger.scatter.tension):
+        return ()
+    return (Proposal("lift-off", "a lift-off, the tension read", like_the_present(design)),)
+
+
+def together(designs: Sequence[Design]) -> tuple[Design, list[IntArray]]:
+    """One design of tests that are all made, and the rows of its data that each has.
+
+    All begin with the same places; further ones are each design's own.
+    """
+    common = min(len(design.places_m) for design in designs)
+    places = designs[0].places_m[:common]
+    parts, rows, shapes = [], [], 0
+    frequencies = 0
+    for test, design in enumerate(designs):
+        own = design.shape_place + np.where(design.shape_place < common, 0, len(places) - common)
+        places += design.places_m[common:]
+        parts.append((design.frequency_test + test, design.shape_mode + frequencies, own))
+        rows.append((frequencies, shapes))
+        frequencies, shapes = frequencies + design.frequencies, shapes + len(own)
+    test_of, mode, place = (np.concatenate(each) for each in zip(*parts, strict=True))
+    whole = Design(
+        survey=designs[0].survey,
+        conditions=tuple(each.conditions[0] for each in designs),
+        places_m=places,
+        frequency_test=test_of,
+        frequency_plane=np.concatenate([each.frequency_plane for each in designs]),
+        frequency_order=np.concatenate([each.frequency_order for each in designs]),
+        shape_mode=mode,
+        shape_place=place,
+        shape_component=np.concatenate([each.shape_component for each in designs]),
+    )
+    of_each = [
+        np.concatenate(
+            [
+                first + np.arange(design.frequencies),
+                frequencies + shape + np.arange(len(design.shape_mode)),
+            ]
+        )
+        for design, (first, shape) in zip(designs, rows, strict=True)
+    ]
+    return whole, of_each
 
 
 def _other_plane(design: Design) -> Iterator[Proposal]:

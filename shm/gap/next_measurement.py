@@ -5,7 +5,7 @@ What a fit predicts of data not yet measured, and how far two such predictions d
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from shm.gap.contract import Design, Fit, Observations
 from shm.gap.experiment_design import Proposal, proposals, sensors_wanted, with_sensors
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import identification_sd
-from shm.values import FloatArray, NextMeasurement
+from shm.values import NAN, FloatArray, NextMeasurement
 
 NO_GAP = "no gap"
 # Judgement: the leader against three rivals, as far behind as 20,000 to one, and a list that a
@@ -56,7 +56,7 @@ def ranked(problem: GapProblem, fits: Sequence[Fit]) -> tuple[NextMeasurement, .
         pair = (contenders[0], fit)
         pairs = zip(general, foresights[0], seen, strict=True)
         promises = [(each, _expected(*both)) for each, *both in pairs]
-        promises += [_promise(problem, pair, each, errors) for each in _sensors(problem, pair)]
+        promises += [_promise(problem, pair, each, errors) for each in new_sensors(problem, pair)]
         found += [_named(pair, promise) for promise in _worth_it(promises)]
     found.sort(key=lambda measurement: -measurement.expected_log_bayes_factor)
     distinct: dict[str, NextMeasurement] = {}
@@ -107,7 +107,7 @@ def _named(pair: tuple[Fit, Fit], promise: _Promise) -> NextMeasurement:
     return NextMeasurement(promise[0].what, (one, other), min(promise[1], _AS_GOOD_AS_CERTAIN))
 
 
-def _sensors(problem: GapProblem, pair: tuple[Fit, Fit]) -> list[Proposal]:
+def new_sensors(problem: GapProblem, pair: tuple[Fit, Fit]) -> list[Proposal]:
     """Sensors where the shapes that the pair predicts differ most; none where there are enough."""
     design = problem.observations.design
     if not sensors_wanted(design):
@@ -161,30 +161,67 @@ class Errors:
 
     The latter, a fraction, is the model error, the same for a mode in all tests. Explanations that
     are compared are given the same errors, lest a difference in errors pass for one in prediction.
+    Something unknown leaves a `remainder` beside them. `unseen_shape` is what shapes err by where
+    none was measured; `sensors` (S, k) are what errors of sensors do to the shapes of a new design,
+    None where those of the old ones stand for them.
     """
 
     sd: FloatArray
     repeated: float
+    remainder: Remainder | None = None
+    unseen_shape: float = _USUAL_SHAPE_SD
+    sensors: FloatArray | None = None
 
     @classmethod
     def of(cls, observations: Observations, fit: Fit) -> Errors:
         known = np.isfinite(observations.sd[: observations.design.frequencies])
         return cls(identification_sd(observations, fit), fit.model_error if known.any() else 0.0)
 
+    def between(self, one: Design, other: Design, *, same: bool) -> FloatArray:
+        """The covariance (F of one, F of the other) by what repeats; of the `same` tests or not."""
+        found = self.repeated**2 * same_modes(one, other)
+        return found if self.remainder is None else found + self.remainder.between(one, other, same)
 
-def foreseen(problem: GapProblem, fit: Fit, design: Design, errors: Errors) -> Foresight:
-    """What `fit` predicts of the data of a new test, given the old ones.
 
+@dataclass(frozen=True)
+class Remainder:
+    """What something unknown leaves over: `size` (a fraction), alike over orders as `pattern` says.
+
+    It comes again in every test, or is new in each (`by_test`).
+    """
+
+    size: float
+    pattern: Callable[[Design, Design], FloatArray]
+    by_test: bool
+
+    def between(self, one: Design, other: Design, same: bool) -> FloatArray:
+        """Its covariance (F of one, F of the other); of the `same` tests or not."""
+        found = self.size**2 * self.pattern(one, other)
+        if not self.by_test:
+            return np.asarray(found)
+        return np.asarray(same * found * (one.frequency_test[:, None] == other.frequency_test))
+
+
+def foreseen(
+    problem: GapProblem, fit: Fit, design: Design, errors: Errors, reading_sd: float = NAN
+) -> Foresight:
+    """What `fit` predicts of the data of new tests, given the old ones.
+
+    With a `reading_sd` (a fraction) the last datum is the logarithm of a tension that is read.
     Parameters vary by their posterior, the prediction with them to first order. New data err as
     the present ones do (median). The model error of a mode is the same in the new test as in the
     old ones, so that what the fit left over of a mode is expected again.
     """
     roots = _roots(fit.covariance)
-    predicted = problem.predict(fit.hypothesis, _around(problem, fit, roots), design)
+    around = _around(problem, fit, roots)
+    predicted = problem.predict(fit.hypothesis, around, design)
     predicted = predicted * _agreement(design, predicted, predicted[0])
+    if np.isfinite(reading_sd):
+        tension_n = problem.tension_n(fit.hypothesis, around)
+        predicted = np.column_stack([predicted, np.log(tension_n)])
     ahead, back = np.split(predicted[1:], 2)
     spread = (ahead - back).T / (2 * _STEP_IN_SDS)
-    return _given_the_old(problem, fit, design, errors, predicted[0], spread)
+    return _given_the_old(problem, fit, design, errors, predicted[0], spread, reading_sd)
 
 
 def divergence(one: Foresight, other: Foresight) -> float:
@@ -225,30 +262,34 @@ def _given_the_old(
     errors: Errors,
     mean: FloatArray,
     spread: FloatArray,
+    reading_sd: float,
 ) -> Foresight:
     """Condition predictions `mean` (data,) and `spread` (data, d) on the errors of the old data."""
     observations = problem.observations
     old, new = observations.design.frequencies, design.frequencies
-    variance = errors.repeated**2
     was, will = problem.repeated, problem.section_of(design)
-    shared = variance * _same_modes(design, observations.design)
-    shared += will @ was.section.T
-    among_old = variance * _same_modes(observations.design, observations.design) + was.frequency
+    shared = errors.between(design, observations.design, same=False) + will @ was.section.T
+    among_old = errors.between(observations.design, observations.design, same=True)
+    among_old += was.frequency
     gain = np.linalg.solve(among_old + np.diag(errors.sd[:old] ** 2), shared.T).T
     mean, spread = mean.copy(), spread.copy()
     mean[:new] += gain @ (observations.value - fit.predicted)[:old]
     spread[:new] -= gain @ (fit.slopes @ _roots(fit.covariance).T)[:old]
-    shapes = np.hypot(errors.sd[old:], np.linalg.norm(was.sensors, axis=1))
-    shape_sd = np.median(shapes) if shapes.size else _USUAL_SHAPE_SD
-    sd = np.repeat([np.median(errors.sd[:old]), shape_sd], [new, len(mean) - new])
+    together = np.linalg.norm(was.sensors, axis=1) if errors.sensors is None else 0.0
+    shapes = np.hypot(errors.sd[old:], together)
+    shape_sd = np.median(shapes) if shapes.size else errors.unseen_shape
+    counts = [new, design.size - new, len(mean) - design.size]
+    sd = np.repeat([np.median(errors.sd[:old]), shape_sd, reading_sd], counts)
     noise = np.diag(sd**2)
     read = problem.readings_of(design)
-    among_new = variance * _same_modes(design, design) + will @ will.T + read @ read.T
+    among_new = errors.between(design, design, same=True) + will @ will.T + read @ read.T
     noise[:new, :new] += among_new - gain @ shared.T
+    if errors.sensors is not None:
+        noise[new : design.size, new : design.size] += errors.sensors @ errors.sensors.T
     return Foresight(design, mean, spread @ spread.T + noise)
 
 
-def _same_modes(one: Design, other: Design) -> FloatArray:
+def same_modes(one: Design, other: Design) -> FloatArray:
     """(F of one, F of the other): 1 where two frequencies are of one plane and order."""
     planes = one.frequency_plane[:, None] == other.frequency_plane
     return np.asarray(planes & (one.frequency_order[:, None] == other.frequency_order), dtype=float)

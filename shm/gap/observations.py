@@ -105,6 +105,7 @@ def survey_of(tests: Sequence[ModalTest]) -> Survey:
         temperatures_c=_distinct([test.temperature_c for test in tests]),
         amplitudes=_distinct([test.amplitude for test in tests]),
         added_masses=tuple(sorted(masses, key=lambda mass: (mass.x_m, mass.mass_kg))),
+        tensions_read_n=_distinct([test.tension_read_n for test in tests]),
     )
 
 

@@ -27,7 +27,7 @@ from shm.gap.repeated_errors import (
 )
 from shm.inference.systematic_errors import shared_loads
 from shm.models.composed import Baseline, ComposedHanger
-from shm.models.effects import Variant, parameters_of
+from shm.models.effects import Conditions, Variant, parameters_of
 from shm.models.hanger import HangerModes
 from shm.values import BoolArray, FloatArray, Hanger, IntArray
 
@@ -35,6 +35,9 @@ Effects = tuple[tuple[str, Variant], ...]
 
 # Technical: an eighth of the prior's standard deviation apart, over 93 % of the prior.
 _TENSIONS = tuple(float(each) for each in np.linspace(-2.5, 1.5, 33))
+
+
+_AT_REST = Conditions(amplitude=0.0)
 
 
 class GapProblem:
@@ -124,9 +127,9 @@ class GapProblem:
         return np.asarray(self.predict(hypothesis, np.concatenate(z)[None])[0])
 
     def tension_n(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
-        """The tension (n,) that z (n, d) stand for."""
-        theta = self.theta(hypothesis, z)[:, : len(self._baseline.names)]
-        return np.asarray(self._baseline.physical(theta, 0).tension_n)
+        """The true tension (n,) that z (n, d) stand for, of the hanger at rest."""
+        composed = self._hanger_with(hypothesis.effects)
+        return np.asarray(composed.physical(self.theta(hypothesis, z), _AT_REST).tension_n)
 
     def likelihood(self, hypothesis: Hypothesis) -> Likelihood:
         """The likelihood of residuals, with a flexible remainder where the hypothesis has one."""
@@ -161,6 +164,12 @@ class GapProblem:
             self.hanger, design.frequency_plane, design.frequency_order, frequency_hz
         )
         return np.hstack([section, shared])
+
+    def sensors_of(self, design: Design) -> FloatArray:
+        """What errors of sensors do to the shapes of a new design: loads (S, k)."""
+        near = self._predicted_near(design)
+        as_if = Observations(design, near, np.ones_like(near))
+        return sensor_loads(as_if, self._predicted_near, self.hanger)[0]
 
     def _predicted_near(self, design: Design) -> FloatArray:
         """The data (data,) that the baseline near the measured ones predicts of a design."""

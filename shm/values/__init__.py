@@ -16,6 +16,7 @@ from shm.values.bridge_diagnosis import (
 )
 from shm.values.diagnosis import (
     FEW_MODES,
+    MEASUREMENT_HOURS,
     NO_GAP,
     Cause,
     Compatibility,
@@ -132,6 +133,7 @@ __all__ = [
     "FEW_MODES",
     "FREQUENCY",
     "LONGEST_TEST_ID",
+    "MEASUREMENT_HOURS",
     "MIX",
     "MOST_MISFIT_PERCENT",
     "NAN",

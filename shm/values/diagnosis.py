@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, Plane
@@ -196,6 +197,23 @@ class TensionEstimate:
     q95: float
     q025: float = NAN
     q975: float = NAN
+
+
+MEASUREMENT_HOURS: Mapping[str, float] = MappingProxyType(
+    {
+        "repeat": 1.0,
+        "level": 1.0,
+        "other plane": 1.0,
+        "more modes": 1.0,
+        "known mass": 2.0,
+        "sensors": 3.0,
+        "temperature": 8.0,
+        "lift-off": 16.0,
+    }
+)
+"""What kinds of measurement cost, in hours of a crew (judgement): an hour a test where the crew is,
+another season's way anew, a jack and its crew for two days. `[measurement_hours]` has the owner's.
+"""
 
 
 @dataclass(frozen=True)

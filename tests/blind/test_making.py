@@ -221,7 +221,8 @@ def test_what_cannot_be_planted_has_an_infinite_size() -> None:
 
 
 def test_every_effect_of_the_catalogue_can_be_planted_and_no_other_stands_in_it() -> None:
-    assert set(PLANTED) == set(EFFECTS)
+    """But for a load cell's: no simulated campaign reads a tension."""
+    assert set(PLANTED) == set(EFFECTS) - {"load_scale"}
     assert not set(UNLISTED) & set(EFFECTS)
 
 

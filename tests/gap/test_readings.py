@@ -15,8 +15,10 @@ from shm.gap.contract import Hypothesis
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.inference.priors import UNKNOWN_READING_SD, reading_of
+from shm.models.effects import EFFECTS
 from shm.models.hanger import PhysicalHanger, solve
 from shm.modes_document import modes_document, parse_modes
+from shm.report.diagnosis_wording import claims
 from shm.values import NAN, FloatArray, ModalTest, Mode, Supports
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
@@ -87,6 +89,42 @@ def test_tensions_that_differ_between_tests_are_no_gap_where_they_were_read() ->
     assert found.no_gap_probability > 0.5
     tension = found.tension_after_n
     assert tension.q025 < true_n.mean() < tension.q975
+
+
+SCALES = GapOptions(
+    without=all_but("bending_stiffness", "effective_length", "timebase", "load_scale"), seed=1
+)
+
+
+def test_a_cell_that_reads_a_fifth_too_much_is_the_measurements_and_leaves_the_tension() -> None:
+    """Four loadings whose frequencies follow the true tensions, while the cell shows 1.2 times."""
+    rng = np.random.default_rng(3)
+    true_n = np.array(READ_N)
+    measured = frequencies_hz(true_n) * (1 + 1e-4 * rng.standard_normal((4, len(ORDERS))))
+    read_n = tuple(float(each) for each in 1.2 * true_n)
+    found = diagnose(loadings(measured, read_n, 1e3), HANGER_3, SCALES)
+    assert found.leading is not None
+    assert found.leading.effect == "load_scale"
+    assert claims(found)[0].of_the_measurement
+    (error,) = found.leading.parameters
+    assert error.q05 < 0.2 < error.q95
+    assert found.tension_after_n.q025 < true_n.mean() < found.tension_after_n.q975
+
+
+def test_only_a_load_scale_parts_the_true_tension_from_the_one_at_rest() -> None:
+    """A known tension that was read a quarter too high is four fifths of it."""
+    weighed = replace(HANGER_3, scatter=replace(HANGER_3.scatter, tension=0.01))
+    tests = loadings(frequencies_hz(np.full(2, 7e5)), (NAN, NAN), SD_N)
+    problem = GapProblem(weighed, "beam1", observed(tests, weighed))
+    for name, effect in EFFECTS.items():
+        for variant in effect.variants(weighed, problem.design.survey):
+            hypothesis = Hypothesis(((name, variant),))
+            theta = problem.theta(hypothesis, np.zeros((1, len(problem.names(hypothesis)))))
+            theta[:, -1] = 0.25 if name == "load_scale" else theta[:, -1]
+            z = problem.coordinates(hypothesis).z(theta)
+            share = 0.8 if name == "load_scale" else 1.0
+            expected = share * weighed.nominal_tension_n
+            assert problem.tension_n(hypothesis, z) == pytest.approx(expected), name
 
 
 def test_a_reading_survives_the_modes_document_and_is_absent_where_there_was_none() -> None:

@@ -44,9 +44,11 @@ DESIGN = [
     "partial_mass",
 ]
 PLACES_M = (1.2, 3.6, 5.1, 8.3)
-RICH = Survey(("t1", "t2", "t3"), PLANES, PLACES_M, True, (2.0, 12.0, 22.0), (0.5, 1.0), ())
+RICH = Survey(
+    ("t1", "t2", "t3"), PLANES, PLACES_M, True, (2.0, 12.0, 22.0), (0.5, 1.0), (), (7e5, 7.4e5)
+)
 BARE = Survey(("t1",), ("transverse",), (), False, (), (), ())
-CONDITIONS = Conditions("t1", temperature_shift_k=8.0, amplitude=0.7)
+CONDITIONS = Conditions("t1", temperature_shift_k=8.0, amplitude=0.7, tension_shift_n=2e4)
 CASES = [
     pytest.param(name, variant, id=f"{name}@{variant.key}")
     for name, effect in EFFECTS.items()
@@ -231,6 +233,7 @@ def test_frequencies_of_one_plane_in_one_test_show_what_they_can() -> None:
         "sensor_mass",
         "sensor_misalignment",
         "skewed_principal_axes",
+        "load_scale",
     }
 
 
@@ -244,6 +247,7 @@ def test_frequencies_of_one_plane_in_one_test_show_what_they_can() -> None:
         ("sensor_mass", replace(RICH, sensor_places_m=()), "known places"),
         ("sensor_misalignment", replace(RICH, biaxial=False), "biaxial"),
         ("skewed_principal_axes", replace(RICH, biaxial=False), "plain end flexibility"),
+        ("load_scale", replace(RICH, tensions_read_n=(7e5,)), "different tensions"),
     ],
 )
 def test_what_data_cannot_show_is_said_in_a_sentence(name: str, survey: Survey, why: str) -> None:

@@ -75,7 +75,7 @@ CASES = [
 def test_a_middling_size_moves_what_the_logger_reports(name: str, variant: Variant) -> None:
     """Frequencies or shapes, seen with small sizes also where the effect is most sensitive."""
     middle = [one.value(np.array([0.7]))[0] for one in parameters_of(name, ROD, variant)]
-    conditions = Conditions(variant.test or "t1", 10.0, 1.0)
+    conditions = Conditions(variant.test or "t1", 10.0, 1.0, tension_shift_n=2e4)
     bare = physical()
     with_effect = EFFECTS[name].applied(bare, np.array([middle]), variant, conditions, ROD)
     one, other = solved(bare), solved(with_effect)

@@ -10,7 +10,7 @@ import pytest
 
 from shm.bridge import load_bridge, load_hanger
 from shm.errors import BadInput
-from shm.values import EndPlate, Thresholds, Turnbuckle
+from shm.values import MEASUREMENT_HOURS, EndPlate, Thresholds, Turnbuckle
 
 ROUND = """
 [[hanger]]
@@ -233,3 +233,24 @@ def test_a_missing_file_tells_how_to_make_one(tmp_path: Path) -> None:
 def test_a_disturbance_needs_a_name_and_a_band(tmp_path: Path, machine: str, fault: str) -> None:
     with pytest.raises(BadInput, match=fault):
         load_bridge(written(tmp_path, f"[[disturbance]]\n{machine}\n"))
+
+
+def test_hours_of_measurements_are_the_owners_where_given_and_usual_elsewhere(
+    tmp_path: Path,
+) -> None:
+    hours = load_bridge(written(tmp_path, "[measurement_hours]\nlift_off = 40\n")).measurement_hours
+    assert hours == {**MEASUREMENT_HOURS, "lift-off": 40.0}
+    assert load_bridge(written(tmp_path, "")).measurement_hours == MEASUREMENT_HOURS
+
+
+@pytest.mark.parametrize(
+    ("hours", "fault"),
+    [
+        ("[measurement_hours]\nlunch = 1", "unknown key lunch"),
+        ("[measurement_hours]\nsensors = 0", "sensors = 0 is not a positive number"),
+        ("measurement_hours = 3", "must be a table"),
+    ],
+)
+def test_hours_that_cannot_be_are_refused(tmp_path: Path, hours: str, fault: str) -> None:
+    with pytest.raises(BadInput, match=fault):
+        load_bridge(written(tmp_path, hours))

@@ -25,6 +25,7 @@ from shm.models.effects.of_mass import (
     SensorMass,
     UnknownPointMass,
 )
+from shm.models.effects.of_readings import LoadScale
 from shm.models.effects.of_section import (
     BendingStiffness,
     SectionLoss,
@@ -75,6 +76,7 @@ _MEMBERS: tuple[Effect, ...] = (
     Timebase(),
     SectionSize(),
     PartialMass(),
+    LoadScale(),
 )
 
 EFFECTS: dict[str, Effect] = members_with_plug_ins(

@@ -28,6 +28,7 @@ class Survey:
     temperatures_c: tuple[float, ...]
     amplitudes: tuple[float, ...]
     added_masses: tuple[AddedMass, ...]
+    tensions_read_n: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

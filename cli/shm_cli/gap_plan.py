@@ -1,0 +1,146 @@
+"""`shm gap plan`: what to measure next on a hanger, in which order, at which cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from itertools import accumulate
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rich_click as click
+
+from shm.bridge import load_bridge
+from shm.errors import NothingThere
+from shm.gap import GapOptions
+from shm.gap.diagnose import examined
+from shm.gap.measurement_plan import PlannedMeasurement, Race, planned
+from shm.values import Hanger, ModalTest
+from shm_cli import completion
+from shm_cli.common import (
+    advancing_bar,
+    hanger_file_option,
+    hanger_option,
+    json_option,
+    one_hanger,
+    open_workspace,
+    opened_store,
+    seed_option,
+    show,
+    show_table,
+    table,
+    tests_and_hanger,
+)
+
+_DEFAULT = GapOptions()
+_LATEST = 20  # as `shm gap diagnose`
+_HEADS = ("measurement", "hours", "in all", "promised log odds", "then", "probability")
+
+
+@click.command()
+@click.argument(
+    "file",
+    metavar="[MODES.json]",
+    required=False,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+)
+@hanger_option()
+@hanger_file_option
+@click.option(
+    "--budget",
+    "budget_hours",
+    type=click.FloatRange(0.0, min_open=True),
+    metavar="HOURS",
+    help="Hours of a crew that the plan may cost.  [default: as many as it takes]",
+)
+@click.option(
+    "--baseline",
+    metavar="NAME",
+    default=_DEFAULT.baseline,
+    show_default=True,
+    shell_complete=completion.models,
+    help="The model class whose gap is diagnosed.",
+)
+@click.option(
+    "--without",
+    multiple=True,
+    metavar="EFFECT",
+    shell_complete=completion.effects,
+    help="Take an effect out of the catalogue; may be given again.",
+)
+@seed_option
+@json_option
+@click.pass_context
+def plan(
+    ctx: click.Context,
+    file: Path | None,
+    hanger_id: int | None,
+    hanger_file: Path | None,
+    budget_hours: float | None,
+    baseline: str,
+    without: tuple[str, ...],
+    seed: int,
+    as_json: bool,
+) -> None:
+    """The next measurements in order, each with its cost and what it promises.
+
+    Of MODES.json, or of the latest 20 tests of a hanger of the workspace. Hours of each kind of
+    measurement stand in the table [measurement_hours] of the bridge file.
+
+    \b
+    Example: shm gap plan hanger3.modes.json --hanger-file H.toml --budget 8
+    """
+    tests, hanger = _measured(ctx, file, hanger_file, hanger_id)
+    bridge = load_bridge(hanger_file) if hanger_file is not None else open_workspace(ctx).bridge
+    options = GapOptions(baseline, without, seed=seed)
+    with advancing_bar() as progress:
+        diagnosis, attribution = examined(tests, hanger, options, progress)
+    race = Race.of(attribution, np.random.default_rng(seed))
+    steps = planned(race, bridge.measurement_hours, budget_hours or np.inf)
+    if as_json:
+        show(
+            {"hanger": diagnosis.hanger, "baseline": baseline, "seed": seed, "steps": _rows(steps)}
+        )
+        return
+    if not steps:
+        click.echo("No measurement promises to tell the explanations further apart.")
+        return
+    shown = table("Next measurements", *_HEADS)
+    for row in _rows(steps):
+        shown.add_row(
+            row["what"],
+            f"{row['hours']:g}",
+            f"{row['hours_in_all']:g}",
+            f"{row['promised_log_odds']:+.1f}",
+            f"{row['log_odds']:.1f}",
+            f"{row['probability']:.2f}",
+        )
+    show_table(shown)
+    click.echo(
+        "Of the true explanation against all others, averaged over which it is; make the first, "
+        "diagnose, and plan anew."
+    )
+
+
+def _measured(
+    ctx: click.Context, file: Path | None, hanger_file: Path | None, hanger_id: int | None
+) -> tuple[Sequence[ModalTest], Hanger]:
+    """The tests and their hanger, those of the workspace as `shm gap diagnose` takes them."""
+    if file is not None:
+        return tests_and_hanger(ctx, file, hanger_file, hanger_id)
+    hanger = one_hanger(ctx, hanger_file, hanger_id)
+    with opened_store(ctx) as (_, store):
+        stored = store.tests.list_all(hanger.id)[-_LATEST:]
+    if not stored:
+        raise NothingThere(
+            f"no test of hanger {hanger.id} is stored.", remedy="Take one in with `shm ingest`."
+        )
+    return [each.test for each in stored], hanger
+
+
+def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:
+    spent = accumulate(step.hours for step in steps)
+    return [
+        asdict(step) | {"hours_in_all": hours} for step, hours in zip(steps, spent, strict=True)
+    ]

@@ -1,0 +1,138 @@
+"""A plan of measurements: what its steps promise, in which order, at which cost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shm.gap.attribution import Attribution, attributed
+from shm.gap.contract import GapOptions
+from shm.gap.experiment_design import lift_off, like_the_present, together, with_sensors
+from shm.gap.measurement_plan import (
+    UNKNOWN,
+    Race,
+    chance_of,
+    chances,
+    holds,
+    planned,
+)
+from shm.gap.next_measurement import NO_GAP
+from shm.gap.observations import observed
+from shm.gap.problem import GapProblem
+from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.values import MEASUREMENT_HOURS
+from tests.helpers.effects import all_but
+from tests.helpers.hangers import HANGER_3
+
+ROD = replace(HANGER_3, plate=None)
+ONE_PLANE = CampaignPlan(
+    ("transverse",), shapes=False, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0
+)
+SOFTER = PlantedEffect("bending_stiffness", "everywhere", {"stiffness_change": -0.2})
+OPTIONS = GapOptions(without=all_but("distributed_mass", "bending_stiffness"))
+
+
+@pytest.fixture(scope="module")
+def found() -> Attribution:
+    """One plane's frequencies, in which more mass is the same as less bending stiffness."""
+    rng = np.random.default_rng(1)
+    tests = campaign(ROD, HangerState(711e3), (SOFTER,), ONE_PLANE, rng)
+    problem = GapProblem(ROD, "beam1", observed(tests, ROD))
+    return attributed(problem, OPTIONS, np.random.default_rng(1))
+
+
+@pytest.fixture(scope="module")
+def race(found: Attribution) -> Race:
+    return Race.of(found, np.random.default_rng(1))
+
+
+def test_a_known_mass_comes_first_and_is_enough(race: Race) -> None:
+    steps = planned(race)
+    assert steps[0].kind == "known mass"
+    assert steps[0].promised_log_odds > 3
+    assert steps[-1].probability > 0.9
+    assert [step.log_odds for step in steps] == sorted(step.log_odds for step in steps)
+
+
+def test_what_costs_too_much_is_not_planned(race: Race) -> None:
+    dear = {**MEASUREMENT_HOURS, "known mass": 50.0}
+    steps = planned(race, dear, budget_hours=40.0)
+    assert "known mass" not in {step.kind for step in steps}
+    assert sum(step.hours for step in steps) <= 40.0
+    assert planned(race, budget_hours=0.1) == ()
+
+
+def test_before_any_measurement_the_odds_are_those_of_the_evidence(
+    found: Attribution, race: Race
+) -> None:
+    now = chances(found)
+    assert sum(now.values()) == pytest.approx(1.0)
+    assert abs(chance_of("distributed_mass", now) - chance_of("bending_stiffness", now)) < 0.5
+    own = [each.probability for each in race.contenders]
+    assert sum(own) == pytest.approx(1.0)
+    held = race._holds @ own
+    assert race.expected([])[1] == pytest.approx(float(np.dot(own, held)))
+
+
+def test_more_measurements_never_promise_less(race: Race) -> None:
+    """But for the few draws, which are the same for each."""
+    kinds = [each.kind for each in race.offered]
+    mass, plane = kinds.index("known mass"), kinds.index("other plane")
+    both = race.expected([mass, plane])[0]
+    assert both > max(race.expected([mass])[0], race.expected([plane])[0]) - 0.1
+
+
+def test_the_same_mass_elsewhere_adds_less_than_it_promised_alone(race: Race) -> None:
+    masses = [k for k, each in enumerate(race.offered) if each.kind == "known mass"][:2]
+    none = race.expected([])[0]
+    alone = [race.expected([k])[0] - none for k in masses]
+    assert race.expected(masses)[0] - none < 0.8 * sum(alone)
+
+
+def test_a_lift_off_tells_mass_by_the_tension_and_is_offered_once(race: Race) -> None:
+    (index,) = [k for k, each in enumerate(race.offered) if each.kind == "lift-off"]
+    repeat = [each.kind for each in race.offered].index("repeat")
+    assert race.expected([index])[0] > race.expected([repeat])[0] + 1.0
+    weighed = replace(ROD, scatter=replace(ROD.scatter, tension=0.01))
+    assert lift_off(race.offered[0].design, weighed) == ()
+
+
+def test_something_unknown_is_in_the_race_and_foresees_less_surely(race: Race) -> None:
+    """Beside the causes that it comes with, in one of several ways."""
+    unknown = [each for each in race.contenders if UNKNOWN in each.name]
+    assert unknown
+    for contender in unknown:
+        assert sum(share for share, _ in contender.ways) == pytest.approx(1.0)
+        known = next(e for e in race.contenders if f"{e.name} + {UNKNOWN}" == contender.name)
+        plane = race.rows[[each.kind for each in race.offered].index("other plane")]
+        variances = [
+            np.trace(seen.covariance[np.ix_(plane, plane)])
+            for _, seen in (*contender.ways, known.ways[0])
+        ]
+        assert min(variances[:-1]) > variances[-1]
+
+
+def test_a_pair_holds_its_causes_and_nothing_holds_no_gap() -> None:
+    assert holds("sag + point_mass", "point_mass")
+    assert not holds("point_mass", "sag + point_mass")
+    assert not holds("point_mass", NO_GAP)
+    assert holds(UNKNOWN, UNKNOWN)
+
+
+def test_tests_together_keep_each_ones_data_and_places(found: Attribution) -> None:
+    design = found.search.problem.design
+    parts = [
+        like_the_present(design),
+        with_sensors(design, (2.0, 4.0)).design,
+        with_sensors(design, (3.0, 9.0)).design,
+    ]
+    whole, rows = together(parts)
+    assert whole.places_m == (2.0, 4.0, 3.0, 9.0)
+    assert sorted(np.concatenate(rows)) == list(range(whole.size))
+    for part, own in zip(parts, rows, strict=True):
+        shapes = own[part.frequencies :] - whole.frequencies
+        places = np.array(whole.places_m)[whole.shape_place[shapes]]
+        assert list(places) == [part.places_m[k] for k in part.shape_place]
+        assert list(whole.frequency_order[own[: part.frequencies]]) == list(part.frequency_order)
