@@ -20,10 +20,12 @@ from shm.identify.estimation.sidebands import without_sidebands
 from shm.identify.measuring.recorded_window import recorded_window_rate
 from shm.identify.measuring.sensor_places import refuse_off_the_hanger
 from shm.identify.measuring.setups import measured, without_unused_force
+from shm.identify.mode_ordering.confirmed import placed_with_doubtful
 from shm.identify.mode_ordering.directions import directions
 from shm.identify.mode_ordering.placement import Placement, placed
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
+from shm.identify.quality.of_modes import first_orders
 from shm.identify.quality.of_sensors import sensor_gain, sensor_places
 from shm.identify.setup_merging.calm_part import LEFT_OUT, calmed, free_below, level_left_at
 from shm.identify.setup_merging.hit_directions import alike, sharpened, together
@@ -96,7 +98,9 @@ def identify(
         quality = (*quality, turned)
     if refused := refusal(quality, records[0].source):
         raise refused
-    placement = placed(found.finding.modes, found.points, hanger, steady)
+    placement = placed_with_doubtful(
+        found.finding.modes, found.finding.doubtful, found.points, hanger, steady
+    )
     level_left, noted = 1.0, found.notes
     if not placement.modes:
         calm = _once_calm(measurements, options, hanger, steady)
@@ -123,18 +127,23 @@ def identify(
         poles=found.finding.poles,
         notes=(*placement.notes, *noted, *_few_hits(measurements), *_no_force(measurements)),
         window_time_constant_s=measurements[0].window_time_constant_s,
-        quality=(*quality, *_of_placed(measurements, found, placement, hanger)),
+        quality=(*quality, *_of_placed(measurements, found, placement, hanger, options)),
         set_aside=placement.set_aside,
         fit=fitted(measurements, found.apart, options) if level_left == 1 else None,
     )
 
 
 def _of_placed(
-    measurements: Sequence[Measurement], found: Joined, placement: Placement, hanger: Hanger | None
+    measurements: Sequence[Measurement],
+    found: Joined,
+    placement: Placement,
+    hanger: Hanger | None,
+    options: IdentifyOptions,
 ) -> list[QualityCheck]:
     """What numbered modes say of their numbers and of the sensors."""
     checks = [placement.check]
     if hanger and hanger.as_hanger:
+        checks.append(first_orders(placement.modes, hanger, options.band_low_hz))
         checks.append(sensor_gain(measurements, found.apart, placement.modes, hanger))
         checks.append(sensor_places(placement.modes, hanger))
     return [check for check in checks if check is not None]
