@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from shm.identify.estimation.amplitude_dependence import with_amplitude_dependen
 from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.estimation.sidebands import without_sidebands
+from shm.identify.estimation.ssi import looked_at_again
 from shm.identify.measuring.recorded_window import recorded_window_rate
 from shm.identify.measuring.sensor_places import refuse_off_the_hanger
 from shm.identify.measuring.setups import measured, without_unused_force
@@ -99,7 +101,11 @@ def identify(
     if refused := refusal(quality, records[0].source):
         raise refused
     placement = placed_with_doubtful(
-        found.finding.modes, found.finding.doubtful, found.points, hanger, steady
+        found.finding.modes,
+        partial(_doubtful, measurements, found.finding, options),
+        found.points,
+        hanger,
+        steady,
     )
     level_left, noted = 1.0, found.notes
     if not placement.modes:
@@ -131,6 +137,22 @@ def identify(
         set_aside=placement.set_aside,
         fit=fitted(measurements, found.apart, options) if level_left == 1 else None,
     )
+
+
+def _doubtful(
+    measurements: Sequence[Measurement],
+    found: Finding,
+    options: IdentifyOptions,
+    at_hz: Sequence[float],
+) -> tuple[FoundMode, ...]:
+    """What may be a mode about the frequencies `at_hz`, of one set-up."""
+    again = None
+    if len(measurements) == 1 and options.identifier in HIT_BY_HIT:
+        again = looked_at_again(measurements[0], options, at_hz)
+    if again is None:
+        return found.doubtful
+    again = _finished(again, measurements[0], options)
+    return (*found.doubtful, *again.modes, *again.doubtful)
 
 
 def _of_placed(
@@ -316,11 +338,14 @@ _LINES_AROUND = 4  # judgement: nine lines have a median that one bad line does 
 def without_window(found: Finding, measurement: Measurement) -> Finding:
     """The finding with the damping of an exponential window taken off its damping ratios."""
     rate = 1 / measurement.decay_time_constant_s
-    modes = tuple(
-        replace(m, damping_ratio=m.damping_ratio - rate / (2 * math.pi * m.frequency_hz))
-        for m in found.modes
+    modes, doubtful = (
+        tuple(
+            replace(m, damping_ratio=m.damping_ratio - rate / (2 * math.pi * m.frequency_hz))
+            for m in each
+        )
+        for each in (found.modes, found.doubtful)
     )
-    return replace(found, modes=modes)
+    return replace(found, modes=modes, doubtful=doubtful)
 
 
 def coherent_only(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:

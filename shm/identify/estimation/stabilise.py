@@ -61,7 +61,8 @@ def completed(found: Finding, other: Finding) -> Finding:
     dropped = tuple(
         entry for entry in found.dropped if not any(_of(entry, mode.frequency_hz) for mode in added)
     )
-    return replace(found, modes=modes, dropped=dropped)
+    doubtful = (*found.doubtful, *other.doubtful)
+    return replace(found, modes=modes, dropped=dropped, doubtful=doubtful)
 
 
 def _same(one: FoundMode, other: FoundMode) -> bool:

@@ -7,7 +7,8 @@ orders are: what moves there, in that plane, is one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeAlias
 
 import numpy as np
 
@@ -22,20 +23,25 @@ _NEAR = 0.003
 """Of the bar's frequency."""
 
 
+Doubtful: TypeAlias = Callable[[Sequence[float]], Sequence[FoundMode]]
+"""Modes in doubt, of those that may be at the given frequencies in Hz."""
+
+
 def placed_with_doubtful(
     found: Sequence[FoundMode],
-    doubtful: Sequence[FoundMode],
+    doubtful: Doubtful,
     points: Sequence[ResponsePoint],
     hanger: Hanger | None,
     tones: Sequence[Tone] = (),
 ) -> Placement:
-    """As `placed`, with those of `doubtful` that fill a gap and leave all other orders."""
+    """As `placed`, with what `doubtful` has in the gaps, where all other orders stay."""
     first = placed(found, points, hanger, tones)
-    if not doubtful or hanger is None or not hanger.as_hanger:
+    gaps = dict(_gaps(first.modes, hanger)) if hanger and hanger.as_hanger else {}
+    if not gaps:
         return first
-    turned_rad = principal_angle(found, points)
-    planes = planes_of(doubtful, points, turned_rad)
-    wanted = dict(_wanted(first.modes, list(zip(doubtful, planes, strict=True)), hanger))
+    modes = doubtful(list(gaps.values()))
+    planes = planes_of(modes, points, principal_angle(found, points))
+    wanted = _nearest(gaps, list(zip(modes, planes, strict=True)))
     known = {(mode.plane, mode.order): mode.frequency_hz for mode in first.modes}
     while wanted:
         every = sorted([*found, *wanted.values()], key=lambda mode: mode.frequency_hz)
@@ -50,28 +56,38 @@ def placed_with_doubtful(
     return first
 
 
-def _wanted(
-    sure: Sequence[Mode], doubtful: Sequence[tuple[FoundMode, Plane]], hanger: Hanger
-) -> Iterator[tuple[tuple[Plane, int], FoundMode]]:
-    """The nearest doubtful mode to each order that the bar of the sure ones has beside them."""
+def _gaps(sure: Sequence[Mode], hanger: Hanger) -> Iterator[tuple[tuple[Plane, int], float]]:
+    """The frequencies in Hz of the orders that the bar of the sure modes has beside them."""
     groups = [[mode for mode in sure if mode.plane == plane] for plane in PLANES]
     planes = [(plane, own) for plane, own in zip(PLANES, groups, strict=True) if own]
     if len(sure) < LEAST_MODES:
         return
-    frequency_hz = [np.array([mode.frequency_hz for mode in own]) for _, own in planes]
+    highest = max(mode.order for mode in sure)
     orders = tuple(tuple(mode.order for mode in own) for _, own in planes)
+    if all(len(own) == highest for own in orders):
+        return
+    frequency_hz = [np.array([mode.frequency_hz for mode in own]) for _, own in planes]
     bar = fitted_bar(frequency_hz, orders, Expected.of(hanger))
     if not bar.fits:
         return
-    highest = max(mode.order for mode in sure)
-    for number, (plane, own) in enumerate(planes):
+    for number, (plane, _) in enumerate(planes):
         for order, hz in enumerate(bar.frequencies_hz(number, highest).tolist(), 1):
-            near = [
-                mode
-                for mode, moves_in in doubtful
-                if moves_in == plane
-                and abs(mode.frequency_hz - hz) < _NEAR * hz
-                and mode.frequency_sd_hz < _NEAR * hz
-            ]
-            if near and all(mode.order != order for mode in own):
-                yield (plane, order), min(near, key=lambda m: abs(m.frequency_hz - hz))
+            if order not in orders[number]:
+                yield (plane, order), hz
+
+
+def _nearest(
+    gaps: dict[tuple[Plane, int], float], modes: Sequence[tuple[FoundMode, Plane]]
+) -> dict[tuple[Plane, int], FoundMode]:
+    """Of each gap the mode nearest to it, in its plane, where one is near and sure enough."""
+    found = {}
+    for (plane, order), hz in gaps.items():
+        near = [
+            mode
+            for mode, moves_in in modes
+            if moves_in == plane
+            and max(abs(mode.frequency_hz - hz), mode.frequency_sd_hz) < _NEAR * hz
+        ]
+        if near:
+            found[plane, order] = min(near, key=lambda mode: abs(mode.frequency_hz - hz))
+    return found
