@@ -1,8 +1,8 @@
 """Modes that one hit or one model order leaves in doubt, where the bar of the sure ones has a mode.
 
 A weak mode, or one beside another, changes by more from hit to hit than is asked of a mode that
-nothing else speaks for. Where the sure modes are a bar's to a thousandth, they say where the missing
-orders are: what moves there, in that plane, is one.
+nothing else speaks for. Where the sure modes are a bar's to a thousandth, they say where the
+missing orders are: what moves there, in that plane, is one.
 """
 
 from __future__ import annotations
