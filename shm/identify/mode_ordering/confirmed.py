@@ -20,10 +20,9 @@ from shm.identify.mode_ordering.planes import planes_of, principal_angle
 from shm.values import PLANES, Hanger, Mode, Plane, ResponsePoint
 
 _NEAR = 3 * PLAIN_BAR
-"""Of the bar's frequency: three standard deviations of a hanger that is but a bar. Of 125 tests of
-tests/worlds/recordings.py (seeds 9400, 9401, 9500 to 9502) 1643 of 1960 identifiable modes are found
-without this module, 1727 with it; 4 false ones with and without."""
-
+"""Of the bar's frequency: three standard deviations of a hanger that is but a bar. In 125 tests of
+tests/worlds/recordings.py (seeds 9400, 9401, 9500 to 9502) 1643 of 1960 identifiable modes are
+found without this module, 1727 with it; 4 false ones with and without."""
 
 Doubtful: TypeAlias = Callable[[Sequence[float]], Sequence[FoundMode]]
 """Modes in doubt, of those that may be at the given frequencies in Hz."""
