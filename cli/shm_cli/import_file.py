@@ -264,6 +264,7 @@ def _say_next(
         for question in found.questions:
             click.echo(f"open: {question.text}", err=True)
         options = " ".join(question.option for question in found.questions)
+    if found.questions and landed is None:
         click.echo(f"Add: shm import {shlex.quote(str(file))} {options}", err=True)
     if landed is None:
         return

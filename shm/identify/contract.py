@@ -113,11 +113,15 @@ class FoundMode:
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """What an identifier found, by rising frequency, and what it dropped."""
+    """What an identifier found, by rising frequency, and what it dropped.
+
+    `doubtful` are those of the dropped that may be modes: one hit or one order says otherwise.
+    """
 
     modes: tuple[FoundMode, ...]
     dropped: tuple[Dropped, ...]
     poles: Poles
+    doubtful: tuple[FoundMode, ...] = ()
 
 
 class Identifier(Protocol):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,13 +18,16 @@ from shm.identify.estimation.amplitude_dependence import with_amplitude_dependen
 from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.estimation.sidebands import without_sidebands
+from shm.identify.estimation.ssi import looked_at_again
 from shm.identify.measuring.recorded_window import recorded_window_rate
 from shm.identify.measuring.sensor_places import refuse_off_the_hanger
 from shm.identify.measuring.setups import measured, without_unused_force
+from shm.identify.mode_ordering.confirmed import placed_with_doubtful
 from shm.identify.mode_ordering.directions import directions
 from shm.identify.mode_ordering.placement import Placement, placed
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
+from shm.identify.quality.of_modes import first_orders
 from shm.identify.quality.of_sensors import sensor_gain, sensor_places
 from shm.identify.setup_merging.calm_part import LEFT_OUT, calmed, free_below, level_left_at
 from shm.identify.setup_merging.hit_directions import alike, sharpened, together
@@ -96,7 +100,13 @@ def identify(
         quality = (*quality, turned)
     if refused := refusal(quality, records[0].source):
         raise refused
-    placement = placed(found.finding.modes, found.points, hanger, steady)
+    placement = placed_with_doubtful(
+        found.finding.modes,
+        partial(_doubtful, measurements, found.finding, options),
+        found.points,
+        hanger,
+        steady,
+    )
     level_left, noted = 1.0, found.notes
     if not placement.modes:
         calm = _once_calm(measurements, options, hanger, steady)
@@ -123,18 +133,39 @@ def identify(
         poles=found.finding.poles,
         notes=(*placement.notes, *noted, *_few_hits(measurements), *_no_force(measurements)),
         window_time_constant_s=measurements[0].window_time_constant_s,
-        quality=(*quality, *_of_placed(measurements, found, placement, hanger)),
+        quality=(*quality, *_of_placed(measurements, found, placement, hanger, options)),
         set_aside=placement.set_aside,
         fit=fitted(measurements, found.apart, options) if level_left == 1 else None,
     )
 
 
+def _doubtful(
+    measurements: Sequence[Measurement],
+    found: Finding,
+    options: IdentifyOptions,
+    at_hz: Sequence[float],
+) -> tuple[FoundMode, ...]:
+    """What may be a mode about the frequencies `at_hz`, of one set-up."""
+    again = None
+    if len(measurements) == 1 and options.identifier in HIT_BY_HIT:
+        again = looked_at_again(measurements[0], options, at_hz)
+    if again is None:
+        return found.doubtful
+    again = _finished(again, measurements[0], options)
+    return (*found.doubtful, *again.modes, *again.doubtful)
+
+
 def _of_placed(
-    measurements: Sequence[Measurement], found: Joined, placement: Placement, hanger: Hanger | None
+    measurements: Sequence[Measurement],
+    found: Joined,
+    placement: Placement,
+    hanger: Hanger | None,
+    options: IdentifyOptions,
 ) -> list[QualityCheck]:
     """What numbered modes say of their numbers and of the sensors."""
     checks = [placement.check]
     if hanger and hanger.as_hanger:
+        checks.append(first_orders(placement.modes, hanger, options.band_low_hz))
         checks.append(sensor_gain(measurements, found.apart, placement.modes, hanger))
         checks.append(sensor_places(placement.modes, hanger))
     return [check for check in checks if check is not None]
@@ -307,11 +338,14 @@ _LINES_AROUND = 4  # judgement: nine lines have a median that one bad line does 
 def without_window(found: Finding, measurement: Measurement) -> Finding:
     """The finding with the damping of an exponential window taken off its damping ratios."""
     rate = 1 / measurement.decay_time_constant_s
-    modes = tuple(
-        replace(m, damping_ratio=m.damping_ratio - rate / (2 * math.pi * m.frequency_hz))
-        for m in found.modes
+    modes, doubtful = (
+        tuple(
+            replace(m, damping_ratio=m.damping_ratio - rate / (2 * math.pi * m.frequency_hz))
+            for m in each
+        )
+        for each in (found.modes, found.doubtful)
     )
-    return replace(found, modes=modes)
+    return replace(found, modes=modes, doubtful=doubtful)
 
 
 def coherent_only(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:

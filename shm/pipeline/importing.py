@@ -73,12 +73,14 @@ class Answers:
 
 @dataclass(frozen=True)
 class Question:
-    """What only a person knows: of a channel, or of the whole file where `channel` is empty."""
+    """What only a person knows: of a channel, or of the whole file where `channel` is empty; a file
+    can be taken in without what is not `needed`."""
 
     about: str
     channel: str
     text: str
     option: str
+    needed: bool = True
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,7 @@ class Import:
 
     @property
     def is_ready(self) -> bool:
-        return not self.questions and not self.problems
+        return not self.problems and not any(question.needed for question in self.questions)
 
 
 def look_into(path: Path, workspace: Workspace, answers: Answers) -> Import:
@@ -243,10 +245,7 @@ def _questions(found: Survey, described: Described, hanger: object, rate: float)
         asked.append(Question("rate", "", "How many samples a second?", "--rate HZ"))
     columns = [_told(column, described) for column in found.columns]
     asked += [_of_unit(column) for column in _open(columns)]
-    for column in columns:
-        if column.quantity == "acceleration":
-            asked += _of_sensor(column, described)
-    return asked
+    return asked + [each for column in columns for each in _of_sensor(column, described)]
 
 
 def _holds_nothing(found: Survey, described: Described, questions: Sequence[Question]) -> bool:
@@ -320,13 +319,14 @@ def _of_unit(column: SurveyedColumn) -> Question:
 
 
 def _of_sensor(column: SurveyedColumn, described: Described) -> list[Question]:
-    name, quoted = column.name, shlex.quote(column.name)
-    asked = []
+    name, quoted, asked = column.name, shlex.quote(column.name), []
     said = {*described.get("channel", {}).get(name, {}), *described}
-    if math.isnan(column.x_m) and "x_m" not in said:
-        text = f"Where is {name}, in m from the deck end (or 'unknown')?"
-        asked.append(Question("place", name, text, f"--place {quoted}=M"))
-    if column.plane is None and "plane" not in described:
+    moves = column.quantity == "acceleration"
+    if column.quantity and math.isnan(column.x_m) and "x_m" not in said:
+        what = f"Where is {name}" if moves else f"Where does the hammer of {name} hit"
+        text = f"{what}, in m from the deck end (or 'unknown')?"
+        asked.append(Question("place", name, text, f"--place {quoted}=M", needed=moves))
+    if moves and column.plane is None and "plane" not in described:
         text = f"In which plane does {name} measure (transverse or longitudinal)?"
         asked.append(Question("plane", name, text, f"--plane {quoted}=transverse|longitudinal"))
     return asked

@@ -15,7 +15,7 @@ from shm.report.colours import VERDICT_STYLES
 from shm.report.contents import ModalTestReport
 from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Fact, Paper, Part, Table, filled
-from shm.report.quality_table import overall, quality_table
+from shm.report.quality_table import headline, overall, quality_table
 from shm.values import PLANES, FrequencyResponse, Mode, Plane, QualityCheck, Recording, Verdict
 from shm.values.force_units import force_unit
 
@@ -29,7 +29,7 @@ def modal_test_paper(sheet: ModalTestReport) -> Paper:
     return Paper(
         title=name(sheet),
         bridge=sheet.bridge,
-        status=HEADLINES[verdict],
+        status=headline(sheet.identification.quality),
         style=VERDICT_STYLES[verdict],
         parts=(
             Part("In short", summary=summary(sheet), facts=facts(sheet)),
@@ -68,12 +68,6 @@ def _force(sheet: ModalTestReport) -> str:
     return f"peak force {formatting.plain(min(forces))} to {formatting.plain(max(forces))} N"
 
 
-HEADLINES: dict[Verdict, str] = {
-    "good": "Good",
-    "warning": "Use with care",
-    "refused": "Do not use",
-    "unknown": "Not checked",
-}
 _MOST_REMEDIES = 3  # layout: more are not read
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from shm.report import formatting
 from shm.report.paper import Table
 from shm.values import QualityCheck, Verdict
+from shm.values.modes import FIRST_ORDERS
 
 SYMBOLS: dict[Verdict, str] = {"good": "✓", "warning": "!", "refused": "✗", "unknown": "?"}
 _GRAVEST: tuple[Verdict, ...] = ("refused", "warning", "unknown", "good")
@@ -24,6 +25,20 @@ def overall(checks: Sequence[QualityCheck]) -> Verdict:
     if given <= {"unknown"}:
         return "unknown"
     return next(verdict for verdict in _GRAVEST if verdict in given - {"unknown"})
+
+
+_HEADLINES: dict[Verdict, str] = {
+    "good": "Good",
+    "warning": "Use with care",
+    "refused": "Do not use",
+    "unknown": "Not checked",
+}
+
+
+def headline(checks: Sequence[QualityCheck]) -> str:
+    """What the whole deserves, and which lowest mode is missing: `Use with care: ...`."""
+    lost = [c.found for c in checks if c.name == FIRST_ORDERS and c.verdict == "warning"]
+    return ": ".join([_HEADLINES[overall(checks)], *lost])
 
 
 def with_unit(value: float, unit: str) -> str:

@@ -97,6 +97,9 @@ class QualityCheck:
     remedy: str = ""
 
 
+FIRST_ORDERS = "first orders"
+"""Name of the check that the lowest modes of each plane were found; it is part of the headline."""
+
 LONGEST_TEST_ID = 200
 """Characters; as long as the name of a file may be, see `shm.store.archive.safe_name`."""
 

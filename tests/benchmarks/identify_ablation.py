@@ -44,9 +44,8 @@ from tests.worlds import recordings as world  # noqa: E402
 
 CONSTANTS: Mapping[str, Mapping[str, float]] = {
     "all as they are": {},
-    "others' shifts when unseen": {"_UNSEEN": 0.0},
     "the error of the law": {"_LAW_ERROR": 0.0},
-    "others' shifts when unsure": {"_SOME": 2.0},
+    "others' shifts when unsure": {"_BY_CHANCE": -1.0},
     "the overlap of stretches": {"_OVERLAP": 1.0},
     "half as sure a phase": {"_LEAST_RATIO": 4.0},
     "stretches twice as long": {"_STRETCH_SECONDS": 1.0},

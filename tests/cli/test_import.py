@@ -24,7 +24,9 @@ from tests.helpers.workspaces import make_workspace
 from tests.helpers.written import write_counts
 
 HEAD = "catman\nMessung;quer\nAbtastrate;{rate:.0f} Hz\n\nZeit [s];Kraft [N];A1 [m/s²];A2 [g]\n"
-SAID = ("--hanger", 3, "--place", "2.52", "--plane", "transverse,longitudinal")
+SAID = (
+    "--hanger", 3, "--place", "2.52", "--place", "Kraft=1.9", "--plane", "transverse,longitudinal"
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -72,6 +74,7 @@ def test_the_second_file_of_a_logger_needs_nothing(
     kept = tomllib.loads(profile.read_text())
     assert kept["hanger"] == 3
     assert kept["channel"]["A2"] == {"x_m": 2.52, "plane": "longitudinal"}
+    assert kept["channel"]["Kraft"] == {"x_m": 1.9}
     second = shm("--workspace", workspace.folder, "import", export(tmp_path / "b.csv", 2), "--json")
     assert second.code == 0
     assert second.document["questions"] == []
@@ -259,7 +262,7 @@ def test_a_table_without_names_or_units_is_read_by_the_answers(
         "--unit", "data_2=N", "--unit", "data_3=g",
     )  # fmt: skip
     asked = shm(*told, "--json").document
-    assert [q["about"] for q in asked["questions"]] == ["place", "plane"]
+    assert [q["about"] for q in asked["questions"]] == ["place", "place", "plane"]
     assert asked["sampling_rate_hz"] == pytest.approx(512)
     assert shm(*told, "--place", "2.52", "--plane", "transverse").code == 0
     found = read(workspace.spool / "table.mat")

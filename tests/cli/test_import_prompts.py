@@ -153,6 +153,7 @@ def test_a_wrong_answer_is_asked_for_again_and_the_right_ones_are_kept(
 ) -> None:
     with terminal(workspace, export(tmp_path / "a.csv")) as person:
         person.answer("Which hanger", "three", "9", "3")
+        person.answer("hammer of Kraft", "1,9")
         person.answer("Where is A1", "high up", "2,52")
         person.answer("which plane does A1", "sideways", "quer")
         person.answer("Where is A2", "unknown")
@@ -165,6 +166,7 @@ def test_a_wrong_answer_is_asked_for_again_and_the_right_ones_are_kept(
     said = tomllib.loads(profile.read_text())
     assert said["hanger"] == 3
     assert said["channel"] == {
+        "Kraft": {"x_m": 1.9},
         "A1": {"x_m": 2.52, "plane": "transverse"},
         "A2": {"x_m": "", "plane": "longitudinal"},
     }
@@ -174,7 +176,7 @@ def test_a_wrong_answer_is_asked_for_again_and_the_right_ones_are_kept(
 def test_a_logger_that_is_carried_is_asked_for_its_hanger_each_time(
     workspace: Workspace, tmp_path: Path
 ) -> None:
-    said = ("--place", "2.52", "--plane", "transverse,longitudinal")
+    said = ("--place", "Kraft=1.9", "--place", "2.52", "--plane", "transverse,longitudinal")
     with terminal(workspace, export(tmp_path / "a.csv"), *said) as person:
         person.answer("Which hanger", "3")
         person.answer("of hanger 3, too?", "")
@@ -194,6 +196,7 @@ def test_what_follows_from_an_answer_is_asked_next(workspace: Workspace, tmp_pat
     with terminal(workspace, path, "--hanger", 3) as person:
         person.answer("full scale of channel_1", "loud", "2000 N")
         person.answer("full scale of channel_2", "50 g")
+        person.answer("hammer of channel_1", "unknown")
         person.answer("Where is channel_2", "2.52")
         person.answer("which plane does channel_2", "transverse")
         person.answer("of hanger 3, too?", "y")
@@ -209,7 +212,8 @@ def test_what_follows_from_an_answer_is_asked_next(workspace: Workspace, tmp_pat
 def test_who_leaves_in_between_leaves_nothing(
     workspace: Workspace, tmp_path: Path, key: str, at: str
 ) -> None:
-    answers = {"Which hanger": "3", "Where is A1": "2", "which plane does A1": "t"}
+    answers = {"Which hanger": "3", "hammer of Kraft": "2", "Where is A1": "2"}
+    answers |= {"which plane does A1": "t"}
     answers |= {"Where is A2": "2", "which plane does A2": "l", "of hanger 3, too?": "y"}
     with terminal(workspace, export(tmp_path / "a.csv")) as person:
         for question, answer in answers.items():

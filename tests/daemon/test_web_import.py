@@ -47,7 +47,7 @@ def test_a_look_keeps_nothing_and_asks_what_the_file_does_not_say(
 ) -> None:
     found = asked(client, export(1)).json()
     assert [(q["about"], q["channel"]) for q in found["questions"]] == [
-        ("hanger", ""), ("unit", "AI 2"), ("place", "A1"), ("plane", "A1"),
+        ("hanger", ""), ("unit", "AI 2"), ("place", "Kraft"), ("place", "A1"), ("plane", "A1"),
     ]  # fmt: skip
     assert [c["quantity"] for c in found["columns"]] == ["force", "acceleration", None]
     assert len(found["columns"][0]["outline"]) == 32
@@ -63,8 +63,9 @@ def test_answers_are_kept_for_the_logger_and_the_file_lands(
         "columns": {"A1": {"place": "2,5", "plane": "transverse"}, "AI 2": {"unit": "leave out"}},
     }
     found = asked(client, export(1), said).json()
-    assert found["questions"] == found["problems"] == []
-    assert found["sha256"]
+    assert [question["channel"] for question in found["questions"]] == ["Kraft"]
+    assert found["problems"] == []
+    assert found["sha256"]  # the hammer's place is asked for, not needed
     told = tomllib.loads((workspace.spool / "a.toml").read_text())
     assert told["channel"]["A1"] == {"x_m": 2.5, "plane": "transverse"}
     assert asked(client, export(2), {}, "b.csv").json()["sha256"]

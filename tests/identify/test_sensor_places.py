@@ -71,6 +71,13 @@ def test_a_sound_test_moves_as_the_described_mass_lets_it(record: Recording) -> 
     assert gain.value == pytest.approx(1, abs=0.1)
 
 
+def test_without_the_hammers_place_the_gain_is_said_to_be_unchecked(record: Recording) -> None:
+    force, *others = record.channels
+    check = check_of("gain", replace(record, channels=(replace(force, x_m=NAN), *others)))
+    assert check.verdict == "unknown"
+    assert "not checked: the hammer's place is not stated" in check.found
+
+
 def test_accelerations_in_g_under_the_name_of_m_s2_are_noticed(record: Recording) -> None:
     force, *others = record.channels
     in_g = tuple(replace(c, values=c.values / 9.81) for c in others)

@@ -58,7 +58,8 @@ def test_windows_cover_the_band_side_by_side() -> None:
 def test_windows_find_close_pairs_of_a_single_decay() -> None:
     """Twelve pairs 0.3 % apart, 60 dB above the noise: every one within 0.05 %."""
     measurement = _measurement((_decay(1, 12, 1e-3), _decay(2, 12, 1e-3)))
-    found = through_windows(measurement, IdentifyOptions(2.0, 50.0))
+    options = IdentifyOptions(2.0, 50.0)
+    found = through_windows(measurement, options, windows(RATE_HZ, options))
     frequencies = np.array([mode.frequency_hz for mode in found.modes])
     for n in range(1, 13):
         for hz in (2.1 * n, 2.1 * n * 1.003):

@@ -15,6 +15,7 @@ from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.contents import ModalTestReport
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
+from shm.report.quality_table import headline
 from shm.values import ModalTest, QualityCheck
 from tests.report.outline import Outline
 from tests.report.sheets import (
@@ -208,3 +209,10 @@ def test_the_document_survives_json_and_holds_what_the_page_tells() -> None:
     }  # fmt: skip
     assert document["hits"][1]["reason"] == "double hit"
     assert document["band_hz"] == [2.0, 90.0]
+
+
+def test_the_headline_names_a_missing_first_order() -> None:
+    lost = QualityCheck("first orders", "warning", 1, 0, "", "transverse order 1 not found", "Hit.")
+    good = QualityCheck("noise", "good", 30, 20, "dB", "quiet")
+    assert headline([good, lost]) == "Use with care: transverse order 1 not found"
+    assert headline([good]) == "Good"

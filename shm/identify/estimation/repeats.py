@@ -126,11 +126,12 @@ def _repeat(
 
 def proven(
     candidates: Sequence[Candidate], repeats: Sequence[Repeats], options: IdentifyOptions
-) -> tuple[tuple[FoundMode, ...], list[Candidate], tuple[Dropped, ...]]:
-    """The candidates that repeat as modes, by rising frequency, and themselves; and those dropped
-    with the reason."""
+) -> tuple[tuple[FoundMode, ...], list[Candidate], tuple[FoundMode, ...], tuple[Dropped, ...]]:
+    """The candidates that repeat as modes, by rising frequency, and themselves; those dropped as
+    the modes that they may be, and with the reason."""
     kept: list[Candidate] = []
     again: list[Repeats] = []
+    doubtful: list[FoundMode] = []
     dropped: list[Dropped] = []
     for candidate, repeat in sorted(
         zip(candidates, repeats, strict=True), key=lambda pair: pair[0].frequency_hz
@@ -139,6 +140,8 @@ def proven(
         if reason:
             what = f"mode at {candidate.frequency_hz:.4g} Hz"
             dropped.append(Dropped(what, 1, reason, candidate.frequency_hz))
+            by_hits_hz = frequency_sd(candidate.frequency_hz, repeat.frequency_hz)
+            doubtful.append(_mode(candidate, repeat, by_hits_hz, options))
         else:
             kept.append(candidate)
             again.append(repeat)
@@ -146,7 +149,7 @@ def proven(
         _mode(candidate, repeat, by_hits, options)
         for candidate, repeat, by_hits in zip(kept, again, _by_hits(kept, again), strict=True)
     )
-    return modes, kept, tuple(dropped)
+    return modes, kept, tuple(doubtful), tuple(dropped)
 
 
 def _by_hits(candidates: Sequence[Candidate], repeats: Sequence[Repeats]) -> list[float]:

@@ -27,7 +27,7 @@ imported: the rest of the package brings pandas and scikit-learn.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, reduce
 from types import ModuleType
@@ -108,7 +108,8 @@ def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Fin
     timed = bool(measurement.hits) or nobody_hit
     if _repeated(measurement) or not (timed and checked):
         return found
-    return completed(found, through_windows(measurement, options))
+    every = windows(measurement.sampling_rate_hz, options)
+    return completed(found, through_windows(measurement, options, every))
 
 
 def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOptions) -> Finding:
@@ -131,9 +132,21 @@ def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOpti
     return modes_of_hankel(matrices, rows, measurement, options)
 
 
-def through_windows(measurement: Measurement, options: IdentifyOptions) -> Finding:
-    """The modes that each window of the band shows by itself."""
+def looked_at_again(
+    measurement: Measurement, options: IdentifyOptions, at_hz: Sequence[float]
+) -> Finding | None:
+    """What windows show about `at_hz`; None where windows were looked through before, or cannot."""
     every = windows(measurement.sampling_rate_hz, options)
+    around = [w for w in every if any(w.low_hz <= hz <= w.high_hz for hz in at_hz)]
+    if not around or not measurement.hits or not _repeated(measurement):
+        return None
+    return through_windows(measurement, options, around)
+
+
+def through_windows(
+    measurement: Measurement, options: IdentifyOptions, every: Iterable[Window]
+) -> Finding:
+    """The modes that each window shows by itself."""
     return reduce(completed, (_in_window(window, measurement, options) for window in every))
 
 

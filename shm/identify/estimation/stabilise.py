@@ -47,10 +47,11 @@ def stabilised(
     final = [poles for poles in sets if poles.order in orders]
     again = find_again(single, without_each_hit)
     told, again = told_apart(single, again, (final, without_each_hit), seconds, options)
-    modes, kept, doubtful = proven(told, again, options)
+    modes, kept, doubtful, refused = proven(told, again, options)
     lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in kept)
     followed = Dropped("poles", lost, "stable, but of a mode that was dropped")
-    return Finding(modes, (*unstable, followed, *doubles, *doubtful), diagram(sets, kept, options))
+    dropped = (*unstable, followed, *doubles, *refused)
+    return Finding(modes, dropped, diagram(sets, kept, options), doubtful)
 
 
 def completed(found: Finding, other: Finding) -> Finding:
@@ -60,7 +61,8 @@ def completed(found: Finding, other: Finding) -> Finding:
     dropped = tuple(
         entry for entry in found.dropped if not any(_of(entry, mode.frequency_hz) for mode in added)
     )
-    return replace(found, modes=modes, dropped=dropped)
+    doubtful = (*found.doubtful, *other.doubtful)
+    return replace(found, modes=modes, dropped=dropped, doubtful=doubtful)
 
 
 def _same(one: FoundMode, other: FoundMode) -> bool:

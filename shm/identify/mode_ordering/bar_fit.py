@@ -31,19 +31,30 @@ PLAIN_BAR = 0.001
 median and above this in seven, three of them of heavy sensors; of orders off by one it is 0.0008
 and more. With 0.0015 one more of 112 tests is refused; no order is wrong with either."""
 _MOST_OFF = 4.0  # judgement, standard deviations: of a mode that is farther off the order is unsure
-_LEAST_MODES = 6  # judgement: two more than tension, stiffness and a spring a plane
+LEAST_MODES = 6  # judgement: two more than tension, stiffness and a spring a plane
 
 
 @dataclass(frozen=True, eq=False)
-class _Bar:
+class Bar:
     """A numbering, the cost of its best bar, and by how much each mode's log frequency is off it.
 
-    `off` (modes,) of both planes one after the other is NaN for modes without an order.
+    `off` (modes,) of both planes one after the other is NaN for modes without an order. `at` is the
+    log unit and log xi, then each plane's fixity; `shift`: see `Grid`.
     """
 
     orders: Orders
     cost: float
     off: FloatArray
+    at: FloatArray
+    shift: tuple[float, ...] = ()
+
+    def frequencies_hz(self, plane: int, highest: int) -> FloatArray:
+        """Of the orders from 1 to `highest` of the plane of that number."""
+        orders = np.arange(1.0, highest + 1)
+        log_hz = self.at[0] + log_frequency(
+            self.at[1], np.full(highest, self.at[2 + plane]), orders
+        )
+        return np.asarray(np.exp(log_hz + (np.array(self.shift[:highest]) if self.shift else 0.0)))
 
     @property
     def fits(self) -> bool:
@@ -58,14 +69,15 @@ def borne_out(planes: Sequence[PlaneModes], expected: Expected, numbering: Numbe
     """
     known = sum(order is not None for own in numbering.orders for order in own)
     least = min((margin for own in numbering.margins for margin in own), default=np.inf)
-    if numbering.basis != "description" or known < _LEAST_MODES or least >= LEAST_MARGIN:
+    if numbering.basis != "description" or known < LEAST_MODES or least >= LEAST_MARGIN:
         return numbering
-    tried = list(_shifted_while_better(planes, expected, numbering.orders))
+    frequency_hz = [plane.frequency_hz for plane in planes]
+    tried = list(_shifted_while_better(frequency_hz, expected, numbering.orders))
     best = min(tried, key=lambda bar: bar.cost)
     beside = [
-        _fitted(planes, _shifted(best.orders, shifts), expected)
+        fitted_bar(frequency_hz, _shifted(best.orders, shifts), expected)
         for shifts in ((0, 1), (0, -1))
-        if all(len(plane.frequency_hz) for plane in planes)
+        if all(len(own_hz) for own_hz in frequency_hz)
     ]
     best, *others = sorted([*tried, *beside], key=lambda bar: bar.cost)
     if not best.fits:
@@ -79,16 +91,16 @@ def borne_out(planes: Sequence[PlaneModes], expected: Expected, numbering: Numbe
 
 
 def _shifted_while_better(
-    planes: Sequence[PlaneModes], expected: Expected, orders: Orders
-) -> Iterator[_Bar]:
+    frequency_hz: Sequence[FloatArray], expected: Expected, orders: Orders
+) -> Iterator[Bar]:
     """Bars of all orders lower and higher, as far as they cost little more than the best so far."""
-    first = _fitted(planes, orders, expected)
+    first = fitted_bar(frequency_hz, orders, expected)
     yield first
     least = first.cost
     for step in (1, -1):
         bar, shift = first, step
         while bar.cost < least + LEAST_MARGIN and np.isfinite(bar.cost):
-            bar = _fitted(planes, _shifted(orders, (shift, shift)), expected)
+            bar = fitted_bar(frequency_hz, _shifted(orders, (shift, shift)), expected)
             least = min(least, bar.cost)
             yield bar
             shift += step
@@ -101,16 +113,18 @@ def _shifted(orders: Orders, shifts: Sequence[int]) -> Orders:
     )
 
 
-def _fitted(planes: Sequence[PlaneModes], orders: Orders, expected: Expected) -> _Bar:
-    """The best bar: tension and stiffness are common, the springs each plane's own."""
+def fitted_bar(frequency_hz: Sequence[FloatArray], orders: Orders, expected: Expected) -> Bar:
+    """The best bar of each plane's modes: tension and stiffness are common, the springs its own."""
+    springs = np.ones(len(frequency_hz))
+    start = np.array([expected.log_unit, expected.log_xi, *(springs / 2)])
     numbers = [np.array([order or np.nan for order in own], float) for own in orders]
     number = np.concatenate(numbers)
     if np.nanmin(number) < 1 or np.nanmax(number) > HIGHEST_ORDER:
-        return _Bar(orders, np.inf, np.full(number.shape, np.nan))
-    log_hz = np.concatenate([np.log(plane.frequency_hz) for plane in planes])
+        return Bar(orders, np.inf, np.full(number.shape, np.nan), start)
+    log_hz = np.log(np.concatenate(frequency_hz))
     if expected.shift:  # what turnbuckles do is taken off
         log_hz = log_hz - np.append(np.nan, expected.shift)[np.nan_to_num(number).astype(int)]
-    plane_of = np.repeat(np.arange(len(planes)), [len(own) for own in orders])
+    plane_of = np.repeat(np.arange(len(springs)), [len(own) for own in orders])
 
     def off(at: FloatArray) -> FloatArray:
         return np.asarray(log_hz - at[0] - log_frequency(at[1], at[2:][plane_of], number))
@@ -124,11 +138,10 @@ def _fitted(planes: Sequence[PlaneModes], orders: Orders, expected: Expected) ->
         )
         return np.asarray(np.sign(every) * np.sqrt(heavy_tailed(every)))
 
-    springs = np.ones(len(planes))
     best = scipy.optimize.least_squares(
         misfit,
-        np.array([expected.log_unit, expected.log_xi, *(springs / 2)]),
+        start,
         bounds=([-np.inf, 0.0, *(0 * springs)], [np.inf, np.inf, *springs]),
         method="dogbox",
     )
-    return _Bar(orders, 2 * float(best.cost), off(best.x))
+    return Bar(orders, 2 * float(best.cost), off(best.x), best.x, expected.shift)

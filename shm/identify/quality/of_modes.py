@@ -1,8 +1,9 @@
-"""Does the force explain the modes, and does a second identifier find them?"""
+"""Does the force explain the modes, does a second identifier find them, are the lowest there?"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,9 +11,21 @@ from shm.identify.contract import Measurement
 from shm.identify.estimation.amplitude_dependence import is_sure
 from shm.identify.measuring.frf import response_of
 from shm.identify.measuring.struck_planes import struck_planes
+from shm.identify.mode_ordering.alignment import log_frequency
+from shm.identify.mode_ordering.order import Expected
 from shm.identify.quality.inspection import Inspection
-from shm.values import NAN, BoolArray, FloatArray, QualityCheck, Verdict
-from shm.values.modes import SLOPE_OF_NOTE
+from shm.values import (
+    NAN,
+    PLANES,
+    BoolArray,
+    FloatArray,
+    Hanger,
+    Mode,
+    Plane,
+    QualityCheck,
+    Verdict,
+)
+from shm.values.modes import FIRST_ORDERS, SLOPE_OF_NOTE
 from shm.values.rounding import listed
 
 # judgement: 0.2 of the response unexplained; sound tests have 0.92 and more: identify_limits.py
@@ -171,3 +184,35 @@ def _alone(who: str, frequency_hz: FloatArray, common: list[int]) -> str:
     alone = np.delete(frequency_hz, common)
     told = listed([f"{value:.2f} Hz" for value in alone])
     return f"; {who} identifier alone saw {told}" if len(alone) else ""
+
+
+def first_orders(modes: Sequence[Mode], hanger: Hanger, low_hz: float) -> QualityCheck | None:
+    """How many modes the described hanger has above `low_hz` and below the first one of a plane."""
+    lost = {plane: _below_first(modes, plane, hanger, low_hz) for plane in PLANES}
+    if not modes:
+        return None
+    told = [
+        f"{plane} order {listed([str(order) for order in orders])}"
+        for plane, orders in lost.items()
+        if orders
+    ]
+    if not told:
+        found = "no mode is missing below the first one of a plane"
+        return QualityCheck(FIRST_ORDERS, "good", 0.0, 0.0, "", found)
+    count = sum(len(orders) for orders in lost.values())
+    return QualityCheck(
+        FIRST_ORDERS, "warning", float(count), 0.0, "", f"{listed(told)} not found",
+        "Hit nearer to the middle with a softer tip, and record longer.",
+    )  # fmt: skip
+
+
+def _below_first(modes: Sequence[Mode], plane: Plane, hanger: Hanger, low_hz: float) -> list[int]:
+    own = [mode for mode in modes if mode.plane == plane]
+    if not own:
+        return []
+    first = min(own, key=lambda mode: mode.order)
+    orders = np.arange(1, first.order + 1)
+    half_fixed = np.full(orders.shape, 0.5)
+    log_hz = log_frequency(Expected.of(hanger).log_xi, half_fixed, orders.astype(float))
+    expected_hz = first.frequency_hz * np.exp(log_hz - log_hz[-1])
+    return [int(order) for order in orders[:-1][expected_hz[:-1] >= low_hz]]

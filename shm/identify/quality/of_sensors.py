@@ -16,7 +16,7 @@ import numpy as np
 from shm.identify.contract import FoundMode, Measurement
 from shm.identify.mode_ordering.alignment import HIGHEST_ORDER, tensioned_beam_pattern
 from shm.identify.setup_merging.modal_participation import ringing
-from shm.values import PLANES, FloatArray, Hanger, IntArray, Mode, Plane, QualityCheck, Verdict
+from shm.values import NAN, PLANES, FloatArray, Hanger, IntArray, Mode, Plane, QualityCheck, Verdict
 
 LARGEST_FACTOR = 2.0
 """Of motion over force."""
@@ -58,8 +58,15 @@ def sensor_gain(
     """Motion for the force over that of the described mass; None where it cannot be told.
 
     `found` are the modes of each set-up, `modes` those with an order. Of frequencies that change
-    much with amplitude the residues are too small.
+    much with amplitude the residues are too small. Not checked where no hammer's place is stated.
     """
+    hammers = [measurement.hammer for measurement in measurements if measurement.driven]
+    if hammers and not any(hammer and np.isfinite(hammer.x_m) for hammer in hammers):
+        return QualityCheck(
+            "gain", "unknown", NAN, LARGEST_FACTOR, "",
+            "not checked: the hammer's place is not stated",
+            "State where the hammer hits: `x_m` of the force, in m from the deck end.",
+        )  # fmt: skip
     if any(m.depends_on_amplitude and abs(m.amplitude_slope) > _LARGEST_SLOPE for m in modes):
         return None
     factors = [

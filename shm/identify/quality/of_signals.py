@@ -149,7 +149,7 @@ def cable(inspection: Inspection) -> QualityCheck | None:
         (CABLE, COPY, DEAD, SILENT, WANDERS, HITS_NOT_SHOWN),
         "no channel jumps, wanders or is silent",
         "Reseat the connectors of these channels, tie the cables down, exchange a cable that stays "
-        "bad, and repeat these hits.",
+        "bad, and repeat these hits; if all channels are named, check the logger's clock.",
     )
 
 

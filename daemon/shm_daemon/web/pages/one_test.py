@@ -14,9 +14,9 @@ from shm.report.colours import VERDICT_STYLES
 from shm.report.figures.modal_test_response import point_name
 from shm.report.figures.modal_test_spectra import shown_points
 from shm.report.intervals import Interval
-from shm.report.modal_test_report import HEADLINES, name
+from shm.report.modal_test_report import name
 from shm.report.paper import Table, filled
-from shm.report.quality_table import overall
+from shm.report.quality_table import headline, overall
 from shm.values import ResponsePoint
 from shm.values.force_units import force_unit
 from shm_daemon.web.access import Reader
@@ -54,7 +54,7 @@ def _page(request: Request, view: TestView, response: int | None) -> HTMLRespons
         "test.html.j2",
         title=name(sheet),
         hanger=hanger_id,
-        verdict=HEADLINES[verdict],
+        verdict=headline(view.stored.quality),
         style=VERDICT_STYLES[verdict],
         summary=view.summary,
         facts=_facts(view),

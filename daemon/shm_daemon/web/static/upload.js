@@ -171,7 +171,7 @@
       return false; // sent as it is, it is refused with its reason
     }
     found.questions = found.questions.filter(({ about }) => about !== "hanger" || !given.hanger);
-    while (found.questions.length) {
+    while (found.questions.length && !found.sha256) {
       state(row, "Say what the file does not: it is kept for all files of this logger.", "open");
       const answers = await asked(found, row);
       if (answers === null) return false;
