@@ -52,7 +52,7 @@ def test_a_profile_is_kept_by_its_layout_without_what_holds_for_one_file(tmp_pat
     ("layout", "name"),
     [
         (Layout("f" * 9, "csv", ()), "csv-csv-ffffff.toml"),
-        (Layout("f" * 9, "×", ("Ü",)), "logger-ffffff.toml"),
+        (Layout("f" * 9, "?", ("Ü",)), "logger-ffffff.toml"),
         (Layout("f" * 9, "csv", ("a" * 60,)), f"csv-{'a' * 36}-ffffff.toml"),
     ],
 )
