@@ -196,7 +196,7 @@ def test_of_a_quiet_hanger_what_its_tests_can_say(
             "WATCH",
             "One is held.",
         ),
-        ({"standing": [alert("slow drift", message="It creeps. Go today.")]}, "WATCH", "It creeps."),
+        ({"standing": [alert("slow drift", message="It creeps. Go today.")]}, "WATCH", "It c"),
         (
             {"warnings": ["It is new. Wait."],
              "standing": [alert("check the modes", message="Modes. Look within a week.")]},
