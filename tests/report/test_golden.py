@@ -29,8 +29,10 @@ from shm.report.figures import (
 from shm.report.figures.every_figure import OF_TRIAL
 from shm.report.figures.hanger_states import FIGURE as STATES
 from shm.report.figures.specification import Specification
+from shm.report.hanger_report import hanger_paper
 from shm.report.intervals import Interval
 from shm.report.paper import Paper
+from shm.report.structure_report import StructureReport, structure_json, structure_paper
 from shm.values import BridgeDiagnosis
 from shm.values.stream import StreamEvent
 from shm.watch.history import Band
@@ -139,10 +141,24 @@ def told(value: Any) -> str:
     return "drawn" if callable(value) else str(value)
 
 
+def _structure(season: HangerReport, *, watched: bool) -> StructureReport:
+    drift = replace(season.drifts[0], quantity="f1", shift_mean=-0.021)
+    return StructureReport(
+        "Arch", replace(season.hanger, kind="any"), 12, START if watched else None,
+        START if watched else None, {"f1": 1.23456, "f2": 2.5}, "It moved." if watched else "",
+        (drift,) if watched else (), season.alerts if watched else (), int(watched), START, "0.1.0",
+    )  # fmt: skip
+
+
 def papers(season: HangerReport) -> Iterator[tuple[str, Paper]]:
     yield from ((kind, make(season)) for kind, make in KINDS.items())
     yield "bridge diagnosis", bridge_diagnosis_paper(BridgeDiagnosisSheet(family(), "Arch"))
     alone = bridge((0.1, 0.2, 0.1), (0.05, 0.01, 0.02))
+    yield "structure", structure_paper(_structure(season, watched=True))
+    yield "structure not watched", structure_paper(_structure(season, watched=False))
+    changed = tuple(f"{name} 1 -> 2" for name in ("area", "length", "mass", "modulus", "plate"))
+    outdated = replace(season, redescribed=changed, discarded=("t001", "t002"))
+    yield "outdated baseline", hanger_paper(outdated)
     yield "no shared cause", bridge_diagnosis_paper(BridgeDiagnosisSheet(alone, "Arch"))
 
 
@@ -157,6 +173,8 @@ def found(season: HangerReport, bare: HangerReport) -> dict[str, str]:
         for name, each in figures(season, bare)
     }
     made |= {f"words {name}": sums([each]) for name, each in words(season)}
+    documents = [structure_json(_structure(season, watched=each)) for each in (True, False)]
+    made["structure as JSON"] = sums([json.dumps(each, default=str) for each in documents])
     for name, paper in papers(season):
         made[f"paper {name}"] = sums([replace(paper, parts=()), *paper.parts])
     return made
