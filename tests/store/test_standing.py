@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime, timedelta
 
 import pytest
@@ -10,7 +11,8 @@ from shm.errors import NothingThere, UsageError
 from shm.store import IdentifiedTest, Lineage, Stage, Store
 from shm.store.recording_rows import Death
 from shm.store.stored_tests import StoredTest
-from tests.helpers.nouns import NOW, a_file, a_test
+from shm.values import Selection
+from tests.helpers.nouns import NOW, a_file, a_posterior, a_test, a_watched_test
 
 HOUR, DAY = timedelta(hours=1), timedelta(days=1)
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
@@ -155,3 +157,47 @@ def test_the_latest_test_whose_tension_was_read(file_store: Store) -> None:
         assert found.test.id == name
     assert tests.latest_weighed([3], NOW + DAY) is None
     assert tests.latest_weighed([4], NOW + 9 * DAY) is None
+
+
+def watched_season(store: Store) -> list[StoredTest]:
+    """Five tests, the first the baseline's, received in another order than they were taken in."""
+    found = [identified(store, number, day) for number, day in enumerate((1, 9, 3, 7, 5), start=1)]
+    made = Selection((a_posterior("beam1"),), (1.0,))
+    store.posteriors.save_selection(3, [found[0]], made, LINEAGE, NOW)
+    baseline = store.watch.baseline(3)
+    assert baseline is not None
+    for test in found[1:]:
+        store.posteriors.save(test, a_posterior("beam1", (test.test.id,)), LINEAGE, NOW)
+        watched = replace(a_watched_test(test.test.id), time=test.time)
+        store.watch.save(test, baseline, watched, None, [], NOW)
+    return list(store.tests.list_all(3))
+
+
+def test_the_tests_beside_one_by_time_and_by_receipt_nearest_first(file_store: Store) -> None:
+    by_name = {each.test.id: each for each in watched_season(file_store)}
+    baseline = file_store.watch.baseline(3)
+    assert baseline is not None
+    tests, middle = file_store.tests, by_name["t4"]
+    before, after = tests.dated_beside(baseline, middle, 9)
+    assert (names(before), names(after)) == (["t5", "t3"], ["t2"])
+    before, after = tests.dated_beside(baseline, middle, 1)
+    assert (names(before), names(after)) == (["t5"], ["t2"])
+    before, after = tests.received_beside(baseline, middle, 9)
+    assert (names(before), names(after)) == (["t3", "t2"], ["t5"])
+    assert tests.beside(middle) == ("t5", "t2")
+    assert tests.beside(by_name["t1"]) == (None, "t3")
+    assert tests.beside(by_name["t2"]) == ("t4", None)
+
+
+def test_watched_tests_are_listed_page_by_page(file_store: Store) -> None:
+    watched_season(file_store)
+    baseline = file_store.watch.baseline(3)
+    assert baseline is not None
+    listed = file_store.watch.list_watched(baseline)
+    assert [each.name for each in listed] == ["t3", "t5", "t4", "t2"]
+    fourth = file_store.tests.named(3, "t4")
+    before = file_store.watch.list_watched(baseline, fourth)
+    assert [each.name for each in before] == ["t3", "t5"]
+    recent = file_store.watch.list_recent(baseline, 2)
+    assert [each.watched.test for each in recent] == ["t4", "t2"]
+    assert [each.watched.test for each in file_store.watch.list_all(3)] == ["t3", "t5", "t4", "t2"]
