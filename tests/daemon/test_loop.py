@@ -18,9 +18,10 @@ from shm.settings import Settings
 from shm.store import Archive, Delivery, DeliveryState, Stage, Workspace
 from shm.store.checking import check_store
 from shm.store.stored_recordings import Recordings
-from shm_daemon import Wakeup, run
+from shm_daemon import Wakeup, loop, run
 from shm_daemon.heartbeat import why_turn_failed
 from shm_daemon.spool import Look, scan
+from shm_daemon.wakeup import SPOOL
 from tests.helpers import quick_update
 from tests.helpers.flows import Postman
 from tests.helpers.flows import threads as make_threads
@@ -369,8 +370,8 @@ class ScriptedWakeup(Wakeup):
         super().__init__()
         self.heard, self.waits = heard, list[float]()
 
-    def wait(self, timeout_s: float) -> set[str]:
-        self.waits.append(timeout_s)
+    def wait(self, seconds: float) -> set[str]:
+        self.waits.append(seconds)
         return self.heard.pop(0)
 
 
