@@ -95,7 +95,8 @@ def figures(season: HangerReport, bare: HangerReport) -> Iterator[tuple[str, Spe
     score = make_score("plausible")
     made: list[tuple[str, Any]] = [(each.name, each.draw(score)) for each in OF_TRIAL]
     course = stream()
-    posterior = season.posterior
+    # Of equal likelihoods each processor sorts others first.
+    posterior = replace(season.posterior, log_likelihood=np.linspace(-9, 0, 1000))
     made += [
         ("states", STATES.draw(replace(season, states=_plain(states)()))),
         ("shared cause", gap_shared.FIGURE.draw(family())),
