@@ -28,6 +28,8 @@ from shm.report.figures import (
 )
 from shm.report.figures.every_figure import OF_TRIAL
 from shm.report.figures.hanger_states import FIGURE as STATES
+from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
 from shm.report.figures.specification import Specification
 from shm.report.hanger_report import hanger_paper
 from shm.report.intervals import Interval
@@ -38,6 +40,7 @@ from shm.values.stream import StreamEvent
 from shm.watch.history import Band
 from tests.gap.test_shared_causes import bridge
 from tests.report.conftest import START, bare, hanger, season
+from tests.report.sheets import make_sheet
 from tests.report.test_captions import _plain
 from tests.report.test_drift_figure import data as states
 from tests.report.test_hovers import specifications
@@ -94,6 +97,14 @@ def figures(season: HangerReport, bare: HangerReport) -> Iterator[tuple[str, Spe
     yield from specifications(season)
     score = make_score("plausible")
     made: list[tuple[str, Any]] = [(each.name, each.draw(score)) for each in OF_TRIAL]
+    near = make_sheet()
+    records = tuple(
+        replace(each, channels=tuple(replace(c, full_scale=float(np.abs(c.values).max()) / 0.8)
+                                     for c in each.channels))
+        for each in near.records
+    )  # fmt: skip
+    near_full_scale = Shown.of(replace(near, records=records))
+    made.append(("near full scale", TIME_HISTORY.draw(near_full_scale)))
     course = stream()
     # Of equal likelihoods each processor sorts others first.
     posterior = replace(season.posterior, log_likelihood=np.linspace(-9, 0, 1000))
