@@ -15,7 +15,6 @@ from shm_cli.main import cli
 
 KEPT = Path(__file__).parent / "options.txt"
 _FACTS = ("required", "default", "nargs", "multiple", "is_flag", "hidden", "count", "envvar")
-_USUAL = (None, False, 1, "")
 
 
 def lines(command: click.Command, name: str) -> Iterator[str]:
@@ -23,7 +22,7 @@ def lines(command: click.Command, name: str) -> Iterator[str]:
     yield f"{name}{' (hidden)' if command.hidden else ''}"
     for each in command.params:
         info = each.to_info_dict()
-        facts = [f"{key}={info[key]}" for key in _FACTS if info.get(key) not in _USUAL]
+        facts = [f"{key}={info[key]}" for key in _FACTS if _is_said(key, info.get(key))]
         yield f"  {' '.join(info['opts'])} {_type(info['type'])} {' '.join(facts)}".rstrip()
     if isinstance(command, click.Group):
         context = click.Context(command)
@@ -31,6 +30,10 @@ def lines(command: click.Command, name: str) -> Iterator[str]:
             found = command.get_command(context, below)
             assert found is not None
             yield from lines(found, f"{name} {below}")
+
+
+def _is_said(key: str, value: object) -> bool:
+    return value is not None and value is not False and (key, value) != ("nargs", 1)
 
 
 def _type(info: dict[str, Any]) -> str:
