@@ -18,9 +18,10 @@ from shm.settings import Settings
 from shm.store import Archive, Delivery, DeliveryState, Stage, Workspace
 from shm.store.checking import check_store
 from shm.store.stored_recordings import Recordings
-from shm_daemon import Wakeup, run
+from shm_daemon import Wakeup, loop, run
 from shm_daemon.heartbeat import why_turn_failed
 from shm_daemon.spool import Look, scan
+from shm_daemon.wakeup import SPOOL
 from tests.helpers import quick_update
 from tests.helpers.flows import Postman
 from tests.helpers.flows import threads as make_threads
@@ -361,3 +362,46 @@ def test_a_setting_changed_on_a_page_is_taken_over(
     with workspace.store() as store:
         workspace.change_setting(store, key, 0.9, utc_now(), "anna")
     until(lambda: "a setting has changed and is taken over" in caplog.text)
+
+
+class ScriptedWakeup(Wakeup):
+    """Hears what it is told, wait by wait, and keeps how long each would have been."""
+
+    def __init__(self, heard: list[set[str]]):
+        super().__init__()
+        self.heard, self.waits = heard, list[float]()
+
+    def wait(self, seconds: float) -> set[str]:
+        self.waits.append(seconds)
+        return self.heard.pop(0)
+
+
+class Beats:
+    count = 0
+
+    def beat(self) -> None:
+        self.count += 1
+
+
+@pytest.mark.parametrize(
+    ("heard", "found", "beats"), [([set(), {SPOOL}], {SPOOL}, 1), ([{SPOOL}], {SPOOL}, 0)]
+)
+def test_a_long_rest_gives_a_sign_from_time_to_time_and_ends_with_a_ring(
+    heard: list[set[str]], found: set[str], beats: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("shm_daemon.loop._DELIVERING_S", 500.0)
+    daemon, wakeup, pulse = loop.Daemon.__new__(loop.Daemon), ScriptedWakeup(heard), Beats()
+    daemon._wakeup, daemon._pulse = wakeup, pulse  # type: ignore[assignment]
+    daemon._scan_at, daemon._longest_wait_s = time.monotonic() + 1000, 10.0
+    assert daemon._rest() == found
+    assert (pulse.count, set(wakeup.waits)) == (beats, {10.0})
+
+
+def test_a_short_rest_ends_with_the_next_scan_or_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    daemon, wakeup = loop.Daemon.__new__(loop.Daemon), ScriptedWakeup([set(), set(), set()])
+    daemon._wakeup, daemon._pulse, daemon._longest_wait_s = wakeup, Beats(), 10.0  # type: ignore[assignment]
+    for ahead_s, deliver_s, waits in ((5, 500.0, 5), (500, 3.0, 3), (-5, 500.0, 0)):
+        monkeypatch.setattr("shm_daemon.loop._DELIVERING_S", deliver_s)
+        daemon._scan_at = time.monotonic() + ahead_s
+        assert daemon._rest() == set()
+        assert wakeup.waits[-1] == pytest.approx(waits, abs=0.5)

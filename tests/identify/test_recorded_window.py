@@ -40,4 +40,6 @@ def test_a_window_is_named_and_widens_the_damping(quantities: tuple[str, ...]) -
     for mode in found.test.modes:
         nearest = min(true, key=lambda hz: abs(hz - mode.frequency_hz))
         assert abs(mode.damping_ratio - true[nearest]) < 1.645 * mode.damping_sd
+        of_window = check.value / (2 * np.pi * mode.frequency_hz)
+        assert of_window * (1 - 1e-9) <= mode.damping_sd < 1.2 * of_window
         assert mode.damping_ratio > 1.2 * true[nearest]

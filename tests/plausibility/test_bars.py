@@ -6,6 +6,7 @@ reasoning. `tests/benchmarks/right_hanger.py` measures it on truth that others w
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +14,9 @@ import pytest
 
 from shm.models import build
 from shm.models.base import Conditions
-from shm.plausibility.bar_evidence import _by_mass
+from shm.plausibility.bar_evidence import _by_mass, _log_normal
 from shm.plausibility.bars import Known, Origin, OtherOrigin, _candidates, _said, doubt_of
-from shm.values import PLANES, AddedMass, Hanger, ModalTest, Mode, Supports
+from shm.values import PLANES, AddedMass, FloatArray, Hanger, ModalTest, Mode, Supports
 from tests.helpers.hangers import HANGER_3
 
 LENGTHS = (5.0, 7.0, 9.0, 11.0, 12.0)
@@ -221,3 +222,24 @@ def test_a_doubt_says_what_was_found_and_asks_for_what_may_be_wrong(
     found = _said(origin, 0.97, NINE)
     assert (found.text, found.kind, found.probability) == (told, origin.kind, 0.97)
     assert (found.hanger, found.factor) == (origin.hanger, origin.factor)
+
+
+def test_one_or_two_modes_that_are_mistaken_cost_their_share_and_no_more() -> None:
+    """Problem: independent modes, the `k`th off by `off[k]` standard deviations of 0.01.
+
+    Solution: the density of all, plus that without the worst and without the two worst, each of
+    which is mistaken with probability 0.02 and then anywhere with density 2.5. Three are kept.
+    """
+    sd = 0.01
+
+    def of(modes: FloatArray) -> float:
+        return float(np.sum(-0.5 * (modes**2 + math.log(2 * math.pi * sd**2))))
+
+    for off in ([0.5, -1.0, 12.0, 0.3, 9.0], [0.1, 8.0, 0.2, -0.3], [7.0, 0.1, 0.2]):
+        kept = np.sort(np.abs(off))
+        terms = [
+            of(kept[: len(kept) - out]) + out * math.log(0.02 * 2.5)
+            for out in range(min(2, len(off) - 3) + 1)
+        ]
+        found = _log_normal(sd * np.array(off), sd**2 * np.eye(len(off))[None])
+        np.testing.assert_allclose(found, np.logaddexp.reduce(terms), rtol=1e-9)

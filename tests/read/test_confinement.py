@@ -285,6 +285,29 @@ def test_a_bound_that_the_system_lacks_is_said_and_the_others_hold(
             obey(tmp_path / "trap.py", f"{probe}; found = 'it succeeded'")
 
 
+def test_a_child_may_use_so_much_of_each_and_holds_no_file_but_its_own(tmp_path: Path) -> None:
+    """No core, its seconds, no file that grows, few open at a time, so much memory."""
+    code = """
+import resource, sys
+limits = [resource.getrlimit(getattr(resource, 'RLIMIT_' + name))
+          for name in ('CORE', 'NOFILE', 'FSIZE')]
+seconds, most = resource.getrlimit(resource.RLIMIT_CPU)
+memory, same = resource.getrlimit(resource.RLIMIT_AS)
+nowhere = [os.fstat(k).st_rdev == os.stat('/dev/null').st_rdev for k in (0, 1, 2)]
+open_files = 0
+for k in range(3, 1500):
+    try:
+        os.fstat(k)
+        open_files += 1
+    except OSError:
+        pass
+raise KeyError(limits, most - seconds, memory == same > 0, nowhere, open_files)
+"""
+    expected = "([(0, 0), (64, 64), (0, 0)], 1, True, [True, True, True], 1)"
+    with pytest.raises(BadInput, match=re.escape(f"KeyError: {expected}")):
+        obey(tmp_path / "trap.py", code)
+
+
 @pytest.mark.parametrize(
     "broken",
     [

@@ -73,3 +73,18 @@ def empty(
     else:
         with postgresql.database() as url:
             yield url
+
+
+@pytest.fixture(scope="session")
+def filled_file(tmp_path_factory: pytest.TempPathFactory, empty_database: Path) -> Path:
+    path = Path(shutil.copyfile(empty_database, tmp_path_factory.mktemp("filled") / "shm.db"))
+    with Store.open(path) as store:
+        fill(store)
+    return path
+
+
+@pytest.fixture
+def filled_copy(filled_file: Path, tmp_path: Path) -> Iterator[Store]:
+    """A file with something in every corner, for who may change it."""
+    with Store.open(shutil.copyfile(filled_file, tmp_path / "filled.db")) as store:
+        yield store

@@ -131,3 +131,69 @@ def test_a_damaged_row_hides_no_other(store: Store) -> None:
         repr(a_reading())
     ]
     assert store.streams.watch_state(3) is None
+
+
+def test_a_stream_says_how_far_it_has_come(file_store: Store) -> None:
+    """Of its windows, its hours and days, each by its own start."""
+    streams = file_store.streams
+    assert streams.first_window("h3") is streams.last_hour("h3") is streams.first_day("h3") is None
+    assert streams.last_pooled("h3", "hour") is None
+    for minutes in (20, 0, 10):
+        streams.save_window(a_window(minutes))
+    for hours, period in ((1, "hour"), (2, "hour"), (-12, "day")):
+        streams.save_pooled(a_reading(hours, period))
+    assert streams.first_window("h3") == NOW
+    assert streams.first_window("h4") is None
+    starts = {NOW + timedelta(minutes=m) for m in (10, 20)}
+    assert streams.window_starts("h3", NOW + timedelta(minutes=10)) == starts
+    assert streams.window_starts("h4", NOW) == frozenset()
+    assert streams.last_hour("h3") == a_reading(2)
+    assert streams.last_pooled("h3", "hour") == NOW + timedelta(hours=2)
+    assert streams.last_pooled("h3", "day") == streams.first_day("h3") == NOW - timedelta(hours=12)
+    assert streams.last_pooled("h3", "6 hours") is None
+    listed = streams.list_pooled(3, "hour", NOW + timedelta(hours=1), NOW + timedelta(hours=2))
+    assert listed == (a_reading(1),)
+    assert streams.list_pooled(4, "hour", NOW, NOW + timedelta(days=1)) == ()
+
+
+@pytest.mark.parametrize(
+    ("hours", "modes", "since", "found"),
+    [
+        ((0, 1, 2), True, 0, None),
+        ((0, 2), True, 0, 1),
+        ((0, 2), False, 0, None),  # nothing to pool
+        ((0, 2), True, 1.5, None),
+        ((0, 1), True, 0, None),  # the latest hour is not over
+    ],
+)
+def test_a_window_whose_hour_was_left_out_is_found(
+    file_store: Store, hours: tuple[int, ...], modes: bool, since: float, found: int | None
+) -> None:
+    streams = file_store.streams
+    for hour in range(3):
+        streams.save_window(a_window(60 * hour, MODES if modes else ()))
+    for hour in hours:
+        streams.save_pooled(a_reading(hour))
+    expected = None if found is None else NOW + timedelta(hours=found)
+    assert streams.first_unpooled("h3", NOW + timedelta(hours=since)) == expected
+    assert streams.first_unpooled("h4", NOW) is None
+
+
+def test_the_watch_goes_back_to_a_day_before(file_store: Store) -> None:
+    streams = file_store.streams
+    assert streams.watch_time(3) is streams.watch_state(3) is streams.watch_before(3, NOW) is None
+    for day in range(3):
+        streams.save_pooled(a_reading(24 * day), b"day %d" % day)
+    end = [NOW + timedelta(days=day, hours=1) for day in range(3)]
+    assert (streams.watch_time(3), streams.watch_state(3)) == (end[2], b"day 2")
+    assert streams.watch_before(3, end[1]) == (end[1], b"day 1")
+    assert streams.watch_before(3, end[1] - timedelta(seconds=1)) == (end[0], b"day 0")
+    assert streams.watch_before(3, end[0] - timedelta(seconds=1)) is None
+    assert streams.watch_before(4, end[2]) is None
+    streams.go_back(3, end[1], b"anew")
+    assert (streams.watch_time(3), streams.watch_state(3)) == (end[1], b"anew")
+    assert streams.watch_before(3, end[2]) == (end[1], b"day 1")
+    streams.forget_watch(4)
+    assert streams.watch_state(3) == b"anew"
+    streams.forget_watch(3)
+    assert streams.watch_time(3) is streams.watch_before(3, end[2]) is None

@@ -1,0 +1,159 @@
+"""What comes over the network lands whole, under a free name, or leaves nothing behind."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from shm.errors import BadInput, ShmError
+from shm_daemon import landing
+from shm_daemon.landing import Landed, incoming, landing_name
+
+SAID = {"hanger": 3}
+CONTENT = b"force,acc_1\n1,2\n"
+DIGEST = hashlib.sha256(CONTENT).hexdigest()
+
+
+def land(spool: Path, name: str = "a.csv", content: bytes = CONTENT, **said: object) -> Landed:
+    with incoming(spool, 100) as file:
+        file.write(content[:5])
+        file.write(content[5:])
+        return file.land(name, said)
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_file_lands_with_its_sidecar_and_nothing_is_left_under_way(tmp_path: Path) -> None:
+    landed = land(tmp_path, **SAID)
+    assert landed == Landed(tmp_path / "a.csv", DIGEST, len(CONTENT))
+    assert landed.path.read_bytes() == CONTENT
+    assert (tmp_path / "a.toml").read_text() == "hanger = 3\n"
+    assert names(tmp_path) == {"a.csv", "a.toml"}
+
+
+def test_the_same_again_lies_there_already(tmp_path: Path) -> None:
+    land(tmp_path, **SAID)
+    assert land(tmp_path, **SAID).path == tmp_path / "a.csv"
+    assert names(tmp_path) == {"a.csv", "a.toml"}
+
+
+@pytest.mark.parametrize(
+    ("content", "said"), [(CONTENT, {}), (CONTENT, {"hanger": 4}), (b"force,acc_1\n1,3\n", SAID)]
+)
+def test_another_file_of_the_name_gets_one_beside_it(
+    content: bytes, said: dict[str, object], tmp_path: Path
+) -> None:
+    land(tmp_path, **SAID)
+    other = land(tmp_path, content=content, **said)
+    assert other.path.name == f"a-{hashlib.sha256(content).hexdigest()[:8]}.csv"
+    assert (tmp_path / "a.csv").read_bytes() == CONTENT
+    third = land(tmp_path, content=content, hanger=5)
+    assert len(third.path.stem) == len("a-") + 12
+    assert third.path.read_bytes() == content
+
+
+def test_a_sidecar_that_waits_for_another_file_keeps_its_name(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text("hanger = 9")
+    assert land(tmp_path).path.name == f"a-{DIGEST[:8]}.csv"
+    assert (tmp_path / "a.toml").read_text() == "hanger = 9"
+
+
+def test_what_does_not_land_leaves_nothing(tmp_path: Path) -> None:
+    with incoming(tmp_path, 100) as file:
+        file.write(CONTENT)
+        assert file.whole().read_bytes() == CONTENT
+        assert (file.sha256, file.size_bytes) == (DIGEST, len(CONTENT))
+        with pytest.raises(BadInput):
+            file.land("..", SAID)
+    assert names(tmp_path) == set()
+
+
+def test_a_sidecar_under_way_goes_with_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "disk full")
+
+    monkeypatch.setattr(landing.Incoming, "_placed", full)
+    with pytest.raises(OSError, match="disk full"):
+        land(tmp_path, **SAID)
+    assert names(tmp_path) == set()
+
+
+def test_more_than_is_taken_is_refused_before_it_is_kept(tmp_path: Path) -> None:
+    with incoming(tmp_path, 10) as file:
+        file.write(b"0123456789")
+        with pytest.raises(ShmError):
+            file.write(b"x")
+        assert file.size_bytes == 10
+
+
+def test_a_file_system_without_links_gets_the_file_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unknown(*_: object) -> None:
+        raise OSError(1, "not permitted")
+
+    monkeypatch.setattr(Path, "hardlink_to", unknown)
+    assert land(tmp_path, **SAID).path == tmp_path / "a.csv"
+    assert land(tmp_path, content=b"else").path.read_bytes() == b"else"
+    assert (tmp_path / "a.csv").read_bytes() == CONTENT
+    assert len(names(tmp_path)) == 3
+
+
+def test_what_a_killed_process_left_goes_after_a_day(tmp_path: Path) -> None:
+    folder = tmp_path / ".landing"
+    folder.mkdir()
+    for age_s in (86_000, 87_000):
+        left = folder / f"{age_s}.part"
+        left.touch()
+        os.utime(left, (time.time() - age_s,) * 2)
+    land(tmp_path)
+    assert names(folder) == {"86000.part"}
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [
+        ("a.csv", "a.csv"),
+        ("C:\\data\\a.csv", "a.csv"),
+        ("/etc/../a.csv", "a.csv"),
+        (" .a\x00\u2028.csv ", "a.csv"),
+        ("...a.csv", "a.csv"),
+    ],
+)
+def test_a_name_is_its_last_part_without_what_harms(given: str, name: str) -> None:
+    assert landing_name(given) == name
+
+
+@pytest.mark.parametrize("given", ["", ".", "..", "/", "\x00", "a/.."])
+def test_what_is_no_name_is_refused(given: str) -> None:
+    with pytest.raises(BadInput, match="is no file name"):
+        landing_name(given)
+
+
+@pytest.mark.parametrize("given", ["a.csv.toml", "a.PART"])
+def test_a_name_that_the_spool_leaves_alone_is_refused(given: str) -> None:
+    with pytest.raises(BadInput, match="would lie in the spool for ever"):
+        landing_name(given)
+
+
+@pytest.mark.parametrize(
+    ("name", "beside"),
+    [
+        ("a.csv", "a-01234567.csv"),
+        ("a.csv.gz", "a-01234567.csv.gz"),
+        ("a.b.csv", "a.b-01234567.csv"),
+        ("a", "a-01234567"),
+        ("a.modes.json", "a-01234567.modes.json"),
+    ],
+)
+def test_a_name_beside_keeps_its_ending(name: str, beside: str, tmp_path: Path) -> None:
+    places = landing._places(tmp_path, name, "0123456789")
+    assert [next(places).name, next(places).name] == [name, beside]

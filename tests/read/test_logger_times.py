@@ -1,0 +1,111 @@
+"""Times of loggers: their unit, their start, and the rate where several rows have the same."""
+
+from __future__ import annotations
+
+import math
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shm.errors import BadInput
+from shm.read import logger_times
+from shm.values import NAN, FloatArray
+
+
+def refused(row: int, what: str) -> BadInput:
+    return BadInput(f"{what} in row {row}.", file=Path("a.csv"))
+
+
+def rate(seconds: FloatArray, said_hz: float = NAN) -> float:
+    return logger_times._rate_of_coarse(seconds, said_hz, refused)
+
+
+def whole_seconds(hz: int, seconds: int, late: int = 0) -> FloatArray:
+    """Times of a clock that counts seconds, begun `late` samples after one."""
+    return np.floor((np.arange(hz * seconds) + late) / hz)
+
+
+def test_a_clock_of_whole_seconds_gives_the_samples_between_its_first_and_last_step() -> None:
+    """However many of the first and the last second are there."""
+    for late in (0, 3, 49):
+        assert rate(whole_seconds(50, 20, late)) == 50
+    assert rate(whole_seconds(50, 20) / 2) == 100
+
+
+def test_a_rate_that_is_said_is_trusted_where_the_clock_does_not_contradict() -> None:
+    times = whole_seconds(50, 20, 3)
+    assert math.isnan(rate(times, 50.9))
+    assert math.isnan(rate(times, 49.1))
+    assert rate(times, 51.5) == 50
+    assert rate(times, 48.5) == 50
+
+
+def test_a_finely_rounded_clock_gives_the_rate_of_all_its_samples() -> None:
+    times = np.floor(np.arange(40_001) / 2000 * 1000) / 1000
+    assert rate(times) == pytest.approx(40_000 / times[-1], rel=1e-12)
+
+
+def test_counts_that_differ_by_more_than_one_say_no_rate() -> None:
+    steady = np.repeat(np.arange(20.0), [50, 50, 51, 50] * 5)
+    assert rate(steady) == 50
+    uneven = np.repeat(np.arange(20.0), [50, 52] * 10)
+    assert math.isnan(rate(uneven))
+    assert math.isnan(rate(np.array([0.0, 0, 0, 1, 1, 1])))
+
+
+def test_times_that_jump_or_go_back_are_refused_at_their_row() -> None:
+    back = np.array([0.0, 0, 1, 1, 0, 2])
+    with pytest.raises(BadInput, match="does not increase in row 4"):
+        rate(back)
+    jumped = whole_seconds(50, 20)
+    jumped[500:] += 5
+    with pytest.raises(BadInput, match="the times are uneven in row"):
+        rate(jumped)
+
+
+@pytest.mark.parametrize(
+    ("first", "step", "start", "factor"),
+    [
+        (1_777_636_800.0, 0.01, datetime(2026, 5, 1, 12, tzinfo=UTC), 1.0),
+        (1_777_636_800e3, 10.0, datetime(2026, 5, 1, 12, tzinfo=UTC), 1e-3),
+        (1_777_636_800e6, 1e4, datetime(2026, 5, 1, 12, tzinfo=UTC), 1e-6),
+        (46143.5, 0.01 / 86400, datetime(2026, 5, 1, 12, tzinfo=UTC), 86400.0),
+    ],
+)
+def test_times_since_an_epoch_say_the_start(
+    first: float, step: float, start: datetime, factor: float
+) -> None:
+    values = first + step * np.arange(5)
+    found = logger_times._since_epoch(values)
+    assert found is not None
+    assert abs((found[1] - start).total_seconds()) < 1e-3
+    np.testing.assert_allclose(found[0], factor * (values - values[0]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("first", [0.0, 29_000.0, 61_000.0, 1e8])
+def test_other_numbers_are_no_epoch(first: float) -> None:
+    assert logger_times._since_epoch(first + 0.01 / 86400 * np.arange(5)) is None
+    assert logger_times._since_epoch(45_000 + 2.0 * np.arange(5)) is None
+
+
+@pytest.mark.parametrize(
+    ("hz", "said", "factor"),
+    [
+        (200.0, NAN, 1.0), (0.2, 200.0, 1e-3), (0.0002, 200.0, 1e-6), (200.0, 200.0, 1.0),
+        (200.0, 300.0, 1.0), (0.0002, NAN, None), (1e7, NAN, None),
+    ],
+)  # fmt: skip
+def test_the_unit_of_times_follows_from_the_rate_that_is_said(
+    hz: float, said: float, factor: float | None
+) -> None:
+    """A unit of 1/1000 s makes a rate of 0.2 per unit one of 200 Hz."""
+    assert logger_times._factor(np.arange(100) / hz, said) == factor
+
+
+def test_times_that_stand_still_have_no_unit() -> None:
+    assert logger_times._factor(np.zeros(5), 200.0) is None
+    assert logger_times.two_days("05/06/2026") == (
+        "05/06/2026 may be one day or another: the time of the test is left open (--time)."
+    )

@@ -1,0 +1,181 @@
+"""What hooks are owed: messages, failures, what is sent again; and settings that were changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import timedelta
+
+import pytest
+
+from shm.errors import NothingThere, UsageError
+from shm.store import DeliveryState, Store
+from shm.store.rows import News
+from tests.helpers.nouns import NOW, an_alert
+from tests.helpers.streams import a_reading
+
+HOUR = timedelta(hours=1)
+WAITING, DELIVERED = DeliveryState.WAITING, DeliveryState.DELIVERED
+GIVEN_UP, NOT_NEEDED = DeliveryState.GIVEN_UP, DeliveryState.NOT_NEEDED
+
+
+def raised(store: Store, number: int, *hooks: str) -> int:
+    """An alert of a stream, owed to hooks from its own hour on."""
+    alert = replace(an_alert(f"hanger-3:{number}"), test="")
+    made = store.streams.save_pooled(a_reading(number), None, alert, hooks, NOW + number * HOUR)
+    assert made is not None
+    return made.id
+
+
+def states(store: Store) -> list[tuple[int, str, DeliveryState, int | None]]:
+    return [(e.stored.id, e.hook, e.state, e.message_id) for e in store.alerts.list_deliveries()]
+
+
+def due(store: Store, hours: float, **asked: object) -> list[int]:
+    return [each.id for each in store.alerts.list_due_deliveries(NOW + hours * HOUR, 9, **asked)]
+
+
+def test_messages_keep_the_deliveries_that_they_were_made_of(file_store: Store) -> None:
+    alerts = file_store.alerts
+    alerts.begin_messages((), {}, NOW)
+    first, second, third = (raised(file_store, n, "mail") for n in (1, 2, 3))
+    assert [each.id for each in alerts.list_unsent()] == [1, 2, 3]
+    assert due(file_store, 2) == [1, 2]
+    assert due(file_store, 2, begun=True) == []
+    alerts.begin_messages([[2, 1]], {3: "resolved before"}, NOW + 5 * HOUR)
+    assert states(file_store) == [
+        (first, "mail", WAITING, 1),
+        (second, "mail", WAITING, 1),
+        (third, "mail", NOT_NEEDED, None),
+    ]
+    left_out = alerts.list_deliveries(NOT_NEEDED)[0]
+    assert (left_out.last_error, left_out.ended_at) == ("resolved before", NOW + 5 * HOUR)
+    assert alerts.list_unsent() == ()
+    assert [each.id for each in alerts.list_of_messages([1])] == [1, 2]
+    assert due(file_store, 5) == due(file_store, 5, begun=True) == [1]
+    assert due(file_store, 4) == due(file_store, 5, excluding=[1]) == []
+    alerts.begin_messages([[1], [2]], {1: "too late", 3: "too late"}, NOW + 6 * HOUR)
+    assert [each[2:] for each in states(file_store)] == [
+        (WAITING, 1), (WAITING, 1), (NOT_NEEDED, None),
+    ]  # fmt: skip
+    alerts.save_delivery(alerts.list_of_messages([1])[0], NOW + 7 * HOUR)
+    assert [each[2] for each in states(file_store)] == [DELIVERED, DELIVERED, NOT_NEEDED]
+    counts = {state: n for state, n in alerts.delivery_counts().items() if n}
+    assert counts == {DELIVERED: 2, NOT_NEEDED: 1}
+
+
+def test_a_failure_is_put_off_and_one_put_off_too_far_is_due_again(file_store: Store) -> None:
+    alerts = file_store.alerts
+    raised(file_store, 0, "mail")
+    (delivery,) = alerts.list_due_deliveries(NOW, 1)
+    alerts.save_failure(delivery, "no route", NOW, NOW + 9 * HOUR)
+    (tried,) = alerts.list_deliveries()
+    assert (tried.attempts, tried.last_error, tried.next_attempt_at, tried.message_id) == (
+        1, "no route", NOW + 9 * HOUR, 1,
+    )  # fmt: skip
+    assert (tried.state, tried.ended_at) == (WAITING, None)
+    assert due(file_store, 1) == []
+    # After one attempt it waits an hour at most: 9 hours were told by a clock that was ahead.
+    assert due(file_store, 1, waits=[9 * HOUR, HOUR, 9 * HOUR]) == [1]
+    assert due(file_store, 1, waits=[HOUR, 9 * HOUR]) == []
+    assert due(file_store, 1, waits=[HOUR]) == [1]
+
+
+def test_what_was_given_up_is_owed_again_with_its_whole_message(file_store: Store) -> None:
+    alerts = file_store.alerts
+    first, second = (raised(file_store, n, "mail", "sms") for n in (1, 2))
+    alerts.begin_messages([[1, 3], [2, 4]], {}, NOW)
+    with pytest.raises(UsageError, match=f"alert {first} was given up by no hook"):
+        alerts.resend(first, NOW)
+    with pytest.raises(NothingThere, match="no alert 99"):
+        alerts.resend(99, NOW)
+    (mail,) = (each for each in alerts.list_due_deliveries(NOW, 9) if each.hook == "mail")
+    alerts.save_failure(mail, "refused", NOW, None)
+    assert [each[2] for each in states(file_store)] == [GIVEN_UP, WAITING, GIVEN_UP, WAITING]
+    assert alerts.list_deliveries(GIVEN_UP)[0].ended_at == NOW
+    again = alerts.resend(second, NOW + HOUR)
+    assert [(each.stored.id, each.hook, each.attempts, each.ended_at) for each in again] == [
+        (second, "mail", 0, None)
+    ]
+    assert [each[2] for each in states(file_store)] == [WAITING] * 4
+    assert {each.next_attempt_at for each in again} == {NOW + HOUR}
+
+
+def test_who_was_told_of_an_alert_is_told_of_its_end_once(file_store: Store) -> None:
+    alerts = file_store.alerts
+    first = raised(file_store, 1, "mail", "sms")
+    mail, sms = alerts.list_deliveries()
+    alerts.save_delivery(mail, NOW)
+    ended = alerts.resolve(first, "Ada", "repaired", NOW + HOUR)
+    assert ended.resolution is not None
+    assert (ended.resolution.who, ended.resolution.why) == ("Ada", "repaired")
+    assert ended.acknowledgement is not None
+    assert ended.acknowledgement.who == "Ada"
+    owed = [(each.hook, each.news, each.state) for each in alerts.list_deliveries()]
+    assert owed[2:] == [("mail", News.RESOLVED, WAITING)]
+    alerts.save_delivery(sms, NOW + 2 * HOUR)
+    owed = [(each.hook, each.news) for each in alerts.list_deliveries()]
+    assert owed[2:] == [("mail", News.RESOLVED), ("sms", News.RESOLVED)]
+    with pytest.raises(UsageError, match=f"alert {first} is resolved already"):
+        alerts.resolve(first, "Ben", "", NOW)
+    assert alerts.list_all(standing=True) == ()
+    assert [each.id for each in alerts.list_all(standing=False)] == [first]
+
+
+def test_an_alert_of_a_key_is_raised_once(file_store: Store) -> None:
+    raised(file_store, 1, "mail")
+    again = replace(an_alert("hanger-3:1"), test="")
+    assert file_store.streams.save_pooled(a_reading(5), None, again, ("mail",), NOW) is None
+    assert len(file_store.alerts.list_deliveries()) == 1
+
+
+def test_an_alert_that_was_acknowledged_keeps_who_did(file_store: Store) -> None:
+    alerts = file_store.alerts
+    first = raised(file_store, 1)
+    alerts.acknowledge(first, "Ada", "seen", NOW)
+    with pytest.raises(UsageError, match="was acknowledged by Ada on 2026-05-01 already"):
+        alerts.acknowledge(first, "Ben", "", NOW)
+    ended = alerts.resolve(first, "Ben", "over", NOW + HOUR)
+    assert ended.acknowledgement is not None
+    assert (ended.acknowledgement.who, ended.acknowledgement.why) == ("Ada", "seen")
+    assert alerts.counts() == (0, 1)
+    noted = [(row.who, row.action, row.detail) for row in file_store.audit.list_rows()]
+    assert noted == [("Ben", "alert resolved", "over"), ("Ada", "alert acknowledged", "seen")]
+
+
+def test_a_test_is_through_when_no_hook_is_owed_its_alert(filled_copy: Store) -> None:
+    """Once, however many hooks there are."""
+    store = filled_copy
+    (first,) = (e for e in store.alerts.list_deliveries() if e.stored.alert.test == "t2")
+    before = [step.stage for step in store.recordings.list_steps(2)]
+    store.alerts.save_delivery(first, NOW + HOUR)
+    after = [step.stage for step in store.recordings.list_steps(2)]
+    assert after == [*before, "notified"]
+
+
+def test_a_changed_setting_holds_until_it_is_given_back(file_store: Store) -> None:
+    settings = file_store.settings
+    assert settings.newest() == 0
+    assert settings.list_current() == {}
+    settings.change("settings.samples", 4000.0, "Ada", NOW)
+    settings.change("hanger.3.thresholds.alert_probability", 0.9, "Ada", NOW)
+    settings.change("settings.samples", 2000.0, "Ben", NOW + HOUR)
+    assert settings.newest() == 3
+    current = settings.list_current()
+    assert {key: (e.value, e.who, e.at) for key, e in current.items()} == {
+        "settings.samples": (2000.0, "Ben", NOW + HOUR),
+        "hanger.3.thresholds.alert_probability": (0.9, "Ada", NOW),
+    }
+    own = current["hanger.3.thresholds.alert_probability"]
+    assert str(own) == (
+        "hanger 3 thresholds alert_probability = 0.9 instead of what bridge.toml says, "
+        "by Ada on 2026-05-01"
+    )
+    assert [own.is_of(3), own.is_of(33), own.is_of(4)] == [True, False, False]
+    assert current["settings.samples"].is_of(4)
+    settings.change("settings.samples", None, "Ada", NOW)
+    assert list(settings.list_current()) == ["hanger.3.thresholds.alert_probability"]
+    told = [(row.subject, row.detail) for row in file_store.audit.list_rows(2)]
+    assert told == [
+        ("settings samples", "from 2000 to not set, back to bridge.toml"),
+        ("settings samples", "from 4000 to 2000"),
+    ]
