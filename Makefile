@@ -11,7 +11,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Who has it set lets each process compile all that it imports anew: the tests begin hundreds.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo demo-live test test-slow test-arithmetic without-avx512 without-avx2 lint bench bench-peers docs tables lock clean
+.PHONY: demo demo-live test test-others test-slow test-arithmetic without-avx512 without-avx2 lint bench bench-peers docs tables lock clean
 
 demo: .venv/runtime
 	$(BIN)/shm demo
@@ -20,12 +20,14 @@ demo: .venv/runtime
 demo-live: .venv/runtime
 	$(BIN)/shm demo --live --folder shm-demo-live
 
-# What takes one processor goes side by side: the types, and the quick numerics, which run on another
-# arithmetic only. Then a third process, because many tests wait for a daemon, a server or a browser;
-# files go out in the order of their names, because by their number of tests one with a single long
-# test would come last, alone.
+# All side by side: the types; the quick numerics, which run on another arithmetic only; and the other
+# tests in three processes, because many wait for a daemon, a server or a browser. Files go out in the
+# order of their names, because by their number of tests one with a single long test would come last,
+# alone.
 test: .venv/development
-	$(MAKE) --jobs 3 lint test-arithmetic
+	$(MAKE) --jobs 3 lint test-arithmetic test-others
+
+test-others: .venv/development
 	$(BIN)/python -m pytest --quiet --numprocesses 3 --dist loadfile --no-loadscope-reorder \
 		$(QUICK:%=--ignore=%)
 

@@ -41,6 +41,7 @@ def test_the_page_holds_words_marks_and_figures_that_exist(page: Path) -> None:
     assert text.startswith(PAGE.read_text(encoding="utf-8").split("<!-- blind trial -->")[0])
 
 
+@pytest.mark.slow
 def test_every_table_of_the_page_is_a_file_of_whole_rows(page: Path) -> None:
     named = re.findall(r"\]\((blind_trial/[^)]+)\)", page.read_text(encoding="utf-8"))
     files = page.with_suffix("").iterdir()

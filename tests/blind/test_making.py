@@ -262,6 +262,7 @@ def test_any_place_where_an_effect_may_act_is_drawn(
     assert seen == refused == set(choices(name, site.plan.places_m(hanger), tests))
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_cases_whatever_the_number_of_processes(
     trial: Path, tmp_path: Path
 ) -> None:

@@ -61,6 +61,7 @@ def test_a_liar_misses_every_mark_but_that_a_gap_is_there(truths: tuple[TrueCase
     assert missed == {each.name for each in score.marks if each.asked} - {"detected"}
 
 
+@pytest.mark.slow
 def test_a_trial_in_which_every_answer_failed_meets_nothing(truths: tuple[TrueCase, ...]) -> None:
     failed = [Answer(truth.case, (), None, "stopped") for truth in truths]
     left_out = [Answer(t.case, t.left_out, None, "stopped") for t in truths if t.left_out]

@@ -107,6 +107,7 @@ def test_a_process_that_is_ended_from_outside_is_said_with_a_remedy() -> None:
         raise BrokenProcessPool
 
 
+@pytest.mark.slow
 def test_a_case_is_diagnosed_in_a_guarded_process(tmp_path: Path) -> None:
     made = Trial(tmp_path, ("c0001",), "")
     make_one(tmp_path / "cases", "c0001")

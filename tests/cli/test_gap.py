@@ -117,6 +117,7 @@ def test_tests_that_cannot_be_used_are_bad_input(
     assert "given 2 times" in ended.err
 
 
+@pytest.mark.slow
 def test_of_one_frequency_it_is_said_how_little_it_shows(
     shm: Shm, hanger_file: Path, tmp_path: Path
 ) -> None:
@@ -135,6 +136,7 @@ def test_of_one_frequency_it_is_said_how_little_it_shows(
     assert int(found[2]) > 1000
 
 
+@pytest.mark.slow
 def test_weak_data_are_answered_first_and_their_weakness_said_next(
     shm: Shm, hanger_file: Path, tmp_path: Path
 ) -> None:

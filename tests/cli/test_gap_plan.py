@@ -34,6 +34,7 @@ def modes(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_plan_goes_by_the_owners_hours_within_the_budget(
     shm: Shm, modes: Path, hanger_file: Path, tmp_path: Path
 ) -> None:

@@ -114,6 +114,7 @@ def test_writing_commands_say_what_they_did(
     assert fetched == {"recording": 1, "file": "t1.modes.json", "from": None}
 
 
+@pytest.mark.slow
 def test_a_blind_trial_is_told_as_json(shm: Shm, tmp_path: Path) -> None:
     key = tmp_path / "keys" / "trial.json"
     key.parent.mkdir()

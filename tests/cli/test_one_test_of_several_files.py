@@ -49,6 +49,7 @@ def taken_in(
     return workspace, code
 
 
+@pytest.mark.slow
 def test_the_shapes_of_a_roving_hammer_stand_at_its_places(
     shm: Shm, set_ups: list[Path], hanger_file: Path
 ) -> None:

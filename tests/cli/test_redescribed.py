@@ -43,6 +43,7 @@ def rewritten(workspace: Workspace, old: str, new: str) -> Workspace:
     return workspace.reopened()
 
 
+@pytest.mark.slow
 def test_a_baseline_of_a_discarded_test_is_said_first_until_there_is_a_new_one(
     shm: Shm, tmp_path: Path
 ) -> None:

@@ -76,6 +76,7 @@ def test_a_page_and_figures_let_a_person_check_the_modes(
     assert drawn >= {"time_history", "hits", "response", "stabilisation", "shapes", "quality"}
 
 
+@pytest.mark.slow
 def test_standard_deviations_hold_what_differs_from_test_to_test(
     shm: Shm, recording: Path, hanger_file: Path
 ) -> None:
@@ -135,6 +136,7 @@ def test_a_file_of_another_hanger_than_described_is_refused(
     assert "says hanger 3, the description is of hanger 8" in ended.err
 
 
+@pytest.mark.slow
 def test_a_file_that_names_no_hanger_is_of_the_described_one(
     shm: Shm, recording: Path, hanger_file: Path, tmp_path: Path
 ) -> None:

@@ -16,6 +16,7 @@ from shm.modes_document import modes_document
 from shm.store import Workspace
 from shm.values import PLANES, ModalTest, Mode
 from tests.cli.conftest import Shm
+from tests.helpers.slow import few_of
 
 QUANTILES = {"mean", "sd", "q05", "q50", "q95", "map"}
 QUICK = ("--samples", 100)
@@ -103,6 +104,7 @@ def test_the_tension_leads_with_both_intervals_and_the_limits(
     assert averaged["tension_n"]["q05"] < 0.9 * 711e3 < averaged["tension_n"]["q95"]
 
 
+@pytest.mark.slow
 def test_a_tension_that_was_measured_calibrates_another_test(
     shm: Shm, modes_file: Path, hanger_file: Path, tmp_path: Path
 ) -> None:
@@ -133,6 +135,7 @@ def test_select_ranks_the_models_and_their_probabilities_add_to_one(
     assert sum(model["probability"] for model in document["models"]) == pytest.approx(1)
 
 
+@pytest.mark.slow
 def test_priors_of_classes_may_be_stated(shm: Shm, modes_file: Path, hanger_file: Path) -> None:
     asked = ("select", modes_file, "--hanger-file", hanger_file, "--models", "beam1,beam2", *QUICK)
     sure = shm(*asked, "--prior", "beam1=1,beam2=1e-99", "--json").document
@@ -294,7 +297,7 @@ def test_a_mode_that_is_left_out_is_said(
 
 
 @pytest.mark.parametrize(
-    "command", [("update", "--model", "beam1"), ("select", "--models", "beam1")]
+    "command", few_of([["update", "--model", "beam1"], ["select", "--models", "beam1"]], 1)
 )
 def test_a_class_that_misses_the_frequencies_by_far_is_said(
     shm: Shm, modes_file: Path, hanger_file: Path, command: tuple[str, ...]

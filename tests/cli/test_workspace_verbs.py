@@ -114,6 +114,7 @@ def test_a_hanger_without_tests_has_nothing_yet(
     assert shm("--workspace", bridge.folder, verb, "--hanger", 4, *out).code == 4
 
 
+@pytest.mark.slow
 def test_drift_shows_the_latest_shift_or_all(shm: Shm, tmp_path: Path) -> None:
     bridge = with_a_slow_loss(tmp_path / "bridge")
     call = ("--workspace", bridge.folder, "drift", "--hanger", 3)

@@ -114,7 +114,7 @@ def signed_in(browser: Browser, site: Site) -> Browser:
     return browser
 
 
-@pytest.mark.parametrize("name", few_of(PAGES, 3))
+@pytest.mark.parametrize("name", few_of(PAGES, 2))
 def test_a_page_is_whole_for_everybody_by_day_and_night_on_desk_and_phone(
     signed_in: Browser, site: Site, name: str
 ) -> None:

@@ -49,6 +49,7 @@ def worked_through(folder: Path, scheduler: str) -> Workspace:
     return workspace
 
 
+@pytest.mark.slow
 def test_a_cluster_gives_what_the_processes_of_one_machine_give_to_the_bit(
     tmp_path: Path, cluster: clusters.Cluster
 ) -> None:

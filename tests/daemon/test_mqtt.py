@@ -134,6 +134,7 @@ def test_what_came_while_the_daemon_was_down_is_taken_in(bridge: Workspace, brok
         until(lambda: not back.waiting)
 
 
+@pytest.mark.slow
 def test_a_broker_that_is_killed_is_found_again(tmp_path: Path) -> None:
     with a_broker() as broker:
         workspace = a_bridge(tmp_path, broker)

@@ -43,6 +43,7 @@ def processes_of(workspace: Workspace) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="needs /proc to find processes")
 def test_sigterm_ends_it_cleanly_and_a_kill_leaves_no_process_behind(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch

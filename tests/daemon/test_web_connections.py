@@ -200,6 +200,7 @@ def certificate(tmp_path: Path) -> tuple[Path, Path]:
     return pem, key
 
 
+@pytest.mark.slow
 def test_a_silent_caller_of_https_is_counted_and_cut_off_before_tls_begins(
     workspace: Workspace, certificate: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from shm.store import Workspace
 from tests.helpers.flows import ingest
 from tests.helpers.structures import DECK, LOST_FROM, with_a_deck, write_week
@@ -11,6 +13,7 @@ from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace
 
 
+@pytest.mark.slow
 def test_alerts_of_a_deck_are_listed_and_no_page_breaks(tmp_path: Path) -> None:
     made = make_workspace(tmp_path / "bridge", settings={"baseline_tests": 3})
     workspace: Workspace = with_a_deck(made)

@@ -13,6 +13,7 @@ from tests.helpers.full_disks import fill_at_calls
 from tests.helpers.power import compiler
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_at_any_call_costs_nothing(tmp_path: Path) -> None:
     if compiler() is None:
         pytest.skip("A FULL DISK IS NOT TESTED HERE: no C compiler (apt-get install gcc)")

@@ -102,6 +102,7 @@ def not_missed(location: str | Path) -> tuple[dict[str, int], dict[str, list[tup
     return tried, unseen
 
 
+@pytest.mark.slow
 def test_each_row_is_missed_but_for_those_that_leave_no_trace(made: Path) -> None:
     tried, unseen = not_missed(made / "shm.db")
     assert set(tried) == set(metadata.tables)  # each table has a row

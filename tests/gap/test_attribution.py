@@ -16,6 +16,7 @@ from shm.gap.problem import GapProblem
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
+from tests.helpers.slow import few_of
 
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 4.0, "x_m": 3.4})
 SWING = PlantedEffect("geometric_hardening", "everywhere", {"hardening": 0.003})
@@ -59,7 +60,9 @@ def test_the_planted_effect_is_named_with_its_size() -> None:
 
 @pytest.mark.parametrize(
     ("effects", "known"),
-    [((), MORE), (("point_mass",), KNOWN), (("point_mass", "geometric_hardening"), KNOWN)],
+    few_of(
+        [((), MORE), (("point_mass",), KNOWN), (("point_mass", "geometric_hardening"), KNOWN)], 1
+    ),
 )
 def test_probabilities_add_to_one(effects: tuple[str, ...], known: tuple[str, ...]) -> None:
     found, _ = _found(*effects, known=known)
@@ -121,6 +124,7 @@ def test_the_same_seed_gives_the_same_answer() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_progress_is_told_and_never_goes_back() -> None:
     _, told = _found("point_mass", "geometric_hardening")
     fractions = [fraction for _, fraction in told]

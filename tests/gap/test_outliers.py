@@ -192,6 +192,7 @@ def test_what_another_test_hit_as_hard_shows_in_its_place_was_a_slip(
     assert acts_alone(design, kept, int(every[0]), 0.5) == 0.0  # farther than any guide moves one
 
 
+@pytest.mark.slow
 def test_a_hanger_that_knocks_while_it_swings_far_is_not_called_sound() -> None:
     (test,) = measured()
     few = GapOptions(without=all_but("point_mass"))

@@ -79,6 +79,7 @@ def weight(search: Search, each: ScoredHypothesis) -> float:
     return each.log_evidence + log_prior(each.hypothesis, search.variants)
 
 
+@pytest.mark.slow
 def test_every_step_keeps_what_was_tried_and_tries_nothing_twice(
     steps: dict[str, list[ScoredHypothesis]],
 ) -> None:

@@ -90,6 +90,7 @@ def test_an_adopted_class_recovers_the_planted_tension_and_covers_it() -> None:
     assert found.r_hat < 1.1
 
 
+@pytest.mark.slow
 def test_tests_at_two_temperatures_tell_the_tension_at_the_reference() -> None:
     size = "tension_per_kelvin_n_k=-3300..-2700"
     model = build(f"{WARMTH}:{size}", HANGER_3, THESIS)
@@ -101,6 +102,7 @@ def test_tests_at_two_temperatures_tell_the_tension_at_the_reference() -> None:
     assert ignored.tension_n.mean() < 0.96 * HANGER_3.nominal_tension_n
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [pytest.param("beam1", marks=pytest.mark.trial), "beam1+bending_stiffness@everywhere"],

@@ -148,6 +148,7 @@ def test_what_is_seen_is_as_much_as_the_class_and_the_tests_show() -> None:
 # ------------------------------------------------ the prior of ends
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("springs", [SPRINGS, ("log10_k1", "log10_k3"), ("log10_k2", "log10_k4")])
 def test_the_prior_of_ends_integrates_to_one_and_is_that_of_its_draws(
     springs: tuple[str, ...],
@@ -173,6 +174,7 @@ def test_the_prior_of_the_tension_integrates_to_one_and_is_that_of_its_draws() -
     assert kstest(draws, lambda at: np.interp(at, x, cumulative)).pvalue > 0.01
 
 
+@pytest.mark.slow
 def test_two_modes_a_plane_of_a_short_thick_bar_leave_its_tension_open() -> None:
     """Clamped ends with next to no tension fit as well as the planted springs and 752 kN do."""
     short = replace(ROD, length_m=4.44, nominal_tension_n=711e3)
@@ -273,6 +275,7 @@ def test_without_a_reading_the_tension_has_the_spread_of_what_no_frequency_sees(
     assert 0.8 * 0.0077 < relative < 1.2 * np.hypot(0.01, 0.003)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off", [-0.02, pytest.param(0.01, marks=pytest.mark.trial)])
 def test_a_reading_makes_of_it_the_product_of_both_normals(unread: Posterior, off: float) -> None:
     """1/v = 1/v0 + 1/r, m = v (m0/v0 + read/r)."""
@@ -421,6 +424,7 @@ def drawn_factor(posterior: Posterior) -> FloatArray:
     return posterior.parameter("bending_factor")
 
 
+@pytest.mark.slow
 def test_a_strands_factor_is_found_from_its_frequencies_and_stays_in_its_range() -> None:
     """Seven tenths are planted, anything from three to ten is allowed."""
     found = update(

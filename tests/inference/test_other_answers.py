@@ -43,6 +43,7 @@ def posterior(test: ModalTest, hanger: Hanger = BAR) -> Posterior:
     return update([test], build(CLASS, hanger), OPTIONS)
 
 
+@pytest.mark.slow
 def test_higher_modes_that_are_numbered_one_too_low_are_told() -> None:
     found = posterior(numbered_lower(a_test(range(4, 7))))
     assert found.tension_of_other_orders_n == pytest.approx(TENSION_N, rel=0.1)

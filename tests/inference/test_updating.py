@@ -84,6 +84,7 @@ def test_beam_1_has_the_tension_of_quadrature(beam1_quadrature) -> None:
     assert tension.std() == pytest.approx(sd, rel=0.08)
 
 
+@pytest.mark.slow
 def test_beam_2_has_the_evidence_of_quadrature_on_one_plane() -> None:
     """With the transverse plane alone, k2 and k4 integrate to one: four dimensions are left."""
     nodes, weights = np.polynomial.legendre.leggauss(16)

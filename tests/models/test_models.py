@@ -14,11 +14,15 @@ from tests.helpers.hangers import HANGER_3
 
 # Each makes a reduced basis of its own: s1 stands for what `AsMade` adds to a solid class.
 MADE_ALIKE = [(name, "description") for name in ("s2", "solid0", "solid1", "solid2")]
+_SLOW = [("solid1", "thesis"), ("solid2", "thesis")]
 
 
 @pytest.fixture(
     params=[
-        pytest.param(each, marks=[pytest.mark.trial] if each in MADE_ALIKE else [])
+        pytest.param(
+            each,
+            marks=[pytest.mark.trial] * (each in MADE_ALIKE) + [pytest.mark.slow] * (each in _SLOW),
+        )
         for each in product(MODELS, PRIORS)
     ],
     ids=" ".join,

@@ -80,6 +80,7 @@ def _volume(mesh: Mesh) -> float:
     return float(Basis(mesh.cells, ElementHex2(), intorder=4).dx.sum())
 
 
+@pytest.mark.slow
 def test_the_mirrored_basis_is_the_longitudinal_plane() -> None:
     model = Solid1(HANGER_3)
     theta = np.array([[1.3, 6.0, 7.5, 8.0, 9.0, 8.5, 9.5, 7.5, 8.2]])

@@ -176,6 +176,7 @@ def test_a_mode_that_is_gone_is_told_and_the_others_stay() -> None:
     assert "longitudinal 2" in reading.why
 
 
+@pytest.mark.slow
 def test_without_known_modes_they_are_found_from_scratch_and_then_tracked() -> None:
     rng = np.random.default_rng(8)
     motion = drawn(rng, orders=4)

@@ -488,6 +488,7 @@ def test_one_impact_counts_once_in_whatever_format_it_comes_again(workspace: Wor
             assert "again" in hold.message
 
 
+@pytest.mark.slow
 def test_a_corrected_sidecar_beside_the_same_bytes_is_taken(workspace: Workspace) -> None:
     write(a_recording(), workspace.spool / "a.uff")  # its sidecar says hanger 3
     raw = (workspace.spool / "a.uff").read_bytes()

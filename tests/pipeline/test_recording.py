@@ -16,11 +16,12 @@ from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage
 from tests.helpers.flows import ingest
+from tests.helpers.slow import few_of
 from tests.helpers.workspaces import START, make_workspace
 
 
 @pytest.mark.usefixtures("real_sampler")
-@pytest.mark.parametrize("suffix", [".csv", ".uff"])
+@pytest.mark.parametrize("suffix", few_of([".csv", ".uff"], 1))
 def test_a_recording_gives_the_tension_that_was_planted(tmp_path: Path, suffix: str) -> None:
     workspace = make_workspace(tmp_path / "bridge", settings={"samples": 500})
     hanger = workspace.bridge.hanger(3)

@@ -56,6 +56,7 @@ def test_a_lower_threshold_raises_at_once_and_put_back_closes_it(
     assert len(standing) == 1
 
 
+@pytest.mark.slow
 def test_of_a_loss_that_is_not_beyond_any_more_the_change_is_left(workspace: Workspace) -> None:
     write_slow_loss(workspace.spool, workspace)
     ingest(workspace)
@@ -69,6 +70,7 @@ def test_of_a_loss_that_is_not_beyond_any_more_the_change_is_left(workspace: Wor
         assert one.alert.kinds == kinds
 
 
+@pytest.mark.slow
 def test_an_alert_that_the_new_threshold_calls_too_is_raised_once(workspace: Workspace) -> None:
     write_slow_loss(workspace.spool, workspace)
     ingest(workspace)

@@ -19,6 +19,7 @@ from shm.values import Alert, WatchedTest
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
 from tests.helpers.nouns import NOW, a_change, a_drift, a_watched_test, an_alert
+from tests.helpers.slow import few_of
 from tests.helpers.streams import a_reading
 from tests.helpers.workspaces import START, make_workspace, write_test
 
@@ -116,7 +117,7 @@ def test_tests_within_a_maintenance_window_raise_nothing_and_the_first_after_it_
     assert f"--since {period[1]:%Y-%m-%d}" in said
 
 
-@pytest.mark.parametrize("days", [(40,), (20, 40)])
+@pytest.mark.parametrize("days", few_of([[40], [20, 40]], 1))
 def test_a_loss_that_lasts_beyond_a_maintenance_window_is_told_once_at_the_first_test_after_it(
     bridge: Workspace, days: Sequence[int]
 ) -> None:
@@ -235,7 +236,7 @@ def test_one_disturbed_visit_does_not_end_the_alert_of_a_loss_that_stands(
     assert ("mail", f"{raised}:resolved") not in postman.told
 
 
-@pytest.mark.parametrize(("tension", "who"), [(0.92, SHM), (0.96, "Ann")])
+@pytest.mark.parametrize(("tension", "who"), few_of([(0.92, SHM), (0.96, "Ann")], 1))
 def test_a_resolved_alert_whose_change_two_visits_show_again_rings_anew(
     bridge: Workspace, tension: float, who: str
 ) -> None:

@@ -46,6 +46,7 @@ def outcome(workspace: Workspace) -> object:
         )
 
 
+@pytest.mark.slow
 def test_steps_done_by_two_give_the_results_of_one(tmp_path: Path) -> None:
     alone, shared = (
         make_workspace(tmp_path / name, hooks={"mail": ["true"]}) for name in ("alone", "shared")

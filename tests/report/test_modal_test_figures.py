@@ -112,6 +112,7 @@ def test_words_beside_the_figures_are_sentences_without_nan(name: str, drawn: Dr
         assert not re.search(r"\b(nan|inf|None)\b", item.caption + item.alt)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["eight sensors", "warned"])
 def test_no_word_of_a_figure_is_cut_off_and_panels_keep_their_room(name: str, drawn: Drawn) -> None:
     for item in drawn[name].values():

@@ -218,6 +218,7 @@ def test_nothing_planted_has_no_size(hanger: Hanger) -> None:
     assert size_of(hanger, STATE, (), EXACT) == 0
 
 
+@pytest.mark.slow
 def test_an_effect_is_scaled_to_a_size(hanger: Hanger) -> None:
     for effect in (
         CLAMP,

@@ -146,6 +146,7 @@ def test_tests_of_later_visits_are_the_watchs_to_judge() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_two_blunders_in_a_row_are_rarely_alike() -> None:
     """One in a hundred tests of any size from half to half as much again: of pairs in a row of
     them, itself one in 10,000, not one in ten is told."""
