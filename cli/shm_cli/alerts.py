@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Collection
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from shm.bridge import Bridge, Hook
 from shm.documents import alert_document, format_time
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
+from shm.pipeline.telling import quiet_until
 from shm.store import DeliveryState, StoredAlert
 from shm.store.stored_silences import silenced_until
 from shm.values import Alert
@@ -200,11 +200,10 @@ def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
         alerts = store.alerts.list_all(hanger_id)
         deliveries = store.alerts.list_deliveries()
         made = store.silences.list_all()
-    escalates = workspace.bridge.escalation_s
     now = utc_now()
     rows = [
         {
-            **_row(stored, deliveries, escalates),
+            **_row(stored, deliveries, workspace.bridge, now),
             "silenced_until": silenced_until(made, stored.alert.hanger, now)
             if stored.resolution is None
             else None,
@@ -253,11 +252,13 @@ def _delivery_words(delivery: dict[str, Any]) -> str:
     if delivery["escalation"]:
         words = {"delivered": "escalated", "waiting": "escalates unless acknowledged"}
         return f"{delivery['hook']}: {what}{words.get(delivery['state'], delivery['state'])}"
-    return f"{delivery['hook']}: {what}{delivery['state']}"
+    until = delivery["waits_until"]
+    state = f"waits until {until:%H:%M %Z}" if until else delivery["state"]
+    return f"{delivery['hook']}: {what}{state}"
 
 
 def _row(
-    stored: StoredAlert, deliveries: tuple[Delivery, ...], escalates: Collection[str]
+    stored: StoredAlert, deliveries: tuple[Delivery, ...], bridge: Bridge, now: datetime
 ) -> dict[str, Any]:
     return {
         "id": stored.id,
@@ -268,8 +269,11 @@ def _row(
             {
                 "hook": delivery.hook,
                 "news": delivery.news.value,
-                "escalation": delivery.hook in escalates,
+                "escalation": delivery.hook in bridge.escalation_s,
                 "state": delivery.state.value,
+                "waits_until": quiet_until(delivery, bridge.hooks, now)
+                if delivery.state is DeliveryState.WAITING
+                else None,
                 "attempts": delivery.attempts,
                 "last_error": delivery.last_error or None,
             }

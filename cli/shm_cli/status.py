@@ -20,6 +20,7 @@ from shm.errors import DamagedRow
 from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.telling import quiet_until
 from shm.report.formatting import model_class
 from shm.report.hanger_status import Status
 from shm.store import (
@@ -114,6 +115,8 @@ def _show(document: dict[str, Any]) -> None:
         f"alerts: {document['alerts']}, {document['open_alerts']} open; "
         f"deliveries: {owed or 'none'}"
     )
+    for said, count in document["quiet"].items():
+        click.echo(f"{said}: {count}")
     for said in document["silences"]:
         click.echo(said)
     click.echo(f"disk: {document['disk_free_bytes'] / 1e9:.1f} GB free; more: `shm doctor`")
@@ -234,6 +237,11 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "open_alerts": open_at.total(),
         "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
+        "quiet": Counter(
+            f"{each.hook} waits until {until:%H:%M %Z}"
+            for each in store.alerts.list_deliveries(DeliveryState.WAITING)
+            if (until := quiet_until(each, workspace.bridge.hooks, now))
+        ),
         "silences": [
             said_of(each) for each in store.silences.list_current(now) if each.starts_at <= now
         ],

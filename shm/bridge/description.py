@@ -15,6 +15,7 @@ from shm.bridge.changes import overlaid
 from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, hook_of
 from shm.bridge.letterhead import letterhead_of
+from shm.bridge.quiet_hours import zone_of
 from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table
 from shm.errors import BadInput
@@ -113,7 +114,8 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
     hangers = tuple(hanger_of(table, path) for table in _tables(document, "hanger", path))
     structures = tuple(structure_of(table, path) for table in _tables(document, "structure", path))
     _refuse_doubles([each.id for each in (*hangers, *structures)], "hanger id", path)
-    hooks = tuple(hook_of(table, path) for table in _tables(document, "hook", path))
+    zone = zone_of(document.get("bridge", {}), path)
+    hooks = tuple(hook_of(table, path, zone) for table in _tables(document, "hook", path))
     _refuse_doubles([hook.name for hook in hooks], "hook name", path)
     described = {each.id: each for each in hangers}
     streams = streams_of(_tables(document, "stream", path), path, described)

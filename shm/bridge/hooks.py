@@ -9,14 +9,18 @@ import ipaddress
 import string
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import datetime, tzinfo
 from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
+from shm.bridge.quiet_hours import QUIET_HOURS, QuietHours, quiet_hours_of
 from shm.bridge.table import Table
 from shm.errors import BadInput
+from shm.values.messages import Lead
 
 _ESCALATION = "escalation_after_seconds"
+_OF_ALL = ("name", _ESCALATION, QUIET_HOURS)
 _LONGEST_ESCALATION_S = 366 * 86400.0  # judgement: what nobody saw for a year, nobody will
 _ADDRESS = 'Write url = "https://host/path".'
 _WHERE_SECRETS_STAND = (
@@ -48,11 +52,24 @@ class Hook:
     """Something that is told of each alert.
 
     With `escalation_after_seconds` it is told only of those that nobody has acknowledged so long
-    after they were raised.
+    after they were raised. In its `quiet_hours` it is told only of what is urgent.
     """
 
     name: str
     escalation_after_seconds: float | None = field(default=None, kw_only=True)
+    quiet_hours: QuietHours | None = field(default=None, kw_only=True)
+
+    def quiet_until(self, message: str, at: datetime, *, is_raised: bool) -> datetime | None:
+        """The end of the quiet hours that a message waits for; None where it goes at once.
+
+        What must be done today and an escalation wait for nothing; that they are over does.
+        """
+        escalates = self.escalation_after_seconds is not None
+        if self.quiet_hours is None:
+            return None
+        if is_raised and (escalates or Lead.of(message).urgency == "today"):
+            return None
+        return self.quiet_hours.until(at)
 
     @property
     def kind(self) -> str:
@@ -93,8 +110,11 @@ class AppriseHook(Hook):
     address_file: str = ""
 
 
-def hook_of(values: Mapping[str, Any], path: Path) -> Hook:
-    """The hook of one `[[hook]]` table; raises BadInput naming the hook and what to write."""
+def hook_of(values: Mapping[str, Any], path: Path, zone: tzinfo) -> Hook:
+    """The hook of one `[[hook]]` table, for a bridge in a time zone.
+
+    Raises BadInput naming the hook and what to write.
+    """
     name = values.get("name")
     if not isinstance(name, str) or not name.strip() or not name.isprintable():
         raise BadInput("a [[hook]] has no name.", file=path, remedy='Write name = "mail".')
@@ -105,8 +125,9 @@ def hook_of(values: Mapping[str, Any], path: Path) -> Hook:
             f"it needs exactly one of {', '.join(_KINDS)}",
             'Write command = ["/path/to/program", "argument"] or url = "https://host/path".',
         )
-    seconds = _escalation_after_seconds(table)
-    return replace(readers.pop()(table, name), escalation_after_seconds=seconds)
+    seconds, quiet = _escalation_after_seconds(table), quiet_hours_of(table, zone)
+    hook = readers.pop()(table, name)
+    return replace(hook, escalation_after_seconds=seconds, quiet_hours=quiet)
 
 
 def _escalation_after_seconds(table: Table) -> float | None:
@@ -137,14 +158,14 @@ def apprise_scheme(address: str) -> str:
 
 
 def _command(table: Table, name: str) -> Hook:
-    table.refuse_unknown(("name", _ESCALATION, "command"))
+    table.refuse_unknown((*_OF_ALL, "command"))
     return CommandHook(name, _texts(table, "command", '["/path/to/program", "argument"]'))
 
 
 def _webhook(table: Table, name: str) -> Hook:
     if "secret" in table:
         raise table.refusal("bridge.toml is no place for a secret", _WHERE_SECRETS_STAND)
-    table.refuse_unknown(("name", _ESCALATION, "url", "secret_file", "secret_env", "allow_http"))
+    table.refuse_unknown((*_OF_ALL, "url", "secret_file", "secret_env", "allow_http"))
     if ("secret_file" in table) == ("secret_env" in table):
         raise table.refusal("it needs a secret to sign with, in one place", _WHERE_SECRETS_STAND)
     in_file, in_environment = (
@@ -154,7 +175,7 @@ def _webhook(table: Table, name: str) -> Hook:
 
 
 def _apprise(table: Table, name: str) -> Hook:
-    table.refuse_unknown(("name", _ESCALATION, "apprise", "apprise_file"))
+    table.refuse_unknown((*_OF_ALL, "apprise", "apprise_file"))
     if "apprise_file" in table and "apprise" not in table:
         return AppriseHook(name, address_file=_text(table, "apprise_file", "Name a file."))
     if "apprise_file" in table:

@@ -20,11 +20,19 @@ from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import WatchResult, registered, run_step
 from shm.pipeline.rejudging import settled
 from shm.pipeline.remote_file import Opens, RemoteFile
-from shm.pipeline.telling import Terms, after_works, message_of, plan, works_before
+from shm.pipeline.telling import (
+    Terms,
+    after_works,
+    held_messages,
+    message_of,
+    plan,
+    works_before,
+)
 from shm.pipeline.watching import tests_beside, to_watch
 from shm.settings import Settings
 from shm.store import (
     Delivery,
+    DeliveryState,
     IdentifiedTest,
     KeptWatch,
     Stage,
@@ -128,7 +136,8 @@ class Jobs:
         if not unsent:
             return
         window_s = self.workspace.settings.alert_grouping_seconds
-        terms = Terms(window_s, self.workspace.bridge.escalation_s, hurry)
+        bridge = self.workspace.bridge
+        terms = Terms(window_s, bridge.escalation_s, hurry, bridge.hooks)
         now = self.clock()
         made = plan(unsent, self.store.silences.list_all(), now, terms)
         self.store.alerts.begin_messages(made.messages, made.not_needed, now)
@@ -141,8 +150,8 @@ class Jobs:
         taken = Counter(delivery.hook for delivery in under_way)
         if taken.total() >= DELIVERIES:
             return
-        ids = [delivery.id for delivery in under_way]
         now, most, waits = self.clock(), 2 * DELIVERIES, _waits(self.workspace.settings)
+        ids = [*(delivery.id for delivery in under_way), *self._held_until_later(now)]
         due = self.store.alerts.list_due_deliveries(now, most, ids, waits, begun=True)
         parts: defaultdict[int | None, list[Delivery]] = defaultdict(list)
         for part in self.store.alerts.list_of_messages([each.id for each in due]) if due else ():
@@ -153,6 +162,14 @@ class Jobs:
                 message = message_of(parts[delivery.id])
                 prepare = partial(self._deliver, notifier, delivery, message)
                 yield Job(("deliver", delivery.id), prepare, delivery=delivery, message=message)
+
+    def _held_until_later(self, now: datetime) -> frozenset[int]:
+        """Messages that wait for the end of quiet hours, that of a failed attempt too."""
+        hooks = self.workspace.bridge.hooks
+        if not any(hook.quiet_hours and hook.quiet_hours.until(now) for hook in hooks):
+            return frozenset()
+        waiting = self.store.alerts.list_deliveries(DeliveryState.WAITING)
+        return held_messages(waiting, hooks, now)
 
     def _waiting_tests(
         self, limit: int, held: Collection[int]

@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 
+from shm.bridge import Hook
 from shm.store import Delivery, News, Silence
 from shm.store.stored_silences import silenced_until
 from shm.values import Alert, Drift, is_ratio, kind_of
@@ -26,7 +27,7 @@ _LISTED = 60  # technical: hangers that a message names; the bridges we know hav
 @dataclass(frozen=True)
 class Terms:
     """How hooks are told: the window in which alike alerts are gathered, and the hooks that are
-    told only of what nobody has acknowledged after so many seconds.
+    told only of what nobody has acknowledged after so many seconds; `hooks` for their quiet hours.
 
     With `hurry` nothing is gathered any longer: who asks is about to end.
     """
@@ -34,6 +35,7 @@ class Terms:
     window_s: float = 0.0
     escalation_s: Mapping[str, float] = field(default_factory=dict)
     hurry: bool = False
+    hooks: Sequence[Hook] = ()
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,28 @@ def _no_need(delivery: Delivery, silences: tuple[Silence, ...], terms: Terms) ->
         return f"acknowledged by {noted.who} in time"
     if _held_back_until(delivery, silences, noted.at) is not None:
         return f"acknowledged by {noted.who} while it was silenced"
+    if quiet_until(delivery, terms.hooks, noted.at) is not None:
+        return f"acknowledged by {noted.who} in the quiet hours"
     return ""
+
+
+def quiet_until(delivery: Delivery, hooks: Sequence[Hook], at: datetime) -> datetime | None:
+    """The end of its hook's quiet hours that a delivery waits for; None where it goes at once."""
+    is_raised, message = delivery.news is News.RAISED, delivery.alert.message
+    ends = (
+        hook.quiet_until(message, at, is_raised=is_raised)
+        for hook in hooks
+        if hook.name == delivery.hook
+    )
+    return next(ends, None)
+
+
+def held_messages(
+    waiting: Sequence[Delivery], hooks: Sequence[Hook], now: datetime
+) -> frozenset[int]:
+    """The numbers of messages that quiet hours hold back: of those with nothing urgent."""
+    goes = {each.message_id for each in waiting if quiet_until(each, hooks, now) is None}
+    return frozenset(each.message_id for each in waiting if each.message_id) - goes
 
 
 def _held_back_until(
@@ -119,6 +142,8 @@ def _ready_at(
     ready_at = max(since, _held_back_until(delivery, silences, now) or since)
     if delivery.news is News.RAISED and delivery.hook in terms.escalation_s:
         ready_at += timedelta(seconds=terms.escalation_s[delivery.hook])
+    if (quiet := quiet_until(delivery, terms.hooks, ready_at)) is not None:
+        ready_at = quiet.astimezone(UTC)
     return ready_at if ready_at <= now else None
 
 

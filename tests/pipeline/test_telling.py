@@ -14,7 +14,7 @@ import pytest
 from shm.bridge import Hook
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import Flow
-from shm.pipeline.telling import after_works, works_before
+from shm.pipeline.telling import after_works, quiet_until, works_before
 from shm.store import IdentifiedTest, Lineage, Silence, Store, StoredTest, Workspace
 from shm.store.stored_silences import silenced_until
 from shm.values import Alert, Selection
@@ -69,8 +69,9 @@ def bridge(tmp_path: Path) -> Workspace:
 
 
 def raise_on(
-    workspace: Workspace, clock: Clock, hangers: Sequence[int], shift: float = -0.08, day: int = 1
-) -> None:
+    workspace: Workspace, clock: Clock, hangers: Sequence[int], shift: float = -0.08, day: int = 1,
+    action: str = "",
+) -> None:  # fmt: skip
     """An alert on each hanger, as the watch raises it; their first tests make the baselines."""
     hooks = [hook.name for hook in workspace.bridge.hooks]
     with workspace.store() as store:
@@ -89,7 +90,7 @@ def raise_on(
             posterior = replace(a_posterior(tests=(name,)), hanger=hanger)
             store.posteriors.save(test, posterior, LINEAGE, clock())
             drift = replace(a_drift(name), hanger=hanger, shift_mean=shift - hanger / 1e4)
-            message = f"Hanger {hanger}: tension fell."
+            message = f"Hanger {hanger}: tension fell. {action}".rstrip()
             key = f"hanger-{hanger}:{name}"
             kinds = ("beyond threshold",)
             alert = Alert(key, hanger, name, test.time, message, (drift,), kinds)
@@ -237,6 +238,65 @@ def test_escalation_counts_from_the_end_of_a_silence(
     assert inbox.of("boss") == []
     live(bridge, clock, inbox, 120.0, 30.0)
     assert len(inbox.of("boss")) == 1
+
+
+# ---------------------------------------------------------------- quiet hours
+
+
+@pytest.fixture
+def quiet(bridge: Workspace) -> Workspace:
+    """The same, quiet from ten to six in Berlin, in May two hours before UTC."""
+    described = Path(bridge.bridge.source)
+    text = described.read_text().replace("command =", 'quiet_hours = "22:00-06:00"\ncommand =')
+    described.write_text(text.replace("[bridge]", '[bridge]\ntime_zone = "Europe/Berlin"'))
+    return bridge.reopened()
+
+
+def test_in_quiet_hours_what_is_urgent_goes_and_the_rest_goes_grouped_at_their_end(
+    quiet: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    clock.pass_by(8.5 * HOUR)  # 22:30 in Berlin
+    raise_on(quiet, clock, [1, 4])
+    raise_on(quiet, clock, [3], action="Repeat the hammer test today.")
+    live(quiet, clock, inbox, 90.0, 30.0)
+    assert [each.hanger for each in inbox.of("mail")] == [3]
+    with quiet.store() as store:
+        waits = {
+            each.alert.hanger: until and f"{until:%H:%M %Z}"
+            for each in store.alerts.list_deliveries()
+            if each.hook == "mail"
+            for until in [quiet_until(each, quiet.bridge.hooks, clock())]
+        }
+        store.alerts.acknowledge(2, "Ann", "seen", clock())
+    assert waits == {1: "06:00 CEST", 3: None, 4: "06:00 CEST"}
+    live(quiet, clock, inbox, HOUR, 600.0)
+    (escalated,) = inbox.of("boss")
+    assert [each.hanger for each in escalated.alerts] == [1, 3]
+    raise_on(quiet, clock, [2])
+    live(quiet, clock, inbox, 6 * HOUR, HOUR)
+    clock.now = NOW + timedelta(hours=15.99)  # half a minute before six
+    look(quiet, clock, inbox)
+    assert len(inbox.of("mail")) == 1
+    live(quiet, clock, inbox, 120.0, 30.0)
+    assert [one.hanger for one in inbox.of("mail")[1].alerts] == [1, 2]
+    assert states(quiet, "mail") == {"delivered", "not needed"}
+
+
+def test_a_failed_attempt_at_what_is_not_urgent_is_not_repeated_in_quiet_hours(
+    quiet: Workspace, clock: Clock, inbox: Inbox
+) -> None:
+    clock.pass_by(8 * HOUR - 62.0)
+    raise_on(quiet, clock, [1])
+    raise_on(quiet, clock, [3], action="Repeat the hammer test today.", shift=0.08)
+    inbox.failures = 2
+    clock.pass_by(61.0)  # a second before ten
+    look(quiet, clock, inbox)
+    assert {each.hanger for each in inbox.of("mail")} == {1, 3}
+    live(quiet, clock, inbox, 60.0, 10.0)
+    assert [each.hanger for each in inbox.of("mail")][2:] == [3]
+    clock.pass_by(8 * HOUR)
+    look(quiet, clock, inbox)
+    assert [each.hanger for each in inbox.of("mail")][3:] == [1]
 
 
 # ---------------------------------------------------------------- silences

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import pickle
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shm.bridge import load_bridge, load_hanger
+from shm.bridge import Bridge, load_bridge, load_hanger
 from shm.errors import BadInput
 from shm.values import MEASUREMENT_HOURS, EndPlate, Thresholds, Turnbuckle
 
@@ -202,6 +203,56 @@ def test_doubles_are_refused(tmp_path: Path) -> None:
 def test_a_hook_needs_a_name_and_an_argument_list(tmp_path: Path, hook: str) -> None:
     with pytest.raises(BadInput, match="hook"):
         load_bridge(written(tmp_path, f"[[hook]]\n{hook}\n"))
+
+
+def quiet_bridge(tmp_path: Path, hours: str, zone: str = "Europe/Berlin") -> Bridge:
+    text = f"[bridge]\ntime_zone = {zone!r}\n[[hook]]\nname = 'mail'\ncommand = ['x']\n"
+    return load_bridge(written(tmp_path, f"{text}quiet_hours = {hours}\n"))
+
+
+@pytest.mark.parametrize(
+    ("hours", "at", "ends"),
+    [
+        ("22:00-06:00", "2026-11-25T21:00Z", "2026-11-26T05:00Z"),  # 22:00 there
+        ("22:00-06:00", "2026-11-26T04:59Z", "2026-11-26T05:00Z"),
+        ("22:00-06:00", "2026-11-26T05:00Z", None),
+        ("22:00-06:00", "2026-11-25T20:59Z", None),
+        ("22:00-06:00", "2026-07-01T20:30Z", "2026-07-02T04:00Z"),  # summer time
+        ("22:00-06:00", "2026-03-28T21:00Z", "2026-03-29T04:00Z"),  # a night of 23 hours
+        ("22:00-06:00", "2026-10-24T20:00Z", "2026-10-25T05:00Z"),  # of 25
+        ("22:00-02:30", "2026-03-28T23:00Z", "2026-03-29T01:30Z"),  # no such time: 03:30 there
+        ("22:00-02:30", "2026-10-25T00:15Z", "2026-10-25T00:30Z"),  # the first 02:30 of two
+        ("22:00-02:30", "2026-10-25T01:15Z", None),
+        ("12:00-13:30", "2026-11-26T12:29Z", "2026-11-26T12:30Z"),
+        ("12:00-13:30", "2026-11-26T12:30Z", None),
+    ],
+)
+def test_quiet_hours_are_those_of_the_clocks_at_the_bridge(
+    tmp_path: Path, hours: str, at: str, ends: str | None
+) -> None:
+    (hook,) = quiet_bridge(tmp_path, f"'{hours}'").hooks
+    assert hook.quiet_hours is not None
+    found = hook.quiet_hours.until(datetime.fromisoformat(at))
+    # In UTC: a time that comes twice equals none of another zone.
+    assert (found and found.astimezone(UTC)) == (ends and datetime.fromisoformat(ends))
+
+
+@pytest.mark.parametrize("hours", ["'22-6'", "'22:00-24:00'", "'06:00-06:00'", "22", "['22:00']"])
+def test_quiet_hours_that_are_no_span_are_refused_with_key_and_line(
+    tmp_path: Path, hours: str
+) -> None:
+    with pytest.raises(BadInput, match=r"hook mail: quiet_hours = .* is not a span") as refusal:
+        quiet_bridge(tmp_path, hours)
+    assert refusal.value.line == 6
+    assert refusal.value.remedy == 'Write quiet_hours = "22:00-06:00".'
+
+
+@pytest.mark.parametrize("zone", ["Europe/Atlantis", "", "../etc", "Europe"])
+def test_a_time_zone_that_nobody_knows_is_refused(tmp_path: Path, zone: str) -> None:
+    with pytest.raises(BadInput, match=r"bridge: time_zone = .* knows") as refusal:
+        quiet_bridge(tmp_path, "'22:00-06:00'", zone)
+    assert "bridge.toml" in str(refusal.value)
+    assert "Europe/Berlin" in refusal.value.remedy
 
 
 def test_an_unknown_hanger_is_refused_with_the_known_ones(tmp_path: Path) -> None:

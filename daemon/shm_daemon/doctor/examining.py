@@ -16,7 +16,7 @@ import shutil
 import sqlite3
 import stat
 import tempfile
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import datetime, timedelta
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -24,9 +24,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from shm import __version__
-from shm.bridge import AppriseHook, Hook, WebhookHook
+from shm.bridge import AppriseHook, Bridge, Hook, WebhookHook
 from shm.errors import ShmError
 from shm.models import competing_names
+from shm.pipeline.telling import quiet_until
 from shm.read import sandbox
 from shm.report.formatting import counted
 from shm.report.logo import read_logo
@@ -91,14 +92,8 @@ def check_deliveries(examined: Examined) -> Iterator[Finding]:
     """Whether alerts wait for their hooks, or were given up."""
     store, now = examined.store, examined.now
     waiting = store.alerts.list_deliveries(DeliveryState.WAITING)
-    silences, escalates = store.silences.list_all(), examined.workspace.bridge.escalation_s
-    late = [
-        each
-        for each in waiting
-        if each.attempts
-        or (each.message_id and now - each.next_attempt_at > WAITS_LONG)
-        or (_is_unheld(each, silences, escalates, now) and now - each.stored.raised_at > WAITS_LONG)
-    ]
+    bridge, silences = examined.workspace.bridge, store.silences.list_all()
+    late = [each for each in waiting if each.attempts or _is_late(each, silences, bridge, now)]
     if late:
         worst = max(late, key=lambda each: each.attempts)
         said = worst.last_error or "not tried yet: is a daemon active?"
@@ -122,13 +117,18 @@ def check_deliveries(examined: Examined) -> Iterator[Finding]:
         yield ok("deliveries", f"{len(waiting)} on their way" if waiting else "none owed")
 
 
-def _is_unheld(
-    delivery: Delivery, silences: tuple[Silence, ...], escalates: Container[str], now: datetime
+def _is_late(
+    delivery: Delivery, silences: tuple[Silence, ...], bridge: Bridge, now: datetime
 ) -> bool:
-    """Whether nothing that people asked for keeps a delivery: no silence, no escalation."""
-    if delivery.message_id is not None or delivery.hook in escalates:
+    """Whether a delivery waits long, and nothing that people asked for keeps it."""
+    if any(quiet_until(delivery, bridge.hooks, at) for at in (now, now - WAITS_LONG)):
         return False
-    return silenced_until(silences, delivery.alert.hanger, now) is None
+    if delivery.message_id is not None:
+        return now - delivery.next_attempt_at > WAITS_LONG
+    if delivery.hook in bridge.escalation_s:
+        return False
+    is_silenced = silenced_until(silences, delivery.alert.hanger, now) is not None
+    return not is_silenced and now - delivery.stored.raised_at > WAITS_LONG
 
 
 def _ready(notifier: HookNotifier, hook: Hook) -> Finding:

@@ -156,6 +156,7 @@ class DeliveryState(BaseModel):
     last_error: str = Field(description="Why the latest attempt failed; empty where none did.")
     news: Literal["raised", "resolved"]
     escalation: bool = Field(description="Told only of what nobody acknowledged in time.")
+    waits_until: datetime | None = Field(description="The end of its hook's quiet hours.")
 
 
 class Acknowledged(BaseModel):

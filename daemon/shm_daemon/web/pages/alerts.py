@@ -4,17 +4,18 @@ then the others.
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
+from shm.bridge import Hook
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.report.hanger_status import HangerMessage
-from shm.store import AlertRow, Silence
+from shm.store import AlertRow, DeliveryRow, DeliveryState, News, Silence
 from shm.store.stored_silences import silenced_until
 from shm.values.messages import Lead
 from shm_daemon.web.access import AtSite, Reader, Writer
@@ -175,12 +176,12 @@ def acknowledge(
 def alert_documents(found: Sequence[AlertRow], site: Site) -> list[dict[str, Any]]:
     """Alerts with what became of their deliveries, and what holds them back."""
     silences, now = site.store.silences.list_all(), utc_now()
-    escalates = site.workspace.bridge.escalation_s
-    return [_document(each, escalates, silences, now) for each in found]
+    hooks = {hook.name: hook for hook in site.workspace.bridge.hooks}
+    return [_document(each, hooks, silences, now) for each in found]
 
 
 def _document(
-    alert: AlertRow, escalates: Container[str], silences: tuple[Silence, ...], now: datetime
+    alert: AlertRow, hooks: Mapping[str, Hook], silences: tuple[Silence, ...], now: datetime
 ) -> dict[str, Any]:
     noted, ended, lead = alert.acknowledgement, alert.resolution, Lead.of(alert.message)
     return {
@@ -197,7 +198,15 @@ def _document(
         "resolved": ended and ended.said,
         "silenced_until": None if ended else silenced_until(silences, alert.hanger, now),
         "deliveries": [
-            {**vars(each), "state": each.state.value, "escalation": each.hook in escalates}
-            for each in alert.deliveries
+            _delivery(each, hooks.get(each.hook), alert.message, now) for each in alert.deliveries
         ],
     }
+
+
+def _delivery(row: DeliveryRow, hook: Hook | None, message: str, now: datetime) -> dict[str, Any]:
+    until = None
+    if hook is not None and row.state is DeliveryState.WAITING:
+        until = hook.quiet_until(message, now, is_raised=row.news is News.RAISED)
+    escalates = hook is not None and hook.escalation_after_seconds is not None
+    state = {"state": row.state.value, "escalation": escalates, "waits_until": until}
+    return {**vars(row), **state}
