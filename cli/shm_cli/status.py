@@ -10,7 +10,7 @@ import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any
 
 import rich_click as click
@@ -115,9 +115,7 @@ def _show(document: dict[str, Any]) -> None:
         f"alerts: {document['alerts']}, {document['open_alerts']} open; "
         f"deliveries: {owed or 'none'}"
     )
-    for said, count in document["quiet"].items():
-        click.echo(f"{said}: {count}")
-    for said in document["silences"]:
+    for said in (*document["quiet_hours"], *document["silences"]):
         click.echo(said)
     click.echo(f"disk: {document['disk_free_bytes'] / 1e9:.1f} GB free; more: `shm doctor`")
     made = table(
@@ -237,11 +235,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "open_alerts": open_at.total(),
         "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
-        "quiet": Counter(
-            f"{each.hook} waits until {until:%H:%M %Z}"
-            for each in store.alerts.list_deliveries(DeliveryState.WAITING)
-            if (until := quiet_until(each, workspace.bridge.hooks, now))
-        ),
+        "quiet_hours": _quiet(workspace, store, now),
         "silences": [
             said_of(each) for each in store.silences.list_current(now) if each.starts_at <= now
         ],
@@ -251,6 +245,16 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "structures": _structures(workspace, store, open_at),
         "hangers": _hangers(workspace, store, open_at, Counter(hold.hanger for hold in held)),
     }
+
+
+def _quiet(workspace: Workspace, store: Store, now: datetime) -> list[str]:
+    waiting = store.alerts.list_deliveries(DeliveryState.WAITING)
+    counts = Counter(
+        (each.hook, f"{until:%H:%M %Z}")
+        for each in waiting
+        if (until := quiet_until(each, workspace.bridge.hooks, now))
+    )
+    return [f"{hook} waits until {until}: {count}" for (hook, until), count in counts.items()]
 
 
 def _daemon(workspace: Workspace) -> dict[str, Any]:

@@ -13,13 +13,15 @@ import pytest
 
 from shm.bridge import Hook
 from shm.errors import NothingThere, UsageError
-from shm.pipeline import Flow
+from shm.pipeline import Flow, utc_now
 from shm.pipeline.telling import after_works, quiet_until, works_before
 from shm.store import IdentifiedTest, Lineage, Silence, Store, StoredTest, Workspace
 from shm.store.stored_silences import silenced_until
 from shm.values import Alert, Selection
+from shm_cli.main import run
 from tests.helpers.flows import Clock, a_flow
 from tests.helpers.nouns import NOW, a_drift, a_file, a_posterior, a_test, a_watched_test
+from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
@@ -246,10 +248,14 @@ def test_escalation_counts_from_the_end_of_a_silence(
 @pytest.fixture
 def quiet(bridge: Workspace) -> Workspace:
     """The same, quiet from ten to six in Berlin, in May two hours before UTC."""
-    described = Path(bridge.bridge.source)
-    text = described.read_text().replace("command =", 'quiet_hours = "22:00-06:00"\ncommand =')
-    described.write_text(text.replace("[bridge]", '[bridge]\ntime_zone = "Europe/Berlin"'))
-    return bridge.reopened()
+    return _quiet(bridge, "22:00-06:00", "Europe/Berlin")
+
+
+def _quiet(workspace: Workspace, hours: str, zone: str) -> Workspace:
+    described = Path(workspace.bridge.source)
+    text = described.read_text().replace("command =", f'quiet_hours = "{hours}"\ncommand =')
+    described.write_text(text.replace("[bridge]", f'[bridge]\ntime_zone = "{zone}"'))
+    return workspace.reopened()
 
 
 def test_in_quiet_hours_what_is_urgent_goes_and_the_rest_goes_grouped_at_their_end(
@@ -297,6 +303,26 @@ def test_a_failed_attempt_at_what_is_not_urgent_is_not_repeated_in_quiet_hours(
     clock.pass_by(8 * HOUR)
     look(quiet, clock, inbox)
     assert [each.hanger for each in inbox.of("mail")][3:] == [1]
+
+
+def test_lists_status_and_page_say_until_when_a_delivery_waits(
+    bridge: Workspace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = utc_now()
+    until = f"{now + timedelta(hours=2):%H:%M}"
+    quiet = _quiet(bridge, f"{now - timedelta(hours=1):%H:%M}-{until}", "UTC")
+    raise_on(quiet, Clock(now), [1])
+    for verb, said in (
+        ("alerts", f"mail: waits until {until} UTC"),
+        ("status", f"mail waits until {until} UTC: 1"),
+    ):
+        assert run(["--workspace", str(quiet.folder), verb]) == 0
+        assert said in " ".join(capsys.readouterr().out.split())
+    with served(quiet) as site, site.client() as client:
+        assert client.get("/alerts").text.count(f"waits until {until} UTC") == 1
+        mail, boss = client.get("/api/alerts").json()["alerts"][0]["deliveries"]
+    assert datetime.fromisoformat(mail["waits_until"]).strftime("%H:%M") == until
+    assert boss["waits_until"] is None
 
 
 # ---------------------------------------------------------------- silences
