@@ -248,13 +248,12 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
 
 
 def _quiet(workspace: Workspace, store: Store, now: datetime) -> list[str]:
-    waiting = store.alerts.list_deliveries(DeliveryState.WAITING)
-    counts = Counter(
-        (each.hook, f"{until:%H:%M %Z}")
-        for each in waiting
+    waits = Counter(
+        f"{each.hook} waits until {until:%H:%M %Z}"
+        for each in store.alerts.list_deliveries(DeliveryState.WAITING)
         if (until := quiet_until(each, workspace.bridge.hooks, now))
     )
-    return [f"{hook} waits until {until}: {count}" for (hook, until), count in counts.items()]
+    return [f"{said}: {count}" for said, count in waits.items()]
 
 
 def _daemon(workspace: Workspace) -> dict[str, Any]:
