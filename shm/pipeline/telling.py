@@ -141,10 +141,18 @@ def _ready_at(
         return now - _MOST_WINDOWS * timedelta(seconds=terms.window_s)
     ready_at = max(since, _held_back_until(delivery, silences, now) or since)
     if delivery.news is News.RAISED and delivery.hook in terms.escalation_s:
+        ready_at = _first_told(delivery.alert, terms.hooks, ready_at)
         ready_at += timedelta(seconds=terms.escalation_s[delivery.hook])
     if (quiet := quiet_until(delivery, terms.hooks, ready_at)) is not None:
         ready_at = quiet.astimezone(UTC)
     return ready_at if ready_at <= now else None
+
+
+def _first_told(alert: Alert, hooks: Sequence[Hook], at: datetime) -> datetime:
+    """When the first of the hooks that do not escalate is told, which quiet hours may put off."""
+    first = (hook for hook in hooks if hook.escalation_after_seconds is None)
+    ends = (hook.quiet_until(alert.message, at, is_raised=True) for hook in first)
+    return min((each.astimezone(UTC) if each else at for each in ends), default=at)
 
 
 def _is_whole(times: Sequence[datetime], now: datetime, terms: Terms, *, is_late: bool) -> bool:
