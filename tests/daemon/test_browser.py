@@ -179,6 +179,12 @@ def test_an_alert_is_acknowledged_with_a_name_and_a_reason(signed_in: Browser, s
     page.reload()
     expect(page.get_by_text("A clamp had slipped; <set> right.")).to_be_visible()
     assert page.locator("article.card.open").count() == before - 1
+    card = page.locator("article.card", has_text="A clamp had slipped")
+    card.get_by_text("Resolve", exact=True).click()
+    card.get_by_label("What came of it").fill("The clamp holds.")
+    card.get_by_role("button").click()
+    expect(card).to_contain_text("Resolved by Anna: The clamp holds.")
+    assert page.locator("article.card.open").count() == before - 1
 
 
 def test_on_a_phone_what_matters_does_not_lie_off_to_the_side(

@@ -96,6 +96,14 @@ def test_person_token_and_reason_go_on_the_record(writer: httpx.Client, alert: i
     assert "Somebody took note of every alert" in page
     assert "Ada &lt;b&gt; (token write)" in page
     assert "Nut tightened." in page
+    assert f"Resolve alert {alert}" in page
+    ended = writer.post(address, json={"why": "Raised by mistake.", "resolved": True}).json()
+    assert (ended["resolved"]["why"], ended["acknowledged"]["why"]) == (
+        "Raised by mistake.", "Nut tightened.",
+    )  # fmt: skip
+    page = writer.get("/alerts").text
+    assert "Raised by mistake." in page
+    assert f"Resolve alert {alert}" not in page
 
 
 def test_older_alerts_are_a_link_away(

@@ -209,6 +209,9 @@ class Acknowledge(BaseModel):
         default=None,
         description="The person behind a token, which is noted too; a user has a name.",
     )
+    resolved: bool = Field(
+        default=False, description="Its cause is gone or explained: hooks hear of it."
+    )
 
 
 class Status(BaseModel):

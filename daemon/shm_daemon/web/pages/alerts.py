@@ -166,10 +166,12 @@ def acknowledge(
     alert_id: Annotated[int, Path(ge=0, le=LARGEST_NUMBER)],
     told: Acknowledge,
 ) -> Any:
-    """Notes on the record that somebody has seen an alert to its end: once an alert."""
+    """Notes on the record that somebody has seen an alert, or with `resolved` to its end."""
     named = told.who is not None and not writer.is_person  # who signed in has a name
     who = f"{told.who} (token {writer.name})" if named else writer.name
-    site.store.acting_as(writer.actor).alerts.acknowledge(alert_id, who, told.why, utc_now())
+    alerts = site.store.acting_as(writer.actor).alerts
+    note = alerts.resolve if told.resolved else alerts.acknowledge
+    note(alert_id, who, told.why, utc_now())
     return alert_documents([site.store.alerts.row(alert_id)], site)[0]
 
 

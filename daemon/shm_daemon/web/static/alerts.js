@@ -1,5 +1,5 @@
 "use strict";
-// Acknowledges an alert by the API; the page then shows what the record says.
+// Acknowledges or resolves an alert by the API; the page then shows what the record says.
 
 (() => {
   const remembered = "shm.who";
@@ -19,10 +19,18 @@
 
   function show(form, alert) {
     const card = form.closest(".card");
+    const [done, by] = alert.resolved ? ["resolved", alert.resolved] : ["acknowledged", alert.acknowledged];
     const noted = document.createElement("p");
     noted.className = "noted";
-    noted.textContent = `Acknowledged by ${alert.acknowledged.who}: ${alert.acknowledged.why}`;
+    noted.textContent = `${done[0].toUpperCase()}${done.slice(1)} by ${by.who}: ${by.why}`;
     form.closest("details").replaceWith(noted);
+    const told = document.getElementById("told");
+    told.textContent = `Alert ${alert.id} is ${done}.`;
+    card.tabIndex = -1;
+    if (!card.classList.contains("open")) {
+      card.focus();
+      return;
+    }
     card.classList.remove("open");
     const open = document.getElementById("open");
     open.dataset.count -= 1;
@@ -32,9 +40,6 @@
       closed.hidden = false;
       closed.querySelector("h2").after(card);
     }
-    const told = document.getElementById("told");
-    told.textContent = `Alert ${alert.id} is acknowledged.`;
-    card.tabIndex = -1;
     card.focus();
     const count = document.querySelector(".top .count");
     if (count) {
@@ -57,7 +62,7 @@
         try {
           show(form, await send(form));
         } catch (error) {
-          problem.textContent = `Not acknowledged: ${error.message}`;
+          problem.textContent = `Not noted: ${error.message}`;
           button.disabled = false;
         }
       });
