@@ -5,6 +5,7 @@ import pytest
 from scipy.signal import firwin, lfilter
 
 from shm.identify.measuring.hits import find_pulses
+from shm.identify.measuring.screening import _carried_on
 from shm.values import FloatArray
 from tests.identify.signals import force_signal, half_sine
 
@@ -127,3 +128,11 @@ def test_the_pulse_ends_where_the_force_is_quiet_again() -> None:
     force, starts = _force()
     for pulse, start in zip(find_pulses(force, 2048.0), starts, strict=True):
         assert 5 <= pulse.end - start <= 9
+
+
+def test_lost_samples_before_a_hit_come_to_nothing_known_without_a_warning() -> None:
+    earlier = np.full((2, 5), 1 + 1j)
+    earlier[1] = complex(np.nan, np.nan)
+    ahead = _carried_on(earlier, 0.5 * earlier)
+    np.testing.assert_allclose(ahead[0], 0.25 * earlier[0])
+    assert np.isnan(ahead[1]).all()

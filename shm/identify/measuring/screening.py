@@ -271,7 +271,8 @@ def disagreement(
     responses = _responses([hits[index] for index in known], sampling_rate_hz, band_hz, step)
     flat = responses.reshape(len(known), -1)
     level = np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
-    alike = np.abs((flat / level) @ (flat / level).conj().T) ** 2
+    with np.errstate(invalid="ignore"):  # a hit with lost samples is like none: NaN
+        alike = np.abs((flat / level) @ (flat / level).conj().T) ** 2
     power = np.sum(np.abs(responses) ** 2, axis=2)
     for group in list(struck_planes(power, planes).values()) or [list(range(len(known)))]:
         ordered = np.sort((1 - alike + 2 * np.eye(len(known)))[np.ix_(group, group)], axis=1)
@@ -347,8 +348,9 @@ def _carried_on(earlier: ComplexArray, later: ComplexArray) -> ComplexArray:
     """
     cross = _three_lines(later * earlier.conj())
     power = np.maximum(_three_lines(np.abs(earlier) ** 2), np.finfo(float).tiny)
-    factor = cross / power
-    return np.asarray(later * factor / np.maximum(1.0, np.abs(factor)))
+    with np.errstate(invalid="ignore"):  # lost samples come to nothing known: NaN
+        factor = cross / power
+        return np.asarray(later * factor / np.maximum(1.0, np.abs(factor)))
 
 
 def _three_lines(values: ComplexArray | FloatArray) -> ComplexArray:
