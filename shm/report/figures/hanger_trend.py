@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -27,10 +28,18 @@ from shm.report.intervals import Interval
 from shm.report.states import CalledChange, QuantityOverTime
 from shm.values import FloatArray
 from shm.values.force_units import ForceUnit, force_unit
+from shm.values.notes import Note, NoteKind
 from shm.values.stated_tension import averaged_now
 from shm.watch.history import Band as Bounds
 
+_LONGEST_WORDS = 200  # layout: characters of a note in a hover; the page has all
 _AT_FOOT = 0.03  # layout: of the height, where signs of what people did stand
+_SYMBOLS: dict[NoteKind, tuple[Symbol, bool]] = {
+    NoteKind.NOTE: ("triangle", False),
+    NoteKind.INSPECTION: ("circle", False),
+    NoteKind.REPAIR: ("triangle", True),
+}
+"""Of a note by its kind, and whether it is filled."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +52,22 @@ class Deed:
     colour: str
     at: datetime
     why: str
+
+
+def noted(notes: Sequence[Note]) -> list[Deed]:
+    """Notes as they stand at the foot of the figure, those of one kind together."""
+    return [
+        Deed(
+            kind,
+            *_SYMBOLS[kind],
+            "ink",
+            each.at,
+            f"of {each.of} by {each.who}: {textwrap.shorten(each.text, _LONGEST_WORDS)}",
+        )
+        for kind in NoteKind
+        for each in notes
+        if each.kind is kind
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +125,14 @@ def specify(course: Course) -> Specification | None:
         *time_axes.changes(course.changes or (), course.times),
     ]
     axis = Axis(label=f"tension ({course.unit.name})", range=_range(course, scale))
-    return stacked([Panel(y=axis, marks=marks, x=time_axes.time_axis(course.times))], 3.4, 5)
+    return stacked([Panel(y=axis, marks=marks, x=_time_axis(course))], 3.4, 5)
+
+
+def _time_axis(course: Course) -> Axis:
+    """Of the tests, and on to what was done after the last of them."""
+    return time_axes.time_axis(
+        [*course.times, *(each.at for each in course.deeds if each.at > max(course.times))]
+    )
 
 
 def _picked(times: Sequence[datetime], chosen: list[int]) -> list[datetime]:
@@ -239,7 +271,7 @@ def _marks(course: Course) -> str:
         "upright spans: when a detected change began, with 90 % probability"
         if course.changes
         else "",
-        "at the foot: what was set or adopted" if course.deeds else "",
+        "at the foot: what was set, adopted, seen or repaired" if course.deeds else "",
     ]
     found = "; ".join(filter(None, told))
     fewer = time_axes.thinned_words(len(course.times))
@@ -280,6 +312,7 @@ def _course(data: HangerReport) -> Course:
         baseline_n=_baseline_n(data),
         reach=data.hanger.thresholds.tension_shift_fraction,
         alerts={i: alerted[r.row.test] for i, r in enumerate(rows) if r.row.test in alerted},
+        deeds=noted(data.inspections),
         remark=left,
     )
 
