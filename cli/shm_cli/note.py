@@ -24,7 +24,7 @@ from shm_cli.parameter_types import Time, Words
 
 @click.group()
 def command() -> None:
-    """Notes, inspections and repairs of a hanger or of the bridge, with a photo each.
+    """Notes, inspections and repairs of a hanger or of the bridge.
 
     \b
     Example: shm note list --hanger 3

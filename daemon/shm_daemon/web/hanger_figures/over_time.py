@@ -50,8 +50,8 @@ def _course(view: HangerView) -> hanger_trend.Course:
             for kind in _HANDS
             for event in view.events
             if event.kind is kind
-        ]
-        + hanger_trend.noted(view.notes),
+        ],
+        notes=view.notes,
         remark=_remark(view),
     )
 
