@@ -70,7 +70,7 @@ def test_an_operator_writes_and_a_reader_sees_the_note_its_photo_and_its_mark(
     sign_in(browser, "reader")
     shown = browser.get("/hangers/3").text
     assert "Notes and inspections (2)" in shown
-    assert "Repair of hanger 3, 2026-05-01" in shown
+    assert "Repair of hanger 3, <time>2026-05-01" in shown
     assert "new pin\n&lt;b&gt;lower&lt;/b&gt; end" in shown
     assert "storm" in browser.get("/").text
     assert "new pin" not in browser.get("/").text
