@@ -78,7 +78,8 @@ class Notes(Repository):
 
 
 def _checked(text: str, at: datetime, now: datetime) -> str:
-    text = text.strip()
+    # No database keeps half a character, nor PostgreSQL a zero.
+    text = text.encode("utf-8", "replace").decode().replace("\0", "").strip()
     if not 0 < len(text) <= _LONGEST_TEXT:
         raise UsageError(
             f"the text of a note has 1 to {_LONGEST_TEXT} characters; this has {len(text)}.",

@@ -35,9 +35,9 @@ from shm.watch.history import Band as Bounds
 _LONGEST_WORDS = 200  # layout: characters of a note in a hover; the page has all
 _AT_FOOT = 0.03  # layout: of the height, where signs of what people did stand
 _SYMBOLS: dict[NoteKind, tuple[Symbol, bool]] = {
-    NoteKind.NOTE: ("triangle", False),
+    NoteKind.NOTE: ("thin cross", True),
     NoteKind.INSPECTION: ("circle", False),
-    NoteKind.REPAIR: ("triangle", True),
+    NoteKind.REPAIR: ("cross", True),
 }
 """Of a note by its kind, and whether it is filled."""
 
