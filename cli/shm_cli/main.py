@@ -53,6 +53,7 @@ VERBS: dict[str, Verb] = {
     ),
     "token": Verb("shm_cli.token", "Who may read and write over the network."),
     "user": Verb("shm_cli.user", "People who may sign in to the dashboard."),
+    "note": Verb("shm_cli.note", "Notes, inspections and repairs of a hanger or of the bridge."),
     "audit": Verb("shm_cli.audit", "Who changed what, when and how: the newest first."),
     "identify": Verb("shm_cli.identify", "Modal parameters of recordings."),
     "predict": Verb("shm_cli.predict", "Frequencies of a model class for given parameters."),

@@ -54,6 +54,7 @@ def hanger_report(
     return replace(
         now,
         alerts=tuple(each for each in now.alerts if period is None or period.holds(each.time)),
+        inspections=tuple(e for e in now.inspections if period is None or period.holds(e.at)),
         frequency_response=store.tests.frequency_response(latest),
         states=hanger_states(
             workspace, store, hanger, store.watch.baseline(hanger_id, now.posterior.model)
@@ -143,6 +144,7 @@ def hanger_now(
         warnings=warnings_of(workspace, store, [hanger]).get(hanger.id, ()),
         standing=findings(each.alert for each in standing),
         notes=notes_of(standing, silences, hanger.id, generated_at),
+        inspections=store.notes.list_all(hanger.id),
         quiet_for=quiet_for(workspace, latest.time, generated_at),
     )
 

@@ -43,6 +43,7 @@ from shm.values import (
 )
 from shm.values.force_units import ForceUnit, force_unit
 from shm.values.letterhead import NO_LETTERHEAD, Letterhead
+from shm.values.notes import Note
 from shm.values.stated_tension import averaged_now, selection_now
 
 if TYPE_CHECKING:  # `shm status` lists hangers and identifies nothing
@@ -130,8 +131,8 @@ class HangerReport:
     `settings` are those that decide the numbers, each with its unit. `redescribed` says what of the
     hanger's description has changed since the baseline, where that moves results; `discarded` names
     the tests of the baseline that count no more. `warnings` are the open ones, `standing` the
-    alerts whose condition has not ended, `notes` what people did about these; `quiet_for` is the
-    time since the latest test where that is long.
+    alerts whose condition has not ended, `notes` what people did about these; `inspections`
+    what they wrote, the latest first; `quiet_for` is the time since the latest test if long.
     """
 
     bridge: str
@@ -163,6 +164,7 @@ class HangerReport:
     warnings: tuple[str, ...] = ()
     standing: tuple[Alert, ...] = ()
     notes: tuple[str, ...] = ()
+    inspections: tuple[Note, ...] = ()
     quiet_for: timedelta | None = None
     letterhead: Letterhead = NO_LETTERHEAD
 

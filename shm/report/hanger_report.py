@@ -186,6 +186,7 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
         "gap_watch": data.gap_watch,
         "drift_watch": data.drift_watch,
         "creep_per_year": documents.creep_document(data.creep),
+        "inspections": [asdict(note) for note in data.inspections],
         "warnings": list(data.warnings),
         "redescribed": list(data.redescribed),
         "discarded_of_baseline": list(data.discarded),

@@ -316,9 +316,22 @@ def _alert_row(row: Alert, acknowledged: Mapping[str, str]) -> tuple[str, ...]:
     return (formatting.moment(row.time), row.test, row.message, acknowledged.get(row.key, "open"))
 
 
+def inspections(data: HangerReport) -> Table:
+    return Table(
+        "Notes and inspections, latest first",
+        ("date", "kind", "of", "by", "text"),
+        tuple(
+            (f"{each.at:%Y-%m-%d}", each.kind, each.of, each.who, each.text)
+            for each in data.inspections
+        ),
+        hidden_note=_EARLIER,
+    ).shortened(_ROWS_SHOWN)
+
+
 _NUMBERS: tuple[Callable[[HangerReport], Table], ...] = (
     period,
     alerts,
+    inspections,
     neighbours,
     temperatures,
     frequencies,

@@ -38,6 +38,7 @@ NUMBERED = (
     "sessions",
     "audit",
     "changed_settings",
+    "notes",
 )
 """Tables of which no row is ever taken out, but for damaged ones of `drifts` and `watches` (see
 `forget`). The order is that of the bits: new ones come last."""

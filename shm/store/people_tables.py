@@ -55,3 +55,18 @@ changed_settings = sa.Table(
     sa.Column("who", sa.Text, nullable=False),
     sa.Index(None, "key"),
 )
+
+# What people saw or did at a hanger, at the bridge where `hanger` is empty, and when (`at`).
+notes = sa.Table(
+    "notes",
+    metadata,
+    identity(),
+    sa.Column("hanger", sa.Integer),
+    sa.Column("at", UtcTime, nullable=False),
+    sa.Column("kind", sa.String(16), nullable=False),
+    sa.Column("text", sa.Text, nullable=False),
+    sa.Column("who", sa.Text, nullable=False),
+    sa.Column("written_at", UtcTime, nullable=False),
+    sa.Column("photo", sa.LargeBinary),
+    sa.Column("photo_checksum", sa.BigInteger),
+)

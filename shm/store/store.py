@@ -14,6 +14,7 @@ from shm.store import schema
 from shm.store.audit import Actor, Audit, acting_as
 from shm.store.changed_settings import ChangedSettings
 from shm.store.database import Database, make_engine
+from shm.store.notes import Notes
 from shm.store.people import People
 from shm.store.stored_alerts import Alerts
 from shm.store.stored_posteriors import Posteriors
@@ -32,8 +33,8 @@ class Store(Database):
     `tests` what was identified from them; `posteriors` what was computed from tests, with
     selections, diagnoses and adoptions; `watch` what it said after each test, and its baselines;
     `alerts` those that were raised, and their deliveries; `silences` when no hook is told;
-    `streams` what permanent sensors said; `people` who signs in by name; `audit` who
-    changed what; `settings` what the dashboard says beside `bridge.toml`;
+    `streams` what permanent sensors said; `people` who signs in by name; `notes` what they saw or
+    did; `audit` who changed what; `settings` what the dashboard says beside `bridge.toml`;
     `upkeep` tokens, copies, backups and the healing of rows.
     """
 
@@ -47,6 +48,7 @@ class Store(Database):
         self.silences = Silences(engine)
         self.streams = Streams(engine)
         self.people = People(engine)
+        self.notes = Notes(engine)
         self.audit = Audit(engine)
         self.settings = ChangedSettings(engine)
         self.upkeep = Upkeep(engine)

@@ -21,7 +21,7 @@ from shm.store.columns import metadata as metadata
 from shm.store.people_tables import users as _of_people  # noqa: F401 - all are there
 from shm.store.stream_tables import stream_windows as _of_streams  # noqa: F401 - all are there
 
-SCHEMA = "0013"
+SCHEMA = "0014"
 
 _OF_TESTS = ("hanger", "time", "stage", "name", "taken_at", "temperature_c")
 
@@ -379,7 +379,7 @@ tokens = sa.Table(
 )
 
 # Columns that are kept under a checksum of their own, NAME_checksum, by table: see `checksums`.
-APART = {"tests": "frequency_response"}
+APART = {"tests": "frequency_response", "notes": "photo"}
 
 # Of all else in the row. Empty in a row that was written in this transaction: an update empties it,
 # and what commits fills it in. The index holds those that are empty alone.

@@ -16,6 +16,7 @@ from shm.report.figures.time_axes import MOST_POINTS, places
 from shm.report.states import NOTHING_WATCHED, QuantityOverTime, StatesOverTime
 from shm.store import BaselineGlance, EventKind, HangerEvent, TrendPoint
 from shm.values import NAN, Averaged, FloatArray, Summary
+from shm.values.notes import Note, NoteKind
 from shm.watch.history import Band
 from shm_daemon.web.hanger_figures.over_time import STIFFNESS, TEMPERATURE, TREND
 from shm_daemon.web.hanger_view import HangerView
@@ -76,6 +77,7 @@ def a_view(tests: int, **parts: Any) -> HangerView:
         trend=tuple(points),
         baseline=BASELINE,
         events=(),
+        notes=(),
         calls=(),
         states=NOTHING_WATCHED,
     )
@@ -213,3 +215,20 @@ def test_tests_without_a_temperature_are_left_out_and_counted() -> None:
     assert sum(len(each["x"]) for each in document["data"]) == 6
     assert "4 tests without a temperature left out" in document["caption"]
     assert not TEMPERATURE.is_there(a_view(2))
+
+
+def test_a_note_widens_the_axis_after_the_last_test_and_never_before_the_first() -> None:
+    def reach(*days: float) -> list[str]:
+        notes = [
+            Note(1, 3, START + timedelta(day), NoteKind.NOTE, "rust " * 100, "anna", START)
+            for day in days
+        ]
+        document = TREND.document(a_view(12, notes=notes))
+        (mark,) = [each for each in document["data"] if each.get("name") == "note"] or [None]
+        assert mark is None or all(len(each) < 400 for each in mark["text"])
+        return list(document["layout"]["xaxis"]["range"])
+
+    plain = reach()
+    assert reach(-900) == plain
+    assert reach(900)[0] < plain[0]
+    assert reach(900)[1] > (START + timedelta(900)).isoformat()

@@ -19,6 +19,7 @@ from shm.store import Adoption, HeldTest, IdentifiedTest, Judged, Lineage, Stage
 from shm.store.people import Role
 from shm.store.tables import SCHEMA
 from shm.values import Doubt, Fingerprint, Selection
+from shm.values.notes import NoteKind
 from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.nouns import (
     NOW,
@@ -81,6 +82,7 @@ def fill(store: Store) -> None:
     fill_streams(store)
     store.people.add("engineer", Role.ENGINEER, "correct horse battery", NOW)
     store.settings.change("hanger.3.thresholds.alert_probability", 0.9, "engineer", NOW)
+    store.notes.add(3, NOW, NoteKind.INSPECTION, "rust at the pin", "engineer", NOW)
 
 
 def _hold(store: Store) -> None:

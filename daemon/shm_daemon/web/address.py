@@ -11,6 +11,8 @@ from urllib.parse import quote
 DEFAULT_PORT = 8400  # technical: above 1024, for which one must be root, and not the usual 8080
 IMPORTS = "/api/imports"
 """Where the first file of a logger is sent to."""
+NOTES = "/notes"
+"""Where notes are sent to, with their photos."""
 STREAMS = "/api/streams"
 """Below it chunks of permanent sensors are sent to."""
 UPLOADS = "/api/recordings"

@@ -21,7 +21,7 @@ from typing import Any
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from shm_daemon.web.address import IMPORTS, STREAMS, UPLOADS
+from shm_daemon.web.address import IMPORTS, NOTES, STREAMS, UPLOADS
 from shm_daemon.web.health import health_document
 from shm_daemon.web.site import Site
 
@@ -164,7 +164,7 @@ def is_upload(scope: Mapping[str, object]) -> bool:
     """Whether a request may have a long body: who sends it needs a token first."""
     path = str(scope["path"])
     is_chunk = path.startswith(f"{STREAMS}/") and path.endswith("/chunks")
-    return scope["method"] == "POST" and (path in (UPLOADS, IMPORTS) or is_chunk)
+    return scope["method"] == "POST" and (path in (UPLOADS, IMPORTS, NOTES) or is_chunk)
 
 
 async def _whole(receive: Receive) -> Receive | None:

@@ -23,6 +23,7 @@ from shm.store import (
     Workspace,
 )
 from shm.values import Hanger
+from shm.values.notes import Note
 from shm_daemon.web.background_work import BackgroundWorker
 
 _BYTES_A_TEST = 1_000  # technical: some ten quantities of a dozen numbers; it bounds a cache
@@ -88,6 +89,11 @@ class HangerView:
     @cached_property
     def events(self) -> tuple[HangerEvent, ...]:
         return self.store.alerts.list_hanger_events(self.hanger.id)
+
+    @cached_property
+    def notes(self) -> tuple[Note, ...]:
+        """What people wrote of it and of the bridge, the latest first."""
+        return self.store.notes.list_all(self.hanger.id)
 
     @cached_property
     def calls(self) -> tuple[StoredWatch, ...]:

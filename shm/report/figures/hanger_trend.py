@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -27,10 +28,18 @@ from shm.report.intervals import Interval
 from shm.report.states import CalledChange, QuantityOverTime
 from shm.values import FloatArray
 from shm.values.force_units import ForceUnit, force_unit
+from shm.values.notes import Note, NoteKind
 from shm.values.stated_tension import averaged_now
 from shm.watch.history import Band as Bounds
 
+_LONGEST_WORDS = 200  # layout: characters of a note in a hover; the page has all
 _AT_FOOT = 0.03  # layout: of the height, where signs of what people did stand
+_SYMBOLS: dict[NoteKind, tuple[Symbol, bool]] = {
+    NoteKind.NOTE: ("thin cross", True),
+    NoteKind.INSPECTION: ("circle", False),
+    NoteKind.REPAIR: ("cross", True),
+}
+"""Of a note by its kind, and whether it is filled."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +74,7 @@ class Course:
     reference_temperature_c: float = math.nan
     changes: Sequence[CalledChange] | None = None
     deeds: Sequence[Deed] = ()
+    notes: Sequence[Note] = ()
     remark: str = ""
     bounds_n: Bounds = field(init=False)
 
@@ -97,10 +107,16 @@ def specify(course: Course) -> Specification | None:
         *_alerts(course, scale),
         *_deeds(course),
         *_repeats(course, chosen.tolist(), scale),
-        *time_axes.changes(course.changes or (), course.times),
+        *time_axes.changes(course.changes or (), _shown(course)),
     ]
     axis = Axis(label=f"tension ({course.unit.name})", range=_range(course, scale))
-    return stacked([Panel(y=axis, marks=marks, x=time_axes.time_axis(course.times))], 3.4, 5)
+    return stacked([Panel(y=axis, marks=marks, x=time_axes.time_axis(_shown(course)))], 3.4, 5)
+
+
+def _shown(course: Course) -> list[datetime]:
+    """The times of the tests, and of what was noted after the last of them."""
+    last = max(course.times)
+    return [*course.times, *(each.at for each in course.notes if each.at > last)]
 
 
 def _picked(times: Sequence[datetime], chosen: list[int]) -> list[datetime]:
@@ -167,17 +183,31 @@ def _alerts(course: Course, scale: float) -> list[Mark]:
 
 
 def _deeds(course: Course) -> list[Mark]:
-    """What people did, by kind."""
-    kinds = {deed.kind: deed for deed in course.deeds}
+    """What people did and noted, by kind."""
+    deeds = [*course.deeds, *_noted(course.notes)]
+    kinds = {deed.kind: deed for deed in deeds}
     return [
         Points(
-            x=[deed.at for deed in course.deeds if deed.kind == kind],
-            y=[_AT_FOOT for deed in course.deeds if deed.kind == kind], in_shares=True,
+            x=[deed.at for deed in deeds if deed.kind == kind],
+            y=[_AT_FOOT for deed in deeds if deed.kind == kind], in_shares=True,
             symbol=like.symbol, filled=like.filled, size=7, colour=like.colour, name=kind,
-            texts=[f"{kind} {deed.why}" for deed in course.deeds if deed.kind == kind],
+            texts=[f"{kind} {deed.why}" for deed in deeds if deed.kind == kind],
         )
         for kind, like in kinds.items()
     ]  # fmt: skip
+
+
+def _noted(notes: Sequence[Note]) -> list[Deed]:
+    return [
+        Deed(
+            each.kind,
+            *_SYMBOLS[each.kind],
+            "ink",
+            each.at,
+            f"of {each.of} by {each.who}: {textwrap.shorten(each.text, _LONGEST_WORDS)}",
+        )
+        for each in notes
+    ]
 
 
 def _range(course: Course, scale: float) -> tuple[float, float]:
@@ -239,7 +269,9 @@ def _marks(course: Course) -> str:
         "upright spans: when a detected change began, with 90 % probability"
         if course.changes
         else "",
-        "at the foot: what was set or adopted" if course.deeds else "",
+        "at the foot: what was set, adopted, seen or repaired"
+        if course.deeds or course.notes
+        else "",
     ]
     found = "; ".join(filter(None, told))
     fewer = time_axes.thinned_words(len(course.times))
@@ -280,6 +312,7 @@ def _course(data: HangerReport) -> Course:
         baseline_n=_baseline_n(data),
         reach=data.hanger.thresholds.tension_shift_fraction,
         alerts={i: alerted[r.row.test] for i, r in enumerate(rows) if r.row.test in alerted},
+        notes=data.inspections,
         remark=left,
     )
 

@@ -51,6 +51,7 @@ def _course(view: HangerView) -> hanger_trend.Course:
             for event in view.events
             if event.kind is kind
         ],
+        notes=view.notes,
         remark=_remark(view),
     )
 

@@ -77,6 +77,7 @@ def hanger(request: Request, site: AtSite, _: Reader, hanger_id: Number) -> HTML
         "test_headings": headings(view),
         "has_more": len(rows) > _LATEST_TESTS,
         "held": held_documents(site, one.id),
+        "notes": view.notes,
     }
     if view.report is None:
         (line,) = hanger_lines(site.workspace, site.store, utc_now(), [one])

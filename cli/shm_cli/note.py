@@ -1,0 +1,109 @@
+"""`shm note`: what people saw or did at a hanger or at the bridge."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+import rich_click as click
+
+from shm.errors import UsageError
+from shm.pipeline import utc_now
+from shm.values.notes import NoteKind
+from shm_cli.common import (
+    hanger_option,
+    json_option,
+    opened_store,
+    show,
+    show_table,
+    table,
+    who_option,
+)
+from shm_cli.parameter_types import Time, Words
+
+
+@click.group()
+def command() -> None:
+    """Notes, inspections and repairs of a hanger or of the bridge.
+
+    \b
+    Example: shm note list --hanger 3
+    """
+
+
+@command.command()
+@click.argument("text", type=Words())
+@hanger_option()
+@click.option("--bridge", "whole", is_flag=True, help="Of the whole bridge.")
+@click.option(
+    "--kind",
+    type=click.Choice([each.value for each in NoteKind]),
+    default=NoteKind.NOTE.value,
+    show_default=True,
+    help="What it was.",
+)
+@click.option("--at", type=Time(), show_default="now", help="When it was seen or done.")
+@click.option(
+    "--photo",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="A JPEG or PNG of 5 MB at most; the picture alone is kept.",
+)
+@who_option
+@json_option
+@click.pass_context
+def add(
+    ctx: click.Context,
+    text: str,
+    hanger_id: int | None,
+    whole: bool,
+    kind: str,
+    at: datetime | None,
+    photo: Path | None,
+    who: str,
+    as_json: bool,
+) -> None:
+    """Write a note, for good: a later one corrects it.
+
+    \b
+    Example: shm note add "new pin, lower end" --hanger 3 --kind repair --at 2026-05-01
+    """
+    if whole == (hanger_id is not None):
+        raise UsageError("a note of what?", remedy="Give --hanger N or --bridge.")
+    now = utc_now()
+    with opened_store(ctx) as (workspace, store):
+        if hanger_id is not None:
+            workspace.bridge.tested(hanger_id)
+        image = photo.read_bytes() if photo else b""
+        made = store.notes.add(hanger_id, at or now, NoteKind(kind), text, who, now, image)
+    if as_json:
+        show(vars(made))
+        return
+    click.echo(f"Note {made.id} of {made.of} is kept.")
+
+
+@command.command("list")
+@hanger_option()
+@json_option
+@click.pass_context
+def list_notes(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
+    """All notes, or those of a hanger and of the bridge; what was seen or done last comes first.
+
+    \b
+    Example: shm note list --hanger 3 --json
+    """
+    with opened_store(ctx) as (workspace, store):
+        if hanger_id is not None:
+            workspace.bridge.tested(hanger_id)
+        found = store.notes.list_all(hanger_id)
+    if as_json:
+        show({"notes": [vars(each) for each in found]})
+        return
+    if not found:
+        click.echo("No note was written.")
+        return
+    made = table("notes", "date", "kind", "of", "by", "photo", "text")
+    for each in found:
+        has_photo = "yes" if each.has_photo else ""
+        made.add_row(f"{each.at:%Y-%m-%d}", each.kind, each.of, each.who, has_photo, each.text)
+    show_table(made)
