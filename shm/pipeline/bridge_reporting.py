@@ -178,7 +178,7 @@ class _Kept:
             point.time if point else None,
             point.test if point else "",
             point is not None and (baseline is None or point.test in baseline.tests),
-            watched.drifts if watched else (),
+            watched.told if watched else (),
             still_detected(self.called.get(hanger.id, ()), watched, hanger),
             findings(each.alert for each in standing),
             self.warnings.get(hanger.id, ()),
@@ -219,7 +219,7 @@ def latest_drifts(store: Store, hanger: int) -> tuple[Drift, ...]:
     """
     baseline = store.watch.baseline(hanger)
     told = store.watch.list_detected_and_latest(baseline) if baseline else ()
-    return told[-1].watched.drifts if told else ()
+    return told[-1].watched.told if told else ()
 
 
 def stored_pattern(store: Store, order: Sequence[int]) -> BridgePattern:

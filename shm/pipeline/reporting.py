@@ -124,7 +124,7 @@ def hanger_now(
         trend=tuple(trend_row_of(point) for point in trend),
         baseline=baseline.posterior if baseline else None,
         selection=selection.selection if selection else None,
-        drifts=watched[-1].drifts if watched else (),
+        drifts=watched[-1].told if watched else (),
         alerts=tuple(stored.alert for stored in alerts),
         acknowledged=_acknowledged(alerts),
         quality=latest.quality,

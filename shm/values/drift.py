@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Literal
 
@@ -310,6 +310,18 @@ class WatchedTest:
     change: Change
     creep_per_year: CreepRate | None = None
     mistaken: tuple[RepeatedMistake, ...] = ()
+
+    @property
+    def told(self) -> tuple[Drift, ...]:
+        """The drifts as all tell them: what is clearly beyond its threshold where a change is
+        called is as probable as that it moved."""
+        moved = {each.quantity: each.probability for each in self.change.moved}
+        return tuple(
+            replace(each, probability=max(each.probability, moved.get(each.quantity, 0.0)))
+            if self.change.called and each.is_clearly_beyond
+            else each
+            for each in self.drifts
+        )
 
 
 @dataclass(frozen=True)

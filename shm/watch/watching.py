@@ -273,7 +273,7 @@ def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ..
 
 def _news(standing: AlertState, test: WatchedTest, level: float) -> _News:
     call = test.change.called and not _is_known(standing, test.change)
-    drifts = _given_the_call(test) if call else test.drifts
+    drifts = test.told if call else test.drifts
     beyond = tuple(
         drift
         for drift in drifts
@@ -281,18 +281,6 @@ def _news(standing: AlertState, test: WatchedTest, level: float) -> _News:
         and (drift.quantity, way_of(drift.shift_mean)) not in standing.beyond
     )
     return _News(beyond, call)
-
-
-def _given_the_call(test: WatchedTest) -> tuple[Drift, ...]:
-    """The shifts given that something has changed, which a call says: what then is clearly beyond
-    its threshold is as probable as that it moved."""
-    moved = {each.quantity: each.probability for each in test.change.moved}
-    return tuple(
-        replace(each, probability=max(each.probability, moved.get(each.quantity, 0.0)))
-        if each.is_clearly_beyond
-        else each
-        for each in test.drifts
-    )
 
 
 def _is_known(standing: AlertState, change: Change) -> bool:

@@ -14,6 +14,7 @@ from shm.watch.alert_state import AlertState
 from shm.watch.change_words import shift_words
 from shm.watch.watching import after, alerts_of, new_alert
 from tests.helpers.hangers import HANGER_3
+from tests.helpers.nouns import a_drift, a_watched_test
 
 START = datetime(2026, 5, 1, tzinfo=UTC)
 FELL = Moved("tension", 0.97, -0.082, 0.0067)
@@ -527,3 +528,11 @@ def test_going_on_from_the_text_gives_the_alerts_of_the_history() -> None:
 def test_a_text_that_tells_nothing_is_refused(text: str) -> None:
     with pytest.raises(BadInput, match="cannot be read"):
         AlertState.from_text(text)
+
+
+def test_of_a_called_change_all_tell_the_probability_that_its_alert_tells() -> None:
+    faint = (a_drift(probability=0.6),)
+    called, quiet = (
+        replace(a_watched_test(evidence_years=years), drifts=faint) for years in (350.0, 1.0)
+    )
+    assert [each.told[0].probability for each in (called, quiet)] == [0.7, 0.6]

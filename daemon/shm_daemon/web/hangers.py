@@ -121,7 +121,7 @@ def _tension(latest: TrendPoint | None) -> dict[str, Any]:
 
 def _shifts(latest: StoredWatch | None) -> list[dict[str, Any]]:
     """Those of the latest test that was compared with the baseline in force."""
-    drifts = latest.watched.drifts if latest else ()
+    drifts = latest.watched.told if latest else ()
     return [{key: _known(getattr(drift, key)) for key in _SHIFT} for drift in drifts]
 
 
