@@ -39,7 +39,7 @@ MAY_GO = (
 
 LAST = (
     "acknowledgements", "archive_copies", "audit", "changed_settings", "diagnoses", "events",
-    "sessions", "silences", "tokens", "users",
+    "notes", "sessions", "silences", "tokens", "users",
 )  # fmt: skip
 """Of these the last row leaves no gap, and nothing else tells of it: what a person did."""
 

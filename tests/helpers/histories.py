@@ -26,6 +26,7 @@ from shm.store.people import Role
 from shm.store.retention import copy_archive, removable, remove
 from shm.store.upkeep import Scope
 from shm.values import Fingerprint
+from shm.values.notes import NoteKind
 from tests.helpers import quick_update
 from tests.helpers.contents import quiet
 from tests.helpers.diagnoses import a_diagnosis
@@ -173,6 +174,7 @@ def _keep(workspace: Workspace, store: Store, clock: Clock, folder: Path) -> Non
         assert store.people.sign_in("Ann", password, clock()) is not None
     for level in (0.9, None):
         store.settings.change("hanger.3.thresholds.alert_probability", level, "Ann", clock())
+        store.notes.add(3, clock(), NoteKind.INSPECTION, "Pin looked at.", "Ann", clock())
     for hanger in workspace.bridge.hangers:
         store.posteriors.save_summaries(hanger)
     copies = Archive(folder / "copies")
