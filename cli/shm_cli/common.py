@@ -41,7 +41,7 @@ from shm_cli.parameter_types import Words
 
 if TYPE_CHECKING:
     from shm.report.paper import Table as Texts
-    from shm.store import Store, Workspace
+    from shm.store import Store, StoredTest, Workspace
 
 # Technical: columns of a file, of no terminal at all, and of lines that are read with ease.
 _WIDTH_OF_A_FILE, _BEYOND_ANY = 120, 100_000
@@ -292,12 +292,16 @@ def tests_and_hanger(
         return tests, hanger
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     with opened_store(ctx) as (_, store):
-        stored = store.tests.list_all(hanger.id)
-    if not stored:
+        return (latest_tests(store, hanger, 1)[0].test,), hanger
+
+
+def latest_tests(store: Store, hanger: Hanger, count: int) -> Sequence[StoredTest]:
+    """So many at most, the latest last; raises NothingThere where there is none."""
+    if not (stored := store.tests.list_all(hanger.id)[-count:]):
         raise NothingThere(
             f"no test of hanger {hanger.id} is stored.", remedy="Take one in with `shm ingest`."
         )
-    return (stored[-1].test,), hanger
+    return stored
 
 
 def told_doubts(

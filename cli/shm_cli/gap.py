@@ -36,6 +36,7 @@ from shm_cli.common import (
     hanger_file_option,
     hanger_option,
     json_option,
+    latest_tests,
     one_hanger,
     opened_store,
     readable_width,
@@ -188,11 +189,7 @@ def _of_workspace(
 ) -> DiagnosisSheet:
     """The diagnosis of the latest tests, which the store keeps."""
     with opened_store(ctx) as (workspace, store):
-        stored = store.tests.list_all(hanger.id)[-count:]
-        if not stored:
-            raise NothingThere(
-                f"no test of hanger {hanger.id} is stored.", remedy="Take one in with `shm ingest`."
-            )
+        stored = latest_tests(store, hanger, count)
         found = _diagnosis([each.test for each in stored], hanger, options)
         store.posteriors.save_diagnosis(
             hanger.id, found, diagnosis_lineage(stored, hanger, asdict(options)), utc_now()

@@ -12,7 +12,6 @@ import numpy as np
 import rich_click as click
 
 from shm.bridge import load_bridge
-from shm.errors import NothingThere
 from shm.gap import GapOptions
 from shm.gap.diagnose import examined
 from shm.gap.measurement_plan import PlannedMeasurement, Race, planned
@@ -23,6 +22,7 @@ from shm_cli.common import (
     hanger_file_option,
     hanger_option,
     json_option,
+    latest_tests,
     one_hanger,
     open_workspace,
     opened_store,
@@ -131,12 +131,7 @@ def _measured(
         return tests_and_hanger(ctx, file, hanger_file, hanger_id)
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     with opened_store(ctx) as (_, store):
-        stored = store.tests.list_all(hanger.id)[-_LATEST:]
-    if not stored:
-        raise NothingThere(
-            f"no test of hanger {hanger.id} is stored.", remedy="Take one in with `shm ingest`."
-        )
-    return [each.test for each in stored], hanger
+        return [each.test for each in latest_tests(store, hanger, _LATEST)], hanger
 
 
 def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:

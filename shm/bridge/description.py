@@ -13,7 +13,7 @@ from typing import Any
 
 from shm.bridge.changes import overlaid
 from shm.bridge.hanger import hanger_of, structure_of
-from shm.bridge.hooks import Hook, hook_of
+from shm.bridge.hooks import Hook, escalations_s, hook_of
 from shm.bridge.letterhead import letterhead_of
 from shm.bridge.quiet_hours import zone_of
 from shm.bridge.streams import stream_named, streams_of
@@ -59,11 +59,7 @@ class Bridge:
     @property
     def escalation_s(self) -> dict[str, float]:
         """The hooks that are told only of what nobody has acknowledged after so many seconds."""
-        return {
-            hook.name: hook.escalation_after_seconds
-            for hook in self.hooks
-            if hook.escalation_after_seconds is not None
-        }
+        return escalations_s(self.hooks)
 
     @property
     def watched(self) -> tuple[Hanger, ...]:

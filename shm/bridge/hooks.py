@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ipaddress
 import string
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, tzinfo
 from pathlib import Path
@@ -108,6 +108,15 @@ class AppriseHook(Hook):
 
     addresses: tuple[str, ...] = ()
     address_file: str = ""
+
+
+def escalations_s(hooks: Iterable[Hook]) -> dict[str, float]:
+    """The hooks that are told only of what nobody has acknowledged after so many seconds."""
+    return {
+        hook.name: hook.escalation_after_seconds
+        for hook in hooks
+        if hook.escalation_after_seconds is not None
+    }
 
 
 def hook_of(values: Mapping[str, Any], path: Path, zone: tzinfo) -> Hook:

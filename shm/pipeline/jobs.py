@@ -136,8 +136,7 @@ class Jobs:
         if not unsent:
             return
         window_s = self.workspace.settings.alert_grouping_seconds
-        bridge = self.workspace.bridge
-        terms = Terms(window_s, bridge.escalation_s, hurry, bridge.hooks)
+        terms = Terms(window_s, hurry, self.workspace.bridge.hooks)
         now = self.clock()
         made = plan(unsent, self.store.silences.list_all(), now, terms)
         self.store.alerts.begin_messages(made.messages, made.not_needed, now)

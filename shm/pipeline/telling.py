@@ -10,8 +10,10 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
+from functools import cached_property
 
 from shm.bridge import Hook
+from shm.bridge.hooks import escalations_s
 from shm.store import Delivery, News, Silence
 from shm.store.stored_silences import silenced_until
 from shm.values import Alert, Drift, is_ratio, kind_of
@@ -26,16 +28,19 @@ _LISTED = 60  # technical: hangers that a message names; the bridges we know hav
 
 @dataclass(frozen=True)
 class Terms:
-    """How hooks are told: the window in which alike alerts are gathered, and the hooks that are
-    told only of what nobody has acknowledged after so many seconds; `hooks` for their quiet hours.
+    """How hooks are told: the window in which alike alerts are gathered, and the hooks, some in
+    quiet hours or only of what nobody has acknowledged.
 
     With `hurry` nothing is gathered any longer: who asks is about to end.
     """
 
     window_s: float = 0.0
-    escalation_s: Mapping[str, float] = field(default_factory=dict)
     hurry: bool = False
     hooks: Sequence[Hook] = ()
+
+    @cached_property
+    def escalation_s(self) -> Mapping[str, float]:
+        return escalations_s(self.hooks)
 
 
 @dataclass(frozen=True)

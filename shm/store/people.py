@@ -175,7 +175,11 @@ _in_force = sa.select(users).where(users.c.removed_at.is_(None))
 
 def same_name(name: str) -> str:
     """What names have in common that read alike: Unicode form, spaces and case are left out."""
-    return " ".join(unicodedata.normalize("NFKC", name).split()).casefold()
+    return _in_one_form(name).casefold()
+
+
+def _in_one_form(name: str) -> str:
+    return " ".join(unicodedata.normalize("NFKC", name).split())
 
 
 def _alike(connection: Connection, name: str) -> list[sa.Row[Any]]:
@@ -194,7 +198,7 @@ def _named(connection: Connection, name: str) -> sa.Row[Any] | None:
 
 def _fit(name: str) -> str:
     """A name in one form; raises UsageError for one that can pass for another."""
-    made = " ".join(unicodedata.normalize("NFKC", name).split())
+    made = _in_one_form(name)
     is_clear = all(unicodedata.category(each)[0] != "C" for each in name.strip())
     if not made or len(made) > _LONGEST_NAME or not is_clear or _UNSEEN.search(name):
         raise UsageError(
