@@ -14,7 +14,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from shm.bridge import Hook
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
-from shm.report.formatting import hanger_name
+from shm.report import formatting
 from shm.report.hanger_status import HangerMessage
 from shm.store import AlertRow, DeliveryRow, DeliveryState, News, Silence
 from shm.store.stored_silences import said_of, silenced_until
@@ -60,7 +60,9 @@ def alerts_page(
         is_first=open_before is None and noted_before is None,
         hanger=hanger,
         silences=[(each.id, _sentence(each)) for each in site.store.silences.list_current(now)],
-        hangers=[(h.id, hanger_name(h.id, h.name)) for h in site.workspace.bridge.watched],
+        hangers=[
+            (h.id, formatting.hanger_name(h.id, h.name)) for h in site.workspace.bridge.watched
+        ],
         has_hooks=bool(site.workspace.bridge.hooks),
         marks=_MARKS,
     )
