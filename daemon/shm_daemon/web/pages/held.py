@@ -1,7 +1,8 @@
-"""What is held until a person decides, decided on the page."""
+"""What counts, decided on the page: of what is held, and of what counted until now."""
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Request, Response
@@ -37,14 +38,23 @@ def _decide(site: Site, writer: Visitor, recording: int, told: dict[str, str]) -
     decisions = site.store.acting_as(who).recordings
     if not why:
         raise UsageError("a decision needs a reason.", remedy="Write why, for the record.")
-    if told.get("action") == "discard":
-        decisions.discard(recording, who.name, why, now)
-        return
+    match told.get("action"):
+        case "confirm":
+            decisions.confirm(recording, who.name, why, now, _time(site, told.get("time", "")))
+        case "discard":
+            decisions.discard(recording, who.name, why, now)
+        case "withdraw":
+            decisions.withdraw(recording, who.name, why, now, told.get("test"))
+        case "reinstate":
+            decisions.reinstate(recording, who.name, why, now)
+        case _:
+            raise BadInput("this is none of the decisions.", remedy="Choose one in the form.")
+
+
+def _time(site: Site, text: str) -> datetime | None:
     try:
-        time = parse_time(told["time"]) if told.get("time") else None
+        time = parse_time(text) if text else None
     except (ValueError, OverflowError):
-        raise BadInput(
-            f"{told['time']!r} is no time.", remedy="Write it as 2026-05-01T10:00."
-        ) from None
+        raise BadInput(f"{text!r} is no time.", remedy="Write it as 2026-05-01T10:00.") from None
     refuse_impossible(time, site.workspace.bridge.built)
-    decisions.confirm(recording, who.name, why, now, time)
+    return time

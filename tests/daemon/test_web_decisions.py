@@ -1,4 +1,4 @@
-"""Silences and what is held, decided in a browser by whoever may write."""
+"""Silences, what is held and what counts, decided in a browser by whoever may write."""
 
 from __future__ import annotations
 
@@ -119,3 +119,22 @@ def test_what_is_held_is_decided_on_the_page_and_the_daemon_goes_on(
     with workspace.store() as store:
         names = [each.test.id for each in store.tests.list_all(3)]
     assert ("epoch3" in names) is (decision is Decision.CONFIRMED)
+
+
+def test_a_test_that_counts_is_discarded_on_its_page_and_taken_back(
+    browser: httpx.Client, workspace: Workspace
+) -> None:
+    sign_in(browser, "reader")
+    assert "Discard this test" not in browser.get("/hangers/3/tests/good").text
+    sign_in(browser, "operator")
+    assert 'action="/held/1"' in browser.get("/hangers/3/tests/good").text
+    out = {"action": "withdraw", "test": "good", "why": "of hanger 4"}
+    assert browser.post("/held/1", data={**out, "action": "burn"}).status_code == 422
+    answer = browser.post("/held/1", data=out)
+    assert browser.get("/hangers/3/tests/good").status_code == 404
+    page = browser.get(answer.headers["location"]).text
+    assert "was withdrawn by <strong>operator</strong>: of hanger 4" in page
+    assert 'value="reinstate"' in page
+    browser.post("/held/1", data={"action": "reinstate", "why": "it was of hanger 3"})
+    ingest(workspace)
+    assert browser.get("/hangers/3/tests/good").status_code == 200
