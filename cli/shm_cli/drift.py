@@ -18,8 +18,7 @@ from shm.documents import drift_document
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import latest_drifts, stored_pattern
-from shm.pipeline.rebaselining import Order, changes_within, still_shown
-from shm.pipeline.rebaselining import rebaseline as rebaseline_in_store
+from shm.pipeline.rebaselining import Order, set_baseline
 from shm.pipeline.reporting import hanger_states
 from shm.report.bridge_report import pattern_json
 from shm.report.figures.along_the_bridge import bridge_illustration
@@ -28,7 +27,6 @@ from shm.report.states import NOTHING_WATCHED
 from shm.report.temperatures import temperature_documents, temperature_table
 from shm.store import Baseline
 from shm.values import Drift
-from shm.values.force_units import force_unit
 from shm.watch.events import EVENT_KINDS
 from shm_cli.common import (
     hanger_option,
@@ -130,55 +128,23 @@ def rebaseline(
     order = Order(since.replace(tzinfo=UTC), why, who, event)
     with opened_store(ctx) as (workspace, store):
         hanger = workspace.bridge.hanger(hanger_id)
-        within = changes_within(store, hanger_id, order.since)
-        is_accepted = event is None or event.accepts
-        accepted = still_shown(store, hanger, order) if is_accepted else ()
         with progress_bar("updating") as progress:
-            made = rebaseline_in_store(workspace, store, hanger, order, utc_now(), progress)
-        all_alerts = store.alerts.list_all(hanger_id)
-    alerts = [each.id for each in all_alerts if each.is_open]
-    explained = [each.id for each in all_alerts if _is_explained_by(each, made)] if kind else []
+            found = set_baseline(workspace, store, hanger, order, utc_now(), progress)
     if as_json:
-        of_event = {"kind": kind, "alerts_explained": explained, "alerts_open": alerts}
+        of_event = {"kind": kind, "alerts_explained": found.explained, "alerts_open": found.left}
         show(
             {
-                **_document(made),
+                **_document(found.made),
                 **of_event,
-                "changes_within": [each.began_by for each in within],
-                "accepted": [vars(each) for each in accepted],
+                "changes_within": [each.began_by for each in found.within],
+                "accepted": [vars(each) for each in found.accepted],
             }
         )
         return
-    if within:
-        day = f"{max(each.began_by for each in within):%Y-%m-%d}"
-        said = (
-            f"These tests lie on both sides of a change that was called (by {day}): the baseline "
-        )
-        said += f"mixes two states. For that after it give `--since {day}`."
-        click.echo(paragraph(said), err=True)
-    tension_n = made.posterior.tension_n
-    unit = force_unit(float(tension_n.mean()))
-    tension = unit.of(tension_n)
-    count = len(made.posterior.tests)
-    tests = "one test" if count == 1 else f"{count} tests"
-    click.echo(
-        f"Hanger {hanger_id} is compared with its {tests} since {since:%Y-%m-%d} from now on: "
-        f"{tension.mean():.4g} {unit.name} (sd {tension.std(ddof=1):.2g} {unit.name})."
-    )
-    for one in accepted:
-        said = f"Its tests still show what alert {one.alert} told ({one.words}): from now on that "
-        click.echo(paragraph(f"{said}is taken for its normal state."))
-    for each in explained:
-        click.echo(f"Alert {each} is explained by it and resolved.")
-    if alerts:
-        notes = ", ".join(f"`shm alerts ack {each}`" for each in alerts)
-        click.echo(f"Alerts of it are still open. Take note of them: {notes}.")
-
-
-def _is_explained_by(stored: StoredAlert, made: Baseline) -> bool:
-    """Whether a new baseline has ended an alert, and nobody had taken note of it before."""
-    noted = stored.acknowledgement
-    return noted is not None and (noted.who, noted.at) == (made.who, made.set_at)
+    if found.warning:
+        click.echo(paragraph(found.warning), err=True)
+    for sentence in found.sentences:
+        click.echo(paragraph(sentence))
 
 
 def _document(made: Baseline) -> dict[str, object]:
@@ -197,7 +163,7 @@ def _document(made: Baseline) -> dict[str, object]:
 
 
 if TYPE_CHECKING:
-    from shm.store import Baseline, Store, StoredAlert
+    from shm.store import Baseline, Store
 
 
 @click.group(invoke_without_command=True)

@@ -20,6 +20,7 @@ from shm.pipeline.lineage import update_terms
 from shm.pipeline.watching import dated_tests
 from shm.store import Baseline, Stage, Store, StoredAlert, StoredTest, Workspace
 from shm.values import Change, Hanger
+from shm.values.force_units import force_unit
 from shm.watch.events import EventKind, is_explained
 from shm.watch.readings import Reader
 from shm.watch.repair_check import Unrepaired, unrepaired
@@ -37,6 +38,79 @@ class Order:
     why: str
     who: str
     kind: EventKind | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A new baseline, and what it makes of the hanger's alerts.
+
+    `within` are changes among its tests, `accepted` what of the alerts it takes for normal;
+    `explained` are the numbers of alerts that it has ended, `left` of those that stay open.
+    """
+
+    made: Baseline
+    within: tuple[Change, ...]
+    accepted: tuple[Unrepaired, ...]
+    explained: tuple[int, ...]
+    left: tuple[int, ...]
+
+    @property
+    def warning(self) -> str:
+        """That it mixes two states; empty where it does not."""
+        if not self.within:
+            return ""
+        day = f"{max(each.began_by for each in self.within):%Y-%m-%d}"
+        return (
+            f"These tests lie on both sides of a change that was called (by {day}): the baseline "
+            f"mixes two states. For that after it give `--since {day}`."
+        )
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What holds from now on."""
+        tension_n, made = self.made.posterior.tension_n, self.made
+        unit = force_unit(float(tension_n.mean()))
+        tension, count = unit.of(tension_n), len(made.posterior.tests)
+        tests = "one test" if count == 1 else f"{count} tests"
+        said = [
+            f"Hanger {made.hanger} is compared with its {tests} since {made.since:%Y-%m-%d} from "
+            f"now on: {tension.mean():.4g} {unit.name} (sd {tension.std(ddof=1):.2g} {unit.name})."
+        ]
+        said += [
+            f"Its tests still show what alert {each.alert} told ({each.words}): from now on that "
+            "is taken for its normal state."
+            for each in self.accepted
+        ]
+        said += [f"Alert {each} is explained by it and resolved." for each in self.explained]
+        if self.left:
+            notes = ", ".join(f"`shm alerts ack {each}`" for each in self.left)
+            said.append(f"Alerts of it are still open. Take note of them: {notes}.")
+        return tuple(said)
+
+
+def set_baseline(
+    workspace: Workspace,
+    store: Store,
+    hanger: Hanger,
+    order: Order,
+    at: datetime,
+    progress: Progress = silent,
+) -> Outcome:
+    """`rebaseline`, with all that who ordered it should know; raises as that does."""
+    within = changes_within(store, hanger.id, order.since)
+    is_accepted = order.kind is None or order.kind.accepts
+    accepted = still_shown(store, hanger, order) if is_accepted else ()
+    made = rebaseline(workspace, store, hanger, order, at, progress)
+    alerts = store.alerts.list_all(hanger.id)
+    explained = [each.id for each in alerts if _is_explained_by(each, made)] if order.kind else []
+    left = tuple(each.id for each in alerts if each.is_open)
+    return Outcome(made, within, accepted, tuple(explained), left)
+
+
+def _is_explained_by(stored: StoredAlert, made: Baseline) -> bool:
+    """Whether a new baseline has ended an alert, and nobody had taken note of it before."""
+    noted = stored.acknowledgement
+    return noted is not None and (noted.who, noted.at) == (made.who, made.set_at)
 
 
 def rebaseline(

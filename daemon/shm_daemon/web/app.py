@@ -34,6 +34,7 @@ from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.pages import (
     alerts,
     audit,
+    baseline,
     bridge,
     comparison,
     downloads,
@@ -54,6 +55,36 @@ from shm_daemon.web.site import Site
 
 _described = APIRouter(include_in_schema=False)
 
+_PARTS = (
+    recordings,
+    streams,
+    imports,
+    hangers,
+    alerts,
+    watching,
+    signing_in,
+    static,
+    bridge,
+    comparison,
+    upload,
+    health,
+    held,
+    silences,
+    sensors,
+    tests,
+    one_test,
+    hanger_numbers,
+    hanger,
+    baseline,
+    downloads,
+    notes,
+    audit,
+    settings,
+    users,
+    password,
+)
+"""What answers, asked in this order."""
+
 _DESCRIPTION = (
     "Recordings come in, states and alerts are read, alerts are acknowledged. Answers that are no "
     "result are `{message, remedy}`. Forces in N, times in UTC."
@@ -73,35 +104,10 @@ def load_pages(site: Site) -> Pages:
     )
     app.state.site = site
     app.state.background_worker = BackgroundWorker()
+    app.state.ordered_baselines = baseline.Ordered()
     app.state.exposition = Exposition(watching_site)
     handle_faults(app)
-    for part in (
-        recordings,
-        streams,
-        imports,
-        hangers,
-        alerts,
-        watching,
-        signing_in,
-        static,
-        bridge,
-        comparison,
-        upload,
-        health,
-        held,
-        silences,
-        sensors,
-        tests,
-        one_test,
-        hanger_numbers,
-        hanger,
-        downloads,
-        notes,
-        audit,
-        settings,
-        users,
-        password,
-    ):
+    for part in _PARTS:
         app.include_router(part.router)
     app.include_router(_described)
 

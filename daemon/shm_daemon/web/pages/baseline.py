@@ -1,0 +1,131 @@
+"""The page where an engineer compares a hanger with itself as it is since some day."""
+
+from __future__ import annotations
+
+import secrets
+from collections import OrderedDict
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import HTMLResponse, RedirectResponse
+from starlette.concurrency import run_in_threadpool
+
+from shm.documents import parse_time
+from shm.errors import BadInput, NothingThere, ShmError, UsageError
+from shm.pipeline import utc_now
+from shm.pipeline.rebaselining import Order, set_baseline
+from shm.report import formatting
+from shm.store import Workspace
+from shm.store.audit import Actor
+from shm.watch.events import EVENT_KINDS
+from shm_daemon.web.access import AtSite, Engineer
+from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
+from shm_daemon.web.frame import page
+from shm_daemon.web.hangers import Number, described
+from shm_daemon.web.signing_in import form_of
+
+router = APIRouter(prefix="/hangers/{hanger_id}/baseline", include_in_schema=False)
+
+_MOST_REMEMBERED = 50  # technical: outcomes that a page may still ask for
+_AT_WORK = "Its tests are updated together; that takes some seconds …"
+
+
+@dataclass(frozen=True)
+class Told:
+    """What came of it, to be shown."""
+
+    warning: str
+    sentences: tuple[str, ...]
+    size_bytes: int = 1000
+
+
+@dataclass(frozen=True)
+class SetBaseline:
+    """An order to make one, as of one moment: it is made once."""
+
+    folder: Path
+    hanger: int
+    order: Order
+    actor: Actor
+    at: datetime
+
+    def make(self) -> Told:
+        workspace = Workspace.described(self.folder)
+        with workspace.store() as store:
+            hanger = workspace.bridge.hanger(self.hanger)
+            acting = store.acting_as(self.actor)
+            found = set_baseline(workspace, acting, hanger, self.order, self.at)
+        return Told(found.warning, found.sentences)
+
+
+Ordered = OrderedDict[str, SetBaseline | Told | ShmError]
+"""By the word that the page of an order asks with: the order, later what came of it."""
+
+
+@router.get("")
+def baseline_page(
+    request: Request, site: AtSite, _: Engineer, hanger_id: Number, order: str = ""
+) -> HTMLResponse:
+    """What the hanger is compared with, and the form for another; what comes of an order."""
+    one = described(site.workspace, hanger_id)
+    return page(
+        request,
+        "baseline.html.j2",
+        name=formatting.hanger_name(one.id, one.name),
+        hanger=one,
+        now=site.store.watch.baseline(one.id),
+        kinds=list(EVENT_KINDS),
+        order=order,
+        at_work=_AT_WORK,
+    )
+
+
+@router.post("")
+async def order_baseline(
+    request: Request, site: AtSite, engineer: Engineer, hanger_id: Number
+) -> Response:
+    """Has it made beside the interface."""
+    told, one = await form_of(request), described(site.workspace, hanger_id)
+    try:
+        since = parse_time(told.get("since", ""))
+    except (ValueError, OverflowError):
+        raise BadInput("a baseline has a first day.", remedy="Choose it in the form.") from None
+    why, kind = told.get("why", "").strip(), told.get("kind", "")
+    if not why:
+        raise UsageError("a baseline needs a reason.", remedy="Write why, for the record.")
+    if kind and kind not in EVENT_KINDS:
+        raise BadInput(f"{kind!r} is nothing that can be done.", remedy="Choose it in the form.")
+    order = Order(since, why, engineer.actor.name, EVENT_KINDS[kind] if kind else None)
+    wanted = SetBaseline(site.workspace.folder, one.id, order, engineer.actor, utc_now())
+    word = secrets.token_urlsafe(9)
+    await run_in_threadpool(background_worker_of(request).wanted, wanted)
+    ordered: Ordered = request.app.state.ordered_baselines
+    ordered[word] = wanted
+    while len(ordered) > _MOST_REMEMBERED:
+        ordered.popitem(last=False)
+    return RedirectResponse(f"/hangers/{one.id}/baseline?order={word}", 303)
+
+
+@router.get("/outcome")
+def outcome(request: Request, _: Engineer, hanger_id: Number, order: str) -> Response:
+    """What came of an order, without the frame; 202 while it is being made."""
+    ordered: Ordered = request.app.state.ordered_baselines
+    found = ordered.get(order)
+    if isinstance(found, SetBaseline):
+        try:
+            made = background_worker_of(request).wanted(found)
+        except ShmError as error:
+            made = error
+        if made is None:
+            return HTMLResponse(f'<p class="note">{_AT_WORK}</p>', 202, RETRY_AFTER)
+        found = ordered[order] = made
+    if found is None:
+        raise NothingThere(
+            "this order is not known any more.",
+            remedy=f"Whether it was made, the page of hanger {hanger_id} says.",
+        )
+    if isinstance(found, ShmError):
+        raise found.with_traceback(None)
+    return page(request, "baseline_outcome.html.j2", told=found)
