@@ -46,6 +46,7 @@ from shm_daemon.web.pages import (
     sensors,
     settings,
     silences,
+    single_sign_on,
     static,
     upload,
     users,
@@ -73,6 +74,7 @@ def load_pages(site: Site) -> Pages:
     )
     app.state.site = site
     app.state.background_worker = BackgroundWorker()
+    app.state.sign_ons = single_sign_on.SignOns()
     app.state.exposition = Exposition(watching_site)
     handle_faults(app)
     for part in (
@@ -83,6 +85,7 @@ def load_pages(site: Site) -> Pages:
         alerts,
         watching,
         signing_in,
+        single_sign_on,
         static,
         bridge,
         comparison,
