@@ -40,7 +40,7 @@ _MEANINGS = {
     "limits.tension_max_n": "overloaded above, in N",
     "limits.tension_min_n": "slack below, in N",
     "escalation_after_seconds": "told only of what nobody has acknowledged after, in s",
-    QUIET_HOURS: "told only of what is urgent from and until, by the clocks at the bridge",
+    QUIET_HOURS: "told only of what is urgent within these, by time_zone of bridge.toml, else UTC",
     **{row.name: f"{row.help}{f', in {row.unit}' if row.unit else ''}" for row in TABLE},
 }
 
