@@ -54,6 +54,34 @@ from shm_daemon.web.pages import (
 from shm_daemon.web.site import Site
 
 _described = APIRouter(include_in_schema=False)
+_PARTS = (
+    recordings,
+    streams,
+    imports,
+    hangers,
+    alerts,
+    watching,
+    signing_in,
+    single_sign_on,
+    static,
+    bridge,
+    comparison,
+    upload,
+    health,
+    held,
+    silences,
+    sensors,
+    tests,
+    one_test,
+    hanger_numbers,
+    hanger,
+    downloads,
+    notes,
+    audit,
+    settings,
+    users,
+    password,
+)
 
 _DESCRIPTION = (
     "Recordings come in, states and alerts are read, alerts are acknowledged. Answers that are no "
@@ -77,34 +105,7 @@ def load_pages(site: Site) -> Pages:
     app.state.sign_ons = single_sign_on.SignOns()
     app.state.exposition = Exposition(watching_site)
     handle_faults(app)
-    for part in (
-        recordings,
-        streams,
-        imports,
-        hangers,
-        alerts,
-        watching,
-        signing_in,
-        single_sign_on,
-        static,
-        bridge,
-        comparison,
-        upload,
-        health,
-        held,
-        silences,
-        sensors,
-        tests,
-        one_test,
-        hanger_numbers,
-        hanger,
-        downloads,
-        notes,
-        audit,
-        settings,
-        users,
-        password,
-    ):
+    for part in _PARTS:
         app.include_router(part.router)
     app.include_router(_described)
 
