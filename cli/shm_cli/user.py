@@ -27,9 +27,10 @@ def command() -> None:
     show_default=True,
     help="An operator also uploads and acknowledges, an engineer also sets limits and users.",
 )
+@click.option("--single-sign-on", "vouched", is_flag=True, help="No password: by that alone.")
 @json_option
 @click.pass_context
-def add(ctx: click.Context, name: str, role: str, as_json: bool) -> None:
+def add(ctx: click.Context, name: str, role: str, vouched: bool, as_json: bool) -> None:
     """Let a person sign in. The password is asked for, or is a line of stdin.
 
     \b
@@ -39,7 +40,7 @@ def add(ctx: click.Context, name: str, role: str, as_json: bool) -> None:
     from shm.store.people import Role
 
     with opened_store(ctx) as (_, store):
-        store.people.add(name, Role(role), _asked(), utc_now())
+        store.people.add(name, Role(role), None if vouched else _asked(), utc_now())
     _done(as_json, {"name": name, "role": role}, f"{name} may sign in as {role}.")
 
 

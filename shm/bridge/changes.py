@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
+from shm.bridge.quiet_hours import QUIET_HOURS
 from shm.values import Limits, Thresholds
 
 HANGER_KEYS = tuple(
@@ -28,15 +29,20 @@ SETTING_KEYS = (
     "quiet_days",
     "backup_days",
 )
-HOOK_KEYS = ("escalation_after_seconds",)
+HOOK_KEYS = ("escalation_after_seconds", QUIET_HOURS)
 
 
 def overlaid(document: Mapping[str, Any], changed: Mapping[str, object]) -> dict[str, Any]:
-    """A document of `bridge.toml` with changes; those of what it does not describe do nothing."""
+    """A document of `bridge.toml` with changes; those of what it does not describe do nothing.
+
+    An empty text takes the key out.
+    """
     made = copy.deepcopy(dict(document))
     for key, value in changed.items():
         table, name = _place(made, key)
-        if table is not None:
+        if table is not None and value == "":
+            table.pop(name, None)
+        elif table is not None:
             table[name] = value
     return made
 

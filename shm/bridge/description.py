@@ -16,6 +16,7 @@ from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, escalations_s, hook_of
 from shm.bridge.letterhead import letterhead_of
 from shm.bridge.quiet_hours import zone_of
+from shm.bridge.single_sign_on import SingleSignOn, single_sign_on_of
 from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table
 from shm.errors import BadInput
@@ -55,6 +56,7 @@ class Bridge:
     letterhead: Letterhead = NO_LETTERHEAD
     measurement_hours: Mapping[str, float] = field(default_factory=lambda: MEASUREMENT_HOURS)
     as_in_file: Bridge | None = None
+    single_sign_on: SingleSignOn | None = None
 
     @property
     def escalation_s(self) -> dict[str, float]:
@@ -129,6 +131,7 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
         streams=streams,
         letterhead=letterhead_of(document, path),
         measurement_hours=_hours(document.get("measurement_hours", {}), path),
+        single_sign_on=single_sign_on_of(document, path),
     )
 
 

@@ -29,6 +29,9 @@ class QuietHours:
     ends: time
     zone: tzinfo
 
+    def __str__(self) -> str:
+        return f"{self.begins:%H:%M}-{self.ends:%H:%M}"
+
     def until(self, at: datetime) -> datetime | None:
         """When the hours end that a moment lies in, by the clocks there; None where in none."""
         today = at.astimezone(self.zone).date()
@@ -51,7 +54,7 @@ def quiet_hours_of(table: Table, zone: tzinfo) -> QuietHours | None:
     if found is None or found[1] == found[2]:
         raise table.refusal(
             f"{QUIET_HOURS} = {text!r} is not a span of the day",
-            f'Write {QUIET_HOURS} = "22:00-06:00".',
+            f'Give two different times: {QUIET_HOURS} = "22:00-06:00".',
         )
     begins, ends = map(time.fromisoformat, found.groups())
     return QuietHours(begins, ends, zone)

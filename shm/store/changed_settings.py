@@ -4,6 +4,7 @@ changed each when.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -24,18 +25,25 @@ class ChangedSetting:
     """The value of a key of `bridge.toml` that holds instead of what the file says."""
 
     key: str
-    value: float
+    value: float | str
     at: datetime
     who: str
     id: int = 0
 
     def __str__(self) -> str:
-        value, by = f"{self.value:.10g}", f"{self.who} on {self.at:%Y-%m-%d}"
-        return f"{self.key.replace('.', ' ')} = {value} instead of what bridge.toml says, by {by}"
+        setting, by = self.key.replace(".", " "), f"{self.who} on {self.at:%Y-%m-%d}"
+        return f"{setting} = {said(self.value)} instead of what bridge.toml says, by {by}"
 
     def is_of(self, hanger: int) -> bool:
         """Whether it changes a hanger, or all of them."""
         return self.key.startswith(("settings.", f"hanger.{hanger}."))
+
+
+def said(value: float | str | None) -> str:
+    """A value as people read it."""
+    if isinstance(value, str):
+        return value or "none"
+    return "not set" if value is None or math.isnan(value) else f"{value:.10g}"
 
 
 class ChangedSettings(Repository):
@@ -44,14 +52,15 @@ class ChangedSettings(Repository):
     def change(
         self,
         key: str,
-        value: float | None,
+        value: float | str | None,
         who: str,
         at: datetime,
         *,
         based_on: int | None = None,
         in_file: str = "not set",
     ) -> None:
-        """Has `value` hold instead of what `bridge.toml` says (`in_file`); None gives the key back.
+        """Has `value` hold instead of what `bridge.toml` says (`in_file`); None gives the key back,
+        an empty text says that there is none.
 
         `based_on` is the number of the change that was in force when this was decided, 0 for the
         file; raises UsageError where another is in force by now.
@@ -62,8 +71,8 @@ class ChangedSettings(Repository):
                 raise _overtaken(key, current, value, in_file)
             values = {"key": key, "document": value, "who": who, "at": at}
             insert(connection, changed_settings, values)
-            before = in_file if current is None else f"{current.value:.10g}"
-            after = f"{in_file}, back to bridge.toml" if value is None else f"{value:.10g}"
+            before = in_file if current is None else said(current.value)
+            after = f"{in_file}, back to bridge.toml" if value is None else said(value)
             detail = f"from {before} to {after}"
             note(connection, at, "setting changed", key.replace(".", " "), detail, who)
 
@@ -91,12 +100,12 @@ def _changed(row: sa.Row[Any]) -> ChangedSetting:
 
 
 def _overtaken(
-    key: str, current: ChangedSetting | None, wanted: float | None, in_file: str
+    key: str, current: ChangedSetting | None, wanted: float | str | None, in_file: str
 ) -> UsageError:
-    yours = "" if wanted is None else f", {wanted:.10g},"
+    yours = "" if wanted is None else f", {said(wanted)},"
     found = f"back at {in_file}, as in bridge.toml"
     if current is not None:
-        found = f"{current.value:.10g}, set by {current.who} at {current.at:%Y-%m-%d %H:%M} UTC"
+        found = f"{said(current.value)}, set by {current.who} at {current.at:%Y-%m-%d %H:%M} UTC"
     return UsageError(
         f"{key.replace('.', ' ')} was changed since you opened the page: it is {found}.",
         remedy=f"Your change{yours} was not saved: make it again if it should still hold.",

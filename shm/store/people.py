@@ -65,10 +65,14 @@ class User:
 class People(Repository):
     """Users, and the sessions of their browsers."""
 
-    def add(self, name: str, role: Role, password: str, at: datetime) -> None:
-        """Lets a person sign in; raises UsageError where the name is taken or the password poor."""
+    def add(self, name: str, role: Role, password: str | None, at: datetime) -> None:
+        """Lets a person sign in; raises UsageError where the name is taken or the password poor.
+
+        Who has none (None) comes by single sign-on alone.
+        """
         name = _fit(name)
-        values = {"name": name, "role": role, "password_hash": _hashed(password), "made_at": at}
+        hashed = _hashed(_secret() if password is None else password)
+        values = {"name": name, "role": role, "password_hash": hashed, "made_at": at}
         with self.writing() as connection:
             for taken in _alike(connection, name):
                 raise UsageError(
@@ -114,13 +118,16 @@ class People(Repository):
         A name that is not there takes as long as a wrong password: the time tells nothing.
         """
         row = self._whose(name, password)
-        if row is None:
-            return None
-        secret = SESSION + secrets.token_urlsafe(_SECRET_BYTES)
-        values = {"user_id": row.id, "secret_sha256": _checksum(secret), "began_at": at}
-        with self.writing() as connection:
-            insert(connection, sessions, values)
-        return secret
+        return None if row is None else self._begin(row.id, at)
+
+    def sign_in_as(self, name: str, at: datetime) -> str | None:
+        """The secret of a new session of whom a provider of ours names; None where no user has
+        exactly this name: a provider may tell names apart that read alike.
+        """
+        with self.reading() as connection:
+            row = connection.execute(_in_force.where(users.c.name == name)).first()
+        # Once more, since a server's collation may take names for equal.
+        return None if row is None or row.name != name else self._begin(row.id, at)
 
     def user_of(self, secret: str, at: datetime) -> User | None:
         """Whose session this is; None where it has ended or never was."""
@@ -138,6 +145,13 @@ class People(Repository):
         one = sa.update(sessions).where(sessions.c.secret_sha256 == _checksum(secret))
         with self.writing() as connection:
             connection.execute(one.where(sessions.c.ended_at.is_(None)).values(ended_at=at))
+
+    def _begin(self, user_id: int, at: datetime) -> str:
+        secret = SESSION + _secret()
+        values = {"user_id": user_id, "secret_sha256": _checksum(secret), "began_at": at}
+        with self.writing() as connection:
+            insert(connection, sessions, values)
+        return secret
 
     def _whose(self, name: str, password: str) -> sa.Row[Any] | None:
         """The user in force of this name, with this password."""
@@ -241,7 +255,11 @@ def _hashed(password: str) -> str:
 @cache
 def _nobodys() -> str:
     """The hash of a password that nobody has."""
-    return argon2.PasswordHasher().hash(secrets.token_urlsafe(_SECRET_BYTES))
+    return argon2.PasswordHasher().hash(_secret())
+
+
+def _secret() -> str:
+    return secrets.token_urlsafe(_SECRET_BYTES)
 
 
 def _checksum(secret: str) -> str:

@@ -84,7 +84,7 @@ class Workspace:
         self,
         store: Store,
         key: str,
-        value: float | None,
+        value: float | str | None,
         at: datetime,
         who: str,
         *,

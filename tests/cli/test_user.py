@@ -6,6 +6,7 @@ import io
 
 import pytest
 
+from shm.pipeline import utc_now
 from shm.store import Workspace
 from tests.cli.conftest import Ended, Shm
 
@@ -31,6 +32,15 @@ def test_a_user_is_made_listed_without_a_secret_and_removed(user: Shm) -> None:
     assert user("remove", "M. Huber").code == 0
     assert user("list", "--json").document["users"][0]["removed_at"]
     assert user("add", "M. Huber", password=PASSWORD).code == 0
+
+
+def test_who_comes_by_single_sign_on_has_no_password(user: Shm, empty: Workspace) -> None:
+    assert user("add", "ann@example.org").code == 2  # an empty line is none
+    assert user("add", "ann@example.org", "--single-sign-on").code == 0
+    with empty.store() as store:
+        assert store.people.sign_in("ann@example.org", "", utc_now()) is None
+        assert store.people.sign_in_as("ann@example.org", utc_now())
+        assert store.people.sign_in_as("Ann@example.org", utc_now()) is None
 
 
 def test_the_password_that_stdin_gives_is_the_one_that_signs_in(

@@ -23,7 +23,7 @@ from tests.helpers.taken_in import with_a_slow_loss
 from tests.helpers.web_servers import served
 
 PASSWORD = "correct horse battery"
-OPEN = {"/health", "/sign-in", "/sign-out"}
+OPEN = {"/health", "/sign-in", "/sign-in/provider", "/sign-in/back", "/sign-out"}
 UPLOAD = "/api/recordings?name=x.csv"
 
 

@@ -96,6 +96,72 @@ def test_the_page_says_whether_stored_tests_are_judged_with_what_it_shows(
     assert "judged again as soon as the daemon runs: tension 0.06 instead of 0.05." in shown
 
 
+HOURS = "hook.night.watch.quiet_hours"
+
+
+@pytest.fixture
+def hooked(browser: httpx.Client, workspace: Workspace) -> httpx.Client:
+    """The bridge has a hook with quiet hours."""
+    with (workspace.folder / "bridge.toml").open("a") as file:
+        file.write(
+            '\n[[hook]]\nname = "night.watch"\ncommand = ["true"]\nquiet_hours = "22:00-06:00"\n'
+        )
+    return browser
+
+
+def put_hours(
+    client: httpx.Client, begins: str, ends: str, action: str = "set", opened: str | None = None
+) -> httpx.Response:
+    opened = based_on(client, HOURS) if opened is None else opened
+    told = {"key": HOURS, "begins": begins, "ends": ends, "action": action, "based_on": opened}
+    return client.post("/settings", data=told)
+
+
+def hours(workspace: Workspace) -> str:
+    (hook,) = workspace.reopened().bridge.hooks
+    return str(hook.quiet_hours or "none")
+
+
+def test_quiet_hours_of_a_hook_are_set_taken_away_and_given_back_to_the_file(
+    hooked: httpx.Client, workspace: Workspace
+) -> None:
+    opened, found = based_on(hooked, HOURS), [hours(workspace)]
+    shown = hooked.get("/settings").text
+    assert 'name="begins" value="22:00"' in shown
+    assert 'name="ends" value="06:00"' in shown
+    for begins, ends, action in (("20:30", "07:00", "set"), ("", "", "set"), ("", "", "back")):
+        assert put_hours(hooked, begins, ends, action).status_code == 303
+        found.append(hours(workspace))
+        if not begins and action == "set":
+            told = "hook night watch quiet_hours = none instead of what bridge.toml says"
+            assert any(told in each.found for each in examine(workspace.folder, utc_now()))
+    assert found == ["22:00-06:00", "20:30-07:00", "none", "22:00-06:00"]
+    with workspace.store() as store:
+        rows = store.audit.list_rows(limit=3)
+    assert {(row.who, row.subject) for row in rows} == {("engineer", HOURS.replace(".", " "))}
+    assert [row.detail for row in rows] == [
+        "from none to 22:00-06:00, back to bridge.toml",
+        "from 20:30-07:00 to none",
+        "from 22:00-06:00 to 20:30-07:00",
+    ]
+    put_hours(hooked, "20:30", "07:00")
+    late = put_hours(hooked, "", "", opened=opened)
+    assert late.status_code == 409
+    assert "it is 20:30-07:00, set by engineer" in late.text
+    assert "Your change, none, was not saved" in late.text
+
+
+@pytest.mark.parametrize("span", [("22:00", ""), ("", "06:00"), ("24:00", "6"), ("06:00", "06:00")])
+def test_quiet_hours_that_are_no_span_are_refused(
+    hooked: httpx.Client, workspace: Workspace, span: tuple[str, str]
+) -> None:
+    answer = put_hours(hooked, *span)
+    assert answer.status_code == 422
+    assert "is not a span of the day" in answer.text
+    assert "Give two different times" in answer.text
+    assert workspace.reopened().bridge.as_in_file is None
+
+
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [

@@ -244,7 +244,7 @@ def test_quiet_hours_that_are_no_span_are_refused_with_key_and_line(
     with pytest.raises(BadInput, match=r"hook mail: quiet_hours = .* is not a span") as refusal:
         quiet_bridge(tmp_path, hours)
     assert refusal.value.line == 6
-    assert refusal.value.remedy == 'Write quiet_hours = "22:00-06:00".'
+    assert refusal.value.remedy == 'Give two different times: quiet_hours = "22:00-06:00".'
 
 
 @pytest.mark.parametrize("zone", ["Europe/Atlantis", "", "../etc", "Europe"])

@@ -37,6 +37,7 @@ from shm.store.rows import Delivery, DeliveryState, Silence
 from shm.store.stored_silences import silenced_until
 from shm.store.workspace import FOLDERS
 from shm_daemon.doctor.check_settings import check_changed_settings
+from shm_daemon.doctor.check_sign_on import check_single_sign_on
 from shm_daemon.doctor.check_streams import check_streams
 from shm_daemon.doctor.checks import (
     WAITS_LONG,
@@ -190,6 +191,7 @@ def examine(folder: Path, now: datetime) -> tuple[Finding, ...]:
     findings += _found("confinement", check_confinement)
     findings += _found("logo", partial(check_logo, workspace))
     findings += _found("hooks", partial(check_hooks, workspace))
+    findings += _found("single sign-on", partial(check_single_sign_on, workspace))
     return (*findings, *_of_store(workspace, now))
 
 
@@ -228,6 +230,7 @@ _MODULES = {
     "distributed": ("distributed",),
     "mqtt": ("paho",),
     "postgres": ("psycopg",),
+    "sso": ("authlib",),
     "web": ("fastapi", "prometheus_client", "uvicorn"),
 }
 _SHOWN = ("numpy", "scipy", "sqlalchemy")
@@ -252,6 +255,7 @@ def check_extras(workspace: Workspace) -> Iterator[Finding]:
         "distributed": bool(settings.scheduler),
         "mqtt": bool(settings.mqtt_url),
         "postgres": "://" in settings.store,
+        "sso": workspace.bridge.single_sign_on is not None,
     }
     missing = [extra for extra, wanted in needed.items() if wanted and extra not in installed]
     if missing:

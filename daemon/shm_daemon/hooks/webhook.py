@@ -100,10 +100,10 @@ class WebhookDeliverer:
             return HookFailed(f"no answer of {hook.host} within {limit}.", remedy=_LOOK)
         if isinstance(error, requests.exceptions.SSLError):
             return HookFailed(
-                f"{hook.host} cannot show that it is who it says ({_reason(error)}).",
+                f"{hook.host} cannot show that it is who it says ({reason_of(error)}).",
                 remedy="Have its certificate mended.",
             )
-        return HookFailed(f"{hook.host} cannot be reached ({_reason(error)}).", remedy=_LOOK)
+        return HookFailed(f"{hook.host} cannot be reached ({reason_of(error)}).", remedy=_LOOK)
 
 
 def signature(secret: bytes, timestamp: str, body: bytes) -> str:
@@ -149,7 +149,7 @@ def _unchanged(request: requests.PreparedRequest) -> requests.PreparedRequest:
     return request
 
 
-def _reason(error: BaseException) -> str:
+def reason_of(error: BaseException) -> str:
     """The innermost cause in the operating system's words, without the address."""
     reason, cause = type(error).__name__, error.__cause__ or error.__context__
     seen: set[int] = set()

@@ -133,7 +133,7 @@ def visitor_in_force(request: Request, site: Site, secret: str) -> Visitor:
         return found
     if secret.startswith(SESSION):
         raise _nobody("You are not signed in any more.", "Sign in again at /sign-in.")
-    site.wrong_attempts.note_wrong(_unless_throttled(request, site))
+    site.wrong_attempts.note_wrong(unless_throttled(request, site))
     raise _nobody("This token is wrong or revoked.", _BY_HEADER)
 
 
@@ -147,7 +147,7 @@ def session_of(request: Request, site: Site, name: str, password: str) -> str:
     """The secret of a new session of a person; raises Refused where name or password is wrong, or
     too many were.
     """
-    caller = _unless_throttled(request, site, name)
+    caller = unless_throttled(request, site, name)
     secret = site.store.people.sign_in(name, password, utc_now())
     if secret is None:
         site.wrong_attempts.note_wrong(caller, name)
@@ -165,14 +165,14 @@ def change_own_password(
     """Raises UsageError where the new one is poor, Refused where the old one is wrong or too many
     were. The browser that asks stays signed in.
     """
-    caller = _unless_throttled(request, site, person.name)
+    caller = unless_throttled(request, site, person.name)
     people, secret = site.store.acting_as(person.actor).people, request.cookies.get(COOKIE, "")
     if not people.change_password(person.name, old, password, utc_now(), secret):
         site.wrong_attempts.note_wrong(caller, person.name)
         raise Refused(403, "The old password is wrong.", "An engineer can give you another one.")
 
 
-def _unless_throttled(request: Request, site: Site, name: str | None = None) -> str:
+def unless_throttled(request: Request, site: Site, name: str | None = None) -> str:
     """The address that asks; raises Refused where too much that is wrong came from there."""
     forwarded = request.headers.get("x-forwarded-for", "")
     peer = request.client.host if request.client else ""

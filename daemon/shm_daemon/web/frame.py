@@ -51,6 +51,7 @@ def page(request: Request, template: str, *, status: int = 200, **content: Any) 
         open_alerts=_open_alerts(site) if visitor else None,
         here=request.url.path,
         notices=notices(site) if visitor else (),
+        single_sign_on=site.workspace.bridge.single_sign_on,
         **content,
     )  # fmt: skip
     return HTMLResponse(text, status)

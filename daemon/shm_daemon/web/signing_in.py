@@ -36,8 +36,8 @@ _LONGEST_FORM_BYTES = 8192  # technical: a token and the address to go on to hav
 def sign_in_page(request: Request, site: AtSite, next: str = "/") -> Response:
     """Asks for name and password, or for a token; who has signed in already goes on."""
     if is_signed_in(request, site):
-        return RedirectResponse(_ours(next), 303)
-    return _ask(request, next)
+        return RedirectResponse(ours(next), 303)
+    return ask(request, next)
 
 
 @router.post("/sign-in")
@@ -51,8 +51,14 @@ async def sign_in(request: Request, site: AtSite) -> Response:
     except Refused as refused:
         if not for_a_person(request):
             raise
-        return _ask(request, wanted, refused.status_code, refused.detail)
-    answer = RedirectResponse(_ours(wanted), 303)
+        return ask(request, wanted, refused.status_code, refused.detail)
+    answer = RedirectResponse(ours(wanted), 303)
+    keep_signed_in(request, answer, secret)
+    return answer
+
+
+def keep_signed_in(request: Request, answer: Response, secret: str) -> None:
+    """Has the browser keep the secret of a session."""
     answer.set_cookie(
         COOKIE,
         secret,
@@ -61,7 +67,6 @@ async def sign_in(request: Request, site: AtSite) -> Response:
         samesite="strict",
         secure=is_https(request.scope),
     )
-    return answer
 
 
 @router.post("/sign-out")
@@ -85,17 +90,18 @@ def _secret(request: Request, site: Site, told: dict[str, str]) -> str:
     return secret
 
 
-def _ask(request: Request, wanted: str, status: int = 200, message: str = "") -> Response:
+def ask(request: Request, wanted: str, status: int = 200, message: str = "") -> Response:
+    """The page that asks who one is, with what went wrong."""
     return page(
         request,
         "sign_in.html.j2",
         status=status,
         message=message,
-        next=_ours(wanted),
+        next=ours(wanted),
     )
 
 
-def _ours(wanted: str) -> str:
+def ours(wanted: str) -> str:
     """An address of this site: nobody is sent elsewhere after signing in."""
     plain = wanted.startswith("/") and wanted.isascii() and wanted.isprintable()
     return wanted if plain and not wanted.startswith("//") and "\\" not in wanted else "/"

@@ -13,12 +13,13 @@ from starlette.concurrency import run_in_threadpool
 
 from shm.bridge import Bridge
 from shm.bridge.changes import HANGER_KEYS, HOOK_KEYS, SETTING_KEYS
+from shm.bridge.quiet_hours import QUIET_HOURS, QuietHours
 from shm.errors import BadInput, UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.rejudging import differences
 from shm.report import formatting
 from shm.settings import TABLE, Settings, load_settings
-from shm.store.changed_settings import ChangedSetting
+from shm.store.changed_settings import ChangedSetting, said
 from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.faults import Refused
@@ -29,6 +30,8 @@ from shm_daemon.web.site import Site
 
 router = APIRouter(include_in_schema=False)
 
+_Value = float | QuietHours | None
+
 _MEANINGS = {
     "thresholds.tension_shift_fraction": "shift of tension that matters, as a fraction",
     "thresholds.stiffness_shift_decades": "shift of end stiffness that matters, in decades",
@@ -37,6 +40,7 @@ _MEANINGS = {
     "limits.tension_max_n": "overloaded above, in N",
     "limits.tension_min_n": "slack below, in N",
     "escalation_after_seconds": "told only of what nobody has acknowledged after, in s",
+    QUIET_HOURS: "told only of what is urgent within these, by time_zone of bridge.toml, else UTC",
     **{row.name: f"{row.help}{f', in {row.unit}' if row.unit else ''}" for row in TABLE},
 }
 
@@ -51,6 +55,12 @@ class _Row:
     in_file: str
     in_force: str
     changed: ChangedSetting | None
+
+    @property
+    def span(self) -> tuple[str, str] | None:
+        """The two times of quiet hours, empty where there are none; None for numbers."""
+        begins, _, ends = self.in_force.partition("-")
+        return ((begins, ends) if ends else ("", "")) if self.name == QUIET_HOURS else None
 
 
 @router.get("/settings")
@@ -74,8 +84,8 @@ async def change(request: Request, site: AtSite, engineer: Engineer) -> Response
     except (BadInput, UsageError) as error:
         site.forget_description()  # somebody else's change, which it may not show yet
         status = 409 if isinstance(error, UsageError) else 422
-        said = f"{error.message} {error.remedy}"
-        return await run_in_threadpool(_page, request, site, hanger, said, status)
+        problem = f"{error.message} {error.remedy}"
+        return await run_in_threadpool(_page, request, site, hanger, problem, status)
     address = "/settings" if hanger is None else f"/settings?hanger={hanger}#hanger"
     return RedirectResponse(address, 303)
 
@@ -85,7 +95,9 @@ def _change(site: Site, engineer: Engineer, key: str, told: dict[str, str]) -> N
     rows = {row.key: row for row in _all_rows(workspace.bridge, workspace.settings)}
     if key not in rows:
         raise Refused(404, f"{key!r} is none of the settings of this page.", "See bridge.toml.")
-    value = None if told.get("action") == "back" else _number(told.get("value", ""))
+    value: float | str | None = None
+    if told.get("action") != "back":
+        value = _span(told) if key.endswith(QUIET_HOURS) else _number(told.get("value", ""))
     based_on = told.get("based_on", "")
     workspace.change_setting(
         store,
@@ -97,6 +109,12 @@ def _change(site: Site, engineer: Engineer, key: str, told: dict[str, str]) -> N
         in_file=rows[key].in_file,
     )
     site.forget_description()
+
+
+def _span(told: Mapping[str, str]) -> str:
+    """Empty where both times are; whether it is one, `bridge.toml`'s own check says."""
+    begins, ends = told.get("begins", ""), told.get("ends", "")
+    return f"{begins}-{ends}" if begins or ends else ""
 
 
 def _number(text: str) -> float:
@@ -184,18 +202,14 @@ def _of_hanger(
 def _row(
     key: str,
     name: str,
-    values: tuple[float | None, float | None],
+    values: tuple[_Value, _Value],
     changed: Mapping[str, ChangedSetting],
     before: str = "",
 ) -> _Row:
-    in_file, in_force = map(_said, values)
+    in_file, in_force = (said(str(v) if isinstance(v, QuietHours) else v) for v in values)
     label = before + _MEANINGS[name]
     label = label if before else label[0].upper() + label[1:]
     return _Row(key, label, name.rpartition(".")[2], in_file, in_force, changed.get(key))
-
-
-def _said(value: float | None) -> str:
-    return "not set" if value is None or math.isnan(value) else f"{value:.10g}"
 
 
 def _hanger_of(key: str) -> int | None:

@@ -28,20 +28,21 @@ async def change(request: Request, site: AtSite, engineer: Engineer) -> Response
     """Adds or removes a user, changes their role or sets a password."""
     told = await form_of(request)
     people = site.store.acting_as(engineer.actor).people
+    by_provider = site.workspace.bridge.single_sign_on is not None
     try:
-        await run_in_threadpool(_change, people, told)
+        await run_in_threadpool(_change, people, told, by_provider)
     except (UsageError, NothingThere) as error:
         said = f"{error.message} {error.remedy}"
         return await run_in_threadpool(_page, request, site, said, 409)
     return RedirectResponse("/users", 303)
 
 
-def _change(people: People, told: dict[str, str]) -> None:
+def _change(people: People, told: dict[str, str], by_provider: bool) -> None:
     name, password, at = told.get("name", ""), told.get("password", ""), utc_now()
     role = next((each for each in Role if each == told.get("role", "")), None)
     match told.get("action", ""), role:
         case "add", Role():
-            people.add(name, role, password, at)
+            people.add(name, role, None if by_provider and not password else password, at)
         case "role", Role():
             people.set_role(name, role, at)
         case "password", _:

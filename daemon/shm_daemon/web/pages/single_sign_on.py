@@ -1,0 +1,147 @@
+"""Signing in where a provider of OpenID Connect says who one is: there and back."""
+
+from __future__ import annotations
+
+import logging
+import secrets
+import threading
+from collections import OrderedDict
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import RedirectResponse
+
+from shm.bridge.single_sign_on import SingleSignOn
+from shm.errors import NothingThere, ShmError, needing
+from shm.pipeline import utc_now
+from shm_daemon.web.access import AtSite, unless_throttled
+from shm_daemon.web.frame import page
+from shm_daemon.web.middleware import is_https
+from shm_daemon.web.signing_in import ask, keep_signed_in, ours
+from shm_daemon.web.site import Site
+
+if TYPE_CHECKING:
+    from shm_daemon.openid import Begun, Provider
+
+router = APIRouter(include_in_schema=False)
+
+_BACK = "/sign-in/back"
+_COOKIE, _ITS_PATH = "shm_sign_on", "/sign-in"
+_WITHIN = timedelta(minutes=10)  # judgement: to type a password and confirm on a telephone
+_MOST = 1024  # technical: a megabyte of memory; the oldest are forgotten
+_FORGOTTEN = (
+    "This sign-in was begun in another browser, too long ago, or is used up. Begin it again."
+)
+
+log = logging.getLogger(__name__)
+
+
+class SignOns:
+    """The provider as it is described now, and the sign-ins that have begun; each is of use once.
+    May be used from many threads.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._begun: OrderedDict[str, tuple[datetime, Begun, str]] = OrderedDict()
+        self._provider: Provider | None = None
+
+    def provider(self, described: SingleSignOn | None) -> Provider:
+        """Raises NothingThere where none is described, UsageError where the extra is missing."""
+        if described is None:
+            raise NothingThere(
+                "This bridge has no single sign-on.", remedy="Sign in with a password."
+            )
+        with needing("sso"):
+            from shm_daemon.openid import Provider  # an extra
+        with self._lock:
+            if self._provider is None or self._provider.described != described:
+                self._provider = Provider(described)
+            return self._provider
+
+    def note(self, begun: Begun, wanted: str) -> None:
+        """Somebody is on their way, and then wants to open a page of ours."""
+        with self._lock:
+            self._begun[begun.state] = utc_now(), begun, wanted
+            while len(self._begun) > _MOST:
+                self._begun.popitem(last=False)
+
+    def take(self, state: str) -> tuple[Begun, str] | None:
+        """What was noted of a state, once and in time."""
+        with self._lock:
+            noted = self._begun.pop(state, None)
+        return noted[1:] if noted is not None and utc_now() - noted[0] < _WITHIN else None
+
+
+@router.get("/sign-in/provider")
+def begin(request: Request, site: AtSite, next: str = "/") -> Response:
+    """Sends a person to the provider."""
+    signs: SignOns = request.app.state.sign_ons
+    host = request.headers["host"]  # one of ours: the middleware has looked
+    back = f"http{'s' if is_https(request.scope) else ''}://{host}{_BACK}"
+    try:
+        begun = signs.provider(site.workspace.bridge.single_sign_on).begin(back)
+    except ShmError as error:
+        return _told(request, next, error)
+    signs.note(begun, ours(next))
+    answer = RedirectResponse(begun.url, 303)
+    # Lax: it must come back with a person whom a page of the provider sends.
+    answer.set_cookie(_COOKIE, begun.state, max_age=int(_WITHIN.total_seconds()), path=_ITS_PATH,
+                      httponly=True, samesite="lax", secure=is_https(request.scope))  # fmt: skip
+    return answer
+
+
+@router.get(_BACK)
+def come_back(
+    request: Request, site: AtSite, state: str = "", code: str = "", error: str = ""
+) -> Response:
+    """Signs in whom the provider names, where that is a user; nobody by default."""
+    caller, signs = unless_throttled(request, site), request.app.state.sign_ons
+    kept = request.cookies.get(_COOKIE, "")
+    is_its_browser = secrets.compare_digest(kept.encode(), state.encode())
+    noted = signs.take(state) if is_its_browser else None
+    if noted is None:
+        return _refused(request, "/", 403, _FORGOTTEN)
+    begun, wanted = noted
+    if error or not code:
+        log.warning("single sign-on was not completed: %.80r", error or "no code came")
+        said = "You have not signed in there" + (f" ({error[:80]})." if error else ".")
+        return _refused(request, wanted, 403, said)
+    try:
+        name = signs.provider(site.workspace.bridge.single_sign_on).name_of(begun, code)
+    except ShmError as failure:
+        if failure.retry_after_s is None:
+            site.wrong_attempts.note_wrong(caller)
+        return _told(request, wanted, failure)
+    return _signed_in(request, site, name, wanted)
+
+
+def _signed_in(request: Request, site: Site, name: str, wanted: str) -> Response:
+    secret = site.store.people.sign_in_as(name, utc_now())
+    if secret is None:
+        log.warning("single sign-on: %.255r is no user of this bridge", name)
+        return _refused(
+            request,
+            wanted,
+            403,
+            "You are not a user of this bridge yet. Ask an engineer of it to add, on the page "
+            f"Users, a user of exactly this name: {name}",
+        )
+    # No redirect: a browser that came from elsewhere would not send the strict cookie along.
+    answer = page(request, "signed_in.html.j2", name=name, next=wanted)
+    keep_signed_in(request, answer, secret)
+    answer.delete_cookie(_COOKIE, path=_ITS_PATH)
+    return answer
+
+
+def _told(request: Request, wanted: str, error: ShmError) -> Response:
+    log.warning("single sign-on: %s", error)
+    passing = error.retry_after_s is not None
+    return _refused(request, wanted, 503 if passing else 403, f"{error.message} {error.remedy}")
+
+
+def _refused(request: Request, wanted: str, status: int, said: str) -> Response:
+    answer = ask(request, wanted, status, said)
+    answer.delete_cookie(_COOKIE, path=_ITS_PATH)
+    return answer
