@@ -56,7 +56,7 @@ class WebhookDeliverer:
                     timeout=timeout_s,
                     allow_redirects=False,
                     stream=True,
-                    auth=_unchanged,
+                    auth=unchanged,
                 ) as response:
                     return _judged(response)
             except (requests.RequestException, OSError) as error:
@@ -100,10 +100,10 @@ class WebhookDeliverer:
             return HookFailed(f"no answer of {hook.host} within {limit}.", remedy=_LOOK)
         if isinstance(error, requests.exceptions.SSLError):
             return HookFailed(
-                f"{hook.host} cannot show that it is who it says ({_reason(error)}).",
+                f"{hook.host} cannot show that it is who it says ({reason_of(error)}).",
                 remedy="Have its certificate mended.",
             )
-        return HookFailed(f"{hook.host} cannot be reached ({_reason(error)}).", remedy=_LOOK)
+        return HookFailed(f"{hook.host} cannot be reached ({reason_of(error)}).", remedy=_LOOK)
 
 
 def signature(secret: bytes, timestamp: str, body: bytes) -> str:
@@ -144,12 +144,12 @@ def _words(response: requests.Response) -> str:
     return one_line(words) or one_line(response.reason or "") or "no message"
 
 
-def _unchanged(request: requests.PreparedRequest) -> requests.PreparedRequest:
+def unchanged(request: requests.PreparedRequest) -> requests.PreparedRequest:
     """Keeps the library from adding a password of the user's own (`.netrc`) to the request."""
     return request
 
 
-def _reason(error: BaseException) -> str:
+def reason_of(error: BaseException) -> str:
     """The innermost cause in the operating system's words, without the address."""
     reason, cause = type(error).__name__, error.__cause__ or error.__context__
     seen: set[int] = set()

@@ -31,10 +31,12 @@ from shm_daemon.web.faults import handle_faults
 from shm_daemon.web.frame import prepare_templates
 from shm_daemon.web.front import Pages
 from shm_daemon.web.metrics import Exposition
+from shm_daemon.web.other_bridges import OtherBridges
 from shm_daemon.web.pages import (
     alerts,
     audit,
     bridge,
+    bridges,
     comparison,
     downloads,
     hanger,
@@ -71,6 +73,7 @@ def load_pages(site: Site) -> Pages:
     )
     app.state.site = site
     app.state.background_worker = BackgroundWorker()
+    app.state.other_bridges = OtherBridges()
     app.state.exposition = Exposition(watching_site)
     handle_faults(app)
     for part in (
@@ -83,6 +86,7 @@ def load_pages(site: Site) -> Pages:
         signing_in,
         static,
         bridge,
+        bridges,
         comparison,
         upload,
         health,
@@ -103,6 +107,7 @@ def load_pages(site: Site) -> Pages:
 
     def close() -> None:
         app.state.background_worker.close()
+        app.state.other_bridges.close()
         watching_site.close()
         site.close()
 
