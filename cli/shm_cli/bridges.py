@@ -41,5 +41,5 @@ def command(ctx: click.Context, as_json: bool) -> None:
         said = [lead.words for lead in row.leads]
         if row.summary:
             said.append(f"It last said: {row.summary.words}" if row.trouble else row.summary.words)
-        state = f" ({row.state})" if row.state else ""
+        state = f" ({', '.join(word for word, _ in row.states)})" if row.states else ""
         click.echo(paragraph(printable(f"{row.name}{state}: {' '.join(said)}", " ")))

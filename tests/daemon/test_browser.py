@@ -43,6 +43,7 @@ PAGES = {
     "recording": page_of(3, RECORDED),
     **{name.lower(): address for address, name in (*NAVIGATION, *FOR_ENGINEERS)},
     "limits": "/settings?hanger=3",
+    "bridges": "/bridges",
     "password": "/password",
 }
 CHARTS = {"hanger": 4, "recording": 6}

@@ -6,15 +6,18 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from typing import Literal
+from urllib.parse import quote
 
 import shm
 from shm.errors import ShmError
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.report.formatting import counted, listed
-from shm.report.hanger_status import Status, bridge_message
+from shm.report.hanger_status import QUIET, Status, bridge_message
 from shm.values.messages import URGENCIES, Lead, Urgency
 from shm_daemon.web.health import notices, troubles
 from shm_daemon.web.site import Site
+
+NOT_REACHED, STANDS_STILL = "Not reached", "Stands still"
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ def summary_of(site: Site, now: datetime) -> Summary:
     return Summary(
         bridge=workspace.bridge.name,
         version=shm.__version__,
-        **message.document,  # type: ignore[arg-type]
+        **{**message.document, "notes": message.notes},  # type: ignore[arg-type]
         others=message.others,
         notices=tuple(notices(site)),
         troubles=tuple(troubles(site)),
@@ -80,6 +83,11 @@ class BridgeRow:
     trouble: Lead | None = None
 
     @property
+    def anchor(self) -> str:
+        """Of its part of the page."""
+        return f"bridge-{quote(self.name, safe='')}"
+
+    @property
     def leads(self) -> tuple[Lead, ...]:
         """What is said before its own words: that it is not reached, or what limits its work."""
         if self.trouble or self.summary is None:
@@ -90,14 +98,19 @@ class BridgeRow:
         return (*(Lead(each, look) for each in sorted(more)), *said)
 
     @property
-    def state(self) -> str:
-        """How it is, in a word or two; empty before its first test."""
-        if self.trouble:
-            return "Not reached"
-        if self.summary and self.summary.troubles:
-            return "Stands still"
-        status = self.summary and self.summary.status
-        return Status[status.upper()].value if status else ""
+    def states(self) -> tuple[tuple[str, str], ...]:
+        """How it is in a word or two, each with its style; empty before its first test.
+
+        What is not watched is never quiet, whatever its last tests said.
+        """
+        status = (
+            Status[self.summary.status.upper()] if self.summary and self.summary.status else None
+        )
+        own = ((status.value, status.name.lower()),) if status else ()
+        if self.is_watched:
+            return own
+        lost = (NOT_REACHED if self.trouble else STANDS_STILL, "alert")
+        return (lost, *(own if status not in QUIET and not self.trouble else ()))
 
     @property
     def is_watched(self) -> bool:
@@ -130,7 +143,7 @@ def row_document(row: BridgeRow) -> dict[str, object]:
     return {
         "name": row.name,
         "address": row.address,
-        "state": row.state,
+        "states": [word for word, _ in row.states],
         "urgency": row.urgency,
         "trouble": row.trouble and asdict(row.trouble),
         "told_at": row.told_at,
@@ -160,13 +173,20 @@ _GROUPS = {
 }
 
 
-def headline(rows: Sequence[BridgeRow]) -> str:
-    """How many bridges there are, and which need what; the most urgent first."""
-    groups: dict[str, list[str]] = {"Not reached": [], "Stands still": []}
-    groups |= {said: [] for said in _GROUPS.values()}
+def groups(rows: Sequence[BridgeRow]) -> dict[str, tuple[BridgeRow, ...]]:
+    """Which bridges need what, the most urgent first; one that stands still may need more."""
+    found: dict[str, list[BridgeRow]] = {
+        said: [] for said in (_GROUPS["today"], NOT_REACHED, STANDS_STILL, *_GROUPS.values())
+    }
     for row in worst_first(rows):
-        key = _GROUPS[row.urgency] if row.is_watched else row.state
-        groups[key].append(row.name)
-    order = (_GROUPS["today"], *(each for each in groups if each != _GROUPS["today"]))
-    said = [f"{each}: {listed(groups[each])}." for each in order if groups[each]]
+        if not row.is_watched:
+            found[row.states[0][0]].append(row)
+        if row.summary and not row.trouble and (row.is_watched or row.summary.urgency != "none"):
+            found[_GROUPS[row.summary.urgency]].append(row)
+    return {said: tuple(of) for said, of in found.items() if of}
+
+
+def headline(rows: Sequence[BridgeRow]) -> str:
+    """How many bridges there are, and which need what."""
+    said = (f"{key}: {listed([each.name for each in of])}." for key, of in groups(rows).items())
     return " ".join((f"{counted(len(rows), 'bridge')}.", *said))

@@ -115,7 +115,7 @@ def _failure(error: Exception) -> NotTold:
             remedy="Have it renewed or, where an authority of your own made it, name that "
             "authority's certificate in bridge.toml: certificate_file.",
         )
-    return NotTold(f"It cannot be reached ({reason_of(error)}).", remedy=_LOOK)
+    return NotTold(f"The connection failed ({reason_of(error)}).", remedy=_LOOK)
 
 
 def _judged(bridge: OtherBridge, status: int, body: bytes) -> Summary:
@@ -239,12 +239,11 @@ class OtherBridges:
 
 def _said(bridge: OtherBridge, known: _Known | None, why: Lead, now: datetime) -> Lead:
     """That a bridge is not reached, since when and why."""
+    since = "is not reached"
     if known and known.told_at:
         since = f"has not been reached for {told(now - known.told_at)}"
-    elif known and known.failing_since:
-        since = f"has not been reached since this was begun {told(now - known.failing_since)} ago"
-    else:
-        since = "has not been reached yet"
+    elif known and known.failing_since and now - known.failing_since > _FRESH_FOR:
+        since = f"has not been reached for at least {told(now - known.failing_since)}"
     return Lead(f"{bridge.name} {since}: {why.state[0].lower()}{why.state[1:]}", why.action)
 
 

@@ -17,6 +17,7 @@ from shm_daemon.web.address import SUMMARY
 from shm_daemon.web.bridge_summary import (
     BridgeRow,
     Summary,
+    groups,
     headline,
     own_row,
     row_document,
@@ -36,7 +37,7 @@ class BridgeInList(BaseModel):
 
     name: str
     address: str
-    state: str = Field(description="In a word or two; empty before the first test.")
+    states: list[str] = Field(description="In a word or two; empty before the first test.")
     urgency: Urgency = Field(description="`today` too where nobody watches it.")
     trouble: Lead | None = Field(description="Why it cannot be asked now; null where it was.")
     told_at: datetime | None
@@ -57,7 +58,7 @@ def bridges_page(request: Request, site: AtSite, _: Reader) -> Response:
     return page(
         request,
         "bridges.html.j2",
-        headline=headline(rows),
+        groups=groups(rows),
         rows=[(each, _facts(each, now)) for each in rows],
     )
 
