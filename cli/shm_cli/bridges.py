@@ -13,9 +13,10 @@ from shm_cli.common import json_option, open_workspace, paragraph, show
 @json_option
 @click.pass_context
 def command(ctx: click.Context, as_json: bool) -> None:
-    """How this bridge and all [[other_bridge]] of bridge.toml are, the worst first.
+    """How this bridge and the others of bridge.toml are, the worst first.
 
-    Each other bridge's dashboard is asked; one that does not answer is named, with what to do.
+    The dashboard of each [[other_bridge]] is asked; one that does not answer is named, with what
+    to do.
 
     \b
     Example: shm --workspace arch bridges
