@@ -8,7 +8,7 @@ from __future__ import annotations
 import getpass
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import date, datetime
+from datetime import datetime
 from typing import Any
 
 import rich_click as click
@@ -55,9 +55,10 @@ def decide(
     `record` is who decided and why. Raises NothingThere, UsageError; then nothing is changed.
     """
     # It brings the hooks' libraries; `shm status` and `shm ingest --held` only tell.
+    from shm.plausibility import refuse_impossible
     from shm_cli.working import LEFT_TO_IT, finish, working
 
-    _refuse_impossible(time, workspace.bridge.built)
+    refuse_impossible(time, workspace.bridge.built)
     who, why = record[0] or getpass.getuser(), record[1] or ""
     with workspace.store() as store:
         known = {stored.id for stored in store.alerts.list_all()}
@@ -107,19 +108,6 @@ def _refuse_without_reason(store: Store, recording_id: int, decision: Decision, 
         f"recording {recording_id} is not held: it {now}.",
         remedy=f"Say why that is changed: `shm ingest --{verb} {recording_id} --why TEXT`.",
     )
-
-
-def _refuse_impossible(time: datetime | None, built: date | None) -> None:
-    """The day of no recording, whatever a person says."""
-    from shm.plausibility import FIRST_DAY
-
-    first = max(FIRST_DAY, built or FIRST_DAY)
-    if time is not None and time.date() < first:
-        why = "the bridge was built" if first == built else "any recording"
-        raise UsageError(
-            f"that time is before {why} ({first:%Y-%m-%d}).",
-            remedy="Give the true time, or leave --time out: then that of its receipt counts.",
-        )
 
 
 def _refuse_copy_without_reason(hold: Hold | None, why: str) -> None:

@@ -110,7 +110,8 @@ def _draw_shape(model: Model, values: dict[str, float], shape: str, path: Path) 
             remedy="Take s1, s2, solid0, solid1 or solid2.",
         )
     corners, moved = model.surface(model.pack(values), PLANES[PLANES.index(plane)], int(order))
-    deformed_solid.write_png(corners, moved, path)
+    deformed_solid.write_png(corners, moved, path, f"{model.title}: mode {order}, {plane}.")
+    click.echo(f"Mode {order}, {plane}, of {model.title} is drawn in {path}.")
 
 
 def _show_one(model: Model, values: dict[str, float], modes: int, as_json: bool) -> None:

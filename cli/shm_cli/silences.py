@@ -9,6 +9,7 @@ import rich_click as click
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Silence
+from shm.store.stored_silences import hangers_of
 from shm_cli.common import (
     hanger_option,
     json_option,
@@ -71,8 +72,9 @@ def silence(
         return
     kind = "Maintenance window" if maintenance else "Silence"
     click.echo(
-        f"{kind} {made.id}: hooks are told nothing of {_of(made)} from {_at(made.starts_at)} until "
-        f"{_at(made.until)} UTC. End it early: `shm alerts unsilence {made.id}`."
+        f"{kind} {made.id}: hooks are told nothing of {hangers_of(made.hanger)} from "
+        f"{_at(made.starts_at)} until {_at(made.until)} UTC. End it early: "
+        f"`shm alerts unsilence {made.id}`."
     )
 
 
@@ -98,7 +100,7 @@ def silences(ctx: click.Context, as_json: bool) -> None:
     for each in found:
         made.add_row(
             str(each.id),
-            _of(each),
+            hangers_of(each.hanger),
             "maintenance" if each.is_maintenance else "silence",
             state_of(each, now),
             _at(each.starts_at),
@@ -125,7 +127,9 @@ def unsilence(ctx: click.Context, silence_id: int, who: str, as_json: bool) -> N
     if as_json:
         show(silence_row(ended, now))
         return
-    click.echo(f"Silence {silence_id} has ended: hooks are told of {_of(ended)} again.")
+    click.echo(
+        f"Silence {silence_id} has ended: hooks are told of {hangers_of(ended.hanger)} again."
+    )
 
 
 def silence_row(silence: Silence, now: datetime) -> dict[str, object]:
@@ -138,19 +142,6 @@ def state_of(silence: Silence, now: datetime) -> str:
     if silence.is_over(now):
         return "over"
     return "to come" if silence.starts_at > now else "in force"
-
-
-def said_of(silence: Silence) -> str:
-    """A silence in force, for the status."""
-    kind = "maintenance window" if silence.is_maintenance else "silence"
-    return (
-        f"{kind} {silence.id}: hooks are told nothing of {_of(silence)} until {_at(silence.until)} "
-        f"UTC ({silence.who}: {silence.why})"
-    )
-
-
-def _of(silence: Silence) -> str:
-    return "all hangers" if silence.hanger is None else f"hanger {silence.hanger}"
 
 
 def _at(time: datetime) -> str:

@@ -37,7 +37,6 @@ from shm.store.checksums import of_readable
 from shm.watch.frequency_text import frequency_words
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
-from shm_cli.silences import said_of
 from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import never_taken, scan
 
@@ -236,9 +235,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
         "quiet_hours": _quiet(workspace, store, now),
-        "silences": [
-            said_of(each) for each in store.silences.list_current(now) if each.starts_at <= now
-        ],
+        "silences": list(store.silences.list_in_force(now)),
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
         "changed_settings": [str(each) for each in store.settings.list_current().values()],

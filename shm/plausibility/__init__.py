@@ -13,7 +13,7 @@ from shm.plausibility.candidate import (
     Check,
     implied_shift,
 )
-from shm.plausibility.clock import FIRST_DAY
+from shm.plausibility.clock import FIRST_DAY, refuse_impossible
 from shm.plausibility.copies import fingerprint_of
 from shm.plausibility.notice import notice_of
 from shm.values import Doubt
@@ -27,6 +27,7 @@ __all__ = [
     "fingerprint_of",
     "implied_shift",
     "notice_of",
+    "refuse_impossible",
 ]
 
 CHECKS: tuple[Check, ...] = (

@@ -11,6 +11,7 @@ from datetime import date, datetime, timedelta
 from datetime import time as clock_time
 
 from shm.documents import format_time
+from shm.errors import UsageError
 from shm.plausibility.candidate import Candidate, implied_shift
 from shm.values import Doubt
 
@@ -23,6 +24,17 @@ RESET_DAYS = (date(1980, 1, 1), date(1980, 1, 6), date(2000, 1, 1))
 _ONE_TEST = timedelta(days=1)  # the hits and set-ups of one test take hours, whatever the zone
 _BETWEEN_CAMPAIGNS = timedelta(days=20 * 365)  # main inspections are six years apart at most
 _SET_RIGHT = "Confirm it with its true time, or discard it"
+
+
+def refuse_impossible(time: datetime | None, built: date | None) -> None:
+    """Raises UsageError where a person gives a time that is that of no recording."""
+    first = max(FIRST_DAY, built or FIRST_DAY)
+    if time is not None and time.date() < first:
+        why = "the bridge was built" if first == built else "any recording"
+        raise UsageError(
+            f"that time is before {why} ({first:%Y-%m-%d}).",
+            remedy="Give the true time, or none: then that of its receipt counts.",
+        )
 
 
 def before_the_bridge(candidate: Candidate) -> Doubt | None:

@@ -75,6 +75,10 @@ class Silences(Repository):
         """Those in force at a time or yet to come."""
         return tuple(each for each in self.list_all() if not each.is_over(at))
 
+    def list_in_force(self, at: datetime) -> tuple[str, ...]:
+        """Those in force at a time, in words."""
+        return tuple(said_of(each) for each in self.list_current(at) if each.starts_at <= at)
+
     @staticmethod
     def _one(
         id_: int, made: Silence, ended_at: datetime | None = None, ended_who: str = ""
@@ -91,8 +95,22 @@ def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> 
     return None if until == at else until
 
 
+def said_of(silence: Silence) -> str:
+    """A silence in force, in words."""
+    kind = "maintenance window" if silence.is_maintenance else "silence"
+    return (
+        f"{kind} {silence.id}: hooks are told nothing of {hangers_of(silence.hanger)} until "
+        f"{silence.until:%Y-%m-%d %H:%M} UTC ({silence.who}: {silence.why})"
+    )
+
+
+def hangers_of(hanger: int | None) -> str:
+    """Whom a silence is about."""
+    return "all hangers" if hanger is None else f"hanger {hanger}"
+
+
 def _named(number: int, hanger: int | None) -> str:
-    return f"silence {number}, " + ("all hangers" if hanger is None else f"hanger {hanger}")
+    return f"silence {number}, {hangers_of(hanger)}"
 
 
 def _silence(row: Row[tuple[object, ...]]) -> Silence:

@@ -102,6 +102,8 @@ def test_every_figure_of_appendix_b_is_a_mode_of_both_planes() -> None:
 def test_predict_draws_a_mode_of_a_solid_and_refuses_a_beam_s(shm: Shm, tmp_path: Path) -> None:
     path = tmp_path / "mode.png"
     given = ("--hanger-file", thesis.HANGER_FILE, "--shape", "longitudinal:1", "--figure", path)
-    assert shm("predict", "s1", *given).code == 0
+    ended = shm("predict", "s1", *given)
+    assert (ended.code, ended.err) == (0, "")
+    assert f"is drawn in {path}" in ended.out.replace("\n", " ")
     assert path.read_bytes().startswith(b"\x89PNG")
     assert "is no solid" in shm("predict", "beam1", *given).err

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from datetime import UTC, datetime
 
 import httpx
 import pytest
 
-from shm.documents import dump
-from shm.modes_document import modes_document
 from shm.store import Workspace
 from shm_daemon.heartbeat import beat
 from tests.helpers import quick_update
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, served
-from tests.helpers.workspaces import make_workspace, modelled_test, put, write_test
+from tests.helpers.workspaces import make_workspace, write_held, write_test
 
 
 @pytest.fixture(scope="module")
@@ -28,9 +24,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
         write_test(made.spool / "good.modes.json", made)
         ingest(made)
         for number in (3, 4):
-            test = modelled_test(f"epoch{number}", made.bridge.hanger(number), tension=0.9)
-            test = replace(test, time=datetime(1970, 1, 1, tzinfo=UTC))
-            put(made.spool / f"epoch{number}.modes.json", dump(modes_document([test])))
+            write_held(made, number)
         ingest(made)
     beat(made)
     return made

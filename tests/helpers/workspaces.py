@@ -118,3 +118,10 @@ def put(path: Path, content: str | bytes) -> None:
     temporary = path.with_name(f".{path.name}.part")
     temporary.write_bytes(content if isinstance(content, bytes) else content.encode())
     temporary.rename(path)
+
+
+def write_held(workspace: Workspace, hanger: int) -> None:
+    """A test of 1970, which is held until a person decides."""
+    test = modelled_test(f"epoch{hanger}", workspace.bridge.hanger(hanger), tension=0.9)
+    test = replace(test, time=datetime(1970, 1, 1, tzinfo=UTC))
+    put(workspace.spool / f"{test.id}.modes.json", dump(modes_document([test])))

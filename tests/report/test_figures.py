@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import subprocess
 import sys
@@ -12,10 +13,12 @@ from datetime import timedelta
 import matplotlib as mpl
 import numpy as np
 import pytest
+from PIL import Image
 
 from shm.report.colours import PALETTE
 from shm.report.contents import HangerReport
 from shm.report.figures.every_figure import Illustration, hanger_figures
+from shm.report.figures.illustration import png
 from shm.values import FrequencyResponse
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -191,8 +194,14 @@ def test_the_same_report_gives_the_same_svg(season: HangerReport) -> None:
     assert first == second
 
 
-def test_a_png_is_a_png(drawn: dict[str, Illustration]) -> None:
-    assert drawn["tension"].png(50).startswith(b"\x89PNG")
+def test_a_png_is_a_png_and_has_room_below_for_words(drawn: dict[str, Illustration]) -> None:
+    figure = drawn["tension"].figure
+    bare, told = (
+        Image.open(io.BytesIO(png(figure, 50, words))) for words in ("", "circles: seen. " * 40)
+    )
+    assert bare.format == "PNG"
+    assert told.height > bare.height + 20
+    assert told.width < 1.1 * bare.width
 
 
 def test_drawing_leaves_the_global_settings_as_they_were(season: HangerReport) -> None:

@@ -26,11 +26,12 @@ class Figure:
     document: Any
     specification: Specification | None = None
     missed: str = ""
-    draw: Callable[[Path], None] | None = None
+    draw: Callable[[Path, str], None] | None = None
 
     def write(self, path: Path) -> None:
-        """The picture, as PNG."""
+        """The picture, as PNG, with what it says below."""
+        words = f"{self.title}. {self.statement}"
         if self.specification is not None:
-            write_png(self.specification, path)
+            write_png(self.specification, path, words)
         elif self.draw is not None:
-            self.draw(path)
+            self.draw(path, words)

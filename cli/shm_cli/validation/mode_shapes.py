@@ -46,5 +46,5 @@ def shown(hanger: Hanger, tell: Callable[[str, float], None], number: str) -> Fi
         [(f"{each['from_deck_m']:.1f}", f"{each['displacement']:+.3f}") for each in rows],
         "Class 1 at 711 kN, springs as stiff as a clamp. The largest displacement is 1.",
         {"figure": number, "order": order, "plane": plane, "frequency_hz": hz, "surface": rows},
-        draw=lambda path: write_png(corners, moved, path),
+        draw=lambda path, words: write_png(corners, moved, path, words),
     )

@@ -13,6 +13,7 @@ from datetime import timedelta
 from typing import Any
 
 from shm.errors import ShmError
+from shm.pipeline import utc_now
 from shm.values.messages import Lead
 from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
 from shm_daemon.spool import never_taken
@@ -55,7 +56,12 @@ def notices(site: Site) -> list[Lead]:
     A page is shown whatever befalls this.
     """
     try:
-        return [*_of_daemon(site), *_of_description(site), *_of_strangers(site)]
+        return [
+            *_of_daemon(site),
+            *_of_description(site),
+            *_of_strangers(site),
+            *_of_silences(site),
+        ]
     except Exception:
         log.exception("the notices of a page cannot be made")
         return []
@@ -94,6 +100,15 @@ def _of_strangers(site: Site) -> list[Lead]:
             f"Add its table `[[hanger]]` with `id = {missing[0]}` to bridge.toml.",
         )
     ]
+
+
+def _of_silences(site: Site) -> list[Lead]:
+    try:
+        found = site.store.silences.list_in_force(utc_now())
+    except ShmError:
+        return []  # told as a trouble
+    action = "Alerts are raised and shown all the same; a silence is ended on the page of alerts."
+    return [Lead(f"{each[0].upper()}{each[1:]}.", action) for each in found]
 
 
 def _found(site: Site, *checks: Callable[[Site], list[str]]) -> list[str]:

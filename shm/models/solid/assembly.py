@@ -244,6 +244,11 @@ def _stress(basis: Basis, displacement: FloatArray, material: Material) -> dict[
     }
 
 
+def _by_column(points: IntArray, cells: IntArray) -> tuple[FloatArray, IntArray]:
+    """As scikit-fem takes them; it warns of a large one that lies otherwise in memory."""
+    return points.T.astype(float, order="C"), cells.T.copy()
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Hexahedra of 27 nodes; `grid` holds each node's place in the grid, shape (3, nodes).
@@ -260,7 +265,7 @@ class Mesh:
         """The quarter of the hanger."""
         corners = _cells(geometry)[:, None, :] + _HEXAHEDRON
         points, index = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-        linear = MeshHex1(points.T.astype(float), index.reshape(len(corners), 8).T, validate=False)
+        linear = MeshHex1(*_by_column(points, index.reshape(len(corners), 8)), validate=False)
         grid = MeshHex2.from_mesh(linear).doflocs
         return cls(geometry, MeshHex2(geometry.place(grid), linear.t, validate=False), grid)
 
@@ -281,7 +286,7 @@ class Mesh:
         zone = self.geometry.zones()[-1 if arch else 0]
         corners = np.array(list(self.geometry.section_cells(zone)))[:, None, :] + _QUADRILATERAL
         points, index = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
-        linear = MeshQuad1(points.T.astype(float), index.reshape(len(corners), 4).T, validate=False)
+        linear = MeshQuad1(*_by_column(points, index.reshape(len(corners), 4)), validate=False)
         grid = MeshQuad2.from_mesh(linear).doflocs
         grid = np.vstack([grid, np.full(grid.shape[1], self._level(arch))])
         # A face of its own: scikit-fem's boundary integrals on curved cells may not converge.

@@ -41,12 +41,12 @@ def specify(parts: Sequence[Curves], x_label: str, y_label: str) -> Specificatio
     return Specification(rows=[panels], height_inches=_ASIDE_INCHES, legend_columns=7)
 
 
-def write_png(figure: Specification, path: Path) -> None:
-    """The figure on white."""
+def write_png(figure: Specification, path: Path, words: str = "") -> None:
+    """The figure on white, with `words` below."""
     # What draws is loaded where something is drawn.
     from shm.report.figures.with_matplotlib import draw
 
-    path.write_bytes(illustration.png(draw(figure)))
+    path.write_bytes(illustration.png(draw(figure), words=words))
 
 
 def _lines(curves: Curves) -> list[Mark]:

@@ -57,6 +57,6 @@ def draw(corners: FloatArray, moved: FloatArray) -> Figure:
     return figure
 
 
-def write_png(corners: FloatArray, moved: FloatArray, path: Path) -> None:
-    """The figure of these on white."""
-    path.write_bytes(illustration.png(draw(corners, moved)))
+def write_png(corners: FloatArray, moved: FloatArray, path: Path, words: str = "") -> None:
+    """The figure of these on white, with `words` below."""
+    path.write_bytes(illustration.png(draw(corners, moved), words=words))

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import io
 import re
+import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from shm.report.colours import PALETTE
+from shm.report.colours import INK, PALETTE
 from shm.report.figures.specification import Specification
+from shm.report.figures.style import TINY
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 Data = TypeVar("Data")
 DOTS_PER_INCH = 150
 """Of a file, for a screen; a PDF has more (`as_pdf`)."""
+_COLUMNS_AN_INCH = 17  # layout: letters of the smallest size, about half as wide as high
 
 
 @dataclass(frozen=True)
@@ -82,10 +85,16 @@ _ID = re.compile(r'\bid="([^"]+)"')
 _REFERENCE = re.compile(r'(href="#|url\(#)([^")]+)')
 
 
-def png(figure: Figure, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
-    """The figure on white."""
+def png(figure: Figure, dots_per_inch: int = DOTS_PER_INCH, words: str = "") -> bytes:
+    """The figure on white; with `words` below it, where it goes without a page that says them."""
+    box = None
+    if words:
+        columns = round(_COLUMNS_AN_INCH * figure.get_figwidth())
+        lines = "\n".join(textwrap.wrap(words, columns))
+        figure.text(0.01, -0.02, lines, va="top", fontsize=TINY, color=INK)
+        box = "tight"
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=dots_per_inch, facecolor="white")
+    figure.savefig(buffer, format="png", dpi=dots_per_inch, facecolor="white", bbox_inches=box)
     return buffer.getvalue()
 
 

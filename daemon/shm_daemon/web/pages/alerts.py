@@ -14,9 +14,10 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from shm.bridge import Hook
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
+from shm.report import formatting
 from shm.report.hanger_status import HangerMessage
 from shm.store import AlertRow, DeliveryRow, DeliveryState, News, Silence
-from shm.store.stored_silences import silenced_until
+from shm.store.stored_silences import said_of, silenced_until
 from shm.values.messages import Lead
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import test_page
@@ -47,7 +48,7 @@ def alerts_page(
     """
     opened, older_open = _some(site, hanger, open_before, is_open=True)
     noted, older_noted = _some(site, hanger, noted_before, is_open=False)
-    counts = site.store.alerts.open_counts()
+    counts, now = site.store.alerts.open_counts(), utc_now()
     return page(
         request,
         "alerts.html.j2",
@@ -58,9 +59,18 @@ def alerts_page(
         open_count=sum(counts.values()) if hanger is None else counts.get(hanger, 0),
         is_first=open_before is None and noted_before is None,
         hanger=hanger,
+        silences=[(each.id, _sentence(each)) for each in site.store.silences.list_current(now)],
+        hangers=[
+            (h.id, formatting.hanger_name(h.id, h.name)) for h in site.workspace.bridge.watched
+        ],
         has_hooks=bool(site.workspace.bridge.hooks),
         marks=_MARKS,
     )
+
+
+def _sentence(silence: Silence) -> str:
+    words = f"{said_of(silence)}, from {silence.starts_at:%Y-%m-%d %H:%M} on."
+    return words[0].upper() + words[1:]
 
 
 def _some(

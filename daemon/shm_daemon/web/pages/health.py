@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
 
 import shm
@@ -30,7 +30,7 @@ from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
 from shm_daemon.web.hangers import quarantined
 from shm_daemon.web.health import troubles
-from shm_daemon.web.models import Examination, Operation, Underway
+from shm_daemon.web.models import LARGEST_NUMBER, Examination, Operation, Underway
 from shm_daemon.web.site import Site, held_documents
 
 router = APIRouter(tags=["operation"])
@@ -79,13 +79,22 @@ class Examine:
 
 
 @router.get("/operation", include_in_schema=False)
-def operation_page(request: Request, site: AtSite, _: Reader) -> Response:
-    """Everything an operator asks first, and the full examination as soon as it is there."""
+def operation_page(
+    request: Request,
+    site: AtSite,
+    _: Reader,
+    decided: Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)] = None,
+) -> Response:
+    """Everything an operator asks first, and the full examination as soon as it is there.
+
+    `decided` is a recording that was held, of which its decision is told.
+    """
     state = _operation(site)
     return page(
         request,
         "health.html.j2",
         state=state,
+        decided=None if decided is None else site.store.recordings.latest_hold(decided),
         facts=_facts(state),
         stages=_stages(state["recordings"]),
         examination=_examination(request, site),

@@ -54,6 +54,8 @@ def _page(request: Request, view: TestView, response: int | None) -> HTMLRespons
         "test.html.j2",
         title=name(sheet),
         hanger=hanger_id,
+        test=view.stored.test.id,
+        recording=view.recording.id,
         verdict=headline(view.stored.quality),
         style=VERDICT_STYLES[verdict],
         summary=view.summary,

@@ -1,0 +1,59 @@
+"""Silences and maintenance windows: made and ended on the page of alerts."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Request, Response
+from fastapi.responses import RedirectResponse
+from starlette.concurrency import run_in_threadpool
+
+from shm.documents import parse_time
+from shm.errors import BadInput, UsageError
+from shm.pipeline import utc_now
+from shm_daemon.web.access import AtSite, Visitor, Writer
+from shm_daemon.web.models import LARGEST_NUMBER
+from shm_daemon.web.signing_in import form_of
+from shm_daemon.web.site import Site
+
+router = APIRouter(prefix="/silences", include_in_schema=False)
+
+_SHOWN_AT = "/alerts#silences"
+
+
+@router.post("")
+async def make(request: Request, site: AtSite, writer: Writer) -> Response:
+    """Holds the messages of hooks back for a while."""
+    await run_in_threadpool(_make, site, writer, await form_of(request))
+    return RedirectResponse(_SHOWN_AT, 303)
+
+
+@router.post("/{number}/end")
+def end(
+    site: AtSite, writer: Writer, number: Annotated[int, Path(ge=0, le=LARGEST_NUMBER)]
+) -> Response:
+    """Ends one before its time."""
+    store = site.store.acting_as(writer.actor)
+    store.silences.end(number, writer.actor.name, utc_now())
+    return RedirectResponse(_SHOWN_AT, 303)
+
+
+def _make(site: Site, writer: Visitor, told: dict[str, str]) -> None:
+    now, number, why = utc_now(), told.get("hanger", ""), told.get("why", "").strip()
+    try:
+        hanger = int(number) if number else None
+        since = parse_time(told["from"]) if told.get("from") else now
+        until = parse_time(told.get("until", ""))
+    except (ValueError, OverflowError):
+        raise BadInput(
+            "a silence has hangers and an end.",
+            remedy="Choose them in the form.",
+        ) from None
+    if not why:
+        raise UsageError("a silence needs a reason.", remedy="Write why, for the record.")
+    if hanger is not None:
+        site.workspace.bridge.tested(hanger)
+    who = writer.actor
+    site.store.acting_as(who).silences.make(
+        hanger, (since, until), who.name, why, now, is_maintenance="maintenance" in told
+    )
