@@ -39,8 +39,6 @@ def command(ctx: click.Context, as_json: bool) -> None:
         return
     click.echo(paragraph(headline(rows)))
     for row in rows:
-        said = [lead.words for lead in row.leads]
-        if row.summary:
-            said.append(f"It last said: {row.summary.words}" if row.trouble else row.summary.words)
+        said = [lead.words for lead in row.leads] + ([row.summary.words] if row.summary else [])
         state = f" ({', '.join(word for word, _ in row.states)})" if row.states else ""
         click.echo(paragraph(printable(f"{row.name}{state}: {' '.join(said)}", " ")))

@@ -33,7 +33,7 @@ def test_a_bridge_is_named_with_its_dashboard_and_its_files(tmp_path: Path) -> N
         ('address = "https://a.example"', "name is missing"),
         ('name = "a\\u001b"\naddress = "https://a.example"', "name = "),
         ('name = "a"', "address is not an address of the web"),
-        ('name = "a"\naddress = "file:///etc/passwd"', "address is not an address of the web"),
+        ('name = "a"\naddress = "ftp://a.example"', "address is not an address of the web"),
         ('name = "a"\naddress = "http://a.example"', "address is not encrypted"),
         ('name = "a"\naddress = "https://u:p@a.example"', "address holds a user or password"),
         ('name = "a"\naddress = "https://a.example/hangers/3"', "address is that of a page"),

@@ -363,6 +363,23 @@ def test_what_was_said_last_is_shown_with_its_age(tmp_path: Path) -> None:
     assert len(listener.told) == 2
 
 
+def test_the_page_shows_the_last_state_in_no_colour_and_as_text(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("shm_daemon.web.other_bridges._FRESH_FOR", timedelta(0))
+    said = replace(SAID, state="<b>No change</b> detected.")
+    with a_listener(lambda _: Answer(200, dump(asdict(said)).encode())) as listener:
+        name_others(workspace, OtherBridge("Severn", listener.url.removesuffix("/alerts")))
+        with served(workspace.reopened()) as site, site.client() as client:
+            now = client.get("/bridges").text
+            listener.answer = lambda _: Answer(cut=True)
+            later = client.get("/bridges").text
+    parts = [page.split('id="bridge-Severn"')[1].split("</article>")[0] for page in (now, later)]
+    assert all("&lt;b&gt;No change&lt;/b&gt; detected." in part for part in parts)
+    assert ["steady" in part for part in parts] == [True, False]
+    assert re.search(r"Last state, of \d{4}-\d\d-\d\d \d\d:\d\d UTC: ", parts[1])
+
+
 def test_a_fault_of_ours_while_asking_is_said_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -56,6 +56,34 @@ from shm_daemon.web.site import Site
 
 _described = APIRouter(include_in_schema=False)
 
+_PARTS = (
+    recordings,
+    streams,
+    imports,
+    hangers,
+    alerts,
+    watching,
+    signing_in,
+    static,
+    bridge,
+    bridges,
+    comparison,
+    upload,
+    health,
+    held,
+    silences,
+    sensors,
+    tests,
+    one_test,
+    hanger_numbers,
+    hanger,
+    downloads,
+    notes,
+    audit,
+    settings,
+    users,
+    password,
+)
 _DESCRIPTION = (
     "Recordings come in, states and alerts are read, alerts are acknowledged. Answers that are no "
     "result are `{message, remedy}`. Forces in N, times in UTC."
@@ -78,34 +106,7 @@ def load_pages(site: Site) -> Pages:
     app.state.other_bridges = OtherBridges()
     app.state.exposition = Exposition(watching_site)
     handle_faults(app)
-    for part in (
-        recordings,
-        streams,
-        imports,
-        hangers,
-        alerts,
-        watching,
-        signing_in,
-        static,
-        bridge,
-        bridges,
-        comparison,
-        upload,
-        health,
-        held,
-        silences,
-        sensors,
-        tests,
-        one_test,
-        hanger_numbers,
-        hanger,
-        downloads,
-        notes,
-        audit,
-        settings,
-        users,
-        password,
-    ):
+    for part in _PARTS:
         app.include_router(part.router)
     app.include_router(_described)
 
