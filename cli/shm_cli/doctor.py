@@ -32,9 +32,9 @@ _FAULT = 1
 def command(ctx: click.Context, as_json: bool) -> int:
     """Whether all is well, and what to do where it is not.
 
-    Looks at folders, disks, store, daemon, spool, recordings, backups, clock, hooks, hangers and
-    versions; changes and sends nothing. Exit code 0 without a fault (warnings are none), 5 where
-    the store is at fault, else 1.
+    Looks at folders, disks, store, daemon, spool, recordings, backups, clock, hooks, hangers,
+    versions and whether other bridges answer; changes nothing. Exit code 0 without a fault
+    (warnings are none), 5 where the store is at fault, else 1.
 
     \b
     Example: shm --workspace arch doctor

@@ -72,6 +72,9 @@ VERBS: dict[str, Verb] = {
     ),
     "doctor": Verb("shm_cli.doctor", "Whether all is well, and what to do where it is not."),
     "status": Verb("shm_cli.status", "What the workspace holds and what waits."),
+    "bridges": Verb(
+        "shm_cli.bridges", "How this bridge and the others of bridge.toml are, the worst first."
+    ),
     "settings": Verb("shm_cli.settings", "Every setting: its default, its range, what it means."),
     "notices": Verb(
         "shm_cli.notices",

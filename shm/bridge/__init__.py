@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from shm.bridge.description import Bridge, Disturbance, load_bridge, load_hanger
 from shm.bridge.hooks import AppriseHook, CommandHook, Hook, WebhookHook
+from shm.bridge.other_bridges import OtherBridge
 
 __all__ = [
     "AppriseHook",
@@ -11,6 +12,7 @@ __all__ = [
     "CommandHook",
     "Disturbance",
     "Hook",
+    "OtherBridge",
     "WebhookHook",
     "load_bridge",
     "load_hanger",

@@ -15,6 +15,7 @@ from shm.bridge.changes import overlaid
 from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, escalations_s, hook_of
 from shm.bridge.letterhead import letterhead_of
+from shm.bridge.other_bridges import OtherBridge, other_bridge_of
 from shm.bridge.quiet_hours import zone_of
 from shm.bridge.single_sign_on import SingleSignOn, single_sign_on_of
 from shm.bridge.streams import stream_named, streams_of
@@ -54,6 +55,7 @@ class Bridge:
     structures: tuple[Hanger, ...] = ()
     streams: tuple[Stream, ...] = ()
     letterhead: Letterhead = NO_LETTERHEAD
+    other_bridges: tuple[OtherBridge, ...] = ()
     measurement_hours: Mapping[str, float] = field(default_factory=lambda: MEASUREMENT_HOURS)
     as_in_file: Bridge | None = None
     single_sign_on: SingleSignOn | None = None
@@ -115,6 +117,8 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
     zone = zone_of(document.get("bridge", {}), path)
     hooks = tuple(hook_of(table, path, zone) for table in _tables(document, "hook", path))
     _refuse_doubles([hook.name for hook in hooks], "hook name", path)
+    others = tuple(other_bridge_of(each, path) for each in _tables(document, "other_bridge", path))
+    _refuse_doubles([other.name for other in others], "other_bridge name", path)
     described = {each.id: each for each in hangers}
     streams = streams_of(_tables(document, "stream", path), path, described)
     return Bridge(
@@ -130,6 +134,7 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
         structures=structures,
         streams=streams,
         letterhead=letterhead_of(document, path),
+        other_bridges=others,
         measurement_hours=_hours(document.get("measurement_hours", {}), path),
         single_sign_on=single_sign_on_of(document, path),
     )

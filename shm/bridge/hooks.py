@@ -5,17 +5,16 @@ A kind of hook is known by the key that only it has (`_KINDS`); what delivers it
 
 from __future__ import annotations
 
-import ipaddress
 import string
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, tzinfo
 from pathlib import Path
 from typing import Any
-from urllib.parse import SplitResult, urlsplit
+from urllib.parse import urlsplit
 
 from shm.bridge.quiet_hours import QUIET_HOURS, QuietHours, quiet_hours_of
-from shm.bridge.table import Table
+from shm.bridge.table import Table, web_address
 from shm.errors import BadInput
 from shm.values.messages import Lead
 
@@ -180,7 +179,8 @@ def _webhook(table: Table, name: str) -> Hook:
     in_file, in_environment = (
         _text(table, key, _WHERE_SECRETS_STAND) for key in ("secret_file", "secret_env")
     )
-    return WebhookHook(name, _url(table), in_file, in_environment)
+    url = web_address(table, "url", _ADDRESS, "alerts are signed instead")
+    return WebhookHook(name, url, in_file, in_environment)
 
 
 def _apprise(table: Table, name: str) -> Hook:
@@ -204,35 +204,6 @@ _KINDS: dict[str, Callable[[Table, str], Hook]] = {
     "apprise": _apprise,
     "apprise_file": _apprise,
 }
-
-
-def _url(table: Table) -> str:
-    url = _text(table, "url", _ADDRESS)
-    try:
-        parts = urlsplit(url)
-        _ = parts.port
-    except ValueError:
-        parts = SplitResult("", "", "", "", "")
-    if parts.scheme not in ("http", "https") or not parts.hostname or not url.isprintable():
-        raise table.refusal("url is not an address of the web", _ADDRESS)
-    if "@" in parts.netloc:
-        raise table.refusal("url holds a user or password; alerts are signed instead", _ADDRESS)
-    open_allowed = table.values.get("allow_http", False)
-    if not isinstance(open_allowed, bool):
-        raise table.refusal("allow_http is neither true nor false", "Write allow_http = true.")
-    if parts.scheme == "http" and not open_allowed and not is_loopback(parts.hostname):
-        raise table.refusal(
-            "url is not encrypted", "Write https://, or allow_http = true in a network you trust."
-        )
-    return url
-
-
-def is_loopback(host: str) -> bool:
-    """Whether a host is this machine itself."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host.lower() == "localhost"
 
 
 def _text(table: Table, key: str, remedy: str) -> str:

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from shm.bridge.hooks import is_loopback
-from shm.bridge.table import Table
+from shm.bridge.table import Table, is_loopback
 from shm.errors import BadInput
 
 EMAIL = "email"

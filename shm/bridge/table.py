@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ipaddress
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import SplitResult, urlsplit
 
 from shm.documents import Misfit, finite, reader, value_of
 from shm.errors import BadInput
@@ -104,6 +106,40 @@ class Table:
             Table(values, f"{self.label} {key} {number}", self.path)
             for number, values in enumerate(found, start=1)
         ]
+
+
+def web_address(table: Table, key: str, remedy: str, no_password: str) -> str:
+    """An address of the web, encrypted unless it is this machine or `allow_http` stands there.
+
+    `no_password` says why it needs none. Raises BadInput.
+    """
+    url = table.values.get(key, "")
+    try:
+        parts = urlsplit(url if isinstance(url, str) and url.isprintable() else "")
+        _ = parts.port
+    except ValueError:
+        parts = SplitResult("", "", "", "", "")
+    if parts.scheme not in ("http", "https") or not parts.hostname:
+        raise table.refusal(f"{key} is not an address of the web", remedy)
+    if "@" in parts.netloc:
+        raise table.refusal(f"{key} holds a user or password; {no_password}", remedy)
+    open_allowed = table.values.get("allow_http", False)
+    if not isinstance(open_allowed, bool):
+        raise table.refusal("allow_http is neither true nor false", "Write allow_http = true.")
+    if parts.scheme == "http" and not open_allowed and not is_loopback(parts.hostname):
+        raise table.refusal(
+            f"{key} is not encrypted",
+            "Write https://, or allow_http = true in a network you trust.",
+        )
+    return str(url)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host is this machine itself."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host.lower() == "localhost"
 
 
 _LABEL = re.compile(r"(?:\[\[)?(\w+)(?:\]\] id)? (\S+)")

@@ -43,7 +43,8 @@ class Status(Enum):
     FIRST = "First test"
 
 
-_QUIET = (Status.STEADY, Status.FIRST)
+QUIET = (Status.STEADY, Status.FIRST)
+"""States in which nothing was found."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class HangerMessage:
     @property
     def needs_action(self) -> bool:
         """Beyond what is planned anyhow."""
-        return self.is_known and self.status not in _QUIET
+        return self.is_known and self.status not in QUIET
 
     @property
     def is_known(self) -> bool:

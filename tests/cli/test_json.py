@@ -46,6 +46,7 @@ READING = (
     "alerts",
     "alerts --hanger 3",
     "archive prune --keep-days 1 --dry-run",
+    "bridges",
     "db check",
     "db check --archive",
     "doctor",

@@ -44,6 +44,7 @@ PAGES = {
     **{name.lower(): address for address, name in (*NAVIGATION, *FOR_ENGINEERS)},
     "limits": "/settings?hanger=3",
     "baseline": "/hangers/3/baseline",
+    "bridges": "/bridges",
     "password": "/password",
 }
 CHARTS = {"hanger": 4, "recording": 6}

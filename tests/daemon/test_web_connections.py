@@ -5,7 +5,6 @@ from __future__ import annotations
 import socket
 import ssl
 import statistics
-import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -188,16 +187,6 @@ def test_more_than_a_request_needs_is_not_read(site: Served) -> None:
 def test_the_places_leave_threads_for_those_who_watch() -> None:
     """Anyio has 40 threads for whatever blocks; each request holds one at most."""
     assert sum(front._PLACES.values()) < 40
-
-
-@pytest.fixture
-def certificate(tmp_path: Path) -> tuple[Path, Path]:
-    pem, key = tmp_path / "certificate.pem", tmp_path / "key.pem"
-    made = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2"]
-    names = ["-keyout", str(key), "-out", str(pem), "-subj", "/CN=localhost"]
-    alternative = ["-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1"]
-    subprocess.run([*made, *names, *alternative], check=True, capture_output=True)
-    return pem, key
 
 
 @pytest.mark.slow

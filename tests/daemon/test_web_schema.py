@@ -50,6 +50,8 @@ ROUTES = (
     "POST /api/alerts/{alert_id}/acknowledgement",
     "GET /api/bridge",
     "GET /api/bridge/moved",
+    "GET /api/bridge/summary",
+    "GET /api/bridges",
     "GET /api/compare/figure",
     "GET /api/operation",
     "GET /api/operation/examination",

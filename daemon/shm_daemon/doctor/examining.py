@@ -62,6 +62,7 @@ from shm_daemon.doctor.checks import (
 )
 from shm_daemon.heartbeat import told
 from shm_daemon.hooks import HookFailed, HookNotifier
+from shm_daemon.web.other_bridges import ask_all
 
 _REMEMBERED = timedelta(days=30)  # judgement: a month, within which an operator looks here
 
@@ -75,9 +76,21 @@ def check_hooks(workspace: Workspace) -> Iterator[Finding]:
     try:
         for hook in workspace.bridge.hooks:
             yield _ready(notifier, hook)
-            yield from _secrecy(workspace, hook)
+            yield from _secrecy(workspace, f"hook {hook.name}", _secret_file(hook))
     finally:
         notifier.close()
+
+
+def check_other_bridges(workspace: Workspace) -> Iterator[Finding]:
+    """Whether the dashboards of other bridges answer; nothing where none is named."""
+    others = workspace.bridge.other_bridges
+    for other, row in zip(others, ask_all(others, workspace.folder), strict=True):
+        check = f"bridge {other.name}"
+        if row.trouble:
+            yield warning(check, row.trouble.state, row.trouble.action)
+        else:
+            yield ok(check, other.address)
+        yield from _secrecy(workspace, check, other.token_file)
 
 
 def check_logo(workspace: Workspace) -> Iterator[Finding]:
@@ -143,15 +156,16 @@ def _ready(notifier: HookNotifier, hook: Hook) -> Finding:
         return fault(check, error.message, error.remedy)
 
 
-def _secrecy(workspace: Workspace, hook: Hook) -> Iterator[Finding]:
-    name = ""
+def _secret_file(hook: Hook) -> str:
     if isinstance(hook, WebhookHook):
-        name = hook.secret_file
-    if isinstance(hook, AppriseHook):
-        name = hook.address_file
+        return hook.secret_file
+    return hook.address_file if isinstance(hook, AppriseHook) else ""
+
+
+def _secrecy(workspace: Workspace, check: str, name: str) -> Iterator[Finding]:
     path = workspace.folder / name
     if name and path.exists() and path.stat().st_mode & (stat.S_IRGRP | stat.S_IROTH):
-        yield warning(f"hook {hook.name}", f"others can read {name}", f"chmod 600 {path}")
+        yield warning(check, f"others can read {name}", f"chmod 600 {path}")
 
 
 _CHECKS: Sequence[tuple[str, Check]] = (
@@ -192,6 +206,7 @@ def examine(folder: Path, now: datetime) -> tuple[Finding, ...]:
     findings += _found("logo", partial(check_logo, workspace))
     findings += _found("hooks", partial(check_hooks, workspace))
     findings += _found("single sign-on", partial(check_single_sign_on, workspace))
+    findings += _found("bridges", partial(check_other_bridges, workspace))
     return (*findings, *_of_store(workspace, now))
 
 

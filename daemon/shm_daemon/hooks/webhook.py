@@ -56,7 +56,7 @@ class WebhookDeliverer:
                     timeout=timeout_s,
                     allow_redirects=False,
                     stream=True,
-                    auth=_unchanged,
+                    auth=unchanged,
                 ) as response:
                     return _judged(response)
             except (requests.RequestException, OSError) as error:
@@ -144,7 +144,7 @@ def _words(response: requests.Response) -> str:
     return one_line(words) or one_line(response.reason or "") or "no message"
 
 
-def _unchanged(request: requests.PreparedRequest) -> requests.PreparedRequest:
+def unchanged(request: requests.PreparedRequest) -> requests.PreparedRequest:
     """Keeps the library from adding a password of the user's own (`.netrc`) to the request."""
     return request
 

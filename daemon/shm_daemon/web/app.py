@@ -31,11 +31,13 @@ from shm_daemon.web.faults import handle_faults
 from shm_daemon.web.frame import prepare_templates
 from shm_daemon.web.front import Pages
 from shm_daemon.web.metrics import Exposition
+from shm_daemon.web.other_bridges import OtherBridges
 from shm_daemon.web.pages import (
     alerts,
     audit,
     baseline,
     bridge,
+    bridges,
     comparison,
     downloads,
     hanger,
@@ -67,6 +69,7 @@ _PARTS = (
     single_sign_on,
     static,
     bridge,
+    bridges,
     comparison,
     upload,
     health,
@@ -107,6 +110,8 @@ def load_pages(site: Site) -> Pages:
     app.state.site = site
     app.state.background_worker = BackgroundWorker()
     app.state.ordered_baselines = baseline.Ordered()
+    app.state.sign_ons = single_sign_on.SignOns()
+    app.state.other_bridges = OtherBridges()
     app.state.exposition = Exposition(watching_site)
     handle_faults(app)
     for part in _PARTS:
@@ -115,6 +120,7 @@ def load_pages(site: Site) -> Pages:
 
     def close() -> None:
         app.state.background_worker.close()
+        app.state.other_bridges.close()
         watching_site.close()
         site.close()
 

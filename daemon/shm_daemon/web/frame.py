@@ -48,6 +48,7 @@ def page(request: Request, template: str, *, status: int = 200, **content: Any) 
     text = _environment().get_template(template).render(
         visitor=visitor,
         bridge=site.workspace.bridge.name if visitor else "",
+        has_others=bool(site.workspace.bridge.other_bridges),
         open_alerts=_open_alerts(site) if visitor else None,
         here=request.url.path,
         notices=notices(site) if visitor else (),

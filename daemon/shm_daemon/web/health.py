@@ -9,12 +9,12 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
 
 from shm.errors import ShmError
 from shm.pipeline import utc_now
+from shm.values.messages import Lead
 from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
 from shm_daemon.spool import never_taken
 from shm_daemon.web.site import Site
@@ -50,16 +50,11 @@ def attention(site: Site) -> list[str]:
     return _found(site, _held, _never_taken)
 
 
-@dataclass(frozen=True)
-class Notice:
-    """What every page says at its top: a state in a sentence, and what to do."""
+def notices(site: Site) -> list[Lead]:
+    """What every page says at its top: what limits the work, and its remedy.
 
-    state: str
-    action: str
-
-
-def notices(site: Site) -> list[Notice]:
-    """What limits the work, with its remedy; a page is shown whatever befalls this."""
+    A page is shown whatever befalls this.
+    """
     try:
         return [
             *_of_daemon(site),
@@ -72,25 +67,25 @@ def notices(site: Site) -> list[Notice]:
         return []
 
 
-def _of_daemon(site: Site) -> list[Notice]:
+def _of_daemon(site: Site) -> list[Lead]:
     silence = _silence(site)
     if not silence:
         return []
     action = "Until it runs again (`shm daemon`), recordings wait and no alert is raised."
-    return [Notice(silence, action)]
+    return [Lead(silence, action)]
 
 
-def _of_description(site: Site) -> list[Notice]:
+def _of_description(site: Site) -> list[Lead]:
     fault = site.fault
     if fault is None:
         return []
     where = fault.where or "bridge.toml"
     message = fault.message.replace(str(site.workspace.folder), "the workspace")
     state = f"{where}: {message} The description before is still in force."
-    return [Notice(state, fault.remedy or "Correct the file; `shm doctor` looks at it again.")]
+    return [Lead(state, fault.remedy or "Correct the file; `shm doctor` looks at it again.")]
 
 
-def _of_strangers(site: Site) -> list[Notice]:
+def _of_strangers(site: Site) -> list[Lead]:
     try:
         tested = set(site.store.tests.latest())
     except ShmError:
@@ -100,20 +95,20 @@ def _of_strangers(site: Site) -> list[Notice]:
         return []
     named = _named(missing)
     return [
-        Notice(
+        Lead(
             f"bridge.toml: hanger {named} is not described, though tests of it are stored.",
             f"Add its table `[[hanger]]` with `id = {missing[0]}` to bridge.toml.",
         )
     ]
 
 
-def _of_silences(site: Site) -> list[Notice]:
+def _of_silences(site: Site) -> list[Lead]:
     try:
         found = site.store.silences.list_in_force(utc_now())
     except ShmError:
         return []  # told as a trouble
     action = "Alerts are raised and shown all the same; a silence is ended on the page of alerts."
-    return [Notice(f"{each[0].upper()}{each[1:]}.", action) for each in found]
+    return [Lead(f"{each[0].upper()}{each[1:]}.", action) for each in found]
 
 
 def _found(site: Site, *checks: Callable[[Site], list[str]]) -> list[str]:
