@@ -86,7 +86,7 @@ def _of_description(site: Site) -> list[Notice]:
 
 def _of_strangers(site: Site) -> list[Notice]:
     try:
-        tested = set(site.store.tests.latest())
+        tested = site.store.tests.tested_hangers()
     except ShmError:
         return []  # told as a trouble
     missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.watched})
