@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
+from functools import partial
 from typing import TYPE_CHECKING
 
 import shm
 from shm.errors import DamagedRow, NothingThere
 from shm.pipeline.lineage import settings_words, software
-from shm.pipeline.open_warnings import warnings_of
+from shm.pipeline.open_warnings import warnings_from
 from shm.report.contents import BridgeReport, Course, HangerLine
 from shm.report.hanger_status import Known, findings, hanger_message, still_detected
 from shm.report.intervals import Interval
@@ -77,7 +78,7 @@ def hanger_lines(
 ) -> tuple[HangerLine, ...]:
     """Each of `hangers` in a line, or all in their order along the bridge, without samples."""
     hangers = hangers or workspace.bridge.hangers
-    kept = _Kept.of(workspace, store, hangers, now)
+    kept = HangersNow.of(workspace, store, hangers, now)
     return tuple(kept.line(hanger) for hanger in hangers)
 
 
@@ -104,7 +105,7 @@ def notes_of(
 
 
 @dataclass(frozen=True)
-class _Kept:
+class HangersNow:
     """What the store says of all hangers, asked in a few queries without any samples."""
 
     workspace: Workspace
@@ -114,7 +115,7 @@ class _Kept:
     watches: Mapping[int, StoredWatch]
     called: Mapping[int, Sequence[Change]]
     open_alerts: Mapping[int, int]
-    standing: Sequence[StoredAlert]
+    standing: Mapping[int, Sequence[StoredAlert]]
     silences: tuple[Silence, ...]
     damaged: Mapping[int, DamagedRow]
     warnings: Mapping[int, tuple[str, ...]]
@@ -122,20 +123,27 @@ class _Kept:
     @classmethod
     def of(
         cls, workspace: Workspace, store: Store, hangers: Sequence[Hanger], now: datetime
-    ) -> _Kept:
+    ) -> HangersNow:
         damaged = {row.hanger: row for row in store.upkeep.known_damage() if row.hanger is not None}
+        every = workspace.bridge.hangers
+        now_at = store.posteriors.latest_trends(hangers)
+        baselines = store.watch.baselines_in_force(every)  # of neighbours too: one may stand out
+        watches = of_readable(partial(store.watch.latest, hangers=hangers), damaged)
+        standing = defaultdict[int, list[StoredAlert]](list)
+        for each in store.alerts.list_all(_only(hangers), standing=True):
+            standing[each.alert.hanger].append(each)
         return cls(
             workspace,
             now,
-            store.posteriors.latest_trends(hangers),
-            store.watch.baselines_in_force(hangers),
-            of_readable(store.watch.latest, damaged),
-            of_readable(store.watch.detected_changes, damaged),
+            now_at,
+            baselines,
+            watches,
+            of_readable(partial(store.watch.detected_changes, hangers=hangers), damaged),
             store.alerts.open_counts(),
-            store.alerts.list_all(standing=True),
+            standing,
             store.silences.list_current(now),
             damaged,
-            warnings_of(workspace, store, hangers),
+            warnings_from(every, hangers, baselines, watches, now_at),
         )
 
     def line(self, hanger: Hanger) -> HangerLine:
@@ -170,7 +178,7 @@ class _Kept:
 
     def _known(self, hanger: Hanger, point: TrendPoint | None) -> Known:
         watched = self._watched(hanger)
-        standing = [each for each in self.standing if each.alert.hanger == hanger.id]
+        standing = self.standing.get(hanger.id, ())
         baseline = self.baselines.get(hanger.id)
         return Known(
             hanger,
@@ -185,6 +193,11 @@ class _Kept:
             notes_of(standing, self.silences, hanger.id, self.now),
             quiet_for(self.workspace, point.time, self.now) if point else None,
         )
+
+
+def _only(hangers: Sequence[Hanger]) -> int | None:
+    """The number of the hanger where it is but one."""
+    return hangers[0].id if len(hangers) == 1 else None
 
 
 def _courses(store: Store, hangers: Sequence[Hanger], period: Period) -> dict[int, Course]:

@@ -37,7 +37,7 @@ from shm.pipeline.jobs import (
 )
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import competing, reason_document
-from shm.pipeline.rejudging import judge_changed
+from shm.pipeline.rejudging import JudgedAgain
 from shm.read import sidecar_path
 from shm.store import Death, Deaths, Delivery, Outcome, Receipt, Store, StoredAlert, Workspace
 from shm.store.archive import Meanwhile, nothing
@@ -115,7 +115,7 @@ class Flow:
             if hanger.id in selected:
                 competing(hanger, workspace.settings, selected)
         self.workspace = workspace
-        judge_changed(workspace, self.store, self.clock())
+        self._judged_again = JudgedAgain(workspace, self.store, self.clock())
         heed_limits(workspace, self.store, workspace.bridge.hangers, self.clock())
         self.jobs = Jobs(workspace, self.store, self.clock)
 
@@ -178,6 +178,7 @@ class Flow:
         damaged: set[int | None] = {
             hanger for hanger, until in self._damaged.items() if _still_waits(until, now)
         }
+        self._judged_again.go_on(now, held, damaged)
         for job in self.jobs.waiting(2 * self.lanes, held):
             if job.hanger in damaged or job.key in self._running:
                 continue

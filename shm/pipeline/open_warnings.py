@@ -5,10 +5,11 @@ Nothing here imports what computes: `shm status` asks it, too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 
 from shm.report.open_warnings import nearly_slack, open_warnings, standing_out
-from shm.store import Store, Workspace
+from shm.store import BaselineGlance, Store, StoredWatch, TrendPoint, Workspace
 from shm.store.checksums import of_readable
 from shm.values import TENSION, Hanger
 
@@ -18,10 +19,20 @@ def warnings_of(
 ) -> dict[int, tuple[str, ...]]:
     """The open warnings of each of `hangers` that has a baseline, by hanger."""
     every = workspace.bridge.hangers
-    baselines = store.watch.baselines_in_force(every)
+    latest = of_readable(partial(store.watch.latest, hangers=hangers), {})
+    now, baselines = store.posteriors.latest_trends(hangers), store.watch.baselines_in_force(every)
+    return warnings_from(every, hangers, baselines, latest, now)
+
+
+def warnings_from(
+    every: Sequence[Hanger],
+    hangers: Sequence[Hanger],
+    baselines: Mapping[int, BaselineGlance],
+    latest: Mapping[int, StoredWatch],
+    now: Mapping[int, TrendPoint],
+) -> dict[int, tuple[str, ...]]:
+    """The same of what was asked already: the `baselines` of `every` hanger of the bridge."""
     tensions = {id_: each.averaged.tension_n for id_, each in baselines.items()}
-    latest = of_readable(store.watch.latest, {})
-    now = store.posteriors.latest_trends(hangers)
 
     def slack(hanger: Hanger) -> str:
         watched = latest[hanger.id].watched if hanger.id in latest else None

@@ -11,7 +11,7 @@ Nothing here imports what computes, so that the daemon itself begins quickly and
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from math import isnan
@@ -40,17 +40,46 @@ _CLOSED = "judged again with the thresholds in force"
 log = logging.getLogger(__name__)
 
 
-def judge_changed(workspace: Workspace, store: Store, at: datetime) -> None:
-    """Sends back the tests of each hanger whose latest was judged with other thresholds."""
-    latest = _latest(store, at)
-    for hanger in workspace.bridge.watched:
-        if hanger.id not in latest:
-            continue
-        why = "; ".join(differences(latest[hanger.id], hanger, workspace.settings))
-        if why:
-            baseline_id = latest[hanger.id].baseline_id
-            count = store.watch.judge_again(hanger.id, baseline_id, why, at)
-            log.info("hanger %d: %d tests are judged again: %s", hanger.id, count, why)
+class JudgedAgain:
+    """Sends back the tests of each hanger whose latest was judged with other thresholds.
+
+    One hanger at a time, so that what comes in meanwhile waits for no other hanger's; those of a
+    new test go first, since it is judged after them. Who is left is told by the store: nothing is
+    lost where the process is killed.
+    """
+
+    def __init__(self, workspace: Workspace, store: Store, at: datetime):
+        self._store, self._judging = store, -1
+        self._left: dict[int, tuple[int, str]] = {}
+        latest = _latest(store, at)
+        for hanger in workspace.bridge.watched:
+            if watch := latest.get(hanger.id):
+                why = "; ".join(differences(watch, hanger, workspace.settings))
+                self._left |= {hanger.id: (watch.baseline_id, why)} if why else {}
+
+    def go_on(
+        self, at: datetime, held: Collection[int] = (), damaged: Collection[int | None] = ()
+    ) -> None:
+        """Sends the next back where it is time; recordings that are held and hangers that stand
+        still are not waited for.
+        """
+        if not self._left:
+            return
+        waiting = {test.hanger for test in self._store.tests.list_waiting(1, excluding=held)}
+        for hanger in waiting & self._left.keys():
+            self._send_back(hanger, at)
+        while self._left and self._judging not in waiting - set(damaged):
+            hanger = next(iter(self._left))
+            if self._send_back(hanger, at):
+                return
+
+    def _send_back(self, hanger: int, at: datetime) -> int:
+        baseline_id, why = self._left.pop(hanger)
+        self._judging = hanger
+        count = self._store.watch.judge_again(hanger, baseline_id, why, at)
+        said = "hanger %d: %d tests are judged again, %d hangers are left: %s"
+        log.info(said, hanger, count, len(self._left), why)
+        return count
 
 
 def differences(judged: StoredWatch, hanger: Hanger, settings: Settings) -> Iterator[str]:

@@ -11,35 +11,42 @@ from shm.report.figures.stream_course import Course
 from shm.store import Store
 from shm.values import FloatArray
 from shm.values.rounding import NINETY_PERCENT
-from shm.values.stream import PooledReading, Stream
+from shm.values.stream import PERIODS, Period, PooledReading, Stream
 from shm.watch.history import Band
 
 _LONGEST_SPECTRA = timedelta(days=7)  # technical: a thousand windows of 200 lines
 
 
+_MOST_SPECTRA = 600  # technical: a spectrogram of more columns than a screen shows
+_MOST_READINGS = 800
+"""Technical: about as many as a screen shows: hours of a month, six hours of half a year, days."""
+
+
 def stream_course(store: Store, stream: Stream, since: datetime, until: datetime) -> Course | None:
-    """Hours from `since` to `until`, and the spectra of the last week of them; None without any."""
+    """Hours from `since` to `until`, or what more of them are pooled to where they are too many,
+    and the spectra of the last week; None without any.
+    """
+    period: Period = next(
+        (each for each, long in PERIODS.items() if (until - since) / long <= _MOST_READINGS), "day"
+    )
     hours = [
         each
-        for each in store.streams.list_pooled(stream.hanger, "hour", since, until)
+        for each in store.streams.list_pooled(stream.hanger, period, since, until)
         if each.stream == stream.name
     ]
     first = max(since, until - _LONGEST_SPECTRA)
-    windows = [
-        each
-        for each in store.streams.list_windows(stream.hanger, first, until)
-        if each.window.stream == stream.name and each.spectrum_db
-    ]
+    windows = store.streams.list_spectra(stream.name, first, until, _MOST_SPECTRA)
     if not hours and not windows:
         return None
-    lines = len(windows[0].spectrum_db) if windows else 0
-    alike = [each for each in windows if len(each.spectrum_db) == lines]
+    lines = len(windows[0][1]) if windows else 0
+    alike = [(at, spectrum) for at, spectrum in windows if len(spectrum) == lines]
     return Course(
         stream=stream.name,
-        window_times=[each.window.start for each in alike],
+        window_times=[at for at, _ in alike],
         line_hz=(np.arange(lines) + 0.5) * stream.sampling_rate_hz / 2 / max(1, lines),
-        spectrum_db=np.array([each.spectrum_db for each in alike], dtype=float),
-        hours=[each.start + timedelta(minutes=30) for each in hours],
+        spectrum_db=np.array([spectrum for _, spectrum in alike], dtype=float),
+        hours=[each.start + PERIODS[period] / 2 for each in hours],
+        period=period,
         modes=_modes(hours),
         tension=_tension(hours),
         events=store.streams.list_events(stream.name, since),

@@ -24,6 +24,9 @@ _LATE, _SILENT = timedelta(minutes=5), timedelta(hours=1)
 _AHEAD = timedelta(minutes=2)  # judgement: clocks without GPS or NTP are seconds off
 _LATELY = timedelta(days=1)
 _AT_FAULT = ("dead", "drifting", "swapped", "saturated")
+_TESTS_COMPARED = 12
+"""Judgement: of so many the mean is known to a tenth of what is taken for likely before any."""
+_ROWS_SEEN = 1000  # technical: three years of a stream's own days among them
 _FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends it
 
 
@@ -142,22 +145,23 @@ def _word(last: datetime | None, events: tuple[StreamEvent, ...], now: datetime)
 
 
 def against_hammer(store: Store, stream: Stream) -> AmbientBias:
-    """What a stream's frequencies differ by from those of hammer tests made while it ran."""
-    tests = [
-        each.test
-        for each in store.tests.list_all(stream.hanger)
-        if not each.test.id.startswith(f"{stream.name}-{each.time:%Y-%m-%d}")  # a day of its own
-    ]
+    """What a stream's frequencies differ by from those of the latest hammer tests made while it
+    ran.
+    """
+    last = store.streams.last_pooled(stream.name, "hour")
+    if last is None:
+        return ambient_bias(stream.hanger, (), ())
+    own = [
+        row.id
+        for row in store.tests.list_rows(stream.hanger, _ROWS_SEEN)
+        if row.time <= last + TOGETHER
+        and not row.name.startswith(f"{stream.name}-{row.time:%Y-%m-%d}")  # a day of its own
+    ][:_TESTS_COMPARED]
+    tests = [each.test for each in store.tests.list_numbered(own)]
     times = [test.time for test in tests if test.time is not None]
-    near = (
-        reading
-        for at in times
-        for reading in store.streams.list_pooled(
-            stream.hanger, "hour", at - TOGETHER, at + TOGETHER
-        )
+    return ambient_bias(
+        stream.hanger, tests, store.streams.list_hours_near(stream.name, times, TOGETHER)
     )
-    own = {each.start: each for each in near if each.stream == stream.name}
-    return ambient_bias(stream.hanger, tests, [own[start] for start in sorted(own)])
 
 
 def tension_words(hour: PooledReading | None) -> str:

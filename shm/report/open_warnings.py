@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Mapping, Sequence
+from itertools import islice
 
 from shm.report.formatting import listed
 from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
@@ -88,9 +89,14 @@ def standing_out(hanger: Hanger, hangers: Sequence[Hanger], tensions: Mapping[in
         return ""
     kind = [each for each in hangers if each.family == hanger.family]
     at = [each.id for each in kind].index(hanger.id)
-    near = sorted(range(len(kind)), key=lambda n: abs(n - at))[1:]
-    others = [each for n in near if (each := _share(kind[n], tensions)) is not None]
-    others = others[:_NEIGHBOURS]
+    near = (
+        kind[n]
+        for step in range(1, len(kind))
+        for n in (at - step, at + step)
+        if 0 <= n < len(kind)
+    )
+    known = (each for one in near if (each := _share(one, tensions)) is not None)
+    others = list(islice(known, _NEIGHBOURS))
     if len(others) < _FEWEST_NEIGHBOURS:
         return ""
     of_others = statistics.median(mean for mean, _, _ in others)

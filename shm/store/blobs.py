@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
-from datetime import datetime
+from datetime import UTC, datetime
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from shm.documents import number, value_of
 from shm.modes_document import MODES_SCHEMA, parse_modes
+from shm.store.checksums import loads
 from shm.values import (
     Change,
     CreepRate,
-    Drift,
     FrequencyResponse,
     ModalTest,
     Posterior,
@@ -24,6 +25,8 @@ from shm.values import (
     WatchedTest,
 )
 
+_HELD = 1024  # technical: what stands is shown again and again, some kilobytes a hanger
+_NO_TIME = datetime.min.replace(tzinfo=UTC)
 _POSTERIOR_ARRAYS = ("samples", "log_likelihood", "most_probable")
 
 
@@ -117,19 +120,22 @@ def watch_document(watched: WatchedTest) -> dict[str, Any]:
     }
 
 
-def watch_from(
-    document: Mapping[str, Any], test: str, time: datetime, drifts: Sequence[Drift]
-) -> WatchedTest:
-    """The watch after a test back from its document and its drifts."""
+@lru_cache(_HELD)
+def watch_in(text: str) -> tuple[WatchedTest, float]:
+    """The watch after a test back from its document, for its test, time and drifts to be put in,
+    and the alert probability that it was judged with.
+    """
+    document = loads(text)
     temperature_c = number(document["temperature_c"])
     kept = document.get("creep_per_year")
     creep = value_of(CreepRate, kept) if kept else None
     # Documents of former versions tell nothing of mistaken modes.
     mistaken = value_of(tuple[RepeatedMistake, ...], document.get("mistaken", []))
-    change = change_from(document)
-    return WatchedTest(test, time, temperature_c, tuple(drifts), change, creep, mistaken)
+    found = WatchedTest("", _NO_TIME, temperature_c, (), change_in(text), creep, mistaken)
+    return found, number(document.get("alert_probability"))
 
 
-def change_from(document: Mapping[str, Any]) -> Change:
+@lru_cache(_HELD)
+def change_in(text: str) -> Change:
     """What the sequential test says after a test back from the document of its watch."""
-    return value_of(Change, document["change"])
+    return value_of(Change, loads(text)["change"])

@@ -92,12 +92,14 @@ def checksum_of(table: sa.Table, row: Values) -> int:
 
     64 bits of a SHA-256: what a disk changes by chance passes once in 2^64 times.
     """
-    apart = APART.get(table.name)
-    digest = hashlib.sha256()
-    for column in table.columns:
-        if column.name not in ("checksum", apart):
-            _add(digest, row[column.name])
-    return _number(digest)
+    contents = [_canonical(row[name]) for name in _summed(table)]
+    return _number(hashlib.sha256(b"".join(map(_counted, contents))))
+
+
+@cache
+def _summed(table: sa.Table) -> tuple[str, ...]:
+    apart = ("checksum", APART.get(table.name))
+    return tuple(column.name for column in table.columns if column.name not in apart)
 
 
 def content_checksum(content: bytes | None) -> int | None:
@@ -109,7 +111,7 @@ def digest_of(row: Values) -> bytes:
     """SHA-256 of all values of a row, its checksum too."""
     digest = hashlib.sha256()
     for value in row.values():
-        _add(digest, value)
+        digest.update(_counted(_canonical(value)))
     return digest.digest()
 
 
@@ -219,14 +221,14 @@ def _own(table: sa.Table) -> tuple[sa.Column[Any], ...]:
     return tuple(column for column in table.columns if column.name != apart)
 
 
-def _add(digest: Any, value: Any) -> None:
-    content = _canonical(value)
-    digest.update(b"%d " % len(content))
-    digest.update(content)
+def _counted(content: bytes) -> bytes:
+    return b"%d %b" % (len(content), content)
 
 
 def _canonical(value: Any) -> bytes:
     """A value in the one form in which both kinds of database, typed or not, agree."""
+    if type(value) is str:  # most are, and a page compares thousands
+        return b"s" + value.encode("utf-8", "surrogateescape")
     if value is None or value != value:  # NaN is kept as nothing
         return b"0"
     if isinstance(value, bytes | memoryview):

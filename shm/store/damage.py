@@ -14,7 +14,7 @@ from sqlalchemy.engine import Connection
 
 from shm.documents import value_of
 from shm.errors import DamagedRow
-from shm.store.blobs import change_from, posterior_from, test_from_document, unpack
+from shm.store.blobs import change_in, posterior_from, test_from_document, unpack
 from shm.store.checksums import (
     Values,
     checksum_of,
@@ -73,7 +73,7 @@ def _decode_test(row: Values) -> None:
 _DECODERS: Mapping[str, Callable[[Values], object]] = {
     "tests": _decode_test,
     "posteriors": lambda row: posterior_from(loads(row["document"]), row["samples"]),
-    "watches": lambda row: change_from(loads(row["document"])),
+    "watches": lambda row: change_in(row["document"]),
     "alerts": lambda row: value_of(Alert, loads(row["document"])),
 }
 

@@ -57,11 +57,15 @@ class Notes(Repository):
             note(connection, now, "note written", f"note {number}, {made.of}", text, who)
         return made
 
-    def list_all(self, hanger: int | None = None) -> tuple[Note, ...]:
-        """All, or those of a hanger and of the bridge; what was seen or done last comes first."""
+    def list_all(self, hanger: int | None = None, *, of_bridge: bool = False) -> tuple[Note, ...]:
+        """All, those of a hanger and of the bridge, or of the bridge alone; what was seen or done
+        last comes first.
+        """
         query = sa.select(*_COLUMNS).order_by(notes.c.at.desc(), notes.c.id.desc())
         if hanger is not None:
             query = query.where(sa.or_(notes.c.hanger == hanger, notes.c.hanger.is_(None)))
+        elif of_bridge:
+            query = query.where(notes.c.hanger.is_(None))
         with self.reading() as connection:
             return tuple(readable(connection.execute(query).all(), _note))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
+from functools import lru_cache
 from typing import Any
 
 import sqlalchemy as sa
@@ -16,6 +17,8 @@ from shm.store.database import insert
 from shm.store.rows import Acknowledgement, DeliveryState, News, Resolution, StoredAlert
 from shm.store.tables import acknowledgements, alerts, deliveries, resolutions, tests
 from shm.values import Alert
+
+_HELD = 1024  # technical: those that stand on a large bridge, of some kilobytes each
 
 stored_alerts = sa.select(
     alerts,
@@ -110,11 +113,17 @@ def stored_alert(row: Row[Any]) -> StoredAlert:
     )
 
 
+@lru_cache(_HELD)
+def _alert_in(text: str) -> Alert:
+    """An alert as it was raised; those that stand are asked for again and again."""
+    return value_of(Alert, loads(text))
+
+
 def alert_of(row: Row[Any]) -> Alert:
     """An alert that was raised is told even where its document is damaged: as much as is left."""
     try:
         with decoding(alerts, row, row.hanger):
-            return value_of(Alert, loads(row.document))
+            return _alert_in(row.document)
     except DamagedRow as error:
         note_damage(error)
         message = f"{row.message} (Details are lost: {error.message})"

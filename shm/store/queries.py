@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -24,7 +25,7 @@ from shm.store.tables import (
     tests,
     watches,
 )
-from shm.values import ForeignMode, Posterior, QualityCheck, Selection
+from shm.values import ForeignMode, Hanger, Posterior, QualityCheck, Selection
 
 # All but the frequency response, which may be as large as all else together a hundredfold.
 _columns = (column for column in tests.columns if column is not tests.c.frequency_response)
@@ -215,3 +216,11 @@ def baseline_in_force(hanger: int) -> sa.Select[Any]:
     """The number of the newest baseline of a hanger in the class in force."""
     query = sa.select(baselines.c.id).join(posteriors).where(baselines.c.hanger == hanger)
     return query.where(_in_force(hanger)).order_by(baselines.c.id.desc()).limit(1)
+
+
+def among(
+    hanger: sa.ColumnElement[int], excluding: Collection[int], hangers: Sequence[Hanger] | None
+) -> tuple[sa.ColumnElement[bool], ...]:
+    """Which rows are of `hangers`, or of any where None, and not of those left out."""
+    chosen = (hanger.not_in(excluding),)
+    return chosen if hangers is None else (*chosen, hanger.in_([each.id for each in hangers]))

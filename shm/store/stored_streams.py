@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import compact, value_of
+from shm.documents import compact, parse_time
 from shm.store.checksums import decoding, readable, whole
 from shm.store.database import Repository, insert
 from shm.store.outbox import raise_alert, resolve
@@ -25,7 +25,7 @@ from shm.store.stream_tables import (
     stream_windows,
 )
 from shm.store.tables import alerts
-from shm.values import Alert, Plane, ShapePoint
+from shm.values import NAN, Alert, Plane, ShapePoint
 from shm.values.modes import Mode
 from shm.values.stream import (
     PERIODS,
@@ -73,6 +73,26 @@ class Streams(Repository):
         within = (table.c.hanger == hanger, table.c.start >= since, table.c.start < until)
         query = sa.select(table).where(*within).order_by(table.c.start, table.c.id)
         return self._values(table, query, WindowReading)
+
+    def list_spectra(
+        self, stream: str, since: datetime, until: datetime, most: int
+    ) -> tuple[tuple[datetime, Sequence[int]], ...]:
+        """When windows of a stream began, and the spectrum that each kept in dB: at most so many,
+        evenly taken out of all.
+        """
+        table = stream_windows
+        within = (table.c.stream == stream, table.c.start >= since, table.c.start < until)
+
+        def value(row: Row[Any]) -> tuple[datetime, Sequence[int]]:
+            with decoding(table, row, row.hanger):
+                return row.start, json.loads(row.document)["spectrum_db"]
+
+        with self.reading() as connection:
+            ids = connection.scalars(sa.select(table.c.id).where(*within).order_by(table.c.start))
+            chosen = ids.all()
+            some = table.c.id.in_(chosen[:: max(1, -(-len(chosen) // most))])
+            rows = connection.execute(sa.select(table).where(some).order_by(table.c.start)).all()
+            return tuple(each for each in readable(rows, value) if each[1])
 
     def last_window(self, stream: str) -> WindowReading | None:
         """What the latest window of a stream said; None where there is none."""
@@ -195,6 +215,16 @@ class Streams(Repository):
         query = sa.select(table).where(table.c.hanger == hanger, table.c.period == period, *within)
         return self._values(table, query.order_by(table.c.start, table.c.id), PooledReading)
 
+    def list_hours_near(
+        self, stream: str, times: Sequence[datetime], within: timedelta
+    ) -> tuple[PooledReading, ...]:
+        """The readings of an hour of a stream that began near any of these times, by time."""
+        table = pooled_readings
+        near = (table.c.start.between(at - within, at + within) for at in times)
+        of_hours = (table.c.stream == stream) & (table.c.period == "hour")
+        query = sa.select(table).where(of_hours, sa.or_(sa.false(), *near))
+        return self._values(table, query.order_by(table.c.start), PooledReading)
+
     def watch_time(self, hanger: int) -> datetime | None:
         """Up to when the watch of a hanger has seen readings; None where there is none."""
         table = stream_watch
@@ -279,10 +309,31 @@ class Streams(Repository):
     def _values(self, table: sa.Table, query: sa.Select[Any], kind: type[_T]) -> tuple[_T, ...]:
         def value(row: Row[Any]) -> _T:
             with decoding(table, row, row.hanger):
-                return value_of(kind, json.loads(row.document))
+                return _reading(kind, json.loads(row.document))
 
         with self.reading() as connection:
             return tuple(readable(connection.execute(query).all(), value))
+
+
+def _reading(kind: type[_T], document: dict[str, Any]) -> _T:
+    """A reading back from its document. The row is as it was written, so that no type is looked at
+    again: there are thousands to be shown at once.
+    """
+    if kind is WindowReading:
+        document["window"] = Window(**_known(document["window"]))
+        document["spectrum_db"] = tuple(document["spectrum_db"])
+    document["modes"] = tuple(map(_mode, document["modes"]))
+    return kind(**_known(document))
+
+
+def _known(values: dict[str, Any]) -> dict[str, Any]:
+    known: dict[str, Any] = {k: NAN if value is None else value for k, value in values.items()}
+    return {**known, "start": parse_time(known["start"])} if "start" in known else known
+
+
+def _mode(values: dict[str, Any]) -> Mode:
+    shape = tuple(ShapePoint(**_known(each)) for each in values.pop("shape", ()))
+    return Mode(**_known(values), shape=shape)
 
 
 def _document(reading: WindowReading | PooledReading) -> str:

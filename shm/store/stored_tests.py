@@ -106,6 +106,11 @@ class Tests(Repository):
         """The tests of a hanger, or of all, by time; those refused are left out."""
         return self._tests(counted_tests(hanger))
 
+    def list_numbered(self, ids: Collection[int]) -> tuple[StoredTest, ...]:
+        """Those of these row numbers, by time."""
+        chosen = plain_tests.where(tests.c.id.in_(ids))
+        return self._tests(chosen.order_by(tests.c.time, tests.c.id))
+
     def list_rows(
         self, hanger: int, limit: int = 50, before: int | None = None
     ) -> tuple[TestRow, ...]:
@@ -186,6 +191,16 @@ class Tests(Repository):
         with self.reading() as connection:
             rows = connection.execute(sa.select(*counted).where(shown).group_by(tests.c.hanger))
             return {row[0]: LatestTest(int(row[1]), row[2]) for row in rows}
+
+    def tested_hangers(self) -> frozenset[int]:
+        """The numbers of hangers of which tests are in force: one look into the index for each."""
+        least = sa.select(sa.func.min(tests.c.hanger)).where(in_force(tests), counts(tests))
+        found = least.cte(recursive=True)
+        hanger = found.c[0]
+        following = least.where(tests.c.hanger > hanger).correlate(found).scalar_subquery()
+        found = found.union_all(sa.select(following).where(hanger.is_not(None)))
+        with self.reading() as connection:
+            return frozenset(connection.scalars(sa.select(found.c[0]))) - {None}
 
     def latest_before(self, hanger: int, recording_id: int, limit: int) -> tuple[StoredTest, ...]:
         """The latest tests of a hanger that count, but for those of one recording, by time."""

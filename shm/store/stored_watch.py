@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from datetime import datetime
 from types import MappingProxyType
 from typing import Any
@@ -12,17 +12,17 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import number
 from shm.errors import DamagedRow, StoreBusy
 from shm.store.audit import note
-from shm.store.blobs import change_from, watch_document, watch_from
-from shm.store.checksums import damaged, decoding, loads, whole
+from shm.store.blobs import change_in, watch_document, watch_in
+from shm.store.checksums import damaged, decoding, whole
 from shm.store.columns import Number
 from shm.store.database import insert
 from shm.store.files import in_force
 from shm.store.list_rows import BaselineGlance, WatchedName
 from shm.store.outbox import raise_alert, resolve
 from shm.store.queries import (
+    among,
     baseline_in_force,
     baselines_now,
     compared_with,
@@ -250,8 +250,10 @@ class Watch(WatchedAgain):
             ids = connection.scalars(latest).all()
         return self._watches(ids)
 
-    def latest(self, excluding: Collection[int] = ()) -> dict[int, StoredWatch]:
-        """What the watch says of each hanger's latest test against its baseline in force.
+    def latest(
+        self, excluding: Collection[int] = (), hangers: Sequence[Hanger] | None = None
+    ) -> dict[int, StoredWatch]:
+        """What the watch says of the latest test of each (or these) hanger against its baseline now.
 
         Raises DamagedRow, which names a hanger: ask again, `excluding` it.
         """
@@ -267,7 +269,7 @@ class Watch(WatchedAgain):
             .limit(1)
             .scalar_subquery()
         )
-        wanted = held.c.id.in_(baselines_now()), held.c.hanger.not_in(excluding)
+        wanted = held.c.id.in_(baselines_now()), *among(held.c.hanger, excluding, hangers)
         ids = sa.select(latest).select_from(held).where(*wanted)
         with self.reading() as connection:
             found = [id_ for id_ in connection.scalars(ids) if id_ is not None]
@@ -278,17 +280,20 @@ class Watch(WatchedAgain):
         chosen = sa.select(watches.c.id).where(watches.c.hanger == hanger, *_called(hanger))
         return self._watches(chosen)
 
-    def detected_changes(self, excluding: Collection[int] = ()) -> dict[int, tuple[Change, ...]]:
-        """The changes detected of each hanger against its baseline in force, by time.
+    def detected_changes(
+        self, excluding: Collection[int] = (), hangers: Sequence[Hanger] | None = None
+    ) -> dict[int, tuple[Change, ...]]:
+        """The changes detected of each (or these) hanger against its baseline in force, by time.
 
         Raises DamagedRow, which names a hanger: ask again, `excluding` it.
         """
-        query = sa.select(watches).where(*_called(), watches.c.hanger.not_in(excluding))
+        chosen = among(watches.c.hanger, excluding, hangers)
+        query = sa.select(watches).where(*_called(), *chosen)
         found = defaultdict[int, list[Change]](list)
         with self.reading() as connection:
             for row in connection.execute(query.order_by(watches.c.time, watches.c.id)):
                 with decoding(watches, row, row.hanger):
-                    found[row.hanger].append(change_from(loads(row.document)))
+                    found[row.hanger].append(change_in(row.document))
         return {hanger: tuple(changes) for hanger, changes in found.items()}
 
     def list_detected_and_latest(self, baseline: Baseline) -> tuple[StoredWatch, ...]:
@@ -384,9 +389,8 @@ def _watch_values(
 
 def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
     with decoding(watches, row, row.hanger):
-        document = loads(row.document)
-        found = watch_from(document, row.test, row.time, shifts)
-        level = number(document.get("alert_probability"))
+        found, level = watch_in(row.document)
+        found = replace(found, test=row.test, time=row.time, drifts=tuple(shifts))
         return StoredWatch(row.id, row.hanger, row.baseline_id, found, level)
 
 

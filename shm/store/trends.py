@@ -65,7 +65,8 @@ class Trends(Repository):
     def latest_trends(self, hangers: Iterable[Hanger]) -> dict[int, TrendPoint]:
         """The latest point of each hanger that has one, by hanger."""
         known = list(hangers)
-        of_hangers = sa.select(tests.c.hanger).where(in_force(tests)).distinct().subquery()
+        one = [tests.c.hanger == each.id for each in known] if len(known) == 1 else []
+        of_hangers = sa.select(tests.c.hanger).where(in_force(tests), *one).distinct().subquery()
         latest = (
             _shown_tests()
             .where(tests.c.hanger == of_hangers.c.hanger, tests.c.id.in_(_of_shown(tests.c.id)))
@@ -341,6 +342,7 @@ def _baseline(row: Row[Any], made_of: Sequence[Row[Any]], numbers: Numbers) -> B
     )
 
 
+@lru_cache(_NUMBERS_HELD)
 def _check(document: str) -> BaselineCheck | None:
     """What was found of the baseline's tests; None of a damaged document."""
     try:

@@ -19,10 +19,10 @@ from shm.values.rounding import NINETY_PERCENT, rounded_percent
 from shm.values.stream import PooledReading
 from shm.watch.quantities import MeasuredMode
 
-TOGETHER = timedelta(hours=12)
-"""Judgement: within half a day temperature and traffic are alike."""
+TOGETHER = timedelta(hours=3)
+"""Judgement: so long temperature and traffic are alike, and a stream that ran has shown a mode."""
 _UNKNOWN_SD = 1e-3  # of a frequency without a stated error, as in `readings`
-# Of ln f, from one test to the next of a mode: what conditions differ by within half a day, and how
+# Of ln f, from one test to the next of a mode: what conditions differ by within TOGETHER, and how
 # a crew mounts its sensors (`WatchOptions.mode_scatter`).
 _TEST_SCATTER = 5e-4
 _BIAS_SD = 2e-3  # before any test: joints slip by 2e-4 to 2e-3 of a frequency. Judgement.
@@ -45,7 +45,7 @@ class AmbientBias:
 
     @property
     def is_known(self) -> bool:
-        """Whether a hammer test ever came within half a day of a reading of the stream."""
+        """Whether a hammer test ever came within three hours of a reading of the stream."""
         return bool(self.modes)
 
     @property
@@ -57,7 +57,7 @@ class AmbientBias:
         """For a report: a sentence, and one of the mode that differs most."""
         if not self.is_known:
             return (
-                f"Hanger {self.hanger}: no hammer test was made within half a day of a reading of "
+                f"Hanger {self.hanger}: no hammer test was made within three hours of a reading of "
                 "its sensors. Make one while they run, to compare both."
             )
         half = NINETY_PERCENT * self.common_sd

@@ -1,20 +1,23 @@
 """A workspace with years of tests of many hangers, filled within minutes.
 
 One hanger is filled by the store's own verbs: posteriors of 1,000 samples, every fifth test from a
-recording with its frequency response, watches with their shifts, alerts, a diagnosis. Its rows are
-then copied for every other hanger within the database.
+recording with its frequency response, watches with their shifts, alerts, a diagnosis, notes. Its
+rows are then copied for every other hanger within the database. Some hangers have a permanent
+sensor with its windows of 40 days and the hours and days of a year, filled and copied likewise.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import sqlalchemy as sa
+from PIL import Image
 from sqlalchemy.engine import Connection
 
 from shm.models import build
@@ -23,6 +26,7 @@ from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Archive, IdentifiedTest, Lineage, Outcome, Store, Workspace
 from shm.store.archive import Kept
 from shm.store.columns import Document
+from shm.store.people import Role
 from shm.store.tables import alerts, metadata, recordings, summaries
 from shm.store.trends import key_of
 from shm.values import (
@@ -40,8 +44,10 @@ from shm.values import (
     ShapePoint,
     WatchedTest,
 )
+from shm.values.notes import NoteKind
 from tests.helpers.diagnoses import a_diagnosis
-from tests.helpers.nouns import a_file, a_response, an_alert
+from tests.helpers.nouns import NOW, a_file, a_response, an_alert
+from tests.helpers.streams import TABLES, a_reading, a_window
 from tests.helpers.workspaces import START, make_workspace
 
 LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
@@ -51,25 +57,50 @@ CALLED = 0.95
 SAMPLES, ORDERS, RESPONSE_LINES = 1000, 6, 3000
 QUANTITIES = ("tension", "transverse_end_stiffness", "longitudinal_end_stiffness")
 HOURS_APART = 12
-_NOT_COPIED = ("tokens", "events")
+SENSORS = 5
+"""Hangers that have a permanent sensor."""
+STREAM_DAYS, WINDOW_DAYS = 365, 40
+NOTED_EVERY = 25
+ENGINEER, PASSWORD = "engineer", "long enough for anybody"
+_NOT_COPIED = ("tokens", "events", "users", "sessions", "changed_settings")
+_OF_STREAMS = ("stream_windows", "pooled_readings")
+_ALL_OF_STREAMS = ("stream_", "pooled_")
 
 
 def filled(folder: Path, hangers: int, tests: int) -> Workspace:
     """A workspace of so many hangers with so many tests each, in a SQLite file."""
     settings = {"models": "beam1,beam2", "samples": SAMPLES}
     workspace = make_workspace(folder, hangers=range(1, hangers + 1), settings=settings)
+    path = workspace.folder / "bridge.toml"
+    sensors = [_sensor(number) for number in range(1, min(SENSORS, hangers) + 1)]
+    path.write_text(path.read_text() + "".join(sensors))
+    workspace = workspace.reopened()
     first, *others = workspace.bridge.hangers
     with workspace.store() as store:
         _fill(store, workspace.archive, first, tests)
         store.posteriors.save_summaries(first)
         with store.reading() as connection:
-            tables = [each for each in metadata.sorted_tables if each.name not in _NOT_COPIED]
+            tables = [
+                table
+                for table in metadata.sorted_tables
+                if table.name not in _NOT_COPIED and not table.name.startswith(_ALL_OF_STREAMS)
+            ]
             rooms = {table.name: _room(connection, table) for table in tables}
         for place, other in enumerate(others, start=1):
             with store.writing() as connection:
                 for table in tables:
                     _copy(connection, table, rooms, place, other)
+        _fill_streams(store, len(sensors))
+        store.people.add(ENGINEER, Role.ENGINEER, PASSWORD, START)
+        for number in range(5):
+            text = f"Inspection {number} of the bridge."
+            store.notes.add(None, START, NoteKind.INSPECTION, text, ENGINEER, START)
     return workspace
+
+
+def is_recorded(test: str) -> bool:
+    """Whether a test comes from a recording, not from modes that were known."""
+    return int(test[-5:]) % RECORDED_EVERY == 0
 
 
 # ---------------------------------------------------------------- one hanger
@@ -96,8 +127,22 @@ def _fill(store: Store, archive: Archive, hanger: Hanger, tests: int) -> None:
         store.watch.save(test, baseline, each.watched, found, ["operator"], test.time)
     for raised in store.alerts.list_all(hanger.id)[:-1]:
         store.alerts.acknowledge(raised.id, "engineer", "looked at the pin", raised.raised_at)
+    store.alerts.resolve(raised.id, "engineer", "the pin was greased", raised.raised_at)
+    for each in made[::NOTED_EVERY]:
+        text, photo = (
+            f"Looked at it around {each.name}: nothing loose.",
+            _photo() if each is made[0] else b"",
+        )
+        store.notes.add(hanger.id, each.time, NoteKind.NOTE, text, ENGINEER, each.time, photo)
     diagnosis = replace(a_diagnosis(), tests=(made[-1].name,))
     store.posteriors.save_diagnosis(hanger.id, diagnosis, LINEAGE, made[-1].time)
+
+
+def _photo() -> bytes:
+    """What a camera gives: 12 megapixels."""
+    content = BytesIO()
+    Image.linear_gradient("L").resize((4000, 3000)).save(content, "JPEG")
+    return content.getvalue()
 
 
 class _Made:
@@ -107,7 +152,7 @@ class _Made:
         self.hanger, self.age, self.name = hanger, number / tests, f"test-{number:05}"
         self.rng = np.random.default_rng([1, number])
         self.time: datetime = START + timedelta(hours=HOURS_APART * number)
-        self.is_recorded = number % RECORDED_EVERY == 0
+        self.is_recorded = is_recorded(self.name)
         self.is_call = CALLED < self.age <= CALLED + 1 / tests
         year = 2 * np.pi * HOURS_APART * number / 8766
         self.temperature_c = 10 + 12 * np.sin(year) + self.rng.normal()
@@ -126,8 +171,8 @@ class _Made:
     @property
     def posterior(self) -> Posterior:
         model = build("beam2", self.hanger)
-        centre = np.array([self.share, 0.98, 7.2, 7.4, 7.1, 7.3, 0.005])
-        spread = np.array([0.01, 0.004, 0.2, 0.2, 0.2, 0.2, 0.001])
+        centre = np.array([self.share, 0.98, 7.2, 7.4, 7.1, 7.3, 1.0, 1.0, 1.0, 0.005])
+        spread = np.array([0.01, 0.004, 0.2, 0.2, 0.2, 0.2, 0.01, 0.01, 0.01, 0.001])
         predicted = tuple(
             PredictedFrequency(
                 mode.plane, mode.order, mode.frequency_hz * 1.003, 0.02, mode.frequency_hz
@@ -195,6 +240,59 @@ def _take_in(store: Store, made: _Made, raw: Kept) -> None:
     store.tests.save(receipt.recording.id, [item], LINEAGE, made.time)
 
 
+# ---------------------------------------------------------------- permanent sensors
+
+
+def _sensor(number: int) -> str:
+    """The tables of `bridge.toml` of the sensor at a hanger."""
+    renamed = TABLES.replace('name = "h3"', f'name = "h{number}"')
+    return renamed.replace("hanger = 3", f"hanger = {number}")
+
+
+def _fill_streams(store: Store, sensors: int) -> None:
+    """Fills the first one's up to now, then copies it for the others."""
+    ago_h = (datetime.now(UTC) - NOW) // timedelta(hours=1)
+    modes = tuple(
+        Mode(plane, order, 5.8 * order, 0.002, 0.003)
+        for plane in PLANES
+        for order in range(1, ORDERS + 1)
+    )
+    spectrum_db = tuple(range(-100, 0))
+    for number in range(WINDOW_DAYS * 144):
+        minutes = 60.0 * ago_h - 10.0 * number
+        made = replace(a_window(minutes, modes), spectrum_db=spectrum_db)
+        store.streams.save_window(replace(made, window=replace(made.window, stream="h1", hanger=1)))
+    for period, hours in (("hour", 1), ("six hours", 6), ("day", 24)):
+        for number in range(STREAM_DAYS * 24 // hours):
+            made_of = a_reading(ago_h - float(hours * number), period)
+            store.streams.save_pooled(
+                replace(
+                    made_of, stream="h1", hanger=1, modes=modes,
+                    tension_shift=0.002, tension_shift_sd=0.001,
+                    compensated_shift=0.001, compensated_sd=0.001,
+                )
+            )  # fmt: skip
+    for number in range(2, sensors + 1):
+        with store.writing() as connection:
+            for name in _OF_STREAMS:
+                _copy_sensor(connection, metadata.tables[name], number)
+
+
+def _copy_sensor(connection: Connection, table: sa.Table, number: int) -> None:
+    own = {
+        "id": "NULL",
+        "checksum": "NULL",
+        "stream": f"'h{number}'",
+        "hanger": f"{number}",
+        "document": f"""replace(replace(document, '"stream":"h1"', '"stream":"h{number}"'),
+                        '"hanger":1,', '"hanger":{number},')""",
+    }
+    names = ", ".join(f'"{column.name}"' for column in table.columns)
+    chosen = ", ".join(own.get(column.name, f'"{column.name}"') for column in table.columns)
+    statement = f"INSERT INTO {table.name} ({names}) SELECT {chosen} FROM {table.name}"
+    connection.exec_driver_sql(f"{statement} WHERE hanger = 1")  # nothing in it is a parameter
+
+
 # ---------------------------------------------------------------- all others
 
 
@@ -206,7 +304,8 @@ def _copy(
     chosen = ", ".join(_copied(column, rooms, place) for column in table.columns)
     statement = f"INSERT INTO {table.name} ({names}) SELECT {chosen} FROM {table.name}"
     statement += f" WHERE {_of_first(table, rooms)}"
-    values = {"hanger": hanger.id, "text": f'"hanger": {hanger.id},', "key": key_of(hanger)}
+    key = key_of(hanger, (place + 1) * rooms["selections"])  # one selection a hanger
+    values = {"hanger": hanger.id, "text": f'"hanger": {hanger.id},', "key": key}
     connection.execute(sa.text(statement), _used(values, statement))
 
 
@@ -229,6 +328,8 @@ def _copied(column: sa.Column[Any], rooms: dict[str, int], place: int) -> str:
     name = f'"{column.name}"'
     for key in column.foreign_keys:
         return f"{name} + {place * rooms[key.column.table.name]}"
+    if column.name == "checksum":  # of other contents: the commit fills it in anew
+        return "NULL"
     if column.name == "id":
         return f"{name} + {place * rooms[column.table.name]}"
     if column is recordings.c.sha256:

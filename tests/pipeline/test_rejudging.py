@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from shm.pipeline.rejudging import differences
 from shm.store import Stage, StoredAlert, Workspace
 from shm.store.missing import missing_rows
-from tests.helpers.flows import Clock, Postman, a_flow, ingest
-from tests.helpers.workspaces import write_loss, write_slow_loss
+from tests.helpers.flows import Clock, Postman, a_flow, ingest, receive_all
+from tests.helpers.workspaces import make_workspace, write_loss, write_slow_loss, write_test
 
 KEY = "hanger.3.thresholds.tension_shift_fraction"
 
@@ -85,3 +88,44 @@ def test_an_alert_that_the_new_threshold_calls_too_is_raised_once(workspace: Wor
             each for each in flow.store.audit.list_rows() if each.action == "tests judged again"
         ]
     assert len(told) == 4
+
+
+def test_hangers_are_judged_again_one_by_one_a_new_test_goes_first_and_a_kill_loses_nothing(
+    tmp_path: Path,
+) -> None:
+    bridge = make_workspace(tmp_path / "bridge", hangers=(1, 2, 3))
+    for hanger in (1, 2, 3):
+        for number in range(4):
+            path = bridge.spool / f"h{hanger}-{number}.modes.json"
+            write_test(path, bridge, hanger=hanger, day=number)
+    ingest(bridge)
+    key = "settings.false_call_years"
+    with bridge.store() as store:
+        bridge.change_setting(store, key, 50.0, Clock()(), "Meier")
+    bridge = bridge.reopened()
+
+    with a_flow(bridge) as killed:
+        killed.advance()
+        waiting = killed.store.tests.list_waiting()
+        assert {test.hanger for test in waiting} == {1}
+        assert len(waiting) == 3  # all but the baseline's
+    with a_flow(bridge) as flow:
+        write_test(bridge.spool / "h3-4.modes.json", bridge, hanger=3, day=9)
+        receive_all(flow)
+        for _ in range(200):
+            flow.advance()
+            if {test.hanger for test in flow.store.tests.list_waiting()} >= {3}:
+                break
+        names = [t.name for t in flow.store.tests.list_waiting() if t.hanger == 3]
+        flow.drain()
+        watches = flow.store.watch.list_all(3)
+        settings, stored = bridge.settings, flow.store.watch.latest()
+        assert len(watches) == 4
+        assert names[-1] == "h3-4"
+        for hanger in bridge.bridge.hangers:
+            assert not list(differences(stored[hanger.id], hanger, settings))
+            assert all(
+                each.watched.change.limit_years == 50.0
+                for each in flow.store.watch.list_all(hanger.id)
+            )
+        assert not flow.store.tests.list_waiting()

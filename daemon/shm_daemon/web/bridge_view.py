@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
+from functools import cached_property
 
 from fastapi import Request
 
@@ -67,7 +68,7 @@ class BridgeGlance:
     name: str
     hangers: tuple[HangerGlance, ...]
 
-    @property
+    @cached_property
     def message(self) -> BridgeMessage:
         """What the page says first."""
         return bridge_message({each.hanger.id: each.line.message for each in self.hangers})

@@ -11,9 +11,8 @@ from fastapi import APIRouter, Path
 from shm.documents import averaged_document
 from shm.errors import BadInput, NothingThere
 from shm.pipeline import utc_now
-from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.bridge_reporting import HangersNow
 from shm.store import DeliveryState, StoredWatch, TrendPoint, Workspace
-from shm.store.checksums import of_readable
 from shm.values import Hanger
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
@@ -86,26 +85,21 @@ def quarantined(workspace: Workspace) -> int:
 def _states(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
     """Of many hangers in as many questions as of one."""
     store = site.store
-    lines = hanger_lines(site.workspace, store, utc_now(), hangers)
-    messages = {each.hanger.id: each.message.document for each in lines}
-    trends, baselines = (
-        store.posteriors.latest_trends(hangers),
-        store.watch.baselines_in_force(hangers),
-    )
-    tests, alerts = store.tests.latest(), store.alerts.open_counts()
-    watches = of_readable(store.watch.latest, {})
+    known = HangersNow.of(site.workspace, store, hangers, utc_now())
+    tests = store.tests.latest()
+    set_at = {id_: each.set_at for id_, each in known.baselines.items()}
     return [
         {
             "hanger": hanger.id,
-            **messages[hanger.id],
+            **known.line(hanger).message.document,
             "tests": tests[hanger.id].tests if hanger.id in tests else 0,
             "latest_test_at": tests[hanger.id].time if hanger.id in tests else None,
             "nominal_tension_n": hanger.nominal_tension_n,
-            "baseline_set_at": baselines[hanger.id].set_at if hanger.id in baselines else None,
-            "shifts": _shifts(watches.get(hanger.id)),
-            "creep_per_year": _creep(watches.get(hanger.id)),
-            "open_alerts": alerts.get(hanger.id, 0),
-            **_tension(trends.get(hanger.id)),
+            "baseline_set_at": set_at.get(hanger.id),
+            "shifts": _shifts(known.watches.get(hanger.id)),
+            "creep_per_year": _creep(known.watches.get(hanger.id)),
+            "open_alerts": known.open_alerts.get(hanger.id, 0),
+            **_tension(known.latest.get(hanger.id)),
         }
         for hanger in hangers
     ]

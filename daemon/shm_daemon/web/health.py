@@ -87,7 +87,7 @@ def _of_description(site: Site) -> list[Lead]:
 
 def _of_strangers(site: Site) -> list[Lead]:
     try:
-        tested = set(site.store.tests.latest())
+        tested = site.store.tests.tested_hangers()
     except ShmError:
         return []  # told as a trouble
     missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.watched})

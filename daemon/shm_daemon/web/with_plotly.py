@@ -366,6 +366,8 @@ def escaped(text: str) -> str:
 
 def wrapped(text: str) -> str:
     """Plotly breaks no lines by itself."""
+    if len(text) <= _LONGEST_LINE and text.isprintable():  # as nearly all of some thousand are
+        return text.strip()
     return "<br>".join(textwrap.wrap(text, _LONGEST_LINE))
 
 
@@ -382,7 +384,7 @@ def numbers(values: FloatArray | Iterable[Any]) -> Any:
             return [_one(value) for value in values]
     known = np.asarray(values, float)
     return [
-        float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None for value in known.tolist()
+        float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None for value in known.tolist()
     ]
 
 

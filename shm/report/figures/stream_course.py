@@ -24,13 +24,13 @@ from shm.report.figures.specification import (
 )
 from shm.values import FloatArray
 from shm.values.rounding import NINETY_PERCENT
-from shm.values.stream import StreamEvent
+from shm.values.stream import PERIODS, Period, StreamEvent
 from shm.watch.history import Band as Bounds
 
 _HUES = ("blue", "orange", "green", "purple")
 _SHOWN_MODES = len(_HUES)
-_MOST_COLUMNS = 600  # technical: a spectrogram of more columns than a screen shows
-_BREAK = timedelta(hours=3)  # judgement: after three missing hours a line would be a guess
+_BREAK = 3  # judgement: after three missing hours, or days, a line would be a guess
+_PACE = {"hour": "from hour to hour", "six hours": "every six hours", "day": "from day to day"}
 _OF_HEALTH = ("dead", "drifting", "swapped", "saturated", "clock step", "lost modes")
 
 
@@ -38,8 +38,9 @@ _OF_HEALTH = ("dead", "drifting", "swapped", "saturated", "clock step", "lost mo
 class Course:
     """`spectrum_db` (windows, lines) over `line_hz` (lines,), empty where none was kept.
 
-    `modes` are hourly frequencies (hours,) and their sds by name, NaN where a mode was not
-    followed; `tension` is the change since the beginning in per cent with its 90 % interval.
+    `hours` are the middles of hours, or of what they are pooled to (`period`). `modes` are their
+    frequencies (hours,) and sds by name, NaN where a mode was not followed; `tension` is the change
+    since the beginning in per cent with its 90 % interval.
     """
 
     stream: str
@@ -50,6 +51,7 @@ class Course:
     modes: Mapping[str, tuple[FloatArray, FloatArray]]
     tension: Bounds
     events: Sequence[StreamEvent] = ()
+    period: Period = "hour"
 
     @property
     def has_tension(self) -> bool:
@@ -76,12 +78,9 @@ def specify(course: Course) -> Specification:
 
 
 def _spectrogram(course: Course) -> Panel:
-    step = max(1, len(course.window_times) // _MOST_COLUMNS)
-    z = course.spectrum_db[::step].T
+    z = course.spectrum_db.T
     floor, top = np.nanquantile(z, [0.1, 0.995])
-    heat = Heat(
-        x=course.window_times[::step], y=course.line_hz, z=np.clip(z, floor, top), colour="ink"
-    )
+    heat = Heat(x=course.window_times, y=course.line_hz, z=np.clip(z, floor, top), colour="ink")
     return Panel(
         y=Axis(label="frequency (Hz)", grid=False), marks=[heat], height=1.4, title_side="left",
         title="Spectrum",
@@ -93,7 +92,7 @@ def _frequencies(course: Course) -> Panel:
     for (name, (hz, sd)), hue in zip(course.followed.items(), _HUES, strict=False):
         middle = float(np.nanmedian(hz))
         shift, reach = 100 * (hz / middle - 1), 100 * NINETY_PERCENT * sd / middle
-        times, shift, reach = _broken(course.hours, shift, reach)
+        times, shift, reach = _broken(course, shift, reach)
         marks.append(Band(x=times, low=shift - reach, high=shift + reach, colour=hue, opacity=0.2))
         texts = [f"{name}: {middle * (1 + each / 100):.4f} Hz" for each in shift]
         marks.append(Line(x=times, y=shift, colour=hue, name=f"{name} ({middle:.3g} Hz)",
@@ -105,7 +104,7 @@ def _frequencies(course: Course) -> Panel:
 
 def _tension(course: Course) -> Panel:
     low, middle, high = course.tension.low, course.tension.middle, course.tension.high
-    times, middle, reach = _broken(course.hours, middle, (high - low) / 2)
+    times, middle, reach = _broken(course, middle, (high - low) / 2)
     texts = [f"{each:+.2f} %" for each in middle]
     marks: list[Mark] = [
         Rule(at=0.0, colour="quiet", dash="dash"),
@@ -128,14 +127,13 @@ def _health(events: Sequence[StreamEvent]) -> list[Span]:
     ]  # fmt: skip
 
 
-def _broken(
-    hours: Sequence[datetime], *values: FloatArray
-) -> tuple[list[datetime], FloatArray, FloatArray]:
+def _broken(course: Course, *values: FloatArray) -> tuple[list[datetime], FloatArray, FloatArray]:
     """Two courses with a NaN in each long gap, so that no line bridges it."""
-    places = [n for n in range(1, len(hours)) if hours[n] - hours[n - 1] > _BREAK]
+    hours, longest = course.hours, _BREAK * PERIODS[course.period]
+    places = [n for n in range(1, len(hours)) if hours[n] - hours[n - 1] > longest]
     times = list(hours)
     for n in reversed(places):
-        times.insert(n, hours[n - 1] + _BREAK / 2)
+        times.insert(n, hours[n - 1] + longest / 2)
     first, second = (np.insert(each, places, np.nan) for each in values)
     return times, first, second
 
@@ -149,7 +147,7 @@ def caption(course: Course) -> str:
     )
     return (
         "Above: the power of all channels, dark where it is strong. Then the frequencies followed "
-        f"from hour to hour, as changes of their medians, with 90 % intervals. {below}"
+        f"{_PACE[course.period]}, as changes of their medians, with 90 % intervals. {below}"
     )
 
 

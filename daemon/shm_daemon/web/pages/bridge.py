@@ -73,7 +73,7 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
             for each in bridge.hangers
             for said in each.line.message.beyond_lead(each.line.warnings)
         ],
-        notes=[each for each in site.store.notes.list_all() if each.hanger is None],
+        notes=site.store.notes.list_all(of_bridge=True),
         rows=[_row(each, unit, now) for each in bridge.hangers],
     )
 

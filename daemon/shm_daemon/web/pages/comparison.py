@@ -50,22 +50,23 @@ def compare_page(
     since: Annotated[str, Query(max_length=10)] = "",
 ) -> HTMLResponse:
     """Hangers to choose from, and those that were chosen, beside each other."""
-    lines = {each.hanger.id: each for each in hanger_lines(site.workspace, site.store, utc_now())}
-    chosen = _chosen(site, hanger) if hanger else _likely(list(lines.values()))
-    day = _day(since)
-    rows = [lines[each.id] for each in chosen]
+    every, day = site.workspace.bridge.hangers, _day(since)
+    chosen = _chosen(site, hanger) if hanger else []
+    rows = hanger_lines(site.workspace, site.store, utc_now(), chosen)
+    if not chosen:
+        rows = _likely(rows)
+        chosen = [each.hanger for each in rows]
     asked = [("hanger", each.id) for each in chosen] + ([("since", day)] if day else [])
     return page(
         request,
         "comparison.html.j2",
         choices=[
-            (each.hanger.id, formatting.hanger_name(each.hanger.id, each.hanger.name),
-             each.hanger in chosen)
-            for each in lines.values()
+            (each.id, formatting.hanger_name(each.id, each.name), each in chosen)
+            for each in every
         ],
         most=MOST,
         since=day,
-        address=f"/api/compare/figure?{urlencode(asked)}" if _courses(site, chosen, day) else "",
+        address=f"/api/compare/figure?{urlencode(asked)}" if _is_there(rows, day) else "",
         table=_table(rows) if rows else None,
     )  # fmt: skip
 
@@ -101,13 +102,23 @@ def _chosen(site: Site, numbers: Sequence[int]) -> list[Hanger]:
     return [each for each in site.workspace.bridge.hangers if each.id in wanted]
 
 
-def _likely(lines: Sequence[HangerLine]) -> list[Hanger]:
+def _likely(lines: tuple[HangerLine, ...]) -> tuple[HangerLine, ...]:
     """Where nobody has chosen: the hanger that is worst off, between its neighbours."""
-    if not lines:
-        return []
     first = next((i for i, each in enumerate(lines) if each.message.urgency == "today"), 0)
     start = max(0, min(first - 1, len(lines) - 3))
-    return [each.hanger for each in lines[start : start + 3]]
+    return lines[start : start + 3]
+
+
+def _is_there(rows: Sequence[HangerLine], since: Day | None) -> bool:
+    """Whether `_courses` has anything of these hangers."""
+    return any(
+        row.baseline_tension_n is not None and row.latest and row.latest >= _begin(since)
+        for row in rows
+    )
+
+
+def _begin(since: Day | None) -> datetime:
+    return datetime.combine(since or Day.min, time(), UTC)
 
 
 def _day(text: str) -> Day | None:
@@ -122,7 +133,7 @@ def _day(text: str) -> Day | None:
 
 def _courses(site: Site, chosen: Sequence[Hanger], since: Day | None) -> list[Course]:
     """Of those that have a baseline and tests since that day."""
-    begin = datetime.combine(since, time(), UTC) if since else None
+    begin = _begin(since) if since else None
     baselines = site.store.watch.baselines_in_force(chosen)
     found = []
     for hanger in chosen:
