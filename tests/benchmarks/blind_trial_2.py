@@ -486,8 +486,8 @@ def score(directory: Path, write: bool) -> None:
         )
         table = "\n".join([lines[0], "|---|---|---|", *lines[1:]])
         fill_in(TRIALS / "blind_trial.md", "blind trial 2", f"{head}\n\n{table}")
-        write_csv(TRIALS / "blind_trial" / "second_by_part.csv", by_part(cases))
-        write_csv(TRIALS / "blind_trial" / "second_every_case.csv", every_case(cases))
+        write_csv(TRIALS / "blind_trial_2" / "by_part.csv", by_part(cases))
+        write_csv(TRIALS / "blind_trial_2" / "every_case.csv", every_case(cases))
 
 
 def kinds(cases: Sequence[Scored]) -> str:
