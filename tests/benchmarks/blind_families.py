@@ -2,7 +2,7 @@
 
 python tests/benchmarks/blind_families.py make DIR --families 4 --seed 20261126
 python tests/benchmarks/blind_families.py solve DIR --until 16:25
-python tests/benchmarks/blind_families.py score DIR
+python tests/benchmarks/blind_families.py score DIR --write-docs
 
 Bridges of `gap_family.py`: finite elements of `tests/worlds`, two planes, nuisances of the field.
 """
@@ -18,6 +18,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from docs.filling import fill_in
 from shm.blind.answers import answers_sha256
 from shm.blind.layout import TRIAL_SCHEMA, Trial, key_beside, read_trial
 from shm.blind.making import of_one_instant
@@ -33,7 +34,7 @@ from shm.read.atomic import replace_text
 from shm.values import TrueCase
 from shm.values.diagnosis import NO_GAP_STANDS_FROM
 from tests.benchmarks import gap_family
-from tests.benchmarks.blind_trial_2 import Plan, share, true_case, write_case
+from tests.benchmarks.blind_trial_2 import TRIALS, Plan, share, true_case, write_case
 
 HANGERS = 3  # one more than the least that can share a cause: 20 s of a core each
 
@@ -111,7 +112,8 @@ def score(trial: Trial) -> str:
     return (
         f"{len(named)} families of {HANGERS} hangers that share a cause: it or its group named in "
         f"{share(named, 0, 1)[0]}; {said} hangers named as members, rightly {right}, of {true}; "
-        f"the tension's 95 % interval holds in {share(covered, 0.9, 0.98)[0]}."
+        f"the tension's 95 % interval holds in {share(covered, 0.9, 0.98)[0]}. SHA-256 of the key "
+        f"`{trial.key_sha256}`."
     )
 
 
@@ -139,6 +141,7 @@ def main() -> None:
     parser.add_argument("--families", type=int, default=4)
     parser.add_argument("--seed", type=int, default=20261126)
     parser.add_argument("--until", default="23:59", help="UTC, today")
+    parser.add_argument("--write-docs", action="store_true")
     given = parser.parse_args()
     if given.what == "make":
         make(given.directory, given.families, given.seed)
@@ -146,7 +149,10 @@ def main() -> None:
         hour, minute = map(int, given.until.split(":"))
         solve(read_trial(given.directory), datetime.now(UTC).replace(hour=hour, minute=minute))
     else:
-        print(score(read_trial(given.directory)))
+        said = score(read_trial(given.directory))
+        print(said)
+        if given.write_docs:
+            fill_in(TRIALS / "blind_trial.md", "families", said)
 
 
 if __name__ == "__main__":

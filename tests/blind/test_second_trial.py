@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from shm.blind.layout import HANGER_FILE, MODES_FILE, key_beside, read_trial
+from shm.blind.scoring.cases import case_scores
 from shm.blind.sealing import key_of
 from shm.bridge import load_hanger
 from shm.modes_document import load_modes
+from tests.benchmarks import blind_families
 from tests.benchmarks import blind_trial_2 as trial
+from tests.helpers.trial_answers import plausible, some_truths
 
 
 def planned(world: str, richness: str, effect: str) -> trial.Plan:
@@ -81,3 +84,33 @@ def test_a_trial_is_made_with_its_key_beside(
     truths, seed = key_of(found, key_beside(tmp_path / "trial"))
     assert (found.cases, seed) == (("c0001",), 4)
     assert [truth.kind for truth in truths] == ["none"]
+
+
+def test_marks_ask_of_what_was_solved_and_parts_sum_to_all() -> None:
+    truths, rng = some_truths(48), np.random.default_rng(1)
+    firsts = case_scores(truths, [plausible(truth, rng) for truth in truths])
+    plans = trial.plans(48, 5)
+    cases = [trial.Scored(plan, each, None) for plan, each in zip(plans, firsts, strict=True)]
+    rows = {what: (said, verdict) for what, said, verdict in trial.marks(cases)}
+    assert rows["Left out: a wrong effect blamed, at most 0.05"] == ("no case", "not judged")
+    sound = sum(truth.kind == "none" for truth in truths)
+    assert f"of {sound}: " in rows["False alarms, at most 0.03"][0]
+    worlds = {trial.SIMULATOR, trial.ELEMENTS, trial.BAR}
+    counts = [int(row[1]) for row in trial.by_part(cases) if row[0] in worlds]
+    assert sum(counts) == 48
+    assert len(trial.every_case(cases)) == 49
+
+
+@pytest.mark.parametrize(("apart", "told"), [(0.01, ["sag", "timebase"]), (0.2, [])])
+def test_a_family_claims_its_likeliest_group_unless_each_may_be_for_itself(
+    apart: float, told: list[str]
+) -> None:
+    members = [{"hanger": 1, "probability": 0.9}, {"hanger": 2, "probability": 0.3}]
+    causes = [
+        {"effect": name, "group": group, "probability": probability, "members": members}
+        for name, group, probability in (("sag", 0, 0.3), ("a", None, 0.35), ("timebase", 0, 0.2))
+    ]
+    found = {
+        "causes": causes, "each_for_itself_probability": apart, "unknown_probability": 0.05
+    }  # fmt: skip
+    assert blind_families.claimed(found) == (told, {1} if told else set())
