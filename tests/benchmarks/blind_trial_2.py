@@ -50,9 +50,9 @@ from shm.blind.layout import (
 from shm.blind.making import of_one_instant, padded
 from shm.blind.making.case import PLANS, make_case
 from shm.blind.making.mix import Draft
-from shm.blind.scoring.calibration import corrected
+from shm.blind.scoring.calibration import bins_of, corrected
 from shm.blind.scoring.cases import NO_GAP, SURE, case_scores, left_out_scores
-from shm.blind.scoring.marks import LARGE
+from shm.blind.scoring.marks import FEWEST, LARGE
 from shm.blind.scoring.questions import leading
 from shm.blind.sealing import key_of, write_key
 from shm.blind.solving import solve_left_out, solve_trial
@@ -379,14 +379,16 @@ def share(flags: Sequence[bool | None], low: float, high: float) -> tuple[str, s
     """The share with its 95 % interval, and whether its better end keeps the bounds."""
     hits, of = sum(map(bool, flags)), len(flags)
     if not of:
-        return "no case", "not judged"
+        return "no case", "too few to judge"
     ends = (
         float(beta.ppf(0.025, hits, of - hits + 1)) if hits else 0.0,
         float(beta.ppf(0.975, hits + 1, of - hits)) if hits < of else 1.0,
     )
     value = hits / of
     verdict = "met" if low <= value <= high else "missed"
-    if verdict == "missed" and ends[0] <= high and ends[1] >= low:
+    if of < FEWEST:
+        verdict = "too few to judge"
+    elif verdict == "missed" and ends[0] <= high and ends[1] >= low:
         verdict = "met by the better end"
     return f"{hits} of {of}: {value:.2f} ({ends[0]:.2f} to {ends[1]:.2f})", verdict
 
@@ -428,6 +430,8 @@ def marks(cases: Sequence[Scored]) -> list[Row]:
     off = found.score.value
     verdict = "met" if off <= 0.05 else "met by the better end" if ends[0] <= 0.05 else "missed"
     said = f"{off:.3f} ({ends[0]:.3f} to {ends[1]:.3f}), {len(cases)} cases"
+    if bins_of(len(cases)) < 2:
+        verdict = "too few to judge"
     return [*rows, ("Expected calibration error, at most 0.05", said, verdict)]
 
 

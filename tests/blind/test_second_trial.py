@@ -66,7 +66,13 @@ def test_a_size_grows_with_the_cause_and_lets_the_baseline_follow_what_it_can(
 
 @pytest.mark.parametrize(
     ("hits", "of", "said"),
-    [(10, 10, "met"), (8, 10, "met by the better end"), (60, 100, "missed"), (0, 0, "not judged")],
+    [
+        (10, 10, "met"),
+        (8, 10, "met by the better end"),
+        (60, 100, "missed"),
+        (9, 9, "too few to judge"),
+        (0, 0, "too few to judge"),
+    ],
 )
 def test_a_mark_is_judged_by_the_better_end(hits: int, of: int, said: str) -> None:
     flags = [n < hits for n in range(of)]
@@ -92,7 +98,7 @@ def test_marks_ask_of_what_was_solved_and_parts_sum_to_all() -> None:
     plans = trial.plans(48, 5)
     cases = [trial.Scored(plan, each, None) for plan, each in zip(plans, firsts, strict=True)]
     rows = {what: (said, verdict) for what, said, verdict in trial.marks(cases)}
-    assert rows["Left out: a wrong effect blamed, at most 0.05"] == ("no case", "not judged")
+    assert rows["Left out: a wrong effect blamed, at most 0.05"] == ("no case", "too few to judge")
     sound = sum(truth.kind == "none" for truth in truths)
     assert f"of {sound}: " in rows["False alarms, at most 0.03"][0]
     worlds = {trial.SIMULATOR, trial.ELEMENTS, trial.BAR}
