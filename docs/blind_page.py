@@ -18,7 +18,7 @@ from shm.report.as_html import as_html
 from shm.report.figures.every_figure import trial_figures
 from shm.report.figures.illustration import Illustration
 from shm.report.paper import Table
-from shm.report.trial_report import answers, evidence, misses, summary, trial_paper
+from shm.report.trial_report import answers, evidence, summary, trial_paper
 from shm.values import TrialScore
 
 DOCS = Path(__file__).parent
@@ -29,10 +29,8 @@ _DOTS_PER_INCH = 110
 
 
 def fragment(score: TrialScore, drawn: Sequence[Illustration]) -> str:
-    """What came out, for people: words, what is missed, figures; the tables are linked to."""
+    """What came out, for people: words and figures; the tables, marks first, are linked to."""
     parts = [summary(score), f"Seed {score.seed}; SHA-256 of the key `{score.key_sha256}`."]
-    if lost := misses(score):
-        parts.append("\n".join(["Missed:\n", *(f"- {each}" for each in lost)]))
     parts += [f"![{item.title}](figures/{item.name}.png)" for item in drawn]
     listed = [f"- [{each.title}](blind_trial/{file_name(each)})" for each in tables(score)]
     listed.append(f"- [The figures explained, and in words](blind_trial/{_IN_WORDS})")

@@ -32,7 +32,6 @@ def test_the_page_holds_words_marks_and_figures_that_exist(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     filled = text.split("<!-- blind trial -->")[1].split("<!-- /blind trial -->")[0]
     assert "96 simulated hangers were put before the diagnosis" in filled
-    assert "Missed:" in filled
     assert not re.search(r"\b(nan|inf)\b", filled)
     shown = re.findall(r"\]\((figures/[^)]+)\)", filled)
     assert len(shown) >= 6
