@@ -253,7 +253,7 @@ class Watch(WatchedAgain):
     def latest(
         self, excluding: Collection[int] = (), hangers: Sequence[Hanger] | None = None
     ) -> dict[int, StoredWatch]:
-        """What the watch says of the latest test of each (or these) hanger against its baseline now.
+        """What the watch says of the latest test of each (or these) against its baseline in force.
 
         Raises DamagedRow, which names a hanger: ask again, `excluding` it.
         """

@@ -210,6 +210,7 @@ def ask(workspace: Workspace, rounds: int) -> tuple[Visitor, float]:
         }
     routes = routes_of(workspace)
     with server(workspace) as (client, pid):
+        _wait_until_warm(pid)
         visitor = Visitor(client, pid)
         for place, (hanger, tests) in enumerate(names.items()):
             values = {"hanger": str(hanger), "test": tests[place % len(tests)]}
