@@ -219,7 +219,10 @@ def hanger_states(
         return NOTHING_WATCHED
     since_baseline, later = dated_tests(store, baseline)
     options = WatchOptions(limit_years=workspace.settings.false_call_years)
-    watched = watch_hanger(baseline.posterior, since_baseline, later, hanger, options)
+    known = {
+        each.watched.test: each.watched for each in store.watch.list_all(hanger.id, baseline.id)
+    }
+    watched = watch_hanger(baseline.posterior, since_baseline, later, hanger, options, known)
     return states_over_time(watched, hanger)
 
 

@@ -367,6 +367,11 @@ def watched(
     for reading in readings[count:]:
         state, found = watcher.after(state, reading)
         tests.append(found)
+    return watch_of(tests)
+
+
+def watch_of(tests: Sequence[WatchedTest]) -> Watch:
+    """The results of a watch, with the changes that they call."""
     calls = (Call(n, test.change) for n, test in enumerate(tests) if test.change.called)
     return Watch(tuple(tests), tuple(calls))
 

@@ -17,9 +17,10 @@ All is derived from the sequence of tests, so that the same tests give the same 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from types import MappingProxyType
 
 from shm.values import (
     Alert,
@@ -48,7 +49,7 @@ from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.repeated_mistakes import news_of, notice_of, repeated_mistakes
 from shm.watch.watch_state import WatchState
-from shm.watch.watcher import Watch, Watcher, watched
+from shm.watch.watcher import Watch, Watcher, watch_of, watched
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
@@ -84,9 +85,12 @@ def watch_hanger(
     later: Sequence[DatedTest],
     hanger: Hanger,
     options: WatchOptions,
+    known: Mapping[str, WatchedTest] = MappingProxyType({}),
 ) -> Watched:
     """The watch of a hanger over the tests of its baseline and `later` ones, both by time.
 
+    `known` is what it has said before, by test: where that is of all later ones, none is judged
+    again.
     How many tests precede every change follows from `baseline_tests`, whatever `options` say; how
     often it may be called falsely from the hanger's `false_call_years`, where it has its own.
     A test that is older than the baseline's counts as made right after them: all later ones are
@@ -99,7 +103,11 @@ def watch_hanger(
     dated = [*baseline_tests, *((test, max(time, since)) for test, time in later)]
     readings = tuple(reader.reading(test, time) for test, time in dated)
     options = options_of(hanger, len(baseline_tests), options)
-    watch = watched(readings, reader.quantities, reader.columns, hanger, options)
+    said = [known[test.id] for test, _ in later if test.id in known]
+    begin = readings if len(said) < len(later) else readings[: len(baseline_tests)]
+    watch = watched(begin, reader.quantities, reader.columns, hanger, options)
+    if begin is not readings:
+        watch = watch_of([*watch.tests, *said])
     tests = list(watch.tests)
     mistaken: tuple[RepeatedMistake, ...] = ()
     for n in range(len(baseline_tests), len(tests)):

@@ -146,3 +146,6 @@ def warm_up(app: FastAPI) -> None:
     app.openapi()
     # What was imported stays for good: to look through it for garbage takes 100 ms, amid a request.
     gc.freeze()
+    # A page of 200 hangers makes some 50,000 objects, in no circle: to look through them each time
+    # that there are 700 more took a tenth of its time (`tests/benchmarks/dashboard.py`).
+    gc.set_threshold(20_000)

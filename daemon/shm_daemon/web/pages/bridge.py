@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -74,7 +75,7 @@ def bridge_page(request: Request, site: AtSite, _: Reader) -> Response:
             for said in each.line.message.beyond_lead(each.line.warnings)
         ],
         notes=site.store.notes.list_all(of_bridge=True),
-        rows=[_row(each, unit, now) for each in bridge.hangers],
+        rows=[SimpleNamespace(**_row(each, unit, now)) for each in bridge.hangers],
     )
 
 
