@@ -94,6 +94,10 @@ def test_the_page_says_whether_stored_tests_are_judged_with_what_it_shows(
     put(browser, "hanger.3.thresholds.tension_shift_fraction", "0.06")
     shown = browser.get("/settings?hanger=3").text
     assert "judged again as soon as the daemon runs: tension 0.06 instead of 0.05." in shown
+    with workspace.store() as store:
+        (watch,) = store.watch.list_all(3)
+        store.watch.judge_again(3, watch.baseline_id, "another threshold", utc_now())
+    assert "Yet to be judged: 1 stored test of it." in browser.get("/settings?hanger=3").text
 
 
 HOURS = "hook.night.watch.quiet_hours"

@@ -19,6 +19,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.rejudging import differences
 from shm.report import formatting
 from shm.settings import TABLE, Settings, load_settings
+from shm.store import Stage
 from shm.store.changed_settings import ChangedSetting, said
 from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Engineer
@@ -156,7 +157,10 @@ def _page(
 
 def _judged(site: Site, hanger: Hanger) -> str:
     """Whether the stored tests of a hanger are judged with what is in force."""
-    latest = site.store.watch.latest().get(hanger.id)
+    waiting = [each for each in site.store.tests.list_waiting() if each.hanger == hanger.id]
+    if any(each.stage is Stage.UPDATED for each in waiting):
+        return f"Yet to be judged: {formatting.counted(len(waiting), 'stored test')} of it."
+    latest = site.store.watch.latest(hangers=[hanger]).get(hanger.id)
     if latest is None:
         return ""
     if others := "; ".join(differences(latest, hanger, site.workspace.settings)):
