@@ -21,13 +21,13 @@ import scipy
 
 from shm.identify.contract import Drift, Finding, FoundMode, Hit
 from shm.identify.estimation.courses import OVERLAP, Course, phases_of
-from shm.identify.estimation.repeats import LEAST_HITS
 from shm.values import FloatArray
 from shm.values.modes import SLOPE_OF_NOTE
 
-_BY_CHANCE = 1e-3
-"""Two-sided probability of a sure drift in a steady test, where modes are apart by chance alone;
-a tenth of the one false warning in a hundred sound tests that a check may cost."""
+_BY_CHANCE = 0.01
+"""Two-sided probability that modes of a steady test, apart by chance alone, agree on a drift: a
+check may warn of one sound test in a hundred."""
+_LEAST_RING_DOWNS = 2  # of a mode: where each plane is hit in turn, it rings after half of the hits
 _WORST = 1e10  # technical: of the condition, so that six digits are left
 _LEAST_MODES = 3  # two are in the same ratio by chance
 
@@ -99,7 +99,7 @@ def _drift(
     decay = 2 * math.pi * mode.frequency_hz * mode.damping_ratio
     seen = [phases_of(course, index, decay) for course in courses]
     rows = [(row, share) for row, share in zip(seen, shares, strict=True) if row is not None]
-    if len(rows) < LEAST_HITS:
+    if len(rows) < _LEAST_RING_DOWNS:
         return None
     largest = max(float(row[3][0]) for row, _ in rows)
     blocks = []
