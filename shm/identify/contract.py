@@ -111,17 +111,30 @@ class FoundMode:
     amplitude_slope_sd: float = NAN
 
 
+@dataclass(frozen=True)
+class Drift:
+    """The relative `change` from first to last hit that all `modes` have in common, its `sd`;
+    `sure` where chance does not make it."""
+
+    change: float
+    sd: float
+    modes: int
+    sure: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Finding:
     """What an identifier found, by rising frequency, and what it dropped.
 
-    `doubtful` are those of the dropped that may be modes: one hit or one order says otherwise.
+    `doubtful` are those of the dropped that may be modes: one hit or one order says otherwise. An
+    identifier leaves `drift` out.
     """
 
     modes: tuple[FoundMode, ...]
     dropped: tuple[Dropped, ...]
     poles: Poles
     doubtful: tuple[FoundMode, ...] = ()
+    drift: Drift | None = None
 
 
 class Identifier(Protocol):

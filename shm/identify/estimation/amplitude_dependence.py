@@ -20,11 +20,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.lib.stride_tricks import sliding_window_view
 
 from shm.identify.contract import Finding, FoundMode, Measurement
+from shm.identify.estimation.courses import OVERLAP, TINY, Course, Row, course_of, phases_of
+from shm.identify.estimation.drift import with_drift
 from shm.identify.estimation.repeats import LEAST_HITS
-from shm.values import NAN, ComplexArray, FloatArray
+from shm.values import NAN, FloatArray
 from shm.values.modes import MOST_SLOPE, SURE_SDS
 
 _LEAST_SLOPE = 2e-5
@@ -44,19 +45,11 @@ _SHIFT_ERROR = 0.02
 """Of a shift: the phase of a stretch is that of its middle, the amplitude is smoothed."""
 _HALVES = (0.1, 0.3, 1.0)
 """Of A_hit: h. Above, it is friction; below, ring-downs end before it shows (judgement)."""
-_LEAK = 0.01
-"""Of a neighbour's motion, at least: comes into a mode's by the error of its shape."""
-_BESIDE_HZ = 2.0  # what stretches of half a second do not part by frequency: one over their length
 _BY_CHANCE = 0.01
 """Probability that as many modes are sure by chance, below which others are corrected, too (0.001
 to 0.1 do alike). 85 % in records that soften if they never are."""
 _ALONE = 1e-3
 """A shift beyond that of one mode while the others stay: no joint does it. It only widens."""
-_OVERLAP = math.sqrt(41 / 35)
-"""Stretches overlap by half: noise in two neighbours has the correlation 3/35 (the integral of
-sin^4 cos^4 over that of sin^8), which makes the variance of a mean 1 + 6/35 times larger."""
-_STRETCH_SECONDS = 0.5  # judgement: some periods of most modes; phases turn by little in it
-_MOST_STRETCHES = 40  # technical: time
 _INDEPENDENT = 8.0
 """Values among the phases, at most: what no law here explains is alike in all ring-downs."""
 _UNLIKE = 0.17
@@ -65,27 +58,7 @@ may be off. A chirp that was found as a mode of thrice its damping is off by tha
 _MOST_ASTRAY = 0.1
 """Radians by which phases leave a law, the surer ones counting more: then it is something else that
 turns them. A law that is wrong by a tenth of 0.5 % leaves 0.03 in a second of 20 Hz."""
-_GROWS = 1.3  # judgement: more than beats of a weak neighbour make
 _FINE = 16  # technical: steps of the integral a stretch
-_LEAST_RATIO = 2.0
-"""Of an amplitude to its standard deviation: its phase is known to half a radian. With 4 the
-median error is a fifth larger."""
-_PHASE_SD = 1e-4  # rad, technical: no weight without bound
-_RIDGE = 1e-9  # technical: keeps the normal equations solvable
-_TINY = np.finfo(float).tiny
-
-
-@dataclass(frozen=True, eq=False)
-class _Course:
-    """One ring-down in stretches, whose middles are at `middle_s`.
-
-    `motion` (stretches, modes): complex amplitudes referred to its beginning, with standard
-    deviations `sd`.
-    """
-
-    middle_s: FloatArray
-    motion: ComplexArray
-    sd: FloatArray
 
 
 @dataclass(frozen=True)
@@ -116,7 +89,7 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
     if not found.modes or not measurement.hits:
         return found
     courses = [
-        _course(decay, found.modes, measurement.sampling_rate_hz) for decay in measurement.decays
+        course_of(decay, found.modes, measurement.sampling_rate_hz) for decay in measurement.decays
     ]
     leads_s = _leads_s(measurement)
     fits = [_fits(mode, index, courses, leads_s) for index, mode in enumerate(found.modes)]
@@ -137,7 +110,8 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
         _unlike(_with_slope(mode, fit, expected, usual), index, courses, mode)
         for index, (mode, fit) in enumerate(zip(found.modes, fits, strict=True))
     )
-    return replace(found, modes=modes)
+    used = [hit for hit in measurement.hits if hit.used]
+    return with_drift(replace(found, modes=modes), courses, used)
 
 
 def _with_slope(mode: FoundMode, fit: _Fit | None, expected: float, usual: float) -> FoundMode:
@@ -155,7 +129,7 @@ def _with_slope(mode: FoundMode, fit: _Fit | None, expected: float, usual: float
         return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, prior_hz))
     # Beside what the other modes shift, a shift that is not sure by itself counts by its share.
     vague = 0.0 if fit.is_sure else fit.shift_sd_hz**2
-    share = 1.0 if fit.is_sure else prior_hz**2 / (prior_hz**2 + vague + _TINY)
+    share = 1.0 if fit.is_sure else prior_hz**2 / (prior_hz**2 + vague + TINY)
     shift_hz = share * fit.shift_hz + (1 - share) * expected * mode.frequency_hz
     by_phase = math.hypot(
         math.sqrt(share) * fit.shift_sd_hz,
@@ -184,55 +158,12 @@ def _leads_s(measurement: Measurement) -> list[float]:
     return leads
 
 
-def _course(decay: FloatArray, modes: Sequence[FoundMode], rate_hz: float) -> _Course:
-    samples = decay.shape[1]
-    hop = max(int(_STRETCH_SECONDS * rate_hz) // 2, samples // _MOST_STRETCHES, 1)
-    length = min(2 * hop, samples)
-    shapes = np.array([mode.shape for mode in modes])  # (modes, channels)
-    omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])
-    damping = np.array([mode.damping_ratio for mode in modes])
-    poles = omega * (-damping + 1j * np.sqrt(1 - damping**2))
-    waves = np.exp(np.outer(poles, np.arange(length) / rate_hz))  # (modes, length)
-    # Columns Re and -Im of shape times wave, for all channels: the same in every stretch.
-    window = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
-    basis = (shapes[:, :, np.newaxis] * (window * waves)[:, np.newaxis, :]).reshape(len(modes), -1)
-    columns = np.vstack([basis.real, -basis.imag])
-    gram = columns @ columns.T
-    scale = np.sqrt(np.diag(gram))
-    inverse = np.linalg.inv(gram / np.outer(scale, scale) + _RIDGE * np.eye(len(gram)))
-    inverse /= np.outer(scale, scale)
-    parts = sliding_window_view(decay, length, axis=1)[:, ::hop] * window
-    flat = parts.transpose(1, 0, 2).reshape(parts.shape[1], -1)
-    solved = flat @ columns.T @ inverse  # (stretches, 2 modes)
-    rest = flat - solved @ columns
-    freedom = max(1, flat.shape[1] - len(columns))
-    noise = np.sum(rest**2, axis=1) / freedom
-    variance = np.diag(inverse)
-    half = len(modes)
-    motion = solved[:, :half] + 1j * solved[:, half:]
-    begin_s = np.arange(len(flat)) * hop / rate_hz
-    hertz = omega / (2 * np.pi)
-    beside = np.abs(hertz[:, np.newaxis] - hertz) < _BESIDE_HZ
-    np.fill_diagonal(beside, False)
-    sd = np.sqrt(np.outer(noise, variance[:half] + variance[half:]) / 2)
-    sd = np.hypot(sd, np.sqrt(np.abs(motion * _leaks(modes)) ** 2 @ beside))
-    turned = np.exp(-np.outer(begin_s, poles))
-    middle_s = begin_s + length / (2 * rate_hz)
-    return _Course(middle_s, motion * turned, sd * np.abs(turned))
-
-
-def _leaks(modes: Sequence[FoundMode]) -> FloatArray:
-    """The error of each mode's shape over it, (modes,)."""
-    shares = [np.linalg.norm(mode.shape_sd) / np.linalg.norm(mode.shape) for mode in modes]
-    return np.fmax(np.array(shares), _LEAK)
-
-
 def _fits(
-    mode: FoundMode, index: int, courses: Sequence[_Course], leads_s: Sequence[float]
+    mode: FoundMode, index: int, courses: Sequence[Course], leads_s: Sequence[float]
 ) -> _Fit | None:
     """What the laws say together; None where too little of the phase is known."""
     decay = 2 * math.pi * mode.frequency_hz * mode.damping_ratio
-    seen = [_phases(course, index, decay) for course in courses]
+    seen = [phases_of(course, index, decay) for course in courses]
     rows = [row for row in seen if row is not None]
     if not rows:
         return None
@@ -246,19 +177,19 @@ def _fits(
     return replace(fit, shift_sd_hz=math.hypot(fit.shift_sd_hz, _UNLIKE * _unlike_hz(rows)))
 
 
-def _unlike_hz(rows: Sequence[_Row]) -> float:
+def _unlike_hz(rows: Sequence[Row]) -> float:
     """By how much the amplitudes fall otherwise than the pole says."""
     off = [math.log(size[-1] / size[0]) / (time_s[-1] - time_s[0]) for time_s, _, _, size in rows]
     return abs(float(np.median(off))) / (2 * math.pi)
 
 
 def _unlike(
-    mode: FoundMode, index: int, courses: Sequence[_Course], as_found: FoundMode
+    mode: FoundMode, index: int, courses: Sequence[Course], as_found: FoundMode
 ) -> FoundMode:
     """Less sure where its amplitudes fall otherwise than it says, as after a clipped start."""
     decay = 2 * math.pi * as_found.frequency_hz * as_found.damping_ratio
     late = [_from_largest(course, index, decay) for course in courses]
-    seen = [row for course in late if (row := _phases(course, index, decay)) is not None]
+    seen = [row for course in late if (row := phases_of(course, index, decay)) is not None]
     off_hz = _unlike_hz(seen) if seen else 0.0
     return replace(
         mode,
@@ -267,10 +198,10 @@ def _unlike(
     )
 
 
-def _from_largest(course: _Course, index: int, decay: float) -> _Course:
+def _from_largest(course: Course, index: int, decay: float) -> Course:
     now = np.abs(course.motion[:, index]) * np.exp(-decay * course.middle_s)
     first = int(np.argmax(now[: max(1, len(now) // 2)]))
-    return _Course(course.middle_s[first:], course.motion[first:], course.sd[first:])
+    return Course(course.middle_s[first:], course.motion[first:], course.sd[first:])
 
 
 def _averaged(laws: Sequence[_Fit]) -> _Fit | None:
@@ -278,8 +209,8 @@ def _averaged(laws: Sequence[_Fit]) -> _Fit | None:
     if not laws:
         return None
     best = min(laws, key=lambda law: law.misfit)
-    worse = np.array([law.misfit for law in laws]) / max(best.misfit, _TINY)
-    weight = worse ** (-min(best.freedom / _OVERLAP, _INDEPENDENT) / 2)
+    worse = np.array([law.misfit for law in laws]) / max(best.misfit, TINY)
+    weight = worse ** (-min(best.freedom / OVERLAP, _INDEPENDENT) / 2)
     weight /= weight.sum()
     values = np.array([(law.shift_hz, law.slope, law.left) for law in laws])
     sds = np.array([(law.shift_sd_hz, law.slope_sd, 0.0) for law in laws])
@@ -290,26 +221,6 @@ def _averaged(laws: Sequence[_Fit]) -> _Fit | None:
         best, shift_hz=float(mean[0]), shift_sd_hz=shift_sd,
         slope=float(mean[1]), slope_sd=slope_sd, left=left,
     )  # fmt: skip
-
-
-_Row = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
-"""Times, phases, their standard deviations; amplitudes referred to the beginning."""
-
-
-def _phases(course: _Course, index: int, decay: float) -> _Row | None:
-    """Of the stretches from the beginning on in which the mode stands out of the rest."""
-    motion, sd = course.motion[:, index], course.sd[:, index]
-    now = np.abs(motion) * np.exp(-decay * course.middle_s)
-    # What grows again is no free decay: something else was heard at its frequency.
-    falls = now < _GROWS * np.minimum.accumulate(now)
-    clear = falls & (np.abs(motion) > _LEAST_RATIO * sd)
-    last = int(np.argmin(clear)) if not np.all(clear) else len(clear)
-    if last < 4:
-        return None
-    phase, size = np.unwrap(np.angle(motion[:last])), np.abs(motion[:last])
-    sd = np.maximum(sd[:last] / np.maximum(size, _TINY), _PHASE_SD)
-    smooth = np.polynomial.Polynomial.fit(course.middle_s[:last], np.log(size), 2, w=1 / sd)
-    return course.middle_s[:last], phase, sd, np.exp(smooth(course.middle_s[:last]))
 
 
 _Grown = tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]
@@ -330,7 +241,7 @@ _LAWS: tuple[_Law, ...] = (
 """How a frequency falls with the amplitude: dry friction, stretching, and a joint that slips."""
 
 
-def _through(row: _Row, decay: float, law: _Law, struck: float) -> _Grown:
+def _through(row: Row, decay: float, law: _Law, struck: float) -> _Grown:
     time_s, phase, sd, size = row
     fine_s = np.linspace(time_s[0], time_s[-1], _FINE * (len(time_s) - 1) + 1)
     amplitude = np.exp(np.interp(fine_s, time_s, np.log(size)) - decay * fine_s) / struck
@@ -368,7 +279,7 @@ def _fit(mode: FoundMode, rows: Sequence[_Grown]) -> _Fit | None:
     misfit = float(left_over @ left_over)
     if misfit > (_MOST_ASTRAY * np.linalg.norm(weight)) ** 2:
         return None
-    spread = np.sqrt(np.diag(inverse) * max(1.0, misfit / freedom)) * _widening(freedom) * _OVERLAP
+    spread = np.sqrt(np.diag(inverse) * max(1.0, misfit / freedom)) * _widening(freedom) * OVERLAP
     spread = np.fmax(spread, _by_ring_downs(weighted, left_over, inverse, rows))
     shift_hz, slope = solved[count:].tolist()
     left = slope * float(np.median([row[4] for row in rows]))

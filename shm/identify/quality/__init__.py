@@ -28,6 +28,7 @@ CHECKS: tuple[Check, ...] = (
     of_hits.force_spectrum,
     of_modes.coherence,
     of_modes.amplitude_dependence,
+    of_modes.drift,
     of_signals.noise,
     of_ambient.stationarity,
     of_ambient.signal_to_noise,

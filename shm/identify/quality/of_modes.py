@@ -26,7 +26,7 @@ from shm.values import (
     Verdict,
 )
 from shm.values.modes import FIRST_ORDERS, SLOPE_OF_NOTE
-from shm.values.rounding import listed
+from shm.values.rounding import NINETY_PERCENT, listed
 
 # judgement: 0.2 of the response unexplained; sound tests have 0.92 and more: identify_limits.py
 _WARNING = 0.8
@@ -140,6 +140,27 @@ def amplitude_dependence(inspection: Inspection) -> QualityCheck | None:
         f"{worst.frequency_hz:.2f} Hz is {side} by {abs(worst.amplitude_slope):.2%}: "
         "those of small amplitude are given",
         "Hit equally hard in every test; look for a joint that slips.",
+    )  # fmt: skip
+
+
+def drift(inspection: Inspection) -> QualityCheck | None:
+    """Relative change from the first hit to the last that all frequencies have in common."""
+    seen = inspection.finding.drift if inspection.finding else None
+    if seen is None:
+        return None
+    change = abs(seen.change)
+    if not seen.sure:
+        told = f"{seen.modes} frequencies do not move together from the first hit to the last"
+        return QualityCheck("drift", "good", change, SLOPE_OF_NOTE, "", told)
+    side = "fall" if seen.change < 0 else "rise"
+    half = NINETY_PERCENT * seen.sd
+    return QualityCheck(
+        "drift", "warning", change, SLOPE_OF_NOTE, "",
+        f"frequencies {side} by {change:.2%} (+/- {half:.2%}) from the first hit to the last, all "
+        "in the same ratio: the logger's clock drifts, or the tension changes with temperature or "
+        "load",
+        "Let logger and sensors warm up and keep traffic off; check the clock against a tone of "
+        "known frequency.",
     )  # fmt: skip
 
 

@@ -69,7 +69,11 @@ def joined(
     pools = [_pool(group, options.frequency_allowance) for group in kept]
     apart = tuple(_as_seen(kept, pools, number) for number in range(len(measurements)))
     points, modes = _over_all_points(measurements, pools, apart, kept)
-    return Joined(points, Finding(modes, dropped, poles), apart, (_note(measurements),))
+    drifts = [finding.drift for finding in findings if finding.drift is not None]
+    drift = max(drifts, key=lambda each: (each.sure, abs(each.change)), default=None)
+    return Joined(
+        points, Finding(modes, dropped, poles, drift=drift), apart, (_note(measurements),)
+    )
 
 
 def _single(measurement: Measurement, found: Finding) -> Joined:
