@@ -1,0 +1,82 @@
+"""What is said of streams that say nothing, and of their hangers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from shm.pipeline.bridge_reporting import unwatched
+from shm.pipeline.unheard import Heard, State, blind_hangers, heard, leads_of, word_of
+from shm.values.stream import StreamEvent
+from tests.helpers.nouns import NOW
+from tests.helpers.streams import STREAM, with_stream
+from tests.helpers.workspaces import make_workspace
+
+HOUR = timedelta(hours=1)
+OTHER = replace(STREAM, name="h3b")
+
+
+def an_event(kind: str, end: datetime) -> StreamEvent:
+    return StreamEvent("h3", kind, end - HOUR, end, "")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("ago", "kind", "state"),
+    [
+        (timedelta(minutes=4), "gap", "live"),
+        (timedelta(minutes=4), "dead", "sensor at fault"),
+        (timedelta(minutes=4), "lost modes", "sees nothing"),
+        (timedelta(minutes=6), "lost modes", "late"),
+        (2 * HOUR, "dead", "silent"),
+        (-HOUR, "dead", "clock ahead"),
+    ],
+)
+def test_a_stream_is_in_one_state(ago: timedelta, kind: str, state: State) -> None:
+    assert word_of(NOW - ago, [an_event(kind, NOW - ago)], NOW) == state
+
+
+def test_each_state_that_asks_for_a_person_is_told_once_with_its_remedy() -> None:
+    found = [
+        Heard(STREAM, "silent", NOW),
+        Heard(replace(STREAM, name="h4"), "silent", NOW - HOUR),
+        Heard(replace(STREAM, name="h5"), "never sent", None),
+        Heard(replace(STREAM, name="h6"), "late", NOW),
+    ]
+    never, silent = leads_of(found)
+    assert never.words == "Stream h5: never sent. Connect its logger: docs/permanent_sensors.md."
+    assert silent.state == (
+        "Stream h3 (last sample 2026-05-01 12:00 UTC) and h4 (last sample 2026-05-01 11:00 UTC): "
+        "silent."
+    )
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [("silent", True), ("never sent", True), ("sees nothing", True), ("live", False)],
+)
+def test_a_hanger_is_blind_where_none_of_its_streams_says_anything(
+    other: State, said: bool
+) -> None:
+    found = [Heard(STREAM, "silent", NOW), Heard(OTHER, other, NOW)]
+    assert (3 in blind_hangers(found)) is said
+    assert blind_hangers([Heard(OTHER, other, NOW) for other in ("late", "clock ahead")]) == {}
+
+
+def test_of_a_hanger_whose_stream_is_silent_nobody_says_that_nothing_needs_doing(
+    tmp_path: Path,
+) -> None:
+    workspace = make_workspace(tmp_path / "bridge")
+    blind = blind_hangers([Heard(STREAM, "silent", NOW)])
+    lead = unwatched(workspace, 3, NOW, blind, NOW)
+    assert lead is not None
+    assert (lead.urgency, lead.state) == (
+        "week", "Hanger 3: its stream h3 (last sample 2026-05-01 12:00 UTC) is silent."
+    )  # fmt: skip
+    assert unwatched(workspace, 2, NOW, blind, NOW) is None
+    with workspace.store() as store:
+        assert heard(workspace, store, NOW) == ()
+        (never,) = heard(with_stream(workspace), store, NOW)
+    assert (never.stream.name, never.state) == ("h3", "never sent")
