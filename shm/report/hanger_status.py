@@ -27,7 +27,7 @@ WATCH_PROBABILITY = 0.5  # likelier than not
 # gives limits.
 OFF_NOMINAL = 0.15
 
-_DOUBTS = frozenset({"check the modes", "check the baseline", "limit"})
+_DOUBTS = frozenset({"check the modes", "check the baseline", "limit", "silent"})
 _BEYOND = "beyond threshold"
 _CHANGES = frozenset({_BEYOND, "sudden change", "slow drift"})
 

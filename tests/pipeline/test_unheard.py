@@ -8,9 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from shm.pipeline.bridge_reporting import unwatched
+from shm.pipeline.bridge_reporting import hanger_lines, unwatched
+from shm.pipeline.silent_streams import heed_silences
 from shm.pipeline.unheard import Heard, State, blind_hangers, heard, leads_of, word_of
+from shm.report.hanger_status import Status
 from shm.values.stream import StreamEvent
+from tests.helpers.live_streams import send, with_live_streams
 from tests.helpers.nouns import NOW
 from tests.helpers.streams import STREAM, with_stream
 from tests.helpers.workspaces import make_workspace
@@ -80,3 +83,25 @@ def test_of_a_hanger_whose_stream_is_silent_nobody_says_that_nothing_needs_doing
         assert heard(workspace, store, NOW) == ()
         (never,) = heard(with_stream(workspace), store, NOW)
     assert (never.stream.name, never.state) == ("h3", "never sent")
+
+
+def test_a_silence_of_a_day_is_one_alert_which_ends_with_it(tmp_path: Path) -> None:
+    workspace = with_live_streams(make_workspace(tmp_path / "bridge"))
+    send(workspace, hours=1 / 6, first=NOW)
+    day, last = timedelta(days=1), NOW + HOUR / 6
+    with workspace.store() as store:
+        for later, alerts in ((day, 0), (day + 3 * HOUR, 1), (5 * day, 1)):
+            heed_silences(workspace, store, last + later)
+            assert len(store.alerts.list_all(standing=True)) == alerts
+        (raised,) = store.alerts.list_all()
+        assert raised.alert.message.startswith(
+            "Hanger 3: its stream hanger03 (last sample 2026-05-01 12:10 UTC) is silent for longer "
+            "than a day. Look at its logger, power and connection within a week."
+        )
+        lines = hanger_lines(workspace, store, last + 5 * day)
+        assert {each.message.status for each in lines if each.hanger.id == 3} == {Status.CHECK}
+        send(workspace, hours=1 / 6, first=NOW + 5 * day)
+        heed_silences(workspace, store, NOW + 5 * day + HOUR / 2)
+        (over,) = store.alerts.list_all()
+        assert over.resolution is not None
+        assert over.resolution.why == "stream hanger03 sends again"
