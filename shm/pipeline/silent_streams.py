@@ -1,4 +1,6 @@
-"""Alerts of streams that are silent for longer than a day: one a silence, over once it ends."""
+"""Streams that say nothing: an alert of each silence that is longer than a day, over once it ends;
+an event of each that sends and sees nothing of its hanger.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +10,7 @@ from shm.pipeline.unheard import Heard, heard
 from shm.store import Store, StoredAlert, Workspace
 from shm.values import Alert, AlertKind
 from shm.values.messages import WEEK
+from shm.values.stream import Stream
 
 _KIND: AlertKind = "silent"
 _LONG = timedelta(hours=26)
@@ -27,6 +30,22 @@ def heed_silences(workspace: Workspace, store: Store, at: datetime) -> None:
         last = each.last_sample
         if name not in told and each.state == "silent" and last and at - last > _LONG:
             store.alerts.settle(_alert(each, last), hooks, {}, at)
+
+
+def note_blindness(store: Store, stream: Stream, start: datetime) -> None:
+    """Notes that a stream sees nothing of its hanger where its windows up to one show it."""
+    from shm.monitor.sensor_health import SEEN_BEFORE, sees_nothing  # they compute
+    from shm.store.ring_files import PERIOD
+
+    since = start - SEEN_BEFORE
+    found = store.streams.list_windows(stream.hanger, since, start + PERIOD)
+    events = store.streams.list_events(stream.name, since)
+    event = sees_nothing(
+        [each for each in found if each.window.stream == stream.name],
+        [each for each in events if each.kind == "lost modes" and each.start <= start],
+    )
+    if event is not None:
+        store.streams.save_event(event)
 
 
 def _stream(stored: StoredAlert) -> str:

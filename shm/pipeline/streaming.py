@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from shm.documents import format_time
 from shm.pipeline.clock import Clock, utc_now
-from shm.pipeline.silent_streams import heed_silences
+from shm.pipeline.silent_streams import heed_silences, note_blindness
 from shm.pipeline.stream_days import baseline_of, hand_on_day, is_told_already
 from shm.store import Store, Workspace
 from shm.store.archive import nothing
@@ -346,6 +346,8 @@ class Streaming:
             self.store.streams.save_event(event)
         self._offsets[stream.name].append(found.offsets)
         self._save(found.reading)
+        if not found.reading.modes:
+            note_blindness(self.store, stream, found.reading.window.start)
 
     def _save(self, reading: WindowReading) -> None:
         window = reading.window
