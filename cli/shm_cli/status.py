@@ -21,6 +21,7 @@ from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.pipeline.telling import quiet_until
+from shm.pipeline.unheard import heard, leads_of
 from shm.report.formatting import model_class
 from shm.report.hanger_status import Status
 from shm.store import (
@@ -114,7 +115,7 @@ def _show(document: dict[str, Any]) -> None:
         f"alerts: {document['alerts']}, {document['open_alerts']} open; "
         f"deliveries: {owed or 'none'}"
     )
-    for said in (*document["quiet_hours"], *document["silences"]):
+    for said in (*document["quiet_hours"], *document["silences"], *document["streams"]):
         click.echo(said)
     click.echo(f"disk: {document['disk_free_bytes'] / 1e9:.1f} GB free; more: `shm doctor`")
     made = table(
@@ -236,6 +237,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
         "quiet_hours": _quiet(workspace, store, now),
         "silences": list(store.silences.list_in_force(now)),
+        "streams": [each.words for each in leads_of(heard(workspace, store, now))],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
         "changed_settings": [str(each) for each in store.settings.list_current().values()],

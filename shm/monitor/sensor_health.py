@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from datetime import timedelta
 from itertools import combinations
 
@@ -11,13 +12,29 @@ import numpy as np
 
 from shm.monitor.spectrum import Stretch, power_near, shape_on, stretch
 from shm.values import FloatArray, Mode
-from shm.values.stream import Piece, Stream, StreamChannel, StreamEvent, StreamEventKind
+from shm.values.stream import (
+    Piece,
+    Stream,
+    StreamChannel,
+    StreamEvent,
+    StreamEventKind,
+    WindowReading,
+)
 
 _AT_FULL_SCALE, _CLIPPED = 0.99, 1e-3
 """judgement: of the full scale, and the share of samples beyond; 0.6 s of ten minutes."""
 _LEAST_EARLIER, _DRIFT = 6, 8.0
 """judgement: an hour of windows, and a change of their median by so many usual deviations, which
 takes 8 normal ones: no chance of noise, and more than a day's temperature moves a sensor in it."""
+_HOUR = 6  # windows: a quiet quarter of an hour hides the modes of a sound sensor, too
+SEEN_BEFORE = timedelta(days=3)
+"""What the windows without modes are compared with: as long as the watch learns."""
+_LEAST_BEFORE = 36  # judgement: six hours of windows, which have met more than one level of motion
+_FALLEN = 0.5
+"""Of the lowest level before: no motion is less than the noise of the sensor itself, which of a
+sound one changes by 1 dB between -20 and +40 degrees (with the root of the absolute temperature),
+and hides the modes once the motion is as low; this is 6 dB."""
+_BLIND = timedelta(days=1)  # derived: each day has traffic and wind, whatever the level is
 _USUAL_SD = 1.4826  # of the median absolute deviation of normal numbers
 _LEAST_MODES = 3  # judgement: one mode or two agree with an exchange by chance
 _AS_KNOWN, _GAIN = 0.9, 0.15
@@ -82,6 +99,39 @@ def sensor_faults(
     return tuple(
         StreamEvent(stream.name, kind, start, end, detail, name) for kind, name, detail in found
     )
+
+
+def sees_nothing(
+    windows: Sequence[WindowReading], told: Sequence[StreamEvent] = ()
+) -> StreamEvent | None:
+    """That the last of `windows` of a stream, oldest first, show a hanger that is not there.
+
+    No mode for an hour, where the windows before had modes, and less motion than these ever had;
+    or no mode for a whole day, whatever the level. Windows that cannot be used say nothing, nor do
+    those of which it was `told` before.
+    """
+    known = [each.window for each in windows if math.isfinite(each.window.level_m_s2)]
+    seen = {each.window.start for each in windows if each.modes}
+    last = max((row for row, each in enumerate(known) if each.start in seen), default=-1)
+    blind = known[last + 1 :]
+    if not blind:
+        return None
+    first, now = blind[0], blind[-1]
+    end = now.start + timedelta(seconds=now.duration_s)
+    if going_on := [each for each in told if each.end > first.start]:
+        return replace(going_on[-1], start=now.start, end=end)
+    before = [w for w in known[: last + 1] if not any(e.start <= w.start < e.end for e in told)]
+    if sum(1 for each in before if each.start in seen) < _LEAST_BEFORE or len(blind) < _HOUR:
+        return None
+    level, lowest = (f(w.level_m_s2 for w in some) for f, some in ((max, blind), (min, before)))
+    if level >= _FALLEN * lowest and end - first.start < _BLIND:
+        return None
+    detail = (
+        f"it sees nothing of the hanger: no mode since {first.start:%Y-%m-%d %H:%M} UTC, at most "
+        f"{level:.2g} m/s^2 where the lowest before was {lowest:.2g}; see whether the sensors are "
+        "fixed to it and connected"
+    )
+    return StreamEvent(now.stream, "lost modes", first.start, end, detail)
 
 
 def exchanged(

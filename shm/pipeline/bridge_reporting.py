@@ -14,6 +14,7 @@ import shm
 from shm.errors import DamagedRow, NothingThere
 from shm.pipeline.lineage import settings_words, software
 from shm.pipeline.open_warnings import warnings_from
+from shm.pipeline.unheard import blind_hangers, heard
 from shm.report.contents import BridgeReport, Course, HangerLine
 from shm.report.hanger_status import Known, findings, hanger_message, still_detected
 from shm.report.intervals import Interval
@@ -31,6 +32,7 @@ from shm.store import (
 from shm.store.checksums import of_readable
 from shm.store.stored_silences import silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, WatchedTest
+from shm.values.messages import WEEK, Lead
 
 if TYPE_CHECKING:
     from shm.watch.neighbours import BridgePattern, HangerShift
@@ -82,10 +84,15 @@ def hanger_lines(
     return tuple(kept.line(hanger) for hanger in hangers)
 
 
-def quiet_for(workspace: Workspace, latest: datetime, now: datetime) -> timedelta | None:
-    """The time since the latest test of a hanger where that is too long."""
+def unwatched(
+    workspace: Workspace, hanger: int, latest: datetime, blind: Mapping[int, Lead], now: datetime
+) -> Lead | None:
+    """That the sensors of a hanger say nothing, or that its latest test was too long ago."""
     since = now - latest
-    return since if since > timedelta(days=workspace.settings.quiet_days) else None
+    if hanger in blind or since <= timedelta(days=workspace.settings.quiet_days):
+        return blind.get(hanger)
+    state = f"Hanger {hanger}: not tested for {since.days} days."
+    return Lead(state, f"Repeat the hammer test {WEEK}.")
 
 
 def notes_of(
@@ -119,6 +126,7 @@ class HangersNow:
     silences: tuple[Silence, ...]
     damaged: Mapping[int, DamagedRow]
     warnings: Mapping[int, tuple[str, ...]]
+    blind: Mapping[int, Lead]
 
     @classmethod
     def of(
@@ -144,6 +152,7 @@ class HangersNow:
             store.silences.list_current(now),
             damaged,
             warnings_from(every, hangers, baselines, watches, now_at),
+            blind_hangers(heard(workspace, store, now)),
         )
 
     def line(self, hanger: Hanger) -> HangerLine:
@@ -191,7 +200,9 @@ class HangersNow:
             findings(each.alert for each in standing),
             self.warnings.get(hanger.id, ()),
             notes_of(standing, self.silences, hanger.id, self.now),
-            quiet_for(self.workspace, point.time, self.now) if point else None,
+            unwatched(self.workspace, hanger.id, point.time, self.blind, self.now)
+            if point
+            else None,
         )
 
 

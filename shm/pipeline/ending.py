@@ -44,12 +44,12 @@ def why_over(
     gone once both are improbable, by half the level: that it is beyond its threshold, and that half
     of what was told is left. Where no change is behind it, as of two tests that agree while their
     clocks left the watch no time for a change, the probability was low all along: the shift must
-    have come back, too. A held test ends by a decision, never here.
+    have come back, too. A held test ends by a decision, a silence by samples, never here.
 
     A notice that asks to repeat one test ends with one: that agrees with those before it and does
     not clearly read beyond a threshold. The next odd one asks anew.
     """
-    if "held" in alert.kinds:
+    if {"held", "silent"} & set(alert.kinds):
         return ""
     end = hanger.thresholds.end_probability
     later = [test for test in tests if test.time > alert.time]

@@ -10,7 +10,7 @@ import shm
 from shm.errors import NothingThere
 from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
-from shm.pipeline.bridge_reporting import notes_of, quiet_for, stored_pattern
+from shm.pipeline.bridge_reporting import notes_of, stored_pattern, unwatched
 from shm.pipeline.lineage import (
     IDENTIFY_SETTINGS,
     identify_lineage,
@@ -21,6 +21,7 @@ from shm.pipeline.lineage import (
 from shm.pipeline.open_warnings import warnings_of
 from shm.pipeline.redescribed import discarded_of, redescribed
 from shm.pipeline.steps import identify_options
+from shm.pipeline.unheard import blind_hangers, heard
 from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import read_test
 from shm.report.contents import HangerReport, ModalTestReport, trend_row_of
@@ -145,7 +146,13 @@ def hanger_now(
         standing=findings(each.alert for each in standing),
         notes=notes_of(standing, silences, hanger.id, generated_at),
         inspections=store.notes.list_all(hanger.id),
-        quiet_for=quiet_for(workspace, latest.time, generated_at),
+        unwatched=unwatched(
+            workspace,
+            hanger.id,
+            latest.time,
+            blind_hangers(heard(workspace, store, generated_at)),
+            generated_at,
+        ),
     )
 
 

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
-from typing import Literal
 
 from shm.documents import parse_time
+from shm.pipeline.unheard import LATELY, State, word_of
 from shm.store import Store, Workspace
 from shm.store.ring import Ring
 from shm.store.ring_files import PERIOD
@@ -17,17 +17,9 @@ from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PooledReading, Stream, StreamEvent, WindowReading
 from shm.watch.ambient_hammer import TOGETHER, AmbientBias, ambient_bias
 
-State = Literal["live", "late", "silent", "never sent", "sensor at fault", "clock ahead"]
-
-_LATE, _SILENT = timedelta(minutes=5), timedelta(hours=1)
-"""judgement: loggers send each minute; a router begins anew within five minutes."""
-_AHEAD = timedelta(minutes=2)  # judgement: clocks without GPS or NTP are seconds off
-_LATELY = timedelta(days=1)
-_AT_FAULT = ("dead", "drifting", "swapped", "saturated")
 _TESTS_COMPARED = 12
 """Judgement: of so many the mean is known to a tenth of what is taken for likely before any."""
 _ROWS_SEEN = 1000  # technical: three years of a stream's own days among them
-_FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends it
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +59,14 @@ def stream_states(
 def _state(
     stream: Stream, last: datetime | None, ring: Ring, store: Store, now: datetime
 ) -> StreamCondition:
-    events = store.streams.list_events(stream.name, now - _LATELY)
+    events = store.streams.list_events(stream.name, now - LATELY)
     progress = store.streams.progress(stream.name)
     window = store.streams.last_window(stream.name)
     state = ring.state(stream.name)
     received, lost = _received(state.received_s, last, now)
     return StreamCondition(
         stream=stream,
-        state=_word(last, events, now),
+        state=word_of(last, events, now),
         last_sample=last,
         lag=None if last is None else max(timedelta(0), now - last),
         behind=None if last is None or progress is None else max(timedelta(0), last - progress),
@@ -116,7 +108,7 @@ def _received(
     """
     known = {parse_time(start): seconds for start, seconds in received_s.items()}
     first, last = min(known, default=now), max(known, default=now)
-    begin = max(first + PERIOD, now - _LATELY)
+    begin = max(first + PERIOD, now - LATELY)
     if last < begin:
         return NAN, NAN
     end = last + PERIOD if last_sample is None else min(last + PERIOD, last_sample)
@@ -127,21 +119,8 @@ def _received(
 
 
 def _lately_s(seconds: Mapping[str, float], now: datetime) -> float:
-    since = now - _LATELY
+    since = now - LATELY
     return sum(each for start, each in seconds.items() if parse_time(start) >= since)
-
-
-def _word(last: datetime | None, events: tuple[StreamEvent, ...], now: datetime) -> State:
-    if last is None:
-        return "never sent"
-    if last - now > _AHEAD:  # whether it still sends cannot be told by its stamps
-        return "clock ahead"
-    if now - last > _SILENT:
-        return "silent"
-    if now - last > _LATE:
-        return "late"
-    faults = (each for each in events if each.kind in _AT_FAULT)
-    return "sensor at fault" if any(last - each.end < _FAULT_STANDS for each in faults) else "live"
 
 
 def against_hammer(store: Store, stream: Stream) -> AmbientBias:

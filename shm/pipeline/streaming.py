@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from shm.documents import format_time
 from shm.pipeline.clock import Clock, utc_now
+from shm.pipeline.silent_streams import heed_silences, note_blindness
 from shm.pipeline.stream_days import baseline_of, hand_on_day, is_told_already
 from shm.store import Store, Workspace
 from shm.store.archive import nothing
@@ -50,6 +51,7 @@ _OFFSETS = 144  # windows of a day, with which a sensor's offset is compared
 _WHOLE = 0.98  # judgement: of ten minutes; a chunk that lacks seconds is not waited for
 _PATIENCE = timedelta(minutes=20)  # judgement: a logger that sends each quarter of an hour
 
+_HEED = timedelta(minutes=10)  # technical: silences are told by the day
 _LOOKED_BACK = timedelta(days=10)
 """Judgement: for what was noticed as a change began; what is told later is a slow one."""
 
@@ -96,7 +98,7 @@ class Streaming:
         self._sealed: defaultdict[str, list[datetime]] = defaultdict(list)
         self._late: defaultdict[str, list[datetime]] = defaultdict(list)
         self._news: SimpleQueue[tuple[str, datetime]] = SimpleQueue()
-        self._first = 0
+        self._first, self._heed_at = 0, _EVER
         self.use(workspace)
 
     def use(self, workspace: Workspace) -> None:
@@ -139,6 +141,9 @@ class Streaming:
             if stream.name not in self._running and self._may_begin(stream.name):
                 self._begin(stream)
         self._first = (self._first + 1) % max(1, len(streams))
+        if (now := self.clock()) >= self._heed_at:
+            self._heed_at = now + _HEED
+            heed_silences(self.workspace, self.store, now)
         return bool(self._running)
 
     def _note(self, name: str, start: datetime) -> None:
@@ -341,6 +346,8 @@ class Streaming:
             self.store.streams.save_event(event)
         self._offsets[stream.name].append(found.offsets)
         self._save(found.reading)
+        if not found.reading.modes:
+            note_blindness(self.store, stream, found.reading.window.start)
 
     def _save(self, reading: WindowReading) -> None:
         window = reading.window

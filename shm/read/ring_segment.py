@@ -61,10 +61,22 @@ def time_of(microseconds: int) -> datetime:
 
 
 def write_segment(path: Path, chunks: Sequence[tuple[ChunkKey, Chunk]]) -> None:
-    """Writes chunks of one stream, which have the same channels, and forces them to disk."""
+    """Writes chunks of one stream, which have the same channels, and forces them to disk.
+
+    HDF5 makes the file in memory: it kills the process where it meets a full disk.
+    """
+    image = _image(chunks)
+    with path.open("wb") as file:
+        file.write(image)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _image(chunks: Sequence[tuple[ChunkKey, Chunk]]) -> bytes:
+    """The contents of the file."""
     first = chunks[0][1]
     packed = {"compression": "gzip", "compression_opts": _LEVEL, "shuffle": True}
-    with h5py.File(path, "w") as file:
+    with h5py.File(first.stream, "w", driver="core", backing_store=False) as file:
         file.attrs["stream"], file.attrs["sampling_rate_hz"] = first.stream, first.sampling_rate_hz
         file.attrs["time"] = format_time(first.start)
         file.attrs["end"] = format_time(max(chunk.end for _, chunk in chunks))
@@ -74,8 +86,9 @@ def write_segment(path: Path, chunks: Sequence[tuple[ChunkKey, Chunk]]) -> None:
             made = file.create_dataset(name, data=values, fletcher32=True, **packed)
             made.attrs["unit"] = "m/s2"
         file.create_dataset(_TABLE, data=_rows(chunks), fletcher32=True, chunks=True)
-    with path.open("rb") as written:
-        os.fsync(written.fileno())
+        file.flush()
+        image: bytes = file.id.get_file_image()
+    return image
 
 
 def _rows(chunks: Sequence[tuple[ChunkKey, Chunk]]) -> NDArray[np.void]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime, timedelta
+from datetime import datetime
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
@@ -43,6 +43,7 @@ from shm.values import (
 )
 from shm.values.force_units import ForceUnit, force_unit
 from shm.values.letterhead import NO_LETTERHEAD, Letterhead
+from shm.values.messages import Lead
 from shm.values.notes import Note
 from shm.values.stated_tension import averaged_now, selection_now
 
@@ -132,7 +133,7 @@ class HangerReport:
     hanger's description has changed since the baseline, where that moves results; `discarded` names
     the tests of the baseline that count no more. `warnings` are the open ones, `standing` the
     alerts whose condition has not ended, `notes` what people did about these; `inspections`
-    what they wrote, the latest first; `quiet_for` is the time since the latest test if long.
+    what they wrote, the latest first; `unwatched` says that nothing has looked at it for long.
     """
 
     bridge: str
@@ -165,7 +166,7 @@ class HangerReport:
     standing: tuple[Alert, ...] = ()
     notes: tuple[str, ...] = ()
     inspections: tuple[Note, ...] = ()
-    quiet_for: timedelta | None = None
+    unwatched: Lead | None = None
     letterhead: Letterhead = NO_LETTERHEAD
 
     @property
@@ -231,7 +232,7 @@ def message(data: HangerReport) -> HangerMessage:
             data.standing,
             data.warnings,
             data.notes,
-            data.quiet_for,
+            data.unwatched,
         )
     )
 

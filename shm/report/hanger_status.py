@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
+from datetime import datetime
 from enum import Enum
 
 from shm.report import formatting
@@ -27,7 +27,7 @@ WATCH_PROBABILITY = 0.5  # likelier than not
 # gives limits.
 OFF_NOMINAL = 0.15
 
-_DOUBTS = frozenset({"check the modes", "check the baseline", "limit"})
+_DOUBTS = frozenset({"check the modes", "check the baseline", "limit", "silent"})
 _BEYOND = "beyond threshold"
 _CHANGES = frozenset({_BEYOND, "sudden change", "slow drift"})
 
@@ -54,8 +54,8 @@ class Known:
     `latest` is when it was tested last, None before the first test; `drifts` are those of that
     test from the baseline in force, `called` the changes detected since, `standing` the alerts
     whose condition has not ended, the oldest first. `notes` say what people did about these.
-    `quiet_for` is the time since the latest test where that is long, `damage` what keeps the
-    results from being read.
+    `unwatched` says that nothing has looked at the hanger for too long, `damage` what keeps
+    the results from being read.
     """
 
     hanger: Hanger
@@ -68,7 +68,7 @@ class Known:
     standing: Sequence[Alert] = ()
     warnings: Sequence[str] = ()
     notes: tuple[str, ...] = ()
-    quiet_for: timedelta | None = None
+    unwatched: Lead | None = None
     damage: str = ""
 
 
@@ -310,11 +310,8 @@ def _quiet(known: Known, status: Status) -> tuple[Status, Lead]:
     """Where nothing was found: whether it could have been, and what the tension is."""
     name = f"Hanger {known.hanger.id}"
     off = _off_limits(known)
-    if known.quiet_for is not None and (off is None or off.urgency == "next_test"):
-        return Status.UNCLEAR, Lead(
-            f"{name}: not tested for {known.quiet_for.days} days.",
-            f"Repeat the hammer test {WEEK}.",
-        )
+    if known.unwatched is not None and (off is None or off.urgency == "next_test"):
+        return Status.UNCLEAR, known.unwatched
     if off:
         return Status.CHECK, off
     if status is Status.FIRST:

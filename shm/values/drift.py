@@ -354,6 +354,7 @@ AlertKind = Literal[
     "gap",
     "held",
     "limit",
+    "silent",
     "test",
     "resolved",
 ]

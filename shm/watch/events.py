@@ -46,7 +46,7 @@ EVENT_KINDS = {
 """A small vocabulary: each word decides which alerts end; `--why` tells the rest."""
 
 
-_OF_OTHERS = {"gap", "held", "limit"}
+_OF_OTHERS = {"gap", "held", "limit", "silent"}
 """Alerts that are not against a baseline's tension and ends: no new baseline ends them."""
 
 

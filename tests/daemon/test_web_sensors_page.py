@@ -60,6 +60,15 @@ def test_the_list_says_of_each_stream_how_it_is_and_how_far_tension_moved(
     assert "-3.10 ± 0.16 %" in page
 
 
+def test_a_silent_stream_is_told_on_every_page_and_by_health(client: httpx.Client) -> None:
+    said = f"Stream {NAME} (last sample "
+    for address in ("/", "/alerts"):
+        assert said in client.get(address).text
+    (told,) = client.get("/health").json()["attention"]
+    assert told.startswith(said)
+    assert told.endswith("silent.")
+
+
 def test_a_stream_has_a_page_with_its_figure_and_what_befell_it(client: httpx.Client) -> None:
     page = client.get(f"/streams/{NAME}").text
     assert "no motion (3 times in a row)" in page

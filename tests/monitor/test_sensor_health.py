@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from datetime import timedelta
+
 import numpy as np
 import pytest
 
-from shm.monitor import offsets, sensor_faults
+from shm.monitor import offsets, sees_nothing, sensor_faults
 from shm.values import FloatArray
+from shm.values.stream import Window, WindowReading
 from tests.helpers.ambient_stream import Motion, drawn, piece, stream, values
+from tests.helpers.nouns import NOW
+from tests.helpers.streams import MODES
 
 RNG = np.random.default_rng(1)
 MOTION: Motion = drawn(RNG, orders=4)
@@ -77,3 +83,61 @@ def test_offsets_are_medians_and_know_of_no_samples() -> None:
     found = offsets([piece(samples)])
     assert set(found) == {"l0", "t1", "l1"}
     assert found["l1"] == pytest.approx(0.02, abs=1e-3)
+
+
+def _hours(*levels: float, modes: bool = True) -> list[WindowReading]:
+    """Windows of ten minutes, an hour of each level."""
+    found = MODES if modes else ()
+    return [
+        WindowReading(Window("h3", 3, NOW, 600.0, "wind", level), found, "tracked")
+        for level in levels
+        for _ in range(6)
+    ]
+
+
+def _in_order(*readings: WindowReading) -> list[WindowReading]:
+    starts = (NOW + n * timedelta(minutes=10) for n in range(len(readings)))
+    return [
+        replace(each, window=replace(each.window, start=start))
+        for each, start in zip(readings, starts, strict=True)
+    ]
+
+
+SEEN = _hours(6e-3, 5e-3, 6e-3, 4e-3, 6e-3, 7e-3)
+
+
+@pytest.mark.parametrize(
+    ("then", "is_told"),
+    [
+        (_hours(3e-4, modes=False), True),
+        (_hours(3e-4, modes=False)[1:], False),  # not an hour yet
+        (_hours(3e-3, modes=False), False),  # a quiet hour
+        (_hours(3e-4), False),
+        ([*_hours(3e-4, modes=False), *_hours(3e-4)[:1]], False),
+        (_hours(*24 * [5e-3], modes=False), True),  # a day without modes, whatever the level
+        (_hours(float("nan"), modes=False), False),
+    ],
+)
+def test_a_stream_without_modes_that_fell_below_its_quietest_sees_nothing(
+    then: list[WindowReading], is_told: bool
+) -> None:
+    windows = _in_order(*SEEN, *then)
+    event = sees_nothing(windows)
+    assert (event is not None) is is_told
+    assert sees_nothing(windows[12:]) is None  # too little was seen before
+    if event is not None:
+        assert (event.kind, event.start) == ("lost modes", windows[36].window.start)
+
+
+def test_what_sees_nothing_goes_on_until_modes_are_seen_and_is_told_again_after() -> None:
+    blind = _hours(3e-4, modes=False)
+    windows = _in_order(*SEEN, *blind, *blind)
+    told = sees_nothing(windows[:-6])
+    assert told is not None
+    after = sees_nothing(windows[:-5], [told])
+    assert after is not None
+    assert (after.start, after.detail) == (windows[-6].window.start, told.detail)
+    again = _in_order(*SEEN, *blind, *_hours(5e-3), *blind)
+    found = sees_nothing(again, [told])
+    assert found is not None
+    assert found.start == again[-6].window.start

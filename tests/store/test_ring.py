@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import random
+import resource
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -16,7 +17,7 @@ import numpy as np
 import pytest
 
 from shm.documents import format_time
-from shm.errors import BadInput, DoubledChunk, StoreBusy, StoreError
+from shm.errors import BadInput, DoubledChunk, ShmError, StoreBusy, StoreError
 from shm.read import read, ring_segment
 from shm.read.chunk_document import chunk_document
 from shm.store import ring as ring_module
@@ -493,6 +494,19 @@ def test_a_full_disk_while_sealing_leaves_the_chunks(
     assert logger.seal() == [("h3", NOW)]
     (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
     assert piece.values.shape == (2, 12_000)
+
+
+def test_a_segment_that_the_disk_has_no_room_for_does_not_end_the_process(logger: Logger) -> None:
+    logger.send(*minutes(0, 1), seals=False)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))  # a write beyond it fails
+    try:
+        with pytest.raises(ShmError, match="too large"):
+            logger.seal()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert list(logger.ring.folder.rglob("*.part")) == []
+    assert logger.seal() == [("h3", NOW)]
 
 
 def test_senders_are_held_up_where_too_many_wait(

@@ -14,6 +14,7 @@ from typing import Any
 
 from shm.errors import ShmError
 from shm.pipeline import utc_now
+from shm.pipeline.unheard import heard, leads_of
 from shm.values.messages import Lead
 from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
 from shm_daemon.spool import never_taken
@@ -47,7 +48,7 @@ def limits(site: Site) -> list[str]:
 
 def attention(site: Site) -> list[str]:
     """What a person should look at though nothing fails."""
-    return _found(site, _held, _never_taken)
+    return _found(site, _held, _never_taken, _streams)
 
 
 def notices(site: Site) -> list[Lead]:
@@ -61,6 +62,7 @@ def notices(site: Site) -> list[Lead]:
             *_of_description(site),
             *_of_strangers(site),
             *_of_silences(site),
+            *_of_streams(site),
         ]
     except Exception:
         log.exception("the notices of a page cannot be made")
@@ -109,6 +111,13 @@ def _of_silences(site: Site) -> list[Lead]:
         return []  # told as a trouble
     action = "Alerts are raised and shown all the same; a silence is ended on the page of alerts."
     return [Lead(f"{each[0].upper()}{each[1:]}.", action) for each in found]
+
+
+def _of_streams(site: Site) -> Sequence[Lead]:
+    try:
+        return leads_of(heard(site.workspace, site.store, utc_now()))
+    except ShmError:
+        return []  # told as a trouble
 
 
 def _found(site: Site, *checks: Callable[[Site], list[str]]) -> list[str]:
@@ -177,6 +186,10 @@ def _held(site: Site) -> list[str]:
 def _never_taken(site: Site) -> list[str]:
     count = len(never_taken(site.workspace.spool))
     return [f"{count} of the spool will never be taken: see `shm doctor`."] if count else []
+
+
+def _streams(site: Site) -> list[str]:
+    return [lead.state for lead in _of_streams(site)]
 
 
 def _recordings(ids: Sequence[int]) -> str:

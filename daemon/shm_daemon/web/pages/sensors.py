@@ -43,6 +43,7 @@ _STYLES = {
     "silent": "alert",
     "never sent": "first",
     "sensor at fault": "alert",
+    "sees nothing": "alert",
     "clock ahead": "alert",
 }
 _EVENTS_SHOWN = 40  # technical: what is read at a glance

@@ -1,0 +1,127 @@
+"""What is said of streams that say nothing, and of their hangers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from shm.pipeline.bridge_reporting import hanger_lines, unwatched
+from shm.pipeline.silent_streams import heed_silences, note_blindness
+from shm.pipeline.unheard import Heard, State, blind_hangers, heard, leads_of, word_of
+from shm.read.chunk_document import chunk_document
+from shm.report.hanger_status import Status
+from shm.store.ring import ring_of
+from shm.values.stream import StreamEvent
+from tests.helpers.live_streams import send, with_live_streams
+from tests.helpers.nouns import NOW
+from tests.helpers.streams import MODES, STREAM, a_chunk, a_window, with_stream
+from tests.helpers.workspaces import make_workspace
+
+HOUR = timedelta(hours=1)
+OTHER = replace(STREAM, name="h3b")
+
+
+def an_event(kind: str, end: datetime) -> StreamEvent:
+    return StreamEvent("h3", kind, end - HOUR, end, "")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("ago", "kind", "state"),
+    [
+        (timedelta(minutes=4), "gap", "live"),
+        (timedelta(minutes=4), "dead", "sensor at fault"),
+        (timedelta(minutes=4), "lost modes", "sees nothing"),
+        (timedelta(minutes=6), "lost modes", "late"),
+        (2 * HOUR, "dead", "silent"),
+        (-HOUR, "dead", "clock ahead"),
+    ],
+)
+def test_a_stream_is_in_one_state(ago: timedelta, kind: str, state: State) -> None:
+    assert word_of(NOW - ago, [an_event(kind, NOW - ago)], NOW) == state
+
+
+def test_each_state_that_asks_for_a_person_is_told_once_with_its_remedy() -> None:
+    found = [
+        Heard(STREAM, "silent", NOW),
+        Heard(replace(STREAM, name="h4"), "silent", NOW - HOUR),
+        Heard(replace(STREAM, name="h5"), "never sent", None),
+        Heard(replace(STREAM, name="h6"), "late", NOW),
+    ]
+    never, silent = leads_of(found)
+    assert never.words == "Stream h5: never sent. Connect its logger: docs/permanent_sensors.md."
+    assert silent.state == (
+        "Stream h3 (last sample 2026-05-01 12:00 UTC) and h4 (last sample 2026-05-01 11:00 UTC): "
+        "silent."
+    )
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [("silent", True), ("never sent", True), ("sees nothing", True), ("live", False)],
+)
+def test_a_hanger_is_blind_where_none_of_its_streams_says_anything(
+    other: State, said: bool
+) -> None:
+    found = [Heard(STREAM, "silent", NOW), Heard(OTHER, other, NOW)]
+    assert (3 in blind_hangers(found)) is said
+    assert blind_hangers([Heard(OTHER, other, NOW) for other in ("late", "clock ahead")]) == {}
+
+
+def test_of_a_hanger_whose_stream_is_silent_nobody_says_that_nothing_needs_doing(
+    tmp_path: Path,
+) -> None:
+    workspace = make_workspace(tmp_path / "bridge")
+    blind = blind_hangers([Heard(STREAM, "silent", NOW)])
+    lead = unwatched(workspace, 3, NOW, blind, NOW)
+    assert lead is not None
+    assert (lead.urgency, lead.state) == (
+        "week", "Hanger 3: its stream h3 (last sample 2026-05-01 12:00 UTC) is silent."
+    )  # fmt: skip
+    assert unwatched(workspace, 2, NOW, blind, NOW) is None
+    with workspace.store() as store:
+        assert heard(workspace, store, NOW) == ()
+        (never,) = heard(with_stream(workspace), store, NOW)
+    assert (never.stream.name, never.state) == ("h3", "never sent")
+
+
+def test_a_silence_of_a_day_is_one_alert_which_ends_with_it(tmp_path: Path) -> None:
+    workspace = with_live_streams(make_workspace(tmp_path / "bridge"))
+    send(workspace, hours=1 / 6, first=NOW)
+    day, last = timedelta(days=1), NOW + HOUR / 6
+    with workspace.store() as store:
+        for later, alerts in ((day, 0), (day + 3 * HOUR, 1), (5 * day, 1)):
+            heed_silences(workspace, store, last + later)
+            assert len(store.alerts.list_all(standing=True)) == alerts
+        (raised,) = store.alerts.list_all()
+        assert raised.alert.message.startswith(
+            "Hanger 3: its stream hanger03 (last sample 2026-05-01 12:10 UTC) is silent for longer "
+            "than a day. Look at its logger, power and connection within a week."
+        )
+        lines = hanger_lines(workspace, store, last + 5 * day)
+        assert {each.message.status for each in lines if each.hanger.id == 3} == {Status.CHECK}
+        send(workspace, hours=1 / 6, first=NOW + 5 * day)
+        heed_silences(workspace, store, NOW + 5 * day + HOUR / 2)
+        (over,) = store.alerts.list_all()
+        assert over.resolution is not None
+        assert over.resolution.why == "stream hanger03 sends again"
+
+
+def test_a_stream_of_noise_is_noted_by_its_windows_and_said_to_see_nothing(tmp_path: Path) -> None:
+    workspace = with_stream(make_workspace(tmp_path / "bridge"))
+    with workspace.store() as store:
+        for n in range(42):
+            window = a_window(10 * n, MODES if n < 36 else ())
+            level = 0.012 if n < 36 else 1e-4
+            store.streams.save_window(
+                replace(window, window=replace(window.window, level_m_s2=level))
+            )
+        for n in (40, 41):
+            note_blindness(store, STREAM, a_window(10 * n).window.start)
+        (event,) = store.streams.list_events("h3", NOW)
+        ring_of(workspace).append(chunk_document(a_chunk(0, event.end - timedelta(seconds=5))))
+        (found,) = heard(workspace, store, event.end)
+        assert found.state == "sees nothing"
+        assert blind_hangers([found])[3].state.endswith("is without any motion of it.")
