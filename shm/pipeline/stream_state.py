@@ -23,11 +23,12 @@ _LATE, _SILENT = timedelta(minutes=5), timedelta(hours=1)
 """judgement: loggers send each minute; a router begins anew within five minutes."""
 _AHEAD = timedelta(minutes=2)  # judgement: clocks without GPS or NTP are seconds off
 _LATELY = timedelta(days=1)
-_AT_FAULT = ("dead", "drifting", "swapped", "saturated")
+_AT_FAULT = ("dead", "drifting", "swapped", "saturated", "thermometer")
 _TESTS_COMPARED = 12
 """Judgement: of so many the mean is known to a tenth of what is taken for likely before any."""
 _ROWS_SEEN = 1000  # technical: three years of a stream's own days among them
 _FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends it
+_THERMOMETER_STANDS = timedelta(hours=2)  # derived: an hour is judged once it is over
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +142,9 @@ def _word(last: datetime | None, events: tuple[StreamEvent, ...], now: datetime)
     if now - last > _LATE:
         return "late"
     faults = (each for each in events if each.kind in _AT_FAULT)
-    return "sensor at fault" if any(last - each.end < _FAULT_STANDS for each in faults) else "live"
+    stands = {"thermometer": _THERMOMETER_STANDS}
+    is_faulty = any(last - each.end < stands.get(each.kind, _FAULT_STANDS) for each in faults)
+    return "sensor at fault" if is_faulty else "live"
 
 
 def against_hammer(store: Store, stream: Stream) -> AmbientBias:
