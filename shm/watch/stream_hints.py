@@ -49,5 +49,5 @@ def _unknown(alert: Alert, events: Sequence[StreamEvent]) -> str:
     told = [e for e in events if e.kind == "thermometer" and e.end > alert.time - _LATELY]
     if not told:
         return ""
-    why = told[-1].detail.partition(":")[0]
+    why = told[-1].detail.partition(": ")[0]
     return f"the temperature is not known ({why}): part of this may be the weather's."

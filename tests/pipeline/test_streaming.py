@@ -19,6 +19,8 @@ from shm.simulate.monitored import streamed
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
 from shm.values.stream import PooledReading
+from shm.watch.stream_reading import ModeTable
+from shm.watch.stream_state import StreamState
 from shm.watch.stream_watch import StreamWatched
 from tests.helpers.flows import Clock
 from tests.helpers.live_streams import CALM, FIRST, HOUR, drain, send, with_live_streams
@@ -163,10 +165,14 @@ def test_an_alert_is_owed_to_the_hooks_and_the_raw_samples_before_it_stay(
 ) -> None:
     from shm.values import Alert
 
+    state = b""
+
     def alarmed(baseline, reading, hanger, kept, options) -> StreamWatched:
         at = reading.start + HOUR
         alert = Alert("hanger-3:sudden-change:x", 3, "hanger03-x", at, "Hanger 3 lost 3 %.", ())
-        return StreamWatched(b"state", -0.03, 1e-3, -0.03, 1e-3, None, alert, (), (), "")
+        nonlocal state
+        state = StreamState.begun("", at, ModeTable.of(None, hanger, reading.modes)).to_bytes()
+        return StreamWatched(state, -0.03, 1e-3, -0.03, 1e-3, None, alert, (), (), "")
 
     monkeypatch.setattr(stream_steps, "watch_reading", alarmed)
     send(workspace, 2)
@@ -175,7 +181,7 @@ def test_an_alert_is_owed_to_the_hooks_and_the_raw_samples_before_it_stay(
         drain(streaming, clock)
         assert [each.alert.key for each in store.alerts.list_all()] == ["hanger-3:sudden-change:x"]
         assert hours_of(store)[0].tension_shift == -0.03
-        assert store.streams.watch_state(3) == b"state"
+        assert store.streams.watch_state(3) == state
     assert len(list((workspace.folder / "ring").glob("*/kept/*.json"))) == 2
 
 
