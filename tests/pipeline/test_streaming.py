@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -183,6 +184,20 @@ def test_an_alert_is_owed_to_the_hooks_and_the_raw_samples_before_it_stay(
         assert hours_of(store)[0].tension_shift == -0.03
         assert store.streams.watch_state(3) == state
     assert len(list((workspace.folder / "ring").glob("*/kept/*.json"))) == 2
+
+
+def test_a_dead_thermometer_is_a_sensor_at_fault(workspace: Workspace) -> None:
+    send(workspace, 1, temperature_c=-127.0)
+    clock = Clock(FIRST + HOUR)
+    with at_work(workspace, clock) as (streaming, store):
+        drain(streaming, clock)
+        (state,) = stream_states(workspace, streaming.ring, store, FIRST + HOUR)
+    assert state.state == "sensor at fault"
+    (event,) = [each for each in state.events if each.kind == "thermometer"]
+    assert (event.start, event.end) == (FIRST, FIRST + HOUR)
+    assert "temperature_c is -127" in event.detail
+    assert state.hour is not None
+    assert math.isnan(state.hour.temperature_c)
 
 
 def test_streams_tell_how_they_are(workspace: Workspace) -> None:
