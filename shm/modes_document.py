@@ -18,7 +18,7 @@ from cattrs.gen import make_dict_structure_fn
 
 from shm.documents import Misfit, finite, key_meant, reader, value_of
 from shm.errors import BadInput
-from shm.values import LONGEST_TEST_ID, ModalTest, Mode, is_test_id
+from shm.values import LONGEST_TEST_ID, ModalTest, Mode, is_test_id, outdoor_c
 
 MODES_SCHEMA = "shm.modes/1"
 _HIGHEST_ORDER = 200  # technical: models solve for every order below; no hammer reaches it
@@ -177,6 +177,9 @@ def _faults(test: ModalTest) -> Iterator[tuple[bool, str, str]]:
         ".added_mass needs a positive mass_kg and an x_m",
         "Give both, in kg and m.",
     )
+    warm = test.temperature_c
+    is_odd = math.isfinite(warm) and math.isnan(outdoor_c(warm))
+    yield is_odd, f": temperature_c = {warm:g} is no temperature outdoors", _LEAVE_OUT
     read, sd = test.tension_read_n, test.tension_read_sd_n
     yield (
         read <= 0 or sd <= 0 or (math.isnan(read) and math.isfinite(sd)),

@@ -120,7 +120,7 @@ def _window(
         level_m_s2=level,
         unrest=unrest,
         signal_to_noise_db=height_db,
-        temperature_c=_mean([piece.temperature_c for piece in pieces], pieces),
+        temperature_c=_longest_c(pieces),
         wind_m_s=_mean([piece.wind_m_s for piece in pieces], pieces),
     )
 
@@ -130,6 +130,14 @@ def _unusable(
 ) -> Judged:
     unrest = events.unrest if events else NAN
     return Judged(_window(pieces, stream, "unusable", NAN, unrest), reason=reason)
+
+
+def _longest_c(pieces: Sequence[Piece]) -> float:
+    """Of the longest piece that knows it: that of a broken thermometer is no part of a mean."""
+    known = [piece for piece in pieces if math.isfinite(piece.temperature_c)]
+    if not known:
+        return NAN
+    return max(known, key=lambda piece: piece.values.shape[1]).temperature_c
 
 
 def _mean(values: Sequence[float], pieces: Sequence[Piece]) -> float:

@@ -15,7 +15,7 @@ from shm.monitor import as_modal_test, offsets, pooled, read_window, sensor_faul
 from shm.values import Alert, Hanger, ModalTest, Mode, Posterior
 from shm.values.stream import Period, Piece, PooledReading, Stream, StreamEvent, WindowReading
 from shm.watch.stream_hints import led_by
-from shm.watch.stream_state import windows_as_mounted
+from shm.watch.stream_state import windows_as_mounted, with_believed
 from shm.watch.stream_watch import StreamOptions, watch_reading
 
 _LINES = 200  # technical: of a spectrogram, as many as a panel has pixels
@@ -104,15 +104,17 @@ def pool_stream(
 
     An alert is led by that of `events` which was at the time of its change.
     """
+    kept, warm = with_believed(kept, readings)
+    readings, noticed = warm.windows, warm.events if period == "hour" else ()
     if period != "hour":  # of an hour the watch tells whether its planes are exchanged
         readings = windows_as_mounted(kept, readings)
     reading = pooled(readings, period, start)
     if reading is None:
-        return Pooled(None)
+        return Pooled(None, events=noticed)
     if period == "day":
         return Pooled(reading, test=as_modal_test(reading))
     if period != "hour" or not is_watched or not hanger.is_modelled:
-        return Pooled(reading)
+        return Pooled(reading, events=noticed)
     own = hanger.thresholds.false_call_years
     options = StreamOptions(limit_years=false_call_years if own is None else own)
     found = watch_reading(baseline, reading, hanger, kept, options)
@@ -124,5 +126,6 @@ def pool_stream(
         compensated_sd=found.compensated_sd,
         learning=found.learning,
     )
-    alert = found.alert and led_by(found.alert, (*events, *found.events))
-    return Pooled(told, found.kept, alert, found.events, ended=found.ended)
+    noticed = (*noticed, *found.events)
+    alert = found.alert and led_by(found.alert, (*events, *noticed))
+    return Pooled(told, found.kept, alert, noticed, ended=found.ended)

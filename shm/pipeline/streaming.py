@@ -366,10 +366,10 @@ class Streaming:
 
     def _keep_pooled(self, stream: Stream, period: Period, start: datetime, found: Pooled) -> None:
         self._pooled[stream.name, period] = end = start + PERIODS[period]
-        if found.reading is None:
-            return
         for event in found.events:
             self.store.streams.save_event(event)
+        if found.reading is None:
+            return
         if found.test is not None:
             hand_on_day(self.workspace, self.store, found.test, self.clock())
         is_told = found.alert is None

@@ -29,8 +29,9 @@ LATELY = timedelta(days=1)
 _LATE, _SILENT = timedelta(minutes=5), timedelta(hours=1)
 """judgement: loggers send each minute; a router begins anew within five minutes."""
 _AHEAD = timedelta(minutes=2)  # judgement: clocks without GPS or NTP are seconds off
-_AT_FAULT = ("dead", "drifting", "swapped", "saturated")
+_AT_FAULT = ("dead", "drifting", "swapped", "saturated", "thermometer")
 _FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends it
+_STANDS = {"thermometer": timedelta(hours=2)}  # derived: an hour is judged once it is over
 _NAMED = 5  # of many: the page of sensors lists them all
 _BLIND: dict[State, tuple[str, str]] = {
     "silent": ("silent", f"Look at its logger, power and connection {WEEK}."),
@@ -81,7 +82,9 @@ def word_of(last: datetime | None, events: Sequence[StreamEvent], now: datetime)
         return "silent"
     if now - last > _LATE:
         return "late"
-    standing = {each.kind for each in events if last - each.end < _FAULT_STANDS}
+    standing = {
+        each.kind for each in events if last - each.end < _STANDS.get(each.kind, _FAULT_STANDS)
+    }
     if "lost modes" in standing:
         return "sees nothing"
     return "live" if standing.isdisjoint(_AT_FAULT) else "sensor at fault"

@@ -11,7 +11,7 @@ from pathlib import Path
 from shm.documents import parse_time
 from shm.errors import BadInput
 from shm.read.units import ACCELERANCE, KNOWN, SI, UNSAID, Unit, accelerance_si, unit_of
-from shm.values import NAN, PLANES, AddedMass, Plane, Quantity
+from shm.values import NAN, PLANES, AddedMass, Plane, Quantity, outdoor_c
 
 KEYS = (
     "hanger",
@@ -87,7 +87,12 @@ class Header:
     def temperature_c(self) -> float:
         entry = self._given("temperature_c")
         remedy = "Give degrees Celsius, or leave it out."
-        return NAN if entry is None else _number(entry, "temperature_c", remedy)
+        if entry is None:
+            return NAN
+        number = _number(entry, "temperature_c", remedy)
+        if math.isnan(number) or not math.isnan(outdoor_c(number)):
+            return number
+        raise entry.refusal(f"temperature_c = {entry.text} is no temperature outdoors.", remedy)
 
     @property
     def added_mass(self) -> AddedMass | None:

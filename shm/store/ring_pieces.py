@@ -184,9 +184,15 @@ def _is_alike(one: Chunk, other: Chunk) -> bool:
 def _piece(run: list[Chunk]) -> Piece:
     first = run[0]
     values = np.concatenate([chunk.values for chunk in run], axis=1, dtype=float)
-    weather = (_mean(run, "temperature_c"), _mean(run, "wind_m_s"))
+    weather = (_middle_c(run), _mean(run, "wind_m_s"))
     rate, start = first.sampling_rate_hz, first.start
     return Piece(first.stream, start, rate, first.channels, values, *weather)
+
+
+def _middle_c(run: list[Chunk]) -> float:
+    """What a chunk says: a mean would make a likely temperature of 10 °C and a broken -127."""
+    known = sorted(c.temperature_c for c in run if not math.isnan(c.temperature_c))
+    return known[len(known) // 2] if known else NAN
 
 
 def _mean(run: list[Chunk], name: str) -> float:

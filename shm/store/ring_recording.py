@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 
@@ -10,7 +11,7 @@ import numpy as np
 from shm.documents import format_time
 from shm.errors import BadInput, NothingThere, UsageError
 from shm.store.ring import Ring
-from shm.values import NAN, Channel, Recording
+from shm.values import NAN, Channel, Recording, outdoor_c
 from shm.values.stream import Piece, Stream
 
 
@@ -57,6 +58,6 @@ def _joined(pieces: Sequence[Piece], stream: Stream) -> Recording:
         known = described.get(name)
         place = (known.plane, known.x_m, known.full_scale) if known else ()
         channels.append(Channel(name, "acceleration", row, *place))
-    temperatures = [p.temperature_c for p in pieces if p.temperature_c == p.temperature_c]
+    temperatures = [p.temperature_c for p in pieces if not math.isnan(outdoor_c(p.temperature_c))]
     mean_c = float(np.mean(temperatures)) if temperatures else NAN
     return Recording(stream.name, tuple(channels), rate, stream.hanger, first.start, mean_c)

@@ -69,8 +69,10 @@ from shm.values.hanger import (
     Turnbuckle,
 )
 from shm.values.kinds import (
+    COLDEST_C,
     NAN,
     PLANES,
+    WARMEST_C,
     BoolArray,
     ComplexArray,
     FloatArray,
@@ -78,6 +80,7 @@ from shm.values.kinds import (
     Plane,
     Quantity,
     Verdict,
+    outdoor_c,
 )
 from shm.values.modes import (
     LONGEST_TEST_ID,
@@ -129,6 +132,7 @@ from shm.values.trial import (
 )
 
 __all__ = [
+    "COLDEST_C",
     "ENOUGH_EFFECTIVE",
     "FEW_MODES",
     "FREQUENCY",
@@ -140,6 +144,7 @@ __all__ = [
     "NO_GAP",
     "PLANES",
     "TENSION",
+    "WARMEST_C",
     "WITHOUT_MODEL",
     "AddedMass",
     "Alert",
@@ -232,5 +237,6 @@ __all__ = [
     "is_test_id",
     "kind_of",
     "leads",
+    "outdoor_c",
     "printable",
 ]

@@ -18,3 +18,11 @@ Verdict: TypeAlias = Literal["good", "warning", "refused", "unknown"]
 
 PLANES: tuple[Plane, Plane] = ("transverse", "longitudinal")
 NAN = math.nan
+
+COLDEST_C, WARMEST_C = -60.0, 80.0
+"""Judgement: no outdoor air or steel is beyond; what a sensor at fault says (-127, 85, 999) is."""
+
+
+def outdoor_c(temperature_c: float) -> float:
+    """The temperature where air or steel outdoors can have it, else NaN."""
+    return temperature_c if COLDEST_C <= temperature_c <= WARMEST_C else NAN

@@ -19,7 +19,7 @@ from shm.values.modes import Mode
 
 StreamEventKind: TypeAlias = Literal[
     "gap", "overlap", "late", "doubled", "clock step", "clock drift", "refused",
-    "dead", "drifting", "swapped", "saturated", "lost modes", "logger",
+    "dead", "drifting", "swapped", "saturated", "lost modes", "logger", "thermometer",
 ]  # fmt: skip
 WindowKind: TypeAlias = Literal["wind", "traffic", "knock", "quiet", "unusable"]
 Period: TypeAlias = Literal["hour", "six hours", "day"]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from datetime import datetime
 from itertools import pairwise
 from typing import Any
@@ -22,6 +22,7 @@ from shm.values.stream import PooledReading, WindowReading
 from shm.watch.alert_state import AlertState
 from shm.watch.stream_filter import FEATURES, Bank
 from shm.watch.stream_reading import ModeTable, SeenReading, exchanged
+from shm.watch.stream_thermometer import Believed, Thermometer, believed
 
 HOURS_A_DAY = 24.0  # by definition
 # Prior sds of what the conditions do to ln T: a kelvin now, over 3 hours' mean, over a day's, over
@@ -48,7 +49,8 @@ class StreamState:
     newest readings' modes with the conditions taken off, `ring_day` their days, `old` (n,) the mean
     of those before. Shifts count from `zero`, compensated ones from `compensated_zero`; a change
     that was told moved the tension by `called_shift` from `called_from` on, 0 where none stands.
-    So many hours the planes were exchanged. Up to `settled_day` readings are gone over again: no
+    So many hours the planes were exchanged. `unknown_sd` of ln T is what an unknown temperature may
+    do, 0 where it is known. Up to `settled_day` readings are gone over again: no
     alert ends before.
     """
 
@@ -72,6 +74,8 @@ class StreamState:
     standing: tuple[str, ...] = ()
     exchanged_hours: int = 0
     settled_day: float = 0.0
+    unknown_sd: float = 0.0
+    thermometer: Thermometer = field(default_factory=Thermometer)
 
     @classmethod
     def begun(cls, key: str, start: datetime, table: ModeTable) -> StreamState:
@@ -103,6 +107,7 @@ class StreamState:
             "tension_n": self.table.tension_n,
             "modes": self.table.modes,
             "told": self.told.to_text(),
+            "thermometer": asdict(self.thermometer),
             "arrays": [(name, each.dtype.str, each.shape) for name, each in arrays.items()],
         }
         return b"\n".join(
@@ -128,6 +133,7 @@ class StreamState:
                 table=ModeTable(modes=modes, tension_n=head["tension_n"], **parts["table"]),
                 bank=Bank(day=head["day"], watched=head["watched"], **parts["bank"]),
                 told=AlertState.from_text(head["told"]),
+                thermometer=Thermometer(**head.get("thermometer", {})),
                 **{name: head[name] for name in _SCALARS if name in head},
                 **parts["state"],
             )
@@ -140,7 +146,7 @@ class StreamState:
 
 _SCALARS = (
     "key", "known_day", "zero", "compensated_zero", "readings", "is_learning", "called_from",
-    "called_shift", "standing", "exchanged_hours", "settled_day",
+    "called_shift", "standing", "exchanged_hours", "settled_day", "unknown_sd",
 )  # fmt: skip
 
 
@@ -166,6 +172,17 @@ def as_mounted(
     else:
         hours = hours - 1 if hours > HOURS_EXCHANGED + 1 else 0
     return replace(state, exchanged_hours=hours), exchanged(modes) if hours else modes
+
+
+def with_believed(
+    kept: bytes | None, readings: Sequence[WindowReading]
+) -> tuple[bytes | None, Believed]:
+    """The windows with the temperatures that are believed, and the state that goes on from them."""
+    if kept is None:
+        return None, believed(Thermometer(), readings, learning=True)
+    state = StreamState.from_bytes(kept)
+    found = believed(state.thermometer, readings, learning=state.is_learning)
+    return replace(state, thermometer=found.thermometer).to_bytes(), found
 
 
 def windows_as_mounted(
@@ -217,7 +234,13 @@ def with_conditions(
     warm = kelvin[2] - kelvin[4]
     rounds = hour * np.arange(1, 4)
     conditions = np.array([*steps, warm**2, *others, *np.sin(rounds), *np.cos(rounds)])
-    state = replace(state, lagged_c=lagged, reference=reference, known_day=known_day)
+    state = replace(
+        state,
+        lagged_c=lagged,
+        reference=reference,
+        known_day=known_day,
+        unknown_sd=math.sqrt(extra / TOGETHER),
+    )
     return state, conditions, extra
 
 

@@ -360,7 +360,7 @@ def _sized(evidence: Evidence, cause: Cause, state: StreamState) -> Evidence:
         return evidence
     later = max(int((state.ring_day >= evidence.by_day).sum()) / TOGETHER, 1.0)
     own = cause.moved[0]
-    sd = math.hypot(own.shift_sd, state.bank.wander_sd / math.sqrt(later))
+    sd = math.hypot(own.shift_sd, state.bank.wander_sd / math.sqrt(later), state.unknown_sd)
     return replace(evidence, shift=own.shift_mean, shift_sd=sd)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 from shm.pipeline.streaming import Streaming
@@ -34,11 +35,18 @@ def with_live_streams(made: Workspace, sampling_rate_hz: float = _FEW_MODES_HZ) 
     return made.reopened()
 
 
-def send(workspace: Workspace, hours: float, *, first: datetime = FIRST, seed: int = 3) -> None:
+def send(
+    workspace: Workspace,
+    hours: float,
+    *,
+    first: datetime = FIRST,
+    seed: int = 3,
+    **said: float,
+) -> None:
     """Some hours of the first stream, in chunks of ten minutes."""
     stream, hanger = workspace.bridge.streams[0], workspace.bridge.hangers[0]
     for chunk in streamed(hanger, stream, CALM, first, hours * 3600, seed):
-        ring_of(workspace).append(chunk_document(chunk))
+        ring_of(workspace).append(chunk_document(replace(chunk, **said)))
 
 
 def drain(streaming: Streaming, clock: Clock) -> None:

@@ -74,6 +74,9 @@ def test_a_gap_divides_a_window_and_takes_nothing_else() -> None:
     parts = [piece(WIND[:, :half]), piece(WIND[:, half:], later)]
     found = judged(parts, stream(), MOTION.known())
     assert found.window.duration_s == pytest.approx(SECONDS + 30)
+    assert found.window.temperature_c == 10.0
+    longer = [piece(WIND[:, : half + 1]), piece(WIND[:, half:], later, -127.0)]
+    assert cut(longer, stream(), MOTION.known()).temperature_c == 10.0
     assert [part.shape[1] for part in found.parts] == [half, half]
 
 

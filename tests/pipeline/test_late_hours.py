@@ -19,6 +19,7 @@ from shm.pipeline.streaming import Streaming
 from shm.store import Store, Workspace
 from shm.values import Mode
 from shm.values.stream import PooledReading, Window, WindowReading
+from shm.watch.stream_thermometer import Thermometer
 from shm.watch.stream_watch import StreamState, watch_reading
 from tests.helpers.flows import Clock, ingest
 from tests.helpers.live_streams import drain, with_live_streams
@@ -116,7 +117,7 @@ def test_what_was_offline_is_watched_in_its_place_and_its_alert_raised_once(
     kept = store.streams.watch_state(3)
     assert kept is not None
     state = StreamState.from_bytes(kept)
-    assert replace(state, settled_day=0.0).to_bytes() == found[-1].kept
+    assert replace(state, settled_day=0.0, thermometer=Thermometer()).to_bytes() == found[-1].kept
     days = sorted(path.name for path in workspace.spool.glob("*.modes.json"))
     assert days == [f"hanger03-2026-06-{day:02d}.modes.json" for day in range(1, 5)]
 

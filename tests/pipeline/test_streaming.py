@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -19,6 +20,8 @@ from shm.simulate.monitored import streamed
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
 from shm.values.stream import PooledReading
+from shm.watch.stream_reading import ModeTable
+from shm.watch.stream_state import StreamState
 from shm.watch.stream_watch import StreamWatched
 from tests.helpers.flows import Clock
 from tests.helpers.live_streams import CALM, FIRST, HOUR, drain, send, with_live_streams
@@ -163,10 +166,14 @@ def test_an_alert_is_owed_to_the_hooks_and_the_raw_samples_before_it_stay(
 ) -> None:
     from shm.values import Alert
 
+    state = b""
+
     def alarmed(baseline, reading, hanger, kept, options) -> StreamWatched:
         at = reading.start + HOUR
         alert = Alert("hanger-3:sudden-change:x", 3, "hanger03-x", at, "Hanger 3 lost 3 %.", ())
-        return StreamWatched(b"state", -0.03, 1e-3, -0.03, 1e-3, None, alert, (), (), "")
+        nonlocal state
+        state = StreamState.begun("", at, ModeTable.of(None, hanger, reading.modes)).to_bytes()
+        return StreamWatched(state, -0.03, 1e-3, -0.03, 1e-3, None, alert, (), (), "")
 
     monkeypatch.setattr(stream_steps, "watch_reading", alarmed)
     send(workspace, 2)
@@ -175,8 +182,22 @@ def test_an_alert_is_owed_to_the_hooks_and_the_raw_samples_before_it_stay(
         drain(streaming, clock)
         assert [each.alert.key for each in store.alerts.list_all()] == ["hanger-3:sudden-change:x"]
         assert hours_of(store)[0].tension_shift == -0.03
-        assert store.streams.watch_state(3) == b"state"
+        assert store.streams.watch_state(3) == state
     assert len(list((workspace.folder / "ring").glob("*/kept/*.json"))) == 2
+
+
+def test_a_dead_thermometer_is_a_sensor_at_fault(workspace: Workspace) -> None:
+    send(workspace, 1, temperature_c=-127.0)
+    clock = Clock(FIRST + HOUR)
+    with at_work(workspace, clock) as (streaming, store):
+        drain(streaming, clock)
+        (state,) = stream_states(workspace, streaming.ring, store, FIRST + HOUR)
+    assert state.state == "sensor at fault"
+    (event,) = [each for each in state.events if each.kind == "thermometer"]
+    assert (event.start, event.end) == (FIRST, FIRST + HOUR)
+    assert "temperature_c is -127" in event.detail
+    assert state.hour is not None
+    assert math.isnan(state.hour.temperature_c)
 
 
 def test_streams_tell_how_they_are(workspace: Workspace) -> None:

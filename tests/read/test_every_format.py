@@ -165,6 +165,7 @@ def test_a_sidecar_goes_before_the_file(
         ("hanger = true\n", "not a number"),
         ('time = "tomorrow"\n', "not an ISO 8601"),
         ("temperature_c = inf\n", "not a number"),
+        ("temperature_c = -127\n", "temperature_c = -127 is no temperature outdoors"),
         ("sampling_rate_hz = 0\n", "not positive"),
         ("channel = 3\n", "must hold tables"),
         ('[channel.acc_9]\nunit = "g"\n', "does not have"),

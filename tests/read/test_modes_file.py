@@ -54,6 +54,14 @@ def test_what_only_samples_have_is_refused(modes: Path, said: str) -> None:
     assert str(refused.value.file) == str(sidecar)
 
 
+def test_a_temperature_of_no_bridge_is_refused(modes: Path) -> None:
+    document = json.loads(modes.read_text())
+    document["tests"][1]["temperature_c"] = 282
+    modes.write_text(json.dumps(document))
+    with pytest.raises(BadInput, match="temperature_c = 282 is no temperature outdoors"):
+        shm.load_modes(modes)
+
+
 def test_a_misspelt_key_is_refused_and_those_of_others_are_left_alone(modes: Path) -> None:
     modes.with_suffix(".toml").write_text("temprature_c = 12.0\n")
     with pytest.raises(BadInput, match="unknown key temprature_c") as refused:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import random
 import resource
@@ -124,6 +125,14 @@ def test_a_chunk_that_comes_again_is_kept_once(logger: Logger) -> None:
     assert not Ring(logger.ring.folder).append(content).is_new
     (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
     assert piece.values.shape == (2, 6000)
+
+
+def test_a_few_minutes_of_a_broken_thermometer_are_no_part_of_a_mean(logger: Logger) -> None:
+    said = [11.0, -127.0, 12.0, math.nan, -127.0, 11.5, 12.0]
+    chunks = minutes(*range(len(said)))
+    logger.send(*(replace(each, temperature_c=c) for each, c in zip(chunks, said, strict=True)))
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert piece.temperature_c == 11.5
 
 
 @pytest.mark.parametrize("is_sealed", [False, True])

@@ -31,7 +31,7 @@ _HUES = ("blue", "orange", "green", "purple")
 _SHOWN_MODES = len(_HUES)
 _BREAK = 3  # judgement: after three missing hours, or days, a line would be a guess
 _PACE = {"hour": "from hour to hour", "six hours": "every six hours", "day": "from day to day"}
-_OF_HEALTH = ("dead", "drifting", "swapped", "saturated", "clock step", "lost modes")
+_OF_HEALTH = ("dead", "drifting", "swapped", "saturated", "clock step", "lost modes", "thermometer")
 
 
 @dataclass(frozen=True, eq=False)

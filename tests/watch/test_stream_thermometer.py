@@ -1,0 +1,159 @@
+"""A stream's thermometer at fault: dead, in another unit, loose. Its tension is not to follow."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import timedelta
+
+import pytest
+
+from shm.pipeline.stream_steps import Pooled, pool_stream
+from shm.values import outdoor_c
+from shm.values.stream import PooledReading, Window, WindowReading
+from shm.watch.stream_state import StreamState
+from shm.watch.stream_thermometer import FASTEST_K_PER_H, Thermometer, believed
+from tests.watch.test_stream_watch import HANGER, START, from_hour, hours
+
+Says = Callable[[int, float], float]
+TEN = timedelta(minutes=10)
+
+
+def windows_of(reading: PooledReading, said_c: float) -> list[WindowReading]:
+    """The first and the last ten minutes of an hour: each follows on the one before."""
+    starts = (reading.start, reading.start + timedelta(minutes=50))
+    level = reading.level_m_s2
+    return [
+        WindowReading(
+            Window("north", 7, at, 600.0, "wind", level, temperature_c=said_c, wind_m_s=4.0),
+            reading.modes,
+            "tracked",
+        )
+        for at in starts
+    ]
+
+
+def watched(readings: Sequence[PooledReading], says: Says) -> list[Pooled]:
+    """Hour by hour as the daemon does, the thermometer saying what `says` makes of the truth."""
+    found: list[Pooled] = []
+    kept, events = None, []
+    for hour, each in enumerate(readings):
+        windows = windows_of(each, says(hour, each.temperature_c))
+        one = pool_stream(windows, "hour", each.start, HANGER, None, kept, 100.0, events[-9:])
+        kept, events = one.kept, [*events, *one.events]
+        found.append(one)
+    return found
+
+
+def from_on(first: int, says: Callable[[float], float], last: int = 10**6) -> Says:
+    return lambda hour, true_c: says(true_c) if first <= hour < last else true_c
+
+
+DEAD = from_on(200, lambda _: -127.0)
+
+
+@pytest.mark.parametrize("said_c", [-127.0, 999.0, -273.0, 85.0, 282.0])
+def test_what_no_bridge_can_be_is_an_unknown_temperature_and_told_each_hour(said_c: float) -> None:
+    assert math.isnan(outdoor_c(said_c))
+    found = watched(hours(4), from_on(2, lambda _: said_c))
+
+    assert [len(each.events) for each in found] == [0, 0, 1, 1]
+    (event,) = found[2].events
+    assert event.kind == "thermometer"
+    assert event.detail.startswith(f"temperature_c is {said_c:g}, and nothing outdoors is")
+    assert event.end == START + timedelta(hours=3)
+    assert [math.isnan(each.reading.temperature_c) for each in found] == [False] * 2 + [True] * 2
+
+
+def test_a_dead_thermometer_neither_moves_the_tension_nor_doubles_a_loss() -> None:
+    readings = hours(240, tension=from_hour(205, -0.02))
+    found = watched(readings, DEAD)
+
+    (told,) = [each.alert for each in found if each.alert]
+    assert told.time > START + timedelta(hours=205)
+    assert told.message.startswith(
+        "Hanger 7: the temperature is not known (temperature_c is -127, and nothing outdoors is "
+        "below -60 or above 80 °C): part of this may be the weather's. Tension fell by "
+    )
+    tension = told.change.moved[0]
+    sighted = watched(readings, lambda _, true_c: true_c)
+    (sharp,) = [each.alert for each in sighted if each.alert]
+    assert tension.quantity == "tension"
+    assert abs(tension.shift_mean + 0.02) < 2 * tension.shift_sd
+    assert 1.5 * sharp.change.moved[0].shift_sd < tension.shift_sd < 0.01
+
+
+@pytest.mark.parametrize("says", [DEAD, from_on(200, lambda true_c: true_c + 12)])
+def test_a_thermometer_at_fault_alone_is_no_alert(says: Says) -> None:
+    found = watched(hours(300, seed=2), says)
+
+    assert not [each.alert for each in found if each.alert]
+    assert {event.kind for each in found for event in each.events} == {"thermometer"}
+    assert all(each.events for each in found[200:])
+
+
+def test_a_jump_is_not_believed_until_it_is_back() -> None:
+    found = watched(hours(120), from_on(100, lambda true_c: true_c + 12, 110))
+
+    told = [each.events[0].detail for each in found if each.events]
+    assert len(told) == 10
+    assert told[0].startswith("temperature_c jumped by +1")
+    assert "at 2026-05-05 04:00, faster than steel warms or cools" in told[0]
+    assert [math.isnan(each.reading.temperature_c) for each in found].count(True) == 10
+    of_day = [w for hour in range(96, 120) for w in _said(found, hour)]
+    day = START + timedelta(days=4)
+    pooled = pool_stream(of_day, "day", day, HANGER, None, found[-1].kept, 100.0)
+    mean_c = sum(each.reading.temperature_c for each in _known(found[96:])) / 14
+    assert pooled.test.temperature_c == pytest.approx(mean_c)
+
+
+def _said(found: Sequence[Pooled], hour: int) -> list[WindowReading]:
+    true_c = hours(120)[hour].temperature_c
+    return windows_of(found[hour].reading, true_c + 12 * (100 <= hour < 110))
+
+
+def _known(found: Sequence[Pooled]) -> list[Pooled]:
+    return [each for each in found if math.isfinite(each.reading.temperature_c)]
+
+
+def test_while_it_learns_a_jump_is_what_it_learns_from() -> None:
+    found = watched(hours(60), from_on(30, lambda true_c: true_c - 15))
+
+    assert not any(each.events for each in found)
+    assert StreamState.from_bytes(found[-1].kept).thermometer.off_k == 0
+
+
+def test_only_what_no_steel_can_do_is_a_jump() -> None:
+    start_s, step = START.timestamp(), FASTEST_K_PER_H / 6
+    seen = Thermometer().after(5.0, start_s)
+
+    assert not seen.after(5.0 + 0.99 * step, start_s + 600).off_k
+    assert seen.after(5.0 + 1.01 * step, start_s + 600).off_k == pytest.approx(1.01 * step)
+    assert not seen.after(5.0 + 1.5 * step, start_s + 1200).off_k
+    off = seen.after(20.0, start_s + 600)
+    assert off.after(16.0, start_s + 1200).off_k == 15.0
+    assert off.after(35.0, start_s + 1200).off_k == 30.0
+    back = off.after(6.0, start_s + 7200)  # of a logger that was off meanwhile
+    assert back.off_k == 0
+    assert [back.is_doubted(start_s + s) for s in (0, 600, 7100, 7200)] == [
+        False,
+        True,
+        True,
+        False,
+    ]
+
+
+def test_windows_that_were_judged_already_are_judged_alike() -> None:
+    reading = hours(1)[0]
+    windows = [
+        replace(each, window=replace(each.window, start=START + n * TEN, temperature_c=c))
+        for n, c in enumerate([9.0, 9.0, 21.0, 21.0, 9.5])
+        for each in windows_of(reading, 9.0)[:1]
+    ]
+    first = believed(Thermometer(), windows, learning=False)
+    again = believed(first.thermometer, windows, learning=False)
+
+    known = [math.isfinite(each.window.temperature_c) for each in first.windows]
+    assert known == [True, True, False, False, True]
+    assert [math.isfinite(each.window.temperature_c) for each in again.windows] == known
