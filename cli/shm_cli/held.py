@@ -142,7 +142,7 @@ def _withdrawn_words(what: str, withdrawal: Withdrawal) -> str:
     said = [f"{what}: {names} is discarded and counts in nothing from now on."]
     if withdrawal.watched_again:
         said.append(
-            f"Later tests that are watched again: {withdrawal.watched_again}; alerts that were "
+            f"Later tests that are watched again: {withdrawal.watched_again}; alerts that others "
             "raised stay raised."
         )
     if withdrawal.of_baseline:

@@ -9,7 +9,6 @@ import math
 import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any
 
@@ -22,22 +21,22 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.pipeline.telling import quiet_until
 from shm.pipeline.unheard import heard, leads_of
+from shm.report.contents import HangerLine
 from shm.report.formatting import model_class
-from shm.report.hanger_status import Status
+from shm.report.hanger_status import Status, bridge_message
 from shm.store import (
     ENDED,
-    Decision,
     DeliveryState,
-    FormerPosterior,
-    FormerTest,
     Store,
     StoredTest,
     Workspace,
 )
 from shm.store.checksums import of_readable
+from shm.store.stored_silences import said_of
 from shm.watch.frequency_text import frequency_words
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
+from shm_cli.stages import show_stages
 from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import never_taken, scan
 
@@ -102,6 +101,9 @@ def _show(document: dict[str, Any]) -> None:
     oldest = document["oldest_waiting_at"]
     since = f", the oldest since {oldest:%Y-%m-%d %H:%M}" if oldest else ""
     owed = ", ".join(f"{n} {state}" for state, n in deliveries.items() if n)
+    said = document["message"]
+    parts = (said["state"], said["action"], *said["notes"], said["others"])
+    click.echo(paragraph(" ".join(part for part in parts if part)))
     click.echo(f"{document['bridge']}: recordings: {recordings or 'none yet'}")
     click.echo(f"daemon: {daemon['active'] or 'none active'}{ago}")
     click.echo(f"waiting: {document['spool']} in the spool, {document['under_way']} stored{since}")
@@ -118,6 +120,12 @@ def _show(document: dict[str, Any]) -> None:
     for said in (*document["quiet_hours"], *document["silences"], *document["streams"]):
         click.echo(said)
     click.echo(f"disk: {document['disk_free_bytes'] / 1e9:.1f} GB free; more: `shm doctor`")
+    _show_hangers(document)
+    for said in _told_of_held(document["held"]):
+        click.echo(said)
+
+
+def _show_hangers(document: dict[str, Any]) -> None:
     made = table(
         "hangers",
         "hanger",
@@ -142,8 +150,6 @@ def _show(document: dict[str, Any]) -> None:
             str(row["open_alerts"] or ""),
         )
     show_table(made)
-    for said in _told_of_held(document["held"]):
-        click.echo(said)
 
 
 def _told_of_structure(row: Mapping[str, Any]) -> str:
@@ -219,6 +225,9 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
     counts = store.recordings.stage_counts()
     ended = sum(counts[stage] for stage in ENDED)
     held, now = store.recordings.list_holds(), utc_now()
+    lines = {each.hanger.id: each for each in hanger_lines(workspace, store, now)}
+    of_hangers = Counter(hold.hanger for hold in held)
+    message = bridge_message({id_: each.message for id_, each in lines.items()})
     return {
         "bridge": workspace.bridge.name,
         "daemon": _daemon(workspace),
@@ -236,13 +245,14 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
         "quiet_hours": _quiet(workspace, store, now),
-        "silences": list(store.silences.list_in_force(now)),
+        "silences": [said_of(each) for each in store.silences.list_in_force(now)],
         "streams": [each.words for each in leads_of(heard(workspace, store, now))],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
         "changed_settings": [str(each) for each in store.settings.list_current().values()],
         "structures": _structures(workspace, store, open_at),
-        "hangers": _hangers(workspace, store, open_at, Counter(hold.hanger for hold in held)),
+        "message": {**message.document, "others": message.others},
+        "hangers": _hangers(workspace, store, lines, open_at, of_hangers),
     }
 
 
@@ -291,14 +301,17 @@ def _structures(
 
 
 def _hangers(
-    workspace: Workspace, store: Store, open_alerts: Mapping[int, int], held: Mapping[int, int]
+    workspace: Workspace,
+    store: Store,
+    lines: Mapping[int, HangerLine],
+    open_alerts: Mapping[int, int],
+    held: Mapping[int, int],
 ) -> list[dict[str, Any]]:
     models, latest, rows = store.posteriors.selected_models(), store.tests.latest(), []
     known_damage = (*store.upkeep.known_damage(), *store.watch.damaged_baselines().values())
     damage = {each.hanger: str(each) for each in known_damage}
     baselines = store.watch.baselines_in_force(workspace.bridge.hangers)
     watches = of_readable(store.watch.latest, {})
-    lines = {each.hanger.id: each for each in hanger_lines(workspace, store, utc_now())}
     for hanger in workspace.bridge.hangers:
         found, baseline = latest.get(hanger.id), baselines.get(hanger.id)
         watch, adopted = None, []
@@ -332,68 +345,3 @@ def _hangers(
             }
         )
     return rows
-
-
-_OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
-
-
-def show_stages(ctx: click.Context, which: str, as_json: bool) -> None:
-    """Raises NothingThere where there is no such recording or test."""
-    with opened_store(ctx) as (_, store):
-        recording_id, _ = store.recordings.find(which)
-        recording = store.recordings.get(recording_id)
-        steps, tests = (
-            store.recordings.list_steps(recording_id),
-            store.tests.list_former(recording_id),
-        )
-        noticed = store.recordings.list_events(recording_id=recording_id)
-        other_names = [
-            n for n in store.recordings.names_of(recording_id) if n != recording.file.file_name
-        ]
-    if as_json:
-        show(
-            {
-                "recording": recording_id,
-                "file": recording.file.file_name,
-                "also_came_as": other_names,
-                "stage": recording.stage.value,
-                "steps": [asdict(step) for step in steps],
-                "noticed": [
-                    {"at": event.at, "kind": event.kind, "message": event.message}
-                    for event in noticed
-                ],
-                "results": [asdict(test) for test in tests],
-            }
-        )
-        return
-    also = f" (also came as {', '.join(other_names)})" if other_names else ""
-    title = f"recording {recording_id}: {recording.file.file_name}{also}"
-    made = table(title, "stage", "test", "at")
-    made.add_column("shm", justify="right")
-    by_a_person = {event.at: event.kind for event in noticed if event.kind in _OUT}
-    for step in steps:
-        made.add_row(
-            by_a_person.get(step.at, step.stage),
-            step.test or "",
-            f"{step.at:%Y-%m-%d %H:%M:%S}",
-            step.version,
-        )
-    show_table(made)
-    for event in noticed:
-        if event.message:
-            kind = "" if event.message.startswith(event.kind) else f"{event.kind}: "
-            said = f"{event.at:%Y-%m-%d %H:%M:%S} {kind}{event.message}"
-            click.echo(paragraph(said))
-    for test in tests:
-        _tell(test)
-
-
-def _tell(test: FormerTest) -> None:
-    click.echo(f"{test.name}: identified by shm {test.lineage.version}{_until(test)}")
-    for made in test.posteriors:
-        click.echo(f"  posterior of {made.model} by shm {made.lineage.version}{_until(made)}")
-
-
-def _until(result: FormerTest | FormerPosterior) -> str:
-    superseded_at = result.superseded_at
-    return f", superseded {superseded_at:%Y-%m-%d %H:%M:%S}" if superseded_at else ""

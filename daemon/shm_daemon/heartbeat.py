@@ -21,6 +21,9 @@ _BEATS_A_WATCHDOG = 3  # sd_watchdog_enabled(3) asks for two at least: one may b
 
 log = logging.getLogger(__name__)
 
+NEARLY_FULL = 0.1
+"""Judgement: of the room that is wanted on a disk; a warning comes ten times earlier."""
+
 
 def beat(workspace: Workspace) -> None:
     """Shows that the loop of the active daemon went round."""

@@ -138,6 +138,8 @@ class HangersNow:
         baselines = store.watch.baselines_in_force(every)  # of neighbours too: one may stand out
         watches = of_readable(partial(store.watch.latest, hangers=hangers), damaged)
         standing = defaultdict[int, list[StoredAlert]](list)
+        silences = store.silences.list_all()
+        works = [each for each in silences if each.is_maintenance]
         for each in store.alerts.list_all(_only(hangers), standing=True):
             standing[each.alert.hanger].append(each)
         return cls(
@@ -149,9 +151,9 @@ class HangersNow:
             of_readable(partial(store.watch.detected_changes, hangers=hangers), damaged),
             store.alerts.open_counts(),
             standing,
-            store.silences.list_current(now),
+            tuple(each for each in silences if not each.is_over(now)),
             damaged,
-            warnings_from(every, hangers, baselines, watches, now_at),
+            warnings_from(every, hangers, baselines, watches, now_at, works),
             blind_hangers(heard(workspace, store, now)),
         )
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from shm.report.open_warnings import nearly_slack, open_warnings, standing_out
-from shm.store import BaselineGlance, Store, StoredWatch, TrendPoint, Workspace
+from shm.report.open_warnings import nearly_slack, open_warnings, passed_over, standing_out
+from shm.store import BaselineGlance, Silence, Store, StoredWatch, TrendPoint, Workspace
 from shm.store.checksums import of_readable
+from shm.store.stored_silences import said_of
 from shm.values import TENSION, Hanger
 
 
@@ -21,7 +22,8 @@ def warnings_of(
     every = workspace.bridge.hangers
     latest = of_readable(partial(store.watch.latest, hangers=hangers), {})
     now, baselines = store.posteriors.latest_trends(hangers), store.watch.baselines_in_force(every)
-    return warnings_from(every, hangers, baselines, latest, now)
+    works = [each for each in store.silences.list_all() if each.is_maintenance]
+    return warnings_from(every, hangers, baselines, latest, now, works)
 
 
 def warnings_from(
@@ -30,8 +32,12 @@ def warnings_from(
     baselines: Mapping[int, BaselineGlance],
     latest: Mapping[int, StoredWatch],
     now: Mapping[int, TrendPoint],
+    works: Sequence[Silence],
 ) -> dict[int, tuple[str, ...]]:
-    """The same of what was asked already: the `baselines` of `every` hanger of the bridge."""
+    """The same of what was asked already: the `baselines` of `every` hanger of the bridge.
+
+    `works` are maintenance windows.
+    """
     tensions = {id_: each.averaged.tension_n for id_, each in baselines.items()}
 
     def slack(hanger: Hanger) -> str:
@@ -43,13 +49,22 @@ def warnings_from(
         of_test = now[hanger.id].averaged.tension_n
         return nearly_slack(hanger, tensions[hanger.id], of_test, is_told=is_told)
 
+    def of_works(hanger: Hanger) -> str:
+        point, watched = now.get(hanger.id), latest.get(hanger.id)
+        if point is None or point.test in baselines[hanger.id].tests:
+            return ""
+        if watched is not None and watched.watched.time >= point.time:
+            return ""
+        windows = [each for each in works if each.covers(hanger.id, point.time)]
+        return passed_over(hanger, said_of(windows[-1])) if windows else ""
+
     return {
         hanger.id: open_warnings(
             hanger,
             baselines[hanger.id].check,
             standing_out(hanger, every, tensions),
             latest[hanger.id].watched if hanger.id in latest else None,
-            slack(hanger),
+            (slack(hanger), of_works(hanger)),
         )
         for hanger in hangers
         if hanger.id in baselines

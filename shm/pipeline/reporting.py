@@ -114,6 +114,7 @@ def hanger_now(
     watched, alerts = _watched_against(store, baseline), store.alerts.list_all(hanger.id)
     standing = [each for each in alerts if each.resolution is None]
     silences = store.silences.list_current(generated_at)
+    blind = blind_hangers(heard(workspace, store, generated_at))
     return HangerReport(
         bridge=workspace.bridge.name,
         letterhead=workspace.bridge.letterhead,
@@ -146,13 +147,7 @@ def hanger_now(
         standing=findings(each.alert for each in standing),
         notes=notes_of(standing, silences, hanger.id, generated_at),
         inspections=store.notes.list_all(hanger.id),
-        unwatched=unwatched(
-            workspace,
-            hanger.id,
-            latest.time,
-            blind_hangers(heard(workspace, store, generated_at)),
-            generated_at,
-        ),
+        unwatched=unwatched(workspace, hanger.id, latest.time, blind, generated_at),
     )
 
 

@@ -149,16 +149,15 @@ def bridge_message(messages: Mapping[int, HangerMessage]) -> BridgeMessage:
     worst = next((status for status in Status if status in found), None)
     needing = {id_: each for id_, each in known.items() if each.needs_action}
 
-    def rank(id_: int) -> tuple[int, int]:
-        status = needing[id_].status
-        return -URGENCIES.index(needing[id_].urgency), order.index(status) if status else len(order)
+    def rank(id_: int) -> tuple[int, int, bool]:
+        one = needing[id_]
+        place = order.index(one.status) if one.status else len(order)
+        return -URGENCIES.index(one.urgency), place, bool(one.notes)  # what nobody noted first
 
     if needing:
         first, *others = sorted(needing, key=rank)
-        more = f"Other hangers that need action: {listed(list(map(str, sorted(others))))}."
-        return BridgeMessage(
-            worst, needing[first].lead, more if others else "", needing[first].notes
-        )
+        more = _how_soon(needing, others)
+        return BridgeMessage(worst, needing[first].lead, more, needing[first].notes)
     if not known:
         return BridgeMessage(None, Lead("No hanger has been tested yet.", f"Test all {NEXT_TEST}."))
     untested = [str(id_) for id_ in messages if id_ not in known]
@@ -168,6 +167,20 @@ def bridge_message(messages: Mapping[int, HangerMessage]) -> BridgeMessage:
         Lead(f"No change detected on {many}.", "No action is needed before the next planned test."),
         f"Not tested yet: {listed(untested)}." if untested else "",
     )
+
+
+_SOON = {"none": "when convenient", "next_test": NEXT_TEST, "week": WEEK, "today": TODAY}
+
+
+def _how_soon(needing: Mapping[int, HangerMessage], others: Iterable[int]) -> str:
+    """The others by urgency, the most urgent first; empty where there are none."""
+    of: dict[Urgency, list[int]] = {}
+    for id_ in others:
+        of.setdefault(needing[id_].urgency, []).append(id_)
+    order = [urgency for urgency in reversed(URGENCIES) if urgency in of]
+    said = [f"{_SOON[each]}: {listed(list(map(str, sorted(of[each]))))}" for each in order]
+    rest = (f" {each[0].upper()}{each[1:]}." for each in said[1:])
+    return f"Other hangers that need action {said[0]}.{''.join(rest)}" if said else ""
 
 
 def hanger_message(known: Known) -> HangerMessage:

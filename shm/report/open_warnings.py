@@ -31,14 +31,14 @@ def open_warnings(
     check: BaselineCheck | None,
     neighbours: str = "",
     latest: WatchedTest | None = None,
-    slack: str = "",
+    now: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """Each a state, what to do, and why; empty where nothing is wrong.
 
     `check` is that of the baseline, `neighbours` what `standing_out` says of it, `latest` what the
-    watch says after the newest test, `slack` what `nearly_slack` says of that.
+    watch says after the newest test, `now` what `nearly_slack` and `passed_over` say of that.
     """
-    found = [slack] if slack else []
+    found = [each for each in now if each]
     if check is not None and check.misfit:
         found.append(
             f"Hanger {hanger.id}: its baseline does not fit. Check the description and the numbers "
@@ -59,6 +59,15 @@ def open_warnings(
     if notable:
         found.append(warning_words(notable, hanger))
     return tuple(found)
+
+
+def passed_over(hanger: Hanger, window: str) -> str:
+    """That the newest test was compared with nothing: it lies within a maintenance `window`."""
+    return (
+        f"Hanger {hanger.id}: its latest test was made in a maintenance window and is compared "
+        f"with nothing. Test it again {WEEK} of the end of the works. Until then nobody knows "
+        f"whether it changed ({window})."
+    )
 
 
 def nearly_slack(hanger: Hanger, baseline: Summary, now: Summary, *, is_told: bool) -> str:

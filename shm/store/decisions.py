@@ -40,12 +40,13 @@ from shm.store.holding import (
     taking_back,
     undecided,
 )
+from shm.store.outbox import resolve
 from shm.store.queries import WEIGHED
 from shm.store.recording_rows import Decision, HeldTest, Hold, Rerun
 from shm.store.reprocessing import of_baselines, reprocess, supersede_results
 from shm.store.results import advance_recordings
 from shm.store.rows import Stage
-from shm.store.tables import holds, recordings, tests, watches
+from shm.store.tables import alerts, holds, recordings, tests, watches
 from shm.store.watched_again import send_back
 
 
@@ -130,9 +131,9 @@ class Decisions(Repository):
     ) -> Withdrawal:
         """From now on the tests of a recording, or one of them, count in nothing.
 
-        Their posteriors and watches are superseded, and the later tests of the hanger are watched
-        again; baselines stay as they were made. Raises NothingThere where there is no such
-        recording, UsageError where none of it counts.
+        Their posteriors and watches are superseded, the alerts that they raised end, and the later
+        tests of the hanger are watched again; baselines stay as they were made. Raises NothingThere
+        where there is no such recording, UsageError where none of it counts.
         """
         with self.writing() as connection:
             recording = by_id(connection, recording_id)
@@ -149,6 +150,10 @@ class Decisions(Repository):
             ids = [row.id for row in chosen]
             end_tests(connection, recording_id, ids, at)
             supersede_results(connection, ids, Stage.IDENTIFIED, at)
+            told = f"test discarded by {who}" + (f": {why}" if why else "")
+            raised = sa.select(alerts.c.id).where(alerts.c.test_id.in_(ids))
+            for alert_id in connection.scalars(raised).all():
+                resolve(connection, alert_id, who, told, at)
             again = _watch_again(connection, chosen, weighed, at)
             held = [HeldTest(row.position, row.name, ()) for row in chosen]
             record = (Decision.WITHDRAWN, who, why, at, None)

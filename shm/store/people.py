@@ -219,6 +219,8 @@ def _fit(name: str) -> str:
             "the name of a user is a short text without invisible characters.",
             remedy="Type the person's name.",
         )
+    if same_name(made) == "shm":
+        raise UsageError("shm itself writes as shm.", remedy="Type the person's name.")
     scripts = {
         re.split("[ -]", unicodedata.name(each, "?"))[0] for each in made if _is_written(each)
     }

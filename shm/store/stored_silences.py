@@ -44,8 +44,10 @@ class Silences(Repository):
         values = {name: value for name, value in vars(made).items() if name != "id"}
         with self.writing() as connection:
             number = insert(connection, silences, {**values, "ended_who": None})
-            note(connection, at, "silence made", _named(number, hanger), why, who)
-            return self._one(number, made)
+            found = self._one(number, made)
+            told = f"{starts_at:%Y-%m-%d %H:%M} to {ends_at:%Y-%m-%d %H:%M} UTC"
+            note(connection, at, f"{kind_of(found)} made", f"{_named(found)}, {told}", why, who)
+            return found
 
     def end(self, silence_id: int, who: str, at: datetime) -> Silence:
         """Ends a silence before its time; raises NothingThere, or UsageError where it is over."""
@@ -62,7 +64,7 @@ class Silences(Repository):
             ended = {"ended_at": at, "ended_who": who}
             one = sa.update(silences).where(silences.c.id == silence_id)
             connection.execute(one.values(**ended))
-            note(connection, at, "silence ended", _named(silence_id, found.hanger), who=who)
+            note(connection, at, f"{kind_of(found)} ended", _named(found), who=who)
             return self._one(silence_id, found, at, who)
 
     def list_all(self) -> tuple[Silence, ...]:
@@ -75,9 +77,9 @@ class Silences(Repository):
         """Those in force at a time or yet to come."""
         return tuple(each for each in self.list_all() if not each.is_over(at))
 
-    def list_in_force(self, at: datetime) -> tuple[str, ...]:
-        """Those in force at a time, in words."""
-        return tuple(said_of(each) for each in self.list_current(at) if each.starts_at <= at)
+    def list_in_force(self, at: datetime) -> tuple[Silence, ...]:
+        """Those in force at a time."""
+        return tuple(each for each in self.list_current(at) if each.starts_at <= at)
 
     @staticmethod
     def _one(
@@ -96,12 +98,20 @@ def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> 
 
 
 def said_of(silence: Silence) -> str:
-    """A silence in force, in words."""
-    kind = "maintenance window" if silence.is_maintenance else "silence"
+    """A silence or a maintenance window in words: what it keeps from whom, until when, and why."""
+    of = hangers_of(silence.hanger)
+    kept = f"hooks are told nothing of {of}"
+    if silence.is_maintenance:
+        kept = f"tests of {of} are compared with nothing, and hooks told nothing of it,"
     return (
-        f"{kind} {silence.id}: hooks are told nothing of {hangers_of(silence.hanger)} until "
-        f"{silence.until:%Y-%m-%d %H:%M} UTC ({silence.who}: {silence.why})"
+        f"{kind_of(silence)} {silence.id}: {kept} until {silence.until:%Y-%m-%d %H:%M} UTC "
+        f"({silence.who}: {silence.why})"
     )
+
+
+def kind_of(silence: Silence) -> str:
+    """What it is called."""
+    return "maintenance window" if silence.is_maintenance else "silence"
 
 
 def hangers_of(hanger: int | None) -> str:
@@ -109,8 +119,8 @@ def hangers_of(hanger: int | None) -> str:
     return "all hangers" if hanger is None else f"hanger {hanger}"
 
 
-def _named(number: int, hanger: int | None) -> str:
-    return f"silence {number}, {hangers_of(hanger)}"
+def _named(silence: Silence) -> str:
+    return f"{kind_of(silence)} {silence.id}, {hangers_of(silence.hanger)}"
 
 
 def _silence(row: Row[tuple[object, ...]]) -> Silence:

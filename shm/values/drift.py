@@ -90,13 +90,12 @@ class WatchedQuantity:
     where it acts, None where they do not tell it apart. Where frequencies cannot say which end of a
     plane moves, both are one quantity, `transverse_end_stiffness` for instance: that of two springs
     alike, 2/(1/k_deck + 1/k_arch), both of which move by the same decades. `parameters` are those
-    of the model class that move. The watch works in a `coordinate` in which
-    frequencies change nearly linearly, 0 at the baseline: of the tension the logarithm of its ratio
-    to the baseline's; of a spring the change of the mean log frequency. `coordinates` (m,),
-    ascending, and `values` (m,) map it to the tension in N or to log10 of the stiffness; `baseline`
-    is the value at 0. `step_sd` is the standard deviation of a change, if there is one, before any
-    data, in the coordinate. `scale_sd` is by what share of itself a shift may be off since the
-    baseline's value is not known well: a bar's frequencies tell newtons, a fraction is of these.
+    of the model class that move. The watch works in a `coordinate` in which frequencies change
+    nearly linearly, 0 at the baseline: of the tension the logarithm of its ratio to the baseline's;
+    of a spring the change of the mean log frequency. `coordinates` (m,), ascending, and `values`
+    (m,) map it to the tension in N or to log10 of the stiffness; `baseline` is the value at 0.
+    `step_sd` is the standard deviation of a change, if there is one, before any data, in the
+    coordinate. `scale_sd` is by what share of itself a shift may be off, as the baseline's value is.
     """
 
     name: str

@@ -404,7 +404,8 @@ def sentences(text: str) -> list[str]:
 _NAMES = re.compile(
     r"`[^`]*`"  # commands
     r"|\d{4}-\d{2}-\d{2}( \d{2}:\d{2})?|\bh\d+-\d+"  # dates and tests
-    r"|angers?( that need action)?:? \d[\d, and]*|yet: \d[\d, and]*"
+    r"|(angers?( that need action [a-z ]+)?|Within a week|At the next planned test):? \d[\d, and]*"
+    r"|yet: \d[\d, and]*"
     r"|\(recording \d+\)|Alert \d+|beam\d|(transverse|longitudinal) \d+|90 % (?=interval)"
 )
 

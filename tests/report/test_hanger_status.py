@@ -261,9 +261,12 @@ def test_a_bridge_leads_with_its_most_urgent_hanger() -> None:
     )
     assert found.status is Status.ALERT
     assert found.notes == ("Ben looked.",)
-    assert found.others == "Other hangers that need action: 2 and 4."
+    assert found.others == (
+        "Other hangers that need action within a week: 2. At the next planned test: 4."
+    )
     assert found.words == (
-        "It is so. Test it within a week. Ben looked. Other hangers that need action: 2 and 4."
+        "It is so. Test it within a week. Ben looked. Other hangers that need action within a "
+        "week: 2. At the next planned test: 4."
     )
     assert found.document == {
         "status": "alert",
@@ -276,7 +279,7 @@ def test_a_bridge_leads_with_its_most_urgent_hanger() -> None:
         {1: message(Status.ALERT, "Look within a week."), 2: message(None, "Go today.")}
     )
     assert (today.urgency, today.status) == ("today", Status.ALERT)
-    assert today.others == "Other hangers that need action: 1."
+    assert today.others == "Other hangers that need action within a week: 1."
     assert bridge_message({4: message(Status.UNCLEAR)}).others == ""
 
 

@@ -74,7 +74,7 @@ def test_a_hanger_that_is_nearly_slack_by_its_own_test_is_said_first(
         assert said.startswith("Hanger 3 carries 3.0 ± 2.0 % of its nominal tension by its latest")
         assert len(said.split(":")[0].split()) <= 25
         assert "today" in said
-        assert open_warnings(HANGER_3, None, slack=said) == (said,)
+        assert open_warnings(HANGER_3, None, now=(said,)) == (said,)
 
 
 def test_a_mode_left_out_of_a_baseline_that_fits_is_no_warning() -> None:

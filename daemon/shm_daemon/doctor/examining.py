@@ -60,7 +60,7 @@ from shm_daemon.doctor.checks import (
     unknown,
     warning,
 )
-from shm_daemon.heartbeat import told
+from shm_daemon.heartbeat import NEARLY_FULL, told
 from shm_daemon.hooks import HookFailed, HookNotifier
 from shm_daemon.web.other_bridges import ask_all
 
@@ -312,9 +312,6 @@ def _version(name: str) -> str:
         return "unknown"
 
 
-_NEARLY_FULL = 0.1  # judgement: of the room that is wanted; a warning comes ten times earlier
-
-
 def check_folders(folder: Path) -> Iterator[Finding]:
     """Whether the folders of a workspace are there and we may write in them."""
     missing = [name for name in FOLDERS if not (folder / name).is_dir()]
@@ -372,7 +369,7 @@ def _room(what: str, path: Path, wanted_bytes: int) -> Finding:
     usage = shutil.disk_usage(path)
     found = f"{what}: {usage.free / 1e9:.1f} of {usage.total / 1e9:.0f} GB free"
     remedy = "Free some space; `shm archive prune --dry-run` says what could go."
-    if usage.free < _NEARLY_FULL * wanted_bytes:
+    if usage.free < NEARLY_FULL * wanted_bytes:
         return fault("disk", found, remedy)
     if usage.free < wanted_bytes:
         return warning("disk", found, remedy)

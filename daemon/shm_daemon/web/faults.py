@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
 from shm.errors import (
+    DISK_FULL,
     BadInput,
     DoubledChunk,
     NothingThere,
@@ -132,4 +133,6 @@ def _known(request: Request, error: Exception) -> Response:
 
 
 def _unknown(request: Request, error: Exception) -> Response:
+    if isinstance(error, OSError) and error.errno in DISK_FULL:
+        return _told(request, 503, "the disk is full.", "Make room on it, and send it again.")
     return _told(request, 500, "an internal error.", "The log of the web interface says more.")

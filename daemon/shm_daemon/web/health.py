@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
+import shutil
 from collections.abc import Callable, Sequence
 from datetime import timedelta
 from typing import Any
@@ -15,8 +16,9 @@ from typing import Any
 from shm.errors import ShmError
 from shm.pipeline import utc_now
 from shm.pipeline.unheard import heard, leads_of
+from shm.store.stored_silences import said_of
 from shm.values.messages import Lead
-from shm_daemon.heartbeat import patience_s, seconds_since_beat, told, why_turn_failed
+from shm_daemon.heartbeat import NEARLY_FULL, patience_s, seconds_since_beat, told, why_turn_failed
 from shm_daemon.spool import never_taken
 from shm_daemon.web.site import Site
 
@@ -38,7 +40,7 @@ def health_document(site: Site) -> tuple[int, dict[str, Any]]:
 
 def troubles(site: Site) -> list[str]:
     """Why work stands still; empty where all is well."""
-    return _found(site, _store, _spool, _daemon)
+    return _found(site, _store, _spool, _disk, _daemon)
 
 
 def limits(site: Site) -> list[str]:
@@ -109,8 +111,14 @@ def _of_silences(site: Site) -> list[Lead]:
         found = site.store.silences.list_in_force(utc_now())
     except ShmError:
         return []  # told as a trouble
-    action = "Alerts are raised and shown all the same; a silence is ended on the page of alerts."
-    return [Lead(f"{each[0].upper()}{each[1:]}.", action) for each in found]
+    return [
+        Lead(
+            f"{said_of(each)[0].upper()}{said_of(each)[1:]}.",
+            f"{'No' if each.is_maintenance else 'Each'} alert of that time is raised; it is ended "
+            "on the page of alerts.",
+        )
+        for each in found
+    ]
 
 
 def _of_streams(site: Site) -> Sequence[Lead]:
@@ -149,6 +157,14 @@ def _spool(site: Site) -> list[str]:
     if os.access(site.workspace.spool, os.W_OK | os.X_OK):
         return []
     return ["The spool cannot be written."]
+
+
+def _disk(site: Site) -> list[str]:
+    """A daemon on a full disk cannot even write that its turn failed."""
+    free = shutil.disk_usage(site.workspace.folder).free
+    if free >= NEARLY_FULL * site.workspace.settings.min_free_bytes:
+        return []
+    return [f"The disk is full: {free / 1e9:.2f} GB are free, and recordings wait."]
 
 
 def _silence(site: Site) -> str:

@@ -18,6 +18,7 @@ from shm_daemon.web.site import Site
 
 router = APIRouter(prefix="/silences", include_in_schema=False)
 
+_ALL = "all"
 _SHOWN_AT = "/alerts#silences"
 
 
@@ -41,7 +42,7 @@ def end(
 def _make(site: Site, writer: Visitor, told: dict[str, str]) -> None:
     now, number, why = utc_now(), told.get("hanger", ""), told.get("why", "").strip()
     try:
-        hanger = int(number) if number else None
+        hanger = None if number == _ALL else int(number)
         since = parse_time(told["from"]) if told.get("from") else now
         until = parse_time(told.get("until", ""))
     except (ValueError, OverflowError):

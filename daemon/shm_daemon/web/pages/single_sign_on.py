@@ -126,7 +126,8 @@ def _signed_in(request: Request, site: Site, name: str, wanted: str) -> Response
             wanted,
             403,
             "You are not a user of this bridge yet. Ask an engineer of it to add, on the page "
-            f"Users, a user of exactly this name: {name}",
+            "Users, a user of exactly this name, in place of one that differs in capitals alone: "
+            f"{name}",
         )
     # No redirect: a browser that came from elsewhere would not send the strict cookie along.
     answer = page(request, "signed_in.html.j2", name=name, next=wanted)
