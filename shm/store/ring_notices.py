@@ -47,8 +47,8 @@ class PassedChunk:
 class StreamState:
     """What is known of a stream: its last chunk, since when its samples have been counted without
     a break and how long they say that is, and of each ten minutes how many seconds of samples
-    count, how many are kept apart, being of a time that was there before, and which are the least
-    and the greatest number of a chunk that belongs there.
+    count, how many are kept apart, being of a time that was there before, which are the least and
+    the greatest number of a chunk that belongs there, and when these begin and end.
     """
 
     last: PassedChunk | None = None
@@ -57,6 +57,7 @@ class StreamState:
     received_s: dict[str, float] = field(default_factory=dict)
     apart_s: dict[str, float] = field(default_factory=dict)
     numbers: dict[str, tuple[int, int]] = field(default_factory=dict)
+    spans: dict[str, tuple[datetime, datetime]] = field(default_factory=dict)
 
 
 def load_state(path: Path) -> StreamState:
