@@ -71,6 +71,11 @@ def chunk_document(chunk: Chunk) -> bytes:
     return compact(header).encode() + b"\n" + body
 
 
+def numbered(sequence: int) -> str:
+    """A chunk as people know it: by its number, if a logger gave it one."""
+    return "a file's chunk" if sequence >= BY_TIME else f"chunk {sequence}"
+
+
 def refuse_long_chunk(size_bytes: int, most_bytes: int = LARGEST_BYTES) -> None:
     """Raises TooLarge for a chunk of more bytes than are taken."""
     if size_bytes > most_bytes:
@@ -198,7 +203,7 @@ def _of_list(header: _Header, channel: str) -> FloatArray:
 
 def _no_reading(header: _Header, channel: str, place: int, what: str) -> BadInput:
     return BadInput(
-        f"chunk {header.sequence} of stream {header.stream} cannot be used: sample {place} is "
+        f"{numbered(header.sequence)} of stream {header.stream} cannot be used: sample {place} is "
         f"{what}, which is no acceleration in m/s2.",
         channel=channel,
         remedy="Send numbers in m/s2, and null or NaN for what is missing.",

@@ -19,6 +19,7 @@ import numpy as np
 from shm.documents import format_time, parse_time
 from shm.errors import BadInput
 from shm.read.atomic import replace_file
+from shm.read.chunk_document import numbered
 from shm.read.ring_segment import ChunkKey, microseconds, time_of, write_segment
 from shm.store.archive import sync
 from shm.store.ring_files import PERIOD, StreamFolder, WaitingChunk, period_of
@@ -166,7 +167,7 @@ def _set_doubled_aside(
     key: ChunkKey,
     note: Note,
 ) -> None:
-    said = f"chunk {chunk.sequence} came twice, with other samples; the first counts"
+    said = f"{numbered(chunk.sequence)} came twice, with other samples; the first counts"
     note(StreamEvent(chunk.stream, "doubled", chunk.start, chunk.end, said))
     path = next(each.path for each in waiting if each.key == key)
     folder.set_aside(path, BadInput(said))
