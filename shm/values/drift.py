@@ -344,20 +344,9 @@ class TemperatureCoefficient:
 
 
 AlertKind = Literal[
-    "sudden change",
-    "slow drift",
-    "beyond threshold",
-    "repeat the test",
-    "tests disagree",
-    "check the modes",
-    "check the baseline",
-    "gap",
-    "held",
-    "limit",
-    "silent",
-    "test",
-    "resolved",
-]
+    "sudden change", "slow drift", "beyond threshold", "repeat the test", "tests disagree",
+    "check the modes", "check the baseline", "gap", "held", "limit", "silent", "test", "resolved",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
