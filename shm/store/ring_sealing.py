@@ -71,8 +71,8 @@ def seal_stream(folder: StreamFolder, now: datetime, note: Note) -> list[datetim
     spans = {k: each for k, each in state.spans.items() if k >= oldest}
     oldest = format_time(now - _NUMBERS_KEPT) or ""
     numbers = {k: each for k, each in state.numbers.items() if k >= oldest}
-    kept = {"received_s": received_s, "apart_s": apart_s, "numbers": numbers, "spans": spans}
-    save_state(path, replace(state, **kept))
+    state = replace(state, received_s=received_s, apart_s=apart_s, numbers=numbers, spans=spans)
+    save_state(path, state)
     return sealed
 
 
