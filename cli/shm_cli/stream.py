@@ -7,6 +7,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 import rich_click as click
+from rich.markup import escape
 
 from shm.documents import format_time
 from shm.errors import NothingThere
@@ -232,7 +233,7 @@ def _show_events(store: Store, since: datetime, as_json: bool) -> None:
     made = table("Events of streams", "stream", "what", "from", "to", "channel", "details")
     for event in found:
         times = _time(event.start), _time(event.end)
-        made.add_row(event.stream, event.kind, *times, event.channel, event.detail)
+        made.add_row(event.stream, event.kind, *times, event.channel, escape(event.detail))
     show_table(made)
 
 

@@ -13,6 +13,7 @@ from dataclasses import MISSING, asdict, fields, is_dataclass
 from typing import Any
 
 from shm.documents import dump
+from shm.pipeline.ending import SHM
 from shm.store import Baseline, Stage, Store
 from shm.values import Hanger
 
@@ -33,9 +34,14 @@ def redescribed(hanger: Hanger, baseline: Baseline | None) -> tuple[str, ...]:
 
 
 def discarded_of(store: Store, baseline: Baseline | None) -> tuple[str, ...]:
-    """The tests of a baseline that count no more, by name: a person has discarded them since."""
+    """The tests of a baseline that count no more, by name: a person has discarded them since.
+
+    A day of a stream in whose place the whole day stands measured the same, of fewer hours.
+    """
     tests = () if baseline is None else store.tests.of_baseline(baseline)
-    return tuple(each.test.id for each in tests if each.stage == Stage.REFUSED)
+    refused = [each for each in tests if each.stage == Stage.REFUSED]
+    out = [(each, store.recordings.discard_in_force(each.recording_id)) for each in refused]
+    return tuple(each.test.id for each, why in out if why is None or why.who != SHM)
 
 
 def _comparable(described: Mapping[str, Any]) -> dict[str, Any]:

@@ -29,8 +29,9 @@ from shm.report.hanger_status import findings, still_detected
 from shm.report.period import Period
 from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
 from shm.report.structure_report import StructureReport
-from shm.store import Baseline, Store, StoredAlert, TrendPoint, Workspace
+from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
 from shm.values import Hanger, WatchedTest
+from shm.values.messages import Lead
 from shm.watch import WatchOptions, watch_hanger
 from shm.watch.alert_text import watch_words
 from shm.watch.frequency_text import frequency_words
@@ -114,7 +115,6 @@ def hanger_now(
     watched, alerts = _watched_against(store, baseline), store.alerts.list_all(hanger.id)
     standing = [each for each in alerts if each.resolution is None]
     silences = store.silences.list_current(generated_at)
-    blind = blind_hangers(heard(workspace, store, generated_at))
     return HangerReport(
         bridge=workspace.bridge.name,
         letterhead=workspace.bridge.letterhead,
@@ -147,8 +147,15 @@ def hanger_now(
         standing=findings(each.alert for each in standing),
         notes=notes_of(standing, silences, hanger.id, generated_at),
         inspections=store.notes.list_all(hanger.id),
-        unwatched=unwatched(workspace, hanger.id, latest.time, blind, generated_at),
+        unwatched=_unwatched(workspace, store, latest, generated_at),
     )
+
+
+def _unwatched(
+    workspace: Workspace, store: Store, latest: StoredTest, now: datetime
+) -> Lead | None:
+    blind = blind_hangers(heard(workspace, store, now))
+    return unwatched(workspace, latest.hanger, latest.time, blind, now)
 
 
 def _changed(store: Store, hanger: Hanger) -> dict[str, str]:

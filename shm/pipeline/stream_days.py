@@ -8,7 +8,7 @@ from datetime import datetime
 
 from shm.documents import dump
 from shm.modes_document import modes_document
-from shm.pipeline.ending import told_by_other
+from shm.pipeline.ending import SHM, told_by_other
 from shm.read.atomic import replace_text
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX
@@ -49,7 +49,7 @@ def hand_on_day(workspace: Workspace, store: Store, test: ModalTest, at: datetim
         if _hz(store.tests.get(row.id).test) == _hz(test):
             return
         why = "more of this day came late: the whole day takes its place"
-        store.recordings.withdraw(row.recording_id, "shm", why, at)
+        store.recordings.withdraw(row.recording_id, SHM, why, at)
     path = workspace.spool / f"{test.id}{MODES_SUFFIX}"
     replace_text(path, dump(modes_document([test])))
     log.info("day of a stream: %s", path.name)

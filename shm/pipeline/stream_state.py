@@ -12,9 +12,10 @@ from shm.pipeline.unheard import LATELY, State, word_of
 from shm.store import Store, Workspace
 from shm.store.ring import Ring
 from shm.store.ring_files import PERIOD
+from shm.store.ring_notices import StreamState as RingState
 from shm.values import NAN
 from shm.values.rounding import NINETY_PERCENT
-from shm.values.stream import PooledReading, Stream, StreamEvent, WindowReading
+from shm.values.stream import PooledReading, Stream, StreamEvent, WindowReading, period_start
 from shm.watch.ambient_hammer import TOGETHER, AmbientBias, ambient_bias
 
 _TESTS_COMPARED = 12
@@ -63,7 +64,7 @@ def _state(
     progress = store.streams.progress(stream.name)
     window = store.streams.last_window(stream.name)
     state = ring.state(stream.name)
-    received, lost = _received(state.received_s, last, now)
+    received, lost = _received(state, now)
     return StreamCondition(
         stream=stream,
         state=word_of(last, events, now),
@@ -98,24 +99,26 @@ def _as_one(run: Sequence[StreamEvent]) -> StreamEvent:
     return replace(run[-1], start=run[0].start, detail=run[-1].detail + times)
 
 
-def _received(
-    received_s: Mapping[str, float], last_sample: datetime | None, now: datetime
-) -> tuple[float, float]:
+def _received(state: RingState, now: datetime) -> tuple[float, float]:
     """Which share of the last ten minutes that are sealed came, and which share of a day did not,
-    up to the last sample.
+    from the first sample on up to the last one.
 
-    The first ten minutes of all may have begun before the stream, and do not count.
+    Ten minutes are those of the chunks that begin in them: what these have beyond the edges counts.
     """
-    known = {parse_time(start): seconds for start, seconds in received_s.items()}
-    first, last = min(known, default=now), max(known, default=now)
-    begin = max(first + PERIOD, now - LATELY)
-    if last < begin:
+    came_s = {parse_time(start): seconds for start, seconds in state.received_s.items()}
+    spans = {parse_time(start): span for start, span in state.spans.items()}
+    since = period_start(now - LATELY, PERIOD) + PERIOD
+    lately = sorted(start for start in spans if start >= since)
+    if not lately:
         return NAN, NAN
-    end = last + PERIOD if last_sample is None else min(last + PERIOD, last_sample)
+    before = max((end for start, (_, end) in spans.items() if start < lately[0]), default=None)
+    begin = spans[lately[0]][0] if before is None else max(before, since)
+    end, last = max(spans[start][1] for start in lately), lately[-1]
+    until_last = max((spans[start][1] for start in spans if start < last), default=spans[last][0])
     expected_s = max((end - begin).total_seconds(), 1.0)
-    came_s = sum(seconds for start, seconds in known.items() if start >= begin)
-    of_last_s = max((end - last).total_seconds(), 1.0)
-    return min(known[last] / of_last_s, 1.0), min(max(1 - came_s / expected_s, 0.0), 1.0)
+    of_last_s = max((end - max(last, until_last)).total_seconds(), 1.0)
+    lost = 1 - sum(came_s[start] for start in lately) / expected_s
+    return min(came_s[last] / of_last_s, 1.0), min(max(lost, 0.0), 1.0)
 
 
 def _lately_s(seconds: Mapping[str, float], now: datetime) -> float:

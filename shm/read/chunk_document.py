@@ -40,6 +40,7 @@ _FASTEST_HZ = 1e5  # judgement: far beyond any mode of a hanger
 _LARGEST_SEQUENCE = 2**62  # technical: kept as a number of 64 bits
 _FIRST_YEAR, _LAST_YEAR = 2000, 2200  # judgement: a clock before was never set
 _LONGEST_EVENT = 200  # judgement: what a line of a message bears
+_UNITS = ("m/s2", "m/s^2", "m/s²")
 _READER = reader(finite)
 
 
@@ -56,6 +57,8 @@ class _Header:
     event: str = ""
     encoding: str = ""
     values: dict[str, list[Any]] = field(default_factory=dict)
+    unit: Any = ""
+    units: Any = ""
 
 
 def chunk_document(chunk: Chunk) -> bytes:
@@ -66,6 +69,11 @@ def chunk_document(chunk: Chunk) -> bytes:
     header |= {"event": chunk.event} if chunk.event else {}
     body = np.ascontiguousarray(chunk.values.T, dtype="<f4").tobytes()
     return compact(header).encode() + b"\n" + body
+
+
+def numbered(sequence: int) -> str:
+    """A chunk as people know it: by its number, if a logger gave it one."""
+    return "a file's chunk" if sequence >= BY_TIME else f"chunk {sequence}"
 
 
 def refuse_long_chunk(size_bytes: int, most_bytes: int = LARGEST_BYTES) -> None:
@@ -99,6 +107,11 @@ def _refuse_header(header: _Header) -> None:
         raise _wrong(
             f"schema = {header.schema[:80]!r} is not {CHUNK_SCHEMA}",
             f'Write "schema": "{CHUNK_SCHEMA}".',
+        )
+    if odd := [each for each in (header.unit, header.units) if each and each not in _UNITS]:
+        raise _wrong(
+            f"its unit is {str(odd[0])[:80]!r}: chunks are taken in m/s2 alone",
+            "Send m/s2 (9.80665 times what is in g) and leave the unit out.",
         )
     if not is_stream_name(header.stream):
         raise _wrong(
@@ -190,7 +203,7 @@ def _of_list(header: _Header, channel: str) -> FloatArray:
 
 def _no_reading(header: _Header, channel: str, place: int, what: str) -> BadInput:
     return BadInput(
-        f"chunk {header.sequence} of stream {header.stream} cannot be used: sample {place} is "
+        f"{numbered(header.sequence)} of stream {header.stream} cannot be used: sample {place} is "
         f"{what}, which is no acceleration in m/s2.",
         channel=channel,
         remedy="Send numbers in m/s2, and null or NaN for what is missing.",

@@ -164,7 +164,13 @@ def _against_baseline(data: HangerReport) -> str:
         return "There is no earlier test to compare with: this one is the baseline."
     size = rounded_percent(change.mean, change.width / 2, "+")
     doubt = "" if is_found(data) else ", if it has changed at all"
-    return f"Against the baseline of {counted_tests(data.baseline.tests)} it is {size}{doubt}."
+    said = f"Against the baseline of {counted_tests(data.baseline.tests)} it is {size}{doubt}"
+    later = [
+        each.time for each in data.standing if data.latest.time and each.time > data.latest.time
+    ]
+    if not later:
+        return f"{said}."
+    return f"{said}: by that test, which was before what the alert of {max(later):%Y-%m-%d} tells."
 
 
 def is_found(data: HangerReport) -> bool:

@@ -18,7 +18,7 @@ from shm.bridge.streams import stream_named
 from shm.documents import dump, format_time
 from shm.errors import BadInput, DoubledChunk, StoreBusy
 from shm.read.atomic import replace_text
-from shm.read.chunk_document import chunk_document, parse_chunk, refuse_long_chunk
+from shm.read.chunk_document import chunk_document, numbered, parse_chunk, refuse_long_chunk
 from shm.read.ring_segment import ChunkKey, microseconds, time_of
 from shm.store.archive import disk_error, sync
 from shm.store.ring_files import PERIOD, StreamFolder, checksum_of_chunk, log
@@ -267,9 +267,13 @@ def ring_of(
     return Ring(folder, streams, clock, late=late, ahead=ahead, **noting)
 
 
+def _named(chunk: Chunk) -> str:
+    return f"{numbered(chunk.sequence)} of stream {chunk.stream}"
+
+
 def _doubled(chunk: Chunk) -> DoubledChunk:
     return DoubledChunk(
-        f"chunk {chunk.sequence} of stream {chunk.stream} of {format_time(chunk.start)} is kept "
+        f"{_named(chunk)} of {format_time(chunk.start)} is kept "
         "already, with other samples, which stay.",
         remedy="Send a chunk again unchanged only; send other samples under the next number and "
         "their own time.",
@@ -282,13 +286,12 @@ def _refuse_other(chunk: Chunk, stream: Stream) -> None:
     rate = chunk.sampling_rate_hz
     if missing:
         raise BadInput(
-            f"chunk {chunk.sequence} of stream {stream.name} has not the channels of bridge.toml: "
-            f"{', '.join(sorted(missing))}.",
+            f"{_named(chunk)} has not the channels of bridge.toml: {', '.join(sorted(missing))}.",
             remedy="Send null for a sensor that is away, or correct [[stream.channel]].",
         )
     if abs(rate - stream.sampling_rate_hz) > _RATE_OFF * stream.sampling_rate_hz:
         raise BadInput(
-            f"chunk {chunk.sequence} of stream {stream.name} has {rate:.10g} Hz where bridge.toml "
+            f"{_named(chunk)} has {rate:.10g} Hz where bridge.toml "
             f"says {stream.sampling_rate_hz:.10g}; {DRIFT_PPM:g} ppm of difference are taken.",
             remedy=f"Write sampling_rate_hz = {rate:.10g} there, or correct the logger.",
         )
@@ -297,7 +300,7 @@ def _refuse_other(chunk: Chunk, stream: Stream) -> None:
         beyond = np.flatnonzero(values > _OVER_RANGE * channel.full_scale)  # none where unknown
         if len(beyond):
             raise BadInput(
-                f"chunk {chunk.sequence} of stream {stream.name}: sample {beyond[0]} is "
+                f"{_named(chunk)}: sample {beyond[0]} is "
                 f"{values[beyond[0]]:g} m/s2 where full_scale is {channel.full_scale:g}.",
                 channel=channel.name,
                 remedy="Send m/s2, and null for what is no reading; or correct full_scale in "
@@ -307,7 +310,7 @@ def _refuse_other(chunk: Chunk, stream: Stream) -> None:
 
 def _refuse_far(chunk: Chunk, now: datetime, late: timedelta, ahead: timedelta) -> None:
     """Raises BadInput for samples that nobody waits for any more, and for those to come."""
-    when = f"chunk {chunk.sequence} of stream {chunk.stream} is of {format_time(chunk.start)}"
+    when = f"{_named(chunk)} is of {format_time(chunk.start)}"
     if chunk.end < now - late:
         raise BadInput(
             f"{when}, longer ago than the {late.total_seconds() / 3600:g} hours of late_hours.",

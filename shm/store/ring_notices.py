@@ -14,7 +14,7 @@ import numpy as np
 
 from shm.documents import Misfit, dump, value_of
 from shm.read.atomic import replace_text
-from shm.read.chunk_document import BY_TIME
+from shm.read.chunk_document import BY_TIME, numbered
 from shm.read.ring_segment import ChunkKey, microseconds
 from shm.store.ring_files import PERIOD
 from shm.store.ring_pieces import slack_s
@@ -47,8 +47,8 @@ class PassedChunk:
 class StreamState:
     """What is known of a stream: its last chunk, since when its samples have been counted without
     a break and how long they say that is, and of each ten minutes how many seconds of samples
-    count, how many are kept apart, being of a time that was there before, and which are the least
-    and the greatest number of a chunk that belongs there.
+    count, how many are kept apart, being of a time that was there before, which are the least and
+    the greatest number of a chunk that belongs there, and when these begin and end.
     """
 
     last: PassedChunk | None = None
@@ -57,6 +57,7 @@ class StreamState:
     received_s: dict[str, float] = field(default_factory=dict)
     apart_s: dict[str, float] = field(default_factory=dict)
     numbers: dict[str, tuple[int, int]] = field(default_factory=dict)
+    spans: dict[str, tuple[datetime, datetime]] = field(default_factory=dict)
 
 
 def load_state(path: Path) -> StreamState:
@@ -93,7 +94,8 @@ def notice(
             events.append(_stepped(stream, state.last, chunk))
     if late:
         delay_h = max((each.arrived - each.end).total_seconds() for each in late) / 3600
-        said = f"{len(late)} chunks came up to {delay_h:.1f} hours late and are in their place"
+        many = "1 chunk" if len(late) == 1 else f"{len(late)} chunks"
+        said = f"{many} came up to {delay_h:.1f} hours late, now in place"
         last = max(each.end for each in late)
         events.append(StreamEvent(stream, "late", late[0].start, last, said))
     return state, events
@@ -108,9 +110,12 @@ def notice_overlap(
         return []
     first, last = found[0][0], found[-1][0]
     samples = sum(count for _, count in found)
-    whose = f"chunk {first.sequence}"
+    whose = numbered(first.sequence)
     if len(found) > 1:
-        whose = f"{len(found)} chunks, {first.sequence} to {last.sequence},"
+        named = (
+            f", {first.sequence} to {last.sequence}," if last.sequence < BY_TIME else " of files"
+        )
+        whose = f"{len(found)} chunks{named}"
     said = (
         f"{samples} samples of {whose} are of a time that was there already: the first to come "
         "count, these are kept apart; see to the logger's clock"
@@ -206,7 +211,7 @@ def _between(stream: str, before: PassedChunk | None, chunk: PassedChunk) -> Ite
         yield _stepped(stream, before, chunk)
     elif off_s > 0:
         samples = round(off_s * chunk.sampling_rate_hz)
-        said = f"{samples} samples are missing before chunk {chunk.sequence}"
+        said = f"{samples} samples are missing before {numbered(chunk.sequence)}"
         yield _event(stream, "gap", before.end, chunk.start, said)
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from shm.documents import format_time, parse_time
 from shm.errors import BadInput
 from shm.read.atomic import replace_file
+from shm.read.chunk_document import numbered
 from shm.read.ring_segment import ChunkKey, microseconds, time_of, write_segment
 from shm.store.archive import sync
 from shm.store.ring_files import PERIOD, StreamFolder, WaitingChunk, period_of
@@ -67,9 +68,11 @@ def seal_stream(folder: StreamFolder, now: datetime, note: Note) -> list[datetim
         {k: s for k, s in known.items() if k >= oldest}
         for known in (state.received_s, state.apart_s)
     )
+    spans = {k: each for k, each in state.spans.items() if k >= oldest}
     oldest = format_time(now - _NUMBERS_KEPT) or ""
     numbers = {k: each for k, each in state.numbers.items() if k >= oldest}
-    save_state(path, replace(state, received_s=received_s, apart_s=apart_s, numbers=numbers))
+    state = replace(state, received_s=received_s, apart_s=apart_s, numbers=numbers, spans=spans)
+    save_state(path, state)
     return sealed
 
 
@@ -164,7 +167,7 @@ def _set_doubled_aside(
     key: ChunkKey,
     note: Note,
 ) -> None:
-    said = f"chunk {chunk.sequence} came twice, with other samples; the first counts"
+    said = f"{numbered(chunk.sequence)} came twice, with other samples; the first counts"
     note(StreamEvent(chunk.stream, "doubled", chunk.start, chunk.end, said))
     path = next(each.path for each in waiting if each.key == key)
     folder.set_aside(path, BadInput(said))
@@ -186,16 +189,20 @@ def _counting(
     """With what came of ten minutes: samples that any channel has, once each."""
     name = format_time(start) or ""
     received_s = apart_s = 0.0
-    for key, part in layout.parts:
-        if period_of(key.start_us) == start:
-            came = int((~np.isnan(part.values).all(axis=0)).sum())
-            received_s += came / part.sampling_rate_hz
+    own = [part for key, part in layout.parts if period_of(key.start_us) == start]
+    for part in own:
+        came = int((~np.isnan(part.values).all(axis=0)).sum())
+        received_s += came / part.sampling_rate_hz
     for key, samples in layout.covered.items():
         if period_of(key.start_us) == start:
             apart_s += samples / found[key].sampling_rate_hz
     sums = {**state.received_s, name: received_s}
     apart = {**state.apart_s, name: apart_s} if apart_s else state.apart_s
-    return replace(state, received_s=sums, apart_s=apart)
+    if not own:
+        return replace(state, received_s=sums, apart_s=apart)
+    span = min(part.start for part in own), max(part.end for part in own)
+    spans = {**state.spans, name: span}
+    return replace(state, received_s=sums, apart_s=apart, spans=spans)
 
 
 def _write(path: Path, chunks: dict[ChunkKey, Chunk]) -> None:

@@ -95,7 +95,7 @@ class WatchedQuantity:
     of a spring the change of the mean log frequency. `coordinates` (m,), ascending, and `values`
     (m,) map it to the tension in N or to log10 of the stiffness; `baseline` is the value at 0.
     `step_sd` is the standard deviation of a change, if there is one, before any data, in the
-    coordinate. `scale_sd` is by what share of itself a shift may be off, as the baseline's value is.
+    coordinate. `scale_sd` is by what share of itself a shift may be off, as the baseline is.
     """
 
     name: str
@@ -343,20 +343,9 @@ class TemperatureCoefficient:
 
 
 AlertKind = Literal[
-    "sudden change",
-    "slow drift",
-    "beyond threshold",
-    "repeat the test",
-    "tests disagree",
-    "check the modes",
-    "check the baseline",
-    "gap",
-    "held",
-    "limit",
-    "silent",
-    "test",
-    "resolved",
-]
+    "sudden change", "slow drift", "beyond threshold", "repeat the test", "tests disagree",
+    "check the modes", "check the baseline", "gap", "held", "limit", "silent", "test", "resolved",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

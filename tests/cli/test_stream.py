@@ -57,12 +57,12 @@ def test_the_table_says_what_is_live_and_what_was_lost(
     assert row["last_sample"] == format_time(start + timedelta(minutes=30))
     assert row["lag_s"] > 0
     assert row["received_hz"] == 100.0
-    assert row["lost_share_24h"] == pytest.approx(0.05)  # the first ten minutes do not count
+    assert row["lost_share_24h"] == pytest.approx(1 / 30)
     assert row["ring_bytes"] > 100_000
     assert (row["last_window_kind"], row["last_window_how"]) == ("wind", "tracked")
     assert row["apart_s_24h"] == 0
     said = shm("--workspace", bridge.folder, "stream").out
-    assert "5.00%" in said
+    assert "3.33%" in said
     assert "late" in said
 
 

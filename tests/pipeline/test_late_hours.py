@@ -14,9 +14,10 @@ import pytest
 
 from shm.models.tensioned_beam import frequencies_hz
 from shm.pipeline import stream_steps
+from shm.pipeline.redescribed import discarded_of
 from shm.pipeline.stream_days import hand_on_day
 from shm.pipeline.streaming import Streaming
-from shm.store import Store, Workspace
+from shm.store import Stage, Store, Workspace
 from shm.values import Mode
 from shm.values.stream import PooledReading, Window, WindowReading
 from shm.watch.stream_thermometer import Thermometer
@@ -149,7 +150,7 @@ def test_the_whole_day_takes_the_place_of_what_was_known_of_it(workspace: Worksp
     from shm.monitor import as_modal_test
 
     with workspace.store() as store:
-        for day, hz in ((0, 2.0), (1, 2.0), (1, 2.0), (1, 2.001)):
+        for day, hz in ((0, 2.0), (1, 2.0), (1, 2.0), (1, 2.001), (0, 2.002)):
             modes = tuple(Mode("transverse", n, hz * n, 1e-3) for n in (1, 2, 3))
             reading = PooledReading(
                 "hanger03", 3, FIRST + day * 24 * HOUR, "day", modes, 9, 0, 0.02, 10.0, 4.0
@@ -157,4 +158,8 @@ def test_the_whole_day_takes_the_place_of_what_was_known_of_it(workspace: Worksp
             hand_on_day(workspace, store, as_modal_test(reading), FIRST + timedelta(days=2))
             ingest(workspace)
         found = [each.test.modes[0].frequency_hz for each in store.tests.list_all(3)]
-    assert found == [2.0, 2.001]
+        baseline = store.watch.baseline(3)
+        assert baseline is not None
+        assert any(each.stage == Stage.REFUSED for each in store.tests.of_baseline(baseline))
+        assert discarded_of(store, baseline) == ()  # no person discarded it
+    assert found == [2.002, 2.001]

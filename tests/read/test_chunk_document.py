@@ -52,6 +52,8 @@ def changed(**changes: object) -> bytes:
         (chunk_document(a_chunk(3))[:-3], "no whole samples of 2 channels"),
         (changed(schema="shm.chunk/2"), "is not shm.chunk/1"),
         (changed(stream="../../etc"), "no name of a stream"),
+        (changed(unit="g"), r"its unit is 'g'.*9\.80665"),
+        (changed(units={"acc_1": "mg"}), "taken in m/s2 alone"),
         (changed(sequence=-1), "is no count"),
         (changed(sequence=1.5), "not a whole number"),
         (changed(sampling_rate_hz=0), "is no sampling rate"),
@@ -68,6 +70,10 @@ def changed(**changes: object) -> bytes:
 def test_what_is_wrong_is_said(content: bytes, said: str) -> None:
     with pytest.raises(BadInput, match=said):
         parse_chunk(content)
+
+
+def test_the_unit_of_a_chunk_may_be_said() -> None:
+    assert parse_chunk(changed(unit="m/s2")).values.shape == (2, 500)
 
 
 @pytest.mark.parametrize(
