@@ -20,7 +20,7 @@ REMEDIES: dict[State, str] = {
     "never sent": "Connect the logger: docs/permanent_sensors.md.",
     "silent": "Look at logger, power and connection; what was stored comes once they are back.",
     "sees nothing": "See whether the sensors are fixed to the hanger and connected to the logger.",
-    "clock ahead": "Set the logger's clock, to UTC: by its stamps nobody can tell whether it sends.",
+    "clock ahead": "Set the logger's clock, to UTC: by its stamps none can tell whether it sends.",
     "sensor at fault": "See `shm stream --events`, and the page of the stream on the dashboard.",
 }
 """Of each state that a person should know of."""
