@@ -17,11 +17,11 @@ State = Literal[
 ]
 
 REMEDIES: dict[State, str] = {
-    "never sent": "Connect its logger: docs/permanent_sensors.md.",
-    "silent": "Look at its logger, power and connection; it sends what it stored once it is back.",
-    "sees nothing": "See whether its sensors are fixed to the hanger and connected to the logger.",
-    "clock ahead": "Set its clock, to UTC: whether it still sends cannot be told by its stamps.",
-    "sensor at fault": "See `shm stream --events`, and its page on the dashboard.",
+    "never sent": "Connect the logger: docs/permanent_sensors.md.",
+    "silent": "Look at logger, power and connection; what was stored comes once they are back.",
+    "sees nothing": "See whether the sensors are fixed to the hanger and connected to the logger.",
+    "clock ahead": "Set the logger's clock, to UTC: by its stamps none can tell whether it sends.",
+    "sensor at fault": "See `shm stream --events`, and the page of the stream on the dashboard.",
 }
 """Of each state that a person should know of."""
 
@@ -97,7 +97,8 @@ def leads_of(found: Sequence[Heard]) -> tuple[Lead, ...]:
         own = [each.named for each in found if each.state == state]
         if own:
             more = ["others"] if own[_NAMED:] else []
-            leads.append(Lead(f"Stream {listed([*own[:_NAMED], *more])}: {state}.", remedy))
+            what = "Streams" if own[1:] else "Stream"
+            leads.append(Lead(f"{what} {listed([*own[:_NAMED], *more])}: {state}.", remedy))
     return tuple(leads)
 
 

@@ -51,9 +51,9 @@ def test_each_state_that_asks_for_a_person_is_told_once_with_its_remedy() -> Non
         Heard(replace(STREAM, name="h6"), "late", NOW),
     ]
     never, silent = leads_of(found)
-    assert never.words == "Stream h5: never sent. Connect its logger: docs/permanent_sensors.md."
+    assert never.words == "Stream h5: never sent. Connect the logger: docs/permanent_sensors.md."
     assert silent.state == (
-        "Stream h3 (last sample 2026-05-01 12:00 UTC) and h4 (last sample 2026-05-01 11:00 UTC): "
+        "Streams h3 (last sample 2026-05-01 12:00 UTC) and h4 (last sample 2026-05-01 11:00 UTC): "
         "silent."
     )
 

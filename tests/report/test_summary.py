@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import timedelta
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from shm.report.contents import HangerReport, status
 from shm.report.hanger_status import Status
 from shm.report.hanger_summary import advice, summary, tension_change
 from shm.values import Drift, Hanger, Thresholds
-from tests.helpers.nouns import a_change
+from tests.helpers.nouns import a_change, an_alert
 from tests.report.diagnoses import LED
 
 
@@ -27,6 +28,14 @@ def test_the_summary_gives_tension_with_interval_against_nominal_and_baseline(
     assert "Its tension is 651 ± 15 kN by test t009 of 2026-09-04." in told
     assert "The tension is 8.4 ± 2.2 % below nominal." in told
     assert "Against the baseline of test t000 it is -7.2 ± 2.0 %." in told
+
+
+def test_an_alert_that_is_later_than_the_latest_test_is_told_apart(season: HangerReport) -> None:
+    assert season.latest.time is not None
+    for days, is_later in ((1, True), (-1, False)):
+        alert = replace(an_alert(), time=season.latest.time + timedelta(days=days))
+        told = summary(replace(season, standing=(alert,)))
+        assert (": by that test, which was before what the alert of" in told) is is_later
 
 
 def test_the_summary_says_which_model_was_chosen_and_how_well_it_fits(
