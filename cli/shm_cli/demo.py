@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
@@ -94,16 +94,12 @@ def drop_measured_baseline(workspace: Workspace) -> None:
     replace_text(workspace.spool / "hanger03_measured.modes.json", dump(modes_document([test])))
 
 
-def planned(workspace: Workspace, store: Store) -> Sequence[PlannedTest]:
+def planned(hangers: Iterable[Hanger], measured: Posterior | None = None) -> Sequence[PlannedTest]:
     """The season: hangers 3 and 7 every three weeks, the others at its start, every third again.
 
-    Hanger 3 is simulated at the most probable parameters of its measured baseline.
+    Hanger 3 is simulated at the most probable parameters of its `measured` baseline.
     """
-    tests = []
-    for hanger in workspace.bridge.hangers:
-        measured = store.posteriors.get(hanger.id) if hanger.id == MEASURED else None
-        for week in _weeks(hanger.id):
-            tests.append(_planned(hanger, week, measured))
+    tests = [_planned(hanger, week, measured) for hanger in hangers for week in _weeks(hanger.id)]
     return sorted(tests, key=lambda test: test.time)
 
 
@@ -195,11 +191,16 @@ def command(folder: Path, live: bool) -> None:
     click.echo(f"Workspace {workspace.folder}: 20 hangers, their daemon is starting.", err=True)
     with workspace.store() as store, _daemon(workspace) as daemon, counting_bar() as bar:
         drop_measured_baseline(workspace)
-        _await(1, store, daemon, bar, "hanger 3, measured: model classes compared")
-        tests = planned(workspace, store)
+        hangers = workspace.bridge.hangers
+        tests = planned(each for each in hangers if each.id != MEASURED)
         for _ in bar.track(dropped(tests, workspace), len(tests), description=_DROPPING):
             pass
-        _await(1 + len(tests), store, daemon, bar, "tests through all stages")
+        # What is simulated needs no daemon: only hanger 3's season waits for its baseline.
+        measured = _await_measured(store, daemon, bar)
+        own = planned((each for each in hangers if each.id == MEASURED), measured)
+        for _ in bar.track(dropped(own, workspace), len(own), description="hanger 3's season"):
+            pass
+        _await(1 + len(tests) + len(own), store, daemon, bar, "tests through all stages")
         alerts = _await_alert(store, daemon)
     _conclude(workspace, alerts)
 
@@ -256,6 +257,16 @@ def _await(
         bar.update(task, completed=through)
         if through >= count:
             return
+
+
+def _await_measured(store: Store, daemon: subprocess.Popen[bytes], bar: Progress) -> Posterior:
+    """The posterior of hanger 3's measured frequencies, once its model classes are compared."""
+    task = bar.add_task("hanger 3, measured: model classes compared", total=1)
+    for _ in _watched(store, daemon):
+        if MEASURED in store.posteriors.selected_models():
+            bar.update(task, completed=1)
+            break
+    return store.posteriors.get(MEASURED)
 
 
 def _watched(store: Store, daemon: subprocess.Popen[bytes]) -> Iterator[int]:

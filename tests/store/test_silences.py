@@ -37,9 +37,19 @@ def test_a_silence_is_kept_as_it_was_made_and_ended(file_store: Store) -> None:
     assert silences.list_current(half) == (later,)
     said = [(row.who, row.action, row.subject, row.detail) for row in file_store.audit.list_rows()]
     assert said == [
-        ("Ben", "silence ended", f"silence {made.id}, hanger 3", ""),
-        ("Ben", "silence made", f"silence {later.id}, all hangers", "race"),
-        ("Ada", "silence made", f"silence {made.id}, hanger 3", "paint"),
+        ("Ben", "maintenance window ended", f"maintenance window {made.id}, hanger 3", ""),
+        (
+            "Ben",
+            "silence made",
+            f"silence {later.id}, all hangers, 2026-05-01 13:00 to 2026-05-01 14:00 UTC",
+            "race",
+        ),
+        (
+            "Ada",
+            "maintenance window made",
+            f"maintenance window {made.id}, hanger 3, 2026-05-01 12:00 to 2026-05-01 13:00 UTC",
+            "paint",
+        ),
     ]
 
 

@@ -4,8 +4,6 @@ no script can read it.
 
 from __future__ import annotations
 
-from urllib.parse import parse_qs
-
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import RedirectResponse
 from starlette.concurrency import run_in_threadpool
@@ -21,15 +19,15 @@ from shm_daemon.web.access import (
     visitor_in_force,
 )
 from shm_daemon.web.faults import Refused
+from shm_daemon.web.forms import form_of
 from shm_daemon.web.frame import for_a_person, page
 from shm_daemon.web.middleware import is_https
 from shm_daemon.web.site import Site
 
 router = APIRouter(include_in_schema=False)
 
+_LONGEST_FORM_BYTES = 8192  # technical: of anybody; a token and an address have some hundreds
 _KEPT_S = int(SIGNED_IN_FOR.total_seconds())
-_MOST_FIELDS = 10  # technical: the longest of our forms has five
-_LONGEST_FORM_BYTES = 8192  # technical: a token and the address to go on to have some hundreds
 
 
 @router.get("/sign-in")
@@ -44,7 +42,7 @@ def sign_in_page(request: Request, site: AtSite, next: str = "/") -> Response:
 async def sign_in(request: Request, site: AtSite) -> Response:
     """Gives the cookie to who signs in; removing the user or revoking the token ends it at once."""
     refuse_foreign(request)
-    told = await form_of(request)
+    told = await form_of(request, _LONGEST_FORM_BYTES)
     wanted = told.get("next", "/")
     try:
         secret = await run_in_threadpool(_secret, request, site, told)
@@ -105,14 +103,3 @@ def ours(wanted: str) -> str:
     """An address of this site: nobody is sent elsewhere after signing in."""
     plain = wanted.startswith("/") and wanted.isascii() and wanted.isprintable()
     return wanted if plain and not wanted.startswith("//") and "\\" not in wanted else "/"
-
-
-async def form_of(request: Request) -> dict[str, str]:
-    """The fields of a form, each once; raises Refused where there is far more than a token."""
-    body = bytearray()
-    async for piece in request.stream():
-        body += piece
-        if len(body) > _LONGEST_FORM_BYTES:
-            raise Refused(413, "This is more than a token.", "Paste the token alone.")
-    fields = parse_qs(body.decode("utf-8", "replace"), max_num_fields=_MOST_FIELDS)
-    return {name: values[-1] for name, values in fields.items()}

@@ -12,8 +12,7 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.concurrency import run_in_threadpool
 
-from shm.documents import parse_time
-from shm.errors import BadInput, NothingThere, ShmError, UsageError
+from shm.errors import BadInput, NothingThere, ShmError
 from shm.pipeline import utc_now
 from shm.pipeline.rebaselining import Order, set_baseline
 from shm.report import formatting
@@ -22,9 +21,9 @@ from shm.store.audit import Actor
 from shm.watch.events import EVENT_KINDS
 from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
+from shm_daemon.web.forms import form_of, reason_in, time_in
 from shm_daemon.web.frame import page
 from shm_daemon.web.hangers import Number, described
-from shm_daemon.web.signing_in import form_of
 
 router = APIRouter(prefix="/hangers/{hanger_id}/baseline", include_in_schema=False)
 
@@ -88,13 +87,9 @@ async def order_baseline(
 ) -> Response:
     """Has it made beside the interface."""
     told, one = await form_of(request), described(site.workspace, hanger_id)
-    try:
-        since = parse_time(told.get("since", ""))
-    except (ValueError, OverflowError):
-        raise BadInput("a baseline has a first day.", remedy="Choose it in the form.") from None
-    why, kind = told.get("why", "").strip(), told.get("kind", "")
-    if not why:
-        raise UsageError("a baseline needs a reason.", remedy="Write why, for the record.")
+    since, why, kind = time_in(told, "since"), reason_in(told, "a baseline"), told.get("kind", "")
+    if since is None:
+        raise BadInput("a baseline has a first day.", remedy="Choose it in the form.")
     if kind and kind not in EVENT_KINDS:
         raise BadInput(f"{kind!r} is nothing that can be done.", remedy="Choose it in the form.")
     order = Order(since, why, engineer.actor.name, EVENT_KINDS[kind] if kind else None)

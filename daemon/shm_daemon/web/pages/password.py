@@ -9,8 +9,8 @@ from starlette.concurrency import run_in_threadpool
 from shm.errors import UsageError
 from shm_daemon.web.access import AtSite, Person, change_own_password
 from shm_daemon.web.faults import Refused
+from shm_daemon.web.forms import form_of
 from shm_daemon.web.frame import page
-from shm_daemon.web.signing_in import form_of
 from shm_daemon.web.site import Site
 
 router = APIRouter(include_in_schema=False)

@@ -24,9 +24,9 @@ from shm.store.changed_settings import ChangedSetting, said
 from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.faults import Refused
+from shm_daemon.web.forms import form_of
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import LARGEST_NUMBER
-from shm_daemon.web.signing_in import form_of
 from shm_daemon.web.site import Site
 
 router = APIRouter(include_in_schema=False)

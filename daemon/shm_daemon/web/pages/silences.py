@@ -8,12 +8,11 @@ from fastapi import APIRouter, Path, Request, Response
 from fastapi.responses import RedirectResponse
 from starlette.concurrency import run_in_threadpool
 
-from shm.documents import parse_time
-from shm.errors import BadInput, UsageError
+from shm.errors import BadInput
 from shm.pipeline import utc_now
 from shm_daemon.web.access import AtSite, Visitor, Writer
+from shm_daemon.web.forms import form_of, reason_in, time_in
 from shm_daemon.web.models import LARGEST_NUMBER
-from shm_daemon.web.signing_in import form_of
 from shm_daemon.web.site import Site
 
 router = APIRouter(prefix="/silences", include_in_schema=False)
@@ -40,18 +39,11 @@ def end(
 
 
 def _make(site: Site, writer: Visitor, told: dict[str, str]) -> None:
-    now, number, why = utc_now(), told.get("hanger", ""), told.get("why", "").strip()
-    try:
-        hanger = None if number == _ALL else int(number)
-        since = parse_time(told["from"]) if told.get("from") else now
-        until = parse_time(told.get("until", ""))
-    except (ValueError, OverflowError):
-        raise BadInput(
-            "a silence has hangers and an end.",
-            remedy="Choose them in the form.",
-        ) from None
-    if not why:
-        raise UsageError("a silence needs a reason.", remedy="Write why, for the record.")
+    now, number, why = utc_now(), told.get("hanger", ""), reason_in(told, "a silence")
+    since, until = time_in(told, "from") or now, time_in(told, "until")
+    if until is None or not (number == _ALL or number.isdecimal()):
+        raise BadInput("a silence has hangers and an end.", remedy="Choose them in the form.")
+    hanger = None if number == _ALL else int(number)
     if hanger is not None:
         site.workspace.bridge.tested(hanger)
     who = writer.actor

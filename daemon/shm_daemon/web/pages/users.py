@@ -10,8 +10,8 @@ from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
 from shm.store.people import People, Role
 from shm_daemon.web.access import AtSite, Engineer
+from shm_daemon.web.forms import form_of
 from shm_daemon.web.frame import page
-from shm_daemon.web.signing_in import form_of
 from shm_daemon.web.site import Site
 
 router = APIRouter(include_in_schema=False)
