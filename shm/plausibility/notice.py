@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from shm.plausibility.candidate import Candidate, frequency_change, implied_shift
 from shm.values import Doubt
+from shm.values.messages import TODAY, WEEK
 
 _OTHER_BAR = ("right hanger", "right planes", "right time base")
 """Checks that modes fail which are not those of the hanger as it was."""
@@ -33,16 +34,17 @@ def notice_of(
     held = f"test {candidate.test.id} (recording {recording_id}) is held: {states}{end}"
     lead = f"{loss} T{held[1:]}" if loss else f"Hanger {candidate.hanger.id}: {held}"
     why = " ".join(doubt.why for doubt in doubts)
-    to_do = _what_to_do(doubts, recording_id)
+    # Whose it is must be known as soon as it would have to be repeated.
+    to_do = _what_to_do(doubts, recording_id, TODAY if TODAY in if_own else WEEK)
     return f"{lead} {to_do} {why} {if_own}Until then it counts in nothing."
 
 
-def _what_to_do(doubts: Sequence[Doubt], recording_id: int) -> str:
+def _what_to_do(doubts: Sequence[Doubt], recording_id: int, soon: str) -> str:
     time = " --time TIME" if any(doubt.check.startswith("clock") for doubt in doubts) else ""
     why = " --why TEXT" if any(doubt.check == "copy" for doubt in doubts) else ""
     ways = [f"--confirm {recording_id}{time}{why}", f"--discard {recording_id}"]
     leading = next((doubt for doubt in doubts if _is_of_others(doubt)), doubts[0])
-    action = f"Within a week, {leading.action[:1].lower()}{leading.action[1:]}"
+    action = f"{soon.capitalize()}, {leading.action[:1].lower()}{leading.action[1:]}"
     if leading.instead_of:
         discards = (f"`shm ingest --discard {each} --why TEXT`" for each in leading.instead_of)
         first = ", ".join(discards)

@@ -13,6 +13,7 @@ import pytest
 from shm.models import THESIS, build
 from shm.plausibility import CHECKS, Candidate, Check, doubts_about, implied_shift, notice_of
 from shm.values import Doubt, Fingerprint, Hanger, KnownSamples
+from shm.values.messages import Lead
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import START, modelled_test
 
@@ -78,6 +79,7 @@ def test_a_doubt_says_what_is_the_matter_what_to_do_and_why(check: str) -> None:
     for part in (doubt.state, doubt.action[1:], doubt.why, "--confirm 12", "--discard 12"):
         assert part in message
     assert ("repeat the test today" in message.lower()) is (check in SHIFTED)
+    assert (Lead.of(message).urgency == "today") is (check in SHIFTED)
     assert len(re.split(r"[.?] ", message, maxsplit=1)[0].split()) <= 25
 
 
