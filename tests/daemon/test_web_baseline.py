@@ -10,12 +10,10 @@ from functools import partial
 import httpx
 import pytest
 
-from shm.pipeline import utc_now
 from shm.store import Workspace
-from shm.store.people import Role
 from shm_daemon.web.address import Address
 from shm_daemon.web.background_work import BackgroundWorker
-from tests.daemon.test_web_people import PASSWORD, sign_in
+from tests.daemon.test_web_people import add_a_user_of_each_role, sign_in
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import a_thread, served
 from tests.helpers.workspaces import START, make_workspace, write_slow_loss
@@ -29,9 +27,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     made = make_workspace(tmp_path_factory.mktemp("baseline") / "bridge", hangers=(3, 4))
     write_slow_loss(made.spool, made)
     ingest(made)
-    with made.store() as store:
-        for role in Role:
-            store.people.add(role, role, PASSWORD, utc_now())
+    add_a_user_of_each_role(made)
     return made
 
 

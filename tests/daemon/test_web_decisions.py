@@ -10,9 +10,8 @@ import pytest
 
 from shm.pipeline import utc_now
 from shm.store import Decision, Stage, Workspace
-from shm.store.people import Role
 from shm_daemon.web.address import Address
-from tests.daemon.test_web_people import PASSWORD, sign_in
+from tests.daemon.test_web_people import add_a_user_of_each_role, sign_in
 from tests.helpers import quick_update
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import served
@@ -29,9 +28,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workspace]:
         ingest(made)
         write_held(made, 3)
         ingest(made)
-        with made.store() as store:
-            for role in Role:
-                store.people.add(role, role, PASSWORD, utc_now())
+        add_a_user_of_each_role(made)
         yield made
 
 

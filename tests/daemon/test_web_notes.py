@@ -18,10 +18,9 @@ from shm.report.figures.hanger_trend import FIGURE
 from shm.report.figures.specification import Points
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.store import Workspace
-from shm.store.people import Role
 from shm.values.notes import NoteKind
 from shm_daemon.web.address import Address
-from tests.daemon.test_web_people import PASSWORD, sign_in
+from tests.daemon.test_web_people import add_a_user_of_each_role, sign_in
 from tests.helpers.taken_in import with_a_slow_loss
 from tests.helpers.web_servers import served
 
@@ -31,9 +30,7 @@ NOTE = {"hanger": "3", "kind": "repair", "at": "2026-05-01", "text": "new pin\r\
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     made = with_a_slow_loss(tmp_path_factory.mktemp("notes") / "bridge")
-    with made.store() as store:
-        for role in Role:
-            store.people.add(role, role, PASSWORD, utc_now())
+    add_a_user_of_each_role(made)
     return made
 
 

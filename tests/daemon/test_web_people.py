@@ -29,11 +29,16 @@ UPLOAD = "/api/recordings?name=x.csv"
 
 @pytest.fixture
 def browser(workspace: Workspace) -> Iterator[httpx.Client]:
+    add_a_user_of_each_role(workspace)
+    with served(workspace, Address("0.0.0.0")) as site, site.client(Origin=site.url) as client:
+        yield client
+
+
+def add_a_user_of_each_role(workspace: Workspace) -> None:
+    """Each named as the role, with the one password."""
     with workspace.store() as store:
         for role in Role:
             store.people.add(role, role, PASSWORD, utc_now())
-    with served(workspace, Address("0.0.0.0")) as site, site.client(Origin=site.url) as client:
-        yield client
 
 
 def sign_in(client: httpx.Client, name: str, password: str = PASSWORD) -> int:

@@ -11,10 +11,9 @@ import pytest
 from shm.bridge.changes import overlaid
 from shm.pipeline import utc_now
 from shm.store import Workspace
-from shm.store.people import Role
 from shm_cli.main import run
 from shm_daemon.doctor import examine
-from tests.daemon.test_web_people import PASSWORD, sign_in
+from tests.daemon.test_web_people import PASSWORD, add_a_user_of_each_role, sign_in
 from tests.helpers.outboxes import make_baseline, raise_alerts
 from tests.helpers.web_servers import served
 
@@ -23,9 +22,7 @@ LEVEL = "hanger.3.thresholds.alert_probability"
 
 @pytest.fixture
 def browser(workspace: Workspace) -> Iterator[httpx.Client]:
-    with workspace.store() as store:
-        for role in Role:
-            store.people.add(role, role, PASSWORD, utc_now())
+    add_a_user_of_each_role(workspace)
     with served(workspace) as site, site.client(Origin=site.url, Accept="text/html") as client:
         sign_in(client, "engineer")
         yield client

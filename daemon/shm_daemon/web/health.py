@@ -113,11 +113,12 @@ def _of_silences(site: Site) -> list[Lead]:
         return []  # told as a trouble
     return [
         Lead(
-            f"{said_of(each)[0].upper()}{said_of(each)[1:]}.",
+            f"{said[0].upper()}{said[1:]}.",
             f"{'No' if each.is_maintenance else 'Each'} alert of that time is raised; it is ended "
             "on the page of alerts.",
         )
         for each in found
+        for said in [said_of(each)]
     ]
 
 
