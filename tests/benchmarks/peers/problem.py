@@ -18,7 +18,7 @@ from importlib.metadata import version
 import numpy as np
 
 from shm.inference.likelihood import Likelihood
-from shm.models import build
+from shm.models import THESIS, build
 from shm.values import FloatArray
 from tests.helpers.evidence_oracle import TABLES, modal_test
 from tests.helpers.hangers import HANGER_3
@@ -45,7 +45,7 @@ class Target:
 
     def __init__(self, repeat: int, sigma: str):
         self.tests = [modal_test(TABLES["1.1"])]
-        self.model = build("beam2", HANGER_3)
+        self.model = build("beam2", HANGER_3, THESIS)
         self.repeat = repeat
         self.evaluations = 0
         self._likelihood = Likelihood(self.tests, repeat)
