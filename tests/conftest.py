@@ -13,6 +13,7 @@ import pytest
 from tests.helpers.postgres import Databases, postgresql_server
 from tests.helpers.quick_stores import (
     copy_new_stores,
+    hash_passwords_quickly,
     share_compiled_statements,
     wait_for_no_disk,
 )
@@ -48,6 +49,7 @@ def quick_stores(tmp_path_factory) -> Iterator[None]:
         copy_new_stores(patch, tmp_path_factory.mktemp("template"))
         share_compiled_statements(patch)
         wait_for_no_disk(patch)
+        hash_passwords_quickly(patch)
         yield
 
 

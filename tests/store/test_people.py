@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
-from functools import partial
 
-import argon2
 import pytest
 
 from shm.errors import NothingThere, UsageError
@@ -21,10 +19,7 @@ OTHER = "four other quiet words"
 
 
 @pytest.fixture
-def store(file_store: Store, monkeypatch: pytest.MonkeyPatch) -> Store:
-    """A store whose passwords are hashed quickly: how dear a guess is, is argon2's to test."""
-    quick = partial(argon2.PasswordHasher, time_cost=1, memory_cost=8, parallelism=1)
-    monkeypatch.setattr(argon2, "PasswordHasher", quick)
+def store(file_store: Store) -> Store:
     return file_store
 
 
