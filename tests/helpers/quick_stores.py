@@ -1,4 +1,4 @@
-"""What hundreds of new stores need not do: run the migrations, compile SQL, sync, make guesses dear.
+"""What hundreds of new stores need not do: run migrations, compile SQL, sync, make guesses dear.
 
 The first two are the same each time: a new file is copied from one that the migrations made in this
 process, and a statement that one store compiled serves the others. And no power fails here: who
