@@ -204,7 +204,7 @@ class HangersNow:
             notes_of(standing, self.silences, hanger.id, self.now),
             unwatched(self.workspace, hanger.id, point.time, self.blind, self.now)
             if point
-            else None,
+            else self.blind.get(hanger.id),
         )
 
 

@@ -208,9 +208,16 @@ def hanger_message(known: Known) -> HangerMessage:
             off if off and "limit" in each.kinds else Lead.of(each.message)
             for each in reversed(known.standing)
         ]
+        if known.unwatched and not (known.warnings or off) and _say_nothing(known.standing):
+            status = Status.UNCLEAR
         return HangerMessage(status, _first(doubts), known.notes)
     status, lead = _quiet(known, status)
     return HangerMessage(status, lead, known.notes)
+
+
+def _say_nothing(standing: Sequence[Alert]) -> bool:
+    """Whether all that stands is that sensors say nothing."""
+    return all(each.kinds == ("silent",) for each in standing)
 
 
 def still_detected(

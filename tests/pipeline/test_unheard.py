@@ -101,12 +101,47 @@ def test_a_silence_of_a_day_is_one_alert_which_ends_with_it(tmp_path: Path) -> N
             "than a day. Look at its logger, power and connection within a week."
         )
         lines = hanger_lines(workspace, store, last + 5 * day)
-        assert {each.message.status for each in lines if each.hanger.id == 3} == {Status.CHECK}
+        assert {each.message.status for each in lines if each.hanger.id == 3} == {Status.UNCLEAR}
         send(workspace, hours=1 / 6, first=NOW + 5 * day)
         heed_silences(workspace, store, NOW + 5 * day + HOUR / 2)
         (over,) = store.alerts.list_all()
         assert over.resolution is not None
         assert over.resolution.why == "stream hanger03 sends again"
+
+
+def test_a_stream_that_saw_nothing_for_a_day_is_one_alert_until_it_sees_again(
+    tmp_path: Path,
+) -> None:
+    workspace = with_live_streams(make_workspace(tmp_path / "bridge"))
+    name = workspace.bridge.streams[0].name
+    with workspace.store() as store:
+
+        def sends(hours: float, *, blind: bool) -> int:
+            send(workspace, hours=1 / 6, first=NOW + hours * HOUR)
+            if blind:
+                start = NOW + hours * HOUR
+                event = StreamEvent(name, "lost modes", start, start + HOUR / 6, "no mode")
+                store.streams.save_event(event)
+            heed_silences(workspace, store, NOW + (hours + 0.2) * HOUR)
+            return len(store.alerts.list_all(standing=True))
+
+        sends(0, blind=True)
+        for start in (NOW + n * HOUR for n in range(1, 27)):  # where ten minutes lack, it goes on
+            store.streams.save_event(StreamEvent(name, "lost modes", start, start + HOUR / 2, ""))
+        assert [sends(hour, blind=True) for hour in (25, 26, 27)] == [0, 1, 1]
+        (raised,) = store.alerts.list_all()
+        assert raised.alert.time == NOW
+        assert "is without any motion of it for longer than a day. See within a week whether" in (
+            raised.alert.message
+        )
+        (line,) = (e for e in hanger_lines(workspace, store, NOW + 27.2 * HOUR) if e.hanger.id == 3)
+        assert line.message.status is Status.UNCLEAR
+        heed_silences(workspace, store, NOW + 60 * HOUR)  # silent, too: it does not see again
+        assert len(store.alerts.list_all(standing=True)) == 2
+        assert sends(70, blind=False) == 0
+        assert {each.resolution.why for each in store.alerts.list_all() if each.resolution} == {
+            f"stream {name} sends again", f"stream {name} sees its hanger again"
+        }  # fmt: skip
 
 
 def test_a_stream_of_noise_is_noted_by_its_windows_and_said_to_see_nothing(tmp_path: Path) -> None:
