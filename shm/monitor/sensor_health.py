@@ -107,8 +107,8 @@ def sees_nothing(
     """That the last of `windows` of a stream, oldest first, show a hanger that is not there.
 
     No mode for an hour, where the windows before had modes, and less motion than these ever had;
-    or no mode for a whole day, whatever the level and whatever was before. Windows that cannot be used say nothing, nor do
-    those of which it was `told` before.
+    or no mode for a whole day, whatever the level and whatever was before. Windows that cannot be
+    used say nothing, nor do those of which it was `told` before.
     """
     known = [each.window for each in windows if math.isfinite(each.window.level_m_s2)]
     seen = {each.window.start for each in windows if each.modes}

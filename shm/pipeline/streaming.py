@@ -24,6 +24,7 @@ from shm.documents import format_time
 from shm.pipeline.clock import Clock, utc_now
 from shm.pipeline.silent_streams import heed_silences, note_blindness
 from shm.pipeline.stream_days import baseline_of, hand_on_day, is_told_already
+from shm.pipeline.thermometers import compare_thermometers
 from shm.store import Store, Workspace
 from shm.store.archive import nothing
 from shm.store.ring import ring_of
@@ -144,6 +145,7 @@ class Streaming:
         if (now := self.clock()) >= self._heed_at:
             self._heed_at = now + _HEED
             heed_silences(self.workspace, self.store, now)
+            compare_thermometers(self.workspace, self.store, now)
         return bool(self._running)
 
     def _note(self, name: str, start: datetime) -> None:
