@@ -1,12 +1,14 @@
 """What a bridge full of permanent sensors costs: processor time, memory, how far behind it gets.
 
     python tests/benchmarks/stream_load.py --hangers 20 --hours 6
-    python tests/benchmarks/stream_load.py --hangers 100 --hours 1 --live 30
+    python tests/benchmarks/stream_load.py --hangers 100 --hours 4 --live 8
 
 Chunks of four channels at 200 Hz are sent into the ring while a real daemon with two workers
 serves; without `--live` as fast as it takes them, so that processor time is what counts: its sum
 over all processes of the daemon, a hanger and hour, and so for 100 hangers the share of two cores.
-With `--live N` so many seconds of the bridge pass in one of ours.
+With `--live N` so many seconds of the bridge pass in one of ours, at least 7: chunks of a past time
+are sealed once none came for ten seconds. Each half hour sent tells memory and how far the stream
+that is worst off is behind, in seconds of the bridge; ten minutes are what a window takes.
 """
 
 from __future__ import annotations
@@ -35,8 +37,10 @@ CORES = 2
 TICKS_A_S = os.sysconf("SC_CLK_TCK")
 
 
-def send(workspace: Workspace, first: datetime, hours: float, live: float) -> None:
-    """All streams minute by minute."""
+def send(
+    workspace: Workspace, first: datetime, hours: float, live: float, sent: list[datetime]
+) -> None:
+    """All streams minute by minute; `sent` grows by when each ends."""
     ring, plan = ring_of(workspace), MonitoringPlan()
     pairs = list(zip(workspace.bridge.hangers, workspace.bridge.streams, strict=True))
     each = [streamed(h, s, plan, first, hours * 3600, 1) for h, s in pairs]
@@ -45,6 +49,14 @@ def send(workspace: Workspace, first: datetime, hours: float, live: float) -> No
         if live:
             time.sleep(max(0.0, begun + 60 * minute / live - time.monotonic()))
         ring.append_all([chunk_document(chunk) for chunk in chunks])
+        sent.append(chunks[0].end)
+
+
+def behind(store: Store, workspace: Workspace, sent: list[datetime]) -> float:
+    """Seconds of the bridge from what was sent to what is read of the stream that is worst off."""
+    done = [store.streams.progress(each.name) for each in workspace.bridge.streams]
+    known = [each for each in done if each]
+    return (sent[-1] - min(known)).total_seconds() if len(known) == len(done) else float("nan")
 
 
 def processor_s(pid: int) -> float:
@@ -81,19 +93,29 @@ def main() -> None:
     first = datetime.now(UTC).replace(minute=0, second=0, microsecond=0)
     first -= timedelta(hours=1 + int(asked.hours))
     ends = first + timedelta(hours=asked.hours)
+    sent: list[datetime] = []
+    told, begun = 0, time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         hangers, settings = range(1, asked.hangers + 1), {"workers": CORES}
         made = make_workspace(Path(folder) / "bridge", hangers=hangers, settings=settings)
         workspace = with_live_streams(made, 200.0)
         with real_daemon(workspace.folder) as daemon, workspace.store() as store:
             sender = threading.Thread(
-                target=send, args=(workspace, first, asked.hours, asked.live), daemon=True
+                target=send, args=(workspace, first, asked.hours, asked.live, sent), daemon=True
             )
             sender.start()
             memory_mb: list[float] = []
             while sender.is_alive():
                 sender.join(5.0)
                 memory_mb.append(sum(map(resident_mb, descendants(daemon.pid))))
+                if sent and len(sent) // 30 > told:
+                    told = len(sent) // 30
+                    late_s, used_s = behind(store, workspace, sent), processor_s(daemon.pid)
+                    print(
+                        f"{told / 2:g} h: memory {memory_mb[-1]:.0f} MB, behind {late_s:.0f} s,"
+                        f" processor {used_s:.0f} s in {time.monotonic() - begun:.0f} s",
+                        flush=True,
+                    )
             wait_until_done(store, workspace, ends, asked.patience_s)
             used_s = processor_s(daemon.pid)
             windows = sum(

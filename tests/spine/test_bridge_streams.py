@@ -78,6 +78,12 @@ def test_what_is_given_twice_is_refused(tmp_path: Path) -> None:
         bridge(tmp_path, STREAM + OTHER_CHANNEL.replace("acc_2", "acc_1"))
 
 
+def test_two_streams_of_one_hanger_are_refused_by_both_names(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="streams h3 and h3y are both of hanger 3") as caught:
+        bridge(tmp_path, STREAM + STREAM.replace('"h3"', '"h3y"'))
+    assert "channels of one stream" in caught.value.remedy
+
+
 def test_names_that_differ_by_capitals_alone_are_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="stream name H3 is h3 but for capitals"):
         bridge(tmp_path, STREAM + STREAM.replace('"h3"', '"H3"'))
