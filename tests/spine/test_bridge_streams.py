@@ -43,6 +43,8 @@ def test_a_stream_has_a_hanger_a_rate_and_sensors(tmp_path: Path) -> None:
     )
     assert repr(found.streams) == repr((Stream("h3", 3, 200.0, channels),))
     assert found.stream("h3") is found.streams[0]
+    assert found.hanger(3).has_sensors
+    assert not bridge(tmp_path, "").hanger(3).has_sensors
     with pytest.raises(BadInput, match=r"'h9' is not described .*known: h3"):
         found.stream("h9")
 
