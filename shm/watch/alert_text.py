@@ -15,7 +15,7 @@ from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.force_units import force_unit
 from shm.values.messages import WEEK, Lead
 from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
-from shm.watch.alert_action import action_words, as_sentence, gravest, look_again
+from shm.watch.alert_action import action_words, as_sentence, gravest
 from shm.watch.change_words import (
     CAUSES,
     beyond_words,
@@ -29,7 +29,7 @@ from shm.watch.change_words import (
     threshold_words,
     undetected_words,
 )
-from shm.watch.frequency_text import each_frequency, frequencies_state, odd_frequencies
+from shm.watch.frequency_text import each_frequency, frequencies_state
 
 _SURE = 0.9  # judgement: below nine in ten a sentence says "most likely"
 _EITHER_LIKELY = 0.8  # judgement: four to one that it was sudden, or slow
@@ -148,39 +148,6 @@ def message_of_agreeing(
         _details(_sizes(None, [drift]) or _HALF_WIDTH, _merged(said)),
     ]
     return " ".join(part for part in parts if part)
-
-
-def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
-    """Of a test that agrees with none before it, or of so many in a row."""
-    if not hanger.is_modelled:
-        return odd_frequencies(test, hanger, in_a_row)
-    if hanger.has_sensors:
-        return _odd_days(test, hanger, in_a_row)
-    if in_a_row == 1:
-        return (
-            f"Hanger {hanger.id}: test {test.test} agrees with no test before it. Repeat it within "
-            "a week; it does not count until another test agrees with it. Another hanger may have "
-            "been hit, a sensor moved or the order of a mode mistaken; or the hanger has changed."
-        )
-    return (
-        f"Hanger {hanger.id}: {in_a_row} tests in a row agree neither with those before nor with "
-        "each other. Repeat the hammer test within a week, with the same people and sensors as at "
-        "the baseline. Until then the state of this hanger rests on older tests."
-    )
-
-
-def _odd_days(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
-    """The same of days of sensors that stay: the next day is another test by itself."""
-    state = (
-        f"test {test.test} agrees with no test before it"
-        if in_a_row == 1
-        else f"{in_a_row} tests in a row agree neither with those before nor with each other"
-    )
-    return (
-        f"Hanger {hanger.id}: {state}. {look_again(hanger)} {WEEK}. Until tests agree again, its "
-        "state rests on older ones. A sensor may have moved or the order of a mode been mistaken; "
-        "or the hanger has changed."
-    )
 
 
 def against_baseline_words(change: Change, hanger: Hanger) -> str:
