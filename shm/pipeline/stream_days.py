@@ -22,7 +22,6 @@ _OWN_DAYS = 7  # judgement: by then every class has been selected and the watch 
 _MAY_LACK = timedelta(hours=1)  # judgement: of a day, whose mean that hardly moves
 _REST_COMES = timedelta(hours=6)
 """Judgement: a logger that sends what it stored sends on without so long a pause."""
-_RESUMED = timedelta(hours=1)
 
 log = logging.getLogger(__name__)
 
@@ -32,8 +31,9 @@ class RestOfDays:
     """Whether what a day lacks may still come: a part of a day, as its night, is no test of it.
 
     A logger that was offline sends what it stored after what is new, or before it, in any order.
-    `came` is when each stream last brought anything out of its turn; what it brought before this
-    process began is not known, and so counts as of its beginning. With `hurry` none is waited for.
+    `came` is when each stream last brought anything out of its turn, or was back after hours; what
+    it brought before this process began is not known, and so counts as of its beginning. With
+    `hurry` none is waited for.
     """
 
     clock: Clock
@@ -43,7 +43,7 @@ class RestOfDays:
 
     def note(self, name: str, start: datetime, done: datetime) -> None:
         """A window has been read, of a stream that was done up to a time."""
-        if not timedelta(0) <= start - done <= _RESUMED:
+        if not timedelta(0) <= start - done <= _REST_COMES:
             self.came[name] = self.clock()
             self.lacking.pop(name, None)
 
