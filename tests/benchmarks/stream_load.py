@@ -45,16 +45,15 @@ def ten_minutes(workspace: Workspace, first: datetime, hours: float) -> Iterator
         yield [chunk_document(chunk) for own in each for chunk in islice(own, 10)]
 
 
-def processor_s(pid: int) -> float:
-    """Of a process and all that it has begun, as long as they live."""
-    total = 0.0
+def processor_s(pid: int, seen: dict[int, float]) -> float:
+    """Of a process and all that it has begun; `seen` keeps what workers took that were replaced."""
     for each in descendants(pid):
         try:
             fields = Path(f"/proc/{each}/stat").read_text().rpartition(")")[2].split()
         except FileNotFoundError:
             continue
-        total += (int(fields[11]) + int(fields[12])) / TICKS_A_S
-    return total
+        seen[each] = (int(fields[11]) + int(fields[12])) / TICKS_A_S
+    return sum(seen.values())
 
 
 def is_read(store: Store, workspace: Workspace, until: datetime) -> bool:
@@ -71,6 +70,7 @@ def main() -> None:
     first = datetime.now(UTC).replace(minute=0, second=0, microsecond=0)
     first -= timedelta(hours=1 + int(asked.hours))
     begun, memory_mb, took_s = time.monotonic(), 0.0, 0.0
+    seen: dict[int, float] = {}
     with tempfile.TemporaryDirectory() as folder:
         hangers, settings = range(1, asked.hangers + 1), {"workers": CORES}
         made = make_workspace(Path(folder) / "bridge", hangers=hangers, settings=settings)
@@ -82,12 +82,13 @@ def main() -> None:
                 sent_at = time.monotonic()
                 while not is_read(store, workspace, first + step * PERIOD):
                     time.sleep(2.0)
+                    processor_s(daemon.pid, seen)
                     memory_mb = max(memory_mb, sum(map(resident_mb, descendants(daemon.pid))))
                     if time.monotonic() - begun > asked.wall_s:
                         return
                 took_s = max(took_s, time.monotonic() - sent_at)
                 if step % 3 == 0:
-                    used_s = processor_s(daemon.pid)
+                    used_s = processor_s(daemon.pid, seen)
                     each_s = used_s / asked.hangers / (step / 6)
                     print(
                         f"{step / 6:g} h of {asked.hangers} hangers: memory {memory_mb:.0f} MB, ten"
