@@ -220,7 +220,7 @@ class Daemon:
             left = self._streaming.advance()
             left = self._flow.advance() or self._flow.suspects_due_s() is not None or left
             if self._once and not left and not self._tracker.watching:
-                left = self._flow.advance(hurry=True)
+                left = self._streaming.advance(hurry=True) or self._flow.advance(hurry=True)
             if is_whole:
                 self._tell_failure("")
             return left

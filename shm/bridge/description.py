@@ -21,7 +21,7 @@ from shm.bridge.single_sign_on import SingleSignOn, single_sign_on_of
 from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table
 from shm.errors import BadInput
-from shm.values import MEASUREMENT_HOURS, Hanger
+from shm.values import MEASUREMENT_HOURS, Hanger, MonitoredHanger
 from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 from shm.values.stream import Stream
 
@@ -121,6 +121,8 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
     _refuse_doubles([other.name for other in others], "other_bridge name", path)
     described = {each.id: each for each in hangers}
     streams = streams_of(_tables(document, "stream", path), path, described)
+    watched = {stream.hanger for stream in streams}
+    hangers = tuple(MonitoredHanger.of(h) if h.id in watched else h for h in hangers)
     return Bridge(
         name=str(document.get("bridge", {}).get("name", path.parent.name)),
         hangers=hangers,

@@ -79,7 +79,23 @@ def streams_of(
     if pair := _alike([stream.name for stream in streams]):
         remedy = "Give each a name of its own: each has a folder, and some disks know no capitals."
         raise BadInput(f"stream name {_both(*pair)}.", file=path, remedy=remedy)
+    _refuse_second(streams, path)
     return streams
+
+
+def _refuse_second(streams: Sequence[Stream], path: Path) -> None:
+    """What the watch learns is of sensors and clock: it would begin anew by each other stream."""
+    first: dict[int, str] = {}
+    for each in streams:
+        if each.hanger in first:
+            raise BadInput(
+                f"streams {first[each.hanger]} and {each.name} are both of hanger {each.hanger}; "
+                "the watch of a hanger takes one.",
+                file=path,
+                remedy="Describe all its sensors as channels of one stream, which one logger "
+                "sends. For a second logger describe the hanger again under another id.",
+            )
+        first[each.hanger] = each.name
 
 
 def _alike(names: Sequence[str]) -> tuple[str, str] | None:

@@ -107,8 +107,8 @@ def sees_nothing(
     """That the last of `windows` of a stream, oldest first, show a hanger that is not there.
 
     No mode for an hour, where the windows before had modes, and less motion than these ever had;
-    or no mode for a whole day, whatever the level. Windows that cannot be used say nothing, nor do
-    those of which it was `told` before.
+    or no mode for a whole day, whatever the level and whatever was before. Windows that cannot be
+    used say nothing, nor do those of which it was `told` before.
     """
     known = [each.window for each in windows if math.isfinite(each.window.level_m_s2)]
     seen = {each.window.start for each in windows if each.modes}
@@ -121,15 +121,17 @@ def sees_nothing(
     if going_on := [each for each in told if each.end > first.start]:
         return replace(going_on[-1], start=now.start, end=end)
     before = [w for w in known[: last + 1] if not any(e.start <= w.start < e.end for e in told)]
-    if sum(1 for each in before if each.start in seen) < _LEAST_BEFORE or len(blind) < _HOUR:
+    if len(blind) < _HOUR:
         return None
-    level, lowest = (f(w.level_m_s2 for w in some) for f, some in ((max, blind), (min, before)))
-    if level >= _FALLEN * lowest and end - first.start < _BLIND:
+    is_known = sum(1 for each in before if each.start in seen) >= _LEAST_BEFORE
+    level = max(w.level_m_s2 for w in blind)
+    lowest = min(w.level_m_s2 for w in before) if is_known else math.nan
+    if not level < _FALLEN * lowest and end - first.start < _BLIND:
         return None
+    compared = f" where the lowest before was {lowest:.2g}" if is_known else ""
     detail = (
         f"it sees nothing of the hanger: no mode since {first.start:%Y-%m-%d %H:%M} UTC, at most "
-        f"{level:.2g} m/s^2 where the lowest before was {lowest:.2g}; see whether the sensors are "
-        "fixed to it and connected"
+        f"{level:.2g} m/s^2{compared}; see whether the sensors are fixed to it and connected"
     )
     return StreamEvent(now.stream, "lost modes", first.start, end, detail)
 

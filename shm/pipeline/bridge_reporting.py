@@ -33,6 +33,7 @@ from shm.store.checksums import of_readable
 from shm.store.stored_silences import silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, WatchedTest
 from shm.values.messages import WEEK, Lead
+from shm.watch.alert_action import look_again
 
 if TYPE_CHECKING:
     from shm.watch.neighbours import BridgePattern, HangerShift
@@ -92,7 +93,7 @@ def unwatched(
     if hanger in blind or since <= timedelta(days=workspace.settings.quiet_days):
         return blind.get(hanger)
     state = f"Hanger {hanger}: not tested for {since.days} days."
-    return Lead(state, f"Repeat the hammer test {WEEK}.")
+    return Lead(state, f"{look_again(workspace.bridge.tested(hanger))} {WEEK}.")
 
 
 def notes_of(
@@ -204,7 +205,7 @@ class HangersNow:
             notes_of(standing, self.silences, hanger.id, self.now),
             unwatched(self.workspace, hanger.id, point.time, self.blind, self.now)
             if point
-            else None,
+            else self.blind.get(hanger.id),
         )
 
 

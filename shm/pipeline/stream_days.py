@@ -3,21 +3,62 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
-from datetime import datetime
+from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta
 
 from shm.documents import dump
 from shm.modes_document import modes_document
+from shm.pipeline.clock import Clock
 from shm.pipeline.ending import SHM, told_by_other
 from shm.read.atomic import replace_text
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX
+from shm.store.ring_files import PERIOD
 from shm.values import Alert, ModalTest, Posterior
 from shm.values.stream import PERIODS, Stream
 
 _OWN_DAYS = 7  # judgement: by then every class has been selected and the watch has learnt
 
+_MAY_LACK = timedelta(hours=1)  # judgement: of a day, whose mean that hardly moves
+_REST_COMES = timedelta(hours=6)
+"""Judgement: a logger that sends what it stored sends on without so long a pause."""
+
 log = logging.getLogger(__name__)
+
+
+@dataclass
+class RestOfDays:
+    """Whether what a day lacks may still come: a part of a day, as its night, is no test of it.
+
+    A logger that was offline sends what it stored after what is new, or before it, in any order.
+    `came` is when each stream last brought anything out of its turn, or was back after hours; what
+    it brought before this process began is not known, and so counts as of its beginning. With
+    `hurry` none is waited for.
+    """
+
+    clock: Clock
+    hurry: bool = False
+    came: dict[str, datetime] = field(default_factory=dict)
+    lacking: dict[str, datetime] = field(default_factory=dict)
+
+    def note(self, name: str, start: datetime, done: datetime) -> None:
+        """A window has been read, of a stream that was done up to a time."""
+        if not timedelta(0) <= start - done <= _REST_COMES:
+            self.came[name] = self.clock()
+            self.lacking.pop(name, None)
+
+    def is_awaited(self, store: Store, name: str, day: datetime) -> bool:
+        """Whether a day that is over lacks windows, and is not old enough to be judged without."""
+        end, now = day + PERIODS["day"], self.clock()
+        if self.hurry or now >= max(self.came.setdefault(name, now), end) + _REST_COMES:
+            return False
+        if self.lacking.get(name) != day:
+            begin = max(day, store.streams.first_window(name) or day)
+            found = sum(start < end for start in store.streams.window_starts(name, begin))
+            if end - begin - found * PERIOD <= _MAY_LACK:
+                return False
+            self.lacking[name] = day
+        return True
 
 
 def baseline_of(store: Store, stream: Stream) -> Posterior | None:

@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING, Any
 from shm.documents import format_time
 from shm.pipeline.clock import Clock, utc_now
 from shm.pipeline.silent_streams import heed_silences, note_blindness
-from shm.pipeline.stream_days import baseline_of, hand_on_day, is_told_already
+from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day, is_told_already
+from shm.pipeline.thermometers import compare_thermometers
 from shm.store import Store, Workspace
 from shm.store.archive import nothing
 from shm.store.ring import ring_of
@@ -50,7 +51,6 @@ _AGAIN = timedelta(minutes=1)  # judgement: a machine without memory or disk is 
 _OFFSETS = 144  # windows of a day, with which a sensor's offset is compared
 _WHOLE = 0.98  # judgement: of ten minutes; a chunk that lacks seconds is not waited for
 _PATIENCE = timedelta(minutes=20)  # judgement: a logger that sends each quarter of an hour
-
 _HEED = timedelta(minutes=10)  # technical: silences are told by the day
 _LOOKED_BACK = timedelta(days=10)
 """Judgement: for what was noticed as a change began; what is told later is a slow one."""
@@ -98,7 +98,7 @@ class Streaming:
         self._sealed: defaultdict[str, list[datetime]] = defaultdict(list)
         self._late: defaultdict[str, list[datetime]] = defaultdict(list)
         self._news: SimpleQueue[tuple[str, datetime]] = SimpleQueue()
-        self._first, self._heed_at = 0, _EVER
+        self._first, self._heed_at, self._rest = 0, _EVER, RestOfDays(clock)
         self.use(workspace)
 
     def use(self, workspace: Workspace) -> None:
@@ -122,11 +122,10 @@ class Streaming:
         """What is being computed now."""
         return tuple(running.future for running in self._running.values())
 
-    def advance(self) -> bool:
-        """Keeps what is finished, begins what has come; whether anything is under way.
-
-        Raises StoreError where the store cannot be used now.
-        """
+    def advance(self, *, hurry: bool = False) -> bool:
+        """Keeps what is finished, begins what has come; whether anything is under way. With `hurry`
+        no rest of a day is waited for. Raises StoreError where the store cannot be used now."""
+        self._rest.hurry = hurry
         for name, running in list(self._running.items()):
             if running.future.done():
                 del self._running[name]
@@ -144,6 +143,7 @@ class Streaming:
         if (now := self.clock()) >= self._heed_at:
             self._heed_at = now + _HEED
             heed_silences(self.workspace, self.store, now)
+            compare_thermometers(self.workspace, self.store, now)
         return bool(self._running)
 
     def _note(self, name: str, start: datetime) -> None:
@@ -258,6 +258,8 @@ class Streaming:
         key = stream.name, period
         start = self._pooled.get(key) or self._pooled_until(stream, period, length)
         while start is not None and start + length <= done:
+            if period == "day" and self._rest.is_awaited(self.store, stream.name, start):
+                return None
             if self._is_due(stream, period, start):
                 break
             start += length
@@ -353,6 +355,7 @@ class Streaming:
         window = reading.window
         self.store.streams.save_window(reading)
         name, done = window.stream, self._done.get(window.stream, _EVER)
+        self._rest.note(name, window.start, done)
         if window.start < done:
             self._changed[name] = min(window.start, self._changed.get(name, window.start))
         self._done[name] = max(done, window.start + WINDOW)

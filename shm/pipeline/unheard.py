@@ -103,14 +103,11 @@ def leads_of(found: Sequence[Heard]) -> tuple[Lead, ...]:
 
 
 def blind_hangers(found: Sequence[Heard]) -> dict[int, Lead]:
-    """What is said first of each hanger of which none of its streams says anything."""
+    """What is said first of each hanger whose stream says nothing."""
     leads = {}
-    for hanger in {each.stream.hanger for each in found if each.state in _BLIND}:
-        own = [each for each in found if each.stream.hanger == hanger]
-        if any(each.state not in (*_BLIND, "never sent") for each in own):
-            continue
-        first = next(each for each in own if each.state in _BLIND)
-        what, action = _BLIND[first.state]
-        state = f"Hanger {hanger}: its stream {first.named} is {what}."
-        leads[hanger] = Lead(state, action)
+    for each in found:
+        if each.state in _BLIND:
+            what, action = _BLIND[each.state]
+            hanger = each.stream.hanger
+            leads[hanger] = Lead(f"Hanger {hanger}: its stream {each.named} is {what}.", action)
     return leads

@@ -18,6 +18,7 @@ from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedT
 from shm.values.force_units import force_unit
 from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
 from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
+from shm.watch.alert_action import look_again
 from shm.watch.alert_text import lead_of
 from shm.watch.change_words import quantity_words, size_words
 
@@ -208,6 +209,9 @@ def hanger_message(known: Known) -> HangerMessage:
             off if off and "limit" in each.kinds else Lead.of(each.message)
             for each in reversed(known.standing)
         ]
+        silent = all(each.kinds == ("silent",) for each in known.standing)
+        if known.unwatched and silent and not (known.warnings or off):
+            status = Status.UNCLEAR
         return HangerMessage(status, _first(doubts), known.notes)
     status, lead = _quiet(known, status)
     return HangerMessage(status, lead, known.notes)
@@ -276,10 +280,8 @@ def _of_change(known: Known) -> Lead:
         return _first([Lead.of(each.message) for each in reversed(others)])
     likeliest = max(drifts, key=lambda each: each.probability)
     words = f"{quantity_words(likeliest.quantity)} {size_words(likeliest)}"
-    return Lead(
-        f"Hanger {hanger.id}: {words}, more likely than not beyond its threshold.",
-        f"Repeat the hammer test {WEEK}.",
-    )
+    state = f"Hanger {hanger.id}: {words}, more likely than not beyond its threshold."
+    return Lead(state, f"{look_again(hanger)} {WEEK}.")
 
 
 def _beyond(known: Known) -> list[Drift]:
@@ -328,15 +330,17 @@ def _quiet(known: Known, status: Status) -> tuple[Status, Lead]:
     if off:
         return Status.CHECK, off
     if status is Status.FIRST:
-        return status, Lead(
-            f"{name}: tension {_tension(known.tension)} by its first test.",
-            f"Choose a warmer or colder day {NEXT_TEST}, so that the baseline covers temperature.",
+        more = (
+            f"Choose a warmer or colder day {NEXT_TEST}, so that the baseline covers temperature."
         )
+        if known.hanger.has_sensors:
+            more = "No action is needed: the next days will be warmer or colder."
+        return status, Lead(f"{name}: tension {_tension(known.tension)} by its first test.", more)
     drift = next((each for each in known.drifts if each.quantity == TENSION), None)
     if drift is None or not math.isfinite(drift.shift_mean + drift.shift_sd):
         return Status.UNCLEAR, Lead(
             f"{name}: its latest test cannot be compared with the baseline.",
-            f"Repeat the hammer test {WEEK}, with the modes of the baseline.",
+            f"{look_again(known.hanger)} {WEEK}: it lacks modes of the baseline.",
         )
     half = NINETY_PERCENT * drift.shift_sd
     shift = rounded_percent(drift.shift_mean, half, "+")
@@ -360,10 +364,8 @@ def off_limits(hanger: Hanger, tension: Averaged) -> Lead | None:
     ):
         if probability > WATCH_PROBABILITY:
             doubt = "" if probability >= hanger.thresholds.alert_probability else "probably "
-            return Lead(
-                f"Hanger {hanger.id}: tension {_tension(tension)} is {doubt}{words}.",
-                f"Repeat the hammer test {soon}, and compare the hanger with its design.",
-            )
+            state = f"Hanger {hanger.id}: tension {_tension(tension)} is {doubt}{words}."
+            return Lead(state, f"{look_again(hanger)} {soon}, and compare it with its design.")
     return None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Literal, TypeAlias
 
 from shm.values.kinds import NAN
@@ -201,6 +201,23 @@ class Hanger(Shown):
         return self.kind != "any"
 
     @property
+    def has_sensors(self) -> bool:
+        """Whether sensors stay on it: its owner is not asked to hit it."""
+        return False
+
+    @property
     def as_hanger(self) -> bool:
         """Whether it is what the model classes take it for: clamped at both ends, in tension."""
         return self.supports.clamped and self.nominal_tension_n > 0
+
+
+class MonitoredHanger(Hanger):
+    """The same with sensors that stay, which is no part of what results rest on."""
+
+    @classmethod
+    def of(cls, hanger: Hanger) -> MonitoredHanger:
+        return cls(**{each.name: getattr(hanger, each.name) for each in fields(hanger)})
+
+    @property
+    def has_sensors(self) -> bool:
+        return True

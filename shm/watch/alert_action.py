@@ -51,30 +51,37 @@ def action_words(
         return f"Look at the structure {_WHEN[urgency]}: {_LOOK_AT}."
     if urgency == "today":
         look = _look(gravest(beyond), change)
-        return f"Repeat the hammer test {TODAY} and decide on traffic until then; {look}."
+        return f"{look_again(hanger)} {TODAY} and decide on traffic until then; {look}."
     groups = probable_groups(change) if change else []
     if len(groups) > 1 and not beyond:
-        return _tell_apart(groups, urgency)
+        return _tell_apart(groups, urgency, hanger)
     lead = gravest(beyond) if beyond else groups[0][0] if groups else None
-    test = _again(urgency)
+    test = _again(urgency, hanger)
     if lead is None:
-        return f"{test}, with more modes."
+        return f"{test}{'' if hanger.has_sensors else ', with more modes'}."
     if lead.quantity in CAUSES:
         check = CAUSES[lead.quantity].check
         return as_sentence(f"{_WHEN[urgency]}, {check}, then test again")
     return f"{test}; {_look(lead, change)}."
 
 
-def _again(urgency: Urgency) -> str:
-    return f"Repeat the hammer test {WEEK}" if urgency == "week" else f"Compare again {NEXT_TEST}"
+def look_again(hanger: Hanger) -> str:
+    """How its owner makes sure: sensors that stay test it again by themselves."""
+    return "Check the hanger and its sensors" if hanger.has_sensors else "Repeat the hammer test"
 
 
-def _tell_apart(groups: Sequence[Sequence[Moved]], urgency: Urgency) -> str:
+def _again(urgency: Urgency, hanger: Hanger) -> str:
+    return f"{look_again(hanger)} {WEEK}" if urgency == "week" else f"Compare again {NEXT_TEST}"
+
+
+def _tell_apart(groups: Sequence[Sequence[Moved]], urgency: Urgency, hanger: Hanger) -> str:
     """What shows which of several causes it was."""
     causes = [CAUSES[each[0].quantity] for each in groups if each[0].quantity in CAUSES]
     if not causes:
-        with_what = "a sensor near each end and more modes"
-        return f"{_again(urgency)} with {with_what}, to see what changed."
+        again, with_what = _again(urgency, hanger), "a sensor near each end and more modes"
+        if hanger.has_sensors:
+            return f"{again}; a hammer test with {with_what} shows what changed."
+        return f"{again} with {with_what}, to see what changed."
     check, apart_by = causes[0].check, causes[0].apart_by
     return as_sentence(f"{_WHEN[urgency]}, {check}; then test with {apart_by}, to tell them apart")
 

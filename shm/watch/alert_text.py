@@ -29,7 +29,7 @@ from shm.watch.change_words import (
     threshold_words,
     undetected_words,
 )
-from shm.watch.frequency_text import each_frequency, frequencies_state, odd_frequencies
+from shm.watch.frequency_text import each_frequency, frequencies_state
 
 _SURE = 0.9  # judgement: below nine in ten a sentence says "most likely"
 _EITHER_LIKELY = 0.8  # judgement: four to one that it was sudden, or slow
@@ -148,23 +148,6 @@ def message_of_agreeing(
         _details(_sizes(None, [drift]) or _HALF_WIDTH, _merged(said)),
     ]
     return " ".join(part for part in parts if part)
-
-
-def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
-    """Of a test that agrees with none before it, or of so many in a row."""
-    if not hanger.is_modelled:
-        return odd_frequencies(test, hanger, in_a_row)
-    if in_a_row == 1:
-        return (
-            f"Hanger {hanger.id}: test {test.test} agrees with no test before it. Repeat it within "
-            "a week; it does not count until another test agrees with it. Another hanger may have "
-            "been hit, a sensor moved or the order of a mode mistaken; or the hanger has changed."
-        )
-    return (
-        f"Hanger {hanger.id}: {in_a_row} tests in a row agree neither with those before nor with "
-        "each other. Repeat the hammer test within a week, with the same people and sensors as at "
-        "the baseline. Until then the state of this hanger rests on older tests."
-    )
 
 
 def against_baseline_words(change: Change, hanger: Hanger) -> str:

@@ -1,30 +1,42 @@
-"""Whether a stream's thermometer is believed: by what it says, and by how fast that moves.
+"""Whether a stream's thermometer is believed: by what it says and how that moves.
 
 A sensor at fault says what no bridge can be. One that came loose or was exchanged jumps, and would
 have the watch explain a jump of the tension that never was. It is believed again once it jumps
-back, or with a new baseline. While the watch learns, only what is impossible is not believed.
+back, or with a new baseline. One that stands still is believed again once it moves. While the watch
+learns, only what is impossible is not believed. A slow drift of a lone thermometer cannot be told;
+those of one bridge are compared with each other.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
+import numpy as np
+
 from shm.values import COLDEST_C, NAN, WARMEST_C, outdoor_c
-from shm.values.stream import StreamEvent, WindowReading
+from shm.values.stream import PERIODS, PooledReading, StreamEvent, Window, WindowReading
 
 FASTEST_K_PER_H = 57.0
 """Derived: of a rod of 20 mm, the thinnest hanger, that loses nothing of the 900 W/m2 of a high sun
 which fall on its diameter d: 4 x 900 / (pi rho c d), with 7850 kg/m3 and 460 J/(kg K)."""
 _WINDOW = timedelta(minutes=10)  # the least time over which two values are compared
+_STILL_K, _STILL_S, _STILL_WINDOWS = 1e-3, 86400.0, 24
+"""Judgement: no thermometer resolves less, and no sun's round leaves the air as it was from hour to
+hour; two days alike at noon are no wonder."""
+APART_K = 5.0
+"""Judgement: of the median over a day, in which the sun warms one side more for a few hours only;
+thermometers themselves are 0.5 to 1 K off."""
+_HOURS_COMPARED = 12  # judgement: half of a day
 
 
 @dataclass(frozen=True)
 class Thermometer:
     """The last value and when that was (seconds of the epoch), and by how much it has jumped: 0
-    where it is believed. It was not from `since_s` until `until_s`.
+    where it is believed. It was not from `since_s` until `until_s`. Since `still_s` it said the
+    same so many times more (`still`).
     """
 
     seen_c: float = NAN
@@ -32,6 +44,8 @@ class Thermometer:
     off_k: float = 0.0
     since_s: float = math.inf
     until_s: float = math.inf
+    still_s: float = math.inf
+    still: int = 0
 
     def after(self, value_c: float, at_s: float) -> Thermometer:
         """After one more window's value."""
@@ -39,7 +53,15 @@ class Thermometer:
             return self
         step = value_c - self.seen_c
         hours = max(at_s - self.seen_s, _WINDOW.total_seconds()) / 3600
-        seen = replace(self, seen_c=value_c, seen_s=at_s)
+        if abs(step) < _STILL_K:  # compared with the first of them, or a creep would be none
+            seen = replace(self, seen_s=at_s, still=self.still + 1)
+            is_stuck = at_s - self.still_s >= _STILL_S and seen.still >= _STILL_WINDOWS
+            if self.is_doubted(at_s) or not is_stuck:
+                return seen
+            return replace(seen, since_s=at_s, until_s=math.inf)
+        seen = replace(self, seen_c=value_c, seen_s=at_s, still_s=at_s, still=0)
+        if self.is_doubted(at_s) and not self.off_k:  # it was stuck
+            return replace(seen, until_s=at_s)
         if abs(self.off_k + step) < abs(self.off_k) / 2:
             return replace(seen, off_k=0.0, until_s=at_s)
         if not abs(step) > FASTEST_K_PER_H * hours:  # NaN at first
@@ -49,7 +71,7 @@ class Thermometer:
 
     def learnt(self) -> Thermometer:
         """As it is where what it says from now on is what the watch learns."""
-        return Thermometer(self.seen_c, self.seen_s)
+        return Thermometer(self.seen_c, self.seen_s, still_s=self.still_s, still=self.still)
 
     def is_doubted(self, at_s: float) -> bool:
         return self.since_s <= at_s < self.until_s
@@ -90,7 +112,7 @@ def believed(
     if absurd:
         events = [_event(absurd, _impossible(absurd[-1].window.temperature_c))]
     elif doubted:
-        events = [_event(doubted, _jumped(thermometer, doubted[0].window.start))]
+        events = [_event(doubted, _why_doubted(thermometer, doubted[0].window))]
     return Believed(tuple(found), thermometer, tuple(events))
 
 
@@ -99,6 +121,55 @@ def _impossible(value_c: float) -> str:
         f"temperature_c is {value_c:g}, and nothing outdoors is below {COLDEST_C:g} or above "
         f"{WARMEST_C:g} °C: the temperature is not known. Check the thermometer, its cable and its "
         "unit, or send none."
+    )
+
+
+def disagreeing(hours: Mapping[str, Sequence[PooledReading]]) -> tuple[StreamEvent, ...]:
+    """Thermometers that differ from the others of their bridge, by each stream's `hours` of a day.
+
+    Of two none can be told to be right: both are named.
+    """
+    said = {
+        name: {each.start: each.temperature_c for each in own if math.isfinite(each.temperature_c)}
+        for name, own in hours.items()
+    }
+    starts = sorted({start for own in said.values() for start in own})
+    table = np.array([[own.get(start, NAN) for start in starts] for own in said.values()])
+    found = []
+    for row, name in enumerate(said):
+        others = table if len(table) > 2 else np.delete(table, row, axis=0)
+        shared = np.isfinite(table[row]) & (np.isfinite(table).sum(axis=0) > 1)
+        if shared.sum() < _HOURS_COMPARED:
+            continue
+        usual = np.nanmedian(others[:, shared], axis=0)
+        off_k = float(np.median(table[row, shared] - usual))
+        if abs(off_k) > APART_K:
+            last = starts[int(np.flatnonzero(shared)[-1])]
+            end = last + PERIODS["hour"]
+            detail = _apart(off_k, of_many=len(table) > 2)
+            found.append(StreamEvent(name, "thermometer", last, end, detail))
+    return tuple(found)
+
+
+def _apart(off_k: float, *, of_many: bool) -> str:
+    which = "the median of the bridge's thermometers" if of_many else "that of another stream"
+    return (
+        f"temperature_c is {off_k:+.1f} K off {which} over a day: what temperature does to the "
+        "tension is taken off wrongly. Compare them on site."
+    )
+
+
+def _why_doubted(thermometer: Thermometer, first: Window) -> str:
+    if thermometer.since_s - thermometer.still_s >= _STILL_S:
+        return _stuck(thermometer, first)
+    return _jumped(thermometer, first.start)
+
+
+def _stuck(thermometer: Thermometer, first: Window) -> str:
+    still = datetime.fromtimestamp(thermometer.still_s, first.start.tzinfo)
+    return (
+        f"temperature_c has been {first.temperature_c:g} since {still:%Y-%m-%d %H:%M}, and no day "
+        "is as even: the temperature is not known until it moves. Check the thermometer."
     )
 
 

@@ -37,7 +37,7 @@ from shm.values import (
 )
 from shm.watch.agreement import Way, agreement, way_of
 from shm.watch.alert_state import AlertState, conditions, still, with_beyond
-from shm.watch.alert_text import message_of, message_of_odd, short_name
+from shm.watch.alert_text import message_of, short_name
 from shm.watch.change_words import CAUSES, suspects
 from shm.watch.lone_baseline import (
     FEW_TESTS,
@@ -45,6 +45,7 @@ from shm.watch.lone_baseline import (
     alert_of_baseline,
     first_tests_against,
 )
+from shm.watch.odd_text import message_of_odd
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
 from shm.watch.repeated_mistakes import news_of, notice_of, repeated_mistakes

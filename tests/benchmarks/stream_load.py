@@ -1,12 +1,12 @@
 """What a bridge full of permanent sensors costs: processor time, memory, how far behind it gets.
 
-    python tests/benchmarks/stream_load.py --hangers 20 --hours 6
-    python tests/benchmarks/stream_load.py --hangers 100 --hours 1 --live 30
+    python tests/benchmarks/stream_load.py --hangers 100 --hours 3
 
 Chunks of four channels at 200 Hz are sent into the ring while a real daemon with two workers
-serves; without `--live` as fast as it takes them, so that processor time is what counts: its sum
-over all processes of the daemon, a hanger and hour, and so for 100 hangers the share of two cores.
-With `--live N` so many seconds of the bridge pass in one of ours.
+serves: ten minutes of all hangers at once, and the next ten as soon as these are read. Printed are,
+each half hour of the bridge, the longest time that ten minutes took, which is how far behind a
+bridge gets, the memory of all processes of the daemon, and the sum of their processor time, which
+is the share of two cores that 100 hangers need.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ import argparse
 import os
 import sys
 import tempfile
-import threading
 import time
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
+from itertools import islice
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
@@ -26,6 +27,7 @@ from shm.read.chunk_document import chunk_document
 from shm.simulate.monitored import MonitoringPlan, streamed
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
+from shm.store.ring_files import PERIOD
 from tests.helpers.daemons import real_daemon
 from tests.helpers.footprint import descendants, resident_mb
 from tests.helpers.live_streams import with_live_streams
@@ -35,79 +37,66 @@ CORES = 2
 TICKS_A_S = os.sysconf("SC_CLK_TCK")
 
 
-def send(workspace: Workspace, first: datetime, hours: float, live: float) -> None:
-    """All streams minute by minute."""
-    ring, plan = ring_of(workspace), MonitoringPlan()
-    pairs = list(zip(workspace.bridge.hangers, workspace.bridge.streams, strict=True))
-    each = [streamed(h, s, plan, first, hours * 3600, 1) for h, s in pairs]
-    begun = time.monotonic()
-    for minute, chunks in enumerate(zip(*each, strict=True), 1):
-        if live:
-            time.sleep(max(0.0, begun + 60 * minute / live - time.monotonic()))
-        ring.append_all([chunk_document(chunk) for chunk in chunks])
+def ten_minutes(workspace: Workspace, first: datetime, hours: float) -> Iterator[list[bytes]]:
+    """The chunks of all streams, those of each one after the other."""
+    pairs = zip(workspace.bridge.hangers, workspace.bridge.streams, strict=True)
+    each = [streamed(h, s, MonitoringPlan(), first, hours * 3600, 1) for h, s in pairs]
+    for _ in range(round(6 * hours)):
+        yield [chunk_document(chunk) for own in each for chunk in islice(own, 10)]
 
 
-def processor_s(pid: int) -> float:
-    """Of a process and all that it has begun, as long as they live."""
-    total = 0.0
+def processor_s(pid: int, seen: dict[int, float]) -> float:
+    """Of a process and all that it has begun; `seen` keeps what workers took that were replaced."""
     for each in descendants(pid):
         try:
             fields = Path(f"/proc/{each}/stat").read_text().rpartition(")")[2].split()
         except FileNotFoundError:
             continue
-        total += (int(fields[11]) + int(fields[12])) / TICKS_A_S
-    return total
+        seen[each] = (int(fields[11]) + int(fields[12])) / TICKS_A_S
+    return sum(seen.values())
 
 
-def wait_until_done(store: Store, workspace: Workspace, until: datetime, patience_s: float) -> None:
-    """Raises TimeoutError where a stream is not read up to a time."""
-    give_up = time.monotonic() + patience_s
-    while True:
-        done = [store.streams.progress(each.name) for each in workspace.bridge.streams]
-        if all(each is not None and each >= until for each in done):
-            return
-        if time.monotonic() > give_up:
-            raise TimeoutError(f"read up to {min(each for each in done if each)}")
-        time.sleep(1.0)
+def is_read(store: Store, workspace: Workspace, until: datetime) -> bool:
+    done = [store.streams.progress(each.name) for each in workspace.bridge.streams]
+    return all(each is not None and each >= until for each in done)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--hangers", type=int, default=20)
     parser.add_argument("--hours", type=float, default=2.0)
-    parser.add_argument("--live", type=float, default=0.0)
-    parser.add_argument("--patience-s", type=float, default=3600.0)
+    parser.add_argument("--wall-s", type=float, default=7200.0, help="ends after so many")
     asked = parser.parse_args()
     first = datetime.now(UTC).replace(minute=0, second=0, microsecond=0)
     first -= timedelta(hours=1 + int(asked.hours))
-    ends = first + timedelta(hours=asked.hours)
+    begun, memory_mb, took_s = time.monotonic(), 0.0, 0.0
+    seen: dict[int, float] = {}
     with tempfile.TemporaryDirectory() as folder:
         hangers, settings = range(1, asked.hangers + 1), {"workers": CORES}
         made = make_workspace(Path(folder) / "bridge", hangers=hangers, settings=settings)
         workspace = with_live_streams(made, 200.0)
+        ring = ring_of(workspace)
         with real_daemon(workspace.folder) as daemon, workspace.store() as store:
-            sender = threading.Thread(
-                target=send, args=(workspace, first, asked.hours, asked.live), daemon=True
-            )
-            sender.start()
-            memory_mb: list[float] = []
-            while sender.is_alive():
-                sender.join(5.0)
-                memory_mb.append(sum(map(resident_mb, descendants(daemon.pid))))
-            wait_until_done(store, workspace, ends, asked.patience_s)
-            used_s = processor_s(daemon.pid)
-            windows = sum(
-                len(store.streams.list_windows(each.id, first, ends))
-                for each in workspace.bridge.hangers
-            )
-    each_s = used_s / asked.hangers / asked.hours
-    print(f"{asked.hangers} hangers, {asked.hours:g} h: {windows} windows")
-    print(f"processor time {used_s:.0f} s, {each_s:.2f} s a hanger and hour, begin included")
-    print(f"100 hangers: {100 * each_s / 3600 / CORES:.0%} of {CORES} cores")
-    half = len(memory_mb) // 2
-    if half:
-        early, late = max(memory_mb[:half]), max(memory_mb[half:])
-        print(f"memory of all processes: up to {early:.0f} MB, in the second half {late:.0f} MB")
+            for step, chunks in enumerate(ten_minutes(workspace, first, asked.hours), 1):
+                ring.append_all(chunks)
+                sent_at = time.monotonic()
+                while not is_read(store, workspace, first + step * PERIOD):
+                    time.sleep(2.0)
+                    processor_s(daemon.pid, seen)
+                    memory_mb = max(memory_mb, sum(map(resident_mb, descendants(daemon.pid))))
+                    if time.monotonic() - begun > asked.wall_s:
+                        return
+                took_s = max(took_s, time.monotonic() - sent_at)
+                if step % 3 == 0:
+                    used_s = processor_s(daemon.pid, seen)
+                    each_s = used_s / asked.hangers / (step / 6)
+                    print(
+                        f"{step / 6:g} h of {asked.hangers} hangers: memory {memory_mb:.0f} MB, ten"
+                        f" minutes read in {took_s:.0f} s at most, processor {used_s:.0f} s: "
+                        f"{each_s:.2f} s a hanger and hour, begin included",
+                        flush=True,
+                    )
+                    memory_mb = took_s = 0.0
 
 
 if __name__ == "__main__":

@@ -124,9 +124,20 @@ def test_a_stream_without_modes_that_fell_below_its_quietest_sees_nothing(
     windows = _in_order(*SEEN, *then)
     event = sees_nothing(windows)
     assert (event is not None) is is_told
-    assert sees_nothing(windows[12:]) is None  # too little was seen before
+    assert sees_nothing(windows[12:-1]) is None  # too little was seen before
     if event is not None:
         assert (event.kind, event.start) == ("lost modes", windows[36].window.start)
+
+
+@pytest.mark.parametrize("before", [[], SEEN[:6]])
+def test_a_stream_that_hardly_ever_had_a_mode_sees_nothing_after_a_day(
+    before: list[WindowReading],
+) -> None:
+    windows = _in_order(*before, *_hours(*24 * [3e-4], modes=False))
+    assert sees_nothing(windows[:-1]) is None
+    event = sees_nothing(windows)
+    assert event is not None
+    assert "lowest before" not in event.detail
 
 
 def test_what_sees_nothing_goes_on_until_modes_are_seen_and_is_told_again_after() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from shm.models.tensioned_beam import frequencies_hz
-from shm.pipeline import stream_steps
+from shm.pipeline import stream_days, stream_steps
 from shm.pipeline.redescribed import discarded_of
 from shm.pipeline.stream_days import hand_on_day
 from shm.pipeline.streaming import Streaming
@@ -61,6 +61,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
         lambda self, stream, start: (starts.append(start), real(self, stream, start))[1],
     )
     monkeypatch.setattr(stream_steps, "read_stream_window", lambda *_: window(starts[-1]))
+    monkeypatch.setattr(stream_days, "PERIOD", HOUR)
     return made
 
 
@@ -99,6 +100,7 @@ def test_what_was_offline_is_watched_in_its_place_and_its_alert_raised_once(
     come(working, *range(80))
     come(working, 100, 101)  # live again; the store of the logger follows, its middle first
     assert not store.alerts.list_all()
+    assert days_of(workspace) == [1, 2, 3]  # of the fourth there are eight hours
     come(working, *range(85, 99), 83, 82, 81, 80, 84, 99)
 
     readings = hours_of(store)
@@ -119,8 +121,37 @@ def test_what_was_offline_is_watched_in_its_place_and_its_alert_raised_once(
     assert kept is not None
     state = StreamState.from_bytes(kept)
     assert replace(state, settled_day=0.0, thermometer=Thermometer()).to_bytes() == found[-1].kept
-    days = sorted(path.name for path in workspace.spool.glob("*.modes.json"))
-    assert days == [f"hanger03-2026-06-{day:02d}.modes.json" for day in range(1, 5)]
+    assert days_of(workspace) == [1, 2, 3, 4]
+
+
+def test_a_part_of_a_day_is_a_test_only_once_no_more_has_come_for_hours(
+    workspace: Workspace, working: tuple[Streaming, Store, Clock]
+) -> None:
+    streaming, _, clock = working
+    come(working, *range(30), 60)
+    assert days_of(workspace) == [1]
+    clock.pass_by(5 * 3600)
+    come(working, 30, 61)  # some of the rest: it is waited for again
+    clock.pass_by(5 * 3600)
+    come(working)
+    assert days_of(workspace) == [1]
+    clock.pass_by(3600)
+    come(working, 62)
+    assert days_of(workspace) == [1, 2]
+    come(working, *range(31, 47), 72)
+    assert days_of(workspace) == [1, 2]  # the third lacks twelve hours
+    drain_in_a_hurry(streaming)
+    assert days_of(workspace) == [1, 2, 3]
+
+
+def drain_in_a_hurry(streaming: Streaming) -> None:
+    while streaming.advance(hurry=True):
+        for running in streaming.under_way:
+            running.exception(timeout=60)
+
+
+def days_of(workspace: Workspace) -> list[int]:
+    return sorted(int(path.name[-13:-11]) for path in workspace.spool.glob("*.modes.json"))
 
 
 def test_whoever_comes_next_ends_what_late_hours_began(

@@ -10,6 +10,7 @@ import pytest
 
 from shm.pipeline.bridge_reporting import hanger_lines, unwatched
 from shm.pipeline.silent_streams import heed_silences, note_blindness
+from shm.pipeline.thermometers import compare_thermometers
 from shm.pipeline.unheard import Heard, State, blind_hangers, heard, leads_of, word_of
 from shm.read.chunk_document import chunk_document
 from shm.report.hanger_status import Status
@@ -17,11 +18,10 @@ from shm.store.ring import ring_of
 from shm.values.stream import StreamEvent
 from tests.helpers.live_streams import send, with_live_streams
 from tests.helpers.nouns import NOW
-from tests.helpers.streams import MODES, STREAM, a_chunk, a_window, with_stream
+from tests.helpers.streams import MODES, STREAM, a_chunk, a_reading, a_window, with_stream
 from tests.helpers.workspaces import make_workspace
 
 HOUR = timedelta(hours=1)
-OTHER = replace(STREAM, name="h3b")
 
 
 def an_event(kind: str, end: datetime) -> StreamEvent:
@@ -59,15 +59,11 @@ def test_each_state_that_asks_for_a_person_is_told_once_with_its_remedy() -> Non
 
 
 @pytest.mark.parametrize(
-    ("other", "said"),
-    [("silent", True), ("never sent", True), ("sees nothing", True), ("live", False)],
+    ("state", "said"),
+    [("silent", True), ("sees nothing", True), ("late", False), ("clock ahead", False)],
 )
-def test_a_hanger_is_blind_where_none_of_its_streams_says_anything(
-    other: State, said: bool
-) -> None:
-    found = [Heard(STREAM, "silent", NOW), Heard(OTHER, other, NOW)]
-    assert (3 in blind_hangers(found)) is said
-    assert blind_hangers([Heard(OTHER, other, NOW) for other in ("late", "clock ahead")]) == {}
+def test_a_hanger_is_blind_whose_stream_says_nothing(state: State, said: bool) -> None:
+    assert (3 in blind_hangers([Heard(STREAM, state, NOW)])) is said
 
 
 def test_of_a_hanger_whose_stream_is_silent_nobody_says_that_nothing_needs_doing(
@@ -101,12 +97,63 @@ def test_a_silence_of_a_day_is_one_alert_which_ends_with_it(tmp_path: Path) -> N
             "than a day. Look at its logger, power and connection within a week."
         )
         lines = hanger_lines(workspace, store, last + 5 * day)
-        assert {each.message.status for each in lines if each.hanger.id == 3} == {Status.CHECK}
+        assert {each.message.status for each in lines if each.hanger.id == 3} == {Status.UNCLEAR}
         send(workspace, hours=1 / 6, first=NOW + 5 * day)
         heed_silences(workspace, store, NOW + 5 * day + HOUR / 2)
         (over,) = store.alerts.list_all()
         assert over.resolution is not None
         assert over.resolution.why == "stream hanger03 sends again"
+
+
+def test_a_stream_that_saw_nothing_for_a_day_is_one_alert_until_it_sees_again(
+    tmp_path: Path,
+) -> None:
+    workspace = with_live_streams(make_workspace(tmp_path / "bridge"))
+    name = workspace.bridge.streams[0].name
+    with workspace.store() as store:
+
+        def sends(hours: float, *, blind: bool) -> int:
+            send(workspace, hours=1 / 6, first=NOW + hours * HOUR)
+            if blind:
+                start = NOW + hours * HOUR
+                event = StreamEvent(name, "lost modes", start, start + HOUR / 6, "no mode")
+                store.streams.save_event(event)
+            heed_silences(workspace, store, NOW + (hours + 0.2) * HOUR)
+            return len(store.alerts.list_all(standing=True))
+
+        sends(0, blind=True)
+        for start in (NOW + n * HOUR for n in range(1, 27)):  # where ten minutes lack, it goes on
+            store.streams.save_event(StreamEvent(name, "lost modes", start, start + HOUR / 2, ""))
+        assert [sends(hour, blind=True) for hour in (25, 26, 27)] == [0, 1, 1]
+        (raised,) = store.alerts.list_all()
+        assert raised.alert.time == NOW
+        assert "is without any motion of it for longer than a day. See within a week whether" in (
+            raised.alert.message
+        )
+        (line,) = (e for e in hanger_lines(workspace, store, NOW + 27.2 * HOUR) if e.hanger.id == 3)
+        assert line.message.status is Status.UNCLEAR
+        heed_silences(workspace, store, NOW + 60 * HOUR)  # silent, too: it does not see again
+        assert len(store.alerts.list_all(standing=True)) == 2
+        assert sends(70, blind=False) == 0
+        assert {each.resolution.why for each in store.alerts.list_all() if each.resolution} == {
+            f"stream {name} sends again", f"stream {name} sees its hanger again"
+        }  # fmt: skip
+
+
+def test_a_thermometer_unlike_that_of_another_stream_is_noted(tmp_path: Path) -> None:
+    workspace = with_live_streams(make_workspace(tmp_path / "bridge", hangers=(3, 4)))
+    one, other = (stream.name for stream in workspace.bridge.streams)
+    with workspace.store() as store:
+        for hour in range(24):
+            for name, hanger, off_k in ((one, 3, 0.0), (other, 4, -8.0)):
+                reading = replace(a_reading(hour), stream=name, hanger=hanger)
+                store.streams.save_pooled(
+                    replace(reading, temperature_c=reading.temperature_c + off_k)
+                )
+        compare_thermometers(workspace, store, NOW + 24 * HOUR)
+        told = {each.stream: each.detail for each in store.streams.list_events(None, NOW)}
+    assert set(told) == {one, other}
+    assert told[other].startswith("temperature_c is -8.0 K off that of another stream over a day")
 
 
 def test_a_stream_of_noise_is_noted_by_its_windows_and_said_to_see_nothing(tmp_path: Path) -> None:

@@ -43,6 +43,8 @@ def test_a_stream_has_a_hanger_a_rate_and_sensors(tmp_path: Path) -> None:
     )
     assert repr(found.streams) == repr((Stream("h3", 3, 200.0, channels),))
     assert found.stream("h3") is found.streams[0]
+    assert found.hanger(3).has_sensors
+    assert not bridge(tmp_path, "").hanger(3).has_sensors
     with pytest.raises(BadInput, match=r"'h9' is not described .*known: h3"):
         found.stream("h9")
 
@@ -76,6 +78,12 @@ def test_what_is_given_twice_is_refused(tmp_path: Path) -> None:
         bridge(tmp_path, STREAM + STREAM)
     with pytest.raises(BadInput, match="channel acc_1 is given twice"):
         bridge(tmp_path, STREAM + OTHER_CHANNEL.replace("acc_2", "acc_1"))
+
+
+def test_two_streams_of_one_hanger_are_refused_by_both_names(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="streams h3 and h3y are both of hanger 3") as caught:
+        bridge(tmp_path, STREAM + STREAM.replace('"h3"', '"h3y"'))
+    assert "channels of one stream" in caught.value.remedy
 
 
 def test_names_that_differ_by_capitals_alone_are_refused(tmp_path: Path) -> None:

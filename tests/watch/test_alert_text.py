@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime, timedelta
 from typing import Literal
 
 import pytest
 
 from shm.errors import BadInput
-from shm.values import PLANES, Alert, Change, Drift, Moved, Plane, Thresholds, WatchedTest
+from shm.values import (
+    PLANES,
+    Alert,
+    Change,
+    Drift,
+    MonitoredHanger,
+    Moved,
+    Plane,
+    Thresholds,
+    WatchedTest,
+)
+from shm.values.messages import Lead
 from shm.watch.alert_state import AlertState
 from shm.watch.change_words import shift_words
+from shm.watch.odd_text import message_of_odd
 from shm.watch.watching import after, alerts_of, new_alert
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_drift, a_watched_test
@@ -337,6 +349,29 @@ def test_another_cause_says_what_to_check_before_the_next_test(
         f"Hanger 3: {state} (frequencies fell by 0.82 ± 0.20 % on average). Within a week, {action}"
     )
     assert ", then test again." in message
+
+
+@pytest.mark.parametrize(
+    ("said", "action"),
+    [
+        (
+            (change(called=True), 0.99),
+            "Check the hanger and its sensors today and decide on traffic",
+        ),
+        ((change(called=True), 0.1), "Check the hanger and its sensors within a week; if the loss"),
+        ((change(called=True, moved=()), 0.1), "Check the hanger and its sensors within a week."),
+    ],
+)
+def test_of_a_hanger_whose_sensors_stay_nobody_asks_for_a_hammer_test(
+    said: tuple[Change, float], action: str
+) -> None:
+    (alert,) = alerts_of([day(2, *said)], MonitoredHanger.of(HANGER_3))
+    assert f". {action}" in alert.message
+    for in_a_row in (1, 3):
+        odd = message_of_odd(day(2), MonitoredHanger.of(HANGER_3), in_a_row)
+        assert Lead.of(odd).action == "Check the hanger and its sensors within a week."
+        assert "hammer" not in odd
+    assert asdict(MonitoredHanger.of(HANGER_3)) == asdict(HANGER_3)  # results stay as they are
 
 
 def test_a_slow_change_below_its_threshold_waits_for_the_next_planned_test() -> None:

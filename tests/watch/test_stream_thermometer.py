@@ -13,7 +13,7 @@ from shm.pipeline.stream_steps import Pooled, pool_stream
 from shm.values import outdoor_c
 from shm.values.stream import PooledReading, Window, WindowReading
 from shm.watch.stream_state import StreamState
-from shm.watch.stream_thermometer import FASTEST_K_PER_H, Thermometer, believed
+from shm.watch.stream_thermometer import FASTEST_K_PER_H, Thermometer, believed, disagreeing
 from tests.watch.test_stream_watch import HANGER, START, from_hour, hours
 
 Says = Callable[[int, float], float]
@@ -142,6 +142,39 @@ def test_only_what_no_steel_can_do_is_a_jump() -> None:
         True,
         False,
     ]
+
+
+def test_one_that_stands_still_for_a_day_is_not_believed_until_it_moves() -> None:
+    found = watched(hours(150), from_on(100, lambda _: 7.5, 140))
+
+    told = [e.detail for each in found for e in each.events if e.kind == "thermometer"]
+    assert len(told) == 140 - 100 - 24
+    assert told[0].startswith("temperature_c has been 7.5 since 2026-05-05 04:00")
+    unknown = [hour for hour, e in enumerate(found) if math.isnan(e.reading.temperature_c)]
+    assert unknown == list(range(124, 140))
+    start_s, seen = START.timestamp(), Thermometer()
+    for day in range(20):  # a logger that sends a window at each noon
+        seen = seen.after(20.0, start_s + 86400 * day)
+    assert not seen.is_doubted(seen.seen_s)
+
+
+@pytest.mark.parametrize(
+    ("off_k", "told"),
+    [((0, 1, 6.5), {2}), ((0, 1, 5.5), set()), ((0, 6), {0, 1}), ((0, 4), set()), ((9,), set())],
+)
+def test_thermometers_of_a_bridge_that_differ_over_a_day_are_named(
+    off_k: Sequence[float], told: set[int]
+) -> None:
+    day = hours(24)
+    events = disagreeing(
+        {
+            str(n): [replace(each, temperature_c=each.temperature_c + own) for each in day]
+            for n, own in enumerate(off_k)
+        }
+    )
+    assert {int(event.stream) for event in events} == told
+    assert all(event.end == START + timedelta(days=1) for event in events)
+    assert not disagreeing({"a": day[:8], "b": [replace(e, temperature_c=50.0) for e in day[:8]]})
 
 
 def test_windows_that_were_judged_already_are_judged_alike() -> None:
