@@ -73,7 +73,7 @@ def sheet(value: Any) -> Sheet:
 def _hanger(hanger: Hanger) -> Sheet:
     """The description of a hanger, in the units of a drawing."""
     from shm.report import formatting
-    from shm.values.force_units import force_unit
+    from shm.values.rounding import force_unit
 
     nominal_n, stiffness = hanger.nominal_tension_n, hanger.bending_stiffness_n_m2
     unit = force_unit(nominal_n)
@@ -106,7 +106,7 @@ def _posterior(posterior: Posterior) -> Sheet:
     """Tension and parameters: mean, 90 % interval, most probable value, meaning."""
     from shm.report import formatting
     from shm.report.intervals import Interval
-    from shm.values.force_units import force_unit
+    from shm.values.rounding import force_unit
     from shm.values.stated_tension import averaged_now, stated
 
     tension_n = Interval.of_samples(posterior.tension_n)
@@ -136,7 +136,7 @@ def _selection(selection: Selection) -> Sheet:
     """The model classes, most probable first, with the tension that each gives."""
     from shm.report import formatting
     from shm.report.intervals import Interval
-    from shm.values.force_units import force_unit
+    from shm.values.rounding import force_unit
 
     tensions_n = [Interval.of_samples(each.tension_n) for each in selection.posteriors]
     unit = force_unit(*(each.mean for each in tensions_n))

@@ -13,7 +13,7 @@ from shm.report.diagnosis_summary import verdict
 from shm.report.diagnosis_wording import effect_phrase, quantity, size, tension_of
 from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
 from shm.values import BridgeDiagnosis, SharedCause, TensionEstimate, effect_label
-from shm.values.force_units import ForceUnit, force_unit
+from shm.values.rounding import ForceUnit, force_unit
 
 if TYPE_CHECKING:
     from shm.report.figures.illustration import Illustration

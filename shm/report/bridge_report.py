@@ -16,9 +16,8 @@ from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, filled
 from shm.report.period import period_json
 from shm.report.shifts import _day, pattern_tables, shift_cells
 from shm.values import Drift
-from shm.values.force_units import ForceUnit
 from shm.values.messages import NEXT_TEST
-from shm.values.rounding import rounded_percent
+from shm.values.rounding import ForceUnit, rounded_percent
 from shm.values.stated_tension import stated
 from shm.watch.neighbours import BridgePattern
 

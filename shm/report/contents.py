@@ -41,10 +41,10 @@ from shm.values import (
     Selection,
     Summary,
 )
-from shm.values.force_units import ForceUnit, force_unit
 from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 from shm.values.messages import Lead
 from shm.values.notes import Note
+from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import averaged_now, selection_now
 
 if TYPE_CHECKING:  # `shm status` lists hangers and identifies nothing

@@ -11,8 +11,7 @@ import numpy as np
 from shm.report.intervals import Interval
 from shm.values import stated_tension
 from shm.values.diagnosis import joined
-from shm.values.force_units import ForceUnit
-from shm.values.rounding import rounded, to_two_digits
+from shm.values.rounding import ForceUnit, rounded, to_two_digits
 
 _LONGEST_NAME = 24  # layout: what a column of a table holds
 _ROTATIONAL_SPRINGS = {

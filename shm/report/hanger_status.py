@@ -15,9 +15,8 @@ from enum import Enum
 from shm.report import formatting
 from shm.report.intervals import Interval
 from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedTest
-from shm.values.force_units import force_unit
 from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
-from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
+from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
 from shm.watch.alert_text import lead_of
 from shm.watch.change_words import quantity_words, size_words
 

@@ -19,7 +19,7 @@ from shm.report.quality_table import quality_table
 from shm.report.shifts import shift_cells, shift_table
 from shm.report.temperatures import temperature_table
 from shm.values import PLANES, WITHOUT_MODEL, Alert, Mode, Posterior, PredictedFrequency
-from shm.values.force_units import ForceUnit, force_unit
+from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import stated
 from shm.watch.change_words import factor
 

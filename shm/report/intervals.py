@@ -12,7 +12,7 @@ from shm.values import (
     FloatArray,
     Summary,
 )
-from shm.values.force_units import ForceUnit
+from shm.values.rounding import ForceUnit
 
 NORMAL_90 = 1.6448536269514722
 """Half width of the central 90 % of a normal distribution, in standard deviations."""

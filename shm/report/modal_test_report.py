@@ -17,7 +17,7 @@ from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Fact, Paper, Part, Table, filled
 from shm.report.quality_table import headline, overall, quality_table
 from shm.values import PLANES, FrequencyResponse, Mode, Plane, QualityCheck, Recording, Verdict
-from shm.values.force_units import force_unit
+from shm.values.rounding import force_unit
 
 if TYPE_CHECKING:
     from shm.report.figures.illustration import Illustration

@@ -8,7 +8,7 @@ from shm.report import formatting
 from shm.report.intervals import Interval
 from shm.report.paper import Table
 from shm.values import NAN, Drift, is_ratio, kind_of
-from shm.values.force_units import ForceUnit, force_unit
+from shm.values.rounding import ForceUnit, force_unit
 from shm.watch.change_words import factor
 from shm.watch.neighbours import BridgePattern, HangerRow
 

@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from datetime import datetime
 
 from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
-from shm.values.force_units import force_unit
 from shm.values.messages import WEEK, Lead
-from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
+from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
 from shm.watch.alert_action import action_words, as_sentence, gravest
 from shm.watch.change_words import (
     CAUSES,

@@ -17,9 +17,9 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from shm.models import Model
+from shm.models.end_effects import coupled_bar
 from shm.models.hanger import PointMass, solve
 from shm.models.hanger.physical import Zone
-from shm.models.turnbuckles import coupled_bar
 from shm.values import PLANES, TENSION, End, FloatArray, Hanger, WatchedQuantity
 from shm.watch.change_layout import Direction, Layout
 from shm.watch.options import WatchOptions

@@ -30,7 +30,7 @@ from shm.values import (
     WatchedTest,
 )
 from shm.values.drift import ENOUGH_AGAINST
-from shm.values.force_units import force_unit
+from shm.values.rounding import force_unit
 from shm.watch.agreement import (
     BY_A_LOAD,
     CLEAR,

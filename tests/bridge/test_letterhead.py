@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from shm.bridge.letterhead import letterhead_of
+from shm.bridge.description import letterhead_of
 from shm.errors import BadInput
 from shm.report.logo import read_logo
 

@@ -27,7 +27,7 @@ from shm.report.intervals import Interval
 from shm.report.shifts import shift_unit
 from shm.report.states import QuantityOverTime, StatesOverTime
 from shm.values import Hanger, Posterior, Selection, TensionEstimate
-from shm.values.force_units import force_unit
+from shm.values.rounding import force_unit
 from shm.watch.history import Band
 from shm.watch.neighbours import HangerShift, bridge_pattern
 from tests.helpers.nouns import a_message

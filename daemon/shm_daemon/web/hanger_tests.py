@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from shm.report import formatting
 from shm.report.intervals import Interval
 from shm.store import TestRow, TrendPoint
-from shm.values.force_units import ForceUnit
+from shm.values.rounding import ForceUnit
 from shm_daemon.web.address import test_page
 from shm_daemon.web.hanger_figures.over_time import tension_unit
 from shm_daemon.web.hanger_view import HangerView

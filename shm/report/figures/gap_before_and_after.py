@@ -25,7 +25,7 @@ from shm.report.figures.gap_map import by_plane, kept, orders, planes
 from shm.report.figures.illustration import Member
 from shm.report.figures.specification import PLANE_HUES, Axis, Points, Specification, Symbol, limits
 from shm.values import Plane, Residual, TensionEstimate
-from shm.values.force_units import ForceUnit
+from shm.values.rounding import ForceUnit
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from shm.report import colours, formatting
 from shm.report.contents import HangerReport
 from shm.report.figures import style
 from shm.report.figures.illustration import Member
-from shm.values.force_units import ForceUnit
+from shm.values.rounding import ForceUnit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -27,8 +27,8 @@ from shm.report.figures.specification import (
 from shm.report.intervals import Interval
 from shm.report.states import CalledChange, QuantityOverTime
 from shm.values import FloatArray
-from shm.values.force_units import ForceUnit, force_unit
 from shm.values.notes import Note, NoteKind
+from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import averaged_now
 from shm.watch.history import Band as Bounds
 

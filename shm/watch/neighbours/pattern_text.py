@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from shm.values.force_units import force_unit
-from shm.values.rounding import NINETY_PERCENT, listed, rounded, rounded_percent
+from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded, rounded_percent
 from shm.watch.neighbours.pattern_types import (
     REDISTRIBUTION,
     BridgePattern,

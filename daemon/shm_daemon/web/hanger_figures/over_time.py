@@ -15,7 +15,7 @@ from shm.report.figures.time_axes import bounds_of, part, places, single_tests, 
 from shm.report.intervals import Interval
 from shm.report.states import CalledChange, QuantityOverTime, called_words
 from shm.store import EventKind, TrendPoint
-from shm.values.force_units import ForceUnit, force_unit
+from shm.values.rounding import ForceUnit, force_unit
 from shm_daemon.web.hanger_figures.member import HangerFigure
 from shm_daemon.web.hanger_view import HangerView
 

@@ -18,7 +18,7 @@ from shm.report.modal_test_report import name
 from shm.report.paper import Table, filled
 from shm.report.quality_table import headline, overall
 from shm.values import ResponsePoint
-from shm.values.force_units import force_unit
+from shm.values.rounding import force_unit
 from shm_daemon.web.access import Reader
 from shm_daemon.web.address import test_json, test_page
 from shm_daemon.web.background_work import RETRY_AFTER

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import RedirectResponse
 
-from shm.bridge.single_sign_on import SingleSignOn
+from shm.bridge.description import SingleSignOn
 from shm.errors import NothingThere, ShmError, needing
 from shm.pipeline import utc_now
 from shm_daemon.web.access import AtSite, unless_throttled
