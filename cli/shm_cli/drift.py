@@ -27,7 +27,7 @@ from shm.report.states import NOTHING_WATCHED
 from shm.report.temperatures import temperature_documents, temperature_table
 from shm.store import Baseline
 from shm.values import Drift
-from shm.watch.events import EVENT_KINDS
+from shm.watch.repair_check import EVENT_KINDS
 from shm_cli.common import (
     hanger_option,
     json_option,

@@ -33,7 +33,7 @@ from shm.store import (
 )
 from shm.store.checksums import of_readable
 from shm.store.stored_silences import said_of
-from shm.watch.frequency_text import frequency_words
+from shm.watch.change_words import frequency_words
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
 from shm_cli.stages import show_stages

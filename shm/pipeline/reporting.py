@@ -33,7 +33,7 @@ from shm.values import Hanger, WatchedTest
 from shm.values.messages import Lead
 from shm.watch import WatchOptions, watch_hanger
 from shm.watch.alert_text import watch_words
-from shm.watch.frequency_text import frequency_words
+from shm.watch.change_words import frequency_words
 from shm.watch.neighbours import BridgePattern
 
 

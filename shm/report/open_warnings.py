@@ -15,7 +15,7 @@ from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
 from shm.values.messages import WEEK
 from shm.values.rounding import rounded_percent
 from shm.watch.alert_text import against_baseline_words
-from shm.watch.mistakes_text import warning_words
+from shm.watch.mistaken_modes import warning_words
 
 # Judgement: hangers of sound bridges are within a quarter of their nominal tension, or all are off.
 _OFF_NOMINAL = 0.25

@@ -18,9 +18,12 @@ from shm.watch.alert_action import action_words, as_sentence, gravest
 from shm.watch.change_words import (
     CAUSES,
     beyond_words,
+    each_frequency,
     factor,
+    frequencies_state,
     group_words,
     is_stiffness,
+    odd_frequencies,
     probable_groups,
     quantity_words,
     size_words,
@@ -28,7 +31,6 @@ from shm.watch.change_words import (
     threshold_words,
     undetected_words,
 )
-from shm.watch.frequency_text import each_frequency, frequencies_state, odd_frequencies
 
 _SURE = 0.9  # judgement: below nine in ten a sentence says "most likely"
 _EITHER_LIKELY = 0.8  # judgement: four to one that it was sudden, or slow
