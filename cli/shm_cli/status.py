@@ -32,7 +32,7 @@ from shm.store import (
     Workspace,
 )
 from shm.store.checksums import of_readable
-from shm.store.stored_silences import said_of
+from shm.store.stored_alerts import said_of
 from shm.watch.change_words import frequency_words
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document

@@ -30,7 +30,7 @@ from shm.store import (
     Workspace,
 )
 from shm.store.checksums import of_readable
-from shm.store.stored_silences import silenced_until
+from shm.store.stored_alerts import silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, WatchedTest
 from shm.values.messages import WEEK, Lead
 

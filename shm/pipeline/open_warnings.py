@@ -31,7 +31,7 @@ from shm.store import (
     Workspace,
 )
 from shm.store.checksums import of_readable
-from shm.store.stored_silences import said_of
+from shm.store.stored_alerts import said_of
 from shm.values import TENSION, Hanger
 
 

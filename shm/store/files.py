@@ -15,7 +15,7 @@ from shm.errors import NothingThere
 from shm.store.archive import suffix_of
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
-from shm.store.recording_rows import ReceivedFile, StoredRecording
+from shm.store.list_rows import ReceivedFile, StoredRecording
 from shm.store.rows import Stage
 from shm.store.tables import events, metadata, posterior_tests, recordings, steps, tests
 

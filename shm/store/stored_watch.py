@@ -29,6 +29,7 @@ from shm.store.queries import (
     plain_tests,
     read_baseline,
 )
+from shm.store.reprocessing import WatchedAgain
 from shm.store.results import all_at, insert_baseline, insert_posterior, move
 from shm.store.rows import (
     Acknowledgement,
@@ -53,7 +54,6 @@ from shm.store.tables import (
     watches,
 )
 from shm.store.trends import baselines_in_numbers
-from shm.store.watched_again import WatchedAgain
 from shm.values import NAN, Alert, Change, Drift, Hanger, Posterior, WatchedTest
 
 _DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")

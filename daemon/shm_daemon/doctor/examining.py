@@ -34,7 +34,7 @@ from shm.report.logo import read_logo
 from shm.settings import Settings
 from shm.store import Workspace
 from shm.store.rows import Delivery, DeliveryState, Silence
-from shm.store.stored_silences import silenced_until
+from shm.store.stored_alerts import silenced_until
 from shm.store.workspace import FOLDERS
 from shm_daemon.doctor.check_settings import check_changed_settings
 from shm_daemon.doctor.check_sign_on import check_single_sign_on

@@ -22,7 +22,7 @@ from prometheus_client.registry import Collector
 
 from shm.pipeline import utc_now
 from shm.pipeline.stream_state import StreamCondition, stream_states
-from shm.store.recording_rows import ON_THE_WAY
+from shm.store.list_rows import ON_THE_WAY
 from shm.store.ring import ring_of
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan

@@ -17,7 +17,7 @@ from shm.pipeline.bridge_reporting import hanger_lines
 from shm.report import formatting
 from shm.report.hanger_status import HangerMessage
 from shm.store import AlertRow, DeliveryRow, DeliveryState, News, Silence
-from shm.store.stored_silences import said_of, silenced_until
+from shm.store.stored_alerts import said_of, silenced_until
 from shm.values.messages import Lead
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import test_page
