@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from shm.models import end_stiffness
+from shm.report.formatting import Interval
 from shm.report.hanger_status import (
     BridgeMessage,
     HangerMessage,
@@ -18,9 +19,7 @@ from shm.report.hanger_status import (
     bridge_message,
     hanger_message,
 )
-from shm.report.intervals import Interval
-from shm.report.period import Period
-from shm.report.states import NOTHING_WATCHED, StatesOverTime
+from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime
 from shm.values import (
     NAN,
     Alert,

@@ -13,7 +13,7 @@ from datetime import datetime
 from enum import Enum
 
 from shm.report import formatting
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedTest
 from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent

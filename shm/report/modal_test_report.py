@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from shm import modes_document
 from shm.report import formatting
-from shm.report.colours import VERDICT_STYLES
 from shm.report.contents import ModalTestReport
+from shm.report.figures.style import VERDICT_STYLES
 from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Fact, Paper, Part, Table, filled
 from shm.report.quality_table import headline, overall, quality_table

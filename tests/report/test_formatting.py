@@ -7,7 +7,7 @@ from datetime import datetime, timedelta, timezone
 import pytest
 
 from shm.report import formatting
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.values.rounding import force_unit
 
 KILONEWTON = force_unit(1e5)

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from shm.models.tensioned_beam import wave_numbers
-from shm.report.figures.against_a_parameter import Curves, specify
+from shm.report.figures.prediction_figures import Curves, specify
 from shm.report.figures.specification import Specification
 from shm.values import FloatArray, Hanger
 from shm_cli.validation.figure import Figure

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shm.report.figures.against_a_parameter import write_png
+from shm.report.figures.prediction_figures import write_curves_png as write_png
 from shm.report.figures.specification import Specification
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from shm.models import THESIS, build
 from shm.models.solid.classes import SolidModel
-from shm.report.figures.deformed_solid import write_png
+from shm.report.figures.prediction_figures import write_deformed_png as write_png
 from shm.values import PLANES, Hanger, Plane
 from shm_cli.validation import frequencies
 from shm_cli.validation.figure import Figure

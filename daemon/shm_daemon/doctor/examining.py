@@ -30,7 +30,7 @@ from shm.models import competing_names
 from shm.pipeline.telling import quiet_until
 from shm.read import sandbox
 from shm.report.formatting import counted
-from shm.report.logo import read_logo
+from shm.report.paper import read_logo
 from shm.settings import Settings
 from shm.store import Workspace
 from shm.store.rows import Delivery, DeliveryState, Silence

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from shm.report import formatting
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.store import TestRow, TrendPoint
 from shm.values.rounding import ForceUnit
 from shm_daemon.web.address import test_page

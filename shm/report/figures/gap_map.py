@@ -28,7 +28,7 @@ from shm.report.figures.specification import (
     Symbol,
     limits,
 )
-from shm.report.intervals import NORMAL_90
+from shm.report.formatting import NORMAL_90
 from shm.values import PLANES, GapPlace, Plane, Residual, Trend
 
 

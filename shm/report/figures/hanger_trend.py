@@ -24,7 +24,7 @@ from shm.report.figures.specification import (
     limits,
     stacked,
 )
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.report.states import CalledChange, QuantityOverTime
 from shm.values import FloatArray
 from shm.values.notes import Note, NoteKind

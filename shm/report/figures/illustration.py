@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from shm.report.colours import INK, PALETTE
 from shm.report.figures.specification import Specification
-from shm.report.figures.style import TINY
+from shm.report.figures.style import INK, PALETTE, TINY
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

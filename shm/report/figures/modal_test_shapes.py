@@ -22,7 +22,7 @@ from shm.report.figures.specification import (
     Rule,
     Specification,
 )
-from shm.report.intervals import NORMAL_90
+from shm.report.formatting import NORMAL_90
 from shm.values import PLANES, FloatArray, Mode
 
 ROOM = 1.35

@@ -12,7 +12,7 @@ from shm.report import formatting
 from shm.report.figures import hanger_stiffness, hanger_trend
 from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked
 from shm.report.figures.time_axes import bounds_of, part, places, single_tests, thinned_words
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.report.states import CalledChange, QuantityOverTime, called_words
 from shm.store import EventKind, TrendPoint
 from shm.values.rounding import ForceUnit, force_unit

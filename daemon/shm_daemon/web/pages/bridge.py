@@ -21,7 +21,7 @@ from fastapi.responses import JSONResponse
 from shm.pipeline import utc_now
 from shm.report import formatting
 from shm.report.contents import hangers_unit
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.values.messages import TODAY, WEEK
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm_daemon.heartbeat import told

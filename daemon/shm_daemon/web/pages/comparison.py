@@ -17,7 +17,7 @@ from shm.pipeline.bridge_reporting import hanger_lines
 from shm.report import formatting
 from shm.report.contents import HangerLine, hangers_unit
 from shm.report.figures.compared_hangers import MOST, Course, alt, caption, specify
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.report.paper import Table
 from shm.values import Hanger
 from shm.values.rounding import rounded_percent
