@@ -40,7 +40,7 @@ from shm_cli.common import json_option, open_workspace, show, show_table, table
 from shm_cli.import_modes import import_modes
 from shm_cli.import_prompts import asked, asked_if_it_stays
 from shm_cli.parameter_types import Time
-from shm_daemon.landing import Landed, incoming
+from shm_daemon.spool import Landed, incoming
 
 _BARS = " ▁▂▃▄▅▆▇█"
 UFF_SUFFIXES = (".uff", ".unv", ".uf")

@@ -19,7 +19,7 @@ from shm.read.modal_sets import ForeignModes, axes_of
 from shm.store import Workspace
 from shm_cli.common import show, show_table, table
 from shm_cli.import_prompts import asked, asked_if_it_stays
-from shm_daemon.landing import Landed, incoming
+from shm_daemon.spool import Landed, incoming
 
 
 def import_modes(

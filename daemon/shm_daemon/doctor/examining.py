@@ -36,9 +36,11 @@ from shm.store import Workspace
 from shm.store.rows import Delivery, DeliveryState, Silence
 from shm.store.stored_alerts import silenced_until
 from shm.store.workspace import FOLDERS
-from shm_daemon.doctor.check_settings import check_changed_settings
-from shm_daemon.doctor.check_sign_on import check_single_sign_on
-from shm_daemon.doctor.check_streams import check_streams
+from shm_daemon.doctor.check_description import (
+    check_changed_settings,
+    check_single_sign_on,
+    check_streams,
+)
 from shm_daemon.doctor.checks import (
     WAITS_LONG,
     Check,

@@ -20,7 +20,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.import_answers import answer_to, import_document
 from shm.pipeline.importing import Answers, Import, Question, keep_profile, look_into, understand
 from shm.store import Workspace
-from shm_daemon.landing import Incoming, Landed, landing_name
+from shm_daemon.spool import Incoming, Landed, landing_name
 from shm_daemon.web.access import AtSite, Writer
 from shm_daemon.web.address import IMPORTS
 from shm_daemon.web.faults import answers

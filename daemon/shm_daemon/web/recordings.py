@@ -17,7 +17,7 @@ from shm.errors import BadInput, NothingThere
 from shm.pipeline import utc_now
 from shm.store import Stage, Store, StoredRecording
 from shm.store.archive import refuse_oversize
-from shm_daemon.landing import Incoming, Landed, landing_name
+from shm_daemon.spool import Incoming, Landed, landing_name
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import UPLOADS, test_page
 from shm_daemon.web.faults import Refused, answers

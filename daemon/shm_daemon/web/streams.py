@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 
 from shm.pipeline import utc_now
 from shm.read.chunk_document import LARGEST_BYTES, refuse_long_chunk
-from shm_daemon.stream_intake import take_chunks
+from shm_daemon.streams import take_chunks
 from shm_daemon.web.access import AtSite, Writer
 from shm_daemon.web.address import STREAMS
 from shm_daemon.web.faults import answers

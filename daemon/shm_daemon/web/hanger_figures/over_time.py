@@ -16,7 +16,7 @@ from shm.report.formatting import Interval
 from shm.report.states import CalledChange, QuantityOverTime, called_words
 from shm.store import EventKind, TrendPoint
 from shm.values.rounding import ForceUnit, force_unit
-from shm_daemon.web.hanger_figures.member import HangerFigure
+from shm_daemon.web.hanger_figures.of_models import HangerFigure
 from shm_daemon.web.hanger_view import HangerView
 
 _HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {

@@ -26,7 +26,7 @@ from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.bridge_view import HangerGlance
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
-from shm_daemon.web.hanger_models import FigureDocument
+from shm_daemon.web.hanger_numbers import FigureDocument
 from shm_daemon.web.hangers import described
 from shm_daemon.web.models import LARGEST_NUMBER
 from shm_daemon.web.plotting import answer

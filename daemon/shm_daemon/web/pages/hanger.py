@@ -25,7 +25,7 @@ from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.background_work import background_worker_of
 from shm_daemon.web.frame import page
 from shm_daemon.web.hanger_figures import FIGURES, HangerFigure
-from shm_daemon.web.hanger_tests import headings, lines_before
+from shm_daemon.web.hanger_numbers import headings, lines_before
 from shm_daemon.web.hanger_view import HangerView
 from shm_daemon.web.hangers import Number, described
 from shm_daemon.web.models import LARGEST_NUMBER

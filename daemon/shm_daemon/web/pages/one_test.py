@@ -23,10 +23,8 @@ from shm_daemon.web.access import Reader
 from shm_daemon.web.address import test_json, test_page
 from shm_daemon.web.background_work import RETRY_AFTER
 from shm_daemon.web.frame import page
-from shm_daemon.web.modal_test_figures import TestFigure
-from shm_daemon.web.modal_test_origin import origin, steps, superseded
-from shm_daemon.web.modal_test_view import AT_WORK, TestView
-from shm_daemon.web.tests import MOST_RESPONSES, View
+from shm_daemon.web.modal_test_view import AT_WORK, TestFigure, TestView
+from shm_daemon.web.tests import MOST_RESPONSES, View, origin, steps, superseded
 
 router = APIRouter(include_in_schema=False)
 Part = Annotated[Literal["page", "hits"], Query()]
