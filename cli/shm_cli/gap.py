@@ -23,7 +23,7 @@ from shm.report.contents import BridgeDiagnosisSheet, DiagnosisSheet
 from shm.report.diagnosis_remainder import effect_file
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
 from shm.report.figures.every_figure import bridge_diagnosis_figures, diagnosis_figures
-from shm.report.figures.illustration import Illustration
+from shm.report.figures.specification import Illustration
 from shm.report.paper import Paper
 from shm.values import Diagnosis, Hanger, ModalTest
 from shm_cli import completion

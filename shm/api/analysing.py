@@ -22,7 +22,7 @@ from shm.identify.identification import identify as identified
 from shm.inference import METHODS, UpdateOptions, updating
 from shm.models import DESCRIPTION, build, competing_names
 from shm.read import read as read_file
-from shm.read import whole_test
+from shm.read import registry
 from shm.settings import Settings, load_settings
 from shm.values import (
     Diagnosis,
@@ -62,7 +62,7 @@ def load_modes(path: str | Path) -> tuple[ModalTest, ...]:
         >>> tests[0].modes[0].frequency_hz
         5.82
     """
-    return whole_test.load_modes(Path(path))
+    return registry.load_modes(Path(path))
 
 
 Test: TypeAlias = ModalTest | Identification

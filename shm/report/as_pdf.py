@@ -38,7 +38,7 @@ from reportlab.platypus import (
 from reportlab.platypus import Table as SetTable
 
 from shm.report.figures import style
-from shm.report.figures.illustration import Illustration
+from shm.report.figures.specification import Illustration
 from shm.report.paper import Fact, Paper, Part, Table
 
 # Layout of an A4 page, in points unless it says mm: margins for a binder, type that reads on paper.

@@ -16,7 +16,7 @@ from shm.values import BridgeDiagnosis, SharedCause, TensionEstimate, effect_lab
 from shm.values.rounding import ForceUnit, force_unit
 
 if TYPE_CHECKING:
-    from shm.report.figures.illustration import Illustration
+    from shm.report.figures.specification import Illustration
 
 _STATES = {
     "shared cause": ("A shared cause", "first"),

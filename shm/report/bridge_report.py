@@ -22,7 +22,7 @@ from shm.values.stated_tension import stated
 from shm.watch.neighbours import BridgePattern
 
 if TYPE_CHECKING:
-    from shm.report.figures.illustration import Illustration
+    from shm.report.figures.specification import Illustration
 
 
 def bridge_paper(data: BridgeReport) -> Paper:

@@ -38,7 +38,7 @@ from shm.values import NO_GAP, Cause, Diagnosis, GapPlace, Residual, TensionEsti
 from shm.values.rounding import ForceUnit
 
 if TYPE_CHECKING:
-    from shm.report.figures.illustration import Illustration
+    from shm.report.figures.specification import Illustration
 
 _STYLES = {
     Answer.EXPLAINED: "first",

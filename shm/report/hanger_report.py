@@ -20,7 +20,7 @@ from shm.values import FrequencyResponse
 from shm.values.stated_tension import StatedTension, stated
 
 if TYPE_CHECKING:
-    from shm.report.figures.illustration import Illustration
+    from shm.report.figures.specification import Illustration
 
 
 def hanger_paper(data: HangerReport) -> Paper:

@@ -20,7 +20,7 @@ from shm.values import PLANES, FrequencyResponse, Mode, Plane, QualityCheck, Rec
 from shm.values.rounding import force_unit
 
 if TYPE_CHECKING:
-    from shm.report.figures.illustration import Illustration
+    from shm.report.figures.specification import Illustration
 
 
 def modal_test_paper(sheet: ModalTestReport) -> Paper:

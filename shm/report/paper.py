@@ -21,7 +21,7 @@ from shm.report import formatting
 from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 
 if TYPE_CHECKING:
-    from shm.report.figures.illustration import Illustration
+    from shm.report.figures.specification import Illustration
 
 _KINDS = {"PNG": "image/png", "JPEG": "image/jpeg"}
 

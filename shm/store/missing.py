@@ -18,6 +18,7 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row, RowMapping
 
+from shm.store.copying import skipped
 from shm.store.missing_rules import (
     HISTORY,
     RESTORE,
@@ -26,7 +27,6 @@ from shm.store.missing_rules import (
     WATCH_MISSING,
     Rule,
 )
-from shm.store.numbering import skipped
 from shm.store.tables import events, metadata
 
 ALERT_RULES = (

@@ -17,17 +17,20 @@ from shm.errors import UsageError
 from shm.store.audit import note
 from shm.store.database import Repository
 from shm.store.files import (
+    advance_recordings,
+    all_at,
     begin_again,
     by_id,
     counts,
     in_force,
+    move,
+    move_numbers,
     recording_from,
     write_event,
     write_step,
 )
 from shm.store.holding import discarded_reason, end_hold, standing_discard, taking_back
 from shm.store.list_rows import ReceivedFile, Rerun
-from shm.store.results import advance_recordings, all_at, move, move_numbers
 from shm.store.rows import Baseline, Stage, StoredTest
 from shm.store.tables import (
     baselines,

@@ -18,7 +18,7 @@ from shm.store.blobs import change_in, watch_document, watch_in
 from shm.store.checksums import damaged, decoding, whole
 from shm.store.columns import Number
 from shm.store.database import insert
-from shm.store.files import in_force
+from shm.store.files import all_at, in_force, insert_baseline, insert_posterior, move
 from shm.store.list_rows import BaselineGlance, WatchedName
 from shm.store.outbox import raise_alert, resolve
 from shm.store.queries import (
@@ -30,7 +30,6 @@ from shm.store.queries import (
     read_baseline,
 )
 from shm.store.reprocessing import WatchedAgain
-from shm.store.results import all_at, insert_baseline, insert_posterior, move
 from shm.store.rows import (
     Acknowledgement,
     Baseline,

@@ -17,7 +17,7 @@ from PIL import Image
 
 from shm.report.contents import HangerReport
 from shm.report.figures.every_figure import Illustration, hanger_figures
-from shm.report.figures.illustration import png
+from shm.report.figures.specification import png
 from shm.report.figures.style import PALETTE
 from shm.values import FrequencyResponse
 

@@ -18,9 +18,9 @@ from shm.report.contents import ModalTestReport
 from shm.report.figures import style
 from shm.report.figures.every_figure import OF_MODAL_TEST
 from shm.report.figures.every_figure import modal_test_figures as report_test_figures
-from shm.report.figures.illustration import Illustration
-from shm.report.figures.illustration import drawn as members_drawn
 from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.specification import Illustration
+from shm.report.figures.specification import drawn as members_drawn
 from shm.report.figures.style import PALETTE
 from shm.values import NAN, PLANES, Channel, ForeignMode, QualityCheck
 from tests.report.sheets import (

@@ -14,7 +14,7 @@ from fastapi.responses import JSONResponse
 import shm
 from shm.errors import ShmError
 from shm.pipeline import utc_now
-from shm_daemon.web import hanger_numbers, hangers, imports, metrics, recordings, streams, tests
+from shm_daemon.web import hanger_numbers, hangers, metrics, recordings, tests
 from shm_daemon.web.access import Reader
 from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.bridge_view import glance
@@ -49,8 +49,7 @@ _described = APIRouter(include_in_schema=False)
 
 _PARTS = (
     recordings,
-    streams,
-    imports,
+    upload,
     hangers,
     alerts,
     metrics,
@@ -60,7 +59,6 @@ _PARTS = (
     bridge,
     bridges,
     comparison,
-    upload,
     health,
     held,
     sensors,

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from shm.report import formatting
 from shm.report.contents import BridgeReport, HangerLine
 from shm.report.figures import style
-from shm.report.figures.illustration import Illustration, Member, drawn
+from shm.report.figures.specification import Illustration, Member, drawn
 from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
 from shm.report.shifts import shift_unit

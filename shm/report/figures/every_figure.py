@@ -16,7 +16,6 @@ from shm.report.figures.hanger_states import FIGURE as STATES
 from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
 from shm.report.figures.hanger_tension import FIGURE as TENSION
 from shm.report.figures.hanger_trend import FIGURE as TREND
-from shm.report.figures.illustration import Illustration, Member, drawn
 from shm.report.figures.modal_test_hits import FIGURE as HITS
 from shm.report.figures.modal_test_quality import FIGURE as QUALITY
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
@@ -25,6 +24,7 @@ from shm.report.figures.modal_test_spectra import Shown
 from shm.report.figures.modal_test_stabilisation import DAMPING
 from shm.report.figures.modal_test_stabilisation import FIGURE as STABILISATION
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
+from shm.report.figures.specification import Illustration, Member, drawn
 from shm.report.figures.trial_answers import CONFUSION, DETECTION, LEFT_OUT
 from shm.report.figures.trial_errors import (
     COVERAGE,

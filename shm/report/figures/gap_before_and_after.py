@@ -22,8 +22,15 @@ from shm.report.diagnosis_wording import (
 )
 from shm.report.figures import style
 from shm.report.figures.gap_map import by_plane, kept, orders, planes
-from shm.report.figures.illustration import Member
-from shm.report.figures.specification import PLANE_HUES, Axis, Points, Specification, Symbol, limits
+from shm.report.figures.specification import (
+    PLANE_HUES,
+    Axis,
+    Member,
+    Points,
+    Specification,
+    Symbol,
+    limits,
+)
 from shm.values import Plane, Residual, TensionEstimate
 from shm.values.rounding import ForceUnit
 

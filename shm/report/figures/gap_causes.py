@@ -13,13 +13,13 @@ from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_summary import verdict
 from shm.report.diagnosis_wording import Claim, claims, label, quantity, size
-from shm.report.figures.illustration import Member
 from shm.report.figures.specification import (
     Axis,
     Band,
     Bars,
     Line,
     Mark,
+    Member,
     Panel,
     Points,
     Rule,

@@ -14,7 +14,6 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import HangerReport
-from shm.report.figures.illustration import Member
 from shm.report.figures.specification import (
     PLANE_HUES,
     PLANE_SYMBOLS,
@@ -22,6 +21,7 @@ from shm.report.figures.specification import (
     Bars,
     Line,
     Mark,
+    Member,
     Panel,
     Points,
     Rule,

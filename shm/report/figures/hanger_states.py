@@ -9,12 +9,12 @@ import numpy as np
 
 from shm.report.contents import HangerReport
 from shm.report.figures import time_axes
-from shm.report.figures.illustration import Member
 from shm.report.figures.specification import (
     Axis,
     Band,
     Line,
     Mark,
+    Member,
     Panel,
     Points,
     Rule,

@@ -9,7 +9,7 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import HangerReport
 from shm.report.figures import style
-from shm.report.figures.illustration import Member
+from shm.report.figures.specification import Member
 from shm.values.rounding import ForceUnit
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import HangerReport
 from shm.report.figures import time_axes
-from shm.report.figures.illustration import Member
 from shm.report.figures.specification import (
     Axis,
     Mark,
+    Member,
     Panel,
     Points,
     Specification,

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shm.report.figures import style
-from shm.report.figures.illustration import Member
 from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.specification import Member
 from shm.report.figures.style import VERDICT_COLOURS
 from shm.report.quality_table import SYMBOLS, overall, verdict_label, with_unit
 from shm.values import QualityCheck

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.report.figures.illustration import Member
 from shm.report.figures.modal_test_spectra import (
     Shown,
     Spectrum,
@@ -24,6 +23,7 @@ from shm.report.figures.specification import (
     Axis,
     Line,
     Mark,
+    Member,
     Panel,
     Points,
     Specification,

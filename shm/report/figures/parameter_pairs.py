@@ -9,8 +9,16 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import HangerReport
-from shm.report.figures.illustration import Member
-from shm.report.figures.specification import Axis, Bars, Mark, Panel, Points, Specification, limits
+from shm.report.figures.specification import (
+    Axis,
+    Bars,
+    Mark,
+    Member,
+    Panel,
+    Points,
+    Specification,
+    limits,
+)
 from shm.report.figures.style import WIDTH_INCHES
 from shm.values import FloatArray, Posterior
 from shm.values.rounding import force_unit

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shm.report.figures import illustration, style
+from shm.report.figures import specification, style
 from shm.report.figures.specification import Axis, Line, Mark, Panel, Specification, limits
 from shm.values import FloatArray
 
@@ -55,7 +55,7 @@ def write_curves_png(figure: Specification, path: Path, words: str = "") -> None
     # What draws is loaded where something is drawn.
     from shm.report.figures.with_matplotlib import draw
 
-    path.write_bytes(illustration.png(draw(figure), words=words))
+    path.write_bytes(specification.png(draw(figure), words=words))
 
 
 def _lines(curves: Curves) -> list[Mark]:
@@ -116,4 +116,4 @@ def draw(corners: FloatArray, moved: FloatArray) -> Figure:
 
 def write_deformed_png(corners: FloatArray, moved: FloatArray, path: Path, words: str = "") -> None:
     """The figure of these on white, with `words` below."""
-    path.write_bytes(illustration.png(draw(corners, moved), words=words))
+    path.write_bytes(specification.png(draw(corners, moved), words=words))

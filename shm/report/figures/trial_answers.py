@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from shm.report import formatting
 from shm.report.figures import style
-from shm.report.figures.illustration import Member
+from shm.report.figures.specification import Member
 from shm.report.trial_scores import RICHNESS, find, judged, large, value
 from shm.values import Bin, CaseScore, MarkName, Richness, Score, TrialScore
 from shm.values.diagnosis import parted

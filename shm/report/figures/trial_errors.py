@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shm.report.figures import style
-from shm.report.figures.illustration import Member
+from shm.report.figures.specification import Member
 from shm.report.figures.trial_answers import name_richness, of_richness, points
 from shm.report.trial_scores import find, judged, value
 from shm.values import CaseScore, MarkName, PlantedKind, Richness, TrialScore, Way
