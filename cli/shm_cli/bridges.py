@@ -22,7 +22,7 @@ def command(ctx: click.Context, as_json: bool) -> None:
     Example: shm --workspace arch bridges
     """
     from shm_daemon.web.address import Address
-    from shm_daemon.web.bridge_view import headline, own_row, row_document, worst_first
+    from shm_daemon.web.bridge_summary import headline, own_row, row_document, worst_first
     from shm_daemon.web.other_bridges import ask_all
     from shm_daemon.web.site import Description, Site
 

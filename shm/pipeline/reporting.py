@@ -18,7 +18,8 @@ from shm.pipeline.lineage import (
     settings_words,
     test_lineage,
 )
-from shm.pipeline.open_warnings import discarded_of, redescribed, warnings_of
+from shm.pipeline.open_warnings import warnings_of
+from shm.pipeline.redescribed import discarded_of, redescribed
 from shm.pipeline.steps import identify_options
 from shm.pipeline.unheard import blind_hangers, heard
 from shm.pipeline.watching import dated_tests

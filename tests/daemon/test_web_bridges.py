@@ -28,7 +28,7 @@ from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import HEARTBEAT, beat
 from shm_daemon.hooks.webhook import Lines
 from shm_daemon.web.address import SUMMARY, Address
-from shm_daemon.web.bridge_view import BridgeRow, Summary, headline, worst_first
+from shm_daemon.web.bridge_summary import BridgeRow, Summary, headline, worst_first
 from shm_daemon.web.other_bridges import NotTold, OtherBridges, ask
 from tests.helpers.listeners import Answer, Listener, a_listener, a_silent_listener
 from tests.helpers.nouns import NOW

@@ -26,7 +26,7 @@ from shm_daemon.heartbeat import told
 from shm_daemon.hooks.contract import one_line
 from shm_daemon.hooks.webhook import Lines, reason_of, unchanged
 from shm_daemon.web.address import SUMMARY
-from shm_daemon.web.bridge_view import BridgeRow, Summary
+from shm_daemon.web.bridge_summary import BridgeRow, Summary
 
 # Judgement: a page takes a second, over a poor line a few; who looks at a page waits no longer.
 LONGEST_S = 10.0

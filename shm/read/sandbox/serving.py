@@ -30,7 +30,7 @@ from shm.read.sandbox.confinement import Confinement, confine, pythons_own
 from shm.read.sandbox.protocol import BEGUN, LARGEST_HEADER, encoded, refusal_as_value
 from shm.read.sandbox.reading_process import ARRAYS_AT_ONCE, WALL_SECONDS
 from shm.read.sidecar import sidecar_path
-from shm.read.survey import layout_of, survey
+from shm.read.surveying import layout_of, survey
 
 _LARGEST_REQUEST = 1 << 16  # three paths of PATH_MAX, 4096 bytes, thrice as long in JSON
 

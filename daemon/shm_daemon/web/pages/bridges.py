@@ -14,7 +14,7 @@ from shm.values.messages import Lead, Urgency
 from shm_daemon.heartbeat import told
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import SUMMARY
-from shm_daemon.web.bridge_view import (
+from shm_daemon.web.bridge_summary import (
     BridgeRow,
     Summary,
     groups,
