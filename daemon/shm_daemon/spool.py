@@ -1,7 +1,7 @@
 """What lies in the spool, and which of it is whole.
 
 The spool is looked through with all its subfolders but `streams/`, where loggers roll their files:
-see `rolling_files`. Left alone are names that begin with a dot,
+see `streams`. Left alone are names that begin with a dot,
 uploads under way (`.part`, `.tmp`, `.filepart`), sidecars, which wait for their file, and what is
 no file or cannot be looked at: links, pipes, devices, folders of another user.
 A file is whole once neither it nor its sidecar has changed for some seconds; an empty one, which

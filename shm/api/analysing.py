@@ -1,6 +1,5 @@
-"""From the records of a test to its modes, the posterior, the best class, the cause of a gap.
-
-What loggers wrote, what was identified before, and a hanger as its owner describes it.
+"""From what loggers wrote and owners describe to modes, the posterior, the best class, the cause
+of a gap.
 """
 
 from __future__ import annotations

@@ -1,12 +1,8 @@
 """The whole of `bridge.toml`: the bridge, its hangers, its hooks, its settings.
 
-The table `[report]`: who makes the reports, and with which logo.
-
-The `[[other_bridge]]` tables of `bridge.toml`: whose state the page of all bridges shows too.
-
-Each is served by a dashboard of its own. Tokens never stand here.
-
-The table `[single_sign_on]`: the OpenID Connect provider that says who people are.
+`[report]` says who makes the reports, and with which logo; `[single_sign_on]` which OpenID Connect
+provider says who people are; `[[other_bridge]]` whose state the page of all bridges shows too. Each
+of these is served by a dashboard of its own. Tokens never stand here.
 """
 
 from __future__ import annotations

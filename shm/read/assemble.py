@@ -1,6 +1,5 @@
-"""The end that all formats share: header, sidecar and raw numbers become values in SI units.
-
-The end that frequency responses of all formats share, as `assemble` is for time records.
+"""The end that all formats share: header, sidecar and raw numbers become values in SI units, of
+time records and of frequency responses.
 """
 
 from __future__ import annotations

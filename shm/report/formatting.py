@@ -1,6 +1,6 @@
 """Numbers in words: units, intervals, signs, times; what is unknown is said, never printed.
 
-A mean with its central 90 % interval, and how intervals combine.
+Beside them a mean with its central 90 % interval, and how intervals combine.
 """
 
 from __future__ import annotations

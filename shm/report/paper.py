@@ -1,8 +1,7 @@
 """One document for every kind of report: `as_text`, `as_html` and `as_pdf` render it alike.
 
 A kind of report is a function that builds a `Paper`; the renderers know none of the kinds.
-
-The logo of a report's head; a report is made without one that cannot be read.
+A report is made without a logo that cannot be read.
 """
 
 from __future__ import annotations

@@ -1,6 +1,5 @@
-"""Rows of received files, their steps and their events, within the caller's transaction.
-
-Rows of results, and how far their tests have come, within the caller's transaction.
+"""Rows of received files, their steps, events and results, and how far their tests have come,
+within the caller's transaction.
 """
 
 from __future__ import annotations

@@ -1,6 +1,5 @@
-"""What the store hands out to be looked at by the thousand: rows without samples or contents.
-
-What the store hands out of recordings, and of those that are or were held: frozen rows.
+"""What the store hands out to be looked at by the thousand, without samples or contents, and of
+recordings, those too that are or were held: frozen rows.
 """
 
 from __future__ import annotations

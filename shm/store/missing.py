@@ -2,8 +2,6 @@
 
 A row leaves traces: others refer to it, a number is skipped, a stage was reached or an event is
 told of it, a document names it. What leaves none (see `docs/operation.md`) is not missed.
-
-What must be there of alerts, given other rows of the store: see `missing_rules`.
 """
 
 from __future__ import annotations

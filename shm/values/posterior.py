@@ -1,6 +1,5 @@
-"""What inference finds.
-
-What the tests of a baseline say of each other: what was left out of it, and whether it fits.
+"""What inference finds, and what the tests of a baseline say of each other: what was left out of
+it, and whether it fits.
 """
 
 from __future__ import annotations

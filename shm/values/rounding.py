@@ -1,6 +1,5 @@
-"""What messages say alike: a number with its interval, and several words in a row.
-
-Forces in the unit that fits their size, as people write them: N, kN or MN.
+"""What messages say alike: a number with its interval, several words in a row, and forces in the
+unit that fits their size: N, kN or MN.
 """
 
 from __future__ import annotations

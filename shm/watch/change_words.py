@@ -1,8 +1,7 @@
 """What may have changed, in words: quantities and causes by name, how far, rounded by the interval.
 
 The words of a cause are those of the catalogue of effects.
-
-What is said of a structure that no model class describes: its frequencies, and by how much.
+Of a structure that no model class describes it is its frequencies, and by how much.
 """
 
 from __future__ import annotations

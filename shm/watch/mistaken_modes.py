@@ -5,15 +5,11 @@ with an error; or, seldom, anywhere. For a given set of mistaken modes all is no
 evidence has a closed form. Sets of up to two are compared exhaustively, since two can hide each
 other; larger ones grow from the best of these, one mode at a time.
 
-Modes that tests keep having wrong: how long, and the notice of it.
-
-One slip of a test is left out and forgotten. The same mode wrong in three tests in a row is
-numbered wrongly each time, or the hanger has changed in a way that its model class does not know.
-Where more modes are off the baseline than can be misnamed, it is the tests that do not fit it.
-
-What is said of modes that tests keep having wrong: state, action, and why.
-
-A misnamed mode is one of a few: where many are off, the tests do not fit the baseline.
+Of modes that tests keep having wrong there is a notice. One slip of a test is left out and
+forgotten. The same mode wrong in three tests in a row is numbered wrongly each time, or the hanger
+has changed in a way that its model class does not know. Where more modes are off the baseline than
+can be misnamed, it is the tests that do not fit it. A misnamed mode is one of a few: where many are
+off, the tests do not fit the baseline.
 """
 
 from __future__ import annotations

@@ -1,18 +1,17 @@
-"""What the swing does to a hanger's frequencies where its joints slip or it stretches.
+"""What the reading of a test rests on: the modes that its baseline has too, and two ways in which
+frequencies go otherwise than the baseline's slopes say.
+
+Amplitude: what the swing does to a hanger's frequencies where its joints slip or it stretches.
 
 Identification gives the frequency of small amplitude where the slope is sure, and so tests at any
 amplitude compare. Where it is not sure in a test but was in the baseline, so much of the baseline's
 slope is taken off, at the test's own amplitude, as such a frequency holds.
 
-How else frequencies go as an end loosens than the baseline's slopes say.
-
-The baseline tells what the ends give together and hardly which of them gives how much: a fork plate
-or a turnbuckle stiffens what a pin softens, and an end that gives looks clamped. As it loosens, the
-modes go by how soft it is: all alike where it is stiff, the lower ones more where it is soft,
-nearly as they go with tension. Without this the rest would be read as tension: an end whose spring
-falls to a third as 3 to 6 % of it.
-
-The modes of a test that its baseline has too, and their likelihood about one place.
+Loosening: the baseline tells what the ends give together and hardly which of them gives how much: a
+fork plate or a turnbuckle stiffens what a pin softens, and an end that gives looks clamped. As it
+loosens, the modes go by how soft it is: all alike where it is stiff, the lower ones more where it
+is soft, nearly as they go with tension. Without this the rest would be read as tension: an end
+whose spring falls to a third as 3 to 6 % of it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What `shm validate --figure` gives of one figure of the thesis.
+"""What `shm validate --figure` gives of the figures of the thesis that are no solid's frequencies.
 
 Figures B.1 to B.14 of the thesis: modes 1 to 7 of "Model 4", the solid on springs, x and y.
 

@@ -1,8 +1,5 @@
-"""What holds instead of `bridge.toml`.
-
-Whether people can sign in where a provider says who they are.
-
-Which permanent sensors send nothing, or are at fault.
+"""Checks of what `bridge.toml` asks for: what holds instead of it, whether people can sign in
+where a provider says who they are, which permanent sensors send nothing or are at fault.
 """
 
 from __future__ import annotations

@@ -1,8 +1,5 @@
-"""What the page of a hanger shows, in numbers: trend, tests, documents of the figures.
-
-The documents about one hanger. Unknown numbers are null.
-
-The tests of a hanger as lines of a table, in the words of the report.
+"""What the page of a hanger shows, in numbers: trend, tests, documents of the figures. Unknown
+numbers are null. The lines of the table of tests are in the words of the report.
 """
 
 from __future__ import annotations

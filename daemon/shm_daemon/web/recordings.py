@@ -1,5 +1,4 @@
 """Recordings over HTTP: streamed to disk, landed in the spool, and asked after.
-
 Chunks of permanent sensors over HTTP: acknowledged once they are on disk.
 """
 

@@ -1,8 +1,7 @@
 """What a score is: which cases it is asked of, what enters, and the bounds that it must keep.
 
-Whether what is said with a probability of 0.7 is right in 70 of 100 cases.
-
-Scores with their 90 % intervals: bootstrap over the cases (Efron and Tibshirani 1993, 13.3).
+Calibration asks whether what is said with a probability of 0.7 is right in 70 of 100 cases. The 90
+% intervals are a bootstrap over the cases (Efron and Tibshirani 1993, 13.3).
 """
 
 from __future__ import annotations

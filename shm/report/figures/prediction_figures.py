@@ -1,6 +1,5 @@
-"""Curves against one parameter: modal frequencies of a sweep, or dimensionless ones of a beam.
-
-A mode of a solid in space: its surface as it bends, coloured by how far it moves.
+"""Figures of what a model class predicts: curves against one parameter, and a mode of a solid in
+space, coloured by how far it moves.
 """
 
 from __future__ import annotations

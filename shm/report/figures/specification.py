@@ -1,6 +1,6 @@
 """What a figure shows, told once: paper draws it by `with_matplotlib`, a screen by plotly.
 
-Colours are names of `colours.PALETTE`, sizes are points. Places may be numbers or times. A
+Colours are names of `style.PALETTE`, sizes are points. Places may be numbers or times. A
 `hover` is a template as plotly takes it; paper leaves it out.
 
 What a figure declares about itself, and what it is once drawn.

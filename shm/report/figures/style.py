@@ -1,6 +1,5 @@
-"""What all figures share: size, letters, quiet axes.
-
-Colours that the colour-blind tell apart, and what they stand for; a word stands beside each.
+"""What all figures share: size, letters, quiet axes, and colours that the colour-blind tell apart;
+a word stands beside each.
 """
 
 from __future__ import annotations

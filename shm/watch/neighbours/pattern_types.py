@@ -1,7 +1,4 @@
-"""What goes into the pattern over the bridge, and what comes out.
-
-The pattern over the bridge in plain English, for its owner.
-"""
+"""What goes into the pattern over the bridge, what comes out, and how that reads in plain English."""
 
 from __future__ import annotations
 

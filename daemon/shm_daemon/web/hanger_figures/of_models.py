@@ -1,8 +1,5 @@
-"""The figures of the gap: those of its diagnosis, one by one.
-
-The figures of the model: how its frequencies fit, what is open, which class it is.
-
-What a figure of the hanger page declares about itself.
+"""The figures of the model and of its gap: how its frequencies fit, what is open, which class it
+is, and those of the diagnosis, one by one; what a figure of the hanger page declares about itself.
 """
 
 from __future__ import annotations

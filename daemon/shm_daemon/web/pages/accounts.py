@@ -1,9 +1,8 @@
 """Signing in: a person gives name and password, or a token, once; the browser keeps a secret where
 no script can read it.
 
-The page where a person changes the own password.
-
-The page where engineers let people in, change what they may, and end them.
+The pages where a person changes the own password, and where engineers let people in, change what
+they may, and end them.
 """
 
 from __future__ import annotations
