@@ -1,4 +1,4 @@
-"""What goes into the pattern over the bridge, what comes out, and how that reads in plain English."""
+"""What goes into the pattern over the bridge, what comes out, and how that reads in English."""
 
 from __future__ import annotations
 
