@@ -16,7 +16,7 @@ from docs.filling import fill_in, write_csv
 from shm.blind.scoring import opened
 from shm.report.as_html import as_html
 from shm.report.figures.every_figure import trial_figures
-from shm.report.figures.illustration import Illustration
+from shm.report.figures.specification import Illustration
 from shm.report.paper import Table
 from shm.report.trial_report import answers, evidence, summary, trial_paper
 from shm.values import TrialScore

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from shm.report.intervals import Interval
+    from shm.report.formatting import Interval
     from shm.values import Diagnosis, Hanger, ModalTest, Posterior, Selection
 
 _CAUSES_SHOWN = 5  # technical: rows of a cell's table
@@ -73,7 +73,7 @@ def sheet(value: Any) -> Sheet:
 def _hanger(hanger: Hanger) -> Sheet:
     """The description of a hanger, in the units of a drawing."""
     from shm.report import formatting
-    from shm.values.force_units import force_unit
+    from shm.values.rounding import force_unit
 
     nominal_n, stiffness = hanger.nominal_tension_n, hanger.bending_stiffness_n_m2
     unit = force_unit(nominal_n)
@@ -105,8 +105,8 @@ def _modal_test(test: ModalTest) -> Sheet:
 def _posterior(posterior: Posterior) -> Sheet:
     """Tension and parameters: mean, 90 % interval, most probable value, meaning."""
     from shm.report import formatting
-    from shm.report.intervals import Interval
-    from shm.values.force_units import force_unit
+    from shm.report.formatting import Interval
+    from shm.values.rounding import force_unit
     from shm.values.stated_tension import averaged_now, stated
 
     tension_n = Interval.of_samples(posterior.tension_n)
@@ -135,8 +135,8 @@ def _posterior(posterior: Posterior) -> Sheet:
 def _selection(selection: Selection) -> Sheet:
     """The model classes, most probable first, with the tension that each gives."""
     from shm.report import formatting
-    from shm.report.intervals import Interval
-    from shm.values.force_units import force_unit
+    from shm.report.formatting import Interval
+    from shm.values.rounding import force_unit
 
     tensions_n = [Interval.of_samples(each.tension_n) for each in selection.posteriors]
     unit = force_unit(*(each.mean for each in tensions_n))

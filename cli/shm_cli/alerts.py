@@ -18,7 +18,7 @@ from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.telling import quiet_until
 from shm.store import DeliveryState, StoredAlert
-from shm.store.stored_silences import silenced_until
+from shm.store.stored_alerts import silenced_until
 from shm.values import Alert
 from shm_cli import completion
 from shm_cli.common import (

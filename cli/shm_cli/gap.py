@@ -20,10 +20,10 @@ from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_json, bridge_diagnosis_paper
 from shm.report.contents import BridgeDiagnosisSheet, DiagnosisSheet
+from shm.report.diagnosis_remainder import effect_file
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
-from shm.report.effect_file import effect_file
 from shm.report.figures.every_figure import bridge_diagnosis_figures, diagnosis_figures
-from shm.report.figures.illustration import Illustration
+from shm.report.figures.specification import Illustration
 from shm.report.paper import Paper
 from shm.values import Diagnosis, Hanger, ModalTest
 from shm_cli import completion

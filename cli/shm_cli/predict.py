@@ -11,8 +11,9 @@ import rich_click as click
 from shm.errors import UsageError
 from shm.models import THESIS, Model, build
 from shm.models.solid.classes import SolidModel
-from shm.report.figures import deformed_solid
-from shm.report.figures.against_a_parameter import Curves, specify, write_png
+from shm.report.figures import prediction_figures
+from shm.report.figures.prediction_figures import Curves, specify
+from shm.report.figures.prediction_figures import write_curves_png as write_png
 from shm.values import PLANES, FloatArray
 from shm_cli import completion
 from shm_cli.common import (
@@ -110,7 +111,9 @@ def _draw_shape(model: Model, values: dict[str, float], shape: str, path: Path) 
             remedy="Take s1, s2, solid0, solid1 or solid2.",
         )
     corners, moved = model.surface(model.pack(values), PLANES[PLANES.index(plane)], int(order))
-    deformed_solid.write_png(corners, moved, path, f"{model.title}: mode {order}, {plane}.")
+    prediction_figures.write_deformed_png(
+        corners, moved, path, f"{model.title}: mode {order}, {plane}."
+    )
     click.echo(f"Mode {order}, {plane}, of {model.title} is drawn in {path}.")
 
 

@@ -21,7 +21,7 @@ from shm.report.bridge_report import bridge_json, bridge_paper
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.paper import Paper
-from shm.report.period import Period, period_since
+from shm.report.states import Period, period_since
 from shm.report.structure_report import structure_json, structure_paper
 from shm_cli.common import drawing, hanger_option, opened_store, readable_width, waiting
 from shm_cli.parameter_types import NewFile

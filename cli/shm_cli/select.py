@@ -14,7 +14,7 @@ from shm.inference import Sigma, select
 from shm.models import applicable, build, competing_names
 from shm.settings import load_settings
 from shm.values import Limits, Selection
-from shm.values.force_units import force_unit
+from shm.values.rounding import force_unit
 from shm_cli import completion
 from shm_cli.common import (
     hanger_file_option,

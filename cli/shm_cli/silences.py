@@ -9,7 +9,7 @@ import rich_click as click
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Silence
-from shm.store.stored_silences import hangers_of
+from shm.store.stored_alerts import hangers_of
 from shm_cli.common import (
     hanger_option,
     json_option,

@@ -32,8 +32,8 @@ from shm.store import (
     Workspace,
 )
 from shm.store.checksums import of_readable
-from shm.store.stored_silences import said_of
-from shm.watch.frequency_text import frequency_words
+from shm.store.stored_alerts import said_of
+from shm.watch.change_words import frequency_words
 from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
 from shm_cli.stages import show_stages

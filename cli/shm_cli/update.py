@@ -17,7 +17,7 @@ from shm.modes_document import load_modes
 from shm.pipeline.calibrating import calibration
 from shm.pipeline.lineage import Taught
 from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior
-from shm.values.force_units import force_unit
+from shm.values.rounding import force_unit
 from shm.values.stated_tension import averaged_now, stated
 from shm_cli import completion
 from shm_cli.common import (

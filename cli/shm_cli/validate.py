@@ -13,22 +13,14 @@ from shm.errors import GateNotMet, UsageError
 from shm.values import Hanger
 from shm_cli import thesis
 from shm_cli.common import json_option, markdown, progress_bar, seed_option, show, show_table, table
-from shm_cli.validation import (
-    beam_solutions,
-    formulas,
-    frequencies,
-    mode_shapes,
-    posterior_figures,
-    selection,
-    solid_figures,
-)
-from shm_cli.validation.figure import Figure
+from shm_cli.validation import formulas, frequencies, selection, solid_figures, thesis_figures
+from shm_cli.validation.thesis_figures import Figure
 
 FIGURES: dict[str, Callable[[Hanger, Callable[[str, float], None], str], Figure]] = {
-    **dict.fromkeys(beam_solutions.FIGURES, beam_solutions.shown),
+    **dict.fromkeys(thesis_figures.SOLUTIONS, thesis_figures.solution),
     **solid_figures.FIGURES,
-    **dict.fromkeys(posterior_figures.FIGURES, posterior_figures.shown),
-    **dict.fromkeys(mode_shapes.FIGURES, mode_shapes.shown),
+    **dict.fromkeys(thesis_figures.POSTERIORS, thesis_figures.posterior),
+    **dict.fromkeys(thesis_figures.MODE_SHAPES, thesis_figures.mode_shape),
 }
 """How each figure of the thesis is made, by its number."""
 

@@ -25,8 +25,8 @@ from shm.pipeline import utc_now
 from shm.read import FORMATS, sidecar_path
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX, refuse_oversize
-from shm_daemon.landing import Incoming, Landed, incoming, landing_name
-from shm_daemon.stream_intake import take_chunks
+from shm_daemon.spool import Incoming, Landed, incoming, landing_name
+from shm_daemon.streams import take_chunks
 from shm_daemon.web.site import Description
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from joserfc.errors import ClaimError, JoseError
 from joserfc.jwk import KeySet
 from joserfc.jws import JWSRegistry
 
-from shm.bridge.single_sign_on import EMAIL, SingleSignOn, is_safe
+from shm.bridge.description import EMAIL, SingleSignOn, is_safe
 from shm.errors import ShmError
 from shm_daemon.hooks.webhook import reason_of
 

@@ -7,8 +7,16 @@ and model classes as objects; these here take names and numbers.
 
 from __future__ import annotations
 
-from shm.api.analysing import diagnose, identify, select, update
-from shm.api.reading import load_hanger, load_modes, read, round_bar
+from shm.api.analysing import (
+    diagnose,
+    identify,
+    load_hanger,
+    load_modes,
+    read,
+    round_bar,
+    select,
+    update,
+)
 from shm.api.simulating import simulate
 from shm.api.stored import Store
 from shm.gap.any_simulator import diagnose_simulator

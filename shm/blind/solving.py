@@ -20,13 +20,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from shm.blind.answers import (
-    answered,
-    read_answers,
-    seal_answers,
-    verified_sha256,
-    write_answer,
-)
 from shm.blind.layout import (
     CASE_FILE,
     CASE_SCHEMA,
@@ -35,9 +28,14 @@ from shm.blind.layout import (
     Round,
     Told,
     Trial,
+    answered,
     key_beside,
     nobody,
+    read_answers,
     read_document,
+    seal_answers,
+    verified_sha256,
+    write_answer,
 )
 from shm.blind.workers import workers
 from shm.bridge import load_hanger

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from shm.bridge.description import Bridge, Disturbance, load_bridge, load_hanger
+from shm.bridge.description import Bridge, Disturbance, OtherBridge, load_bridge, load_hanger
 from shm.bridge.hooks import AppriseHook, CommandHook, Hook, WebhookHook
-from shm.bridge.other_bridges import OtherBridge
 
 __all__ = [
     "AppriseHook",

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from shm.bridge.quiet_hours import QUIET_HOURS
+from shm.bridge.hooks import QUIET_HOURS
 from shm.values import Limits, Thresholds
 
 HANGER_KEYS = tuple(

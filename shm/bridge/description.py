@@ -1,4 +1,9 @@
-"""The whole of `bridge.toml`: the bridge, its hangers, its hooks, its settings."""
+"""The whole of `bridge.toml`: the bridge, its hangers, its hooks, its settings.
+
+`[report]` says who makes the reports, and with which logo; `[single_sign_on]` which OpenID Connect
+provider says who people are; `[[other_bridge]]` whose state the page of all bridges shows too. Each
+of these is served by a dashboard of its own. Tokens never stand here.
+"""
 
 from __future__ import annotations
 
@@ -10,20 +15,151 @@ from datetime import date, datetime
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+from urllib.parse import urlsplit
 
 from shm.bridge.changes import overlaid
 from shm.bridge.hanger import hanger_of, structure_of
-from shm.bridge.hooks import Hook, escalations_s, hook_of
-from shm.bridge.letterhead import letterhead_of
-from shm.bridge.other_bridges import OtherBridge, other_bridge_of
-from shm.bridge.quiet_hours import zone_of
-from shm.bridge.single_sign_on import SingleSignOn, single_sign_on_of
+from shm.bridge.hooks import Hook, escalations_s, hook_of, zone_of
 from shm.bridge.streams import stream_named, streams_of
-from shm.bridge.table import Table
+from shm.bridge.table import Table, is_loopback, web_address
 from shm.errors import BadInput
 from shm.values import MEASUREMENT_HOURS, Hanger, MonitoredHanger
 from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 from shm.values.stream import Stream
+
+_TEXTS = ("organisation", "prepared_by", "checked_by", "logo")
+_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+
+def letterhead_of(document: Mapping[str, Any], path: Path) -> Letterhead:
+    """What `[report]` says; raises BadInput for what it cannot hold. The logo is not opened."""
+    values = document.get("report", {})
+    if not isinstance(values, dict):
+        raise BadInput("report must be a table.", file=path, remedy="Write [report].")
+    table = Table(values, "[report]", path)
+    table.refuse_unknown(_TEXTS)
+    organisation, prepared_by, checked_by, logo = (
+        _text_of_letterhead(table, key) for key in _TEXTS
+    )
+    if logo and Path(logo).suffix.lower() not in _SUFFIXES:
+        raise table.refusal(f"logo = {logo!r} is no PNG or JPEG file", 'Write logo = "logo.png".')
+    return Letterhead(organisation, prepared_by, checked_by, path.parent / logo if logo else None)
+
+
+def _text_of_letterhead(table: Table, key: str) -> str:
+    return str(table.value(key, str, "is not a text", f'Write {key} = "...".', usual="")).strip()
+
+
+_KNOWN = ("name", "address", "token_file", "certificate_file", "allow_http")
+_ADDRESS = 'Write address = "https://host:8400", as its dashboard is opened, without a page.'
+_WHERE_TOKENS_STAND = (
+    "Make one there with `shm token create all-bridges --scope read`, write it into a file that "
+    'only this user can read, and name it: token_file = "arch.token".'
+)
+
+
+@dataclass(frozen=True)
+class OtherBridge:
+    """A bridge by the name that it has here, and where its dashboard is: no slash at the end.
+
+    The files are taken from the workspace's folder on; empty where none is named.
+    `certificate_file` holds the certificate of an authority that this machine does not trust.
+    """
+
+    name: str
+    address: str
+    token_file: str = ""
+    certificate_file: str = ""
+
+
+def other_bridge_of(values: Mapping[str, Any], path: Path) -> OtherBridge:
+    """The bridge of one table; raises BadInput naming it and what to write."""
+    table = Table(values, f"other_bridge {values.get('name', '?')}", path)
+    if "token" in table:
+        raise table.refusal("bridge.toml is no place for a token", _WHERE_TOKENS_STAND)
+    table.refuse_unknown(_KNOWN)
+    name = _text_of_bridge(table, "name", 'Write name = "Arch bridge".', usual=None)
+    address = web_address(table, "address", _ADDRESS, "a token in a file says who asks")
+    if urlsplit(address).path.strip("/") or "?" in address or "#" in address:
+        raise table.refusal("address is that of a page", _ADDRESS)
+    token, certificate = (
+        _text_of_bridge(table, key, f'Write {key} = "arch.{suffix}".')
+        for key, suffix in (("token_file", "token"), ("certificate_file", "pem"))
+    )
+    return OtherBridge(name, address.rstrip("/"), token, certificate)
+
+
+def _text_of_bridge(table: Table, key: str, remedy: str, usual: str | None = "") -> str:
+    def can_be_shown(text: str) -> bool:
+        return bool(text.strip()) and text.isprintable()
+
+    return str(table.value(key, str, "is not a text", remedy, usual, can_be_shown))
+
+
+EMAIL = "email"
+_KEYS = ("issuer", "client_id", "client_secret_file", "user_claim")
+_IN_A_FILE = 'Write it into a file that only you can read: client_secret_file = "sign_on.secret".'
+
+
+@dataclass(frozen=True)
+class SingleSignOn:
+    """A provider, and us as it knows us.
+
+    A person is the user of shm whose name is exactly what the provider says in `user_claim`; what
+    they may do is said by their role here, never by the provider.
+    """
+
+    issuer: str
+    client_id: str
+    client_secret_file: Path
+    user_claim: str = EMAIL
+
+    @property
+    def host(self) -> str:
+        """The provider as people know it."""
+        return urlsplit(self.issuer).hostname or ""
+
+
+def single_sign_on_of(document: Mapping[str, Any], path: Path) -> SingleSignOn | None:
+    """What `[single_sign_on]` says, None where there is none; raises BadInput."""
+    values = document.get("single_sign_on")
+    if values is None:
+        return None
+    if not isinstance(values, dict):
+        raise BadInput("single_sign_on must be a table.", file=path, remedy="[single_sign_on]")
+    table = Table(values, "[single_sign_on]", path)
+    if "client_secret" in table:
+        raise table.refusal("bridge.toml is no place for a secret", _IN_A_FILE)
+    table.refuse_unknown(_KEYS)
+    issuer = _text_of_sign_on(table, "issuer", "Write https://, as your provider states it.")
+    if not is_safe(issuer):
+        remedy = "Write https://; http:// is for a provider on this computer alone."
+        raise table.refusal(f"issuer = {issuer!r} is not an encrypted address", remedy)
+    client_id = _text_of_sign_on(
+        table, "client_id", "Write the one that the provider gave this bridge."
+    )
+    secret_file = path.parent / _text_of_sign_on(table, "client_secret_file", _IN_A_FILE)
+    return SingleSignOn(
+        issuer, client_id, secret_file, _text_of_sign_on(table, "user_claim", "", usual=EMAIL)
+    )
+
+
+def is_safe(address: str) -> bool:
+    """Whether what is sent to an address is encrypted, or stays on this computer."""
+    try:
+        parts = urlsplit(address)
+        host = parts.hostname or ""
+    except ValueError:
+        return False
+    plain = not (parts.username or parts.password or parts.fragment) and address.isprintable()
+    is_kept = parts.scheme == "https" or (parts.scheme == "http" and is_loopback(host))
+    return bool(host) and plain and is_kept
+
+
+def _text_of_sign_on(table: Table, key: str, remedy: str, usual: str | None = None) -> str:
+    remedy = remedy or f'Write {key} = "...".'
+    found = table.value(key, str, "is not a text", remedy, usual, lambda text: bool(text.strip()))
+    return str(found).strip()
 
 
 @dataclass(frozen=True)

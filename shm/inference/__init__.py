@@ -9,8 +9,7 @@ from shm.resources import when_asked
 
 if TYPE_CHECKING:
     from shm.inference.ensemble import refresh
-    from shm.inference.textbook import BiasedEvidenceWarning
-    from shm.inference.updating import class_probabilities, select, update
+    from shm.inference.updating import BiasedEvidenceWarning, class_probabilities, select, update
 
 __all__ = [
     "METHODS",
@@ -32,7 +31,7 @@ if not TYPE_CHECKING:
         __name__,
         {
             "refresh": "shm.inference.ensemble",
-            "BiasedEvidenceWarning": "shm.inference.textbook",
+            "BiasedEvidenceWarning": "shm.inference.updating",
             **dict.fromkeys(("class_probabilities", "select", "update"), "shm.inference.updating"),
         },
     )

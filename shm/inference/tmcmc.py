@@ -3,7 +3,7 @@
 A population goes from the prior to the posterior in stages; each next stage is as far away as a
 coefficient of variation of the weights of 2 allows; the population is resampled and moved.
 
-The likelihood is not raised to a power, as the textbook (`shm.inference.textbook`) has it: on this
+The likelihood is not raised to a power, as the textbook (`shm.inference.updating`) has it: on this
 problem that path meets a phase transition (the model error sigma collapses at some power) and its
 evidence is biased by -1 to -7. Instead a fictitious error `floor` is added to the variance of the
 likelihood and lowered from infinity (the prior) to 0 (the posterior). A stage makes several moves:

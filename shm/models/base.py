@@ -13,9 +13,8 @@ from typing import ClassVar
 import numpy as np
 
 from shm.errors import BadInput, UsageError
-from shm.models.end_effects import EndWaves
+from shm.models.end_effects import EndWaves, coupled_bar
 from shm.models.hanger import PointMass, solve
-from shm.models.turnbuckles import coupled_bar
 from shm.values import AddedMass, FloatArray, Hanger, IntArray, ModalTest, Plane, Prior
 
 Swap = tuple[str, str]

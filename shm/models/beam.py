@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.models import tensioned_beam, timoshenko_beam
+from shm.models import tensioned_beam
 from shm.models.base import Model
+from shm.models.end_effects import alike_from_both_ends, coupled_bar
 from shm.models.hanger import PhysicalHanger, solve
-from shm.models.turnbuckles import alike_from_both_ends, coupled_bar
 from shm.values import PLANES, FloatArray, Hanger, Plane
 
 _NO_SHEAR = 1e-9
@@ -20,7 +20,7 @@ _POINTS_A_HALF_WAVE, _RISEN = 40, 0.01
 class Beam(Model):
     """A tensioned Euler-Bernoulli beam; members say which rotational springs hold its ends.
 
-    With turnbuckles it is a case of the general model (`shm.models.turnbuckles`), and its ends can
+    With turnbuckles it is a case of the general model (`shm.models.end_effects`), and its ends can
     be exchanged only where the turnbuckles lie alike from both.
     """
 
@@ -152,7 +152,7 @@ class Beam3(Beam2):
         """
         hanger, rigid_n = self.hanger, self.shear_stiffness_n
         deck, arch = self.springs_n_m_rad(theta)
-        return timoshenko_beam.frequencies_hz(
+        return tensioned_beam.timoshenko_frequencies_hz(
             self._length_m(theta)[:, None],
             self._tension_n(theta)[:, None],
             np.asarray(hanger.bending_stiffness_n_m2),

@@ -17,15 +17,23 @@ quotient, to first order and each end by itself:
   some 0.9 p h (found with r = 4: 0.4 with 1.5, 1.5 with 30);
 - a mass M at x lowers ln f by M w(x)^2 / (m L); as much mass as the bar's again over h, by the
   integral of w^2 over L.
+
+The bar that a hanger with turnbuckles is, in the terms of the general model.
+
+A turnbuckle is what it is, whatever the effective length: theta_L stretches or shortens the bar
+between the turnbuckles, each piece in proportion, and the turnbuckles keep their length, mass and
+bending stiffness.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.values import FloatArray
+from shm.errors import UsageError
+from shm.models.hanger import PhysicalHanger
+from shm.values import FloatArray, Hanger
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 """Exact to a thousandth for fittings up to half a wave long."""
@@ -93,3 +101,40 @@ class EndWaves:
         """w at `x_m` from the end."""
         wave = np.cos(self.q * x_m) - np.exp(-self.p * x_m)
         return np.asarray(self.cos * np.sin(self.q * x_m) - self.sin * wave)
+
+
+_ALIKE = 1e-9  # rounding
+
+
+def coupled_bar(hanger: Hanger, length_m: FloatArray, tension_n: FloatArray) -> PhysicalHanger:
+    """Clamped bars of effective lengths `length_m` (n,) at tensions (n,).
+
+    Raises UsageError where one is not longer than the turnbuckles together.
+    """
+    fixed = sum(each.length_m for each in hanger.turnbuckles)
+    if np.any(length_m <= fixed):
+        raise UsageError(
+            f"the turnbuckles of hanger {hanger.id} are {fixed:g} m long together, no shorter than "
+            f"the effective length.",
+            remedy="Give a larger theta_L.",
+        )
+    described = PhysicalHanger.clamped(hanger, tension_n)
+    stretch = (length_m - fixed) / (hanger.length_m - fixed)
+    zones = []
+    for own, zone in zip(hanger.turnbuckles, described.zones, strict=True):
+        below = sum(each.length_m for each in hanger.turnbuckles if each.x_m < own.x_m)
+        start = below + (own.x_m - own.length_m / 2 - below) * stretch
+        zones.append(replace(zone, start_m=start, end_m=start + own.length_m))
+    return replace(described, arch_end_m=length_m, zones=tuple(zones))
+
+
+def alike_from_both_ends(hanger: Hanger) -> bool:
+    """Whether the turnbuckles look the same from the arch end as from the deck end."""
+    if not hanger.turnbuckles:
+        return True
+    rows = np.array(
+        [(t.x_m, t.length_m, t.mass_kg, t.bending_stiffness_n_m2) for t in hanger.turnbuckles]
+    ).reshape(-1, 4)
+    turned = rows * [-1, 1, 1, 1] + [hanger.length_m, 0, 0, 0]
+    order, back = rows[:, 0].argsort(), turned[:, 0].argsort()
+    return bool(np.allclose(rows[order], turned[back], rtol=_ALIKE))

@@ -16,10 +16,9 @@ from shm.pipeline.lineage import settings_words, software
 from shm.pipeline.open_warnings import warnings_from
 from shm.pipeline.unheard import blind_hangers, heard
 from shm.report.contents import BridgeReport, Course, HangerLine
+from shm.report.formatting import Interval
 from shm.report.hanger_status import Known, findings, hanger_message, still_detected
-from shm.report.intervals import Interval
-from shm.report.period import Period
-from shm.report.states import called_words
+from shm.report.states import Period, called_words
 from shm.store import (
     BaselineGlance,
     Silence,
@@ -30,7 +29,7 @@ from shm.store import (
     Workspace,
 )
 from shm.store.checksums import of_readable
-from shm.store.stored_silences import silenced_until
+from shm.store.stored_alerts import silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, WatchedTest
 from shm.values.messages import WEEK, Lead
 from shm.watch.alert_action import look_again

@@ -6,8 +6,7 @@ from typing import Any
 
 from shm.errors import UsageError
 from shm.pipeline.importing import WORTHS, Import, Question, Understood
-from shm.read.logger_words import measured_unit, seconds_of, sensitivity_of, volts_of
-from shm.read.units import KNOWN
+from shm.read.logger_words import KNOWN, measured_unit, seconds_of, sensitivity_of, volts_of
 from shm.values import PLANES, Plane
 
 _PLANES: dict[str, Plane] = {

@@ -1,4 +1,7 @@
-"""Which column of an imported file holds its times, and the sampling rate that they tell."""
+"""Which column of an imported file holds its times, and the sampling rate that they tell.
+
+The picture of a channel over time that an import shows.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from shm.errors import BadInput
 from shm.read import logger_words as words
+from shm.read.comma_table import REMEDY, rate_of
 from shm.read.profiles import Described
 from shm.read.survey import Survey
-from shm.read.table import REMEDY, rate_of
-from shm.values import NAN
+from shm.values import NAN, FloatArray
 
 
 def with_times(described: dict[str, Any], found: Survey) -> dict[str, Any]:
@@ -49,3 +54,18 @@ def _uneven(found: Survey, channel: str) -> Callable[[int, str], BadInput]:
     return lambda row, what: BadInput(
         f"{what} at sample {row + 1}.", file=Path(found.source), channel=channel, remedy=REMEDY
     )
+
+
+OUTLINE_BINS = 32
+"""Into how many parts of equal length the picture of a channel divides it."""
+
+
+def outline(values: FloatArray | None) -> tuple[float, ...]:
+    """The largest departure from the middle in each part, as a share of the largest of all."""
+    if values is None or len(values) < OUTLINE_BINS or not np.isfinite(values).any():
+        return ()
+    middle = float(np.nanmedian(values))
+    away = np.nan_to_num(np.abs(values - middle), posinf=0.0)
+    parts = np.array([part.max() for part in np.array_split(away, OUTLINE_BINS)])
+    top = float(parts.max())
+    return tuple(float(part) for part in (parts / top if top > 0 else parts))

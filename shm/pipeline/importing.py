@@ -20,8 +20,7 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.identify.measuring.sensor_places import fault_of_place
-from shm.pipeline.import_outline import outline
-from shm.pipeline.import_times import rate_told, with_times
+from shm.pipeline.import_times import outline, rate_told, with_times
 from shm.pipeline.lineage import read_limits
 from shm.read import logger_words as words
 from shm.read.assemble import recording

@@ -17,9 +17,8 @@ from shm.pipeline.ending import told_by_other
 from shm.pipeline.judging import judge
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
-from shm.pipeline.registry import WatchResult, registered, run_step
+from shm.pipeline.registry import Opens, RemoteFile, WatchResult, registered, run_step
 from shm.pipeline.rejudging import settled
-from shm.pipeline.remote_file import Opens, RemoteFile
 from shm.pipeline.telling import (
     Terms,
     after_works,

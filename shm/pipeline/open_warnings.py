@@ -11,7 +11,7 @@ from functools import partial
 from shm.report.open_warnings import nearly_slack, open_warnings, passed_over, standing_out
 from shm.store import BaselineGlance, Silence, Store, StoredWatch, TrendPoint, Workspace
 from shm.store.checksums import of_readable
-from shm.store.stored_silences import said_of
+from shm.store.stored_alerts import said_of
 from shm.values import TENSION, Hanger
 
 

@@ -20,10 +20,9 @@ from shm.pipeline.lineage import update_terms
 from shm.pipeline.watching import dated_tests
 from shm.store import Baseline, Stage, Store, StoredAlert, StoredTest, Workspace
 from shm.values import Change, Hanger
-from shm.values.force_units import force_unit
-from shm.watch.events import EventKind, is_explained
+from shm.values.rounding import force_unit
 from shm.watch.readings import Reader
-from shm.watch.repair_check import Unrepaired, unrepaired
+from shm.watch.repair_check import EventKind, Unrepaired, is_explained, unrepaired
 from shm.watch.watching import kept_of
 
 

@@ -26,15 +26,14 @@ from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import read_test
 from shm.report.contents import HangerReport, ModalTestReport, trend_row_of
 from shm.report.hanger_status import findings, still_detected
-from shm.report.period import Period
-from shm.report.states import NOTHING_WATCHED, StatesOverTime, states_over_time
+from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_over_time
 from shm.report.structure_report import StructureReport
 from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
 from shm.values import Hanger, WatchedTest
 from shm.values.messages import Lead
 from shm.watch import WatchOptions, watch_hanger
 from shm.watch.alert_text import watch_words
-from shm.watch.frequency_text import frequency_words
+from shm.watch.change_words import frequency_words
 from shm.watch.neighbours import BridgePattern
 
 

@@ -15,8 +15,7 @@ from shm.inference import refresh, select, update
 from shm.models import build
 from shm.pipeline.calibrating import checked, options_of
 from shm.pipeline.lineage import Terms, competing, identify_settings, read_limits
-from shm.pipeline.registry import WatchResult
-from shm.pipeline.remote_file import Opens
+from shm.pipeline.registry import Opens, WatchResult
 from shm.plausibility import fingerprint_of
 from shm.read.sandbox import Limits, load_modes, read_test
 from shm.settings import Settings

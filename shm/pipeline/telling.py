@@ -15,7 +15,7 @@ from functools import cached_property
 from shm.bridge import Hook
 from shm.bridge.hooks import escalations_s
 from shm.store import Delivery, News, Silence
-from shm.store.stored_silences import silenced_until
+from shm.store.stored_alerts import silenced_until
 from shm.values import Alert, Drift, is_ratio, kind_of
 
 _MOST_WINDOWS = 5

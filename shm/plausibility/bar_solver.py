@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.models import timoshenko_beam
+from shm.models import tensioned_beam
 from shm.models.beam import Beam3
 from shm.values import FloatArray, Hanger
 
@@ -50,7 +50,7 @@ class Solver:
         stiffer = np.exp(2 * theta[..., 1])
         stiffness = self._stiffness * stiffer
         springs = 10 ** theta[..., SPRINGS] * (stiffness / self._length)[..., None]
-        hz = timoshenko_beam.frequencies_hz(
+        hz = tensioned_beam.timoshenko_frequencies_hz(
             self._length[:, None],
             (self._nominal * np.exp(theta[..., 0]))[..., None],
             stiffness[..., None],

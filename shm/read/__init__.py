@@ -17,9 +17,8 @@ if TYPE_CHECKING:
     from shm.read.base import Format, Peek, PeekChannel
     from shm.read.bundles import bundle, holds_test
     from shm.read.limits import Limits
-    from shm.read.registry import FORMATS, peek, read, write
+    from shm.read.registry import FORMATS, peek, peek_test, read, read_test, write
     from shm.read.sidecar import sidecar_path
-    from shm.read.whole_test import peek_test, read_test
 
 __all__ = [
     "FORMATS",
@@ -47,6 +46,6 @@ if not TYPE_CHECKING:
             "Limits": "shm.read.limits",
             **dict.fromkeys(("FORMATS", "peek", "read", "write"), "shm.read.registry"),
             "sidecar_path": "shm.read.sidecar",
-            **dict.fromkeys(("peek_test", "read_test"), "shm.read.whole_test"),
+            **dict.fromkeys(("peek_test", "read_test"), "shm.read.registry"),
         },
     )

@@ -16,15 +16,14 @@ from typing import Literal
 import numpy as np
 
 from shm.errors import BadInput
-from shm.read import assemble, responses
+from shm.read import assemble
 from shm.read.arrays import Arrays, Variable, arranged
-from shm.read.base import Peek
+from shm.read.base import LoggerColumn, LoggerTable, Peek
+from shm.read.comma_table import REMEDY, evened, rate_of
 from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, quantity_named
 from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples
-from shm.read.logger_table import LoggerColumn, LoggerTable
+from shm.read.logger_words import UNSAID, accelerance_si, unit_of
 from shm.read.sidecar import channels_described, with_sidecar
-from shm.read.table import REMEDY, evened, rate_of
-from shm.read.units import UNSAID, accelerance_si, unit_of
 from shm.values import NAN, ComplexArray, FloatArray, FrequencyResponse, Recording
 
 Opener = Callable[[Path], AbstractContextManager[Arrays]]
@@ -227,7 +226,7 @@ def _response(chosen: _Chosen) -> FrequencyResponse:
     header = chosen.header(found)
     values = np.array([_loaded(v, path) for v in found], dtype=np.complex128)
     listed = _real([_frequencies(chosen, lines)], path)[0]
-    return responses.frequency_response(
+    return assemble.frequency_response(
         header, listed, values, _coherence(chosen, header, lines), path
     )
 
@@ -235,7 +234,7 @@ def _response(chosen: _Chosen) -> FrequencyResponse:
 def _response_peek(chosen: _Chosen, name: str) -> Peek:
     found, path = chosen.by_role["response"], chosen.path
     listed = _real([_frequencies(chosen, _same_length(found, path))], path)[0]
-    return responses.peeked(chosen.header(found), name, listed, path, chosen.left_out)
+    return assemble.peeked_response(chosen.header(found), name, listed, path, chosen.left_out)
 
 
 def _frequencies(chosen: _Chosen, lines: int) -> Variable:

@@ -28,7 +28,7 @@ from shm.documents import format_time
 from shm.errors import UsageError
 from shm.read.base import names_in
 from shm.read.header import CHANNEL_KEYS, KEYS, mass_entries
-from shm.read.units import ACCELERANCE, SI
+from shm.read.logger_words import ACCELERANCE, SI
 from shm.values import (
     Channel,
     ComplexArray,

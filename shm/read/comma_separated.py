@@ -31,14 +31,20 @@ from shm.documents import format_time
 from shm.errors import BadInput, UsageError
 from shm.read import assemble, frequency_text, logger_text
 from shm.read.atomic import replace_text
-from shm.read.base import Format, Peek, names_in
-from shm.read.comma_header import Heading, parse_heading
+from shm.read.base import Format, LoggerColumn, LoggerTable, Peek, names_in
+from shm.read.comma_table import (
+    REMEDY,
+    Heading,
+    evened,
+    parse_heading,
+    parse_table,
+    rate_of,
+    rows_in,
+)
 from shm.read.content import is_text, text_of
 from shm.read.header import mass_entries
-from shm.read.logger_table import LoggerColumn, LoggerTable
+from shm.read.logger_words import ACCELERANCE, SI
 from shm.read.sidecar import with_sidecar
-from shm.read.table import REMEDY, evened, parse_table, rate_of, rows_in
-from shm.read.units import ACCELERANCE, SI
 from shm.values import NAN, Channel, FloatArray, FrequencyResponse, Recording, ResponsePoint
 
 _PLAIN = re.compile(r"[^,;\t\r\n#\"]+")

@@ -14,11 +14,10 @@ from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
 from shm.errors import BadInput
-from shm.read.base import Format, Peek
+from shm.read.base import Format, LoggerTable, Peek
 from shm.read.comma_separated import peek_text, read_text, table_of_text
 from shm.read.content import checked_members
 from shm.read.limits import guarded, limits, refuse_many_samples, too_large
-from shm.read.logger_table import LoggerTable
 from shm.values import FrequencyResponse, Recording
 
 _NAME = "Excel"

@@ -20,19 +20,19 @@ from typing import Literal
 import numpy as np
 
 from shm.errors import BadInput
-from shm.read import responses
+from shm.read import assemble
 from shm.read.base import Peek
-from shm.read.comma_header import (
+from shm.read.comma_table import (
     LINE_BREAK,
     Heading,
     cells_of,
     header_of,
     mark_between,
+    parse_table,
     refuse_long_heading,
 )
 from shm.read.header import Entry, Header
 from shm.read.sidecar import with_sidecar
-from shm.read.table import parse_table
 from shm.values import FrequencyResponse
 
 _Part = Literal["real", "imaginary", "coherence"]
@@ -79,13 +79,13 @@ def read(table: ResponseTable, path: Path) -> FrequencyResponse:
     coherence = None
     if all("coherence" in part for part in parts):
         coherence = np.array([rows[part["coherence"]] for part in parts])
-    return responses.frequency_response(_header(table, path), rows[0], values, coherence, path)
+    return assemble.frequency_response(_header(table, path), rows[0], values, coherence, path)
 
 
 def peek(table: ResponseTable, file_format: str, path: Path) -> Peek:
     """What the heading and the column of frequencies say."""
     listed = parse_table(table.heading, path)[0]
-    found = responses.peeked(_header(table, path), file_format, listed, path)
+    found = assemble.peeked_response(_header(table, path), file_format, listed, path)
     return replace(found, problems=(*table.heading.remarks, *found.problems))
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from shm.documents import parse_time
 from shm.errors import BadInput
-from shm.read.units import ACCELERANCE, KNOWN, SI, UNSAID, Unit, accelerance_si, unit_of
+from shm.read.logger_words import ACCELERANCE, KNOWN, SI, UNSAID, Unit, accelerance_si, unit_of
 from shm.values import NAN, PLANES, AddedMass, Plane, Quantity, outdoor_c
 
 KEYS = (

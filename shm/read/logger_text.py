@@ -25,8 +25,8 @@ from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read import assemble
 from shm.read import logger_words as words
-from shm.read.base import Peek
-from shm.read.comma_header import LINE_BREAK, cells_of, mark_between
+from shm.read.base import LoggerColumn, LoggerTable, Peek
+from shm.read.comma_table import LINE_BREAK, cells_of, mark_between
 from shm.read.header import Entry, Header, quantity_named
 from shm.read.limits import refuse_long_header
 from shm.read.logger_heading import Heading, heading_of, quantity_said, rate_said, unlike, unrounded
@@ -39,11 +39,10 @@ from shm.read.logger_rows import (
     script_of,
     values_of,
 )
-from shm.read.logger_table import LoggerColumn, LoggerTable
 from shm.read.logger_times import Clock, clock_of, two_days
+from shm.read.logger_words import UNSAID
 from shm.read.sidecar import channels_described, with_sidecar
 from shm.read.stamps import moment, parsed
-from shm.read.units import UNSAID
 from shm.values import NAN, FloatArray, Recording
 
 _PLAIN_NAME = set("abcdefghijklmnopqrstuvwxyz0123456789_")

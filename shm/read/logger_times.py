@@ -12,10 +12,10 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.read import logger_words as words
+from shm.read.comma_table import REMEDY, evened
 from shm.read.logger_heading import Heading
 from shm.read.logger_rows import Block, second_record, values_of
 from shm.read.stamps import parsed, seconds_of_stamps
-from shm.read.table import REMEDY, evened
 from shm.values import NAN, FloatArray
 
 # Judgement: no logger records a hammer test slower than this, and none faster.

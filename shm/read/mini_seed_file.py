@@ -18,9 +18,8 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.read import logger_text
-from shm.read.base import Format, Peek
+from shm.read.base import Format, LoggerColumn, LoggerTable, Peek
 from shm.read.limits import guarded, refuse_large, refuse_many_samples
-from shm.read.logger_table import LoggerColumn, LoggerTable
 from shm.read.logger_words import hanger_numbered
 from shm.read.sidecar import sidecar_path
 from shm.values import NAN, FloatArray, Recording

@@ -9,9 +9,8 @@ from pathlib import Path
 from shm.errors import BadInput
 from shm.read import logger_text
 from shm.read import logger_words as words
-from shm.read.base import Format, Peek, PeekChannel
+from shm.read.base import Format, LoggerColumn, LoggerTable, Peek, PeekChannel
 from shm.read.bundles import holds_test
-from shm.read.logger_table import LoggerColumn, LoggerTable
 from shm.read.registry import format_of
 from shm.read.survey import Layout, Survey, SurveyedColumn
 

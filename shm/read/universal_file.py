@@ -18,12 +18,11 @@ import numpy as np
 from shm.errors import BadInput, UsageError
 from shm.read import assemble, universal_frf
 from shm.read.atomic import replace_file
-from shm.read.base import Format, Peek, PeekChannel
+from shm.read.base import Format, LoggerColumn, LoggerTable, Peek, PeekChannel
 from shm.read.header import Header
 from shm.read.logger_heading import unlike
-from shm.read.logger_table import LoggerColumn, LoggerTable
+from shm.read.logger_words import SI, unit_of
 from shm.read.sidecar import channels_described, with_sidecar, write_sidecar
-from shm.read.units import SI, unit_of
 from shm.read.universal_sets import TIME_RESPONSE, Content, FunctionSet, load, recognises, save
 from shm.values import NAN, FloatArray, FrequencyResponse, Quantity, Recording
 

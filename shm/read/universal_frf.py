@@ -21,8 +21,8 @@ from shm.errors import BadInput
 from shm.read import assemble
 from shm.read.base import Peek, PeekChannel
 from shm.read.header import KEYS, Entry, Header, mass_entries
+from shm.read.logger_words import accelerance_si
 from shm.read.sidecar import with_sidecar
-from shm.read.units import accelerance_si
 from shm.read.universal_sets import COHERENCE, FREQUENCY_RESPONSE, Content, FunctionSet
 from shm.values import (
     NAN,

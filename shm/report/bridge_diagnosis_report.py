@@ -13,10 +13,10 @@ from shm.report.diagnosis_summary import verdict
 from shm.report.diagnosis_wording import effect_phrase, quantity, size, tension_of
 from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
 from shm.values import BridgeDiagnosis, SharedCause, TensionEstimate, effect_label
-from shm.values.force_units import ForceUnit, force_unit
+from shm.values.rounding import ForceUnit, force_unit
 
 if TYPE_CHECKING:
-    from shm.report.figures.illustration import Illustration
+    from shm.report.figures.specification import Illustration
 
 _STATES = {
     "shared cause": ("A shared cause", "first"),

@@ -9,21 +9,20 @@ from typing import TYPE_CHECKING, Any
 from shm.documents import averaged_document, drift_document
 from shm.report import formatting
 from shm.report.contents import BridgeReport, Course, HangerLine, hangers_unit
+from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
-from shm.report.intervals import Interval
 from shm.report.origin import lineage, settings
 from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, filled
-from shm.report.period import period_json
 from shm.report.shifts import _day, pattern_tables, shift_cells
+from shm.report.states import period_json
 from shm.values import Drift
-from shm.values.force_units import ForceUnit
 from shm.values.messages import NEXT_TEST
-from shm.values.rounding import rounded_percent
+from shm.values.rounding import ForceUnit, rounded_percent
 from shm.values.stated_tension import stated
 from shm.watch.neighbours import BridgePattern
 
 if TYPE_CHECKING:
-    from shm.report.figures.illustration import Illustration
+    from shm.report.figures.specification import Illustration
 
 
 def bridge_paper(data: BridgeReport) -> Paper:

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from shm.models import end_stiffness
+from shm.report.formatting import Interval
 from shm.report.hanger_status import (
     BridgeMessage,
     HangerMessage,
@@ -18,9 +19,7 @@ from shm.report.hanger_status import (
     bridge_message,
     hanger_message,
 )
-from shm.report.intervals import Interval
-from shm.report.period import Period
-from shm.report.states import NOTHING_WATCHED, StatesOverTime
+from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime
 from shm.values import (
     NAN,
     Alert,
@@ -41,10 +40,10 @@ from shm.values import (
     Selection,
     Summary,
 )
-from shm.values.force_units import ForceUnit, force_unit
 from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 from shm.values.messages import Lead
 from shm.values.notes import Note
+from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import averaged_now, selection_now
 
 if TYPE_CHECKING:  # `shm status` lists hangers and identifies nothing

@@ -35,10 +35,10 @@ from shm.report.diagnosis_wording import (
 )
 from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
 from shm.values import NO_GAP, Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
-from shm.values.force_units import ForceUnit
+from shm.values.rounding import ForceUnit
 
 if TYPE_CHECKING:
-    from shm.report.figures.illustration import Illustration
+    from shm.report.figures.specification import Illustration
 
 _STYLES = {
     Answer.EXPLAINED: "first",

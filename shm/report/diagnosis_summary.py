@@ -19,7 +19,7 @@ from shm.report.diagnosis_wording import (
     tension_unit,
     tension_words,
 )
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.report.paper import Fact
 from shm.values import MOST_MISFIT_PERCENT, Diagnosis, NextMeasurement, Trend
 

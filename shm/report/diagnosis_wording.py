@@ -9,10 +9,10 @@ from enum import Enum
 
 from shm.models.effects import EFFECTS
 from shm.report import formatting
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.values import Cause, Diagnosis, EffectEstimate, Residual, TensionEstimate, effect_label
 from shm.values.diagnosis import joined
-from shm.values.force_units import ForceUnit, force_unit
+from shm.values.rounding import ForceUnit, force_unit
 
 # Even odds; two places fit a sentence.
 _LIKELIER_THAN_NOT = 0.5

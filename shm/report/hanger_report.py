@@ -14,13 +14,13 @@ from shm.report.diagnosis_report import diagnosis_json, diagnosis_part
 from shm.report.hanger_summary import advice, further, is_found, summary, tension_change, why
 from shm.report.hanger_tables import numbers, origins, results
 from shm.report.paper import CREDIBLE, Fact, Paper, Part, appendices
-from shm.report.period import period_json
-from shm.report.temperatures import temperature_documents
+from shm.report.shifts import temperature_documents
+from shm.report.states import period_json
 from shm.values import FrequencyResponse
 from shm.values.stated_tension import StatedTension, stated
 
 if TYPE_CHECKING:
-    from shm.report.figures.illustration import Illustration
+    from shm.report.figures.specification import Illustration
 
 
 def hanger_paper(data: HangerReport) -> Paper:

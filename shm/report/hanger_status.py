@@ -13,11 +13,10 @@ from datetime import datetime
 from enum import Enum
 
 from shm.report import formatting
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedTest
-from shm.values.force_units import force_unit
 from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
-from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
+from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
 from shm.watch.alert_action import look_again
 from shm.watch.alert_text import lead_of
 from shm.watch.change_words import quantity_words, size_words

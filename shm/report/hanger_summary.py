@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.report import formatting, outdated_baseline
+from shm.report import formatting, open_warnings
 from shm.report.contents import HangerReport, message
 from shm.report.diagnosis_summary import next_step, verdict
 from shm.report.diagnosis_wording import AFTER, tension_of
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.values import TENSION, Diagnosis, PredictedFrequency
 from shm.values.posterior import MOST_MISFIT_PERCENT
 from shm.values.rounding import rounded_percent
@@ -42,8 +42,8 @@ def _doubts(data: HangerReport) -> tuple[str, ...]:
     """What must not wait until the details: warnings, an outdated baseline, caveats."""
     found = (
         *message(data).beyond_lead(data.warnings),
-        outdated_baseline.redescribed(data),
-        outdated_baseline.discarded(data),
+        open_warnings.redescribed(data),
+        open_warnings.discarded(data),
         *data.averaged.caveats,
     )
     return tuple(each for each in found if each)

@@ -11,15 +11,14 @@ import numpy as np
 from shm.models.practice_formulas import FORMULAS
 from shm.report import formatting
 from shm.report.contents import HangerReport, TrendRow
+from shm.report.formatting import Interval
 from shm.report.hanger_summary import counted_tests, misfits_percent
-from shm.report.intervals import Interval
 from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Table, filled
 from shm.report.quality_table import quality_table
-from shm.report.shifts import shift_cells, shift_table
-from shm.report.temperatures import temperature_table
+from shm.report.shifts import shift_cells, shift_table, temperature_table
 from shm.values import PLANES, WITHOUT_MODEL, Alert, Mode, Posterior, PredictedFrequency
-from shm.values.force_units import ForceUnit, force_unit
+from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import stated
 from shm.watch.change_words import factor
 

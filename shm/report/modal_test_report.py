@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 from shm import modes_document
 from shm.report import formatting
-from shm.report.colours import VERDICT_STYLES
 from shm.report.contents import ModalTestReport
+from shm.report.figures.style import VERDICT_STYLES
 from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Fact, Paper, Part, Table, filled
 from shm.report.quality_table import headline, overall, quality_table
 from shm.values import PLANES, FrequencyResponse, Mode, Plane, QualityCheck, Recording, Verdict
-from shm.values.force_units import force_unit
+from shm.values.rounding import force_unit
 
 if TYPE_CHECKING:
-    from shm.report.figures.illustration import Illustration
+    from shm.report.figures.specification import Illustration
 
 
 def modal_test_paper(sheet: ModalTestReport) -> Paper:

@@ -2,6 +2,8 @@
 
 A watch that compares with a wrong baseline is quiet for years. So a baseline that does not fit, or
 that stands out among its neighbours, and a mode that tests keep having wrong are never "No change".
+
+That a baseline no longer fits what is known, and what to do: sentences of the report.
 """
 
 from __future__ import annotations
@@ -10,12 +12,13 @@ import statistics
 from collections.abc import Mapping, Sequence
 from itertools import islice
 
+from shm.report.contents import HangerReport
 from shm.report.formatting import listed
 from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
 from shm.values.messages import WEEK
 from shm.values.rounding import rounded_percent
 from shm.watch.alert_text import against_baseline_words
-from shm.watch.mistakes_text import warning_words
+from shm.watch.mistaken_modes import warning_words
 
 # Judgement: hangers of sound bridges are within a quarter of their nominal tension, or all are off.
 _OFF_NOMINAL = 0.25
@@ -127,3 +130,35 @@ def _share(hanger: Hanger, tensions: Mapping[int, Summary]) -> tuple[float, floa
     if found is None or not nominal_n > 0:
         return None
     return found.mean / nominal_n, found.q05 / nominal_n, found.q95 / nominal_n
+
+
+_MOST_CHANGES = 3  # what a sentence bears
+
+
+def redescribed(data: HangerReport) -> str:
+    """That the description has changed since the baseline, and what to do; empty where not."""
+    if not data.redescribed:
+        return ""
+    changed, more = data.redescribed[:_MOST_CHANGES], data.redescribed[_MOST_CHANGES:]
+    named = ", ".join(changed) + (f" and {len(more)} more" if more else "")
+    number = data.hanger.id
+    return (
+        f"The description of hanger {number} has changed since its baseline: {named}. "
+        f"{_anew(number)} "
+        "Until then shifts and alerts compare two descriptions, not two states of the hanger."
+    )
+
+
+def discarded(data: HangerReport) -> str:
+    """That tests of the baseline count no more, and what to do; empty where all do."""
+    if not data.discarded:
+        return ""
+    names, number = ", ".join(data.discarded), data.hanger.id
+    return (
+        f"The baseline of hanger {number} was made from {names}, discarded since: the comparison "
+        f"with it is no longer valid. {_anew(number)}"
+    )
+
+
+def _anew(number: int) -> str:
+    return f"Set a new baseline: `shm drift rebaseline --hanger {number} --since DAY --why TEXT`."

@@ -10,7 +10,7 @@ from shm.documents import alert_document, drift_document
 from shm.report.paper import Paper, Part, Table, filled
 from shm.values import Alert, Drift, Hanger
 from shm.values.rounding import NINETY_PERCENT, rounded_percent
-from shm.watch.frequency_text import structure_words
+from shm.watch.change_words import structure_words
 
 _NOT_WATCHED = "No test was watched yet: its first tests make the baseline."
 

@@ -30,7 +30,7 @@ from shm.report.trial_scores import (
 from shm.values import CaseScore, Mark, MarkName, TrialScore
 
 if TYPE_CHECKING:
-    from shm.report.figures.illustration import Illustration
+    from shm.report.figures.specification import Illustration
 
 _FACTS: tuple[tuple[MarkName, str], ...] = (
     ("detected", "Gaps seen"),

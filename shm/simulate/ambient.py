@@ -13,8 +13,7 @@ import numpy as np
 import scipy
 
 from shm.simulate.elements import modes_below, plane_modes
-from shm.simulate.logger import Line, logged
-from shm.simulate.response import poles_of
+from shm.simulate.response import Line, logged, poles_of
 from shm.simulate.state import HammerPlan, HangerState, check
 from shm.values import PLANES, ComplexArray, FloatArray, Hanger, Recording
 

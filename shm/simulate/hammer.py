@@ -16,7 +16,6 @@ from shm.simulate.disturbances import DISTURBANCES, Channels, Disturbance, Lines
 from shm.simulate.disturbances.base import Scene, T, Verb
 from shm.simulate.effects import PlantedEffect, TestConditions
 from shm.simulate.elements import PlaneModes, modes_below, plane_modes
-from shm.simulate.logger import Line, logged
 from shm.simulate.planted import (
     by_logger,
     planted_bar,
@@ -24,9 +23,16 @@ from shm.simulate.planted import (
     seen_by_turned,
     shifted,
 )
-from shm.simulate.response import accelerations
+from shm.simulate.response import (
+    Line,
+    Strike,
+    accelerations,
+    draw_schedule,
+    force_of,
+    logged,
+    pulse_of,
+)
 from shm.simulate.state import HammerPlan, HangerState, check
-from shm.simulate.strikes import Strike, draw_schedule, force_of, pulse_of
 from shm.values import NAN, PLANES, FloatArray, Hanger, Recording
 
 

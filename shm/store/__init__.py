@@ -6,27 +6,25 @@ from shm.store.holding import Judged
 from shm.store.list_rows import (
     AlertRow,
     BaselineGlance,
-    DeliveryRow,
-    EventKind,
-    HangerEvent,
-    Numbers,
-    TestRow,
-    TrendPoint,
-    WaitingTest,
-    WatchedName,
-)
-from shm.store.recording_rows import (
     Death,
     Deaths,
     Decision,
+    DeliveryRow,
+    EventKind,
+    HangerEvent,
     HeldTest,
     Hold,
+    Numbers,
     Outcome,
     Receipt,
     ReceivedFile,
     Rerun,
     Step,
     StoredRecording,
+    TestRow,
+    TrendPoint,
+    WaitingTest,
+    WatchedName,
 )
 from shm.store.reprocessing import AGAIN_FROM
 from shm.store.rows import (

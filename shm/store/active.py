@@ -18,9 +18,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
 from shm.errors import StoreBusy, StoreError
-from shm.store.database import ACTIVE_LOCK, make_engine
-from shm.store.faults import translated
-from shm.store.location import is_server, shown
+from shm.store.database import ACTIVE_LOCK, is_server, make_engine, shown, translated
 
 Wait = Callable[[StoreError], bool]
 """Is told why the lock could not be had, waits, and says whether to try again."""

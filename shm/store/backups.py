@@ -27,8 +27,7 @@ from shm.store import schema
 from shm.store.archive import sync
 from shm.store.checking import CheckedStore, check_store
 from shm.store.copying import TableContent, Tell, copy_rows, delete_rows, row_counts
-from shm.store.database import BUSY_SECONDS, Database, make_engine
-from shm.store.faults import translated
+from shm.store.database import BUSY_SECONDS, Database, make_engine, translated
 
 _PAGES_AT_ONCE = 1000  # technical: 4 MB, between which the daemon may write
 

@@ -26,8 +26,7 @@ from shm.store.checksums import (
     plain_table,
 )
 from shm.store.columns import Document
-from shm.store.copying import Rows
-from shm.store.numbering import forget
+from shm.store.copying import Rows, forget
 from shm.store.tables import APART
 from shm.values import Alert
 

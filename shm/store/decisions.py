@@ -18,6 +18,7 @@ from shm.store.audit import note
 from shm.store.checksums import loads
 from shm.store.database import Repository, insert
 from shm.store.files import (
+    advance_recordings,
     by_id,
     counts,
     end_recording,
@@ -40,14 +41,12 @@ from shm.store.holding import (
     taking_back,
     undecided,
 )
+from shm.store.list_rows import Decision, HeldTest, Hold, Rerun
 from shm.store.outbox import resolve
 from shm.store.queries import WEIGHED
-from shm.store.recording_rows import Decision, HeldTest, Hold, Rerun
-from shm.store.reprocessing import of_baselines, reprocess, supersede_results
-from shm.store.results import advance_recordings
+from shm.store.reprocessing import of_baselines, reprocess, send_back, supersede_results
 from shm.store.rows import Stage
 from shm.store.tables import alerts, holds, recordings, tests, watches
-from shm.store.watched_again import send_back
 
 
 @dataclass(frozen=True)

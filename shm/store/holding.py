@@ -18,8 +18,8 @@ from shm.store.blobs import pack, test_from_document, unpack
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
 from shm.store.files import in_force, write_event, write_step
+from shm.store.list_rows import Decision, HeldTest, Hold
 from shm.store.outbox import raise_alert, resolve
-from shm.store.recording_rows import Decision, HeldTest, Hold
 from shm.store.rows import Stage, StoredAlert
 from shm.store.tables import (
     acknowledgements,

@@ -1,4 +1,8 @@
-"""Doing work again: what it replaces is superseded and stays, with its lineage."""
+"""Doing work again: what it replaces is superseded and stays, with its lineage.
+
+Tests that are compared with their baseline again, since what they are judged by has changed, or
+with none.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +14,24 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError
+from shm.store.audit import note
+from shm.store.database import Repository
 from shm.store.files import (
+    advance_recordings,
+    all_at,
     begin_again,
     by_id,
     counts,
     in_force,
+    move,
+    move_numbers,
     recording_from,
     write_event,
     write_step,
 )
 from shm.store.holding import discarded_reason, end_hold, standing_discard, taking_back
-from shm.store.recording_rows import ReceivedFile, Rerun
-from shm.store.results import advance_recordings
-from shm.store.rows import Stage
+from shm.store.list_rows import ReceivedFile, Rerun
+from shm.store.rows import Baseline, Stage, StoredTest
 from shm.store.tables import (
     baselines,
     drifts,
@@ -190,3 +199,56 @@ def _send_back(
 def _kept_states(hanger: int | None) -> sa.ColumnElement[bool]:
     """What the watch keeps of a hanger was made with the test that is done again."""
     return watch_states.c.hanger == hanger
+
+
+class WatchedAgain(Repository):
+    """Sends watched tests back, tells those that were watched before, passes tests over."""
+
+    def judge_again(self, hanger: int, baseline_id: int, why: str, at: datetime) -> int:
+        """Sends back what was compared with a baseline, to be judged anew; how many tests."""
+        with self.writing() as connection:
+            which = watches.c.baseline_id == baseline_id
+            count = send_back(connection, hanger, which, Stage.WATCHED, at)
+            if count:
+                note(connection, at, "tests judged again", f"hanger {hanger}", why, "shm")
+            return count
+
+    def pass_over(self, test: StoredTest, at: datetime) -> None:
+        """A test within a maintenance window is compared with nothing."""
+        with self.writing() as connection:
+            if all_at(connection, [test], Stage.UPDATED):
+                move(connection, [test], Stage.WATCHED, at)
+
+    def is_again(self, test: StoredTest, baseline: Baseline) -> bool:
+        """Whether a test has been compared with a baseline before."""
+        own = (watches.c.test_id == test.id) & (watches.c.baseline_id == baseline.id)
+        with self.reading() as connection:
+            return connection.execute(sa.select(watches.c.id).where(own)).first() is not None
+
+    def is_last(self, test: StoredTest, baseline: Baseline) -> bool:
+        """Whether no later test that counts has ever been compared with a baseline."""
+        query = (
+            sa.select(tests.c.id)
+            .join(watches)
+            .where(watches.c.baseline_id == baseline.id, tests.c.stage != Stage.REFUSED)
+            .where(in_force(tests), tests.c.time > test.time)
+        )
+        with self.reading() as connection:
+            return connection.execute(query).first() is None
+
+
+def send_back(
+    connection: Connection, hanger: int, which: sa.ColumnElement[bool], stage: Stage, at: datetime
+) -> int:
+    """Sends watched tests of a hanger back so that `stage` is reached anew; how many tests."""
+    query = (
+        sa.select(tests.c.id, tests.c.recording_id)
+        .join(watches)
+        .where(watches.c.hanger == hanger, which, in_force(watches))
+        .where(tests.c.stage == Stage.WATCHED, in_force(tests))
+    )
+    again = {row.id: row.recording_id for row in connection.execute(query)}
+    connection.execute(sa.delete(watch_states).where(watch_states.c.hanger == hanger))
+    supersede_results(connection, list(again), stage, at)
+    move_numbers(connection, again, BEFORE[stage], at)
+    return len(again)

@@ -19,7 +19,7 @@ from shm.read import sidecar_path
 from shm.store.archive import Archive, checksum, is_whole
 from shm.store.checking import file_troubles
 from shm.store.copying import Tell
-from shm.store.recording_rows import StoredRecording
+from shm.store.list_rows import StoredRecording
 from shm.store.rows import Stage
 from shm.store.store import Store
 

@@ -11,9 +11,8 @@ from sqlalchemy.engine import Connection, Engine
 from shm.errors import SchemaOutdated, StoreError
 from shm.resources import migrations_folder
 from shm.store.checksums import seal
-from shm.store.database import make_engine, reading, writing
-from shm.store.location import shown
-from shm.store.numbering import note_numbering
+from shm.store.copying import note_numbering
+from shm.store.database import make_engine, reading, shown, writing
 from shm.store.tables import SCHEMA
 
 

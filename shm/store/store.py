@@ -16,10 +16,9 @@ from shm.store.changed_settings import ChangedSettings
 from shm.store.database import Database, make_engine
 from shm.store.notes import Notes
 from shm.store.people import People
-from shm.store.stored_alerts import Alerts
+from shm.store.stored_alerts import Alerts, Silences
 from shm.store.stored_posteriors import Posteriors
 from shm.store.stored_recordings import Recordings
-from shm.store.stored_silences import Silences
 from shm.store.stored_streams import Streams
 from shm.store.stored_tests import Tests
 from shm.store.stored_watch import Watch

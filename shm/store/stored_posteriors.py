@@ -16,7 +16,14 @@ from shm.errors import NothingThere, StoreBusy, UsageError
 from shm.store.audit import note
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
-from shm.store.files import in_force
+from shm.store.files import (
+    all_at,
+    in_force,
+    insert_baseline,
+    insert_posterior,
+    insert_selection,
+    move,
+)
 from shm.store.queries import (
     counted_tests,
     hidden,
@@ -27,7 +34,6 @@ from shm.store.queries import (
     selection_in_force,
     selection_of,
 )
-from shm.store.results import all_at, insert_baseline, insert_posterior, insert_selection, move
 from shm.store.rows import (
     Adoption,
     Lineage,

@@ -32,7 +32,7 @@ from shm.store.files import (
     write_step,
 )
 from shm.store.holding import standing_discard
-from shm.store.recording_rows import (
+from shm.store.list_rows import (
     ON_THE_WAY,
     Death,
     Deaths,

@@ -14,7 +14,7 @@ from shm.errors import NothingThere
 from shm.store.blobs import unpack_response
 from shm.store.checksums import content_checksum, damaged, decoding
 from shm.store.database import Repository, insert
-from shm.store.files import counts, in_force, write_step
+from shm.store.files import advance_recordings, counts, in_force, test_contents, write_step
 from shm.store.holding import Judged, fingerprint_from, keep_judgement
 from shm.store.list_rows import LatestTest, TestRow, WaitingTest
 from shm.store.queries import (
@@ -25,7 +25,6 @@ from shm.store.queries import (
     plain_tests,
     read_tests,
 )
-from shm.store.results import advance_recordings, test_contents
 from shm.store.rows import (
     Baseline,
     FormerPosterior,

@@ -18,7 +18,7 @@ from shm.store.blobs import change_in, watch_document, watch_in
 from shm.store.checksums import damaged, decoding, whole
 from shm.store.columns import Number
 from shm.store.database import insert
-from shm.store.files import in_force
+from shm.store.files import all_at, in_force, insert_baseline, insert_posterior, move
 from shm.store.list_rows import BaselineGlance, WatchedName
 from shm.store.outbox import raise_alert, resolve
 from shm.store.queries import (
@@ -29,7 +29,7 @@ from shm.store.queries import (
     plain_tests,
     read_baseline,
 )
-from shm.store.results import all_at, insert_baseline, insert_posterior, move
+from shm.store.reprocessing import WatchedAgain
 from shm.store.rows import (
     Acknowledgement,
     Baseline,
@@ -53,7 +53,6 @@ from shm.store.tables import (
     watches,
 )
 from shm.store.trends import baselines_in_numbers
-from shm.store.watched_again import WatchedAgain
 from shm.values import NAN, Alert, Change, Drift, Hanger, Posterior, WatchedTest
 
 _DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")

@@ -20,10 +20,9 @@ from shm.store.archive import Archive
 from shm.store.audit import note
 from shm.store.damage import damaged_ids, damaged_rows, drop_rows, overwrite
 from shm.store.database import Repository, insert
-from shm.store.files import write_event
+from shm.store.files import posterior_values, test_contents, write_event
+from shm.store.list_rows import StoredRecording
 from shm.store.missing import ACCEPTED, missing_rows
-from shm.store.recording_rows import StoredRecording
-from shm.store.results import posterior_values, test_contents
 from shm.store.rows import IdentifiedTest, Lineage, StoredTest
 from shm.store.tables import (
     archive_copies,

@@ -17,7 +17,7 @@ from shm.settings import Settings, commented, load_settings
 from shm.store.active import ActiveLock, Wait, active, holder
 from shm.store.archive import Archive, Quarantine
 from shm.store.audit import Actor
-from shm.store.location import has_password
+from shm.store.database import has_password
 from shm.store.store import Store
 
 _DATABASE = "shm.db"

@@ -7,7 +7,6 @@ end (0) to the arch end (its length).
 
 from __future__ import annotations
 
-from shm.values.baseline_check import BaselineCheck, MistakenMode, MistakenTest
 from shm.values.bridge_diagnosis import (
     BridgeDiagnosis,
     HangerTensions,
@@ -99,6 +98,9 @@ from shm.values.posterior import (
     MOST_MISFIT_PERCENT,
     WITHOUT_MODEL,
     Averaged,
+    BaselineCheck,
+    MistakenMode,
+    MistakenTest,
     Posterior,
     PredictedFrequency,
     Prior,

@@ -1,11 +1,65 @@
-"""What messages say alike: a number with its interval, and several words in a row."""
+"""What messages say alike: a number with its interval, several words in a row, and forces in the
+unit that fits their size: N, kN or MN.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeVar
 
-from shm.values.force_units import MOST_DECIMALS
+import numpy as np
+
+from shm.values.kinds import FloatArray
+
+Force = TypeVar("Force", float, FloatArray)
+
+_DIGITS = 4  # an interval's half width is some percent: two digits of it are four of the force
+MOST_DECIMALS = 6  # technical: what is smaller is written as 0
+
+
+@dataclass(frozen=True)
+class ForceUnit:
+    """A unit of force: its name and how many N it is."""
+
+    name: str
+    newtons: float
+
+    def of(self, force_n: Force) -> Force:
+        """Forces in N, a number or an array of any shape, in this unit."""
+        return force_n / self.newtons
+
+    def decimals(self, force_n: float) -> int:
+        """Decimals that show four significant digits of a force in N, one at the least."""
+        size = abs(self.of(force_n))
+        if not (math.isfinite(size) and size > 0):
+            return 1
+        return min(MOST_DECIMALS, max(1, _DIGITS - 1 - math.floor(math.log10(size))))
+
+    def told(self, force_n: float) -> str:
+        """`654.1 kN` of a force in N: four significant digits, never as a power of ten."""
+        value = self.of(force_n)
+        digits = np.format_float_positional(
+            value, precision=_DIGITS, fractional=False, unique=False, trim="-"
+        )
+        return f"{digits} {self.name}"
+
+
+_NEWTON = ForceUnit("N", 1.0)
+_KILONEWTON = ForceUnit("kN", 1e3)  # SI prefixes
+_MEGANEWTON = ForceUnit("MN", 1e6)
+# Engineers write 1200 kN, not 1.2 MN: only main cables and the like are told in MN.
+_KILONEWTON_FROM_N, _MEGANEWTON_FROM_N = 1e3, 1e7
+
+
+def force_unit(*forces_n: float) -> ForceUnit:
+    """The one unit for all these forces in N, by the largest; kN where none is known."""
+    known = [abs(each) for each in forces_n if math.isfinite(each)]
+    if not known or _KILONEWTON_FROM_N <= max(known) < _MEGANEWTON_FROM_N:
+        return _KILONEWTON
+    return _NEWTON if max(known) < _KILONEWTON_FROM_N else _MEGANEWTON
+
 
 NINETY_PERCENT = 1.645  # sds on either side that hold 90 % of a normal law
 

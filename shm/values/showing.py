@@ -48,8 +48,8 @@ def line(what: str, hanger: int | None, said: str) -> str:
 
 def tension_words(mean_n: float, low_n: float, high_n: float) -> str:
     """`654 kN (90 % credible interval 640 to 671 kN)`; the mean alone without an interval."""
-    from shm.values.force_units import force_unit
     from shm.values.posterior import Averaged, Summary
+    from shm.values.rounding import force_unit
     from shm.values.stated_tension import stated
 
     if not math.isfinite(mean_n):

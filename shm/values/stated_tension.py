@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from shm.values.force_units import MOST_DECIMALS, ForceUnit, force_unit
 from shm.values.hanger import Limits
 from shm.values.posterior import Averaged, Posterior, Selection
-from shm.values.rounding import to_two_digits
+from shm.values.rounding import MOST_DECIMALS, ForceUnit, force_unit, to_two_digits
 
 _LEAST_SAID = 0.01  # ten of a thousand draws: they tell a smaller probability to no digit
 

@@ -12,14 +12,15 @@ from collections.abc import Sequence
 from datetime import datetime
 
 from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
-from shm.values.force_units import force_unit
 from shm.values.messages import WEEK, Lead
-from shm.values.rounding import NINETY_PERCENT, listed, rounded_percent
+from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
 from shm.watch.alert_action import action_words, as_sentence, gravest
 from shm.watch.change_words import (
     CAUSES,
     beyond_words,
+    each_frequency,
     factor,
+    frequencies_state,
     group_words,
     is_stiffness,
     probable_groups,
@@ -29,7 +30,6 @@ from shm.watch.change_words import (
     threshold_words,
     undetected_words,
 )
-from shm.watch.frequency_text import each_frequency, frequencies_state
 
 _SURE = 0.9  # judgement: below nine in ten a sentence says "most likely"
 _EITHER_LIKELY = 0.8  # judgement: four to one that it was sudden, or slow

@@ -3,21 +3,238 @@
 A baseline that holds a mistake is wrong for years: its posterior follows it, and later tests fit it
 no better than it fits itself. Tests are checked against each other, mode by mode; where there are
 too few, against what the description allows.
+
+The tests of a baseline beside each other, mode by mode.
+
+Tests of one baseline may differ in what a hanger does: its tension, the stiffness of its ends, and
+what all frequencies have in common, the clock of the logger and the warmth of the steel. Stiff
+bars' modes move unequally with these. They are fitted to each test, by the slopes of a model class
+at the state that the tests have in the median; what no such difference explains is mistaken.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shm.models import Model
 from shm.models.base import Conditions
-from shm.values import BaselineCheck, BoolArray, MistakenMode, MistakenTest, ModalTest
-from shm.watch.baseline_comparison import ENOUGH, Comparison, Fitted, spread_of
-from shm.watch.baseline_state import Key, best_of, known_modes, places
-from shm.watch.mistaken_modes import MOST_MISTAKEN
+from shm.values import (
+    BaselineCheck,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    MistakenMode,
+    MistakenTest,
+    ModalTest,
+    Mode,
+)
+from shm.watch.baseline_state import Key, Quantities, best_of, known_modes, places, plausible
+from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, log_mixture, sound_modes
+
+_ROUNDS = 3  # technical: of "what is mistaken" and "where the others lie"
+_MAD = 1.4826  # of a normal law
+# Mode by mode two tests of one state differ by more than is stated: judgement, as in readings.
+_SCATTER = 1e-3
+_UNKNOWN_SD = 1e-3  # of a frequency without a stated error: the worse end of usual ones
+# Of a log frequency: what a mode of its own may do from test to test (a joint, a sensor) is less.
+_LEAST = 0.006
+_FAR = 6.0  # robust standard deviations
+# What the level of a mode may be off the model by: a bar as made, sag and fittings; its tail is
+# heavy, so that a mode which most tests agree on is theirs however odd. Judgement.
+_LEVEL_SD, _HEAVY = 0.02, 2.0
+# Judgement, standard deviations of what tests of one baseline differ by: seasons and traffic move
+# a tension by less, a joint that settles an end by less than a factor of two.
+_TENSION_SD, _DECADES_SD = 0.1, 0.3
+# What all frequencies have in common: sensors and clock; and half of what a kelvin softens steel by
+# (0.03 % of its modulus), where temperatures are not known that of ten.
+_COMMON_SD, _PER_KELVIN, _UNKNOWN_KELVIN = 1e-3, 1.5e-4, 10.0
+# A whole test is another hanger's, or by a wrong clock: by this all its modes may be off alike.
+_WRONG_CLOCK_SD = 0.05
+_LEAST_TENSION_SD, _LEAST_DECADES_SD = 0.01, 0.03  # judgement: a day's traffic and warmth do it
+_LEAST_CLOCK = 0.007  # judgement: below, warmth and sensors do as much
+_WRONG_TEST = 0.003  # of tests, judgement: a wrong hanger or clock
+ENOUGH = 3
+"""Tests from which on the odd one can be told: of two that differ, neither is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """One test: its modes' places among the keys, what of them is sound, and by what it differs.
+
+    `expected` (modes,) are log frequencies by the sound ones; `modes.x` (q,) is what the test
+    differs by from the median one: in common, in log tension, and in decades of each spring.
+    `linear` are log frequencies (modes,), slopes (modes, q) and variance (modes,) about there,
+    `of_median` the same about the median test.
+    """
+
+    at: IntArray
+    expected: FloatArray
+    modes: SoundModes
+    linear: tuple[FloatArray, FloatArray, FloatArray]
+    of_median: tuple[FloatArray, FloatArray, FloatArray]
+    common_sd: float
+
+    @property
+    def off(self) -> float:
+        """By what its log frequencies are off the median test's, in the median."""
+        return float(np.median(self.of_median[0])) if len(self.at) else 0.0
+
+    @property
+    def fits_no_state(self) -> bool:
+        """Whether its modes fit none of the other tests', more than may be mistaken."""
+        if not self.modes.is_misfit:
+            return False
+        off, slopes, _ = self.linear
+        is_far = np.abs(off - slopes @ self.modes.x) > _LEAST
+        return bool(is_far.sum() > MOST_MISTAKEN * len(self.at))
+
+    def common_shift(self, spread: FloatArray) -> float:
+        """By what all log frequencies are off alike, 0 where the tension explains it as well.
+
+        `spread` (q,) is what the other tests differ by among themselves: where their ends keep
+        still, an odd test is not explained by its ends; where their tensions do not, a little that
+        is common to all frequencies may be theirs, too.
+        """
+        tension, clock = spread.copy(), spread.copy()
+        tension[:2], clock[0] = (self.common_sd, _TENSION_SD), _WRONG_CLOCK_SD
+        by_tension = sound_modes(*self.linear, 1 / tension**2)
+        by_clock = sound_modes(*self.of_median, 1 / clock**2)
+        odds = math.log(_WRONG_TEST / (1 - _WRONG_TEST))
+        likelier = by_clock.log_evidence + odds > by_tension.log_evidence
+        by_spread = float(np.median(self.of_median[1][:, 1])) * spread[1] if len(self.at) else 0.0
+        least = max(_LEAST_CLOCK, by_spread)
+        common = float(by_clock.x[0])
+        return common if likelier and abs(common) > least else 0.0
+
+
+class Comparison:
+    """The tests of a baseline about a common level of each mode (keys,), robustly."""
+
+    def __init__(self, tests: Sequence[ModalTest], model: Model):
+        self.tests, self.model = tests, model
+        counts: dict[Key, int] = {}
+        for test in tests:
+            for mode in known_modes(test):
+                counts[mode.plane, mode.order] = counts.get((mode.plane, mode.order), 0) + 1
+        self.keys = sorted(key for key, count in counts.items() if count >= ENOUGH)
+        self.counts = np.array([counts[key] for key in self.keys])
+        kelvin = np.array([test.temperature_c for test in tests])
+        kelvin = np.abs(kelvin - np.nanmedian(kelvin)) if np.isfinite(kelvin).any() else kelvin
+        kelvin = np.where(np.isfinite(kelvin), kelvin, _UNKNOWN_KELVIN)
+        self.common_sd = np.hypot(_COMMON_SD, _PER_KELVIN * kelvin)
+        self.table = np.full((len(tests), len(self.keys)), np.nan)
+        self.variance = np.full_like(self.table, np.nan)
+        for row, errors, test in zip(self.table, self.variance, tests, strict=True):
+            for mode in known_modes(test):
+                if (mode.plane, mode.order) in self.keys:
+                    at = self.keys.index((mode.plane, mode.order))
+                    row[at], errors[at] = math.log(mode.frequency_hz), _variance_of(mode)
+
+    def fitted(self) -> list[Fitted]:
+        """Each test, what all have in common being the median of what they differ by."""
+        planes, orders = places(self.keys)
+        level = np.nanmedian(self.table, axis=0)
+        base = plausible(self.model, level, planes, orders)
+        quantities = Quantities(self.model, base, planes, orders)
+        moved = [np.zeros(quantities.count)] * len(self.tests)
+        level = self._polished(quantities)
+        spread = _SCATTER
+        for _ in range(_ROUNDS):
+            found = [
+                self._fit(n, quantities, moved[n], level, spread) for n in range(len(self.tests))
+            ]
+            moved = [each.modes.x for each in found]
+            predicted = np.array(
+                [
+                    quantities.log_frequency(x, self.model.conditions(test))
+                    for x, test in zip(moved, self.tests, strict=True)
+                ]
+            )
+            level, off = self._levels(self.table - predicted, spread)
+            spread = max(_SCATTER, _MAD * float(np.nanmedian(np.abs(off))))
+        return found
+
+    def _levels(self, off: FloatArray, spread: float) -> tuple[FloatArray, FloatArray]:
+        """Of what tests are off from the model (tests, keys): the level of each mode, and what is
+        left of the tests that share it, NaN of others.
+
+        The level is that of the test which most others join, weighed with how far off the model
+        it is: where two of three tests have a mode wrong, the third may still be right.
+        """
+        apart = off[None] - off[:, None]
+        variance = 2 * (self.variance + spread**2)
+        joins = np.where(np.isfinite(apart), log_mixture(apart, variance), 0.0).sum(axis=1)
+        centre = np.nanmedian(off)
+        score = joins - _HEAVY * np.log1p(((off - centre) / _LEVEL_SD) ** 2)
+        chosen = np.nanargmax(np.where(np.isfinite(off), score, -np.inf), axis=0)
+        near = np.abs(off - off[chosen, np.arange(off.shape[1])]) < max(_LEAST, _FAR * spread)
+        shared = np.where(near, off, np.nan)
+        level = np.nanmedian(shared, axis=0)
+        return level, shared - level
+
+    def _polished(self, quantities: Quantities) -> FloatArray:
+        """The level of each mode once the tension of each test is taken off: by medians."""
+        slopes = quantities.slopes(np.zeros(quantities.count), Conditions())[:, 1]
+        slopes = np.maximum(slopes, 0.05)  # technical: a mode that no tension moves says nothing
+        tension = np.zeros(len(self.tests))
+        for _ in range(2 * _ROUNDS):
+            level = np.nanmedian(self.table - tension[:, None] * slopes, axis=0)
+            shifts = (self.table - level) / slopes
+            tension = np.array([_median_or_0(row) for row in shifts])
+            tension = tension - np.median(tension)
+        here = quantities.log_frequency(np.zeros(quantities.count), Conditions())
+        return np.asarray(level - here)
+
+    def _fit(
+        self, n: int, quantities: Quantities, x: FloatArray, level: FloatArray, spread: float
+    ) -> Fitted:
+        at = np.flatnonzero(np.isfinite(self.table[n]))
+        conditions = self.model.conditions(self.tests[n])
+        slopes = quantities.slopes(x, conditions)[at]
+        here = quantities.log_frequency(x, conditions)[at] + level[at]
+        off = self.table[n, at] - here + slopes @ x
+        # A median of n is off by 1.25 standard deviations over the root of n.
+        variance = (self.variance[n, at] + spread**2) * (1 + 1.57 / self.counts[at])
+        sd = np.array([self.common_sd[n], _TENSION_SD, *[_DECADES_SD] * (quantities.count - 2)])
+        modes = sound_modes(off, slopes, variance, 1 / sd**2)
+        expected = here + slopes @ (modes.x - x)
+        is_far = np.abs(self.table[n, at] - expected) > _LEAST
+        modes = replace(modes, sound=modes.sound | ~is_far)
+        still = np.zeros(len(x))
+        median = quantities.log_frequency(still, conditions)[at] + level[at]
+        of_median = self.table[n, at] - median, quantities.slopes(still, conditions)[at]
+        return Fitted(
+            at,
+            expected,
+            modes,
+            (off, slopes, variance),
+            (*of_median, variance),
+            float(self.common_sd[n]),
+        )
+
+
+def spread_of(states: FloatArray) -> FloatArray:
+    """What tests (n, q) differ by, robustly: at least what they surely may, at most what any do."""
+    q = states.shape[1]
+    least = np.array([_COMMON_SD, _LEAST_TENSION_SD, *[_LEAST_DECADES_SD] * (q - 2)])
+    most = np.array([_COMMON_SD, _TENSION_SD, *[_DECADES_SD] * (q - 2)])
+    found = _MAD * np.median(np.abs(states - np.median(states, axis=0)), axis=0)
+    # Of four tests the spread is hardly known: in one of ten it seems a third of what it is.
+    return np.asarray(np.clip(3 * found, least, most))
+
+
+def _variance_of(mode: Mode) -> float:
+    sd = mode.frequency_sd_hz / mode.frequency_hz
+    return sd**2 if sd > 0 and math.isfinite(sd) else _UNKNOWN_SD**2
+
+
+def _median_or_0(row: FloatArray) -> float:
+    return float(np.nanmedian(row)) if np.isfinite(row).any() else 0.0
+
 
 _ENOUGH_OF_TESTS = 4  # of three states of a hanger, two alike may be chance
 _MOST_TENSION = 0.35  # judgement: twice 15 %, which tests of one baseline may lie apart

@@ -5,6 +5,8 @@ Beside them stand what the catalogue of effects knows and a comparison with the 
 mass put on or taken off, section lost over a stretch, another bending stiffness, a clock that is
 off, sensors of other mass or in another place. Each as one column a place, by the general bar on
 the ends of the baseline. What none of these does is "unexplained": every mode by itself.
+
+The ways to change, the changes that were called, and what stands where in a test's columns.
 """
 
 from __future__ import annotations
@@ -17,13 +19,67 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from shm.models import Model
+from shm.models.end_effects import coupled_bar
 from shm.models.hanger import PointMass, solve
 from shm.models.hanger.physical import Zone
-from shm.models.turnbuckles import coupled_bar
-from shm.values import PLANES, TENSION, End, FloatArray, Hanger, WatchedQuantity
-from shm.watch.change_layout import Direction, Layout
+from shm.values import PLANES, TENSION, End, FloatArray, Hanger, IntArray, WatchedQuantity
 from shm.watch.options import WatchOptions
 from shm.watch.quantities import MeasuredMode
+
+
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """One way to change: `factor` (columns, r) maps r independent unit normals to the change.
+
+    `columns` are the modes (n), then the watched quantities (q). `name` is the cause's, `members`
+    the quantities that move. `log_prior` is that of this cause given a change, `may_ramp` whether
+    it may come slowly.
+    """
+
+    name: str
+    factor: FloatArray
+    members: tuple[int, ...]
+    log_prior: float
+    may_ramp: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """A called change: the test at which it began, its time, and whether it goes on.
+
+    `precision` (n + q, n + q) is that of its size before the tests after the call: which causes
+    called it.
+    """
+
+    first: int
+    years: float
+    is_ramp: bool
+    precision: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """What stands where in the columns of a test: `n` modes, `q` quantities, then covariates.
+
+    `prior_sd` (columns,) are those of the null's parameters; the quantities' own columns are no
+    part of it, since the modes' levels hold them.
+    """
+
+    n: int
+    q: int
+    prior_sd: FloatArray
+
+    @property
+    def null(self) -> IntArray:
+        """The columns of the null."""
+        covariates = np.arange(self.n + self.q, len(self.prior_sd))
+        return np.concatenate([np.arange(self.n), covariates])
+
+    @property
+    def change(self) -> slice:
+        """The columns of which a change is made."""
+        return slice(0, self.n + self.q)
+
 
 POINT_MASS, SECTION_LOSS, TIMEBASE = "point_mass", "section_loss", "timebase"
 SPRINGS = "springs"

@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from shm.values import FloatArray, IntArray
-from shm.watch.change_layout import Direction, Layout, Told
+from shm.watch.causes import Direction, Layout, Told
 from shm.watch.conditions import OF_ONE_VISIT_YEARS
 
 STEP, RAMP = 0, 1

@@ -29,8 +29,7 @@ from shm.values import (
     Reading,
     WatchedQuantity,
 )
-from shm.watch.causes import UNEXPLAINED, Columns, Structure
-from shm.watch.change_layout import Direction, Layout
+from shm.watch.causes import UNEXPLAINED, Columns, Direction, Layout, Structure
 from shm.watch.change_point import Evidence
 from shm.watch.conditions import DAYS_PER_YEAR, Warmth
 from shm.watch.options import WatchOptions

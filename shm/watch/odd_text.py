@@ -5,7 +5,7 @@ from __future__ import annotations
 from shm.values import Hanger, WatchedTest
 from shm.values.messages import WEEK
 from shm.watch.alert_action import look_again
-from shm.watch.frequency_text import odd_frequencies
+from shm.watch.change_words import odd_frequencies
 
 
 def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:

@@ -46,10 +46,7 @@ from shm.values import (
     Reading,
     WatchedQuantity,
 )
-from shm.watch.amplitude_softening import AmplitudeSlopes
 from shm.watch.causes import columns_of
-from shm.watch.linear_reading import SELDOM, LinearReading, SeenModes, credible_share
-from shm.watch.loosening import loosening_of
 from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, sound_modes
 from shm.watch.quantities import (
     MeasuredMode,
@@ -57,6 +54,14 @@ from shm.watch.quantities import (
     moved,
     shift_of,
     watched_quantities,
+)
+from shm.watch.reading_corrections import (
+    SELDOM,
+    AmplitudeSlopes,
+    LinearReading,
+    SeenModes,
+    credible_share,
+    loosening_of,
 )
 from shm.watch.steel_softening import softening
 

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.values import Change, FloatArray, IntArray, WatchedQuantity, is_ratio
-from shm.watch.causes import Structure
-from shm.watch.change_layout import Told
+from shm.watch.causes import Structure, Told
 from shm.watch.change_point import SIZES, Evidence, Sums, sums_of
 from shm.watch.conditions import OF_ONE_VISIT_YEARS, Warmth, warmth_of
 from shm.watch.isolated_tests import Seen

@@ -27,8 +27,7 @@ from shm.values import (
     WatchedTest,
 )
 from shm.values.drift import ENOUGH_AGAINST
-from shm.watch.causes import Columns, Structure, structure_of
-from shm.watch.change_layout import Told
+from shm.watch.causes import Columns, Structure, Told, structure_of
 from shm.watch.change_point import Evidence, evidence_of, log_probability_of_called
 from shm.watch.conditions import OF_ONE_VISIT_YEARS, reference_of, years_between
 from shm.watch.isolated_tests import counted, outlier_probability

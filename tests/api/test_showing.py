@@ -12,9 +12,8 @@ import pytest
 import shm
 from shm.errors import UsageError
 from shm.report.diagnosis_summary import verdict
-from shm.report.formatting import tension
-from shm.report.intervals import Interval
-from shm.values.force_units import force_unit
+from shm.report.formatting import Interval, tension
+from shm.values.rounding import force_unit
 from tests.helpers.diagnoses import a_diagnosis
 
 

@@ -19,8 +19,7 @@ from typing import Any, cast
 import numpy as np
 
 from docs.filling import fill_in
-from shm.blind.answers import answers_sha256
-from shm.blind.layout import TRIAL_SCHEMA, Trial, key_beside, read_trial
+from shm.blind.layout import TRIAL_SCHEMA, Trial, answers_sha256, key_beside, read_trial
 from shm.blind.making import of_one_instant
 from shm.blind.sealing import key_of, write_key
 from shm.blind.solving import guard

@@ -35,7 +35,6 @@ import numpy as np
 from scipy.stats import beta
 
 from docs.filling import fill_in, write_csv
-from shm.blind.answers import answered, read_answers, verified_sha256
 from shm.blind.layout import (
     CASE_FILE,
     CASE_SCHEMA,
@@ -44,16 +43,17 @@ from shm.blind.layout import (
     TRIAL_SCHEMA,
     Round,
     Trial,
+    answered,
     key_beside,
+    read_answers,
     read_trial,
+    verified_sha256,
 )
 from shm.blind.making import of_one_instant, padded
-from shm.blind.making.case import PLANS, make_case
-from shm.blind.making.mix import Draft
-from shm.blind.scoring.calibration import bins_of, corrected
+from shm.blind.making.case import PLANS, Draft, make_case
 from shm.blind.scoring.cases import NO_GAP, SURE, case_scores, left_out_scores
 from shm.blind.scoring.marks import FEWEST, LARGE
-from shm.blind.scoring.questions import leading
+from shm.blind.scoring.scores import bins_of, corrected, leading
 from shm.blind.sealing import key_of, write_key
 from shm.blind.solving import solve_left_out, solve_trial
 from shm.documents import dump

@@ -20,9 +20,9 @@ from rich.progress import track
 from shm.bridge import load_hanger
 from shm.models import build
 from shm.models.base import silent
-from shm.models.solid.affine import natural_modes
 from shm.models.solid.basis import assembled, transverse_basis
 from shm.models.solid.geometry import Fineness
+from shm.models.solid.reduction import natural_modes
 from shm.values import FloatArray, Hanger
 
 HANGER_FILE = Path(__file__).parents[2] / "cli/shm_cli/thesis/hanger3.toml"

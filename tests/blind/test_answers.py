@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from shm.blind.answers import (
+from shm.blind.layout import (
+    Trial,
     answer_document,
     answered,
     answers_sha256,
@@ -15,7 +16,6 @@ from shm.blind.answers import (
     verified_sha256,
     write_answer,
 )
-from shm.blind.layout import Trial
 from shm.documents import dump
 from shm.errors import BadInput, NothingThere
 from shm.values import Answer

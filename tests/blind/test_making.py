@@ -15,8 +15,7 @@ import pytest
 from shm.blind.layout import read_trial
 from shm.blind.making import case as one_case
 from shm.blind.making import make_trial, of_one_instant, padded
-from shm.blind.making.case import PLANS, Site, make_case, planted_effects
-from shm.blind.making.mix import WAYS, Draft
+from shm.blind.making.case import PLANS, WAYS, Draft, Site, make_case, planted_effects
 from shm.blind.sealing import key_of
 from shm.bridge import load_hanger
 from shm.errors import UsageError

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from shm.blind.making.mix import RICHNESSES, WAYS, Draft, balanced, drafts
+from shm.blind.making.case import RICHNESSES, WAYS, Draft, balanced, drafts
 from shm.values import MIX
 
 EFFECTS = tuple(f"effect{number}" for number in range(19))

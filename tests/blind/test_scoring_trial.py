@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from shm.blind.scoring import trial_score
-from shm.blind.scoring.calibration import (
+from shm.blind.scoring.scores import (
+    Samples,
     by_chance,
     calibration_error,
     corrected,
     counted,
     missed_if_perfect,
+    share,
 )
-from shm.blind.scoring.estimates import Samples, share
 from shm.values import Answer, Mark, MarkName, Score, TrialScore, TrueCase
 from tests.helpers.trial_answers import a_truth, an_answer, liar, oracle, plausible, some_truths
 

@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shm.blind.answers import read_answers, write_answer
-from shm.blind.layout import Trial
-from shm.blind.making.case import make_case
-from shm.blind.making.mix import Draft
+from shm.blind.layout import Trial, read_answers, write_answer
+from shm.blind.making.case import Draft, make_case
 from shm.blind.solving import Refused, guard, solve_left_out, solve_trial, solved
 from shm.blind.workers import workers
 from shm.errors import BadInput, NothingThere, ShmError

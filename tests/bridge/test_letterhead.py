@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from shm.bridge.letterhead import letterhead_of
+from shm.bridge.description import letterhead_of
 from shm.errors import BadInput
-from shm.report.logo import read_logo
+from shm.report.paper import read_logo
 
 
 def test_a_missing_logo_is_named(tmp_path: Path) -> None:

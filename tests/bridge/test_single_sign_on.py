@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from shm.bridge.single_sign_on import is_safe, single_sign_on_of
+from shm.bridge.description import is_safe, single_sign_on_of
 from shm.errors import BadInput
 
 TABLE = {

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shm_cli.validation.beam_solutions import FIGURES, LIMIT, MODES, _distance, solutions
+from shm_cli.validation.thesis_figures import LIMIT, MODES, _distance, solutions
+from shm_cli.validation.thesis_figures import SOLUTIONS as FIGURES
 from tests.cli.conftest import Shm
 
 PNG = b"\x89PNG"

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from shm.settings import TABLE
-from shm_daemon.web.front import HEALTH
+from shm_daemon.web.middleware import HEALTH
 from tests.helpers.command_lines import commands, parse
 from tests.helpers.pages import DOCS, ROOT
 

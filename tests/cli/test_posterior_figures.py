@@ -15,7 +15,7 @@ from shm.modes_document import load_modes
 from shm.report.figures.specification import Points
 from shm.values import PLANES, Posterior
 from shm_cli import thesis
-from shm_cli.validation import mode_shapes, posterior_figures
+from shm_cli.validation import thesis_figures
 from tests.cli.conftest import Shm
 
 HANGER = load_hanger(thesis.HANGER_FILE)
@@ -32,19 +32,19 @@ def posterior() -> Posterior:
 
 
 def test_every_figure_of_chapter_5_is_of_parameters_that_its_class_has() -> None:
-    assert [*posterior_figures.FIGURES] == [f"5.{number}" for number in range(1, 38)]
-    for model, names in posterior_figures.FIGURES.values():
+    assert [*thesis_figures.POSTERIORS] == [f"5.{number}" for number in range(1, 38)]
+    for model, names in thesis_figures.POSTERIORS.values():
         known = {*build(model, HANGER, THESIS).parameter_names, "sigma"}
         parts = [part for name in names for part in name.split("/")]
-        assert {posterior_figures._name(part) for part in parts} <= known
+        assert {thesis_figures._name(part) for part in parts} <= known
 
 
 @pytest.mark.parametrize("number", ["5.4", "5.6", "5.18"])
 def test_a_figure_of_each_kind_is_drawn(
     number: str, posterior: Posterior, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(posterior_figures, "_posterior", lambda *_: posterior)
-    found = posterior_figures.shown(HANGER, _quiet, number)
+    monkeypatch.setattr(thesis_figures, "_posterior", lambda *_: posterior)
+    found = thesis_figures.posterior(HANGER, _quiet, number)
     found.write(tmp_path / "figure.png")
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
     assert len(found.cells) == len(found.document)
@@ -53,8 +53,8 @@ def test_a_figure_of_each_kind_is_drawn(
 def test_the_densest_draws_of_a_pair_are_the_likeliest(
     posterior: Posterior, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(posterior_figures, "_posterior", lambda *_: posterior)
-    drawn = posterior_figures.shown(HANGER, _quiet, "5.6").specification
+    monkeypatch.setattr(thesis_figures, "_posterior", lambda *_: posterior)
+    drawn = thesis_figures.posterior(HANGER, _quiet, "5.6").specification
     assert drawn is not None
     clouds = [mark for mark in drawn.panels[0].marks if isinstance(mark, Points)][:-1]
     assert sum(len(cloud.x) for cloud in clouds) == len(posterior.samples)
@@ -94,9 +94,9 @@ def test_the_plates_of_a_solid_are_on_its_surface() -> None:
 
 
 def test_every_figure_of_appendix_b_is_a_mode_of_both_planes() -> None:
-    assert mode_shapes.FIGURES["B.1"] == (1, "transverse")
-    assert mode_shapes.FIGURES["B.14"] == (7, "longitudinal")
-    assert len(mode_shapes.FIGURES) == 14
+    assert thesis_figures.MODE_SHAPES["B.1"] == (1, "transverse")
+    assert thesis_figures.MODE_SHAPES["B.14"] == (7, "longitudinal")
+    assert len(thesis_figures.MODE_SHAPES) == 14
 
 
 def test_predict_draws_a_mode_of_a_solid_and_refuses_a_beam_s(shm: Shm, tmp_path: Path) -> None:

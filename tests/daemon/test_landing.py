@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from shm.errors import BadInput, ShmError
-from shm_daemon import landing
-from shm_daemon.landing import Landed, incoming, landing_name
+from shm_daemon import spool as landing
+from shm_daemon.spool import Landed, incoming, landing_name
 
 SAID = {"hanger": 3}
 CONTENT = b"force,acc_1\n1,2\n"

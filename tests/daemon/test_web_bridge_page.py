@@ -14,8 +14,8 @@ import httpx
 import pytest
 
 from shm.report.contents import HangerLine
+from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
-from shm.report.intervals import Interval
 from shm.store import Workspace
 from shm.values import TENSION, Drift, Hanger
 from shm_daemon.web import bridge_view

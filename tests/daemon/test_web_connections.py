@@ -14,7 +14,7 @@ import httpx
 import pytest
 
 from shm.store import Workspace
-from shm_daemon.web import connections, front
+from shm_daemon.web import connections, middleware
 from shm_daemon.web.address import UPLOADS
 from tests.helpers.slow import few_of
 from tests.helpers.web_servers import Served, served
@@ -170,7 +170,7 @@ def test_a_long_answer_may_be_taken_slowly_but_not_left(
 def test_too_much_at_once_is_refused_in_our_words_and_health_still_answers(
     site: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(front, "_PLACES", dict.fromkeys(front.Kind, 0))
+    monkeypatch.setattr(middleware, "_PLACES", dict.fromkeys(middleware.Kind, 0))
     with site.client() as client:
         refused = client.get("/")
         assert refused.status_code == 503
@@ -186,7 +186,7 @@ def test_more_than_a_request_needs_is_not_read(site: Served) -> None:
 
 def test_the_places_leave_threads_for_those_who_watch() -> None:
     """Anyio has 40 threads for whatever blocks; each request holds one at most."""
-    assert sum(front._PLACES.values()) < 40
+    assert sum(middleware._PLACES.values()) < 40
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ import sqlalchemy as sa
 from prometheus_client.parser import text_string_to_metric_families
 
 from shm.pipeline import utc_now
-from shm.store import Workspace, files, list_rows, recording_rows, rows
+from shm.store import Workspace, files, list_rows, rows
 from shm.store.columns import Number, UtcTime
 from shm.store.tables import metadata
 from shm_daemon.heartbeat import beat
@@ -51,7 +51,7 @@ def names() -> set[str]:
     """Every name that a row may say: of all enumerations of the store, and one of the future."""
     kinds = {
         kind
-        for module in (rows, recording_rows, list_rows)
+        for module in (rows, list_rows, list_rows)
         for _, kind in inspect.getmembers(module, inspect.isclass)
         if issubclass(kind, StrEnum)
     }

@@ -10,7 +10,7 @@ import pytest
 
 from shm.store import FormerTest, Lineage, Step
 from shm.store.rows import FormerPosterior
-from shm_daemon.web.modal_test_origin import formers_of, origin, steps, steps_of, superseded
+from shm_daemon.web.tests import formers_of, origin, steps, steps_of, superseded
 
 NOON = datetime(2026, 5, 1, 12, tzinfo=UTC)
 NOW, BEFORE = Lineage("a" * 64, "b" * 64, "0.2.0"), Lineage("c" * 64, "d" * 64, "0.1.0")

@@ -27,7 +27,7 @@ from shm_daemon.web.address import name_in
 from shm_daemon.web.address import test_json as document_of
 from shm_daemon.web.address import test_page as page_of
 from shm_daemon.web.background_work import BackgroundWorker
-from shm_daemon.web.modal_test_figures import FIGURES, FROM_RECORDS
+from shm_daemon.web.modal_test_view import FIGURES, FROM_RECORDS
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, a_thread, served
 from tests.helpers.workspaces import START, make_workspace, write_test

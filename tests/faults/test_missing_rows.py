@@ -16,10 +16,10 @@ from sqlalchemy.engine import Connection
 from shm.store import Store, Workspace
 from shm.store.backups import back_up, copy_store, restore
 from shm.store.checking import check_store
+from shm.store.copying import NUMBERED, noted
 from shm.store.database import make_engine
 from shm.store.files import write_event
 from shm.store.missing import MissingRow, missing_rows
-from shm.store.numbering import NUMBERED, noted
 from shm.store.tables import metadata
 from shm_cli import working
 from shm_cli.main import run

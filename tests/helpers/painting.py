@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from matplotlib.figure import Figure
 
-from shm.report.figures.illustration import Illustration
+from shm.report.figures.specification import Illustration
 
 
 def unpaint(patch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ import sqlalchemy as sa
 from shm.pipeline import Flow
 from shm.store import Workspace
 from shm.store.tables import steps as reached
-from shm_daemon.landing import incoming
+from shm_daemon.spool import incoming
 from tests.helpers import quick_update
 from tests.helpers.feeds import Feed
 from tests.helpers.flows import Clock, a_flow

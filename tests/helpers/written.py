@@ -23,8 +23,8 @@ from shm.read import write as write_ours
 from shm.read.arrays import Layout, layout_of
 from shm.read.base import PeekChannel
 from shm.read.comma_separated import recording_text, response_text
+from shm.read.logger_words import SI
 from shm.read.sidecar import sidecar_path, write_sidecar
-from shm.read.units import SI
 from shm.values import FrequencyResponse, Recording
 
 

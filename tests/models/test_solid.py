@@ -11,10 +11,9 @@ import scipy
 
 from shm.models.base import silent
 from shm.models.solid import S1, S2, Solid0, Solid1, Solid2
-from shm.models.solid.affine import AffineSystem, Modes, natural_modes
 from shm.models.solid.assembly import Mesh, assembled
 from shm.models.solid.basis import transverse_basis
-from shm.models.solid.reduction import Reservoir
+from shm.models.solid.reduction import AffineSystem, Modes, Reservoir, natural_modes
 from shm_cli import thesis
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.slow import few_of

@@ -16,7 +16,7 @@ from shm.errors import NothingThere, UsageError
 from shm.pipeline import Flow, utc_now
 from shm.pipeline.telling import after_works, quiet_until, works_before
 from shm.store import IdentifiedTest, Lineage, Silence, Store, StoredTest, Workspace
-from shm.store.stored_silences import silenced_until
+from shm.store.stored_alerts import silenced_until
 from shm.values import Alert, Selection
 from shm_cli.main import run
 from tests.helpers.flows import Clock, a_flow

@@ -11,7 +11,7 @@ from shm.modes_document import load_modes
 from shm.read import FORMATS, peek, read, sidecar_path
 from shm.read.content import MOST_MEMBERS
 from shm.read.limits import Limits
-from shm.read.units import unit_of
+from shm.read.logger_words import unit_of
 from shm.values import FrequencyResponse, Recording
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text(encoding="utf-8")

@@ -6,7 +6,7 @@ import pytest
 
 import shm.read
 from shm.read import FORMATS, peek, sidecar_path
-from shm.read.units import accelerance_si, unit_of
+from shm.read.logger_words import accelerance_si, unit_of
 from shm.read.universal_frf import number_nodes, sign
 
 

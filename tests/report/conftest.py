@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from shm.report.contents import HangerReport, trend_row
-from shm.report.figures import illustration as illustrations
-from shm.report.figures.illustration import Illustration, Member, illustration
+from shm.report.figures import specification
+from shm.report.figures.specification import Illustration, Member, illustration
 from shm.values import (
     Alert,
     Drift,
@@ -157,4 +157,4 @@ def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
             kept[key] = (data, illustration(of, data))
         return kept[key][1]
 
-    monkeypatch.setattr(illustrations, "illustration", shared)
+    monkeypatch.setattr(specification, "illustration", shared)

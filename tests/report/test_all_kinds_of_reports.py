@@ -24,12 +24,11 @@ from shm.report.contents import (
     ModalTestReport,
     TrendRow,
 )
+from shm.report.formatting import Interval
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_status import Status
-from shm.report.intervals import Interval
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
-from shm.report.period import Period
-from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime
+from shm.report.states import CalledChange, Period, QuantityOverTime, StatesOverTime
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
 from shm.watch.history import Band
 from tests.helpers.nouns import a_change, a_message

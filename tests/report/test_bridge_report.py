@@ -12,10 +12,10 @@ from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_json, bridge_paper
 from shm.report.contents import BridgeReport, HangerLine, HangerReport
+from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
 from shm.report.hanger_summary import summary
 from shm.report.hanger_tables import neighbours
-from shm.report.intervals import Interval
 from shm.report.shifts import bar
 from shm.values import Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern

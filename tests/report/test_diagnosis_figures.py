@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.report.colours import PALETTE
 from shm.report.contents import DiagnosisSheet
 from shm.report.figures.every_figure import diagnosis_figures
-from shm.report.figures.illustration import Illustration
+from shm.report.figures.specification import Illustration
+from shm.report.figures.style import PALETTE
 from shm.values import TensionEstimate
 from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, STRING, STRING_HANGER, sheet
 

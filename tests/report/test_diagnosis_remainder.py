@@ -12,9 +12,9 @@ from shm.errors import NothingThere
 from shm.models.composed import ComposedHanger
 from shm.models.effects import EFFECTS, Conditions, Effect, Survey, Variant
 from shm.report.contents import DiagnosisSheet
+from shm.report.diagnosis_remainder import effect_file
 from shm.report.diagnosis_report import causes
 from shm.report.diagnosis_summary import consequences, verdict
-from shm.report.effect_file import effect_file
 from shm.values import Compatibility, LawTerm, Remainder, TensionEstimate
 from tests.report.diagnoses import HANGER, LED, NO_GAP, UNEXPLAINED, make_residuals
 

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from shm.report.colours import PALETTE
 from shm.report.contents import HangerReport
 from shm.report.figures.every_figure import Illustration, hanger_figures
-from shm.report.figures.illustration import png
+from shm.report.figures.specification import png
+from shm.report.figures.style import PALETTE
 from shm.values import FrequencyResponse
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -20,14 +20,14 @@ from shm.report.figures.along_the_bridge import bridge_illustration
 from shm.report.figures.every_figure import hanger_figures
 from shm.report.figures.gap_before_and_after import GAP_TENSION
 from shm.report.figures.hanger_states import STATES
+from shm.report.formatting import Interval
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_status import Status
 from shm.report.hanger_tables import history, models, results
-from shm.report.intervals import Interval
 from shm.report.shifts import shift_unit
 from shm.report.states import QuantityOverTime, StatesOverTime
 from shm.values import Hanger, Posterior, Selection, TensionEstimate
-from shm.values.force_units import force_unit
+from shm.values.rounding import force_unit
 from shm.watch.history import Band
 from shm.watch.neighbours import HangerShift, bridge_pattern
 from tests.helpers.nouns import a_message

@@ -7,8 +7,8 @@ from datetime import datetime, timedelta, timezone
 import pytest
 
 from shm.report import formatting
-from shm.report.intervals import Interval
-from shm.values.force_units import force_unit
+from shm.report.formatting import Interval
+from shm.values.rounding import force_unit
 
 KILONEWTON = force_unit(1e5)
 

@@ -14,14 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from shm.report import colours
-from shm.report.colours import PALETTE
 from shm.report.contents import ModalTestReport
+from shm.report.figures import style
 from shm.report.figures.every_figure import OF_MODAL_TEST
 from shm.report.figures.every_figure import modal_test_figures as report_test_figures
-from shm.report.figures.illustration import Illustration
-from shm.report.figures.illustration import drawn as members_drawn
 from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.specification import Illustration
+from shm.report.figures.specification import drawn as members_drawn
+from shm.report.figures.style import PALETTE
 from shm.values import NAN, PLANES, Channel, ForeignMode, QualityCheck
 from tests.report.sheets import (
     ambient,
@@ -216,7 +216,7 @@ def test_hits_are_laid_over_each_other_dropped_ones_in_red(drawn: Drawn) -> None
     pulse, spectrum, fade = figure.axes
     assert len(pulse.lines) == len(fade.lines) == 6
     assert len(spectrum.lines) == 7  # and the line of a tenth
-    red = [line.get_label() for line in pulse.lines if line.get_color() == colours.RED]
+    red = [line.get_label() for line in pulse.lines if line.get_color() == style.RED]
     assert red == ["hit 2, dropped: double hit", "hit 5, dropped: not-a-number samples"]
     peaks = [float(np.max(np.asarray(line.get_ydata()))) for line in pulse.lines]
     assert peaks == pytest.approx([900 + 50 * hit for hit in range(6)], abs=4)
@@ -347,9 +347,9 @@ def test_damping_is_shown_with_its_interval(drawn: Drawn) -> None:
 def test_the_quality_sheet_says_each_verdict_by_symbol_word_and_colour(drawn: Drawn) -> None:
     texts = {t.get_text(): t for t in drawn["warned"]["quality"].figure.axes[0].texts}
     for verdict, symbol, colour in (
-        ("good", "✓", colours.GREEN),
-        ("warning", "!", colours.ORANGE),
-        ("unknown", "?", colours.QUIET),
+        ("good", "✓", style.GREEN),
+        ("warning", "!", style.ORANGE),
+        ("unknown", "?", style.QUIET),
     ):
         assert texts[f"{symbol} {verdict}"].get_color() == colour
     assert {"double hits", "14 dB", "10 dB", "not known", "→ Hit freely."} <= set(texts)

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from shm.report import colours
 from shm.report.as_pdf import WIDTH, _rules, as_pdf, widths
 from shm.report.contents import HangerReport
+from shm.report.figures import style
 from shm.report.hanger_report import hanger_paper
 from shm.report.paper import Paper, Part, Table
 from tests.helpers.painting import paint_blank
@@ -147,6 +147,6 @@ def test_a_rows_mark_stands_before_its_second_cell_in_the_colour_of_its_verdict(
     ]
     coloured = [(n, v) for n, v in enumerate(verdicts, 1) if v not in ("unknown", "best")]
     assert drawn == [
-        (marked, line, colours.VERDICT_COLOURS[verdict][1:].lower())  # type: ignore[index]
+        (marked, line, style.VERDICT_COLOURS[verdict][1:].lower())  # type: ignore[index]
         for line, verdict in coloured
     ]

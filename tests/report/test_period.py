@@ -11,12 +11,12 @@ from shm.errors import UsageError
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.contents import HangerReport
+from shm.report.formatting import Interval
 from shm.report.hanger_report import hanger_json, hanger_paper
 from shm.report.hanger_summary import in_period, summary
 from shm.report.hanger_tables import numbers, origins
 from shm.report.hanger_tables import period as period_table
-from shm.report.intervals import Interval
-from shm.report.period import Period, period_since
+from shm.report.states import Period, period_since
 from tests.report.conftest import START
 
 NOW = datetime(2026, 9, 10, 12, tzinfo=UTC)

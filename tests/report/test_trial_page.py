@@ -16,7 +16,7 @@ from shm.blind.scoring import trial_score
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.figures.every_figure import trial_figures
-from shm.report.figures.illustration import Illustration
+from shm.report.figures.specification import Illustration
 from shm.report.trial_report import trial_json, trial_paper
 from shm.values import TrialScore
 from tests.helpers.trial_answers import a_truth, an_answer, oracle, plausible, some_truths

@@ -9,7 +9,7 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import Stage, Store
-from shm.store.recording_rows import Decision
+from shm.store.list_rows import Decision
 from tests.helpers.nouns import NOW, a_watched_test
 
 DAY = timedelta(days=1)

@@ -13,8 +13,7 @@ import sqlalchemy as sa
 
 from shm.errors import BadInput, SchemaOutdated, StoreBusy, StoreError
 from shm.store import Outcome, Stage, Store, Workspace, database
-from shm.store.database import make_engine
-from shm.store.location import shown, url_of
+from shm.store.database import make_engine, shown, url_of
 from tests.helpers.nouns import NOW, a_file
 from tests.helpers.postgres import Databases
 from tests.helpers.workspaces import make_workspace

@@ -9,7 +9,7 @@ import pytest
 from shm.errors import NothingThere, UsageError
 from shm.store import Store
 from shm.store.rows import Silence
-from shm.store.stored_silences import silenced_until
+from shm.store.stored_alerts import silenced_until
 
 NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)
 HOUR = timedelta(hours=1)

@@ -9,7 +9,7 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import IdentifiedTest, Lineage, Stage, Store
-from shm.store.recording_rows import Death
+from shm.store.list_rows import Death
 from shm.store.stored_tests import StoredTest
 from shm.values import Selection
 from tests.helpers.nouns import NOW, a_file, a_posterior, a_test, a_watched_test

@@ -11,9 +11,9 @@ import pytest
 
 from shm.models import described
 from shm.models.base import Conditions
+from shm.models.end_effects import coupled_bar
 from shm.models.hanger import PointMass, solve
 from shm.models.hanger.physical import Zone
-from shm.models.turnbuckles import coupled_bar
 from shm.values import PLANES, FloatArray
 from shm.watch.causes import (
     BENDING_STIFFNESS,

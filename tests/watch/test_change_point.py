@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
 from shm.values import FloatArray
-from shm.watch.change_layout import Direction, Layout, Told
+from shm.watch.causes import Direction, Layout, Told
 from shm.watch.change_point import (
     LOG_SHARES,
     RAMP,

@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from shm.values import Alert, AlertKind, Change, Drift, Moved
-from shm.watch.events import EVENT_KINDS, is_explained
+from shm.watch.repair_check import EVENT_KINDS, is_explained
 
 DAY = datetime(2026, 5, 1, tzinfo=UTC)
 TENSION = Moved("tension", 0.9, -0.08, 0.01)

@@ -7,8 +7,8 @@ import pytest
 
 from shm.models import described
 from shm.values import TENSION
-from shm.watch.loosening import loosening_of
 from shm.watch.quantities import base_point, log_frequencies, watched_quantities
+from shm.watch.reading_corrections import loosening_of
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.modelled_tests import posterior
 

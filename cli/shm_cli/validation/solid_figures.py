@@ -29,8 +29,8 @@ from shm.report.figures.specification import (
 from shm.values import PLANES, FloatArray, Hanger, Plane
 from shm_cli import thesis
 from shm_cli.validation import frequencies
-from shm_cli.validation.figure import Figure
 from shm_cli.validation.frequencies import FrequencyRow
+from shm_cli.validation.thesis_figures import Figure
 
 Tell = Callable[[str, float], None]
 HUES = ("blue", "orange", "green", "purple", "red", "quiet")  # in a fixed order

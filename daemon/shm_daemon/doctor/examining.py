@@ -30,15 +30,17 @@ from shm.models import competing_names
 from shm.pipeline.telling import quiet_until
 from shm.read import sandbox
 from shm.report.formatting import counted
-from shm.report.logo import read_logo
+from shm.report.paper import read_logo
 from shm.settings import Settings
 from shm.store import Workspace
 from shm.store.rows import Delivery, DeliveryState, Silence
-from shm.store.stored_silences import silenced_until
+from shm.store.stored_alerts import silenced_until
 from shm.store.workspace import FOLDERS
-from shm_daemon.doctor.check_settings import check_changed_settings
-from shm_daemon.doctor.check_sign_on import check_single_sign_on
-from shm_daemon.doctor.check_streams import check_streams
+from shm_daemon.doctor.check_description import (
+    check_changed_settings,
+    check_single_sign_on,
+    check_streams,
+)
 from shm_daemon.doctor.checks import (
     WAITS_LONG,
     Check,

@@ -14,25 +14,17 @@ from fastapi.responses import JSONResponse
 import shm
 from shm.errors import ShmError
 from shm.pipeline import utc_now
-from shm_daemon.web import (
-    hanger_numbers,
-    hangers,
-    imports,
-    recordings,
-    signing_in,
-    streams,
-    tests,
-    watching,
-)
+from shm_daemon.web import hanger_numbers, hangers, metrics, recordings, tests
 from shm_daemon.web.access import Reader
 from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.bridge_view import glance
 from shm_daemon.web.faults import handle_faults
 from shm_daemon.web.frame import prepare_templates
-from shm_daemon.web.front import Pages
 from shm_daemon.web.metrics import Exposition
+from shm_daemon.web.middleware import Pages
 from shm_daemon.web.other_bridges import OtherBridges
 from shm_daemon.web.pages import (
+    accounts,
     alerts,
     audit,
     baseline,
@@ -45,14 +37,11 @@ from shm_daemon.web.pages import (
     held,
     notes,
     one_test,
-    password,
     sensors,
     settings,
-    silences,
     single_sign_on,
     static,
     upload,
-    users,
 )
 from shm_daemon.web.site import Site
 
@@ -60,21 +49,18 @@ _described = APIRouter(include_in_schema=False)
 
 _PARTS = (
     recordings,
-    streams,
-    imports,
+    upload,
     hangers,
     alerts,
-    watching,
-    signing_in,
+    metrics,
+    accounts,
     single_sign_on,
     static,
     bridge,
     bridges,
     comparison,
-    upload,
     health,
     held,
-    silences,
     sensors,
     tests,
     one_test,
@@ -85,8 +71,6 @@ _PARTS = (
     notes,
     audit,
     settings,
-    users,
-    password,
 )
 """What answers, asked in this order."""
 

@@ -15,8 +15,8 @@ from fastapi import Request
 from shm.errors import NothingThere
 from shm.pipeline.bridge_reporting import hanger_lines, hanger_shifts
 from shm.report.contents import HangerLine
+from shm.report.formatting import Interval
 from shm.report.hanger_status import BridgeMessage, Status, bridge_message
-from shm.report.intervals import Interval
 from shm.values import NAN, Hanger
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
 from shm_daemon.web.background_work import background_worker_of

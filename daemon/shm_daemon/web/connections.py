@@ -25,7 +25,7 @@ from typing import Any, ClassVar
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from shm_daemon.web.address import network_of
-from shm_daemon.web.front import is_upload
+from shm_daemon.web.middleware import is_upload
 
 DEADLINE_S = 10.0
 """From the first moment to the last byte of a request that is no upload; also for TLS to begin."""

@@ -18,7 +18,7 @@ from shm.errors import ShmError
 from shm.report import formatting
 from shm.report.as_html import ENVIRONMENT as OF_REPORTS
 from shm.report.as_html import environment
-from shm.report.colours import PALETTE
+from shm.report.figures.style import PALETTE
 from shm_daemon.web.health import notices
 from shm_daemon.web.site import Site
 

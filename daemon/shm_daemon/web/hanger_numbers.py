@@ -1,28 +1,192 @@
-"""What the page of a hanger shows, in numbers: trend, tests, documents of the figures."""
+"""What the page of a hanger shows, in numbers: trend, tests, documents of the figures. Unknown
+numbers are null. The lines of the table of tests are in the words of the report.
+"""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import JSONResponse
+from pydantic import BaseModel, Field
 
 from shm.documents import averaged_document
 from shm.errors import NothingThere
+from shm.report import formatting
+from shm.report.formatting import Interval
 from shm.report.states import QuantityOverTime, StatesOverTime, called_words
-from shm.store import StoredWatch, TrendPoint
+from shm.store import StoredWatch, TestRow
+from shm.store import TrendPoint as StoredPoint
+from shm.values.rounding import ForceUnit
 from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.address import test_page
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
 from shm_daemon.web.hanger_figures import FIGURES
-from shm_daemon.web.hanger_models import FigureDocument, HangerTests, HangerTrend
-from shm_daemon.web.hanger_tests import TestLine, lines_before
+from shm_daemon.web.hanger_figures.over_time import tension_unit
 from shm_daemon.web.hanger_view import HangerView
 from shm_daemon.web.hangers import Number, described
-from shm_daemon.web.models import LARGEST_NUMBER, MOST_ROWS
+from shm_daemon.web.models import LARGEST_NUMBER, MOST_ROWS, AveragedTension
 from shm_daemon.web.plotting import answer, plain
 from shm_daemon.web.site import Site
+
+
+class Numbers(BaseModel):
+    """Posterior samples in numbers; `q05` and `q95` bound 90 % of them."""
+
+    mean: float
+    sd: float
+    q05: float
+    q50: float
+    q95: float
+
+
+class TrendPoint(BaseModel):
+    """One test; stiffness is log10 of N m/rad, by `transverse_end_stiffness` and the like."""
+
+    test: str
+    time: datetime
+    temperature_c: float | None
+    model: str
+    tension_n: Numbers = Field(description="By the class in force alone.")
+    averaged: AveragedTension = Field(description="What figures and tables show.")
+    stiffness: dict[str, Numbers]
+
+
+class TrendEvent(BaseModel):
+    """What happened to the hanger beside its tests."""
+
+    at: datetime
+    kind: str = Field(description="baseline, adopted, adoption undone, alert, acknowledged")
+    who: str
+    why: str
+
+
+class CalledChange(BaseModel):
+    """A change that was called, and when it began with 90 % probability."""
+
+    called_by: str = Field(description="The test after which it was called.")
+    began_after: datetime
+    began_by: datetime
+    words: str
+
+
+class StateOverTime(BaseModel):
+    """What all tests up to each say of one quantity: tension in N, stiffness log10 of its unit.
+
+    It holds at the reference temperature: the swing with the temperature is taken out.
+    """
+
+    quantity: str
+    reference_temperature_c: float | None
+    times: list[datetime]
+    q05: list[float | None]
+    q50: list[float | None]
+    q95: list[float | None]
+
+
+class HangerTrend(BaseModel):
+    """A hanger over time; `states` are null while they are worked out: ask again."""
+
+    hanger: int
+    points: list[TrendPoint]
+    events: list[TrendEvent]
+    changes: list[CalledChange]
+    states: list[StateOverTime] | None
+
+
+class TestState(BaseModel):
+    """One test; what updating finds is null before it has been through it."""
+
+    __test__ = False  # no test, though named so
+
+    id: int
+    test: str
+    time: datetime
+    stage: str
+    temperature_c: float | None
+    model: str | None
+    tension_n: Numbers | None = Field(description="By the class in force alone.")
+    averaged: AveragedTension | None = Field(description="What tables show.")
+    page: str = Field(description="The address of its page.")
+
+
+class HangerTests(BaseModel):
+    """Tests of a hanger, the newest first."""
+
+    hanger: int
+    tests: list[TestState]
+    next_before: int | None = Field(description="To go on with; null at the oldest test.")
+
+
+class FigureDocument(BaseModel):
+    """A figure as plotly draws it, with its words."""
+
+    data: list[dict[str, Any]]
+    layout: dict[str, Any]
+    caption: str
+    alt: str = Field(description="What a blind reader needs.")
+
+
+@dataclass(frozen=True)
+class TestLine:
+    """One test, its tension in `unit`; `point` is None before it has been through updating."""
+
+    __test__ = False  # no test, though named so
+
+    row: TestRow
+    point: StoredPoint | None
+    unit: ForceUnit
+
+    @property
+    def id(self) -> int:
+        return self.row.id
+
+    @property
+    def name(self) -> str:
+        return self.row.name
+
+    @property
+    def address(self) -> str:
+        return test_page(self.row.hanger, self.row.name)
+
+    @property
+    def time(self) -> str:
+        """Its own or, where it tells none, that of its receipt."""
+        received = self.point is not None and self.point.taken_at is None
+        return formatting.moment(self.row.time) + (" (received)" if received else "")
+
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """Temperature, model, tension and its interval."""
+        if self.point is None:
+            return ("", f"on its way: {self.row.stage.value}", "", "")
+        tension = Interval.of_averaged(self.point.averaged).in_unit(self.unit)
+        known = math.isfinite(self.point.temperature_c)
+        return (
+            formatting.temperature(self.point.temperature_c) if known else "not recorded",
+            formatting.model_class(self.point.model),
+            formatting.mean(tension),
+            formatting.span(tension),
+        )
+
+
+def headings(view: HangerView) -> tuple[str, ...]:
+    """Of the table of the lines."""
+    unit = tension_unit(view.trend)
+    return ("test", "time", "temperature", "model", *formatting.tension_headings(unit))
+
+
+def lines_before(view: HangerView, limit: int, before: int | None = None) -> list[TestLine]:
+    """So many tests, the newest first; `before` is the number of the test to go on after."""
+    points = {point.test_id: point for point in view.trend}
+    rows = view.store.tests.list_rows(view.hanger.id, limit, before)
+    unit = tension_unit(view.trend)
+    return [TestLine(row, points.get(row.id), unit) for row in rows]
+
 
 router = APIRouter(prefix="/api/hangers/{hanger_id}", tags=["hangers"])
 
@@ -121,7 +285,7 @@ def _headers(view: HangerView) -> dict[str, str]:
     return RETRY_AFTER if view.states is None else {}
 
 
-def _point(point: TrendPoint) -> dict[str, Any]:
+def _point(point: StoredPoint) -> dict[str, Any]:
     return {
         "test": point.test,
         "time": point.time,

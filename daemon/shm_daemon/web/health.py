@@ -16,7 +16,7 @@ from typing import Any
 from shm.errors import ShmError
 from shm.pipeline import utc_now
 from shm.pipeline.unheard import heard, leads_of
-from shm.store.stored_silences import said_of
+from shm.store.stored_alerts import said_of
 from shm.values.messages import Lead
 from shm_daemon.heartbeat import NEARLY_FULL, patience_s, seconds_since_beat, told, why_turn_failed
 from shm_daemon.spool import never_taken

@@ -2,6 +2,8 @@
 
 It is made in parts. A part that fails is left out, counted in `shm_scrape_errors_total` and logged;
 the others answer, so that one odd row or folder never blinds those who watch.
+
+For those who watch over the daemon: health, and metrics for Prometheus.
 """
 
 from __future__ import annotations
@@ -13,8 +15,11 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from datetime import timedelta
+from typing import Any
 
 import numpy as np
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import JSONResponse
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4 as CONTENT_TYPE
@@ -22,11 +27,16 @@ from prometheus_client.registry import Collector
 
 from shm.pipeline import utc_now
 from shm.pipeline.stream_state import StreamCondition, stream_states
-from shm.store.recording_rows import ON_THE_WAY
+from shm.store.list_rows import ON_THE_WAY
 from shm.store.ring import ring_of
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
+from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.faults import answers
 from shm_daemon.web.hangers import quarantined
+from shm_daemon.web.health import health_document
+from shm_daemon.web.middleware import HEALTH, METRICS
+from shm_daemon.web.models import Health
 from shm_daemon.web.site import Site
 
 __all__ = ["CONTENT_TYPE", "Exposition"]
@@ -226,3 +236,42 @@ def _labelled(name: str, text: str, label: str, values: Mapping[str, int]) -> Ga
     for key, value in values.items():
         family.add_metric([key], value)
     return family
+
+
+router = APIRouter(tags=["watching"])
+
+
+@router.get(
+    HEALTH,
+    response_model=Health,
+    responses={
+        **answers(400),
+        503: {"model": Health, "description": "Store, spool or daemon fail."},
+    },
+    summary="Whether all is well",
+)
+def health(site: AtSite) -> Any:
+    """Needs no token and tells no secrets: for load balancers and service managers.
+
+    What works, though not as it is described now, is `degraded` and answers 200.
+    """
+    status, document = health_document(site)  # `front` has answered already, where it stands before
+    return JSONResponse(document, status)
+
+
+@router.get(
+    METRICS,
+    response_class=Response,
+    responses={
+        200: {"content": {CONTENT_TYPE: {"schema": {"type": "string"}}}},
+        **answers(400, 401, 403),
+    },
+    summary="Metrics for Prometheus",
+)
+def metrics(request: Request, _: Reader) -> Response:
+    """Computed from store and spool at each scrape; `shm_store_up` is 0 where the store is out, and
+    `shm_scrape_errors_total` counts what could not be told.
+    """
+    exposition = request.app.state.exposition
+    assert isinstance(exposition, Exposition)
+    return Response(exposition.page(), headers={"Content-Type": CONTENT_TYPE})

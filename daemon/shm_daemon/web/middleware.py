@@ -1,17 +1,34 @@
 """Around every request: whose Host it names, which headers protect the answer, a line in the log.
 
 Plain ASGI: what wraps requests the comfortable way would hold uploads in memory.
+
+What stands before the pages: answers `/health` by itself and sees that no caller takes it all.
+
+It is there within a second or two; the pages, with all that draws and computes, are loaded behind
+it, and whoever wants one of them waits so long. Where callers keep every place of the pages taken,
+uploads, `/metrics` and `/health` still have places of their own.
 """
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import threading
 import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from shm_daemon.web.address import IMPORTS, NOTES, STREAMS, UPLOADS
+from shm_daemon.web.health import health_document
 from shm_daemon.web.site import Site
 
 PROTECTION = {
@@ -83,3 +100,171 @@ def is_https(scope: Scope) -> bool:
     """
     forwarded = Headers(scope=scope).get("x-forwarded-proto", "").split(",")[0].strip().lower()
     return "https" in (scope["scheme"], forwarded)
+
+
+HEALTH, METRICS = "/health", "/metrics"
+
+
+# Technical: within the 10 s that Prometheus waits by default; many times the few seconds that
+# loading takes; a few askings meanwhile.
+_LONGEST_CHECK_S = 5.0
+_LONGEST_LOADING_S = 120.0
+_AGAIN_S = 5
+_LONGEST_BODY_BYTES = 65_536
+"""Of what is no upload: a reason for an acknowledgement has 2,000 characters at most."""
+
+
+class Kind(StrEnum):
+    """What is wanted, by what it may take."""
+
+    PAGE = "pages"
+    UPLOAD = "uploads"
+    METRICS = "metrics"
+
+
+_PLACES = {Kind.PAGE: 24, Kind.UPLOAD: 12, Kind.METRICS: 3}
+"""So many requests of a kind at once: together fewer than the 40 threads that answer them."""
+
+
+@dataclass(frozen=True)
+class Pages:
+    """What is loaded behind the front, how it is ended, and what its first visitor need not do."""
+
+    app: ASGIApp
+    close: Callable[[], None]
+    warm_up: Callable[[], None]
+
+
+class Front:
+    """An ASGI app before another, which `load` makes beside: the ways in are open meanwhile."""
+
+    def __init__(self, site: Site, load: Callable[[], Pages], *, warms_up: bool = False):
+        # Of its own: the pages may keep all connections to the store busy.
+        self._site, self._load, self._warms_up = site.twin(), load, warms_up
+        self._pages: Pages | None = None
+        self._failed = False
+        self._taken: Counter[Kind] = Counter()
+        self._checking: asyncio.Task[tuple[int, dict[str, Any]]] | None = None
+        self._checker = ThreadPoolExecutor(1, "health")
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await self._live(receive, send)
+        elif scope["type"] == "http":
+            await self._answer(scope, receive, send)
+
+    async def _live(self, receive: Receive, send: Send) -> None:
+        await receive()
+        loop, self._loaded = asyncio.get_running_loop(), asyncio.Event()
+        thread = threading.Thread(target=self._load_pages, args=(loop,), name="load", daemon=True)
+        thread.start()
+        await send({"type": "lifespan.startup.complete"})
+        await receive()
+        if self._pages is not None:
+            await loop.run_in_executor(None, self._pages.close)
+        self._checker.shutdown(wait=False, cancel_futures=True)
+        self._site.close()
+        await send({"type": "lifespan.shutdown.complete"})
+
+    def _load_pages(self, loop: asyncio.AbstractEventLoop) -> None:
+        # With no lower priority: a thread that the system lets wait would keep Python's lock.
+        try:
+            self._pages = self._load()
+        except Exception:
+            self._failed = True
+            log.exception("the pages cannot be loaded")
+        with suppress(RuntimeError):  # the loop has ended meanwhile
+            loop.call_soon_threadsafe(self._loaded.set)
+        if self._pages is not None and self._warms_up:
+            self._pages.warm_up()
+
+    async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
+        path, method = scope["path"], scope["method"]
+        if path == HEALTH and method in ("GET", "HEAD"):
+            status, document = await self._health()
+            await JSONResponse(document, status)(scope, receive, send)
+            return
+        kind = Kind.METRICS if path == METRICS else Kind.PAGE
+        if is_upload(scope):
+            kind = Kind.UPLOAD
+        else:
+            whole = await _whole(receive)
+            if whole is None:
+                await _fault(413, "This is more than is taken here.")(scope, receive, send)
+                return
+            receive = whole
+        if self._taken[kind] >= _PLACES[kind]:
+            said = f"Too many requests at once: all places of {kind} are taken."
+            await _fault(503, said, "Try again in some seconds.")(scope, receive, send)
+            return
+        self._taken[kind] += 1
+        try:
+            await self._pass_on(scope, receive, send)
+        finally:
+            self._taken[kind] -= 1
+
+    async def _pass_on(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            async with asyncio.timeout(_LONGEST_LOADING_S):
+                await self._loaded.wait()
+        except TimeoutError:
+            log.warning("the pages are still being loaded")
+        if self._pages is None:
+            said = "failed to load" if self._failed else "are still being loaded"
+            refusal = _fault(503, f"The pages {said}.", "The log of the web interface says more.")
+            await refusal(scope, receive, send)
+            return
+        await self._pages.app(scope, receive, send)
+
+    async def _health(self) -> tuple[int, dict[str, Any]]:
+        """Many who ask at once get one answer, and none waits for a store that hangs."""
+        if self._checking is None or self._checking.done():
+            self._checking = asyncio.create_task(self._check())
+        try:
+            async with asyncio.timeout(_LONGEST_CHECK_S):
+                return await asyncio.shield(self._checking)
+        except TimeoutError:
+            slow = f"The checks take more than {_LONGEST_CHECK_S:.0f} s."
+            return 503, {"status": "failing", "reasons": [slow]}
+
+    async def _check(self) -> tuple[int, dict[str, Any]]:
+        loop = asyncio.get_running_loop()
+        status, document = await loop.run_in_executor(self._checker, health_document, self._site)
+        if self._failed:
+            reasons = ["The pages cannot be shown: they failed to load.", *document["reasons"]]
+            return 503, {"status": "failing", "reasons": reasons}
+        return status, document
+
+
+def is_upload(scope: Mapping[str, object]) -> bool:
+    """Whether a request may have a long body: who sends it needs a token first."""
+    path = str(scope["path"])
+    is_chunk = path.startswith(f"{STREAMS}/") and path.endswith("/chunks")
+    return scope["method"] == "POST" and (path in (UPLOADS, IMPORTS, NOTES) or is_chunk)
+
+
+async def _whole(receive: Receive) -> Receive | None:
+    """A `receive` whose body has come already, so that nobody holds a place while it drips in;
+    None where it is too long.
+    """
+    body, message = bytearray(), await receive()
+    while message["type"] == "http.request":
+        body += message.get("body", b"")
+        if len(body) > _LONGEST_BODY_BYTES:
+            return None
+        if not message.get("more_body"):
+            break
+        message = await receive()
+    first: list[Message] = [{"type": "http.request", "body": bytes(body), "more_body": False}]
+    if message["type"] != "http.request":
+        first = [message]
+
+    async def told() -> Message:
+        return first.pop() if first else await receive()
+
+    return told
+
+
+def _fault(status: int, message: str, remedy: str = "") -> JSONResponse:
+    headers = {"Retry-After": str(_AGAIN_S)} if status == 503 else None
+    return JSONResponse({"message": message, "remedy": remedy}, status, headers)

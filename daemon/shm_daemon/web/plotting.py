@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from fastapi.responses import JSONResponse
 
-from shm.report.colours import PALETTE
+from shm.report.figures.style import PALETTE
 
 
 def answer(document: dict[str, Any], status: int = 200) -> JSONResponse:

@@ -1,4 +1,6 @@
-"""Recordings over HTTP: streamed to disk, landed in the spool, and asked after."""
+"""Recordings over HTTP: streamed to disk, landed in the spool, and asked after.
+Chunks of permanent sensors over HTTP: acknowledged once they are on disk.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +11,20 @@ from datetime import datetime
 from typing import Annotated, Any, Protocol
 
 from fastapi import APIRouter, Depends, Header, Path, Query, Request
+from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
 from shm.documents import parse_time
 from shm.errors import BadInput, NothingThere
 from shm.pipeline import utc_now
+from shm.read.chunk_document import LARGEST_BYTES, refuse_long_chunk
 from shm.store import Stage, Store, StoredRecording
 from shm.store.archive import refuse_oversize
-from shm_daemon.landing import Incoming, Landed, landing_name
+from shm_daemon.spool import Incoming, Landed, landing_name
+from shm_daemon.streams import take_chunks
 from shm_daemon.web.access import AtSite, Reader, Writer
-from shm_daemon.web.address import UPLOADS, test_page
+from shm_daemon.web.address import STREAMS, UPLOADS, test_page
 from shm_daemon.web.faults import Refused, answers
 from shm_daemon.web.models import (
     LARGEST_NUMBER,
@@ -39,7 +44,7 @@ PLAIN_BODY = {
     }
 }
 
-router = APIRouter(prefix=UPLOADS, tags=["recordings"])
+_of_uploads = APIRouter(prefix=UPLOADS, tags=["recordings"])
 
 List = Annotated[str | None, Query(max_length=MOST_WRITTEN)]
 Number = Annotated[float | None, Query(allow_inf_nan=False)]
@@ -81,7 +86,7 @@ def described_by(
     return {key: value for key, value in values.items() if value is not None}
 
 
-@router.post(
+@_of_uploads.post(
     "",
     status_code=202,
     response_model=Uploaded,
@@ -129,7 +134,7 @@ async def upload(
     )
 
 
-@router.get(
+@_of_uploads.get(
     "/{key}",
     response_model=RecordingStatus,
     responses=answers(400, 401, 403, 404, 422, 503),
@@ -146,7 +151,7 @@ def status(
     return _row(site.store, _recording(site.store, key))
 
 
-@router.get(
+@_of_uploads.get(
     "",
     response_model=Recordings,
     responses=answers(400, 401, 403, 422, 503),
@@ -292,3 +297,60 @@ def _numbers(key: str, text: str | None) -> list[object] | None:
 
 
 _NUMBER = re.compile(r"[+-]?\d{1,12}(\.\d{0,12})?([eE][+-]?\d{1,2})?")
+
+
+_of_streams = APIRouter(prefix=STREAMS, tags=["streams"])
+
+
+class AcknowledgedChunk(BaseModel):
+    """A chunk that is on disk: the logger may forget it."""
+
+    stream: str
+    sequence: int
+    start: datetime
+    end: datetime
+    is_new: bool = Field(description="False where the same chunk was there before.")
+
+
+class _Body:
+    """What comes, in memory: a chunk is small."""
+
+    def __init__(self) -> None:
+        self.content = bytearray()
+
+    def write(self, piece: bytes | bytearray) -> None:
+        refuse_long_chunk(len(self.content) + len(piece))
+        self.content += piece
+
+
+@_of_streams.post(
+    "/{name}/chunks",
+    status_code=202,
+    response_model=AcknowledgedChunk,
+    responses=answers(400, 401, 403, 408, 409, 413, 415, 422, 503),
+    openapi_extra=PLAIN_BODY,
+    summary="Send a chunk of a stream",
+)
+async def chunks(
+    request: Request, site: AtSite, _: Writer, name: Annotated[str, Path(max_length=64)]
+) -> AcknowledgedChunk:
+    """Takes one chunk (`shm.chunk/1`) and answers once it is on disk.
+
+    The same chunk may be sent again after a broken connection: it is kept once. 409 says that its
+    number and time are another's, whose samples differ and stay. 503 says to keep it and to send it
+    again after `Retry-After`.
+
+    Example: `curl --data-binary @chunk.json -H "Authorization: Bearer $TOKEN"
+    http://127.0.0.1:8400/api/streams/h3/chunks`
+    """
+    body = _Body()
+    await receive_body(request, body, LARGEST_BYTES, refuse_long_chunk)
+    content = [bytes(body.content)]
+    workspace, store = site.workspace, site.store
+    (kept,) = await run_in_threadpool(take_chunks, workspace, store, name, content, utc_now())
+    return AcknowledgedChunk(**vars(kept))
+
+
+router = APIRouter()
+router.include_router(_of_uploads)
+router.include_router(_of_streams)

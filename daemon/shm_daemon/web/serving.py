@@ -63,8 +63,7 @@ def make_app(
 
     It answers `/health` at once and loads its pages beside.
     """
-    from shm_daemon.web.front import Front, Pages
-    from shm_daemon.web.middleware import Around
+    from shm_daemon.web.middleware import Around, Front, Pages
     from shm_daemon.web.site import Description, Site
 
     def load() -> Pages:

@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from shm.blind.layout import TRIAL_SCHEMA, Told, nobody
-from shm.blind.making.case import make_case
-from shm.blind.making.mix import WAYS, Draft, drafts
+from shm.blind.making.case import WAYS, Draft, drafts, make_case
 from shm.blind.sealing import write_key
 from shm.blind.workers import workers
 from shm.documents import dump

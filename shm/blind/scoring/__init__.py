@@ -9,13 +9,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from shm.blind.answers import read_answers, verified_sha256
-from shm.blind.layout import read_trial
-from shm.blind.scoring.calibration import reliability
+from shm.blind.layout import read_answers, read_trial, verified_sha256
 from shm.blind.scoring.cases import case_scores, left_out_scores
-from shm.blind.scoring.estimates import share
 from shm.blind.scoring.marks import marks
-from shm.blind.scoring.questions import figures, leading
+from shm.blind.scoring.scores import figures, leading, reliability, share
 from shm.blind.sealing import key_of
 from shm.values import Answer, Bin, CaseScore, Richness, TrialScore, TrueCase
 

@@ -15,23 +15,17 @@ from typing import get_args
 
 import numpy as np
 
-from shm.blind.scoring import calibration
+from shm.blind.scoring import scores
 from shm.blind.scoring.cases import SURE
-from shm.blind.scoring.estimates import (
-    Estimate,
-    difference,
-    median,
-    ratio_of_medians,
-    share,
-    weighed_mean,
-)
-from shm.blind.scoring.questions import (
+from shm.blind.scoring.scores import (
     Bounds,
+    Estimate,
     Question,
     after_percent,
     at_least,
     at_most,
     before_percent,
+    difference,
     every,
     everything,
     figures,
@@ -39,9 +33,13 @@ from shm.blind.scoring.questions import (
     known,
     leading,
     log_score,
+    median,
     mixed,
     of_kind,
     planted,
+    ratio_of_medians,
+    share,
+    weighed_mean,
 )
 from shm.values import CaseScore, Mark, Richness, Score
 
@@ -184,17 +182,17 @@ _MISCALIBRATED = 0.06
 
 _CALIBRATED = (
     Question(
-        "calibration error", everything, _LEADING, calibration.corrected,
+        "calibration error", everything, _LEADING, scores.corrected,
         overall=at_most(_MISCALIBRATED), each=every(at_most(_MISCALIBRATED)), better=-1,
     ),
-    Question("calibration error as counted", everything, _LEADING, calibration.counted),
-    Question("calibration error by chance", everything, _LEADING, calibration.by_chance),
+    Question("calibration error as counted", everything, _LEADING, scores.counted),
+    Question("calibration error by chance", everything, _LEADING, scores.by_chance),
     Question(
         "calibration missed if perfect", everything, _LEADING,
-        calibration.missed_if_perfect(_MISCALIBRATED),
+        scores.missed_if_perfect(_MISCALIBRATED),
     ),
     Question(
-        "calibration error above size four", everything, _LEADING, calibration.corrected,
+        "calibration error above size four", everything, _LEADING, scores.corrected,
         above=LARGE,
     ),
     Question(

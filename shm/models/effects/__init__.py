@@ -25,14 +25,18 @@ from shm.models.effects.of_mass import (
     SensorMass,
     UnknownPointMass,
 )
-from shm.models.effects.of_readings import LoadScale
 from shm.models.effects.of_section import (
     BendingStiffness,
     SectionLoss,
     SectionSize,
     ShearAndRotaryInertia,
 )
-from shm.models.effects.of_sensors import SensorMisalignment, SkewedPrincipalAxes, Timebase
+from shm.models.effects.of_sensors import (
+    LoadScale,
+    SensorMisalignment,
+    SkewedPrincipalAxes,
+    Timebase,
+)
 from shm.models.effects.of_tension import (
     GeometricHardening,
     JointSoftening,

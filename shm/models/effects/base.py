@@ -1,15 +1,23 @@
-"""What an effect of the catalogue is: places where it may act, parameters, and a physical term."""
+"""What an effect of the catalogue is: places where it may act, parameters, and a physical term.
+
+Where effects may act: ends, planes, any place along the hanger.
+
+What the size of an effect is measured against in a given hanger, and the priors it makes.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from shm.models.base import Conditions
-from shm.models.hanger.physical import PhysicalHanger
-from shm.values import AddedMass, FloatArray, Hanger, Plane
+from shm.models.as_made import RESTRAINT
+from shm.models.base import Conditions, Model
+from shm.models.hanger.physical import PhysicalHanger, Zone
+from shm.values import NAN, PLANES, AddedMass, FloatArray, Hanger, Plane
 
 GRADUAL = (0.6, 1.0, 1.4)
 """Reaches of three steps that stand for one gradual edge."""
@@ -168,3 +176,117 @@ class Effect:
         With the size at its `zero` they are the same.
         """
         raise TypeError(f"{type(self).__name__} does not say what it does to a hanger.")
+
+
+_ENDS = (("deck end", (0,)), ("arch end", (1,)), ("both ends", (0, 1)))
+
+
+def single_planes(survey: Survey) -> tuple[Variant, ...]:
+    """The whole hanger in each measured plane alone."""
+    return tuple(
+        Variant(f"everywhere, {plane}", planes=(PLANES.index(plane),)) for plane in survey.planes
+    )
+
+
+def planes(survey: Survey) -> tuple[Variant, ...]:
+    """The whole hanger: both planes where both were measured, and each measured plane alone."""
+    both = (Variant(),) if len(survey.planes) == len(PLANES) else ()
+    return both + single_planes(survey)
+
+
+def ends() -> tuple[Variant, ...]:
+    """Each end and both, both planes alike."""
+    return tuple(Variant(at, ends=where) for at, where in _ENDS)
+
+
+def ends_and_planes(survey: Survey) -> tuple[Variant, ...]:
+    """Each end and both; of the planes those that `planes` lists."""
+    return tuple(
+        Variant(plane.at.replace("everywhere", at), ends=where, planes=plane.planes)
+        for at, where in _ENDS
+        for plane in planes(survey)
+    )
+
+
+def springs(survey: Survey) -> tuple[Variant, ...]:
+    """Of springs at the ends: those of `ends_and_planes`, and alike in both measured planes.
+
+    What holds an end round its axis gives way the same in all directions; two free springs would
+    pay for a freedom that it does not have.
+    """
+    both = len(survey.planes) == len(PLANES)
+    alike = tuple(
+        Variant(f"{at}, both planes alike", ends=where, alike=True) for at, where in _ENDS if both
+    )
+    return ends_and_planes(survey) + alike
+
+
+def at_ends(variants: tuple[Variant, ...], ends: tuple[int, ...]) -> tuple[Variant, ...]:
+    """Those of `variants` that act at no other ends."""
+    return tuple(each for each in variants if set(each.ends) <= set(ends))
+
+
+def free_planes(variant: Variant) -> tuple[int, ...]:
+    """The planes that have a spring of their own; the first stands for all where they are alike."""
+    return variant.planes[:1] if variant.alike else variant.planes
+
+
+def place_along(hanger: Hanger) -> Parameter:
+    """The place of a local effect."""
+    return Parameter(
+        "x_m",
+        "m",
+        0.0,
+        hanger.length_m,
+        NAN,
+        "Nobody knows where along the hanger: every place is as likely.",
+        least=0.0,
+        most=hanger.length_m,
+    )
+
+
+def nested_zones(
+    middle_m: FloatArray,
+    extent_m: FloatArray,
+    reaches: Sequence[float],
+    stiffness_factor: FloatArray,
+    mass_factor: FloatArray,
+) -> tuple[Zone, ...]:
+    """A stretch that begins and ends in steps: one zone a share of its extent, about one middle.
+
+    Arrays (draws,); where zones overlap their factors multiply.
+    """
+    return tuple(
+        Zone(
+            start_m=middle_m - reach * extent_m / 2,
+            end_m=middle_m + reach * extent_m / 2,
+            stiffness_factor=stiffness_factor,
+            mass_factor=mass_factor,
+        )
+        for reach in reaches
+    )
+
+
+_MIDDLE_ORDER = 4  # of the seven or so orders that a hammer test finds
+
+
+def mass_kg(hanger: Hanger) -> float:
+    """The hanger's own mass."""
+    return hanger.mass_per_length_kg_m * hanger.length_m
+
+
+def rotational_stiffness(name: str, hanger: Hanger, hinge: bool = False) -> Parameter:
+    """The log10 of an end spring's stiffness, scaled by EI p of a mode of order 4.
+
+    No effect is an infinite stiffness, or none at all where the description has a `hinge`.
+    """
+    own = Model(hanger).wave_stiffness_n_m_rad(_MIDDLE_ORDER)
+    return Parameter(
+        name,
+        "N m/rad",
+        math.log10(RESTRAINT[0] * own),
+        math.log10(RESTRAINT[1] * own),
+        -np.inf if hinge else np.inf,
+        "0.03 to 1000 times EI p, what the bar itself resists with in mode 4: softer is a hinge, "
+        "stiffer a clamp; nobody knows the order of magnitude.",
+    )

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.models.base import Conditions
-from shm.models.effects import places
+from shm.models.effects import base
 from shm.models.effects.base import Effect, Parameter, Survey, Variant
 from shm.models.hanger.physical import LateralSpring, PhysicalHanger
 from shm.values import FloatArray, Hanger
@@ -28,7 +28,7 @@ class IntermediateSupport(Effect):
     imitated_by = ("sag", "support_motion", "section_loss", "point_mass", "partial_mass")
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        return places.planes(survey)
+        return base.planes(survey)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         own = _lateral_stiffness_n_m(hanger)
@@ -42,7 +42,7 @@ class IntermediateSupport(Effect):
             "EI/L^3, the bar): from a cable that leans on the hanger to a stiff tie.",
             spread="logarithmic",
         )
-        return size, places.place_along(hanger)
+        return size, base.place_along(hanger)
 
     def applied(
         self,

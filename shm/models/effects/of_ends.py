@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.models.base import Conditions
-from shm.models.effects import places, scales
+from shm.models.effects import base
 from shm.models.effects.base import GRADUAL, Effect, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger, SupportMode, Zone
 from shm.values import NAN, PLANES, FloatArray, Hanger
@@ -45,16 +45,16 @@ class RotationalEndFlexibility(Effect):
         return "" if hanger.supports.ends("clamped", "pinned") else "Nothing holds either end."
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        everywhere = places.springs(survey)
-        turning = places.at_ends(everywhere, hanger.supports.ends("pinned"))
-        return places.at_ends(everywhere, hanger.supports.ends("clamped")) + turning
+        everywhere = base.springs(survey)
+        turning = base.at_ends(everywhere, hanger.supports.ends("pinned"))
+        return base.at_ends(everywhere, hanger.supports.ends("clamped")) + turning
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         first = 1 + 2 * variant.ends[0]
         hinge = variant.ends[0] in hanger.supports.ends("pinned")
         return tuple(
-            scales.rotational_stiffness(f"log10_k{first + plane}", hanger, hinge)
-            for plane in places.free_planes(variant)
+            base.rotational_stiffness(f"log10_k{first + plane}", hanger, hinge)
+            for plane in base.free_planes(variant)
         )
 
     def applied(
@@ -98,7 +98,7 @@ class TranslationalEndFlexibility(Effect):
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         held = hanger.supports.ends("clamped", "pinned")
-        return places.at_ends(places.springs(survey), held)
+        return base.at_ends(base.springs(survey), held)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         first = 1 + 2 * variant.ends[0]
@@ -113,7 +113,7 @@ class TranslationalEndFlexibility(Effect):
                 "3 to 3000 times T/L + 100 EI/L^3, what the bar itself resists with: what holds a "
                 "hanger is stiffer than the hanger, nobody knows by how many orders of magnitude.",
             )
-            for plane in places.free_planes(variant)
+            for plane in base.free_planes(variant)
         )
 
     def applied(
@@ -162,7 +162,7 @@ class EffectiveLength(Effect):
     )
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        return places.ends()
+        return base.ends()
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         size = Parameter(
@@ -219,7 +219,7 @@ class StiffEndZones(Effect):
     )
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        return places.ends_and_planes(survey)
+        return base.ends_and_planes(survey)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         size = Parameter(
@@ -317,11 +317,11 @@ class SupportMotion(Effect):
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         held = hanger.supports.ends("clamped", "pinned")
-        everywhere = places.at_ends(places.ends_and_planes(survey), held)
+        everywhere = base.at_ends(base.ends_and_planes(survey), held)
         return tuple(each for each in everywhere if len(each.ends) == len(each.planes) == 1)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        own_kg = scales.mass_kg(hanger)
+        own_kg = base.mass_kg(hanger)
         size = Parameter(
             "support_mass_kg",
             "kg",

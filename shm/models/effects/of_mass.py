@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.models.base import Conditions
-from shm.models.effects import places, scales
+from shm.models.effects import base
 from shm.models.effects.base import GRADUAL, STEEP, Effect, OverTime, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger, PointMass
 from shm.values import NAN, FloatArray, Hanger
@@ -89,7 +89,7 @@ class UnknownPointMass(Effect):
     other_laws = ("it turns with the bar, with a radius of gyration of 0.1 m",)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        own_kg = scales.mass_kg(hanger)
+        own_kg = base.mass_kg(hanger)
         size = Parameter(
             "mass_kg",
             "kg",
@@ -99,7 +99,7 @@ class UnknownPointMass(Effect):
             "0.005 to 10 % of the hanger's mass: from a cable tie to a coupler or a heavy clamp.",
             spread="logarithmic",
         )
-        return size, places.place_along(hanger)
+        return size, base.place_along(hanger)
 
     def applied(
         self,
@@ -155,7 +155,7 @@ class PartialMass(Effect):
             "5 to 80 % of the length: shorter is a point mass, longer is mass all along.",
             spread="logarithmic",
         )
-        return size, places.place_along(hanger), extent
+        return size, base.place_along(hanger), extent
 
     def applied(
         self,
@@ -168,7 +168,7 @@ class PartialMass(Effect):
         change, middle_m, extent_m = values.T
         reaches = {1: GRADUAL, 2: STEEP}.get(variant.law, (1.0,))
         put_on = (1 + change) ** (1 / len(reaches))
-        zones = places.nested_zones(middle_m, extent_m, reaches, np.ones_like(change), put_on)
+        zones = base.nested_zones(middle_m, extent_m, reaches, np.ones_like(change), put_on)
         return replace(physical, zones=physical.zones + zones)
 
 

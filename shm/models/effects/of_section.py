@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.models.base import Conditions
-from shm.models.effects import places
+from shm.models.effects import base
 from shm.models.effects.base import GRADUAL, STEEP, Effect, OverTime, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import NAN, FloatArray, Hanger
@@ -46,7 +46,7 @@ class BendingStiffness(Effect):
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         round_section = math.isfinite(hanger.diameter_m)
-        return (Variant(),) if round_section else places.planes(survey)
+        return (Variant(),) if round_section else base.planes(survey)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         size = Parameter(
@@ -175,7 +175,7 @@ class SectionLoss(Effect):
             "2 to 50 % of the length: from a splash zone or a notch at the socket to half the bar.",
             spread="logarithmic",
         )
-        return size, places.place_along(hanger), extent
+        return size, base.place_along(hanger), extent
 
     def applied(
         self,
@@ -189,7 +189,7 @@ class SectionLoss(Effect):
         reaches = {1: GRADUAL, 3: STEEP}.get(variant.law, (1.0,))
         power = 1 if variant.law == 2 else 2
         left = (1 - loss) ** (1 / len(reaches))
-        zones = places.nested_zones(middle_m, extent_m, reaches, left**power, left)
+        zones = base.nested_zones(middle_m, extent_m, reaches, left**power, left)
         return replace(physical, zones=physical.zones + zones)
 
 

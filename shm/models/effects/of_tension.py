@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.models.base import Conditions
-from shm.models.effects import places, scales
+from shm.models.effects import base
 from shm.models.effects.base import Effect, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import FloatArray, Hanger
@@ -160,10 +160,10 @@ class JointSoftening(Effect):
         return missing_levels(survey)
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        return places.at_ends(places.ends(), hanger.supports.ends("clamped"))
+        return base.at_ends(base.ends(), hanger.supports.ends("clamped"))
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        return (scales.rotational_stiffness("log10_k_at_reference_level", hanger),)
+        return (base.rotational_stiffness("log10_k_at_reference_level", hanger),)
 
     def applied(
         self,
@@ -217,7 +217,7 @@ class Sag(Effect):
         return ""
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
-        return places.single_planes(survey)
+        return base.single_planes(survey)
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         size = Parameter(

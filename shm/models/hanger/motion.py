@@ -16,11 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.models.hanger.breaks import stiffness_ratio
+from shm.models.hanger.bar import stiffness_ratio
 from shm.models.hanger.functions import SLOPES
 from shm.models.hanger.physical import PhysicalHanger
-from shm.models.hanger.supports import Swing, are_coupled, rotational_n_m_rad
-from shm.models.hanger.system import System
+from shm.models.hanger.system import Swing, System, are_coupled, rotational_n_m_rad
 from shm.values import BoolArray, FloatArray, IntArray
 
 _FREE_SHIFT = 1.0

@@ -8,13 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models.hanger.bar import Bar
-from shm.models.hanger.breaks import along, bar_of, by_plane
+from shm.models.hanger.bar import Bar, along, bar_of, by_plane
 from shm.models.hanger.functions import SLOPES
 from shm.models.hanger.motion import Motion, motion
 from shm.models.hanger.physical import HangerModes, LateralSpring, PhysicalHanger, SupportMode
-from shm.models.hanger.supports import are_coupled, rotational_n_m_rad
-from shm.models.hanger.system import System, system
+from shm.models.hanger.system import System, are_coupled, rotational_n_m_rad, system
 from shm.values import PLANES, FloatArray
 
 _PLANES = len(PLANES)

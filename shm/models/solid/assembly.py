@@ -28,8 +28,8 @@ from skfem import (
     MeshQuad2,
 )
 
-from shm.models.solid.affine import AffineSystem, factorised, natural_modes
 from shm.models.solid.geometry import AXIAL, LATERAL, Edge, Geometry, Material, Support
+from shm.models.solid.reduction import AffineSystem, factorised, natural_modes
 from shm.values import PLANES, BoolArray, FloatArray, IntArray, Plane
 
 # A cell's corners in the order of scikit-fem, as steps along the three axes of the grid.

@@ -29,7 +29,7 @@ from shm.models.solid.reduction import TARGET_ERROR, Projected, Reduction
 from shm.values import FloatArray, Plane
 
 if TYPE_CHECKING:
-    from shm.models.solid.affine import AffineSystem
+    from shm.models.solid.reduction import AffineSystem
 
 # To be raised whenever the same description gives another basis than before.
 _VERSION = 1
@@ -60,7 +60,7 @@ class Description:
 
     def full_frequencies_hz(self, points: FloatArray, modes: int) -> FloatArray:
         """Transverse frequencies (n, modes) of the full model at points of tension and log10 k."""
-        from shm.models.solid.affine import natural_modes
+        from shm.models.solid.reduction import natural_modes
 
         system = self.system("transverse", rounded_up(modes))
         return np.array(

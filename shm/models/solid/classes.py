@@ -82,7 +82,7 @@ class SolidModel(Model):
 
     def convergence_hz(self, rods: tuple[int, ...], modes: int) -> Iterator[tuple[int, FloatArray]]:
         """Unknowns and frequencies (modes,) of held ends at nominal tension, by cells along it."""
-        from shm.models.solid.affine import natural_modes
+        from shm.models.solid.reduction import natural_modes
 
         for rod in rods:
             system = self.description().meshed("transverse", rod)

@@ -12,12 +12,12 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
-from shm.report import colours, formatting
+from shm.report import formatting
 from shm.report.contents import BridgeReport, HangerLine
 from shm.report.figures import style
-from shm.report.figures.illustration import Illustration, Member, drawn
+from shm.report.figures.specification import Illustration, Member, drawn
+from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
-from shm.report.intervals import Interval
 from shm.report.shifts import shift_unit
 from shm.values import FloatArray
 from shm.watch.neighbours import BridgePattern, HangerRow
@@ -27,7 +27,7 @@ Along = TypeVar("Along", float, FloatArray)
 # Vermilion and blue differ in hue and lightness for every kind of colour blindness; the middle is a
 # grey that still shows as a line.
 _SHIFTS = LinearSegmentedColormap.from_list(
-    "lost to gained", ["#8c3d00", colours.ORANGE, "#c9ccd2", colours.BLUE, "#003f63"]
+    "lost to gained", ["#8c3d00", style.ORANGE, "#c9ccd2", style.BLUE, "#003f63"]
 )
 _RISE = 1.0
 _DECK = 0.0
@@ -92,7 +92,7 @@ def _elevation(
 ) -> None:
     ends = _ends(places)
     along = np.linspace(*ends, 200)
-    style_of = {"color": colours.INK, "solid_capstyle": "round", "zorder": 4}
+    style_of = {"color": style.INK, "solid_capstyle": "round", "zorder": 4}
     axes.plot(along, _arch(along, ends), linewidth=3.0, **style_of)  # type: ignore[arg-type]
     axes.plot(ends, (_DECK, _DECK), linewidth=4.5, **style_of)  # type: ignore[arg-type]
     width = min(4.0, _WIDTH_POINTS / len(places))
@@ -103,7 +103,7 @@ def _elevation(
     for each in pattern.not_compared:
         at = places[each.hanger]
         top = _arch(at, ends)
-        axes.plot((at, at), (_DECK, top), color=colours.QUIET, linewidth=1.0, linestyle=":")
+        axes.plot((at, at), (_DECK, top), color=style.QUIET, linewidth=1.0, linestyle=":")
     _numbers(axes, pattern, places)
     axes.set_ylim(-0.25, _RISE * 1.06)
     axes.set_axis_off()
@@ -122,7 +122,7 @@ def _numbers(axes: Axes, pattern: BridgePattern, places: dict[int, float]) -> No
         axes.text(
             places[hanger], -_CLEARANCE, str(hanger),
             ha="center", va="center", fontsize=style.TINY + 1,
-            color=colours.INK if hanger in compared else colours.QUIET,
+            color=style.INK if hanger in compared else style.QUIET,
             fontweight="bold" if hanger in marked else "normal",
         )  # fmt: skip
 
@@ -158,10 +158,10 @@ def _bars(axes: Axes, pattern: BridgePattern, places: dict[int, float], scale: N
     axes.bar(at, shifts, 0.62 * _step(places), color=_colours(rows, scale), zorder=2)
     axes.errorbar(
         at, shifts, half,
-        fmt="none", ecolor=colours.INK, elinewidth=1.1, zorder=3,
+        fmt="none", ecolor=style.INK, elinewidth=1.1, zorder=3,
         capsize=2.5 if len(rows) <= _MOST_NUMBERS else 0,
     )  # fmt: skip
-    axes.axhline(0, color=colours.INK, linewidth=0.9)
+    axes.axhline(0, color=style.INK, linewidth=0.9)
     axes.set_xlim(*_ends(places))
     if not metres:
         shown = _with_room(sorted(places, key=lambda hanger: places[hanger]), places)
@@ -172,8 +172,8 @@ def _colour_bar(figure: Figure, panels: Sequence[Axes], scale: Normalize) -> Non
     bar = figure.colorbar(
         ScalarMappable(scale, _SHIFTS), ax=list(panels), fraction=0.03, pad=0.02, aspect=34
     )
-    bar.set_label("shift of the tension (%)", fontsize=9.0, color=colours.INK)
-    bar.ax.tick_params(labelsize=9.0, colors=colours.INK)
+    bar.set_label("shift of the tension (%)", fontsize=9.0, color=style.INK)
+    bar.ax.tick_params(labelsize=9.0, colors=style.INK)
     bar.outline.set_visible(False)
 
 
@@ -206,12 +206,12 @@ SHIFTS = Member(
 
 
 _MARKS = {
-    Status.ALERT: (colours.RED, "v"),
-    Status.WATCH: (colours.ORANGE, "D"),
-    Status.CHECK: (colours.ORANGE, "X"),
-    Status.UNCLEAR: (colours.ORANGE, "P"),
-    Status.STEADY: (colours.GREEN, "o"),
-    Status.FIRST: (colours.BLUE, "s"),
+    Status.ALERT: (style.RED, "v"),
+    Status.WATCH: (style.ORANGE, "D"),
+    Status.CHECK: (style.ORANGE, "X"),
+    Status.UNCLEAR: (style.ORANGE, "P"),
+    Status.STEADY: (style.GREEN, "o"),
+    Status.FIRST: (style.BLUE, "s"),
 }
 _MOST_TICKS = 40
 _VIEW_PERCENT = 25.0
@@ -226,7 +226,7 @@ def _draw_tensions(data: BridgeReport) -> Figure | None:
     axes = figure.subplots()
     style.dress(axes, "hanger, in the order of the bridge", "tension (% of nominal)")
     axes.grid(False, axis="x")
-    axes.axhline(100, color=colours.INK, linestyle=":", label="nominal")
+    axes.axhline(100, color=style.INK, linestyle=":", label="nominal")
     for status in Status:
         _points(axes, [each for each in shares if each[1].status is status], status)
     _view(axes, [share for *_, share in shares])

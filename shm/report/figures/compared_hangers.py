@@ -18,7 +18,7 @@ from shm.report.figures.specification import (
     stacked,
 )
 from shm.report.figures.time_axes import bounds_of, level, part, places, thinned_words, time_axis
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.values.rounding import rounded_percent
 
 _MARKS: tuple[tuple[str, Symbol], ...] = (

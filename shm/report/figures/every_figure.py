@@ -8,23 +8,23 @@ from shm.report.contents import BridgeReport, DiagnosisSheet, HangerReport, Moda
 from shm.report.figures.along_the_bridge import SHIFTS, TENSIONS
 from shm.report.figures.gap_before_and_after import BEFORE_AND_AFTER, GAP_TENSION
 from shm.report.figures.gap_causes import FIGURE as CAUSES
+from shm.report.figures.gap_causes import SHARED
 from shm.report.figures.gap_map import FIGURE as GAP_MAP
-from shm.report.figures.gap_shared import FIGURE as SHARED
 from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
-from shm.report.figures.hanger_response import FIGURE as RESPONSE_OF_LATEST
+from shm.report.figures.hanger_frequencies import RESPONSE as RESPONSE_OF_LATEST
 from shm.report.figures.hanger_states import FIGURE as STATES
 from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
 from shm.report.figures.hanger_tension import FIGURE as TENSION
 from shm.report.figures.hanger_trend import FIGURE as TREND
-from shm.report.figures.illustration import Illustration, Member, drawn
-from shm.report.figures.modal_test_damping import FIGURE as DAMPING
 from shm.report.figures.modal_test_hits import FIGURE as HITS
 from shm.report.figures.modal_test_quality import FIGURE as QUALITY
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
 from shm.report.figures.modal_test_shapes import FIGURE as SHAPES
 from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.modal_test_stabilisation import DAMPING
 from shm.report.figures.modal_test_stabilisation import FIGURE as STABILISATION
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
+from shm.report.figures.specification import Illustration, Member, drawn
 from shm.report.figures.trial_answers import CONFUSION, DETECTION, LEFT_OUT
 from shm.report.figures.trial_errors import (
     COVERAGE,

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shm.report import colours, formatting
+from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_wording import (
     AFTER,
@@ -22,10 +22,17 @@ from shm.report.diagnosis_wording import (
 )
 from shm.report.figures import style
 from shm.report.figures.gap_map import by_plane, kept, orders, planes
-from shm.report.figures.illustration import Member
-from shm.report.figures.specification import PLANE_HUES, Axis, Points, Specification, Symbol, limits
+from shm.report.figures.specification import (
+    PLANE_HUES,
+    Axis,
+    Member,
+    Points,
+    Specification,
+    Symbol,
+    limits,
+)
 from shm.values import Plane, Residual, TensionEstimate
-from shm.values.force_units import ForceUnit
+from shm.values.rounding import ForceUnit
 
 
 @dataclass(frozen=True)
@@ -161,8 +168,8 @@ def _draw_gap_tension(sheet: DiagnosisSheet) -> Figure | None:
 def _rows(sheet: DiagnosisSheet) -> list[tuple[str, TensionEstimate, str]]:
     diagnosis = sheet.diagnosis
     rows = [
-        (f"baseline {diagnosis.baseline}", diagnosis.tension_before_n, colours.QUIET),
-        (AFTER, diagnosis.tension_after_n, colours.BLUE),
+        (f"baseline {diagnosis.baseline}", diagnosis.tension_before_n, style.QUIET),
+        (AFTER, diagnosis.tension_after_n, style.BLUE),
     ]
     return [row for row in rows if math.isfinite(row[1].mean)]
 
@@ -184,7 +191,7 @@ def _interval(
         textcoords="offset points",
         ha="center",
         fontsize=style.TINY + 0.5,
-        color=colours.INK,
+        color=style.INK,
     )
 
 
@@ -194,7 +201,7 @@ def _nominal(axes: Axes, nominal: float) -> None:
     reach = _NEAR * (high - low)
     if not low - reach <= nominal <= high + reach:
         return
-    axes.axvline(nominal, color=colours.INK, linestyle=":", linewidth=1.2, label="nominal")
+    axes.axvline(nominal, color=style.INK, linestyle=":", linewidth=1.2, label="nominal")
     margin = 0.08 * (high - low)
     axes.set_xlim(min(low, nominal - margin), max(high, nominal + margin))
     style.legend_above(axes)

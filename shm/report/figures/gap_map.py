@@ -11,7 +11,6 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_wording import is_set_aside
-from shm.report.figures.illustration import Member
 from shm.report.figures.specification import (
     PLANE_HUES,
     PLANE_SYMBOLS,
@@ -21,6 +20,7 @@ from shm.report.figures.specification import (
     Dash,
     Line,
     Mark,
+    Member,
     Panel,
     Points,
     Rule,
@@ -28,7 +28,7 @@ from shm.report.figures.specification import (
     Symbol,
     limits,
 )
-from shm.report.intervals import NORMAL_90
+from shm.report.formatting import NORMAL_90
 from shm.values import PLANES, GapPlace, Plane, Residual, Trend
 
 

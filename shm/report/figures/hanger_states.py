@@ -9,12 +9,12 @@ import numpy as np
 
 from shm.report.contents import HangerReport
 from shm.report.figures import time_axes
-from shm.report.figures.illustration import Member
 from shm.report.figures.specification import (
     Axis,
     Band,
     Line,
     Mark,
+    Member,
     Panel,
     Points,
     Rule,
@@ -25,7 +25,7 @@ from shm.report.figures.specification import (
 )
 from shm.report.states import QuantityOverTime, StatesOverTime
 from shm.values import BoolArray
-from shm.values.force_units import force_unit
+from shm.values.rounding import force_unit
 from shm.watch.history import Band as Bounds
 
 _TENSION_INCHES, _STIFFNESS_INCHES, _TEMPERATURE_INCHES = 2.3, 1.5, 0.75

@@ -13,8 +13,15 @@ from shm.models import end_stiffness
 from shm.report import formatting
 from shm.report.contents import HangerReport
 from shm.report.figures import time_axes
-from shm.report.figures.illustration import Member
-from shm.report.figures.specification import Axis, Mark, Panel, Specification, limits, stacked
+from shm.report.figures.specification import (
+    Axis,
+    Mark,
+    Member,
+    Panel,
+    Specification,
+    limits,
+    stacked,
+)
 from shm.values import FloatArray
 from shm.watch.history import Band as Bounds
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shm.report import colours, formatting
+from shm.report import formatting
 from shm.report.contents import HangerReport
 from shm.report.figures import style
-from shm.report.figures.illustration import Member
-from shm.values.force_units import ForceUnit
+from shm.report.figures.specification import Member
+from shm.values.rounding import ForceUnit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,11 +27,11 @@ def _draw(data: HangerReport) -> Figure:
     style.dress(axes, f"tension ({unit.name})", f"probability density (1/{unit.name})")
     _histogram(axes, data)
     _see(axes, data)
-    _line(axes, data.hanger.nominal_tension_n, unit, "nominal", colours.INK, ":", 0.9)
+    _line(axes, data.hanger.nominal_tension_n, unit, "nominal", style.INK, ":", 0.9)
     if data.baseline_tension_n is not None:
         baseline = data.baseline_tension_n.in_unit(unit)
-        axes.axvspan(baseline.low, baseline.high, color=colours.GREEN, alpha=0.15, linewidth=0)
-        _line(axes, data.baseline_tension_n.mean, unit, "baseline", colours.GREEN, "--", 0.8)
+        axes.axvspan(baseline.low, baseline.high, color=style.GREEN, alpha=0.15, linewidth=0)
+        _line(axes, data.baseline_tension_n.mean, unit, "baseline", style.GREEN, "--", 0.8)
     style.legend_above(axes)
     return figure
 
@@ -88,7 +88,7 @@ def _histogram(axes: Axes, data: HangerReport) -> None:
             centres[mask],
             heights[mask],
             width=np.diff(edges)[mask] * 0.94,
-            color=colours.BLUE,
+            color=style.BLUE,
             alpha=alpha,
             linewidth=0,
             label=label,

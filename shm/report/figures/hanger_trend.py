@@ -13,10 +13,10 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import HangerReport
 from shm.report.figures import time_axes
-from shm.report.figures.illustration import Member
 from shm.report.figures.specification import (
     Axis,
     Mark,
+    Member,
     Panel,
     Points,
     Specification,
@@ -24,11 +24,11 @@ from shm.report.figures.specification import (
     limits,
     stacked,
 )
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.report.states import CalledChange, QuantityOverTime
 from shm.values import FloatArray
-from shm.values.force_units import ForceUnit, force_unit
 from shm.values.notes import Note, NoteKind
+from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import averaged_now
 from shm.watch.history import Band as Bounds
 

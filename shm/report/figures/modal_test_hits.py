@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from shm.report import formatting
-from shm.report.figures.illustration import Member
 from shm.report.figures.modal_test_signals import (
     CURVE_BINS,
     LOWEST_DB,
@@ -23,6 +22,7 @@ from shm.report.figures.specification import (
     Axis,
     Dash,
     Line,
+    Member,
     Panel,
     Rule,
     Span,

@@ -7,11 +7,10 @@ import textwrap
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shm.report import colours
-from shm.report.colours import VERDICT_COLOURS
 from shm.report.figures import style
-from shm.report.figures.illustration import Member
 from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.specification import Member
+from shm.report.figures.style import VERDICT_COLOURS
 from shm.report.quality_table import SYMBOLS, overall, verdict_label, with_unit
 from shm.values import QualityCheck
 
@@ -38,10 +37,10 @@ def _draw(shown: Shown) -> Figure | None:
     axes.set_axis_off()
     axes.set_xlim(0, 1)
     axes.set_ylim(sum(heights) + _HEAD_INCHES, 0)
-    _row(axes, _BASE_INCHES, tuple([heading] for heading in _HEADINGS), colours.QUIET)
+    _row(axes, _BASE_INCHES, tuple([heading] for heading in _HEADINGS), style.QUIET)
     top = _HEAD_INCHES
     for check, row, height in zip(checks, rows, heights, strict=True):
-        axes.axhline(top, color=colours.GRID, linewidth=0.8)
+        axes.axhline(top, color=style.GRID, linewidth=0.8)
         _row(axes, top + _BASE_INCHES, row, VERDICT_COLOURS[check.verdict])
         top += height
     return figure
@@ -65,7 +64,7 @@ def _row(axes: Axes, base: float, cells: tuple[list[str], ...], first_colour: st
         for number, line in enumerate(lines):
             axes.text(
                 x, base + number * _LINE_INCHES, line, fontsize=style.TINY,
-                color=first_colour if column == 0 else colours.INK,
+                color=first_colour if column == 0 else style.INK,
                 fontweight="bold" if column == 0 else "normal",
             )  # fmt: skip
 

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from shm.report import formatting
-from shm.report.figures.illustration import Member
 from shm.report.figures.modal_test_spectra import (
     Shown,
     Spectrum,
@@ -27,6 +26,7 @@ from shm.report.figures.specification import (
     Dash,
     Line,
     Mark,
+    Member,
     Panel,
     Specification,
     envelope_places,

@@ -9,7 +9,6 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import ModalTestReport
-from shm.report.figures.illustration import Member
 from shm.report.figures.modal_test_spectra import Shown
 from shm.report.figures.specification import (
     PLANE_HUES,
@@ -17,12 +16,13 @@ from shm.report.figures.specification import (
     Axis,
     Line,
     Mark,
+    Member,
     Panel,
     Points,
     Rule,
     Specification,
 )
-from shm.report.intervals import NORMAL_90
+from shm.report.formatting import NORMAL_90
 from shm.values import PLANES, FloatArray, Mode
 
 ROOM = 1.35

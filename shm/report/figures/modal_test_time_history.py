@@ -9,7 +9,6 @@ import numpy as np
 from shm.identify import Hit
 from shm.report import formatting
 from shm.report.contents import ModalTestReport
-from shm.report.figures.illustration import Member
 from shm.report.figures.modal_test_signals import (
     HitRecord,
     borders_s,
@@ -28,6 +27,7 @@ from shm.report.figures.specification import (
     Axis,
     Line,
     Mark,
+    Member,
     Panel,
     Points,
     Rule,

@@ -9,11 +9,19 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import HangerReport
-from shm.report.figures.illustration import Member
-from shm.report.figures.specification import Axis, Bars, Mark, Panel, Points, Specification, limits
+from shm.report.figures.specification import (
+    Axis,
+    Bars,
+    Mark,
+    Member,
+    Panel,
+    Points,
+    Specification,
+    limits,
+)
 from shm.report.figures.style import WIDTH_INCHES
 from shm.values import FloatArray, Posterior
-from shm.values.force_units import force_unit
+from shm.values.rounding import force_unit
 
 # Layout: a page holds seven panels beside each other, each a cloud that can be seen through.
 _PANEL_INCHES = 1.6

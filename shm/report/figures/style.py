@@ -1,17 +1,62 @@
-"""What all figures share: size, letters, quiet axes."""
+"""What all figures share: size, letters, quiet axes, and colours that the colour-blind tell apart;
+a word stands beside each.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from shm.report import colours
+from shm.values import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, FigureBase
     from matplotlib.legend import Legend
+
+INK = "#1d2330"
+GRID = "#d5d9e0"
+BLUE = "#0072b2"
+ORANGE = "#d55e00"
+GREEN = "#009e73"
+PURPLE = "#9b4f96"
+RED = "#b00020"
+QUIET = "#565f70"
+# Okabe and Ito (2008), darkened where small marks need it; names are the page's CSS variables.
+PALETTE = {
+    "ink": INK,
+    "grid": GRID,
+    "blue": BLUE,
+    "orange": ORANGE,
+    "green": GREEN,
+    "purple": PURPLE,
+    "red": RED,
+    "quiet": QUIET,
+}
+STATUS_COLOURS = {
+    "alert": RED,
+    "watch": ORANGE,
+    "check": ORANGE,
+    "unclear": ORANGE,
+    "steady": GREEN,
+    "first": BLUE,
+}
+"""By the page's style of a state."""
+VERDICT_COLOURS: dict[Verdict, str] = {
+    "good": GREEN,
+    "warning": ORANGE,
+    "refused": RED,
+    "unknown": QUIET,
+}
+VERDICT_STYLES: dict[Verdict, str] = {
+    "good": "steady",
+    "warning": "watch",
+    "refused": "alert",
+    "unknown": "first",
+}
+"""The page's style of a whole test's verdict."""
+
 
 WIDTH_INCHES = 7.4
 _SMALL = 9.0
@@ -35,13 +80,13 @@ def stacked(figure: FigureBase, heights: Sequence[float]) -> list[Axes]:
 def dress(axes: Axes, x_label: str, y_label: str) -> None:
     """Labels, grid and spines."""
     axes.set_facecolor("none")
-    axes.set_xlabel(x_label, fontsize=_SMALL, color=colours.INK)
-    axes.set_ylabel(y_label, fontsize=_SMALL, color=colours.INK)
-    axes.tick_params(which="both", labelsize=_SMALL, colors=colours.INK)
-    axes.grid(True, color=colours.GRID, linewidth=0.6)
+    axes.set_xlabel(x_label, fontsize=_SMALL, color=INK)
+    axes.set_ylabel(y_label, fontsize=_SMALL, color=INK)
+    axes.tick_params(which="both", labelsize=_SMALL, colors=INK)
+    axes.grid(True, color=GRID, linewidth=0.6)
     axes.set_axisbelow(True)
     for side, spine in axes.spines.items():
-        spine.set_color(colours.INK)
+        spine.set_color(INK)
         spine.set_visible(side in ("left", "bottom"))
 
 
@@ -52,7 +97,7 @@ def legend_above(axes: Axes, columns: int = 4) -> Legend:
         bbox_to_anchor=(0.0, 1.0),
         ncols=columns,
         fontsize=_SMALL,
-        labelcolor=colours.INK,
+        labelcolor=INK,
         frameon=False,
         borderaxespad=0.2,
         handlelength=1.6,
@@ -75,7 +120,7 @@ def legend_of_figure(
             loc=where,  # type: ignore[call-overload]
             ncols=columns,
             fontsize=TINY + 1,
-            labelcolor=colours.INK,
+            labelcolor=INK,
             frameon=False,
             borderaxespad=0.2,
             handlelength=2.0,

@@ -21,7 +21,7 @@ from shm.report.figures.specification import (
     Values,
     envelope_places,
 )
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.report.states import CalledChange
 from shm.values import FloatArray, IntArray
 from shm.watch.history import Band as Bounds

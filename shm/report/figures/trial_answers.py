@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from shm.report import colours, formatting
+from shm.report import formatting
 from shm.report.figures import style
-from shm.report.figures.illustration import Member
+from shm.report.figures.specification import Member
 from shm.report.trial_scores import RICHNESS, find, judged, large, value
 from shm.values import Bin, CaseScore, MarkName, Richness, Score, TrialScore
 from shm.values.diagnosis import parted
@@ -61,9 +61,9 @@ def _draw_detection(score: TrialScore) -> Figure | None:
     for axes in panels.flat[len(shown) :]:
         axes.set_visible(False)
     for axes in panels[:, 0]:
-        axes.set_ylabel("share seen", fontsize=9, color=colours.INK)
+        axes.set_ylabel("share seen", fontsize=9, color=style.INK)
     for axes in panels[-1]:
-        axes.set_xlabel("size (standard deviations)", fontsize=9, color=colours.INK)
+        axes.set_xlabel("size (standard deviations)", fontsize=9, color=style.INK)
     return figure
 
 
@@ -73,13 +73,13 @@ def _bins(score: TrialScore, richness: Richness) -> list[Bin]:
 
 def _panel(axes: Axes, score: TrialScore, richness: Richness) -> None:
     style.dress(axes, "", "")
-    axes.set_title(richness, fontsize=9, color=colours.INK, loc="left")
+    axes.set_title(richness, fontsize=9, color=style.INK, loc="left")
     bins = _bins(score, richness)
-    points(axes, [each.mean for each in bins], [each.score for each in bins], colours.BLUE)
+    points(axes, [each.mean for each in bins], [each.score for each in bins], style.BLUE)
     mark = find(score, "detected")
     if mark and np.isfinite(mark.lower):
         axes.plot(
-            [mark.above, _TICKS[-1]], [mark.lower] * 2, color=colours.ORANGE, linestyle="--",
+            [mark.above, _TICKS[-1]], [mark.lower] * 2, color=style.ORANGE, linestyle="--",
             linewidth=1.2,
         )  # fmt: skip
     axes.set_xscale("log")
@@ -117,7 +117,7 @@ DETECTION = Member(
 
 _NOTHING, _TWO, _UNKNOWN = "nothing", "two effects", "not in the catalogue"
 _NO_GAP, _PAIR, _UNEXPLAINED, _FAILED = "no gap", "a pair", "unexplained", "failed"
-_SHADES = LinearSegmentedColormap.from_list("share", ["#ffffff00", colours.BLUE])
+_SHADES = LinearSegmentedColormap.from_list("share", ["#ffffff00", style.BLUE])
 _DARK = 0.55  # layout: of the darkest; beyond, letters are white
 
 
@@ -157,7 +157,7 @@ def _draw_confusion(score: TrialScore) -> Figure | None:
         dark = share[row, column] > _DARK
         axes.text(
             column, row, f"{table[row, column]:.0f}", ha="center", va="center",
-            fontsize=style.TINY, color="white" if dark else colours.INK,
+            fontsize=style.TINY, color="white" if dark else style.INK,
         )  # fmt: skip
     axes.set_xticks(range(len(columns)), list(map(formatting.quantity, columns)), rotation=60,
                     ha="right", rotation_mode="anchor")  # fmt: skip
@@ -193,12 +193,12 @@ CONFUSION = Member(
 
 
 _OUTCOMES = {
-    "unexplained": colours.GREEN,
-    "one of its group": colours.BLUE,
-    "no gap": colours.GRID,
-    "another, not sure": colours.PURPLE,
-    "another, more than 0.9 sure": colours.RED,
-    "failed": colours.INK,
+    "unexplained": style.GREEN,
+    "one of its group": style.BLUE,
+    "no gap": style.GRID,
+    "another, not sure": style.PURPLE,
+    "another, more than 0.9 sure": style.RED,
+    "failed": style.INK,
 }
 
 

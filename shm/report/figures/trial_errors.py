@@ -8,9 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shm.report import colours
 from shm.report.figures import style
-from shm.report.figures.illustration import Member
+from shm.report.figures.specification import Member
 from shm.report.figures.trial_answers import name_richness, of_richness, points
 from shm.report.trial_scores import find, judged, value
 from shm.values import CaseScore, MarkName, PlantedKind, Richness, TrialScore, Way
@@ -23,13 +22,13 @@ def _draw_reliability(score: TrialScore) -> Figure | None:
     figure = style.new_figure(3.6)
     axes = figure.subplots()
     style.dress(axes, "probability of what leads", "share that is right")
-    axes.plot([0, 1], [0, 1], color=colours.QUIET, linewidth=1.0, linestyle=":", label="just right")
+    axes.plot([0, 1], [0, 1], color=style.QUIET, linewidth=1.0, linestyle=":", label="just right")
     points(
-        axes, [each.mean for each in bins], [each.score for each in bins], colours.BLUE,
+        axes, [each.mean for each in bins], [each.score for each in bins], style.BLUE,
         "found, with 90 % interval",
     )  # fmt: skip
     for each in bins:
-        axes.hlines(each.score.value, each.low, each.high, color=colours.BLUE, linewidth=0.8)
+        axes.hlines(each.score.value, each.low, each.high, color=style.BLUE, linewidth=0.8)
     axes.set_xlim(min(0.4, bins[0].low - 0.02), 1.02)
     axes.set_ylim(-0.02, 1.05)
     style.legend_above(axes)
@@ -85,13 +84,13 @@ def _draw_log_score(score: TrialScore) -> Figure | None:
     figure = style.new_figure(2.8)
     axes = figure.subplots()
     style.dress(axes, "", "log score")
-    points(axes, range(len(found)), [each for _, each in found], colours.BLUE, "this trial")
+    points(axes, range(len(found)), [each for _, each in found], style.BLUE, "this trial")
     before = [_prototype(score, richness) for richness, _ in found]
     there = [(x, bound) for x, bound in enumerate(before) if math.isfinite(bound)]
     if there:
         axes.plot(
             *zip(*there, strict=True), linestyle="none", marker="D", markersize=5,
-            color=colours.ORANGE, label="prototype: the mark to beat",
+            color=style.ORANGE, label="prototype: the mark to beat",
         )  # fmt: skip
     name_richness(axes, [richness for richness, _ in found])
     axes.set_ylim(bottom=0)
@@ -128,10 +127,10 @@ LOG_SCORE = Member(
 
 
 _KINDS: dict[PlantedKind, tuple[str, str, str]] = {
-    "none": ("nothing", colours.QUIET, "x"),
-    "one": ("one effect", colours.BLUE, "o"),
-    "two": ("two effects", colours.PURPLE, "s"),
-    "unknown": ("not in the catalogue", colours.ORANGE, "^"),
+    "none": ("nothing", style.QUIET, "x"),
+    "one": ("one effect", style.BLUE, "o"),
+    "two": ("two effects", style.PURPLE, "s"),
+    "unknown": ("not in the catalogue", style.ORANGE, "^"),
 }
 _LEAST = 0.01  # layout: of a per cent, where an axis of logarithms begins
 
@@ -165,8 +164,8 @@ def _draw_tension_errors(score: TrialScore) -> Figure | None:
                 markerfacecolor="none", label=name,
             )  # fmt: skip
     ends = np.array([_LEAST * 0.8, 1.3 * max(max(_errors(case)) for case in cases)])
-    axes.plot(ends, ends, color=colours.INK, linewidth=0.9, linestyle=":")
-    axes.plot(ends, ends / 5, color=colours.GREEN, linewidth=1.1, linestyle="--")
+    axes.plot(ends, ends, color=style.INK, linewidth=0.9, linestyle=":")
+    axes.plot(ends, ends / 5, color=style.GREEN, linewidth=1.1, linestyle="--")
     axes.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
     ticks = [tick for tick in (0.01, 0.1, 1, 10, 100) if tick < ends[1]]
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
@@ -222,8 +221,8 @@ def _draw_coverage(score: TrialScore) -> Figure | None:
     panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     for axes, (name, title, nominal) in zip(panels, shown, strict=True):
         _panel(axes, score, name, nominal)
-        axes.set_title(title, fontsize=9, color=colours.INK, loc="left")
-    panels[0].set_ylabel("share that holds the truth", fontsize=9, color=colours.INK)
+        axes.set_title(title, fontsize=9, color=style.INK, loc="left")
+    panels[0].set_ylabel("share that holds the truth", fontsize=9, color=style.INK)
     return figure
 
 
@@ -232,9 +231,9 @@ def _panel(axes: Axes, score: TrialScore, name: MarkName, nominal: float) -> Non
     found = of_richness(score, name)
     mark = find(score, name)
     if mark and math.isfinite(mark.lower + mark.upper):
-        axes.axhspan(mark.lower, mark.upper, color=colours.GREEN, alpha=0.15, linewidth=0)
-    axes.axhline(nominal, color=colours.QUIET, linestyle=":", linewidth=1.0)
-    points(axes, range(len(found)), [each for _, each in found], colours.BLUE)
+        axes.axhspan(mark.lower, mark.upper, color=style.GREEN, alpha=0.15, linewidth=0)
+    axes.axhline(nominal, color=style.QUIET, linestyle=":", linewidth=1.0)
+    points(axes, range(len(found)), [each for _, each in found], style.BLUE)
     name_richness(axes, [richness for richness, _ in found])
     lowest = min((each.low for _, each in found if math.isfinite(each.low)), default=0.5)
     axes.set_ylim(min(0.5, axes.get_ylim()[0], lowest - 0.05), 1.03)
@@ -265,7 +264,7 @@ COVERAGE = Member(
 )
 
 
-_COLOURS: dict[Way, str] = {"modes": colours.BLUE, "recordings": colours.ORANGE}
+_COLOURS: dict[Way, str] = {"modes": style.BLUE, "recordings": style.ORANGE}
 
 
 def _above(score: TrialScore) -> float:
@@ -293,11 +292,11 @@ def _draw_held_out(score: TrialScore) -> Figure | None:
     style.dress(axes, "held-out error, after over before", "share of cases below")
     for way, ratios in found.items():
         axes.ecdf(ratios, color=_COLOURS[way], linewidth=1.5, label=f"{way} ({len(ratios)} cases)")
-    axes.axvline(1.0, color=colours.QUIET, linestyle=":", linewidth=1.0)
+    axes.axvline(1.0, color=style.QUIET, linestyle=":", linewidth=1.0)
     mark = find(score, "held-out misfit after over before")
     if mark and math.isfinite(mark.upper):
         axes.plot(
-            mark.upper, 0.5, marker="D", markersize=6, color=colours.GREEN, linestyle="none",
+            mark.upper, 0.5, marker="D", markersize=6, color=style.GREEN, linestyle="none",
             label="asked of the median: left of this",
         )  # fmt: skip
     axes.set_xlim(0, max(1.3, min(2.5, max(map(max, found.values())) * 1.05)))

@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import MaxNLocator, NullFormatter, NullLocator, ScalarFormatter
 
-from shm.report import colours
 from shm.report.figures import style
 from shm.report.figures.specification import (
     Axis,
@@ -56,7 +55,7 @@ def draw(figure: Specification) -> Figure:
         made.supxlabel(
             figure.x_label,
             fontsize=style.TINY + 1,
-            color=colours.INK,
+            color=style.INK,
             y=0.06 / figure.height_inches,
         )
     where = "upper left" if figure.is_grid else "outside upper left"
@@ -112,14 +111,14 @@ def _panel(axes: Axes, panel: Panel, figure: Specification) -> None:
         axes.set_axis_off()
         axes.text(
             0.5, 0.5, panel.words, transform=axes.transAxes, ha="center", va="center",
-            color=colours.INK, fontsize=style.TINY + 1.5,
+            color=style.INK, fontsize=style.TINY + 1.5,
         )  # fmt: skip
         return
     style.dress(axes, panel.x.label if panel.x else "", panel.y.label)
     for mark in panel.marks:
         _DRAWN[type(mark)](axes, mark)
     if panel.title:
-        colour = colours.PALETTE[panel.title_colour]
+        colour = style.PALETTE[panel.title_colour]
         size = style.TINY + (0 if figure.is_grid else 0.5 if panel.title_side == "right" else 1.5)
         axes.set_title(panel.title, fontsize=size, color=colour, loc=panel.title_side, pad=2)
     if figure.is_grid:
@@ -143,7 +142,7 @@ def _scale(axes: Axes, letter: str, wanted: Axis) -> None:
         axis.set_major_locator(locator)
         concise = ConciseDateFormatter(locator, tz=UTC)  # type: ignore[no-untyped-call]
         axis.set_major_formatter(concise)
-        axis.get_offset_text().set_color(colours.INK)
+        axis.get_offset_text().set_color(style.INK)
     if isinstance(formatter := axis.get_major_formatter(), ScalarFormatter):
         formatter.set_useOffset(False)
     if wanted.range is not None:
@@ -161,7 +160,7 @@ def _scale(axes: Axes, letter: str, wanted: Axis) -> None:
 
 def _look(axes: Axes, mark: Mark) -> dict[str, Any]:
     shares = {"transform": axes.get_xaxis_transform()} if mark.in_shares else {}
-    colour = colours.PALETTE[mark.colour]
+    colour = style.PALETTE[mark.colour]
     return {"color": colour, "alpha": mark.opacity, "label": mark.name or None, **shares}
 
 
@@ -211,11 +210,11 @@ def _bars(axes: Axes, mark: Bars) -> None:
     else:
         bars = axes.bar(mark.x, mark.y, width=mark.width, bottom=mark.base, **look)
     if len(mark.labels):
-        axes.bar_label(bars, mark.labels, padding=5, fontsize=style.TINY + 0.5, color=colours.INK)
+        axes.bar_label(bars, mark.labels, padding=5, fontsize=style.TINY + 0.5, color=style.INK)
 
 
 def _heat(axes: Axes, mark: Heat) -> None:
-    code = colours.PALETTE[mark.colour]
+    code = style.PALETTE[mark.colour]
     shades = LinearSegmentedColormap.from_list(mark.colour, [(1, 1, 1, 0), to_rgba(code)])
     axes.pcolormesh(
         mark.x, mark.y, np.asarray(mark.z, float), cmap=shades, shading="nearest", rasterized=True
@@ -244,7 +243,7 @@ def _span(axes: Axes, mark: Span) -> None:
             (_place(mark.low if is_left else mark.high), 1),
             xycoords=axes.get_xaxis_transform(), ha=mark.label_side, va="top",
             xytext=(2 if is_left else -2, -1 - 10 * mark.label_line), textcoords="offset points",
-            fontsize=style.TINY + 0.5, color=colours.PALETTE[mark.colour],
+            fontsize=style.TINY + 0.5, color=style.PALETTE[mark.colour],
         )  # fmt: skip
 
 

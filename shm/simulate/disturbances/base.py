@@ -10,9 +10,8 @@ import numpy as np
 
 from shm.simulate.bar import Bar
 from shm.simulate.elements import PlaneModes
-from shm.simulate.logger import Line
+from shm.simulate.response import Line, Pulse, Schedule, Strike
 from shm.simulate.state import HammerPlan, HangerState
-from shm.simulate.strikes import Pulse, Schedule, Strike
 from shm.values import NAN, Channel, FloatArray, Hanger
 
 T = TypeVar("T")

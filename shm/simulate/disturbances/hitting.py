@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.simulate.disturbances.base import Planted, Scene
-from shm.simulate.strikes import Schedule, Strike
+from shm.simulate.response import Schedule, Strike
 
 _LEAST_GAP_S = 0.6  # blows closer than half a second are one swing of the hammer
 

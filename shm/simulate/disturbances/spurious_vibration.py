@@ -12,8 +12,14 @@ import numpy as np
 
 from shm.simulate.disturbances.base import Lines, Motion, Planted, Scene
 from shm.simulate.elements import PlaneModes
-from shm.simulate.logger import Line
-from shm.simulate.response import Stretch, driven_states, driven_unit_states, poles_of, state_of
+from shm.simulate.response import (
+    Line,
+    Stretch,
+    driven_states,
+    driven_unit_states,
+    poles_of,
+    state_of,
+)
 from shm.values import NAN, PLANES, ComplexArray, FloatArray
 
 _HIGHEST = 0.4  # of the sampling rate: what the logger passes

@@ -16,7 +16,6 @@ from shm.values import NAN, TENSION, Drift, FloatArray
 from shm.values.rounding import NINETY_PERCENT
 from shm.watch.neighbours.evidence import Bridge
 from shm.watch.neighbours.hypotheses import AlikeCause, Part, alike_causes, hypotheses
-from shm.watch.neighbours.pattern_text import remarks_of, sentence_of
 from shm.watch.neighbours.pattern_types import (
     BridgePattern,
     Explanation,
@@ -28,6 +27,8 @@ from shm.watch.neighbours.pattern_types import (
     SumKept,
     Suspect,
     Way,
+    remarks_of,
+    sentence_of,
 )
 
 FEWEST = 3  # of two, either may be the one that moved

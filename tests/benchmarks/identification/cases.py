@@ -25,7 +25,7 @@ from shm.simulate import (
     simulated_test,
 )
 from shm.simulate.elements import PlaneModes, plane_modes
-from shm.simulate.strikes import Strike
+from shm.simulate.response import Strike
 from shm.values import PLANES, Hanger, Plane
 
 BAND_HZ = (2.0, 100.0)

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from shm_daemon.web.hanger_figures.gap import BEFORE_AND_AFTER, CAUSES, GAP_MAP, GAP_PLACES
-from shm_daemon.web.hanger_figures.member import HangerFigure
-from shm_daemon.web.hanger_figures.model import FREQUENCIES, MODELS, PAIRS
+from shm_daemon.web.hanger_figures.of_models import (
+    BEFORE_AND_AFTER,
+    CAUSES,
+    FREQUENCIES,
+    GAP_MAP,
+    GAP_PLACES,
+    MODELS,
+    PAIRS,
+    HangerFigure,
+)
 from shm_daemon.web.hanger_figures.over_time import STIFFNESS, TEMPERATURE, TREND
 
 __all__ = ["FIGURES", "HangerFigure"]

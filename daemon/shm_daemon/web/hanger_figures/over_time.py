@@ -12,11 +12,11 @@ from shm.report import formatting
 from shm.report.figures import hanger_stiffness, hanger_trend
 from shm.report.figures.specification import Axis, Panel, Specification, Symbol, stacked
 from shm.report.figures.time_axes import bounds_of, part, places, single_tests, thinned_words
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.report.states import CalledChange, QuantityOverTime, called_words
 from shm.store import EventKind, TrendPoint
-from shm.values.force_units import ForceUnit, force_unit
-from shm_daemon.web.hanger_figures.member import HangerFigure
+from shm.values.rounding import ForceUnit, force_unit
+from shm_daemon.web.hanger_figures.of_models import HangerFigure
 from shm_daemon.web.hanger_view import HangerView
 
 _HANDS: dict[EventKind, tuple[str, Symbol, bool, str]] = {

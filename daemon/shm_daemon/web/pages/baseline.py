@@ -18,7 +18,7 @@ from shm.pipeline.rebaselining import Order, set_baseline
 from shm.report import formatting
 from shm.store import Workspace
 from shm.store.audit import Actor
-from shm.watch.events import EVENT_KINDS
+from shm.watch.repair_check import EVENT_KINDS
 from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.forms import form_of, reason_in, time_in

@@ -21,10 +21,9 @@ from fastapi.responses import JSONResponse
 from shm.pipeline import utc_now
 from shm.report import formatting
 from shm.report.contents import hangers_unit
-from shm.report.intervals import Interval
-from shm.values.force_units import ForceUnit
+from shm.report.formatting import Interval
 from shm.values.messages import TODAY, WEEK
-from shm.values.rounding import rounded_percent
+from shm.values.rounding import ForceUnit, rounded_percent
 from shm_daemon.heartbeat import told
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import test_page

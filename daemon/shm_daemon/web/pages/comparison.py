@@ -17,7 +17,7 @@ from shm.pipeline.bridge_reporting import hanger_lines
 from shm.report import formatting
 from shm.report.contents import HangerLine, hangers_unit
 from shm.report.figures.compared_hangers import MOST, Course, alt, caption, specify
-from shm.report.intervals import Interval
+from shm.report.formatting import Interval
 from shm.report.paper import Table
 from shm.values import Hanger
 from shm.values.rounding import rounded_percent
@@ -26,7 +26,7 @@ from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.bridge_view import HangerGlance
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
-from shm_daemon.web.hanger_models import FigureDocument
+from shm_daemon.web.hanger_numbers import FigureDocument
 from shm_daemon.web.hangers import described
 from shm_daemon.web.models import LARGEST_NUMBER
 from shm_daemon.web.plotting import answer

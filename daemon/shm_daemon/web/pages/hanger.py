@@ -17,15 +17,15 @@ from shm.report.diagnosis_report import answers, evidence
 from shm.report.hanger_report import facts, gap_part
 from shm.report.hanger_summary import details
 from shm.report.paper import Table
+from shm.report.shifts import temperature_table
 from shm.report.states import called_words
-from shm.report.temperatures import temperature_table
 from shm.store import EventKind, Workspace
 from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.background_work import background_worker_of
 from shm_daemon.web.frame import page
 from shm_daemon.web.hanger_figures import FIGURES, HangerFigure
-from shm_daemon.web.hanger_tests import headings, lines_before
+from shm_daemon.web.hanger_numbers import headings, lines_before
 from shm_daemon.web.hanger_view import HangerView
 from shm_daemon.web.hangers import Number, described
 from shm_daemon.web.models import LARGEST_NUMBER

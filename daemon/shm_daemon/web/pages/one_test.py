@@ -10,23 +10,21 @@ from fastapi.responses import HTMLResponse
 
 from shm.errors import NothingThere
 from shm.report import formatting, modal_test_report
-from shm.report.colours import VERDICT_STYLES
 from shm.report.figures.modal_test_response import point_name
 from shm.report.figures.modal_test_spectra import shown_points
-from shm.report.intervals import Interval
+from shm.report.figures.style import VERDICT_STYLES
+from shm.report.formatting import Interval
 from shm.report.modal_test_report import name
 from shm.report.paper import Table, filled
 from shm.report.quality_table import headline, overall
 from shm.values import ResponsePoint
-from shm.values.force_units import force_unit
+from shm.values.rounding import force_unit
 from shm_daemon.web.access import Reader
 from shm_daemon.web.address import test_json, test_page
 from shm_daemon.web.background_work import RETRY_AFTER
 from shm_daemon.web.frame import page
-from shm_daemon.web.modal_test_figures import TestFigure
-from shm_daemon.web.modal_test_origin import origin, steps, superseded
-from shm_daemon.web.modal_test_view import AT_WORK, TestView
-from shm_daemon.web.tests import MOST_RESPONSES, View
+from shm_daemon.web.modal_test_view import AT_WORK, TestFigure, TestView
+from shm_daemon.web.tests import MOST_RESPONSES, View, origin, steps, superseded
 
 router = APIRouter(include_in_schema=False)
 Part = Annotated[Literal["page", "hits"], Query()]

@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 
 from shm.bridge import Bridge
 from shm.bridge.changes import HANGER_KEYS, HOOK_KEYS, SETTING_KEYS
-from shm.bridge.quiet_hours import QUIET_HOURS, QuietHours
+from shm.bridge.hooks import QUIET_HOURS, QuietHours
 from shm.errors import BadInput, UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.rejudging import differences

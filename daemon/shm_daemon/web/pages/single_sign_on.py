@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import RedirectResponse
 
-from shm.bridge.single_sign_on import SingleSignOn
+from shm.bridge.description import SingleSignOn
 from shm.errors import NothingThere, ShmError, needing
 from shm.pipeline import utc_now
 from shm_daemon.web.access import AtSite, unless_throttled
 from shm_daemon.web.frame import page
 from shm_daemon.web.middleware import is_https
-from shm_daemon.web.signing_in import ask, keep_signed_in, ours
+from shm_daemon.web.pages.accounts import ask, keep_signed_in, ours
 from shm_daemon.web.site import Site
 
 if TYPE_CHECKING:

@@ -1,17 +1,41 @@
-"""The page where a person hands recordings in and sees each become a test."""
+"""The page where a person hands recordings in and sees each become a test.
+
+A logger's file over HTTP, the first time: what is understood of it, and what is asked.
+"""
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+import json
+import math
+import shutil
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated, Any, Literal
 
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel, Field
+from starlette.concurrency import run_in_threadpool
+
+from shm.errors import BadInput, UsageError
+from shm.pipeline import utc_now
+from shm.pipeline.import_answers import answer_to, import_document
+from shm.pipeline.importing import Answers, Import, Question, keep_profile, look_into, understand
 from shm.report import formatting
-from shm_daemon.web.access import AtSite, Reader
+from shm.store import Workspace
+from shm_daemon.spool import Incoming, Landed, landing_name
+from shm_daemon.web.access import AtSite, Reader, Writer
+from shm_daemon.web.address import IMPORTS
+from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
+from shm_daemon.web.models import LARGEST_NUMBER
+from shm_daemon.web.recordings import PLAIN_BODY, receive_body
 
-router = APIRouter(include_in_schema=False)
+_of_page = APIRouter(include_in_schema=False)
 
 
-@router.get("/upload")
+@_of_page.get("/upload")
 def upload_page(request: Request, site: AtSite, _: Reader) -> Response:
     """Files go to `POST /api/recordings` one by one; `static/upload.js` follows each."""
     workspace = site.workspace
@@ -25,3 +49,178 @@ def upload_page(request: Request, site: AtSite, _: Reader) -> Response:
         max_mb=workspace.settings.max_file_bytes / 1e6,
         max_bytes=workspace.settings.max_file_bytes,
     )
+
+
+_MOST_ANSWERS = 4000  # technical: of an address, 64 kB at most when each character is escaped
+
+_of_imports = APIRouter(prefix=IMPORTS, tags=["recordings"])
+
+
+class ImportedColumn(BaseModel):
+    """A column of a file and what it is taken for; `least` and `largest` in N or m/s2."""
+
+    name: str
+    unit: str
+    quantity: Literal["force", "acceleration"] | None
+    plane: Literal["transverse", "longitudinal"] | None
+    x_m: float | None
+    least: float | None
+    largest: float | None
+    overloads: int
+    is_clipped: bool
+    hits: int | None
+    outline: list[float] = Field(description="Its largest value in parts of equal length, 0 to 1.")
+
+
+class ImportQuestion(BaseModel):
+    """What only a person knows; `channel` is empty for the whole file."""
+
+    about: str
+    channel: str
+    text: str
+    option: str
+
+
+class ImportLook(BaseModel):
+    """A file as it is understood; `sha256` is null while questions are open or nothing was kept."""
+
+    format: str
+    fingerprint: str
+    hanger: int | None
+    time: datetime | None
+    temperature_c: float | None
+    sampling_rate_hz: float | None
+    samples: int
+    columns: list[ImportedColumn]
+    questions: list[ImportQuestion]
+    problems: list[str]
+    remarks: list[str]
+    sha256: str | None
+
+
+@_of_imports.post(
+    "",
+    response_model=ImportLook,
+    responses=answers(400, 401, 403, 408, 409, 413, 415, 422, 503),
+    openapi_extra=PLAIN_BODY,
+    summary="Import the first file of a logger",
+)
+async def import_file(
+    request: Request,
+    site: AtSite,
+    writer: Writer,
+    name: Annotated[str, Query(min_length=1, max_length=255)],
+    said: Annotated[
+        str | None,
+        Query(
+            max_length=_MOST_ANSWERS,
+            description='Answers, as JSON: {"hanger": 3, "columns": {"A1": {"plane": "transverse",'
+            ' "place": "2.5"}}}; with "each_time": true the hanger is not kept. Without answers the'
+            " file is only looked into.",
+        ),
+    ] = None,
+) -> Any:
+    """Shows what is understood of a file and asks what it does not say; keeps nothing yet.
+
+    With answers to all, they are kept as the profile of its logger, and the file goes to the
+    daemon as any other.
+    """
+    landing_name(name)
+    workspace = site.workspace
+    file = await run_in_threadpool(Incoming, workspace.spool, workspace.settings.max_file_bytes)
+    try:
+        await receive_body(request, file, workspace.settings.max_file_bytes)
+        looked = await run_in_threadpool(_looked, file, landing_name(name), workspace, said)
+        if looked.sha256 is not None:
+            audit = site.store.acting_as(writer.actor).audit
+            await run_in_threadpool(audit.note, utc_now(), "recording uploaded", name)
+        return looked
+    finally:
+        await run_in_threadpool(file.close)
+
+
+def _looked(file: Incoming, name: str, workspace: Workspace, said: str | None) -> ImportLook:
+    if file.size_bytes == 0:
+        raise BadInput("the body is empty.", remedy="Send the bytes of the file.")
+    with TemporaryDirectory(prefix="shm-import-") as folder:
+        path = Path(folder) / name
+        shutil.copyfile(file.whole(), path)
+        found = look_into(path, workspace, Answers())
+    landed: Landed | None = None
+    if said is not None:
+        answers = _answers(said, found)
+        found = understand(found.survey, workspace, answers)
+        if found.is_ready:
+            keep_profile(found, workspace, each_time=answers.each_time)
+            landed = file.land(name, found.described)
+    document = import_document(found)
+    return ImportLook(**_plain(document), sha256=landed.sha256 if landed else None)
+
+
+def _plain(node: Any) -> Any:
+    """A document in which unknown numbers are null."""
+    if isinstance(node, dict):
+        return {key: _plain(value) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_plain(value) for value in node]
+    return None if isinstance(node, float) and not math.isfinite(node) else node
+
+
+def _answers(said: str, found: Import) -> Answers:
+    """The answers of a request; raises BadInput for what is none."""
+    try:
+        document = json.loads(said)
+    except (ValueError, RecursionError) as error:
+        raise _misread(str(error)[:100]) from error
+    columns = document.get("columns", {}) if isinstance(document, dict) else None
+    if not isinstance(columns, dict) or not all(isinstance(t, dict) for t in columns.values()):
+        raise _misread("it holds no answers")
+    asked = {(q.channel, q.about): q for q in found.questions}
+    tables: dict[str, dict[str, object]] = {}
+    for name, given in columns.items():
+        for about, text in given.items():
+            question = asked.get((name, about))
+            if question is None:  # of a column that another answer makes a channel
+                question = next((q for q in found.questions if q.channel == name), None)
+            if question is None:
+                raise _misread(f"nothing was asked of {name[:60]!r}")
+            tables.setdefault(name, {}).update(_answered(question, about, str(text), found))
+    hanger = document.get("hanger")
+    if hanger is not None and not (type(hanger) is int and 0 <= hanger <= LARGEST_NUMBER):
+        raise _misread("hanger is no number of a hanger")
+    return Answers(
+        hanger,
+        _number(document, "sampling_rate_hz", least=0.0),
+        None,
+        _number(document, "temperature_c", least=-300.0),
+        tables,
+        each_time=document.get("each_time") is True,
+    )
+
+
+def _answered(question: Question, about: str, text: str, found: Import) -> dict[str, object]:
+    try:
+        return answer_to(replace(question, about=about), text, found)
+    except UsageError as error:
+        raise BadInput(error.message, remedy=error.remedy) from error
+
+
+def _number(document: dict[str, Any], key: str, least: float) -> float:
+    value = document.get(key)
+    if value is None:
+        return math.nan
+    if isinstance(value, bool) or not isinstance(value, int | float) or not least < value < 1e9:
+        raise _misread(f"{key} is no such number")
+    return float(value)
+
+
+def _misread(what: str) -> BadInput:
+    return BadInput(
+        f"the answers cannot be read: {what}.",
+        remedy='Send said={"hanger": 3, "columns": {"A1": {"plane": "transverse"}}}.',
+    )
+
+
+router = APIRouter()
+router.include_router(_of_imports)
+router.include_router(_of_page)
