@@ -164,15 +164,17 @@ def _left_over(slopes: FloatArray, sd: FloatArray, rows: int) -> FloatArray:
     return np.asarray(np.diag(sd[:rows] ** 2) - absorbed)
 
 
-def predictive_p_value(observations: Observations, fit: Fit, noise: Covariance) -> float:
+def predictive_p_value(
+    observations: Observations, predicted: FloatArray, noise: Covariance
+) -> float:
     """Posterior predictive p-value of the misfit (Gelman, Meng and Stern, Stat. Sinica 6, 1996).
 
-    `noise` is the covariance that the data should have about a right prediction. Three misfits are
-    looked at, each a chi-square: of all frequencies, of each mode's mean frequency over the tests
-    (a gap that repeats drowns in the first) and of the shapes. The smallest p-value is returned,
-    times their number.
+    `predicted` (draws, data) are those of draws of the posterior, `noise` is the covariance that
+    the data should have about a right prediction. Three misfits are looked at, each a chi-square:
+    of all frequencies, of each mode's mean frequency over the tests (a gap that repeats drowns in
+    the first) and of the shapes. The smallest p-value is returned, times their number.
     """
-    residual = observations.value - _predictions(fit)
+    residual = observations.value - predicted
     count = observations.design.frequencies
     misfits = [
         _p_value(residual[:, :count], noise.frequency, np.eye(count)),
@@ -184,9 +186,16 @@ def predictive_p_value(observations: Observations, fit: Fit, noise: Covariance) 
     return min(1.0, len(misfits) * min(misfits))
 
 
-def _predictions(fit: Fit) -> FloatArray:
-    """Of draws of the posterior (draws, data), linearised about its most probable point."""
+def predictions(problem: GapProblem, fit: Fit) -> FloatArray:
+    """Of some draws of a fit's posterior (draws, data).
+
+    Draws that were sampled (`effective` is known) lie along whatever bent ridge the end springs
+    leave, where slopes at the most probable point say nothing; those of a normal distribution hold
+    for its own slopes alone.
+    """
     some = fit.draws[:: max(1, len(fit.draws) // DRAWS)]
+    if np.isfinite(fit.effective):
+        return problem.predict(fit.hypothesis, some)
     return np.asarray(fit.predicted + (some - fit.z) @ fit.slopes.T)
 
 

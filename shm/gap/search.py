@@ -24,7 +24,7 @@ from shm.gap.importance_sampling import sampled
 from shm.gap.law_error import by_its_laws, mixed, otherwise
 from shm.gap.model_probabilities import Family, ScoredHypothesis, families, log_prior
 from shm.gap.problem import GapProblem
-from shm.gap.residuals import predictive_p_value
+from shm.gap.residuals import predictions, predictive_p_value
 from shm.inference.tmcmc import normalised
 from shm.values import FloatArray
 
@@ -226,7 +226,9 @@ class Search:
 
     def p_value(self, fit: Fit) -> float:
         """Of the absolute fit, with the errors as they are expected to be."""
-        return predictive_p_value(self.problem.observations, fit, fit.noise)
+        return predictive_p_value(
+            self.problem.observations, predictions(self.problem, fit), fit.noise
+        )
 
     def leaders(self, tried: Sequence[ScoredHypothesis], most: int = LEADERS) -> list[Family]:
         """The likeliest families of one effect."""
