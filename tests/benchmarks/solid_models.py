@@ -21,7 +21,8 @@ from shm.bridge import load_hanger
 from shm.models import build
 from shm.models.base import silent
 from shm.models.solid.affine import natural_modes
-from shm.models.solid.basis import assembled, transverse_basis
+from shm.models.solid.assembly import assembled
+from shm.models.solid.basis import transverse_basis
 from shm.models.solid.geometry import Fineness
 from shm.values import FloatArray, Hanger
 
