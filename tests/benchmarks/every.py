@@ -57,16 +57,17 @@ SHORT = {
     "identify_limits": "--sound 2 --faulty 1", "identify_seconds": "--runs 1",
     "identify_simulated": "--tests 4", "kill_daemon": "--kills 4 --files 6",
     "kill_stream": "--kills 4", "kill_two_daemons": "--files 12",
-    "kill_workers": "--kills 4 --files 6", "load": "--queue 6 --hangers 3 --alerts 1",
+    "kill_workers": "--kills 4 --files 6",
+    "load": "--queue 6 --hangers 3 --alerts 1 --models beam2",
     "mutants": "--mutants 1", "power_cuts": "--files 1 --minutes 0.3",
     "recordings_trial": "--kinds softening --seeds 0:1", "right_hanger": "--bridges 1",
     "right_signals": "--tests 2", "sharp_evidence": "--cases 2", "solid_models": "--held-out 3",
     "stream_load": "--hangers 2 --hours 0.2", "stream_oracle": "--hangers 1",
     "stream_trial": "--hangers 1 --years 0.2", "stream_windows": "--seeds 1 --hours 0.3",
-    "tension_coverage": "--cases 2", "updating_from_known": "--cases 2", "upload": "20",
+    "tension_coverage": "--cases 2", "updating_from_known": "--cases 4", "upload": "20",
     "watch_ambient": "--scenarios quiet --structures 1",
     "watch_worlds": "--world tied_arch --scenarios quiet --bridges 1 --years 1 --jobs 1",
-    "week": "--tests 60 --hangers 3 --every 20", "worlds": "--hangers 1",
+    "week": "--tests 24 --hangers 2 --every 6 --samples 200", "worlds": "--hangers 1",
 }  # fmt: skip
 # What `make bench` runs besides: tests, in the targets of the Makefile that set their processor.
 TESTS = {
