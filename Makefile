@@ -11,7 +11,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Who has it set lets each process compile all that it imports anew: the tests begin hundreds.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo demo-live test test-others test-slow test-arithmetic without-avx512 without-avx2 lint bench bench-peers docs tables lock clean
+.PHONY: demo demo-live test test-others test-slow test-trials test-arithmetic numerics without-avx512 \
+	without-avx2 slow-without-avx512 slow-without-avx2 lint bench bench-peers docs tables lock clean
 
 demo: .venv/runtime
 	$(BIN)/shm demo
@@ -34,6 +35,9 @@ test-others: .venv/development
 # Before a release, and with `make bench`: the slow tests, which have a quicker kin in `make test`.
 test-slow: .venv/development
 	$(BIN)/python -m pytest --quiet --numprocesses 3 --dist loadfile --no-loadscope-reorder -m slow
+
+test-trials: .venv/development
+	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile -m trial
 
 # numpy, OpenBLAS and the C library choose by the processor how many numbers they add at once and
 # whether they round between multiplying and adding: another processor gives other last digits, and
@@ -64,11 +68,20 @@ NUMERICS := $(BIN)/python -m pytest --quiet $(QUICK)
 
 test-arithmetic: without-avx2
 
+numerics: .venv/development
+	$(NUMERICS)
+
 without-avx512: .venv/development
 	$(WITHOUT_AVX512) $(NUMERICS)
 
 without-avx2: .venv/development
 	$(WITHOUT_AVX2) $(NUMERICS)
+
+slow-without-avx512: .venv/development
+	$(WITHOUT_AVX512) $(BIN)/python -m pytest --quiet $(SLOW)
+
+slow-without-avx2: .venv/development
+	$(WITHOUT_AVX2) $(BIN)/python -m pytest --quiet $(SLOW)
 
 lint: .venv/development
 	$(BIN)/ruff check .
@@ -76,14 +89,9 @@ lint: .venv/development
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: .venv/development test-slow
-	$(BIN)/python -m pytest --quiet --numprocesses 2 --dist loadfile -m trial
-	$(NUMERICS)
-	$(MAKE) without-avx512
-	$(WITHOUT_AVX512) $(BIN)/python -m pytest --quiet $(SLOW)
-	$(WITHOUT_AVX2) $(BIN)/python -m pytest --quiet $(SLOW)
-	for benchmark in $(filter-out %peers.py,$(wildcard tests/benchmarks/*.py)); do \
-		echo "== $$benchmark"; $(BIN)/python $$benchmark || exit 1; done
+# Goes on where it stopped, and after what fails: build/bench/table.md.
+bench: .venv/development
+	$(BIN)/python tests/benchmarks/every.py
 
 # Makes the peers' environments and runs them: hours.
 bench-peers: .venv/development

@@ -9,6 +9,7 @@ takes more than 60 s of processor time.
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from pathlib import Path
@@ -68,7 +69,9 @@ def line(name: str, found: Posterior, seconds: float) -> bool:
 
 
 def main() -> int:
-    options = UpdateOptions(samples=int(sys.argv[1]) if len(sys.argv) > 1 else 300)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("samples", nargs="?", type=int, default=300)
+    options = UpdateOptions(samples=parser.parse_args().samples)
     kept = []
     for effect, values in CASES.items():
         model = build(f"beam1+{effect}", HANGER_3)

@@ -33,7 +33,7 @@ from shm.read.atomic import replace_text
 from shm.values import TrueCase
 from shm.values.diagnosis import NO_GAP_STANDS_FROM
 from tests.benchmarks import gap_family
-from tests.benchmarks.blind_trial_2 import TRIALS, Plan, share, true_case, write_case
+from tests.benchmarks.blind_trial_2 import TRIALS, Plan, moment, share, true_case, write_case
 
 HANGERS = 3  # one more than the least that can share a cause: 20 s of a core each
 
@@ -139,14 +139,13 @@ def main() -> None:
     parser.add_argument("directory", type=Path)
     parser.add_argument("--families", type=int, default=4)
     parser.add_argument("--seed", type=int, default=20261126)
-    parser.add_argument("--until", default="23:59", help="UTC, today")
+    parser.add_argument("--until", help="UTC, today; else to the end")
     parser.add_argument("--write-docs", action="store_true")
     given = parser.parse_args()
     if given.what == "make":
         make(given.directory, given.families, given.seed)
     elif given.what == "solve":
-        hour, minute = map(int, given.until.split(":"))
-        solve(read_trial(given.directory), datetime.now(UTC).replace(hour=hour, minute=minute))
+        solve(read_trial(given.directory), moment(given.until))
     else:
         said = score(read_trial(given.directory))
         print(said)

@@ -303,6 +303,13 @@ def _write_told(directory: Path, plan: Plan, seed: int) -> None:
     (directory / CASE_FILE).write_text(dump(told) + "\n", encoding="utf-8")
 
 
+def moment(until: str | None) -> datetime:
+    if until is None:
+        return datetime.max.replace(tzinfo=UTC)
+    hour, minute = map(int, until.split(":"))
+    return datetime.now(UTC).replace(hour=hour, minute=minute, second=0)
+
+
 def solve(directory: Path, left_out: bool, until: datetime, at_once: int) -> None:
     """Few cases at a time, sealed each time, until the clock says."""
     trial = read_trial(directory)
@@ -509,16 +516,14 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=96)
     parser.add_argument("--seed", type=int, default=20261126)
     parser.add_argument("--left-out", action="store_true")
-    parser.add_argument("--until", default="23:59", help="UTC, today")
+    parser.add_argument("--until", help="UTC, today; else to the end")
     parser.add_argument("--at-once", type=int, default=12)
     parser.add_argument("--write-docs", action="store_true")
     given = parser.parse_args()
     if given.what == "make":
         make(given.directory, given.cases, given.seed)
     elif given.what == "solve":
-        hour, minute = map(int, given.until.split(":"))
-        until = datetime.now(UTC).replace(hour=hour, minute=minute, second=0)
-        solve(given.directory, given.left_out, until, given.at_once)
+        solve(given.directory, given.left_out, moment(given.until), given.at_once)
     else:
         score(given.directory, given.write_docs)
 

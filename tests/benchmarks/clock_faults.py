@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import argparse
 import logging
 import sys
 from pathlib import Path
@@ -18,9 +19,13 @@ from tests.helpers.clock_faults import FAULTS, one_case
 
 def main() -> None:
     logging.disable(logging.WARNING)
-    number = int(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("number", nargs="?", type=int, default=50)
+    parser.add_argument("faults", nargs="*", default=list(FAULTS))
+    asked = parser.parse_args()
+    number = asked.number
     quick_update.stand_in(setattr)
-    for fault in sys.argv[2:] or FAULTS:
+    for fault in asked.faults:
         with TemporaryDirectory() as folder:
             found = [one_case(fault, seed, Path(folder)) for seed in range(number)]
         told = sum(each.told for each in found)

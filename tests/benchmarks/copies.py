@@ -6,6 +6,7 @@ the real ones in `shared/data` where that is there.
 
 from __future__ import annotations
 
+import argparse
 import itertools
 import sys
 from collections.abc import Callable, Sequence
@@ -66,7 +67,9 @@ def tell_altered(
 
 
 def main() -> None:
-    number = int(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("number", nargs="?", type=int, default=20)
+    number = parser.parse_args().number
     for kind, plan in KINDS.items():
         tell_distinct(kind, [made(seed, plan) for seed in range(number)])
     if REAL.exists():

@@ -39,16 +39,16 @@ from recordings_trial import (  # noqa: E402
 from shm.errors import ShmError  # noqa: E402
 from shm.identify import IdentifyOptions, identification, identify  # noqa: E402
 from shm.identify.contract import Finding  # noqa: E402
-from shm.identify.estimation import amplitude_dependence, stabilise  # noqa: E402
+from shm.identify.estimation import amplitude_dependence, courses, stabilise  # noqa: E402
 from tests.worlds import recordings as world  # noqa: E402
 
-CONSTANTS: Mapping[str, Mapping[str, float]] = {
-    "all as they are": {},
-    "the error of the law": {"_LAW_ERROR": 0.0},
-    "others' shifts when unsure": {"_BY_CHANCE": -1.0},
-    "the overlap of stretches": {"_OVERLAP": 1.0},
-    "half as sure a phase": {"_LEAST_RATIO": 4.0},
-    "stretches twice as long": {"_STRETCH_SECONDS": 1.0},
+CONSTANTS: Mapping[str, tuple[Any, str, float] | None] = {
+    "all as they are": None,
+    "the error of the law": (amplitude_dependence, "_LAW_ERROR", 0.0),
+    "others' shifts when unsure": (amplitude_dependence, "_BY_CHANCE", -1.0),
+    "the overlap of stretches": (amplitude_dependence, "OVERLAP", 1.0),
+    "half as sure a phase": (courses, "_LEAST_RATIO", 4.0),
+    "stretches twice as long": (courses, "_STRETCH_SECONDS", 1.0),
 }
 AS_FOUND = "any correction"
 STEPS: Mapping[str, Mapping[str, Any]] = {
@@ -98,7 +98,7 @@ def without_constants(cases: Iterator[world.Recording]) -> None:
 
         def all_ways(found: Finding, measurement: Any, hz: list[float] = truths_hz) -> Finding:
             for name, changed in CONSTANTS.items():
-                with patch.multiple(amplitude_dependence, **changed) if changed else ExitStack():
+                with patch.object(*changed) if changed else ExitStack():
                     put(errors, name, hz, own(found, measurement).modes)
             put(errors, AS_FOUND, hz, found.modes)
             corrected = own(found, measurement)

@@ -47,7 +47,7 @@ def main() -> None:
             noted = Counter(event.kind for event in store.recordings.list_events())
     print(
         f"{struck} kills over {options.files} healthy files, {options.workers} workers: "
-        f"{ {stage.value: n for stage, n in counts.items()} }; noted: {dict(noted)}; "
+        f"{ {str(stage): n for stage, n in counts.items()} }; noted: {dict(noted)}; "
         f"{time.monotonic() - began:.0f} s"
     )
 

@@ -8,6 +8,7 @@ case in which frequencies tell a soft spring from tension worst (docs/trials/val
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 from concurrent.futures import ProcessPoolExecutor
@@ -89,6 +90,7 @@ def told(case: Case) -> tuple[float, float, float, tuple[str, ...]]:
 
 
 def main() -> None:
+    argparse.ArgumentParser(description=__doc__).parse_args()
     covered, warned, every = 0, 0, cases()
     with ProcessPoolExecutor(2) as pool:
         for case, (mean, low, high, caveats) in zip(every, pool.map(told, every), strict=True):

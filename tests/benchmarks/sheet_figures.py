@@ -5,6 +5,7 @@ Sixteen channels, five hits, 60 s at 2048 Hz, twenty-four modes. Exits 1 where a
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from dataclasses import replace
@@ -36,6 +37,7 @@ def large_sheet() -> ModalTestReport:
 
 
 def main() -> int:
+    argparse.ArgumentParser(description=__doc__).parse_args()
     sheet = large_sheet()
     begin = time.process_time()
     figures = [item.svg() for item in report_test_figures(sheet)]

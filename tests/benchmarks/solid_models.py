@@ -18,7 +18,7 @@ import numpy as np
 from rich.progress import track
 
 from shm.bridge import load_hanger
-from shm.models import build
+from shm.models import THESIS, build
 from shm.models.base import silent
 from shm.models.solid.basis import assembled, transverse_basis
 from shm.models.solid.geometry import Fineness
@@ -37,7 +37,7 @@ LIMITS = {"solid0": (15, 60.0), "solid2": (30, 60.0), "solid1": (70, 240.0)}
 
 def meshes(hanger: Hanger) -> list[str]:
     """solid0 on three meshes; the faults found."""
-    description = build("solid0", hanger).description()  # type: ignore[attr-defined]
+    description = build("solid0", hanger, THESIS).description()  # type: ignore[attr-defined]
     found, faults = {}, []
     for name, fineness in MESHES.items():
         geometry = replace(description.geometry, fineness=fineness)
@@ -60,7 +60,7 @@ def meshes(hanger: Hanger) -> list[str]:
 
 def reduction(hanger: Hanger, name: str, held_out: int) -> list[str]:
     """A class's basis made from nothing, and its error on fresh points and corners."""
-    model = build(name, hanger)
+    model = build(name, hanger, THESIS)
     started = time.process_time()
     model.prepare(MODES)
     offline = time.process_time() - started
@@ -84,7 +84,7 @@ def reduction(hanger: Hanger, name: str, held_out: int) -> list[str]:
 
 def _error_percent(model: object, theta: FloatArray) -> float:
     worst = 0.0
-    for block in track(np.array_split(theta, 20), "full model", transient=True):
+    for block in track(np.array_split(theta, min(20, len(theta))), "full model", transient=True):
         reference = model.reference_frequencies_hz(block, MODES)  # type: ignore[attr-defined]
         reduced = model.frequencies_hz(block, MODES)  # type: ignore[attr-defined]
         worst = max(worst, 100 * float(np.abs(reduced / reference - 1).max()))

@@ -170,7 +170,7 @@ def main() -> None:
     with ProcessPoolExecutor(arguments.workers) as executor:
         mapped = executor.map(partial(compared, arguments.samples), range(arguments.cases))
         cases = list(track(mapped, "tests", total=arguments.cases))
-    for error in ERRORS:
+    for error in sorted({case.error for case in cases}, reverse=True):
         report(f"noise {error:.1%}", [case for case in cases if case.error == error])
     report("all", cases)
     failed = faults(cases)

@@ -5,6 +5,7 @@ python -m tests.benchmarks.upload [MEGABYTES]
 
 from __future__ import annotations
 
+import argparse
 import re
 import subprocess
 import sys
@@ -74,4 +75,6 @@ def _peak_mb(pid: int) -> float:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 500)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("megabytes", nargs="?", type=int, default=500)
+    main(parser.parse_args().megabytes)

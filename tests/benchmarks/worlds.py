@@ -121,6 +121,8 @@ def diagnosed(task: tuple[int, int, int, int]) -> dict[str, Any]:
 
 def share(hits: int, count: int) -> str:
     """A share with its 90 % interval (Clopper and Pearson)."""
+    if not count:
+        return "of no case"
     low = beta.ppf(0.05, hits, count - hits + 1) if hits else 0.0
     high = beta.ppf(0.95, hits + 1, count - hits) if hits < count else 1.0
     return f"{hits / count:.2f} ({low:.2f} to {high:.2f})"

@@ -1,0 +1,74 @@
+"""Each benchmark begins, takes the arguments that `make bench` gives it, and its end is judged."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.benchmarks import every
+
+# Each as `__main__`, in one process, so that what they all import is imported once.
+BEGUN = """
+import argparse, contextlib, io, runpy, sys, traceback
+from pathlib import Path
+from tests.benchmarks import every
+
+class Parsed(Exception):
+    pass
+
+def parsed(parser, *given):
+    parse(parser, *given)
+    raise Parsed
+
+parse, argparse.ArgumentParser.parse_args = argparse.ArgumentParser.parse_args, parsed
+for name in every.benchmarks():
+    rows = [row for short in (False, True) for row in every.commands(name, short, Path("none"))]
+    for sys.argv in [each[1:] for each in rows] + [[rows[0][1], "--help"]]:
+        sys.path[:0] = [str(every.HERE)]
+        said = io.StringIO()
+        try:
+            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+                runpy.run_path(sys.argv[0], run_name="__main__")
+            print(sys.argv, "takes no arguments")
+        except Parsed:
+            pass
+        except SystemExit as ended:
+            if ended.code != 0:
+                print(sys.argv, said.getvalue())
+        except Exception:
+            print(sys.argv, traceback.format_exc())
+        sys.path.remove(str(every.HERE))
+"""
+
+
+def test_every_benchmark_can_be_imported_and_takes_its_arguments() -> None:
+    begun = subprocess.run(
+        [sys.executable, "-c", BEGUN], cwd=every.ROOT, env=every.ENVIRONMENT,
+        capture_output=True, text=True, timeout=200, check=False,
+    )  # fmt: skip
+    assert begun.stdout + begun.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("program", "verdict"),
+    [
+        ("pass", every.HELD),
+        ("raise SystemExit('the mark is missed')", every.MISSED),
+        ("1 / 0", every.BROKEN),
+        ("raise SystemExit(2)", every.BROKEN),
+        ("import time; time.sleep(60)", every.UNFINISHED),
+    ],
+)
+def test_a_missed_mark_is_no_broken_benchmark(program: str, verdict: str, tmp_path: Path) -> None:
+    seconds = 0.5 if verdict == every.UNFINISHED else 60.0
+    assert every.run([[sys.executable, "-c", program]], tmp_path / "log.txt", seconds) == verdict
+
+
+def test_the_table_of_arguments_names_benchmarks_and_targets() -> None:
+    assert set(every.WHOLE | every.SHORT) <= set(every.benchmarks())
+    makefile = (every.ROOT / "Makefile").read_text(encoding="utf-8").splitlines()
+    targets = {line.partition(":")[0] for line in makefile}
+    assert set(every.TESTS) <= targets
