@@ -20,7 +20,8 @@ from rich.progress import track
 from shm.bridge import load_hanger
 from shm.models import THESIS, build
 from shm.models.base import silent
-from shm.models.solid.basis import assembled, transverse_basis
+from shm.models.solid.assembly import assembled
+from shm.models.solid.basis import transverse_basis
 from shm.models.solid.geometry import Fineness
 from shm.models.solid.reduction import natural_modes
 from shm.values import FloatArray, Hanger
