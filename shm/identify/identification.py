@@ -71,6 +71,18 @@ class Identification:
     set_aside: tuple[ForeignMode, ...] = ()
     fit: ComplexArray | None = None
 
+    def with_orders(self, source: str) -> Identification:
+        """Itself, where modes have orders; else NotIdentifiable, which lists what was found."""
+        if self.test.modes:
+            return self
+        checks = [each for each in self.quality if each.verdict == "refused"]
+        listed = ", ".join(f"{each.frequency_hz:.4g}" for each in self.set_aside)
+        raise NotIdentifiable(
+            f"{'; '.join(each.found for each in checks)} ({listed} Hz).",
+            file=source,
+            remedy=" ".join(each.remedy for each in checks),
+        )
+
 
 _DEFAULTS = IdentifyOptions()
 _FEWEST_CALM = 3  # judgement: two frequencies fit a bar's tension and stiffness by chance
@@ -86,7 +98,8 @@ def identify(
     """The modes of one test from its records: time records with hits, or frequency responses.
 
     The description of the `hanger`, where known, helps to number the modes. Raises BadInput
-    where the records cannot be used together, NotIdentifiable where no mode can be trusted.
+    where the records cannot be used together, NotIdentifiable where no mode can be trusted. Modes
+    whose orders are not known are set aside: the test is without modes where all are.
     """
     refuse_off_the_hanger(records, hanger)
     recordings = [record for record in records if isinstance(record, Recording)]
@@ -110,9 +123,9 @@ def identify(
     level_left, noted = 1.0, found.notes
     if not placement.modes:
         calm = _once_calm(measurements, options, hanger, steady)
-        if calm is None:
+        if calm is None and placement.check is None:
             raise _nothing_found(records[0].source, found.finding, placement)
-        placement, level_left, noted = calm
+        placement, level_left, noted = calm or (placement, 1.0, noted)
         free = level_left
     else:
         free = free_below(measurements, placement.modes)
@@ -164,7 +177,7 @@ def _of_placed(
 ) -> list[QualityCheck]:
     """What numbered modes say of their numbers and of the sensors."""
     checks = [placement.check]
-    if hanger and hanger.as_hanger:
+    if hanger and hanger.as_hanger and placement.modes:
         checks.append(first_orders(placement.modes, hanger, options.band_low_hz))
         checks.append(sensor_gain(measurements, found.apart, placement.modes, hanger))
         checks.append(sensor_places(placement.modes, hanger))

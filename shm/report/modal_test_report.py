@@ -57,7 +57,7 @@ def facts(sheet: ModalTestReport) -> tuple[Fact, ...]:
         ("Modes", str(len(sheet.modes)), f"in {formatting.counted(len(planes), 'plane')}"),
         ("Hits used", f"{len(sheet.used_hits)} of {len(hits)}" if hits else "none", _force(sheet)),
         ("Tested", formatting.moment(test.time), formatting.temperature(test.temperature_c)),
-        ("Set aside", str(len(sheet.identification.set_aside)), "resonances not of the hanger"),
+        ("Set aside", str(len(sheet.identification.set_aside)), "resonances without an order"),
     )
 
 
@@ -128,7 +128,7 @@ def _excitation(sheet: ModalTestReport) -> str:
 
 def _what_was_found(sheet: ModalTestReport) -> str:
     if not sheet.modes:
-        return "No mode was identified."
+        return "No mode has an order." if _unnumbered(sheet) else "No mode was identified."
     groups = [_group(sheet, plane) for plane in PLANES]
     listed = formatting.listed([group for group in groups if group])
     verb = "was" if len(sheet.modes) == 1 else "were"
@@ -160,7 +160,12 @@ def _what_is_no_mode(sheet: ModalTestReport) -> str:
     if not found:
         return ""
     listed = formatting.listed([f"{each.kind} at {each.frequency_hz:.4g} Hz" for each in found])
-    return f"Set aside as no modes of the hanger: {listed}."
+    known = "" if _unnumbered(sheet) else " as no modes of the hanger"
+    return f"Set aside{known}: {listed}."
+
+
+def _unnumbered(sheet: ModalTestReport) -> bool:
+    return any(each.kind == "unnumbered" for each in sheet.identification.set_aside)
 
 
 def trust(sheet: ModalTestReport) -> str:
@@ -257,12 +262,13 @@ def quality(sheet: ModalTestReport) -> Table:
 
 def set_aside(sheet: ModalTestReport) -> Table:
     return Table(
-        "Set aside: not modes of the hanger",
-        ("what", "frequency, Hz", "damping, %", "why"),
+        "Set aside: not known as modes of the hanger",
+        ("what", "frequency, Hz", "sd, Hz", "damping, %", "why"),
         tuple(
             (
-                each.kind,
+                f"{each.kind} {each.plane or ''}".rstrip(),
                 f"{each.frequency_hz:.3f}",
+                formatting.plain(each.frequency_sd_hz, 2),
                 formatting.number(100 * each.damping_ratio, ".4f"),
                 each.reason,
             )

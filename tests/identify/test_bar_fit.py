@@ -7,8 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.identify.mode_ordering.alignment import PlaneModes, log_frequency
-from shm.identify.mode_ordering.bar_fit import borne_out
+from shm.identify.mode_ordering.alignment import (
+    PlaneModes,
+    log_frequency,
+    tensioned_beam_pattern,
+)
+from shm.identify.mode_ordering.bar_fit import borne_out, described_orders
 from shm.identify.mode_ordering.order import LEAST_MARGIN, Expected, Numbering, assign_orders
 
 LONG = Expected(log_unit=float(np.log(0.05)), log_xi=float(np.log(35.0)))
@@ -58,3 +62,20 @@ def test_a_hanger_that_is_no_plain_bar_keeps_its_margins() -> None:
 def test_orders_that_no_frequency_tells_stay_open() -> None:
     planes = _planes((tuple(range(20, 27)), ()))
     assert _least_margin(borne_out(planes, LONG, assign_orders(planes, LONG))) < LEAST_MARGIN
+
+
+def test_shapes_that_one_cause_turns_do_not_outvote_the_frequencies() -> None:
+    """Each mode has the shape of the next order, as with places that are too small."""
+    orders = (tuple(range(3, 15)), tuple(range(4, 13)))
+    place = np.array([0.03, 0.06, 0.09, 0.12])
+    pattern = tensioned_beam_pattern()
+    tension = np.array([np.argmin(np.abs(pattern.log_xi - LONG.log_xi))])
+    shapes = pattern.shapes(place, tension)[0, -1]
+    planes = [
+        replace(plane, position=place, shapes=shapes[list(own)], shape_sd=np.full(len(own), 0.01))
+        for plane, own in zip(_planes(orders), orders, strict=True)
+    ]
+    assert _least_margin(borne_out(planes, LONG, assign_orders(planes, LONG))) < LEAST_MARGIN
+    found = described_orders(planes, LONG)
+    assert found.orders == orders
+    assert _least_margin(found) > LEAST_MARGIN

@@ -2,7 +2,8 @@
 
 A fault of one channel after one hit leaves out that hit; after most hits, that channel. A clipped
 force does not: the ring-down is as good as any, the check `clipping` tells what it spoils. Nor does
-an acceleration that is clipped at first: the ring-down begins later. A double hit's begins after
+an acceleration that is clipped at first: the ring-down begins later. What strikes unseen in a
+ring-down, as a hit that falls between two samples of the force, ends it. A double hit's begins after
 the second blow, and is used where there are fewer than three others. A hit that disagrees with the
 others fell at a wrong place or direction, or somebody held the hanger.
 """
@@ -17,7 +18,7 @@ import numpy as np
 
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Dropped, Hit
-from shm.identify.measuring.frf import least_seconds
+from shm.identify.measuring.frf import RATE_OVER_BAND, least_seconds
 from shm.identify.measuring.hits import (
     LEAST_SHARE_OF_HARDEST,
     PULSE_SECONDS,
@@ -30,10 +31,12 @@ from shm.identify.measuring.signal_faults import (
     CLIPPED,
     CUT_OFF,
     DOUBLE_HIT,
+    KNOCK,
     NOT_A_NUMBER,
     OUTLIER,
     clipped_ends,
     faults_of_channels,
+    knocked_at,
 )
 from shm.identify.measuring.struck_planes import struck_planes
 from shm.identify.measuring.unforced_hits import find_unforced
@@ -72,6 +75,7 @@ def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screenin
     ends = clipped_ends(channels, ring_downs)
     ring_downs = [replace(r, clipped_end=end) for r, (end, _) in zip(ring_downs, ends, strict=True)]
     faults = faults_of_channels(channels, ring_downs, rate, options)
+    ring_downs, faults = _until_knocks(channels, ring_downs, faults, rate, options)
     rows, dropped = _usable_channels(channels, faults)
     ring_downs = _with_rows(ring_downs, rows)
     reasons = _reasons(ring_downs, [[each[row] for row in rows] for each in faults], rate, options)
@@ -87,6 +91,30 @@ def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screenin
         for hit, reason, ring_down, (_, names) in zip(hits, reasons, ring_downs, ends, strict=True)
     ]
     return Screening(tuple(judged), tuple(used), tuple(rows), dropped + _counted(reasons))
+
+
+def _until_knocks(
+    channels: Sequence[Channel],
+    ring_downs: Sequence[HitRecord],
+    faults: list[list[str]],
+    sampling_rate_hz: float,
+    options: IdentifyOptions,
+) -> tuple[list[HitRecord], list[list[str]]]:
+    """Disturbed ring-downs end where they are disturbed, if what is left is sound and no stub."""
+    wanted = RATE_OVER_BAND * options.band_high_hz
+    least = _least_samples(ring_downs, sampling_rate_hz, options)
+    kept = list(ring_downs)
+    for number, (r, names) in enumerate(zip(ring_downs, faults, strict=True)):
+        if KNOCK not in names:
+            continue
+        first = r.free + RINGING_SAMPLES
+        ring = r.accelerations[[name == KNOCK for name in names], first : r.pulse.stop]
+        stop = first + knocked_at(ring, sampling_rate_hz, wanted)
+        if stop - r.free >= least:
+            kept[number] = replace(r, pulse=replace(r.pulse, stop=stop), cut=KNOCK)
+    if kept == list(ring_downs):
+        return kept, faults
+    return kept, faults_of_channels(channels, kept, sampling_rate_hz, options)
 
 
 def pulses_of(record: Recording, options: IdentifyOptions) -> list[Pulse]:
@@ -126,10 +154,10 @@ def _with_double_hits(
 
 
 def _cut(ring_down: HitRecord, clipped_channels: Sequence[str]) -> str:
-    """Why a used ring-down begins later than its first pulse ends."""
+    """Why a used ring-down begins later than its first pulse ends, or ends before the next."""
     if ring_down.clipped_end:
         return f"{CLIPPED}: {', '.join(clipped_channels)}"
-    return DOUBLE_HIT if ring_down.pulse.second_peak > 0 else ""
+    return DOUBLE_HIT if ring_down.pulse.second_peak > 0 else ring_down.cut
 
 
 def _with_rows(ring_downs: Sequence[HitRecord], rows: list[int]) -> list[HitRecord]:
@@ -183,11 +211,18 @@ def _reasons(
     options: IdentifyOptions,
 ) -> list[str]:
     """Why each hit cannot be used; empty where it can."""
+    least = _least_samples(ring_downs, sampling_rate_hz, options)
+    return [_hit_fault(r, f, least) for r, f in zip(ring_downs, faults, strict=True)]
+
+
+def _least_samples(
+    ring_downs: Sequence[HitRecord], sampling_rate_hz: float, options: IdentifyOptions
+) -> float:
+    """Of a ring-down that is no stub."""
     longest = max((r.pulse.stop - r.free for r in ring_downs), default=0)
-    least = max(
+    return max(
         least_seconds(options.band_high_hz) * sampling_rate_hz, _LEAST_SHARE_OF_LONGEST * longest
     )
-    return [_hit_fault(r, f, least) for r, f in zip(ring_downs, faults, strict=True)]
 
 
 def _hit_fault(ring_down: HitRecord, faults: Sequence[str], least_samples: float) -> str:

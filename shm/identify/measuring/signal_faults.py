@@ -19,7 +19,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from shm.identify.measuring.frf import RATE_OVER_BAND
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
 from shm.identify.options import IdentifyOptions
-from shm.values import BoolArray, Channel, FloatArray
+from shm.values import PLANES, BoolArray, Channel, FloatArray, Plane
 
 DOUBLE_HIT = "double hit"
 CUT_OFF = "ring-down cut off"
@@ -102,7 +102,7 @@ def faults_of_channels(
         1, int(sampling_rate_hz / (RATE_OVER_BAND * options.band_high_hz))
     )
     _add(faults, _wanders(free, faults, rate))
-    _add(faults, _surprises(free, faults))
+    _add(faults, _surprises(free, faults, [channel.plane for channel in channels]))
     for r, names in zip(ring_downs, faults, strict=True):
         ring = r.accelerations[:, r.free + RINGING_SAMPLES : r.pulse.stop - RINGING_SAMPLES]
         if KNOCK in names and is_cut_short(ring[[name == KNOCK for name in names]]):
@@ -193,8 +193,11 @@ def _wanders(free: Sequence[FloatArray], known: Faults, rate_hz: float) -> Fault
     return faults
 
 
-def _surprises(free: Sequence[FloatArray], known: Faults) -> Faults:
-    """Jumps, bursts and loose contacts; where more than half the channels have them, a knock."""
+def _surprises(
+    free: Sequence[FloatArray], known: Faults, planes: Sequence[Plane | None]
+) -> Faults:
+    """Jumps, bursts and loose contacts; where more than half the channels have them, or of those of
+    a plane, a knock."""
     channels = len(free[0])
     found = np.zeros((len(free), channels))
     for row in range(channels):
@@ -202,7 +205,11 @@ def _surprises(free: Sequence[FloatArray], known: Faults) -> Faults:
         if sound:
             found[sound, row] = surprise([free[hit][row] for hit in sound])
     wild = found > _SURPRISE
-    knocks = (channels > 1) & (2 * wild.sum(axis=1) > channels)
+    groups = [np.array([plane == own for own in planes]) for plane in PLANES]
+    groups = [group for group in (*groups, np.full(channels, True)) if group.sum() > 1]
+    knocks = np.full(len(free), False)
+    for group in groups:
+        knocks |= 2 * wild[:, group].sum(axis=1) > group.sum()
     return [
         [(KNOCK if knock else CABLE) if is_wild else "" for is_wild in row]
         for row, knock in zip(wild, knocks, strict=True)
@@ -368,6 +375,14 @@ def is_cut_short(ring: FloatArray) -> bool:
     return bool(unlike[1:].min() < min(_AS_PREDICTED, unlike[0] / 2))
 
 
+def knocked_at(ring: FloatArray, sampling_rate_hz: float, wanted_rate_hz: float) -> int:
+    """The sample of a ring-down (channels, samples) before which nothing else has struck yet."""
+    free = thinned(ring, sampling_rate_hz, wanted_rate_hz)
+    blocks = [int(np.argmax(_beside_usual(part, prediction_rule([part])))) for part in free]
+    first = max(0, int(np.median(blocks)) - 1) * _BLOCK + _ORDER
+    return first * (ring.shape[1] // free.shape[1])
+
+
 def prediction_rule(parts: Sequence[FloatArray]) -> FloatArray:
     """Coefficients (1 + order,) that annihilate the parts, by least squares over all of them."""
     rows = np.vstack([sliding_window_view(part[:_FIT_SAMPLES], _ORDER + 1) for part in parts])
@@ -381,6 +396,11 @@ def prediction_rule(parts: Sequence[FloatArray]) -> FloatArray:
 def _worst(part: FloatArray, rule: FloatArray) -> float:
     if len(part) < 2 * _ORDER:
         return float("nan")
+    return float(np.max(_beside_usual(part, rule)))
+
+
+def _beside_usual(part: FloatArray, rule: FloatArray) -> FloatArray:
+    """The largest error of each block of the prediction over what is usual about it, (blocks,)."""
     error = np.abs(np.convolve(part, rule, mode="valid"))
     peaks = error[: len(error) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).max(axis=1)
     width = min(_AROUND, len(peaks))
@@ -388,4 +408,4 @@ def _worst(part: FloatArray, rule: FloatArray) -> float:
     usual = around.copy()
     late = width // 2 + 1
     usual[late:] = np.minimum(around[late:], around[:-late])
-    return float(np.max(peaks / np.maximum(usual, np.finfo(float).tiny)))
+    return np.asarray(peaks / np.maximum(usual, np.finfo(float).tiny))
