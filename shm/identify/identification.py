@@ -19,6 +19,7 @@ from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifi
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.estimation.sidebands import without_sidebands
 from shm.identify.estimation.ssi import looked_at_again
+from shm.identify.estimation.stabilise import completed
 from shm.identify.measuring.recorded_window import recorded_window_rate
 from shm.identify.measuring.sensor_places import refuse_off_the_hanger
 from shm.identify.measuring.setups import measured, without_unused_force
@@ -105,21 +106,17 @@ def identify(
     recordings = [record for record in records if isinstance(record, Recording)]
     measurements = measured(records, options)
     recordings = without_unused_force(recordings, measurements)
-    found = _found(measurements, options.identifier, options)
-    second = _cross_check(measurements, options)
     steady = tones(measurements, recordings, options)
+    found = _found(measurements, options.identifier, options)
+    placement = _placed(found, measurements, hanger, steady, options)
+    if not placement.modes and (closer := _closer(found, measurements, options)):
+        found, placement = closer, _placed(closer, measurements, hanger, steady, options)
+    second = _cross_check(measurements, options)
     quality = assess(Inspection(recordings, measurements, options, steady, found.finding, second))
     if turned := directions(found.finding.modes, found.points):
         quality = (*quality, turned)
     if refused := refusal(quality, records[0].source):
         raise refused
-    placement = placed_with_doubtful(
-        found.finding.modes,
-        partial(_doubtful, measurements, found.finding, options),
-        found.points,
-        hanger,
-        steady,
-    )
     level_left, noted = 1.0, found.notes
     if not placement.modes:
         calm = _once_calm(measurements, options, hanger, steady)
@@ -152,20 +149,49 @@ def identify(
     )
 
 
-def _doubtful(
+def _placed(
+    found: Joined,
+    measurements: Sequence[Measurement],
+    hanger: Hanger | None,
+    steady: Sequence[Tone],
+    options: IdentifyOptions,
+) -> Placement:
+    return placed_with_doubtful(
+        found.finding.modes,
+        partial(_looked_at, measurements, found.finding, options),
+        found.points,
+        hanger,
+        steady,
+    )
+
+
+def _closer(
+    found: Joined, measurements: Sequence[Measurement], options: IdentifyOptions
+) -> Joined | None:
+    """With what windows over the whole band show of one set-up; None where they show no more."""
+    if len(measurements) > 1 or options.identifier not in HIT_BY_HIT:
+        return None
+    again = looked_at_again(measurements[0], options)
+    if again is None or not again.modes:
+        return None
+    more = _allowed_for(_finished(again, measurements[0], options), options.shape_allowance)
+    return _of_modes_alone(joined(measurements, [completed(found.finding, more)], options))
+
+
+def _looked_at(
     measurements: Sequence[Measurement],
     found: Finding,
     options: IdentifyOptions,
     at_hz: Sequence[float],
-) -> tuple[FoundMode, ...]:
-    """What may be a mode about the frequencies `at_hz`, of one set-up."""
+) -> tuple[tuple[FoundMode, ...], tuple[FoundMode, ...]]:
+    """What windows show about the frequencies `at_hz`, of one set-up, and what may be a mode."""
     again = None
     if len(measurements) == 1 and options.identifier in HIT_BY_HIT:
         again = looked_at_again(measurements[0], options, at_hz)
     if again is None:
-        return found.doubtful
+        return (), found.doubtful
     again = _finished(again, measurements[0], options)
-    return (*found.doubtful, *again.modes, *again.doubtful)
+    return again.modes, (*found.doubtful, *again.doubtful)
 
 
 def _of_placed(
@@ -249,7 +275,8 @@ def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOpti
         every = together(measurements)
         whole = _finished(function(every, options), every, options)
         found = sharpened(measurements, found, whole)
-    return _allowed_for(_of_modes_alone(found), options.shape_allowance)
+    found = _of_modes_alone(found)
+    return replace(found, finding=_allowed_for(found.finding, options.shape_allowance))
 
 
 def _of_modes_alone(found: Joined) -> Joined:
@@ -262,13 +289,13 @@ def _of_modes_alone(found: Joined) -> Joined:
     return replace(found, finding=finding, apart=apart)
 
 
-def _allowed_for(found: Joined, shape_allowance: float) -> Joined:
+def _allowed_for(found: Finding, shape_allowance: float) -> Finding:
     """With what shapes differ by from test to test in their standard deviations."""
     modes = tuple(
         replace(mode, shape_sd=np.hypot(mode.shape_sd, shape_allowance))
-        for mode in found.finding.modes
+        for mode in found.modes
     )
-    return replace(found, finding=replace(found.finding, modes=modes))
+    return replace(found, modes=modes)
 
 
 def _finished(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
