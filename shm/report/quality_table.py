@@ -36,7 +36,7 @@ _HEADLINES: dict[Verdict, str] = {
 
 
 def headline(checks: Sequence[QualityCheck]) -> str:
-    """What the whole deserves, and which lowest mode or orders are missing: `Use with care: ...`."""
+    """What the whole deserves, and which lowest mode or orders it lacks: `Use with care: ...`."""
     grave = (FIRST_ORDERS, "warning"), (NUMBERING, "refused")
     lost = [c.found for c in checks if (c.name, c.verdict) in grave]
     return ": ".join([_HEADLINES[overall(checks)], *lost])

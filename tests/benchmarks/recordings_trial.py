@@ -51,7 +51,8 @@ SAME_MODE = 0.005
 NOMINAL_OFF = 0.1
 NINETY = 1.645
 COLUMNS = (
-    "kind", "tests", "refused", "found", "%", "of identifiable", "%", "unnumbered", "wrong names", "of them Good",
+    "kind", "tests", "refused", "found", "%", "of identifiable", "%", "unnumbered",
+    "wrong names", "of them Good",
     "false", "of modes", "frequency covered", "damping covered", "CPU s",
 )  # fmt: skip
 

@@ -9,8 +9,8 @@ import pytest
 
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Finding, FoundMode, Measurement, Poles
+from shm.identify.measuring.prediction import surprise
 from shm.identify.measuring.setups import measured_recordings
-from shm.identify.measuring.signal_faults import surprise
 from shm.identify.quality import CHECKS, Inspection, assess, refusal, tones
 from shm.values import FloatArray, FrequencyResponse, Recording, ResponsePoint
 from tests.identify.planted import (

@@ -178,9 +178,7 @@ def _same_pulse(sampling_rate_hz: float) -> int:
     return max(int(PULSE_SECONDS * sampling_rate_hz), RINGING_SAMPLES)
 
 
-def _struck_again(
-    after: FloatArray, fall: int, noise: float, sampling_rate_hz: float
-) -> IntArray:
+def _struck_again(after: FloatArray, fall: int, noise: float, sampling_rate_hz: float) -> IntArray:
     """The samples of `after`, which begins with the first peak, at which something strikes again.
 
     Up to 6 ms after the peak, and until it has fallen after `fall` samples (a soft tip's pulse is

@@ -3,8 +3,8 @@
 A fault of one channel after one hit leaves out that hit; after most hits, that channel. A clipped
 force does not: the ring-down is as good as any, the check `clipping` tells what it spoils. Nor does
 an acceleration that is clipped at first: the ring-down begins later. What strikes unseen in a
-ring-down, as a hit that falls between two samples of the force, ends it. A double hit's begins after
-the second blow, and is used where there are fewer than three others. A hit that disagrees with the
+ring-down, as a hit between two samples of the force does, ends it. A double hit's begins after the
+second blow, and is used where there are fewer than three others. A hit that disagrees with the
 others fell at a wrong place or direction, or somebody held the hanger.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Dropped, Hit
-from shm.identify.measuring.frf import RATE_OVER_BAND, least_seconds
+from shm.identify.measuring.frf import least_seconds
 from shm.identify.measuring.hits import (
     LEAST_SHARE_OF_HARDEST,
     PULSE_SECONDS,
@@ -31,12 +31,11 @@ from shm.identify.measuring.signal_faults import (
     CLIPPED,
     CUT_OFF,
     DOUBLE_HIT,
-    KNOCK,
     NOT_A_NUMBER,
     OUTLIER,
     clipped_ends,
     faults_of_channels,
-    knocked_at,
+    until_knocks,
 )
 from shm.identify.measuring.struck_planes import struck_planes
 from shm.identify.measuring.unforced_hits import find_unforced
@@ -75,7 +74,8 @@ def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screenin
     ends = clipped_ends(channels, ring_downs)
     ring_downs = [replace(r, clipped_end=end) for r, (end, _) in zip(ring_downs, ends, strict=True)]
     faults = faults_of_channels(channels, ring_downs, rate, options)
-    ring_downs, faults = _until_knocks(channels, ring_downs, faults, rate, options)
+    least = _least_samples(ring_downs, rate, options)
+    ring_downs, faults = until_knocks(channels, ring_downs, faults, least, rate, options)
     rows, dropped = _usable_channels(channels, faults)
     ring_downs = _with_rows(ring_downs, rows)
     reasons = _reasons(ring_downs, [[each[row] for row in rows] for each in faults], rate, options)
@@ -91,30 +91,6 @@ def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screenin
         for hit, reason, ring_down, (_, names) in zip(hits, reasons, ring_downs, ends, strict=True)
     ]
     return Screening(tuple(judged), tuple(used), tuple(rows), dropped + _counted(reasons))
-
-
-def _until_knocks(
-    channels: Sequence[Channel],
-    ring_downs: Sequence[HitRecord],
-    faults: list[list[str]],
-    sampling_rate_hz: float,
-    options: IdentifyOptions,
-) -> tuple[list[HitRecord], list[list[str]]]:
-    """Disturbed ring-downs end where they are disturbed, if what is left is sound and no stub."""
-    wanted = RATE_OVER_BAND * options.band_high_hz
-    least = _least_samples(ring_downs, sampling_rate_hz, options)
-    kept = list(ring_downs)
-    for number, (r, names) in enumerate(zip(ring_downs, faults, strict=True)):
-        if KNOCK not in names:
-            continue
-        first = r.free + RINGING_SAMPLES
-        ring = r.accelerations[[name == KNOCK for name in names], first : r.pulse.stop]
-        stop = first + knocked_at(ring, sampling_rate_hz, wanted)
-        if stop - r.free >= least:
-            kept[number] = replace(r, pulse=replace(r.pulse, stop=stop), cut=KNOCK)
-    if kept == list(ring_downs):
-        return kept, faults
-    return kept, faults_of_channels(channels, kept, sampling_rate_hz, options)
 
 
 def pulses_of(record: Recording, options: IdentifyOptions) -> list[Pulse]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
@@ -20,6 +19,7 @@ from shm.identify.mode_ordering.non_bending_modes import (
     unnumbered_mode,
     without_tones,
 )
+from shm.identify.mode_ordering.notes import basis_notes, plane_notes, support_notes
 from shm.identify.mode_ordering.one_axis import own_series
 from shm.identify.mode_ordering.order import LEAST_MARGIN, Expected, Numbering, assign_orders
 from shm.identify.mode_ordering.planes import (
@@ -41,8 +41,6 @@ from shm.values import (
     ShapePoint,
 )
 from shm.values.modes import NUMBERING
-
-_NOTED_DEGREES = 5.0  # judgement: a sensor clamped on by eye; it sees 0.8 % of the other plane
 
 
 @dataclass(frozen=True)
@@ -98,10 +96,10 @@ def placed(
         modes=tuple(_mode(*each, pairs) for each in numbered.ordered),
         set_aside=_by_frequency([*steady, *foreign]),
         notes=(
-            *_plane_notes(points, turned_rad),
+            *plane_notes(points, turned_rad),
             *(pair_note(mode) for mode in pairs),
-            *_support_notes(hanger),
-            *_basis_notes(numbered.numbering, known, points),
+            *support_notes(hanger),
+            *basis_notes(numbered.numbering, known, points),
             *_order_notes(numbered.ordered),
             *_irregular_notes(numbered.ordered),
         ),
@@ -260,18 +258,6 @@ def _by_frequency(modes: Sequence[ForeignMode]) -> tuple[ForeignMode, ...]:
     return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
 
 
-def _plane_notes(points: Sequence[ResponsePoint], turned_rad: float) -> list[str]:
-    if not any(point.plane for point in points):
-        return ["no channel states its plane: all modes are taken as transverse"]
-    degrees = abs(math.degrees(turned_rad))
-    if degrees >= _NOTED_DEGREES:
-        return [
-            f"the hanger's planes are turned by {degrees:.0f} degrees from the sensors' axes: each "
-            "mode has the name of the nearer plane"
-        ]
-    return []
-
-
 _MORE = "Measure more of the lowest modes: hit with a softer tip, and away from the ends."
 
 
@@ -357,30 +343,6 @@ def _listed(
 
 def _direction(mode: FoundMode, points: Sequence[ResponsePoint]) -> Plane:
     return PLANES[int(transverse_share(mode.shape, points) < 0.5)]
-
-
-def _support_notes(hanger: Hanger | None) -> list[str]:
-    if hanger is None or hanger.as_hanger:
-        return []
-    return [
-        "the hanger is not clamped at both ends and in tension: its description does not help to "
-        "number the modes"
-    ]
-
-
-def _basis_notes(
-    numbering: Numbering, hanger: Hanger | None, points: Sequence[ResponsePoint]
-) -> list[str]:
-    if numbering.basis == "counting":
-        return ["the modes fit no tensioned beam: they are counted, so orders may be off"]
-    if hanger and numbering.basis == "pattern":
-        return [
-            "the modes do not fit the hanger's description: they are numbered by the pattern of "
-            "their frequencies alone"
-        ]
-    if hanger and not any(np.isfinite(point.x_m) for point in points):
-        return ["no sensor states its position: shapes do not help to number the modes"]
-    return []
 
 
 def _order_notes(ordered: Sequence[_Ordered]) -> list[str]:
