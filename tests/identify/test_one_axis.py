@@ -12,6 +12,7 @@ from shm.identify.mode_ordering.order import LEAST_MARGIN
 from shm.identify.mode_ordering.placement import Placement, placed
 from shm.simulate.elements import plane_modes
 from shm.values import NAN, PLANES, Hanger, ResponsePoint
+from shm.values.modes import NUMBERING
 from tests.identify.test_non_bending_modes import HANGER, PLACES, STATE, hanger_modes
 
 POINTS = tuple(ResponsePoint(f"{x}", "transverse", x) for x in PLACES)
@@ -94,6 +95,10 @@ def test_orders_that_may_be_others_are_not_guessed_where_the_hanger_is_described
     described = placed(own, POINTS[:1], HANGER)
     assert described.modes == ()
     assert all("not guessed" in mode.reason for mode in described.set_aside)
+    kinds = {(mode.kind, mode.plane, mode.frequency_sd_hz > 0) for mode in described.set_aside}
+    assert kinds == {("unnumbered", POINTS[0].plane, True)}
+    assert described.check is not None
+    assert (described.check.name, described.check.verdict) == (NUMBERING, "refused")
     plain = placed(own, POINTS[:1], None)
     assert len(plain.modes) == len(own)
     assert plain.check is not None

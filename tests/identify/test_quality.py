@@ -11,6 +11,7 @@ from shm.errors import NotIdentifiable
 from shm.identify.contract import Finding, FoundMode, Measurement, Poles
 from shm.identify.measuring.prediction import surprise
 from shm.identify.measuring.setups import measured_recordings
+from shm.identify.measuring.signal_faults import KNOCK
 from shm.identify.quality import CHECKS, Inspection, assess, refusal, tones
 from shm.values import FloatArray, FrequencyResponse, Recording, ResponsePoint
 from tests.identify.planted import (
@@ -72,6 +73,29 @@ def test_samples_that_are_lost_are_told_from_a_knock(hits: tuple[int, ...], verd
     found = check_of("drop-outs", replace(SOUND, channels=cut))
     assert found.verdict == verdict
     assert found.value == len(hits)
+
+
+@pytest.mark.parametrize("planes", [1, 2])
+def test_a_hit_that_the_force_does_not_show_ends_the_ring_down_in_which_it_falls(
+    planes: int,
+) -> None:
+    """It is heard in both planes, or in one: a knock, no fault of cables."""
+    at, late = SLOT + FIRST, 4000
+
+    def knock(values: FloatArray) -> None:
+        values[at + late : 2 * SLOT] += 0.7 * values[at : 2 * SLOT - late].copy()
+
+    record = SOUND
+    for channel in SOUND.accelerations:
+        if planes == 2 or channel.plane == "transverse":
+            record = changed(channel.name, knock, record)
+    (measurement,) = measured_recordings([record], OPTIONS)
+    (sound,) = measured_recordings([SOUND], OPTIONS)
+    assert [hit.used for hit in measurement.hits] == [hit.used for hit in sound.hits]
+    assert [hit.cut for hit in measurement.hits if hit.cut] == [KNOCK]
+    lengths = [decay.shape[1] for decay in measurement.decays]
+    assert lengths[1] == pytest.approx(lengths[0] * late / (SLOT - FIRST), rel=0.2)
+    assert not measurement.dropped
 
 
 def test_clipped_ring_downs_are_told() -> None:

@@ -76,12 +76,15 @@ def is_cut_short(ring: FloatArray) -> bool:
     return bool(unlike[1:].min() < min(_AS_PREDICTED, unlike[0] / 2))
 
 
-def knocked_at(ring: FloatArray, sampling_rate_hz: float, wanted_rate_hz: float) -> int:
-    """The sample of a ring-down (channels, samples) before which nothing else has struck yet."""
-    free = thinned(ring, sampling_rate_hz, wanted_rate_hz)
-    blocks = [int(np.argmax(_beside_usual(part, prediction_rule([part])))) for part in free]
-    first = max(0, int(np.median(blocks)) - 1) * _BLOCK + _ORDER
-    return int(first * (ring.shape[1] // free.shape[1]))
+def knocked_at(ring_downs: Sequence[FloatArray], number: int, limit: float) -> int:
+    """The sample before which nothing in the ring-down of that number is a surprise above `limit`;
+    each is (channels, samples)."""
+    blocks = []
+    for row, part in enumerate(ring_downs[number]):
+        every = [ring[row] for ring in ring_downs if ring.shape[1] >= 2 * _ORDER]
+        error = _beside_usual(part, prediction_rule(every))
+        blocks.append(int(np.argmax(error > limit)))
+    return max(0, int(np.median(blocks)) - 1) * _BLOCK + _ORDER
 
 
 def prediction_rule(parts: Sequence[FloatArray]) -> FloatArray:

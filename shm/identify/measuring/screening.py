@@ -275,7 +275,9 @@ def disagreement(
     known = [
         index
         for index, hit in enumerate(hits)
-        if hit.pulse.start > 0 and hit.free == hit.pulse.end and not _comes_too_soon(hit, step)
+        if hit.pulse.start > 0
+        and hit.free == hit.pulse.end
+        and not _comes_too_soon(hit, step, unseen=hits[max(0, index - 1)])
     ]
     if len(known) < 2:
         return apart
@@ -312,8 +314,11 @@ def _gap(sampling_rate_hz: float) -> int:
     return int(PULSE_SECONDS * sampling_rate_hz) + RINGING_SAMPLES
 
 
-def _comes_too_soon(hit: HitRecord, step: int) -> bool:
-    """Is there another hit in the two spectra that foretell what still rings?"""
+def _comes_too_soon(hit: HitRecord, step: int, unseen: HitRecord) -> bool:
+    """Is there another hit in the two spectra that foretell what still rings, or one that the force
+    does not show, which ends the ring-down before?"""
+    if unseen.cut and unseen.force is hit.force and unseen.pulse.start < hit.pulse.start:
+        return unseen.pulse.stop > hit.pulse.start - 2 * step
     before = hit.force[
         max(0, hit.pulse.start - 2 * step) : max(0, hit.pulse.start - RINGING_SAMPLES)
     ]

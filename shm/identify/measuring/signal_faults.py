@@ -70,24 +70,27 @@ def faults_of_channels(
     rings = [r.accelerations[:, r.free : r.pulse.stop] for r in ring_downs]
     _add(faults, _copies(cuts, faults))
     _add(faults, _clipped(channels, rings, faults))
-    free = [
-        thinned(
-            r.accelerations[:, r.free + RINGING_SAMPLES : r.pulse.stop - RINGING_SAMPLES],
-            sampling_rate_hz,
-            RATE_OVER_BAND * options.band_high_hz,
-        )
-        for r in ring_downs
-    ]
-    rate = sampling_rate_hz / max(
-        1, int(sampling_rate_hz / (RATE_OVER_BAND * options.band_high_hz))
-    )
-    _add(faults, _wanders(free, faults, rate))
+    free, step = _thin(ring_downs, sampling_rate_hz, options)
+    _add(faults, _wanders(free, faults, sampling_rate_hz / step))
     _add(faults, _surprises(free, faults, [channel.plane for channel in channels]))
     for r, names in zip(ring_downs, faults, strict=True):
         ring = r.accelerations[:, r.free + RINGING_SAMPLES : r.pulse.stop - RINGING_SAMPLES]
         if KNOCK in names and is_cut_short(ring[[name == KNOCK for name in names]]):
             names[:] = [LOST if name == KNOCK else name for name in names]
     return faults
+
+
+def _thin(
+    ring_downs: Sequence[HitRecord], sampling_rate_hz: float, options: IdentifyOptions
+) -> tuple[list[FloatArray], int]:
+    """The free motion after each hit, thinned, and every how many samples that is."""
+    wanted_hz = RATE_OVER_BAND * options.band_high_hz
+    rings = [
+        r.accelerations[:, r.free + RINGING_SAMPLES : r.pulse.stop - RINGING_SAMPLES]
+        for r in ring_downs
+    ]
+    thin = [thinned(ring, sampling_rate_hz, wanted_hz) for ring in rings]
+    return thin, max(1, int(sampling_rate_hz / wanted_hz))
 
 
 def until_knocks(
@@ -100,14 +103,14 @@ def until_knocks(
 ) -> tuple[list[HitRecord], list[list[str]]]:
     """Disturbed ring-downs end where they are disturbed, if that leaves `least_samples`; what is
     wrong with them then."""
-    wanted = RATE_OVER_BAND * options.band_high_hz
+    free, step = _thin(ring_downs, sampling_rate_hz, options)
     kept = list(ring_downs)
     for number, (r, names) in enumerate(zip(ring_downs, faults, strict=True)):
         if KNOCK not in names:
             continue
-        first = r.free + RINGING_SAMPLES
-        ring = r.accelerations[[name == KNOCK for name in names], first : r.pulse.stop]
-        stop = first + knocked_at(ring, sampling_rate_hz, wanted)
+        heard = [name == KNOCK for name in names]
+        at = knocked_at([part[heard] for part in free], number, _SURPRISE)
+        stop = r.free + RINGING_SAMPLES + at * step
         if stop - r.free >= least_samples:
             kept[number] = replace(r, pulse=replace(r.pulse, stop=stop), cut=KNOCK)
     if not any(r.cut for r in kept):
