@@ -266,17 +266,18 @@ def disagreement(
     Of hits j and k over all channels and lines: 1 - |h_j . h_k|^2 / (|h_j|^2 |h_k|^2) (the modal
     assurance criterion, Allemang 1982, of two responses), which a hammer's level and calibration
     do not move; for each hit the lower median over the others. NaN where there are none, for a hit
-    whose pulse the record's beginning may cut off, that struck twice or was clipped, and for one so
-    soon after another that nobody can say what of its ring-down is its own. Where both of the
-    channels' `planes` were struck in turn, the others are those of its plane.
+    whose pulse the record's beginning may cut off, that struck twice, was clipped or disturbed, and
+    for one so soon after another that nobody can say what of its ring-down is its own. Where both
+    of the channels' `planes` were struck in turn, the others are those of its plane.
     """
     apart = np.full(len(hits), np.nan)
-    step = _step(hits, sampling_rate_hz, band_hz)
+    step = _step([hit for hit in hits if not hit.cut], sampling_rate_hz, band_hz)
     known = [
         index
         for index, hit in enumerate(hits)
         if hit.pulse.start > 0
         and hit.free == hit.pulse.end
+        and not hit.cut
         and not _comes_too_soon(hit, step, unseen=hits[max(0, index - 1)])
     ]
     if len(known) < 2:
