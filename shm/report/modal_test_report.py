@@ -84,6 +84,7 @@ def summary(sheet: ModalTestReport) -> str:
     sentences = (
         measured(sheet),
         _what_was_found(sheet),
+        _without_order(sheet),
         _what_is_no_mode(sheet),
         trust(sheet),
         advice(sheet),
@@ -128,11 +129,20 @@ def _excitation(sheet: ModalTestReport) -> str:
 
 def _what_was_found(sheet: ModalTestReport) -> str:
     if not sheet.modes:
-        return "No mode has an order." if _unnumbered(sheet) else "No mode was identified."
+        return "" if _without_order(sheet) else "No mode was identified."
     groups = [_group(sheet, plane) for plane in PLANES]
     listed = formatting.listed([group for group in groups if group])
     verb = "was" if len(sheet.modes) == 1 else "were"
     return f"{formatting.counted(len(sheet.modes), 'mode')} {verb} identified: {listed}."
+
+
+def _without_order(sheet: ModalTestReport) -> str:
+    """How many modes are known, and their orders are not."""
+    found_hz = [m.frequency_hz for m in sheet.identification.set_aside if m.kind == "unnumbered"]
+    if not found_hz:
+        return ""
+    count = formatting.counted(len(found_hz), "mode")
+    return f"The order of {count} is not known ({min(found_hz):.4g} to {max(found_hz):.4g} Hz)."
 
 
 def _group(sheet: ModalTestReport, plane: Plane) -> str:
@@ -156,16 +166,11 @@ def _orders(modes: Sequence[Mode]) -> str:
 
 
 def _what_is_no_mode(sheet: ModalTestReport) -> str:
-    found = sheet.identification.set_aside
+    found = [each for each in sheet.identification.set_aside if each.kind != "unnumbered"]
     if not found:
         return ""
     listed = formatting.listed([f"{each.kind} at {each.frequency_hz:.4g} Hz" for each in found])
-    known = "" if _unnumbered(sheet) else " as no modes of the hanger"
-    return f"Set aside{known}: {listed}."
-
-
-def _unnumbered(sheet: ModalTestReport) -> bool:
-    return any(each.kind == "unnumbered" for each in sheet.identification.set_aside)
+    return f"Set aside as no modes of the hanger: {listed}."
 
 
 def trust(sheet: ModalTestReport) -> str:
