@@ -3,9 +3,9 @@
 A fault of one channel after one hit leaves out that hit; after most hits, that channel. A clipped
 force does not: the ring-down is as good as any, the check `clipping` tells what it spoils. Nor does
 an acceleration that is clipped at first: the ring-down begins later. What strikes unseen in a
-ring-down, as a hit between two samples of the force does, ends it. A double hit's begins after the
-second blow, and is used where there are fewer than three others. A hit that disagrees with the
-others fell at a wrong place or direction, or somebody held the hanger.
+ring-down, as a hit between two samples of the force does, and a gap in one channel end it. A double
+hit's begins after the second blow. A hit that disagrees with the others fell at a wrong place or
+direction, or somebody held the hanger.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from shm.identify.measuring.signal_faults import (
     OUTLIER,
     clipped_ends,
     faults_of_channels,
-    until_knocks,
+    until_disturbed,
 )
 from shm.identify.measuring.struck_planes import struck_planes
 from shm.identify.measuring.unforced_hits import find_unforced
@@ -43,7 +43,6 @@ from shm.identify.options import IdentifyOptions
 from shm.values import BoolArray, Channel, ComplexArray, FloatArray, Plane, Recording
 
 _LEAST_SHARE_OF_LONGEST = 0.25  # judgement: a quarter as sharp, it blurs the others
-LEAST_HITS = 3  # that say how well they repeat
 FEWEST_TO_COMPARE = 3
 """Of two that differ nobody can say which is right."""
 # identify_limits.py (docs/trials/identification_benchmarks.md): sound hits lie below 0.013, planted
@@ -75,14 +74,13 @@ def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screenin
     ring_downs = [replace(r, clipped_end=end) for r, (end, _) in zip(ring_downs, ends, strict=True)]
     faults = faults_of_channels(channels, ring_downs, rate, options)
     least = _least_samples(ring_downs, rate, options)
-    ring_downs, faults = until_knocks(channels, ring_downs, faults, least, rate, options)
+    ring_downs, faults = until_disturbed(channels, ring_downs, faults, least, rate, options)
     rows, dropped = _usable_channels(channels, faults)
     ring_downs = _with_rows(ring_downs, rows)
     reasons = _reasons(ring_downs, [[each[row] for row in rows] for each in faults], rate, options)
     if records[0].force is not None:
         planes = [channels[row].plane for row in rows]
         reasons = _with_outliers(ring_downs, reasons, rate, options, planes)
-    reasons = _with_double_hits(reasons, faults, rows)
     used = [ring_down for ring_down, reason in zip(ring_downs, reasons, strict=True) if not reason]
     if not used or not rows:
         raise _nothing_left(records, reasons, dropped)
@@ -117,23 +115,13 @@ def _hits(
     return hits, ring_downs
 
 
-def _with_double_hits(
-    reasons: Sequence[str], faults: Sequence[Sequence[str]], rows: Sequence[int]
-) -> list[str]:
-    """The reasons without that of double hits, where fewer than three others can be used."""
-    if sum(not reason for reason in reasons) >= LEAST_HITS:
-        return list(reasons)
-    return [
-        next((each[row] for row in rows if each[row]), "") if reason == DOUBLE_HIT else reason
-        for reason, each in zip(reasons, faults, strict=True)
-    ]
-
-
 def _cut(ring_down: HitRecord, clipped_channels: Sequence[str]) -> str:
     """Why a used ring-down begins later than its first pulse ends, or ends before the next."""
+    if ring_down.cut:
+        return ring_down.cut
     if ring_down.clipped_end:
         return f"{CLIPPED}: {', '.join(clipped_channels)}"
-    return DOUBLE_HIT if ring_down.pulse.second_peak > 0 else ring_down.cut
+    return DOUBLE_HIT if ring_down.pulse.second_peak > 0 else ""
 
 
 def _with_rows(ring_downs: Sequence[HitRecord], rows: list[int]) -> list[HitRecord]:
@@ -209,8 +197,6 @@ def _hit_fault(ring_down: HitRecord, faults: Sequence[str], least_samples: float
         return NOT_A_NUMBER
     if pulse.stop - ring_down.free < least_samples:
         return CUT_OFF
-    if pulse.second_peak > 0:
-        return DOUBLE_HIT
     return next((fault for fault in faults if fault), "")
 
 

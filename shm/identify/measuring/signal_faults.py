@@ -93,7 +93,7 @@ def _thin(
     return thin, max(1, int(sampling_rate_hz / wanted_hz))
 
 
-def until_knocks(
+def until_disturbed(
     channels: Sequence[Channel],
     ring_downs: Sequence[HitRecord],
     faults: list[list[str]],
@@ -101,21 +101,39 @@ def until_knocks(
     sampling_rate_hz: float,
     options: IdentifyOptions,
 ) -> tuple[list[HitRecord], list[list[str]]]:
-    """Disturbed ring-downs end where they are disturbed, if that leaves `least_samples`; what is
-    wrong with them then."""
+    """Ring-downs that something strikes, or in which a channel drops out that mostly does not, end
+    there, if that leaves `least_samples`; and what is wrong with them then."""
     free, step = _thin(ring_downs, sampling_rate_hz, options)
     kept = list(ring_downs)
     for number, (r, names) in enumerate(zip(ring_downs, faults, strict=True)):
-        if KNOCK not in names:
-            continue
         heard = [name == KNOCK for name in names]
-        at = knocked_at([part[heard] for part in free], number, _SURPRISE)
-        stop = r.free + RINGING_SAMPLES + at * step
+        gaps = [row for row in range(len(names)) if _drops_out(row, number, faults)]
+        if any(heard):
+            at = knocked_at([part[heard] for part in free], number, _SURPRISE)
+            cut, stop = KNOCK, r.free + RINGING_SAMPLES + at * step
+        elif gaps:
+            rings = r.accelerations[gaps, r.free : r.pulse.stop]
+            cut, stop = names[gaps[0]], r.free + min(map(_gap_in, rings)) - RINGING_SAMPLES
+        else:
+            continue
         if stop - r.free >= least_samples:
-            kept[number] = replace(r, pulse=replace(r.pulse, stop=stop), cut=KNOCK)
+            kept[number] = replace(r, pulse=replace(r.pulse, stop=stop), cut=cut)
     if not any(r.cut for r in kept):
         return kept, faults
     return kept, faults_of_channels(channels, kept, sampling_rate_hz, options)
+
+
+def _drops_out(row: int, number: int, faults: Sequence[Sequence[str]]) -> bool:
+    """Whether a channel does after that hit, and after most others has no fault."""
+    faulty = sum(bool(names[row]) for names in faults)
+    return faults[number][row] in (NOT_A_NUMBER, FROZEN) and 2 * faulty <= len(faults)
+
+
+def _gap_in(signal: FloatArray) -> int:
+    """The sample of a signal from which it is missing or stands still; 0 where neither is."""
+    if not np.all(np.isfinite(signal)):
+        return int(np.argmin(np.isfinite(signal)))
+    return next((first for first, _ in _still_runs(signal)), 0)
 
 
 Faults = list[list[str]]
@@ -318,15 +336,20 @@ def frozen(signals: FloatArray) -> BoolArray:
 
 
 def _stands_still(signal: FloatArray) -> bool:
+    return bool(_still_runs(signal))
+
+
+def _still_runs(signal: FloatArray) -> list[tuple[int, int]]:
+    """The first and last samples of those stretches that stand still."""
     steps = np.abs(np.diff(signal))
     edges = np.flatnonzero(np.diff(np.concatenate(([0], steps == 0, [0]))))
-    runs = [(a, b) for a, b in edges.reshape(-1, 2) if b - a + 1 >= FROZEN_SAMPLES]
+    runs = [(a, b) for a, b in edges.reshape(-1, 2).tolist() if b - a + 1 >= FROZEN_SAMPLES]
     if not runs or not np.any(steps > 0):
-        return False
+        return []
     # A slow or weak signal rests on one level of its converter for long: there the samples around
     # move by a few levels (nine around a crest). Where they move by 30, it cannot have rested.
     level = float(steps[steps > 0].min())
-    return any(_moves_around(signal, a, b + 1, _MOVES * level) for a, b in runs)
+    return [(a, b) for a, b in runs if _moves_around(signal, a, b + 1, _MOVES * level)]
 
 
 def _moves_around(signal: FloatArray, first: int, stop: int, least: float) -> bool:
