@@ -273,7 +273,7 @@ def set_aside(sheet: ModalTestReport) -> Table:
             (
                 f"{each.kind} {each.plane or ''}".rstrip(),
                 f"{each.frequency_hz:.3f}",
-                formatting.plain(each.frequency_sd_hz, 2) if each.plane else "",
+                formatting.plain(each.frequency_sd_hz, 2) if each.kind == "unnumbered" else "",
                 formatting.number(100 * each.damping_ratio, ".4f"),
                 each.reason,
             )

@@ -71,7 +71,8 @@ class ForeignMode:
 
     `kind`: `harmonic` (a multiple of another mode's frequency), `tone` (mains, a machine), `deck`
     (the bridge or another neighbour moves the hanger) or `unnumbered` (identified as a mode, but of
-    an order that is not known); of the latter plane and standard deviations are known.
+    an order that is not known); of the latter the standard deviations are known, and the plane if
+    both are measured.
     """
 
     kind: Literal["harmonic", "tone", "deck", "unnumbered"]

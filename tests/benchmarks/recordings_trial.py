@@ -9,8 +9,8 @@ is 10 % off (standard deviation), and the settings' defaults. Only what tests di
 
 Frequencies are judged by those of small amplitude, as the file's own clock shows them. A mode is to
 be found where it is 20 dB above the rest at its best sensor, in the band, and in a plane that the
-channels are said to measure; those of refused tests count as missed. A mode that is told with its
-plane, its order said to be unknown, is found and counted apart, too. A wrong name is a mode of the
+channels are said to measure; those of refused tests count as missed. A mode whose order, or
+plane, is said to be unknown is found and counted apart, too. A wrong name is a mode of the
 structure under another plane or order; where no bar is (kinds `any_...`) names mean nothing.
 Of the modes to be found, those that anybody could identify (`recordings_limit`) are counted apart.
 """
@@ -162,12 +162,13 @@ def answered(kind: str, seed: int, clock_drift: float = 0.0) -> Answer:
 
 
 def _told(found: Identification) -> Iterator[Mode]:
-    """All that are told as modes; the order of those whose order is not known is 0."""
+    """All that are told as modes; an order that is not known is 0, a plane None."""
     yield from found.test.modes
     for each in found.set_aside:
-        if each.kind == "unnumbered" and each.plane:
+        if each.kind == "unnumbered":
+            plane: Any = each.plane
             yield Mode(
-                each.plane, 0, each.frequency_hz, each.frequency_sd_hz,
+                plane, 0, each.frequency_hz, each.frequency_sd_hz,
                 each.damping_ratio, each.damping_sd,
             )  # fmt: skip
 
@@ -216,7 +217,7 @@ def _own(
         mode
         for mode in modes
         if _same(mode.frequency_hz, shown_hz)
-        and (not named or (mode.plane == truth.plane and mode.order in (0, truth.order)))
+        and (not named or (mode.plane in (None, truth.plane) and mode.order in (0, truth.order)))
     ]
     return min(near, key=lambda m: (not m.order, abs(m.frequency_hz - shown_hz)), default=None)
 

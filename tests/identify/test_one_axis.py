@@ -99,7 +99,7 @@ def test_orders_that_may_be_others_are_not_guessed_where_the_hanger_is_described
     assert described.modes == ()
     assert all("not guessed" in mode.reason for mode in described.set_aside)
     kinds = {(mode.kind, mode.plane, mode.frequency_sd_hz > 0) for mode in described.set_aside}
-    assert kinds == {("unnumbered", POINTS[0].plane, True)}
+    assert kinds == {("unnumbered", None, True)}
     assert described.check is not None
     assert (described.check.name, described.check.verdict) == (NUMBERING, "refused")
     assert headline([described.check]).startswith("Do not use: the orders of the modes are not")

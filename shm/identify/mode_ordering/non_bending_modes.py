@@ -104,7 +104,7 @@ def askew_mode(mode: FoundMode, order: int) -> ForeignMode:
     return ForeignMode("deck", mode.frequency_hz, mode.damping_ratio, reason)
 
 
-def unnumbered_mode(mode: FoundMode, plane: Plane, order: int | None) -> ForeignMode:
+def unnumbered_mode(mode: FoundMode, plane: Plane | None, order: int | None) -> ForeignMode:
     """A mode that may be of that order, or of another; None where none has an order."""
     reason = "The modes fit neither the hanger's description nor any tensioned bar."
     if order:

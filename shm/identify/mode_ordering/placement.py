@@ -90,7 +90,10 @@ def placed(
     kept = [candidate.found for candidate, *_ in numbered.ordered]
     pairs = [mode for mode in found if sum(each is mode for each in kept) == len(PLANES)]
     aside = [mode for mode in found if not any(each is mode for each in kept)]
-    planes = dict(zip(map(id, found), planes_of(found, points, turned_rad), strict=True))
+    # On one axis the other plane's modes are heard, too.
+    both = {point.plane for point in points} == set(PLANES)
+    told = planes_of(found, points, turned_rad) if both else [None] * len(found)
+    planes = dict(zip(map(id, found), told, strict=True))
     foreign = [_foreign(mode, planes[id(mode)], numbered, found, kept) for mode in aside]
     return Placement(
         modes=tuple(_mode(*each, pairs) for each in numbered.ordered),
@@ -109,7 +112,7 @@ def placed(
 
 def _foreign(
     mode: FoundMode,
-    plane: Plane,
+    plane: Plane | None,
     numbered: _Numbered,
     found: Sequence[FoundMode],
     kept: Sequence[FoundMode],
