@@ -72,7 +72,7 @@ class ForeignMode:
     `kind`: `harmonic` (a multiple of another mode's frequency), `tone` (mains, a machine), `deck`
     (the bridge or another neighbour moves the hanger) or `unnumbered` (identified as a mode, but of
     an order that is not known); of the latter the standard deviations are known, and the plane if
-    both are measured.
+    it moves in one alone.
     """
 
     kind: Literal["harmonic", "tone", "deck", "unnumbered"]

@@ -11,7 +11,12 @@ import numpy as np
 from shm.identify.contract import FoundMode, Tone
 from shm.identify.mode_ordering.alignment import PlaneModes
 from shm.identify.mode_ordering.bar_fit import described_orders
-from shm.identify.mode_ordering.both_planes import blurred, pair_note, with_both_planes
+from shm.identify.mode_ordering.both_planes import (
+    blurred,
+    moves_in_one_plane,
+    pair_note,
+    with_both_planes,
+)
 from shm.identify.mode_ordering.non_bending_modes import (
     askew_mode,
     doubts,
@@ -90,10 +95,10 @@ def placed(
     kept = [candidate.found for candidate, *_ in numbered.ordered]
     pairs = [mode for mode in found if sum(each is mode for each in kept) == len(PLANES)]
     aside = [mode for mode in found if not any(each is mode for each in kept)]
-    # On one axis the other plane's modes are heard, too.
-    both = {point.plane for point in points} == set(PLANES)
-    told = planes_of(found, points, turned_rad) if both else [None] * len(found)
-    planes = dict(zip(map(id, found), told, strict=True))
+    planes = {
+        id(mode): plane if moves_in_one_plane(mode, points, turned_rad) else None
+        for mode, plane in zip(found, planes_of(found, points, turned_rad), strict=True)
+    }
     foreign = [_foreign(mode, planes[id(mode)], numbered, found, kept) for mode in aside]
     return Placement(
         modes=tuple(_mode(*each, pairs) for each in numbered.ordered),
