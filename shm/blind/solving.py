@@ -139,7 +139,8 @@ def identify_tests(directory: Path, hanger: Hanger) -> Identified:
 def _identified(paths: Sequence[Path], name: str, hanger: Hanger) -> ModalTest:
     records = [record for path in paths for record in read_test(path)]
     recordings = [each for each in records if isinstance(each, Recording)]
-    return identify(records, campaign_options(recordings), test_id=name, hanger=hanger).test
+    found = identify(records, campaign_options(recordings), test_id=name, hanger=hanger)
+    return found.with_orders(name).test
 
 
 def _last_line(error: Exception) -> str:

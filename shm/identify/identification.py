@@ -1,7 +1,4 @@
-"""From records of one test to its identified modes: the whole of the room in one function.
-
-What a finding must still pass once an identifier has made it.
-"""
+"""From records of one test to its identified modes: the whole of the room in one function."""
 
 from __future__ import annotations
 
@@ -14,12 +11,12 @@ import numpy as np
 
 from shm.errors import NotIdentifiable, UsageError
 from shm.identify.contract import Dropped, Finding, FoundMode, Hit, Measurement, Poles, Tone
-from shm.identify.estimation.amplitude_dependence import with_amplitude_dependence
+from shm.identify.estimation.finished import finished
 from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.estimation.sidebands import without_sidebands
 from shm.identify.estimation.ssi import looked_at_again
-from shm.identify.measuring.recorded_window import recorded_window_rate
+from shm.identify.estimation.stabilise import completed
 from shm.identify.measuring.sensor_places import refuse_off_the_hanger
 from shm.identify.measuring.setups import measured, without_unused_force
 from shm.identify.mode_ordering.confirmed import placed_with_doubtful
@@ -37,7 +34,6 @@ from shm.identify.setup_merging.products import joined_response
 from shm.values import (
     NAN,
     ComplexArray,
-    FloatArray,
     ForeignMode,
     FrequencyResponse,
     Hanger,
@@ -71,6 +67,18 @@ class Identification:
     set_aside: tuple[ForeignMode, ...] = ()
     fit: ComplexArray | None = None
 
+    def with_orders(self, source: str) -> Identification:
+        """Itself, where modes have orders; else NotIdentifiable, which lists what was found."""
+        if self.test.modes:
+            return self
+        checks = [each for each in self.quality if each.verdict == "refused"]
+        listed = ", ".join(f"{each.frequency_hz:.4g}" for each in self.set_aside)
+        raise NotIdentifiable(
+            f"{'; '.join(each.found for each in checks)} ({listed} Hz).",
+            file=source,
+            remedy=" ".join(each.remedy for each in checks),
+        )
+
 
 _DEFAULTS = IdentifyOptions()
 _FEWEST_CALM = 3  # judgement: two frequencies fit a bar's tension and stiffness by chance
@@ -86,33 +94,30 @@ def identify(
     """The modes of one test from its records: time records with hits, or frequency responses.
 
     The description of the `hanger`, where known, helps to number the modes. Raises BadInput
-    where the records cannot be used together, NotIdentifiable where no mode can be trusted.
+    where the records cannot be used together, NotIdentifiable where no mode can be trusted. Modes
+    whose orders are not known are set aside: the test is without modes where all are.
     """
     refuse_off_the_hanger(records, hanger)
     recordings = [record for record in records if isinstance(record, Recording)]
     measurements = measured(records, options)
     recordings = without_unused_force(recordings, measurements)
-    found = _found(measurements, options.identifier, options)
-    second = _cross_check(measurements, options)
     steady = tones(measurements, recordings, options)
+    found = _found(measurements, options.identifier, options)
+    placement = _placed(found, measurements, hanger, steady, options)
+    if not placement.modes and (closer := _closer(found, measurements, options)):
+        found, placement = closer, _placed(closer, measurements, hanger, steady, options)
+    second = _cross_check(measurements, options)
     quality = assess(Inspection(recordings, measurements, options, steady, found.finding, second))
     if turned := directions(found.finding.modes, found.points):
         quality = (*quality, turned)
     if refused := refusal(quality, records[0].source):
         raise refused
-    placement = placed_with_doubtful(
-        found.finding.modes,
-        partial(_doubtful, measurements, found.finding, options),
-        found.points,
-        hanger,
-        steady,
-    )
     level_left, noted = 1.0, found.notes
     if not placement.modes:
         calm = _once_calm(measurements, options, hanger, steady)
-        if calm is None:
+        if calm is None and placement.check is None:
             raise _nothing_found(records[0].source, found.finding, placement)
-        placement, level_left, noted = calm
+        placement, level_left, noted = calm or (placement, 1.0, noted)
         free = level_left
     else:
         free = free_below(measurements, placement.modes)
@@ -139,20 +144,49 @@ def identify(
     )
 
 
-def _doubtful(
+def _placed(
+    found: Joined,
+    measurements: Sequence[Measurement],
+    hanger: Hanger | None,
+    steady: Sequence[Tone],
+    options: IdentifyOptions,
+) -> Placement:
+    return placed_with_doubtful(
+        found.finding.modes,
+        partial(_looked_at, measurements, found.finding, options),
+        found.points,
+        hanger,
+        steady,
+    )
+
+
+def _closer(
+    found: Joined, measurements: Sequence[Measurement], options: IdentifyOptions
+) -> Joined | None:
+    """With what windows over the whole band show of one set-up; None where they show no more."""
+    if len(measurements) > 1 or options.identifier not in HIT_BY_HIT:
+        return None
+    again = looked_at_again(measurements[0], options)
+    if again is None or not again.modes:
+        return None
+    more = _allowed_for(finished(again, measurements[0], options), options.shape_allowance)
+    return _of_modes_alone(joined(measurements, [completed(found.finding, more)], options))
+
+
+def _looked_at(
     measurements: Sequence[Measurement],
     found: Finding,
     options: IdentifyOptions,
     at_hz: Sequence[float],
-) -> tuple[FoundMode, ...]:
-    """What may be a mode about the frequencies `at_hz`, of one set-up."""
+) -> tuple[tuple[FoundMode, ...], tuple[FoundMode, ...]]:
+    """What windows show about the frequencies `at_hz`, of one set-up, and what may be a mode."""
     again = None
     if len(measurements) == 1 and options.identifier in HIT_BY_HIT:
         again = looked_at_again(measurements[0], options, at_hz)
     if again is None:
-        return found.doubtful
-    again = _finished(again, measurements[0], options)
-    return (*found.doubtful, *again.modes, *again.doubtful)
+        return (), found.doubtful
+    again = finished(again, measurements[0], options)
+    return again.modes, (*found.doubtful, *again.doubtful)
 
 
 def _of_placed(
@@ -164,7 +198,7 @@ def _of_placed(
 ) -> list[QualityCheck]:
     """What numbered modes say of their numbers and of the sensors."""
     checks = [placement.check]
-    if hanger and hanger.as_hanger:
+    if hanger and hanger.as_hanger and placement.modes:
         checks.append(first_orders(placement.modes, hanger, options.band_low_hz))
         checks.append(sensor_gain(measurements, found.apart, placement.modes, hanger))
         checks.append(sensor_places(placement.modes, hanger))
@@ -230,13 +264,14 @@ def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOpti
         )
     # What tests differ by is allowed for once, not set-up by set-up.
     alone = options if len(measurements) == 1 else replace(options, frequency_allowance=0.0)
-    findings = [_finished(function(m, alone), m, options) for m in measurements]
+    findings = [finished(function(m, alone), m, options) for m in measurements]
     found = joined(measurements, findings, options)
     if name in HIT_BY_HIT and alike(measurements):
         every = together(measurements)
-        whole = _finished(function(every, options), every, options)
+        whole = finished(function(every, options), every, options)
         found = sharpened(measurements, found, whole)
-    return _allowed_for(_of_modes_alone(found), options.shape_allowance)
+    found = _of_modes_alone(found)
+    return replace(found, finding=_allowed_for(found.finding, options.shape_allowance))
 
 
 def _of_modes_alone(found: Joined) -> Joined:
@@ -249,28 +284,12 @@ def _of_modes_alone(found: Joined) -> Joined:
     return replace(found, finding=finding, apart=apart)
 
 
-def _allowed_for(found: Joined, shape_allowance: float) -> Joined:
+def _allowed_for(found: Finding, shape_allowance: float) -> Finding:
     """With what shapes differ by from test to test in their standard deviations."""
     modes = tuple(
-        replace(mode, shape_sd=np.hypot(mode.shape_sd, shape_allowance))
-        for mode in found.finding.modes
+        replace(mode, shape_sd=np.hypot(mode.shape_sd, shape_allowance)) for mode in found.modes
     )
-    return replace(found, finding=replace(found.finding, modes=modes))
-
-
-def _finished(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
-    found = coherent_only(without_window(found, measurement), measurement, options)
-    return _unsure_of_damping(with_amplitude_dependence(found, measurement), measurement)
-
-
-def _unsure_of_damping(found: Finding, measurement: Measurement) -> Finding:
-    """The finding with what an analyser's window may add to its damping as an uncertainty."""
-    rate = recorded_window_rate(measurement)
-    modes = tuple(
-        replace(m, damping_sd=math.hypot(m.damping_sd, rate / (2 * math.pi * m.frequency_hz)))
-        for m in found.modes
-    )
-    return replace(found, modes=modes) if rate else found
+    return replace(found, modes=modes)
 
 
 def _test(
@@ -330,49 +349,3 @@ def _amplitude(hits: Sequence[Hit], options: IdentifyOptions) -> float:
     """Median peak force of the used hits over that of the reference level."""
     forces = [hit.peak_force_n for hit in hits if hit.used and math.isfinite(hit.peak_force_n)]
     return float(np.median(forces)) / options.reference_force_n if forces else NAN
-
-
-_LINES_AROUND = 4  # judgement: nine lines have a median that one bad line does not move
-
-
-def without_window(found: Finding, measurement: Measurement) -> Finding:
-    """The finding with the damping of an exponential window taken off its damping ratios."""
-    rate = 1 / measurement.decay_time_constant_s
-    modes, doubtful = (
-        tuple(
-            replace(m, damping_ratio=m.damping_ratio - rate / (2 * math.pi * m.frequency_hz))
-            for m in each
-        )
-        for each in (found.modes, found.doubtful)
-    )
-    return replace(found, modes=modes, doubtful=doubtful)
-
-
-def coherent_only(found: Finding, measurement: Measurement, options: IdentifyOptions) -> Finding:
-    """The finding without modes at which the measured coherence is low.
-
-    Only for decays made from frequency responses: after hits, coherence also falls where a hit came
-    before the last had rung down, which free decays do not mind.
-    """
-    response = measurement.frequency_response
-    if measurement.hits or response is None or response.coherence is None:
-        return found
-    frequency_hz, coherence = response.frequency_hz, response.coherence
-    good = [
-        _coherence(mode, frequency_hz, coherence) >= options.min_coherence for mode in found.modes
-    ]
-    reason = f"coherence below {options.min_coherence:g}"
-    dropped = tuple(
-        Dropped(f"mode at {mode.frequency_hz:.4g} Hz", 1, reason)
-        for mode, ok in zip(found.modes, good, strict=True)
-        if not ok
-    )
-    modes = tuple(mode for mode, ok in zip(found.modes, good, strict=True) if ok)
-    return replace(found, modes=modes, dropped=found.dropped + dropped)
-
-
-def _coherence(mode: FoundMode, frequency_hz: FloatArray, coherence: FloatArray) -> float:
-    """Median coherence over the points and the lines around a mode."""
-    line = int(np.argmin(np.abs(frequency_hz - mode.frequency_hz)))
-    near = coherence[:, max(0, line - _LINES_AROUND) : line + _LINES_AROUND + 1]
-    return float(np.median(near))

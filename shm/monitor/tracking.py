@@ -160,7 +160,7 @@ def _from_scratch(
         raise NotIdentifiable(
             "what moved the hanger looks like hits.", file=record.source, remedy="Wait for wind."
         )
-    return made.test.modes
+    return made.with_orders(record.source).test.modes
 
 
 def tracked(found: Judged, known: Sequence[Mode], options: IdentifyOptions) -> tuple[Mode, ...]:

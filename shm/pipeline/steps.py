@@ -80,6 +80,7 @@ def _test_in(path: Path, bridge: Bridge, settings: Settings) -> IdentifiedTest:
     hanger = _hanger(records[0].hanger, bridge)
     options = identify_options(settings, bridge)
     result = identify(records, options, test_id=path.stem, hanger=hanger)
+    result = result.with_orders(records[0].source)
     dropped = tuple(f"{each.count} {each.what}: {each.reason}" for each in result.dropped)
     measured = [each for each in records if isinstance(each, Recording)]
     return IdentifiedTest(

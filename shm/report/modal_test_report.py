@@ -57,7 +57,7 @@ def facts(sheet: ModalTestReport) -> tuple[Fact, ...]:
         ("Modes", str(len(sheet.modes)), f"in {formatting.counted(len(planes), 'plane')}"),
         ("Hits used", f"{len(sheet.used_hits)} of {len(hits)}" if hits else "none", _force(sheet)),
         ("Tested", formatting.moment(test.time), formatting.temperature(test.temperature_c)),
-        ("Set aside", str(len(sheet.identification.set_aside)), "resonances not of the hanger"),
+        ("Set aside", str(len(sheet.identification.set_aside)), "resonances without an order"),
     )
 
 
@@ -84,6 +84,7 @@ def summary(sheet: ModalTestReport) -> str:
     sentences = (
         measured(sheet),
         _what_was_found(sheet),
+        _without_order(sheet),
         _what_is_no_mode(sheet),
         trust(sheet),
         advice(sheet),
@@ -128,11 +129,20 @@ def _excitation(sheet: ModalTestReport) -> str:
 
 def _what_was_found(sheet: ModalTestReport) -> str:
     if not sheet.modes:
-        return "No mode was identified."
+        return "" if _without_order(sheet) else "No mode was identified."
     groups = [_group(sheet, plane) for plane in PLANES]
     listed = formatting.listed([group for group in groups if group])
     verb = "was" if len(sheet.modes) == 1 else "were"
     return f"{formatting.counted(len(sheet.modes), 'mode')} {verb} identified: {listed}."
+
+
+def _without_order(sheet: ModalTestReport) -> str:
+    """How many modes are known, and their orders are not."""
+    found_hz = [m.frequency_hz for m in sheet.identification.set_aside if m.kind == "unnumbered"]
+    if not found_hz:
+        return ""
+    count = formatting.counted(len(found_hz), "mode")
+    return f"The order of {count} is not known ({min(found_hz):.4g} to {max(found_hz):.4g} Hz)."
 
 
 def _group(sheet: ModalTestReport, plane: Plane) -> str:
@@ -156,7 +166,7 @@ def _orders(modes: Sequence[Mode]) -> str:
 
 
 def _what_is_no_mode(sheet: ModalTestReport) -> str:
-    found = sheet.identification.set_aside
+    found = [each for each in sheet.identification.set_aside if each.kind != "unnumbered"]
     if not found:
         return ""
     listed = formatting.listed([f"{each.kind} at {each.frequency_hz:.4g} Hz" for each in found])
@@ -257,12 +267,13 @@ def quality(sheet: ModalTestReport) -> Table:
 
 def set_aside(sheet: ModalTestReport) -> Table:
     return Table(
-        "Set aside: not modes of the hanger",
-        ("what", "frequency, Hz", "damping, %", "why"),
+        "Set aside: not known as modes of the hanger",
+        ("what", "frequency, Hz", "sd, Hz", "damping, %", "why"),
         tuple(
             (
-                each.kind,
+                f"{each.kind} {each.plane or ''}".rstrip(),
                 f"{each.frequency_hz:.3f}",
+                formatting.plain(each.frequency_sd_hz, 2) if each.kind == "unnumbered" else "",
                 formatting.number(100 * each.damping_ratio, ".4f"),
                 each.reason,
             )

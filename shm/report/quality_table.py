@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from shm.report import formatting
 from shm.report.paper import Table
 from shm.values import QualityCheck, Verdict
-from shm.values.modes import FIRST_ORDERS
+from shm.values.modes import FIRST_ORDERS, NUMBERING
 
 SYMBOLS: dict[Verdict, str] = {"good": "✓", "warning": "!", "refused": "✗", "unknown": "?"}
 _GRAVEST: tuple[Verdict, ...] = ("refused", "warning", "unknown", "good")
@@ -36,8 +36,9 @@ _HEADLINES: dict[Verdict, str] = {
 
 
 def headline(checks: Sequence[QualityCheck]) -> str:
-    """What the whole deserves, and which lowest mode is missing: `Use with care: ...`."""
-    lost = [c.found for c in checks if c.name == FIRST_ORDERS and c.verdict == "warning"]
+    """What the whole deserves, and which lowest mode or orders it lacks: `Use with care: ...`."""
+    grave = (FIRST_ORDERS, "warning"), (NUMBERING, "refused")
+    lost = [c.found for c in checks if (c.name, c.verdict) in grave]
     return ": ".join([_HEADLINES[overall(checks)], *lost])
 
 

@@ -67,16 +67,21 @@ MOST_SLOPE = 0.01
 
 @dataclass(frozen=True)
 class ForeignMode:
-    """A resonance or tone in a test that is not a bending mode of the hanger, and why not.
+    """A resonance or tone in a test that is not known as a mode of the hanger, and why not.
 
-    `kind`: `harmonic` (a multiple of another mode's frequency), `tone` (mains, a machine) or
-    `deck` (the bridge or another neighbour moves the hanger).
+    `kind`: `harmonic` (a multiple of another mode's frequency), `tone` (mains, a machine), `deck`
+    (the bridge or another neighbour moves the hanger) or `unnumbered` (identified as a mode, but of
+    an order that is not known); of the latter the standard deviations are known, and the plane if
+    it moves in one alone.
     """
 
-    kind: Literal["harmonic", "tone", "deck"]
+    kind: Literal["harmonic", "tone", "deck", "unnumbered"]
     frequency_hz: float
     damping_ratio: float
     reason: str
+    plane: Plane | None = None
+    frequency_sd_hz: float = NAN
+    damping_sd: float = NAN
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ class QualityCheck:
 
     `value` and `limit` are in `unit` (empty: none); `found` says what was seen and where; `remedy`
     is what the crew should do, empty where the verdict is good. A figure that these records do not
-    give is NaN and `unknown`; a test with a `refused` check is not identified.
+    give is NaN and `unknown`; a test with a `refused` check is not used.
     """
 
     name: str
@@ -99,6 +104,9 @@ class QualityCheck:
 
 FIRST_ORDERS = "first orders"
 """Name of the check that the lowest modes of each plane were found; it is part of the headline."""
+
+NUMBERING = "numbering"
+"""Name of the check that orders are known; where none is, it is part of the headline."""
 
 LONGEST_TEST_ID = 200
 """Characters; as long as the name of a file may be, see `shm.store.archive.safe_name`."""

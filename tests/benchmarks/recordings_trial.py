@@ -9,7 +9,8 @@ is 10 % off (standard deviation), and the settings' defaults. Only what tests di
 
 Frequencies are judged by those of small amplitude, as the file's own clock shows them. A mode is to
 be found where it is 20 dB above the rest at its best sensor, in the band, and in a plane that the
-channels are said to measure; those of refused tests count as missed. A wrong name is a mode of the
+channels are said to measure; those of refused tests count as missed. A mode whose order, or
+plane, is said to be unknown is found and counted apart, too. A wrong name is a mode of the
 structure under another plane or order; where no bar is (kinds `any_...`) names mean nothing.
 Of the modes to be found, those that anybody could identify (`recordings_limit`) are counted apart.
 """
@@ -50,7 +51,8 @@ SAME_MODE = 0.005
 NOMINAL_OFF = 0.1
 NINETY = 1.645
 COLUMNS = (
-    "kind", "tests", "refused", "found", "%", "of identifiable", "%", "wrong names", "of them Good",
+    "kind", "tests", "refused", "found", "%", "of identifiable", "%", "unnumbered",
+    "wrong names", "of them Good",
     "false", "of modes", "frequency covered", "damping covered", "CPU s",
 )  # fmt: skip
 
@@ -68,6 +70,7 @@ class Answer:
     found: int = 0
     identifiable: int = 0
     identified: int = 0
+    unnumbered: int = 0
     reported: int = 0
     wrong: int = 0
     false: int = 0
@@ -150,12 +153,24 @@ def answered(kind: str, seed: int, clock_drift: float = 0.0) -> Answer:
         answer.not_good = [
             f"{check.name}: {check.verdict}" for check in found.quality if check.verdict != "good"
         ]
-    _judge(answer, case, list(found.test.modes) if found else [])
+    _judge(answer, case, list(_told(found)) if found else [])
     if found is not None:
         answer.remarks += [
             f"aside: {m.kind} {m.frequency_hz:.3f} Hz, {m.reason}" for m in found.set_aside
         ]
     return answer
+
+
+def _told(found: Identification) -> Iterator[Mode]:
+    """All that are told as modes; an order that is not known is 0, a plane None."""
+    yield from found.test.modes
+    for each in found.set_aside:
+        if each.kind == "unnumbered":
+            plane: Any = each.plane
+            yield Mode(
+                plane, 0, each.frequency_hz, each.frequency_sd_hz,
+                each.damping_ratio, each.damping_sd,
+            )  # fmt: skip
 
 
 def _judge(answer: Answer, case: world.Recording, modes: list[Mode]) -> None:
@@ -174,6 +189,7 @@ def _judge(answer: Answer, case: world.Recording, modes: list[Mode]) -> None:
             answer.found += own is not None
             answer.identifiable += limit.identifiable
             answer.identified += limit.identifiable and own is not None
+            answer.unnumbered += own is not None and not own.order
             if own is None:
                 why = "" if limit.identifiable else ", as anybody would"
                 answer.remarks.append(f"missed {_words(truth, shown_hz)}{why}")
@@ -201,9 +217,9 @@ def _own(
         mode
         for mode in modes
         if _same(mode.frequency_hz, shown_hz)
-        and (not named or (mode.plane, mode.order) == (truth.plane, truth.order))
+        and (not named or (mode.plane in (None, truth.plane) and mode.order in (0, truth.order)))
     ]
-    return min(near, key=lambda mode: abs(mode.frequency_hz - shown_hz), default=None)
+    return min(near, key=lambda m: (not m.order, abs(m.frequency_hz - shown_hz)), default=None)
 
 
 def _same(one_hz: float, other_hz: float) -> bool:
@@ -249,6 +265,7 @@ def _row(name: str, answers: Sequence[Answer]) -> tuple[str, ...]:
         f"{100 * found / expected:.1f}" if expected else "-",
         f"{identified}/{identifiable}",
         f"{100 * identified / identifiable:.1f}" if identifiable else "-",
+        str(sum(a.unnumbered for a in answers)),
         str(sum(a.wrong for a in answers)),
         str(sum(a.wrong for a in answers if a.verdict == "good")),
         str(sum(a.false for a in answers)),

@@ -7,8 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.identify.mode_ordering.alignment import PlaneModes, log_frequency
-from shm.identify.mode_ordering.bar_fit import borne_out
+from shm.identify.mode_ordering.alignment import (
+    PlaneModes,
+    log_frequency,
+    tensioned_beam_pattern,
+)
+from shm.identify.mode_ordering.bar_fit import borne_out, described_orders
 from shm.identify.mode_ordering.order import LEAST_MARGIN, Expected, Numbering, assign_orders
 
 LONG = Expected(log_unit=float(np.log(0.05)), log_xi=float(np.log(35.0)))
@@ -58,3 +62,24 @@ def test_a_hanger_that_is_no_plain_bar_keeps_its_margins() -> None:
 def test_orders_that_no_frequency_tells_stay_open() -> None:
     planes = _planes((tuple(range(20, 27)), ()))
     assert _least_margin(borne_out(planes, LONG, assign_orders(planes, LONG))) < LEAST_MARGIN
+
+
+def test_a_sensor_of_ten_times_the_gain_does_not_outvote_the_frequencies() -> None:
+    orders = (tuple(range(5, 17)), tuple(range(7, 17)))
+    place = np.array([0.028, 0.058])
+    pattern = tensioned_beam_pattern()
+    tension = np.array([np.argmin(np.abs(pattern.log_xi - LONG.log_xi))])
+    shapes = pattern.shapes(place, tension)[0, -1] * [1.0, 10.0]
+    planes = [
+        replace(
+            plane,
+            position=place,
+            shapes=shapes[np.array(own) - 1],
+            shape_sd=np.full(len(own), 0.01),
+        )
+        for plane, own in zip(_planes(orders), orders, strict=True)
+    ]
+    assert borne_out(planes, LONG, assign_orders(planes, LONG)).orders != orders
+    found = described_orders(planes, LONG)
+    assert found.orders == orders
+    assert _least_margin(found) > LEAST_MARGIN

@@ -59,26 +59,38 @@ def test_a_doubtful_mode_is_taken_only_where_the_bar_lacks_one(
 ) -> None:
     asked: list[float] = []
 
-    def of(at_hz: Sequence[float]) -> list[FoundMode]:
+    def look(at_hz: Sequence[float]) -> tuple[list[FoundMode], list[FoundMode]]:
         asked.extend(at_hz)
-        return [doubtful]
+        return [], [doubtful]
 
-    placement = placed_with_doubtful(SURE, of, POINTS, HANGER)
+    placement = placed_with_doubtful(SURE, look, POINTS, HANGER)
     given = {(each.plane, each.order): each.frequency_hz for each in placement.modes}
     assert asked == pytest.approx([mode(*GAP).frequency_hz], rel=1e-3)
     assert (given.get(GAP) == doubtful.frequency_hz) is is_taken
     assert len(given) == len(SURE) + is_taken
 
 
+@pytest.mark.parametrize("in_doubt", [False, True])
+def test_of_a_hanger_that_is_no_plain_bar_only_what_is_proven_is_taken(in_doubt: bool) -> None:
+    rough = [
+        replace(each, frequency_hz=each.frequency_hz * (1 + 0.004 * (-1) ** number))
+        for number, each in enumerate(SURE)
+    ]
+    more = [mode(*GAP, 0.006)]
+    seen = ([], more) if in_doubt else (more, [])
+    placement = placed_with_doubtful(rough, lambda _: seen, POINTS, HANGER)
+    assert len(placement.modes) == len(SURE) + (not in_doubt)
+
+
 def test_without_a_description_nothing_is_asked_for() -> None:
-    def never(_: object) -> list[FoundMode]:
+    def never(_: object) -> tuple[list[FoundMode], list[FoundMode]]:
         raise AssertionError
 
     assert placed_with_doubtful(SURE, never, POINTS, None).modes
 
 
 def test_a_first_order_below_the_band_is_not_missed() -> None:
-    placement = placed_with_doubtful(SURE[1:], lambda _: [], POINTS, HANGER)
+    placement = placed_with_doubtful(SURE[1:], lambda _: ([], []), POINTS, HANGER)
     lowest, next_hz = (mode(PLANES[0], order).frequency_hz for order in (1, 2))
     lost = min(PLANES, key=lambda plane: mode(plane, 1).frequency_hz)
     told = first_orders(placement.modes, HANGER, 0.8 * lowest)

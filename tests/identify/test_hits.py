@@ -88,6 +88,16 @@ def test_a_soft_knock_among_hard_hits_is_not_a_hit() -> None:
     assert len(find_pulses(force, 2048.0)) == len(starts)
 
 
+@pytest.mark.parametrize("after_s", [0.7, 2.0])
+def test_a_weak_blow_after_the_swing_ends_the_ring_down_and_is_no_second_blow(
+    after_s: float,
+) -> None:
+    force, starts = _force()
+    hit = find_pulses(_struck_again(force, starts[2], 0.05, after_s), 2048.0)[2]
+    assert (hit.start, hit.second_peak) == (pytest.approx(starts[2], abs=1), 0.0)
+    assert 0 < starts[2] + after_s * 2048 - hit.stop < 0.02 * 2048
+
+
 @pytest.mark.parametrize("share", [0.04, 0.3, 1.5])
 @pytest.mark.parametrize("after_s", [0.015, 0.06, 0.4])
 def test_a_second_strike_of_the_same_swing_is_seen(share: float, after_s: float) -> None:

@@ -7,11 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.identify.contract import FoundMode, Tone
+from shm.errors import NotIdentifiable
+from shm.identify import Identification
+from shm.identify.contract import FoundMode, Poles, Tone
 from shm.identify.mode_ordering.order import LEAST_MARGIN
 from shm.identify.mode_ordering.placement import Placement, placed
+from shm.report.quality_table import headline
 from shm.simulate.elements import plane_modes
-from shm.values import NAN, PLANES, Hanger, ResponsePoint
+from shm.values import NAN, PLANES, Hanger, ModalTest, ResponsePoint
+from shm.values.modes import NUMBERING
 from tests.identify.test_non_bending_modes import HANGER, PLACES, STATE, hanger_modes
 
 POINTS = tuple(ResponsePoint(f"{x}", "transverse", x) for x in PLACES)
@@ -94,6 +98,18 @@ def test_orders_that_may_be_others_are_not_guessed_where_the_hanger_is_described
     described = placed(own, POINTS[:1], HANGER)
     assert described.modes == ()
     assert all("not guessed" in mode.reason for mode in described.set_aside)
+    kinds = {(mode.kind, mode.plane, mode.frequency_sd_hz > 0) for mode in described.set_aside}
+    assert kinds == {("unnumbered", None, True)}
+    assert described.check is not None
+    assert (described.check.name, described.check.verdict) == (NUMBERING, "refused")
+    assert headline([described.check]).startswith("Do not use: the orders of the modes are not")
+    none = np.empty(0)
+    found = Identification(
+        ModalTest("t", ()), None, (), (), Poles(none, none, none, none.astype(bool)),
+        quality=(described.check,), set_aside=described.set_aside,
+    )  # fmt: skip
+    with pytest.raises(NotIdentifiable, match=f"{own[0].frequency_hz:.4g}, .* Hz"):
+        found.with_orders("t.csv")
     plain = placed(own, POINTS[:1], None)
     assert len(plain.modes) == len(own)
     assert plain.check is not None

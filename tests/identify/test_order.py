@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.identify.mode_ordering.alignment import PlaneModes
+from shm.identify.mode_ordering.alignment import PlaneModes, log_pinned
 from shm.identify.mode_ordering.order import Expected, assign_orders
 from shm.simulate import HangerState, natural_frequencies
 from shm.values import Hanger
@@ -65,6 +65,18 @@ def test_a_lonely_mode_is_numbered_by_the_other_plane() -> None:
 
 def test_a_lonely_mode_alone_is_the_first() -> None:
     assert _orders([_plane([14.8]), _plane([])]) == [[1], []]
+
+
+def test_modes_of_the_deck_below_any_of_the_described_hanger_do_not_doubt_it() -> None:
+    told = _round_bar(0.09, 4.0, 200e3)
+    level = told.log_unit + np.array([log_pinned(np.array(told.log_xi))])
+    first_hz = float(np.exp(level[0]))
+    bar_hz = first_hz * np.array([1.0, 2.4, 4.4])
+    deck_hz = first_hz * np.array([0.15, 0.2, 0.25, 0.3])
+    found = assign_orders([_plane([*deck_hz, *bar_hz]), _plane([])], told)
+    alone = assign_orders([_plane(bar_hz), _plane([])], told)
+    assert found.basis == alone.basis == "description"
+    assert found.orders[0][4:] == alone.orders[0]
 
 
 def test_what_is_no_hanger_is_counted() -> None:

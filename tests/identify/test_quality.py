@@ -9,10 +9,11 @@ import pytest
 
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Finding, FoundMode, Measurement, Poles
+from shm.identify.measuring.prediction import surprise
 from shm.identify.measuring.setups import measured_recordings
-from shm.identify.measuring.signal_faults import surprise
+from shm.identify.measuring.signal_faults import KNOCK
 from shm.identify.quality import CHECKS, Inspection, assess, refusal, tones
-from shm.values import FloatArray, FrequencyResponse, Recording, ResponsePoint
+from shm.values import Channel, FloatArray, FrequencyResponse, Recording, ResponsePoint
 from tests.identify.planted import (
     FIRST,
     OPTIONS,
@@ -72,6 +73,34 @@ def test_samples_that_are_lost_are_told_from_a_knock(hits: tuple[int, ...], verd
     found = check_of("drop-outs", replace(SOUND, channels=cut))
     assert found.verdict == verdict
     assert found.value == len(hits)
+
+
+@pytest.mark.parametrize("heard", [("transverse",), ("transverse", "longitudinal")])
+def test_a_hit_that_the_force_does_not_show_ends_the_ring_down_in_which_it_falls(
+    heard: tuple[str, ...],
+) -> None:
+    """All sensors hear it in both planes, or in one: no fault of cables."""
+    at, late = SLOT + FIRST, 2600
+    rng = np.random.default_rng(5)
+
+    def knock(values: FloatArray) -> None:
+        values[at + late : 2 * SLOT] += 0.7 * values[at : 2 * SLOT - late].copy()
+
+    def beside(channel: Channel) -> Channel:
+        hiss = 0.02 * rng.standard_normal(len(channel.values))
+        return replace(channel, name=f"{channel.name}b", values=0.8 * channel.values + hiss)
+
+    more = tuple(beside(channel) for channel in SOUND.accelerations)
+    record = replace(SOUND, channels=(*SOUND.channels, *more))
+    for channel in record.accelerations:
+        if channel.plane in heard:
+            record = changed(channel.name, knock, record)
+    (measurement,) = measured_recordings([record], OPTIONS)
+    assert all(hit.used for hit in measurement.hits)
+    assert [hit.cut for hit in measurement.hits if hit.cut] == [KNOCK]
+    lengths = [decay.shape[1] for decay in measurement.decays]
+    assert lengths[1] == pytest.approx(lengths[0] * late / (SLOT - FIRST), rel=0.2)
+    assert not measurement.dropped
 
 
 def test_clipped_ring_downs_are_told() -> None:

@@ -66,6 +66,17 @@ def test_windows_find_close_pairs_of_a_single_decay() -> None:
             assert np.min(np.abs(frequencies / hz - 1)) < 5e-4, hz
 
 
+def test_a_short_ring_down_among_long_ones_does_not_shorten_the_lags() -> None:
+    long = tuple(_decay(seed, 12, 1e-3) for seed in (1, 2, 3))
+    options = IdentifyOptions(2.0, 14.0)
+    found, without = (
+        through_windows(_measurement(each), options, windows(RATE_HZ, options)).modes
+        for each in ((*long, long[0][:, :400]), long)
+    )
+    assert [mode.frequency_hz for mode in found] == [mode.frequency_hz for mode in without]
+    assert len(found) == 12
+
+
 def test_the_bound_of_one_decay_is_the_closed_one() -> None:
     """A exp(-s t) cos(w t + p) in noise of density S for ever: var w = 8 s^3 S / A^2."""
     hz, damping, density, amplitude = 10.0, 0.004, 1e-6, 0.5

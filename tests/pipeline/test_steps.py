@@ -58,7 +58,7 @@ class Logger:
         self.asked = {"options": options, "hanger": hanger.id, "source": records[0].source}
         test: ModalTest = a_test(test_id, hanger=records[0].hanger, time=records[0].time)
         dropped = (SimpleNamespace(count=2, what="poles", reason="too damped"),)
-        return SimpleNamespace(
+        found = SimpleNamespace(
             test=test,
             frequency_response=a_response(),
             dropped=dropped,
@@ -66,6 +66,7 @@ class Logger:
             quality=(a_check(),),
             set_aside=(a_foreign_mode(),),
         )
+        return SimpleNamespace(with_orders=lambda source: found)
 
 
 @pytest.fixture

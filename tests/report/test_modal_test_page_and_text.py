@@ -206,6 +206,7 @@ def test_the_document_survives_json_and_holds_what_the_page_tells() -> None:
     assert document["quality"][-1]["value"] is None
     assert document["set_aside"][1] == {
         "kind": "tone", "frequency_hz": 50.0, "damping_ratio": None, "reason": "mains",
+        "plane": None, "frequency_sd_hz": None, "damping_sd": None,
     }  # fmt: skip
     assert document["hits"][1]["reason"] == "double hit"
     assert document["band_hz"] == [2.0, 90.0]

@@ -23,7 +23,7 @@ from shm.identify.estimation.poles import (
 from shm.identify.options import IdentifyOptions
 from shm.values import FloatArray
 
-_FEW_HITS = 0.2
+FEW_HITS = 0.2
 """Where too few hits show whether a mode repeats, its poles must stay together this much closer."""
 _SHARP = 0.2
 """A frequency this much better than it must be is trusted even where the damping is not known."""
@@ -172,7 +172,7 @@ def doubt(candidate: Candidate, repeat: Repeats, options: IdentifyOptions) -> st
     frequency_wide, damping_wide = (options.ambient_width * each for each in best)
     missed = int(np.sum(~np.isfinite(repeat.frequency_hz)))
     by_hits = len(repeat.frequency_hz) >= LEAST_HITS and not missed
-    strict = 1.0 if by_hits or _steady(candidate) else _FEW_HITS
+    strict = 1.0 if by_hits or _steady(candidate) else FEW_HITS
     # What the order moves it by is part of its standard deviation.
     if candidate.frequency_spread > max(strict * options.max_frequency_spread, frequency_wide):
         return "its frequency changes with the model order"

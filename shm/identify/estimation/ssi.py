@@ -77,6 +77,10 @@ _LEAST_POINTS = 3
 """Of one hit, shapes alone tell a mode from noise in a window, and those of two channels agree by
 chance: case1 of tests/identify/test_real_records.py, one channel, would have seven modes too many.
 """
+_LONG = 0.75
+"""Of the third longest: the shortest ring-down that windows look at. Lags are a third of the
+shortest, and two planes' modes beat slowly: of five of 1.6 to 4.5 s in a record of a long hanger
+(tests/worlds/recordings.py, plain 9302) a window finds 2 of 16 modes, of the three longest 10."""
 _ROWS_WINDOW = 60  # judgement: two seconds of lags, at four times the reach of a window
 _MOST_SUMS = 10  # judgement: parts of ambient motion by twos; Student's quantile is 6 % above
 _COARSE_FROM = 60  # judgement: thirty orders or so tell what stays, and more only cost
@@ -133,11 +137,12 @@ def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOpti
 
 
 def looked_at_again(
-    measurement: Measurement, options: IdentifyOptions, at_hz: Sequence[float]
+    measurement: Measurement, options: IdentifyOptions, at_hz: Sequence[float] | None = None
 ) -> Finding | None:
-    """What windows show about `at_hz`; None where windows were looked through before, or cannot."""
+    """What windows show about `at_hz`, or anywhere; None where they were looked through before, or
+    cannot be."""
     every = windows(measurement.sampling_rate_hz, options)
-    around = [w for w in every if any(w.low_hz <= hz <= w.high_hz for hz in at_hz)]
+    around = [w for w in every if at_hz is None or any(w.low_hz <= hz <= w.high_hz for hz in at_hz)]
     if not around or not measurement.hits or not _repeated(measurement):
         return None
     return through_windows(measurement, options, around)
@@ -152,8 +157,11 @@ def through_windows(
 
 def _in_window(window: Window, measurement: Measurement, options: IdentifyOptions) -> Finding:
     rate, rate_slow = measurement.sampling_rate_hz, window.rate_hz(measurement.sampling_rate_hz)
-    decays = tuple(window.through(decay, rate) for decay in measurement.decays)
-    if _size(decays) < STOPPED * _size(measurement.decays):
+    by_length = sorted(decay.shape[1] for decay in measurement.decays)
+    least = _LONG * by_length[-min(LEAST_HITS, len(by_length))]
+    long = [decay for decay in measurement.decays if decay.shape[1] >= least]
+    decays = tuple(window.through(decay, rate) for decay in long)
+    if _size(decays) < STOPPED * _size(long):
         return nothing_moves(len(decays))
     mixed = references(decays)
     rows = min(_ROWS_WINDOW, min(decay.shape[1] for decay in decays) // 3)

@@ -10,6 +10,7 @@ import numpy as np
 from shm.identify.contract import Dropped, Finding, FoundMode, Poles
 from shm.identify.estimation.candidates import diagram, resolved, stable_candidates
 from shm.identify.estimation.close_pairs import told_apart
+from shm.identify.estimation.delays import as_simultaneous, delays_s, simultaneous
 from shm.identify.estimation.poles import PoleSet, modal_assurance
 from shm.identify.estimation.repeats import LEAST_HITS, find_again, proven
 from shm.identify.options import IdentifyOptions
@@ -43,6 +44,11 @@ def stabilised(
     # Where hits cannot prove a mode, the orders must: noise seldom makes a pole at nearly all.
     gaps = len(without_each_hit) >= LEAST_HITS
     candidates, unstable = stable_candidates(sets, orders, options, gaps=gaps)
+    late_s = delays_s(candidates, options)
+    if late_s is not None:
+        sets = [simultaneous(poles, late_s) for poles in sets]
+        without_each_hit = [[simultaneous(p, late_s) for p in of] for of in without_each_hit]
+        candidates = [as_simultaneous(candidate, late_s) for candidate in candidates]
     single, doubles = resolved(candidates, seconds)
     final = [poles for poles in sets if poles.order in orders]
     again = find_again(single, without_each_hit)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.values import FloatArray
+from shm.values import FloatArray, IntArray
 
 # judgement: normal noise reaches 5 sigmas once in a million samples, mains and steps of a converter
 # somewhat more; a second blow is sought only where one has struck, so that less may count
@@ -34,9 +34,9 @@ _BASELINE_SAMPLES = 64
 class Pulse:
     """One hit in samples: force above the noise from `start` up to `end`, quiet up to `stop`.
 
-    `stop` is shortly before the next hit begins, or where the record ends. `second_peak` is the
-    largest share of the peak force that strikes again before `stop`, and `second_end` the first
-    sample after that; both 0 where none does.
+    `stop` is shortly before the next blow, be it too weak for a hit, or where the record ends.
+    `second_peak` is the largest share of the peak force that strikes again in the same swing, and
+    `second_end` the first sample after that; both 0 where none does.
     """
 
     start: int
@@ -53,13 +53,14 @@ class HitRecord:
     """The hit of `pulse` in its record: `force` (samples,), `accelerations` (channels, samples).
 
     `clipped_end` is the first sample from which no acceleration is clipped any more, 0 where none
-    is in the ring-down.
+    is in the ring-down; `cut`: why it ends before the next hit.
     """
 
     force: FloatArray
     accelerations: FloatArray
     pulse: Pulse
     clipped_end: int = 0
+    cut: str = ""
 
     @property
     def free(self) -> int:
@@ -152,8 +153,15 @@ def _pulse(
     falls = np.flatnonzero(push[first:stop] < _quiet(push[first], noise))
     end = first + int(falls[0]) if len(falls) else stop
     hardest = max(_between_samples(push, peak) for peak in peaks)
-    second, over = _second_peak(push[first:stop], end - first, noise, rate)
-    return Pulse(start, first, end, stop, hardest, second, first + over if second else 0)
+    again = first + _struck_again(push[first:stop], end - first, noise, rate)
+    apart = again[again > peaks[-1] + int(GROUP_SECONDS * rate)]
+    if len(apart):  # too weak for a hit, and no second blow of this one
+        stop = int(apart[0]) - int(PULSE_SECONDS * rate) - RINGING_SAMPLES
+        again = again[again < stop]
+    if not len(again):
+        return Pulse(start, first, end, stop, hardest)
+    second = float(np.max(push[again]) / push[first])
+    return Pulse(start, first, end, stop, hardest, second, int(again[-1]) + 1)
 
 
 def _between_samples(push: FloatArray, peak: int) -> float:
@@ -170,22 +178,14 @@ def _same_pulse(sampling_rate_hz: float) -> int:
     return max(int(PULSE_SECONDS * sampling_rate_hz), RINGING_SAMPLES)
 
 
-def _second_peak(
-    after: FloatArray, fall: int, noise: float, sampling_rate_hz: float
-) -> tuple[float, int]:
-    """Share of the first peak's force (`after[0]`) that strikes again, and the sample after that.
-
-    Both 0 where nothing does.
+def _struck_again(after: FloatArray, fall: int, noise: float, sampling_rate_hz: float) -> IntArray:
+    """The samples of `after`, which begins with the first peak, at which something strikes again.
 
     Up to 6 ms after the peak, and until it has fallen after `fall` samples (a soft tip's pulse is
     long), it is the same pulse; then 2 % of the peak and 8 sigma count, and more near the pulse,
     where the ringing of an anti-aliasing filter is still above 2 %.
     """
     skip = max(1, fall, int(np.ceil(PULSE_SECONDS * sampling_rate_hz)))
-    later = after[skip:]
     ringing = RINGING / np.arange(skip, len(after))
     limit = np.maximum(after[0] * np.maximum(DOUBLE_SHARE, ringing), DOUBLE_SIGMAS * noise)
-    struck = later > limit
-    if not np.any(struck):
-        return 0.0, 0
-    return float(np.max(later[struck]) / after[0]), skip + int(np.flatnonzero(struck)[-1]) + 1
+    return np.asarray(skip + np.flatnonzero(after[skip:] > limit))

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from shm.identify.contract import Measurement
-from shm.identify.measuring.signal_faults import prediction_rule
+from shm.identify.measuring.prediction import prediction_rule
 from shm.values import FloatArray
 
 _AFTER_S = 0.5  # judgement: the pulse, its filter's ringing and the hand's shaking are over

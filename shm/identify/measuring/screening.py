@@ -2,9 +2,10 @@
 
 A fault of one channel after one hit leaves out that hit; after most hits, that channel. A clipped
 force does not: the ring-down is as good as any, the check `clipping` tells what it spoils. Nor does
-an acceleration that is clipped at first: the ring-down begins later. A double hit's begins after
-the second blow, and is used where there are fewer than three others. A hit that disagrees with the
-others fell at a wrong place or direction, or somebody held the hanger.
+an acceleration that is clipped at first: the ring-down begins later. What strikes unseen in a
+ring-down, as a hit between two samples of the force does, and a gap in one channel end it. A double
+hit's begins after the second blow. A hit that disagrees with the others fell at a wrong place or
+direction, or somebody held the hanger.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from shm.identify.measuring.signal_faults import (
     OUTLIER,
     clipped_ends,
     faults_of_channels,
+    until_disturbed,
 )
 from shm.identify.measuring.struck_planes import struck_planes
 from shm.identify.measuring.unforced_hits import find_unforced
@@ -41,7 +43,6 @@ from shm.identify.options import IdentifyOptions
 from shm.values import BoolArray, Channel, ComplexArray, FloatArray, Plane, Recording
 
 _LEAST_SHARE_OF_LONGEST = 0.25  # judgement: a quarter as sharp, it blurs the others
-LEAST_HITS = 3  # that say how well they repeat
 FEWEST_TO_COMPARE = 3
 """Of two that differ nobody can say which is right."""
 # identify_limits.py (docs/trials/identification_benchmarks.md): sound hits lie below 0.013, planted
@@ -72,13 +73,14 @@ def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screenin
     ends = clipped_ends(channels, ring_downs)
     ring_downs = [replace(r, clipped_end=end) for r, (end, _) in zip(ring_downs, ends, strict=True)]
     faults = faults_of_channels(channels, ring_downs, rate, options)
+    least = _least_samples(ring_downs, rate, options)
+    ring_downs, faults = until_disturbed(channels, ring_downs, faults, least, rate, options)
     rows, dropped = _usable_channels(channels, faults)
     ring_downs = _with_rows(ring_downs, rows)
     reasons = _reasons(ring_downs, [[each[row] for row in rows] for each in faults], rate, options)
     if records[0].force is not None:
         planes = [channels[row].plane for row in rows]
         reasons = _with_outliers(ring_downs, reasons, rate, options, planes)
-    reasons = _with_double_hits(reasons, faults, rows)
     used = [ring_down for ring_down, reason in zip(ring_downs, reasons, strict=True) if not reason]
     if not used or not rows:
         raise _nothing_left(records, reasons, dropped)
@@ -113,20 +115,10 @@ def _hits(
     return hits, ring_downs
 
 
-def _with_double_hits(
-    reasons: Sequence[str], faults: Sequence[Sequence[str]], rows: Sequence[int]
-) -> list[str]:
-    """The reasons without that of double hits, where fewer than three others can be used."""
-    if sum(not reason for reason in reasons) >= LEAST_HITS:
-        return list(reasons)
-    return [
-        next((each[row] for row in rows if each[row]), "") if reason == DOUBLE_HIT else reason
-        for reason, each in zip(reasons, faults, strict=True)
-    ]
-
-
 def _cut(ring_down: HitRecord, clipped_channels: Sequence[str]) -> str:
-    """Why a used ring-down begins later than its first pulse ends."""
+    """Why a used ring-down begins later than its first pulse ends, or ends before the next."""
+    if ring_down.cut:
+        return ring_down.cut
     if ring_down.clipped_end:
         return f"{CLIPPED}: {', '.join(clipped_channels)}"
     return DOUBLE_HIT if ring_down.pulse.second_peak > 0 else ""
@@ -183,11 +175,18 @@ def _reasons(
     options: IdentifyOptions,
 ) -> list[str]:
     """Why each hit cannot be used; empty where it can."""
+    least = _least_samples(ring_downs, sampling_rate_hz, options)
+    return [_hit_fault(r, f, least) for r, f in zip(ring_downs, faults, strict=True)]
+
+
+def _least_samples(
+    ring_downs: Sequence[HitRecord], sampling_rate_hz: float, options: IdentifyOptions
+) -> float:
+    """Of a ring-down that is no stub."""
     longest = max((r.pulse.stop - r.free for r in ring_downs), default=0)
-    least = max(
+    return max(
         least_seconds(options.band_high_hz) * sampling_rate_hz, _LEAST_SHARE_OF_LONGEST * longest
     )
-    return [_hit_fault(r, f, least) for r, f in zip(ring_downs, faults, strict=True)]
 
 
 def _hit_fault(ring_down: HitRecord, faults: Sequence[str], least_samples: float) -> str:
@@ -198,8 +197,6 @@ def _hit_fault(ring_down: HitRecord, faults: Sequence[str], least_samples: float
         return NOT_A_NUMBER
     if pulse.stop - ring_down.free < least_samples:
         return CUT_OFF
-    if pulse.second_peak > 0:
-        return DOUBLE_HIT
     return next((fault for fault in faults if fault), "")
 
 
@@ -255,16 +252,19 @@ def disagreement(
     Of hits j and k over all channels and lines: 1 - |h_j . h_k|^2 / (|h_j|^2 |h_k|^2) (the modal
     assurance criterion, Allemang 1982, of two responses), which a hammer's level and calibration
     do not move; for each hit the lower median over the others. NaN where there are none, for a hit
-    whose pulse the record's beginning may cut off, that struck twice or was clipped, and for one so
-    soon after another that nobody can say what of its ring-down is its own. Where both of the
-    channels' `planes` were struck in turn, the others are those of its plane.
+    whose pulse the record's beginning may cut off, that struck twice, was clipped or disturbed, and
+    for one so soon after another that nobody can say what of its ring-down is its own. Where both
+    of the channels' `planes` were struck in turn, the others are those of its plane.
     """
     apart = np.full(len(hits), np.nan)
-    step = _step(hits, sampling_rate_hz, band_hz)
+    step = _step([hit for hit in hits if not hit.cut], sampling_rate_hz, band_hz)
     known = [
         index
         for index, hit in enumerate(hits)
-        if hit.pulse.start > 0 and hit.free == hit.pulse.end and not _comes_too_soon(hit, step)
+        if hit.pulse.start > 0
+        and hit.free == hit.pulse.end
+        and not hit.cut
+        and not _comes_too_soon(hit, step, unseen=hits[max(0, index - 1)])
     ]
     if len(known) < 2:
         return apart
@@ -301,8 +301,11 @@ def _gap(sampling_rate_hz: float) -> int:
     return int(PULSE_SECONDS * sampling_rate_hz) + RINGING_SAMPLES
 
 
-def _comes_too_soon(hit: HitRecord, step: int) -> bool:
-    """Is there another hit in the two spectra that foretell what still rings?"""
+def _comes_too_soon(hit: HitRecord, step: int, unseen: HitRecord) -> bool:
+    """Is there another hit in the two spectra that foretell what still rings, or one that the force
+    does not show, which ends the ring-down before?"""
+    if unseen.cut and unseen.force is hit.force and unseen.pulse.start < hit.pulse.start:
+        return unseen.pulse.stop > hit.pulse.start - 2 * step
     before = hit.force[
         max(0, hit.pulse.start - 2 * step) : max(0, hit.pulse.start - RINGING_SAMPLES)
     ]

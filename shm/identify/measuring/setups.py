@@ -29,8 +29,8 @@ from shm.identify.measuring.frf import (
 )
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
 from shm.identify.measuring.responses import measurement_of_responses, point_of
-from shm.identify.measuring.screening import Screening, pulses_of, screened
-from shm.identify.measuring.signal_faults import HITS_NOT_SHOWN
+from shm.identify.measuring.screening import FEWEST_TO_COMPARE, Screening, pulses_of, screened
+from shm.identify.measuring.signal_faults import HITS_NOT_SHOWN, KNOCK
 from shm.identify.options import IdentifyOptions
 from shm.values import Channel, ComplexArray, FloatArray, FrequencyResponse, Recording
 
@@ -81,7 +81,10 @@ def measured_recordings(
         return tuple(ambient_measurement(set_up.records, options) for set_up in set_ups)
     try:
         if len(set_ups) == 1:
-            return (measurement_of_recordings(records, options),)
+            found = measurement_of_recordings(records, options)
+            if hammered and _misses_hits(records, found, options):
+                raise NotIdentifiable("the force does not show most hits.", file=found.source)
+            return (found,)
         return _measured_apart(set_ups, options)
     except NotIdentifiable as refused:
         return _by_motion_alone(records, refused, options)
@@ -94,6 +97,17 @@ def without_unused_force(
     if all(m.frequency_response is not None for m in measurements):
         return list(records)
     return [replace(record, channels=record.accelerations) for record in records]
+
+
+def _misses_hits(
+    records: Sequence[Recording], found: Measurement, options: IdentifyOptions
+) -> bool:
+    """Whether the motion shows more hits than a force that shows few, some in its ring-downs."""
+    few = sum(hit.used for hit in found.hits) < FEWEST_TO_COMPARE
+    if not few or all(hit.cut != KNOCK for hit in found.hits):
+        return False
+    rest = [replace(record, channels=record.accelerations) for record in records]
+    return sum(len(pulses_of(record, options)) for record in rest) > len(found.hits)
 
 
 def _by_motion_alone(

@@ -1,25 +1,20 @@
 """The fault of each acceleration after each hit, and the names that faults go by.
 
 Faults of one signal that a logger or its connectors make: clipped, or standing still.
-
-What no ring-down can do: jumps, bursts and gaps that its past does not foretell.
-
-A ring-down is a sum of decaying sines, so each sample follows from the ones before it by one linear
-rule (Prony). What does not follow came in on the way from the sensor to the file.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-import scipy
-from numpy.lib.stride_tricks import sliding_window_view
 
 from shm.identify.measuring.frf import RATE_OVER_BAND
 from shm.identify.measuring.hits import RINGING_SAMPLES, HitRecord
+from shm.identify.measuring.prediction import is_cut_short, knocked_at, surprise, thinned
 from shm.identify.options import IdentifyOptions
-from shm.values import BoolArray, Channel, FloatArray
+from shm.values import PLANES, BoolArray, Channel, FloatArray, Plane
 
 DOUBLE_HIT = "double hit"
 CUT_OFF = "ring-down cut off"
@@ -59,21 +54,6 @@ _MOVES = 30.0  # judgement: three times the nine levels about a crest, see `_sta
 _FINE = 4000.0
 """Levels up to the peak: forces of hits differ by tens of percent, a thousand levels, so that two
 are hardly the same by chance."""
-_ORDER = 128
-"""Two for each mode that a channel sees, aliased ones too; 64 left sound tests of long hangers with
-errors 8 times those around them."""
-# judgement: four rows a coefficient from each hit; a fault shorter than a block is still seen, and
-# 25 blocks about it tell what is usual
-_FIT_SAMPLES = 600
-_BLOCK = 16
-_AROUND = 25
-_FIRST = 0.3  # judgement: of the largest error; a jump is in all 128 predictions after it
-_MOST_LOST, _COMPARED = 256, 64  # judgement: of a prediction that noise does not spoil
-_AS_PREDICTED = 0.2
-"""Of the motion's energy after a jump, unexplained as later motion: 0.07 at most where 1 to 200
-samples were lost in 15 ring-downs; a knock of a tenth or all of a hit's strength left 0.4 and more,
-or nothing was better than no jump, in 18."""
-_RIDGE = 1e-9  # judgement: 90 dB below the signal, beneath the noise of recordings
 
 
 def faults_of_channels(
@@ -90,24 +70,70 @@ def faults_of_channels(
     rings = [r.accelerations[:, r.free : r.pulse.stop] for r in ring_downs]
     _add(faults, _copies(cuts, faults))
     _add(faults, _clipped(channels, rings, faults))
-    free = [
-        thinned(
-            r.accelerations[:, r.free + RINGING_SAMPLES : r.pulse.stop - RINGING_SAMPLES],
-            sampling_rate_hz,
-            RATE_OVER_BAND * options.band_high_hz,
-        )
-        for r in ring_downs
-    ]
-    rate = sampling_rate_hz / max(
-        1, int(sampling_rate_hz / (RATE_OVER_BAND * options.band_high_hz))
-    )
-    _add(faults, _wanders(free, faults, rate))
-    _add(faults, _surprises(free, faults))
+    free, step = _thin(ring_downs, sampling_rate_hz, options)
+    _add(faults, _wanders(free, faults, sampling_rate_hz / step))
+    _add(faults, _surprises(free, faults, [channel.plane for channel in channels]))
     for r, names in zip(ring_downs, faults, strict=True):
         ring = r.accelerations[:, r.free + RINGING_SAMPLES : r.pulse.stop - RINGING_SAMPLES]
         if KNOCK in names and is_cut_short(ring[[name == KNOCK for name in names]]):
             names[:] = [LOST if name == KNOCK else name for name in names]
     return faults
+
+
+def _thin(
+    ring_downs: Sequence[HitRecord], sampling_rate_hz: float, options: IdentifyOptions
+) -> tuple[list[FloatArray], int]:
+    """The free motion after each hit, thinned, and every how many samples that is."""
+    wanted_hz = RATE_OVER_BAND * options.band_high_hz
+    rings = [
+        r.accelerations[:, r.free + RINGING_SAMPLES : r.pulse.stop - RINGING_SAMPLES]
+        for r in ring_downs
+    ]
+    thin = [thinned(ring, sampling_rate_hz, wanted_hz) for ring in rings]
+    return thin, max(1, int(sampling_rate_hz / wanted_hz))
+
+
+def until_disturbed(
+    channels: Sequence[Channel],
+    ring_downs: Sequence[HitRecord],
+    faults: list[list[str]],
+    least_samples: float,
+    sampling_rate_hz: float,
+    options: IdentifyOptions,
+) -> tuple[list[HitRecord], list[list[str]]]:
+    """Ring-downs that something strikes, or in which a channel drops out that mostly does not, end
+    there, if that leaves `least_samples`; and what is wrong with them then."""
+    free, step = _thin(ring_downs, sampling_rate_hz, options)
+    kept = list(ring_downs)
+    for number, (r, names) in enumerate(zip(ring_downs, faults, strict=True)):
+        heard = [name == KNOCK for name in names]
+        gaps = [row for row in range(len(names)) if _drops_out(row, number, faults)]
+        if any(heard):
+            at = knocked_at([part[heard] for part in free], number, _SURPRISE)
+            cut, stop = KNOCK, r.free + RINGING_SAMPLES + at * step
+        elif gaps:
+            rings = r.accelerations[gaps, r.free : r.pulse.stop]
+            cut, stop = names[gaps[0]], r.free + min(map(_gap_in, rings)) - RINGING_SAMPLES
+        else:
+            continue
+        if stop - r.free >= least_samples:
+            kept[number] = replace(r, pulse=replace(r.pulse, stop=stop), cut=cut)
+    if not any(r.cut for r in kept):
+        return kept, faults
+    return kept, faults_of_channels(channels, kept, sampling_rate_hz, options)
+
+
+def _drops_out(row: int, number: int, faults: Sequence[Sequence[str]]) -> bool:
+    """Whether a channel does after that hit, and after most others has no fault."""
+    faulty = sum(bool(names[row]) for names in faults)
+    return faults[number][row] in (NOT_A_NUMBER, FROZEN) and 2 * faulty <= len(faults)
+
+
+def _gap_in(signal: FloatArray) -> int:
+    """The sample of a signal from which it is missing or stands still; 0 where neither is."""
+    if not np.all(np.isfinite(signal)):
+        return int(np.argmin(np.isfinite(signal)))
+    return next((first for first, _ in _still_runs(signal)), 0)
 
 
 Faults = list[list[str]]
@@ -193,8 +219,9 @@ def _wanders(free: Sequence[FloatArray], known: Faults, rate_hz: float) -> Fault
     return faults
 
 
-def _surprises(free: Sequence[FloatArray], known: Faults) -> Faults:
-    """Jumps, bursts and loose contacts; where more than half the channels have them, a knock."""
+def _surprises(free: Sequence[FloatArray], known: Faults, planes: Sequence[Plane | None]) -> Faults:
+    """Jumps, bursts and loose contacts; where more than half the channels have them, or of those of
+    a plane, a knock."""
     channels = len(free[0])
     found = np.zeros((len(free), channels))
     for row in range(channels):
@@ -202,7 +229,11 @@ def _surprises(free: Sequence[FloatArray], known: Faults) -> Faults:
         if sound:
             found[sound, row] = surprise([free[hit][row] for hit in sound])
     wild = found > _SURPRISE
-    knocks = (channels > 1) & (2 * wild.sum(axis=1) > channels)
+    groups = [np.array([plane == own for own in planes]) for plane in PLANES]
+    groups = [group for group in (*groups, np.full(channels, True)) if group.sum() > 1]
+    knocks = np.full(len(free), False)
+    for group in groups:
+        knocks |= 2 * wild[:, group].sum(axis=1) > group.sum()
     return [
         [(KNOCK if knock else CABLE) if is_wild else "" for is_wild in row]
         for row, knock in zip(wild, knocks, strict=True)
@@ -305,15 +336,20 @@ def frozen(signals: FloatArray) -> BoolArray:
 
 
 def _stands_still(signal: FloatArray) -> bool:
+    return bool(_still_runs(signal))
+
+
+def _still_runs(signal: FloatArray) -> list[tuple[int, int]]:
+    """The first and last samples of those stretches that stand still."""
     steps = np.abs(np.diff(signal))
     edges = np.flatnonzero(np.diff(np.concatenate(([0], steps == 0, [0]))))
-    runs = [(a, b) for a, b in edges.reshape(-1, 2) if b - a + 1 >= FROZEN_SAMPLES]
+    runs = [(a, b) for a, b in edges.reshape(-1, 2).tolist() if b - a + 1 >= FROZEN_SAMPLES]
     if not runs or not np.any(steps > 0):
-        return False
+        return []
     # A slow or weak signal rests on one level of its converter for long: there the samples around
     # move by a few levels (nine around a crest). Where they move by 30, it cannot have rested.
     level = float(steps[steps > 0].min())
-    return any(_moves_around(signal, a, b + 1, _MOVES * level) for a, b in runs)
+    return [(a, b) for a, b in runs if _moves_around(signal, a, b + 1, _MOVES * level)]
 
 
 def _moves_around(signal: FloatArray, first: int, stop: int, least: float) -> bool:
@@ -321,71 +357,3 @@ def _moves_around(signal: FloatArray, first: int, stop: int, least: float) -> bo
     sides = signal[max(0, first - length) : first], signal[stop : stop + length]
     moves = [float(np.ptp(side)) for side in sides if len(side) >= min(length, FROZEN_SAMPLES)]
     return bool(moves) and min(moves) >= least
-
-
-def thinned(signals: FloatArray, sampling_rate_hz: float, wanted_rate_hz: float) -> FloatArray:
-    """Means of neighbouring samples, (channels, fewer samples), at no less than the wanted rate.
-
-    What folds back stays a sum of decaying sines, which is all that counts here.
-    """
-    factor = max(1, int(sampling_rate_hz / wanted_rate_hz))
-    samples = signals.shape[1] // factor * factor
-    parts = signals[:, :samples].reshape(len(signals), -1, factor)
-    return np.asarray(parts.mean(axis=2))
-
-
-def surprise(ring_downs: Sequence[FloatArray]) -> FloatArray:
-    """How far one channel's ring-downs, each (samples,), leave their rule at worst, (hits,).
-
-    Largest error of the prediction in a block of 16 samples over the median of those of the blocks
-    around it, or of those before it: what comes back slowly disturbs the blocks after it for long.
-    NaN for a ring-down too short to tell.
-    """
-    long_enough = [part for part in ring_downs if len(part) >= 2 * _ORDER]
-    if not long_enough:
-        return np.full(len(ring_downs), np.nan)
-    rule = prediction_rule(long_enough)
-    return np.array([_worst(part, rule) for part in ring_downs])
-
-
-def is_cut_short(ring: FloatArray) -> bool:
-    """Whether all channels, (channels, samples), go on after a jump as they would some samples
-    later: samples are lost. After a knock they do not."""
-    rules = [prediction_rule([row]) for row in ring]
-    errors = [
-        np.abs(np.convolve(row, rule, mode="valid")) for row, rule in zip(ring, rules, strict=True)
-    ]
-    firsts = [int(np.argmax(error > _FIRST * error.max())) for error in errors]
-    jump = int(np.median(firsts)) + _ORDER
-    after = ring[:, jump : jump + _COMPARED]
-    unlike = np.zeros(_MOST_LOST)
-    for row, rule, seen in zip(ring, rules, after, strict=True):
-        ahead = list(row[jump - _ORDER : jump])
-        for _ in range(_MOST_LOST + len(seen)):
-            ahead.append(-float(rule[:0:-1] @ ahead[-_ORDER:]))
-        later = sliding_window_view(np.array(ahead[_ORDER:]), len(seen))[:_MOST_LOST]
-        unlike += np.sum((later - seen) ** 2, axis=1) / np.sum(seen**2) / len(ring)
-    return bool(unlike[1:].min() < min(_AS_PREDICTED, unlike[0] / 2))
-
-
-def prediction_rule(parts: Sequence[FloatArray]) -> FloatArray:
-    """Coefficients (1 + order,) that annihilate the parts, by least squares over all of them."""
-    rows = np.vstack([sliding_window_view(part[:_FIT_SAMPLES], _ORDER + 1) for part in parts])
-    past, now = rows[:, :-1], rows[:, -1]
-    square = past.T @ past
-    square += _RIDGE * float(np.trace(square)) / _ORDER * np.eye(_ORDER)
-    weights = scipy.linalg.solve(square, past.T @ now, assume_a="pos")
-    return np.concatenate(([1.0], -weights[::-1]))
-
-
-def _worst(part: FloatArray, rule: FloatArray) -> float:
-    if len(part) < 2 * _ORDER:
-        return float("nan")
-    error = np.abs(np.convolve(part, rule, mode="valid"))
-    peaks = error[: len(error) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).max(axis=1)
-    width = min(_AROUND, len(peaks))
-    around = scipy.ndimage.median_filter(peaks, width)
-    usual = around.copy()
-    late = width // 2 + 1
-    usual[late:] = np.minimum(around[late:], around[:-late])
-    return float(np.max(peaks / np.maximum(usual, np.finfo(float).tiny)))

@@ -16,7 +16,7 @@ from shm.identify.measuring.hits import (
     RINGING_SAMPLES,
     Pulse,
 )
-from shm.identify.measuring.signal_faults import thinned
+from shm.identify.measuring.prediction import thinned
 from shm.values import NAN, FloatArray
 
 _WINDOW_SECONDS = 0.04

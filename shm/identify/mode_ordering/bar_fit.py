@@ -21,6 +21,7 @@ from shm.identify.mode_ordering.order import (
     Expected,
     Numbering,
     Orders,
+    assign_orders,
     heavy_tailed,
 )
 from shm.values import FloatArray
@@ -60,6 +61,42 @@ class Bar:
     def fits(self) -> bool:
         known = self.off[np.isfinite(self.off)]
         return bool(np.sqrt(np.mean(known**2)) < PLAIN_BAR)
+
+
+def described_orders(planes: Sequence[PlaneModes], expected: Expected) -> Numbering:
+    """By frequencies and shapes; where these make no bar to a thousandth but the orders that the
+    frequencies alone are sure of do, by those.
+
+    A sensor's weight, gain or place is one cause for the shapes of all modes: many that are off a
+    little say no more than one, and yet outvote the frequencies.
+    """
+    numbering = borne_out(planes, expected, assign_orders(planes, expected))
+    shaped = any(len(plane.position) for plane in planes)
+    if not shaped or (_is_sure(numbering) and _is_plain_bar(planes, numbering, expected)):
+        return numbering
+    bare = [replace(p, position=np.empty(0), shapes=np.empty((0, 0))) for p in planes]
+    alone = borne_out(bare, expected, assign_orders(bare, expected))
+    plain = _is_sure(alone) and _is_plain_bar(planes, alone, expected)
+    return alone if plain else numbering
+
+
+def _is_sure(numbering: Numbering) -> bool:
+    """Whether the description gives each mode its order, and no other fits nearly as well."""
+    margins = [
+        margin
+        for orders, own in zip(numbering.orders, numbering.margins, strict=True)
+        for order, margin in zip(orders, own, strict=True)
+        if order is not None
+    ]
+    least = min(margins, default=0.0)
+    return numbering.basis == "description" and least >= LEAST_MARGIN
+
+
+def _is_plain_bar(planes: Sequence[PlaneModes], numbering: Numbering, expected: Expected) -> bool:
+    """Whether modes enough to tell are one bar's to a thousandth."""
+    if sum(order is not None for own in numbering.orders for order in own) < LEAST_MODES:
+        return False
+    return fitted_bar([plane.frequency_hz for plane in planes], numbering.orders, expected).fits
 
 
 def borne_out(planes: Sequence[PlaneModes], expected: Expected, numbering: Numbering) -> Numbering:

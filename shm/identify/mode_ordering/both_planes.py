@@ -47,6 +47,14 @@ def _stands_for_both(
     return alone and LEAST_SHARE <= share <= 1 - LEAST_SHARE
 
 
+def moves_in_one_plane(mode: FoundMode, points: Sequence[ResponsePoint], turned_rad: float) -> bool:
+    """Whether it is seen to: on one axis the other plane's modes are heard, too."""
+    if set(PLANES) - {point.plane for point in points}:
+        return False
+    share = transverse_share(mode.shape, points, turned_rad)
+    return not LEAST_SHARE <= share <= 1 - LEAST_SHARE
+
+
 def blurred(mode: FoundMode) -> FoundMode:
     """An unresolved pair's mode: either of the two has its frequency to a tenth of the bandwidth.
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from shm.identify.contract import FoundMode, Tone
 from shm.identify.estimation.poles import modal_assurance
-from shm.values import FloatArray, ForeignMode
+from shm.values import FloatArray, ForeignMode, Plane
 
 MULTIPLES = (2, 3)  # judgement: rattling contacts give the first two, higher ones are fainter
 _MULTIPLE_TOLERANCE = 5e-4  # judgement: it is exact but for the drift within a test
@@ -104,16 +104,20 @@ def askew_mode(mode: FoundMode, order: int) -> ForeignMode:
     return ForeignMode("deck", mode.frequency_hz, mode.damping_ratio, reason)
 
 
-def unsure_mode(mode: FoundMode, order: int) -> ForeignMode:
-    """A mode that may be of that order, or of another."""
-    reason = f"Its order may be {order}, another fits nearly as well: it is not guessed."
-    return ForeignMode("deck", mode.frequency_hz, mode.damping_ratio, reason)
-
-
-def unnumbered_mode(mode: FoundMode) -> ForeignMode:
-    """A mode where none has an order."""
+def unnumbered_mode(mode: FoundMode, plane: Plane | None, order: int | None) -> ForeignMode:
+    """A mode that may be of that order, or of another; None where none has an order."""
     reason = "The modes fit neither the hanger's description nor any tensioned bar."
-    return ForeignMode("deck", mode.frequency_hz, mode.damping_ratio, reason)
+    if order:
+        reason = f"Its order may be {order}, another fits nearly as well: it is not guessed."
+    return ForeignMode(
+        "unnumbered",
+        mode.frequency_hz,
+        mode.damping_ratio,
+        reason,
+        plane,
+        mode.frequency_sd_hz,
+        mode.damping_sd,
+    )
 
 
 def base_of(mode: FoundMode, modes: Sequence[FoundMode]) -> tuple[int, FoundMode] | None:

@@ -95,13 +95,17 @@ class Expected:
         xi = hanger.length_m * np.sqrt(hanger.nominal_tension_n / stiffness)
         return cls(float(np.log(unit)), float(np.log(xi)), turnbuckle_shift(hanger))
 
+    @property
+    def lowest(self) -> float:
+        """Log of the least first frequency in Hz of the beams that are tried."""
+        return self.log_unit + float(log_pinned(np.array(self.log_xi))) - _AROUND
+
     def grid(self) -> Grid:
         """Beams around the description."""
         log_xi = tensioned_beam_pattern().log_xi
         away = np.abs(log_xi - self.log_xi)
         tensions = np.flatnonzero(away < max(_TENSIONS_AROUND, away.min() + _LEVEL))
-        centre = self.log_unit + float(log_pinned(np.array(self.log_xi)))
-        levels = centre + np.arange(-_AROUND, _AROUND, _LEVEL)
+        levels = self.lowest + np.arange(0, 2 * _AROUND, _LEVEL)
         return Grid(tensions, levels, MISSING_COST_DESCRIBED, self.shift)
 
     def cost(self, grid: Grid) -> FloatArray:
@@ -125,19 +129,28 @@ def assign_orders(planes: Sequence[PlaneModes], expected: Expected | None = None
             bases = [("description", expected), *bases]
         for basis, each in bases:
             found = _fitted(planes, each, basis)
-            if sum(plane.count(None) for plane in found.orders) <= _most_aside(sum(counts), basis):
+            if _few_aside(planes, found, each):
                 return found
     counted = tuple(tuple(range(1, count + 1)) for count in counts)
     margins = tuple((0.0,) * count for count in counts)
     return Numbering(counted, (False,) * len(counts), "counting", margins=margins)
 
 
-def _most_aside(modes: int, basis: Basis) -> float:
-    """How many modes may be set aside before the basis itself is doubted.
+def _few_aside(planes: Sequence[PlaneModes], found: Numbering, expected: Expected | None) -> bool:
+    """Whether so few modes are set aside that the basis itself is not doubted.
 
-    Without a description, the first few modes only find out what beam it is.
+    What lies below the lowest frequency of any beam that the description allows is the deck's and
+    says nothing of the hanger. Without a description, the first few modes only find out what beam
+    it is.
     """
-    return MOST_ASIDE * (modes if basis == "description" else max(modes - _FREE, 0))
+    lowest_hz = np.exp(expected.lowest) if expected else 0.0
+    orders = [
+        order
+        for plane, own in zip(planes, found.orders, strict=True)
+        for hz, order in zip(plane.frequency_hz, own, strict=True)
+        if hz >= lowest_hz
+    ]
+    return orders.count(None) <= MOST_ASIDE * max(len(orders) - (0 if expected else _FREE), 0)
 
 
 def _fitted(planes: Sequence[PlaneModes], expected: Expected | None, basis: Basis) -> Numbering:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
@@ -11,16 +10,21 @@ import numpy as np
 
 from shm.identify.contract import FoundMode, Tone
 from shm.identify.mode_ordering.alignment import PlaneModes
-from shm.identify.mode_ordering.bar_fit import borne_out
-from shm.identify.mode_ordering.both_planes import blurred, pair_note, with_both_planes
+from shm.identify.mode_ordering.bar_fit import described_orders
+from shm.identify.mode_ordering.both_planes import (
+    blurred,
+    moves_in_one_plane,
+    pair_note,
+    with_both_planes,
+)
 from shm.identify.mode_ordering.non_bending_modes import (
     askew_mode,
     doubts,
     explained,
     unnumbered_mode,
-    unsure_mode,
     without_tones,
 )
+from shm.identify.mode_ordering.notes import basis_notes, plane_notes, support_notes
 from shm.identify.mode_ordering.one_axis import own_series
 from shm.identify.mode_ordering.order import LEAST_MARGIN, Expected, Numbering, assign_orders
 from shm.identify.mode_ordering.planes import (
@@ -41,8 +45,7 @@ from shm.values import (
     ResponsePoint,
     ShapePoint,
 )
-
-_NOTED_DEGREES = 5.0  # judgement: a sensor clamped on by eye; it sees 0.8 % of the other plane
+from shm.values.modes import NUMBERING
 
 
 @dataclass(frozen=True)
@@ -92,24 +95,29 @@ def placed(
     kept = [candidate.found for candidate, *_ in numbered.ordered]
     pairs = [mode for mode in found if sum(each is mode for each in kept) == len(PLANES)]
     aside = [mode for mode in found if not any(each is mode for each in kept)]
-    foreign = [_foreign(mode, numbered, found, kept) for mode in aside]
+    planes = {
+        id(mode): plane if moves_in_one_plane(mode, points, turned_rad) else None
+        for mode, plane in zip(found, planes_of(found, points, turned_rad), strict=True)
+    }
+    foreign = [_foreign(mode, planes[id(mode)], numbered, found, kept) for mode in aside]
     return Placement(
         modes=tuple(_mode(*each, pairs) for each in numbered.ordered),
         set_aside=_by_frequency([*steady, *foreign]),
         notes=(
-            *_plane_notes(points, turned_rad),
+            *plane_notes(points, turned_rad),
             *(pair_note(mode) for mode in pairs),
-            *_support_notes(hanger),
-            *_basis_notes(numbered.numbering, known, points),
+            *support_notes(hanger),
+            *basis_notes(numbered.numbering, known, points),
             *_order_notes(numbered.ordered),
             *_irregular_notes(numbered.ordered),
         ),
-        check=_check(numbered, known),
+        check=_check(numbered, known, found),
     )
 
 
 def _foreign(
     mode: FoundMode,
+    plane: Plane | None,
     numbered: _Numbered,
     found: Sequence[FoundMode],
     kept: Sequence[FoundMode],
@@ -117,10 +125,9 @@ def _foreign(
     """A mode without an order, as what it is."""
     if order := numbered.askew.get(id(mode)):
         return askew_mode(mode, order)
-    if order := numbered.unsure.get(id(mode)):
-        return unsure_mode(mode, order)
-    if not kept:
-        return unnumbered_mode(mode)
+    order = numbered.unsure.get(id(mode))
+    if order or not kept:
+        return unnumbered_mode(mode, plane, order)
     return explained(mode, found, kept)
 
 
@@ -154,9 +161,7 @@ def _numbered(
         (group,) = [each for each in groups if each] or [[]]
         return _on_one_axis(group, length_m, expected)
     planes = [_plane_modes(group, length_m) for group in groups]
-    numbering = assign_orders(planes, expected)
-    if expected:
-        numbering = borne_out(planes, expected, numbering)
+    numbering = described_orders(planes, expected) if expected else assign_orders(planes)
     every = [
         (candidate, order, irregular and order == 1, margin)
         for group, orders, irregular, margins in zip(
@@ -261,32 +266,35 @@ def _by_frequency(modes: Sequence[ForeignMode]) -> tuple[ForeignMode, ...]:
     return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
 
 
-def _plane_notes(points: Sequence[ResponsePoint], turned_rad: float) -> list[str]:
-    if not any(point.plane for point in points):
-        return ["no channel states its plane: all modes are taken as transverse"]
-    degrees = abs(math.degrees(turned_rad))
-    if degrees >= _NOTED_DEGREES:
-        return [
-            f"the hanger's planes are turned by {degrees:.0f} degrees from the sensors' axes: each "
-            "mode has the name of the nearer plane"
-        ]
-    return []
-
-
 _MORE = "Measure more of the lowest modes: hit with a softer tip, and away from the ends."
 
 
-def _check(numbered: _Numbered, known: Hanger | None) -> QualityCheck | None:
+def _check(
+    numbered: _Numbered, known: Hanger | None, found: Sequence[FoundMode]
+) -> QualityCheck | None:
     """Whether the orders are known, or guessed."""
     if not numbered.ordered:
-        return None
+        return _of_no_order(numbered) if found else None
     value = float(min(numbered.margin, 100.0))  # technical: of a figure that can be read
     doubt, remedy = _doubt_of_numbers(numbered, known)
     if doubt:
-        return QualityCheck("numbering", "warning", value, LEAST_MARGIN, "", doubt, remedy)
+        return QualityCheck(NUMBERING, "warning", value, LEAST_MARGIN, "", doubt, remedy)
     return QualityCheck(
-        "numbering", "good", value, LEAST_MARGIN, "", "no other numbering fits as well"
+        NUMBERING, "good", value, LEAST_MARGIN, "", "no other numbering fits as well"
     )
+
+
+def _of_no_order(numbered: _Numbered) -> QualityCheck:
+    """That modes are known and their orders are not."""
+    found = "the modes fit neither the hanger's description nor any tensioned bar"
+    if numbered.unsure:
+        found = f"the lowest may be order {min(numbered.unsure.values())}, or another"
+    return QualityCheck(
+        NUMBERING, "refused", 0.0, LEAST_MARGIN, "",
+        f"the orders of the modes are not known: {found}",
+        f"{_MORE} Or correct length, section and nominal tension in the description; or give the "
+        "modes with the orders that you know for right as a modal-tests document.",
+    )  # fmt: skip
 
 
 def _doubt_of_numbers(numbered: _Numbered, known: Hanger | None) -> tuple[str, str]:
@@ -343,30 +351,6 @@ def _listed(
 
 def _direction(mode: FoundMode, points: Sequence[ResponsePoint]) -> Plane:
     return PLANES[int(transverse_share(mode.shape, points) < 0.5)]
-
-
-def _support_notes(hanger: Hanger | None) -> list[str]:
-    if hanger is None or hanger.as_hanger:
-        return []
-    return [
-        "the hanger is not clamped at both ends and in tension: its description does not help to "
-        "number the modes"
-    ]
-
-
-def _basis_notes(
-    numbering: Numbering, hanger: Hanger | None, points: Sequence[ResponsePoint]
-) -> list[str]:
-    if numbering.basis == "counting":
-        return ["the modes fit no tensioned beam: they are counted, so orders may be off"]
-    if hanger and numbering.basis == "pattern":
-        return [
-            "the modes do not fit the hanger's description: they are numbered by the pattern of "
-            "their frequencies alone"
-        ]
-    if hanger and not any(np.isfinite(point.x_m) for point in points):
-        return ["no sensor states its position: shapes do not help to number the modes"]
-    return []
 
 
 def _order_notes(ordered: Sequence[_Ordered]) -> list[str]:

@@ -70,15 +70,24 @@ def places(inspection: Inspection, hits: Sequence[Hit]) -> str:
 
 
 def fault_count(
-    inspection: Inspection, name: str, reasons: Sequence[str], none: str, remedy: str
+    inspection: Inspection,
+    name: str,
+    reasons: Sequence[str],
+    none: str,
+    remedy: str,
+    part: str = "used until then",
 ) -> QualityCheck | None:
-    """How many hits and channels were left out for the reasons; none is good."""
+    """How many hits and channels were left out for the reasons, or of how many hits a part is used;
+    none is good."""
     if not hits_of(inspection):
         return None
     hits, channels = hits_for(inspection, reasons), channels_for(inspection, reasons)
-    count = len(hits) + len(channels)
+    cut = [hit for hit in hits_of(inspection) if hit.cut.startswith(tuple(reasons))]
+    count = len(hits) + len(channels) + len(cut)
     if not count:
         return QualityCheck(name, "good", 0.0, 0.0, "", none)
     told = [places(inspection, hits)] if hits else []
-    found = f"left out: {listed(told + channels)}"
+    found = f"left out: {listed(told + channels)}" if told + channels else ""
+    used = f"{part}: {places(inspection, cut)}" if cut else ""
+    found = "; ".join(each for each in (found, used) if each)
     return QualityCheck(name, "warning", float(count), 0.0, "", found, remedy)

@@ -77,18 +77,17 @@ def _reasons(reasons: list[str]) -> str:
 def double_hits(inspection: Inspection) -> QualityCheck | None:
     """How many hits have a second blow in their ring-down.
 
-    They are left out, or used from after it where there are fewer than three others.
+    They are used from after it.
     """
     remedy = "Hit from the wrist and let the hammer spring back at once; repeat these hits."
-    figure = fault_count(
-        inspection, "double hits", (DOUBLE_HIT,), "each hit is a single blow", remedy
+    return fault_count(
+        inspection,
+        "double hits",
+        (DOUBLE_HIT,),
+        "each hit is a single blow",
+        remedy,
+        part="used from after the second blow",
     )
-    late = [hit for hit in hits_of(inspection) if hit.cut == DOUBLE_HIT]
-    if figure is None or not late:
-        return figure
-    told = f"used from after the second blow: {places(inspection, late)}"
-    found = f"{figure.found}; {told}" if figure.value else told
-    return QualityCheck("double hits", "warning", figure.value + len(late), 0.0, "", found, remedy)
 
 
 def pre_trigger(inspection: Inspection) -> QualityCheck | None:
@@ -153,8 +152,11 @@ def repeatability(inspection: Inspection) -> QualityCheck | None:
     known = [value for value in values if np.isfinite(value)]
     value = max(known, default=NAN)
     remedy = "Hit the same point in the same direction, and let nobody touch the hanger."
-    if dropped:
-        found = f"left out as unlike the others: {places(inspection, dropped)}"
+    struck = [hit for hit in hits_of(inspection) if hit.cut == KNOCK]
+    if dropped or struck:
+        told = [f"left out as unlike the others: {places(inspection, dropped)}"] if dropped else []
+        told += [f"something else struck: {places(inspection, struck)}"] if struck else []
+        found = "; ".join(told)
         return QualityCheck("repeatability", "warning", value, LIMIT, "", found, remedy)
     if not known:
         found = f"fewer than {FEWEST_TO_COMPARE} hits: nothing to compare"

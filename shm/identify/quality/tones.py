@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from shm.identify.contract import Hit, Measurement, Tone
 from shm.identify.measuring.frf import LEAST_SAMPLES, RATE_OVER_BAND
 from shm.identify.measuring.hits import RINGING_SAMPLES
-from shm.identify.measuring.signal_faults import thinned
+from shm.identify.measuring.prediction import thinned
 from shm.identify.options import IdentifyOptions
 from shm.identify.quality.inspection import Inspection
 from shm.values import BoolArray, Channel, ComplexArray, FloatArray, QualityCheck, Recording

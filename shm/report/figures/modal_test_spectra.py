@@ -170,7 +170,7 @@ def mode_marks(sheet: ModalTestReport, low_hz: float, high_hz: float) -> list[Ma
     apart = [s for s in sheet.identification.set_aside if low_hz <= s.frequency_hz <= high_hz]
     at = [each.frequency_hz for each in apart]
     texts = [f"{each.kind}, {each.frequency_hz:.4g} Hz: {each.reason}" for each in apart]
-    name = "set aside: not a mode of the hanger"
+    name = "set aside"
     return found + _row(at, _SET_ASIDE_ROW, "red", "cross", name, texts, [], "dot")
 
 

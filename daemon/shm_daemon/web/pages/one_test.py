@@ -136,7 +136,7 @@ def _facts(view: TestView) -> tuple[tuple[str, str, str], ...]:
             formatting.moment(test.time),
             f"received {formatting.moment(view.recording.received_at)}",
         ),
-        ("Set aside", str(aside), "resonances not of the hanger"),
+        ("Set aside", str(aside), "resonances without an order"),
     )
 
 

@@ -1,0 +1,115 @@
+"""What no ring-down can do: jumps, bursts and gaps that its past does not foretell.
+
+A ring-down is a sum of decaying sines, so each sample follows from the ones before it by one linear
+rule (Prony). What does not follow came in on the way from the sensor to the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy
+from numpy.lib.stride_tricks import sliding_window_view
+
+from shm.values import FloatArray
+
+_ORDER = 128
+"""Two for each mode that a channel sees, aliased ones too; 64 left sound tests of long hangers with
+errors 8 times those around them."""
+# judgement: four rows a coefficient from each hit; a fault shorter than a block is still seen, and
+# 25 blocks about it tell what is usual
+_FIT_SAMPLES = 600
+_BLOCK = 16
+_AROUND = 25
+_FIRST = 0.3  # judgement: of the largest error; a jump is in all 128 predictions after it
+_MOST_LOST, _COMPARED = 256, 64  # judgement: of a prediction that noise does not spoil
+_AS_PREDICTED = 0.2
+"""Of the motion's energy after a jump, unexplained as later motion: 0.07 at most where 1 to 200
+samples were lost in 15 ring-downs; a knock of a tenth or all of a hit's strength left 0.4 and more,
+or nothing was better than no jump, in 18."""
+_RIDGE = 1e-9  # judgement: 90 dB below the signal, beneath the noise of recordings
+
+
+def thinned(signals: FloatArray, sampling_rate_hz: float, wanted_rate_hz: float) -> FloatArray:
+    """Means of neighbouring samples, (channels, fewer samples), at no less than the wanted rate.
+
+    What folds back stays a sum of decaying sines, which is all that counts here.
+    """
+    factor = max(1, int(sampling_rate_hz / wanted_rate_hz))
+    samples = signals.shape[1] // factor * factor
+    parts = signals[:, :samples].reshape(len(signals), -1, factor)
+    return np.asarray(parts.mean(axis=2))
+
+
+def surprise(ring_downs: Sequence[FloatArray]) -> FloatArray:
+    """How far one channel's ring-downs, each (samples,), leave their rule at worst, (hits,).
+
+    Largest error of the prediction in a block of 16 samples over the median of those of the blocks
+    around it, or of those before it: what comes back slowly disturbs the blocks after it for long.
+    NaN for a ring-down too short to tell.
+    """
+    long_enough = [part for part in ring_downs if len(part) >= 2 * _ORDER]
+    if not long_enough:
+        return np.full(len(ring_downs), np.nan)
+    rule = prediction_rule(long_enough)
+    return np.array([_worst(part, rule) for part in ring_downs])
+
+
+def is_cut_short(ring: FloatArray) -> bool:
+    """Whether all channels, (channels, samples), go on after a jump as they would some samples
+    later: samples are lost. After a knock they do not."""
+    rules = [prediction_rule([row]) for row in ring]
+    errors = [
+        np.abs(np.convolve(row, rule, mode="valid")) for row, rule in zip(ring, rules, strict=True)
+    ]
+    firsts = [int(np.argmax(error > _FIRST * error.max())) for error in errors]
+    jump = int(np.median(firsts)) + _ORDER
+    after = ring[:, jump : jump + _COMPARED]
+    unlike = np.zeros(_MOST_LOST)
+    for row, rule, seen in zip(ring, rules, after, strict=True):
+        ahead = list(row[jump - _ORDER : jump])
+        for _ in range(_MOST_LOST + len(seen)):
+            ahead.append(-float(rule[:0:-1] @ ahead[-_ORDER:]))
+        later = sliding_window_view(np.array(ahead[_ORDER:]), len(seen))[:_MOST_LOST]
+        unlike += np.sum((later - seen) ** 2, axis=1) / np.sum(seen**2) / len(ring)
+    return bool(unlike[1:].min() < min(_AS_PREDICTED, unlike[0] / 2))
+
+
+def knocked_at(ring_downs: Sequence[FloatArray], number: int, limit: float) -> int:
+    """The sample before which nothing in the ring-down of that number is a surprise above `limit`;
+    each is (channels, samples)."""
+    blocks = []
+    for row, part in enumerate(ring_downs[number]):
+        every = [ring[row] for ring in ring_downs if ring.shape[1] >= 2 * _ORDER]
+        error = _beside_usual(part, prediction_rule(every))
+        blocks.append(int(np.argmax(error > limit)))
+    return max(0, int(np.median(blocks)) - 1) * _BLOCK + _ORDER
+
+
+def prediction_rule(parts: Sequence[FloatArray]) -> FloatArray:
+    """Coefficients (1 + order,) that annihilate the parts, by least squares over all of them."""
+    rows = np.vstack([sliding_window_view(part[:_FIT_SAMPLES], _ORDER + 1) for part in parts])
+    past, now = rows[:, :-1], rows[:, -1]
+    square = past.T @ past
+    square += _RIDGE * float(np.trace(square)) / _ORDER * np.eye(_ORDER)
+    weights = scipy.linalg.solve(square, past.T @ now, assume_a="pos")
+    return np.concatenate(([1.0], -weights[::-1]))
+
+
+def _worst(part: FloatArray, rule: FloatArray) -> float:
+    if len(part) < 2 * _ORDER:
+        return float("nan")
+    return float(np.max(_beside_usual(part, rule)))
+
+
+def _beside_usual(part: FloatArray, rule: FloatArray) -> FloatArray:
+    """The largest error of each block of the prediction over what is usual about it, (blocks,)."""
+    error = np.abs(np.convolve(part, rule, mode="valid"))
+    peaks = error[: len(error) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).max(axis=1)
+    width = min(_AROUND, len(peaks))
+    around = scipy.ndimage.median_filter(peaks, width)
+    usual = around.copy()
+    late = width // 2 + 1
+    usual[late:] = np.minimum(around[late:], around[:-late])
+    return np.asarray(peaks / np.maximum(usual, np.finfo(float).tiny))
