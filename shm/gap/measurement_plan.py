@@ -161,7 +161,7 @@ class Race:
             for each, own in zip(offered, rows, strict=True)
         ]
         reading_sd = UNKNOWN_READING_SD if lift_off(problem.design, problem.hanger) else NAN
-        errors = Errors.of(problem.observations, fits[0][2][0][1])
+        errors = Errors.of(problem, fits[0][2][0][1])
         errors = replace(errors, sensors=problem.sensors_of(design))
         first: Foresight | None = None
         contenders = []
