@@ -14,7 +14,7 @@ import rich_click as click
 from shm.bridge import load_bridge
 from shm.gap import GapOptions
 from shm.gap.diagnose import examined
-from shm.gap.measurement_plan import PlannedMeasurement, Race, planned
+from shm.gap.measurement_plan import PlannedMeasurement, Race, nothing_planned, planned
 from shm.values import Hanger, ModalTest
 from shm_cli import completion
 from shm_cli.common import (
@@ -104,7 +104,7 @@ def plan(
         )
         return
     if not steps:
-        click.echo("No measurement promises to tell the explanations further apart.")
+        click.echo(nothing_planned(race, bridge.measurement_hours, budget_hours or np.inf))
         return
     shown = table("Next measurements", *_HEADS)
     for row in _rows(steps):

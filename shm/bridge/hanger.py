@@ -39,6 +39,7 @@ _LARGEST_POISSONS_RATIO = 0.499
 _LEAST_FACTOR = 1e-6
 _SOFTEST_PA, _STIFFEST_PA = 1e6, 2e12
 """Rubber, and twice a diamond: what lies beyond was written in another unit."""
+_LONGEST_M = 1000.0  # judgement: the longest stays have 580 m; of 4000 m and more no mode is solved
 
 _FORK_DIAMETERS, _NODE_SHARE = 4.0, 0.03
 """Judgement: a fork, from pin to bar, takes up to four diameters, a node plate with half a chord
@@ -61,6 +62,11 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         )
     area, second_moment, mass = _section(table)
     diameter = table.positive("diameter_m") if "diameter_m" in table else NAN
+    if length_m > _LONGEST_M:
+        raise table.refusal(
+            f"length_m = {length_m:g} is longer than any hanger",
+            f"Give it in m, at most {_LONGEST_M:g}.",
+        )
     if max(diameter, math.sqrt(area)) >= length_m:
         raise table.refusal(
             f"a section of {max(diameter, math.sqrt(area)):g} m is no hanger of {length_m:g} m",

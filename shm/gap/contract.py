@@ -60,6 +60,7 @@ class Observations:
     (data,), None where nothing is, is what one standard deviation of a turn about the hanger's axis
     does to a component of a shape; all of a mode turn together. `known_damping` (F, 2)
     holds the logarithm of each mode's damping ratio and its standard deviation; NaN where unknown.
+    `rounding` (F,), None for none, is the standard deviation that rounding adds to frequencies.
     """
 
     design: Design
@@ -67,6 +68,7 @@ class Observations:
     sd: FloatArray
     turned: FloatArray | None = None
     known_damping: FloatArray | None = None
+    rounding: FloatArray | None = None
 
     @property
     def damping(self) -> FloatArray:
@@ -77,8 +79,11 @@ class Observations:
     def part(self, design: Design, data: IntArray) -> Observations:
         """Those of another design, which are `data` of these."""
         turned = None if self.turned is None else self.turned[data]
-        damping = self.damping[data[: design.frequencies]]
-        return Observations(design, self.value[data], self.sd[data], turned, damping)
+        kept = data[: design.frequencies]
+        rounding = None if self.rounding is None else self.rounding[kept]
+        return Observations(
+            design, self.value[data], self.sd[data], turned, self.damping[kept], rounding
+        )
 
 
 @dataclass(frozen=True, eq=False)

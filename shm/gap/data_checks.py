@@ -11,6 +11,7 @@ from statistics import median
 
 from shm.errors import BadInput
 from shm.gap.few_frequencies import told_of_few
+from shm.gap.rounding import told_of_rounding
 from shm.values import PLANES, Hanger, ModalTest, Mode, Outlier
 from shm.values.modes import MOST_SLOPE
 
@@ -166,6 +167,7 @@ def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
         told_of_few(tests, hanger),
         _irregular(tests),
         _without_sd(tests),
+        told_of_rounding(tests),
         _without_temperature(tests),
         _without_shape_sd(tests),
         _amplitude(tests),

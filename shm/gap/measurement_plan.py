@@ -99,6 +99,26 @@ def planned(
     return tuple(steps)
 
 
+def nothing_planned(race: Race, hours: Mapping[str, float], budget_hours: float) -> str:
+    """Why a plan holds nothing, in words."""
+    log_odds, probability = race.expected([])
+    if probability >= ENOUGH:
+        return (
+            f"These data are enough: whichever explanation is true, it is expected to have "
+            f"{probability:.2f} already. What `shm gap diagnose` lists to measure next tells it "
+            "from others that are unlikely as it is."
+        )
+    gains = [race.expected([k])[0] - log_odds for k in range(len(race.offered))]
+    able = [each for each, gain in zip(race.offered, gains, strict=True) if gain >= _WORTH_IT]
+    if not able:
+        return "No measurement promises to tell the explanations further apart."
+    cheapest = min(able, key=lambda each: hours[each.kind])
+    return (
+        f"No measurement that promises to tell the explanations further apart fits into "
+        f"{budget_hours:g} h. The cheapest, {cheapest.what}, takes {hours[cheapest.kind]:g} h."
+    )
+
+
 def chances(attribution: Attribution) -> dict[str, float]:
     """The probability of each explanation by the evidence, by its name.
 
@@ -161,7 +181,7 @@ class Race:
             for each, own in zip(offered, rows, strict=True)
         ]
         reading_sd = UNKNOWN_READING_SD if lift_off(problem.design, problem.hanger) else NAN
-        errors = Errors.of(problem.observations, fits[0][2][0][1])
+        errors = Errors.of(problem, fits[0][2][0][1])
         errors = replace(errors, sensors=problem.sensors_of(design))
         first: Foresight | None = None
         contenders = []

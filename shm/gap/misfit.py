@@ -47,7 +47,7 @@ class Misfit:
     def of(cls, problem: GapProblem, before: Fit) -> Misfit:
         observations = problem.observations
         rows, kind = _distinct(observations.design, before.predicted)
-        precision = identification_sd(observations, before) ** -2
+        precision = identification_sd(problem, before) ** -2
         sd = np.asarray(np.bincount(kind, precision) ** -0.5)
         value = np.bincount(kind, precision * observations.value) * sd**2
         slopes = np.column_stack([before.slopes, problem.repeated.loads])[rows]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.gap.contract import Design, Fit, Observations
+from shm.gap.contract import Design, Fit
 from shm.gap.experiment_design import Proposal, proposals, sensors_wanted, with_sensors
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import identification_sd
@@ -47,7 +47,7 @@ def ranked(problem: GapProblem, fits: Sequence[Fit]) -> tuple[NextMeasurement, .
     if len(contenders) < 2:
         return ()
     general = proposals(problem.observations.design, problem.hanger)
-    errors = Errors.of(problem.observations, contenders[0])
+    errors = Errors.of(problem, contenders[0])
     foresights = [
         [foreseen(problem, fit, each.design, errors) for each in general] for fit in contenders
     ]
@@ -173,9 +173,9 @@ class Errors:
     sensors: FloatArray | None = None
 
     @classmethod
-    def of(cls, observations: Observations, fit: Fit) -> Errors:
-        known = np.isfinite(observations.sd[: observations.design.frequencies])
-        return cls(identification_sd(observations, fit), fit.model_error if known.any() else 0.0)
+    def of(cls, problem: GapProblem, fit: Fit) -> Errors:
+        known = np.isfinite(problem.observations.sd[: problem.design.frequencies])
+        return cls(identification_sd(problem, fit), fit.model_error if known.any() else 0.0)
 
     def between(self, one: Design, other: Design, *, same: bool) -> FloatArray:
         """The covariance (F of one, F of the other) by what repeats; of the `same` tests or not."""

@@ -11,8 +11,9 @@ takes none of it for scatter finds a cause in each. Stated standard
 deviations rest on a few hits and are themselves uncertain: those of one mode in several tests are
 drawn together as far as they differ by chance, and `factor`, what is left and common to all, has a
 log-normal prior of 20 %. That of the shapes is taken from their own scatter between tests. Where no
-standard deviations are given there is instead one unknown standard deviation for all, log-uniform;
-where some are, both. Unknowns are integrated by the trapezoidal rule over their logarithm.
+standard deviations are given there is instead one unknown standard deviation for all, log-uniform,
+beside what rounding adds (`shm.gap.rounding`); where some are, both. Unknowns are integrated by the
+trapezoidal rule over their logarithm.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import numpy as np
 
 from shm.gap.contract import Covariance, Design, NoiseNode, Observations
 from shm.gap.repeated_errors import Repeated, turned_modes
+from shm.gap.rounding import rounding_covariance
 from shm.values import FloatArray, IntArray
 
 # As the general model and other finite elements differ at most (docs/gap.md, what is compared).
@@ -63,9 +65,10 @@ def nodes(observations: Observations, repeated: Repeated | None = None) -> tuple
     correlations = _correlations(observations)
     observations = replace(observations, sd=drawn_together(observations))
     stated = observations.sd[observations.design.frequencies :] ** 2
+    in_any_case = repeated.frequency + rounding_covariance(observations)
     return tuple(
         NoiseNode(
-            Covariance(frequency + repeated.frequency, factor**2 * stated, repeated.sensors),
+            Covariance(frequency + in_any_case, factor**2 * stated, repeated.sensors),
             float(np.log(weight * share)),
             error,
         )

@@ -26,6 +26,7 @@ import scipy
 
 from shm.errors import BadInput
 from shm.gap.contract import Design, Observations
+from shm.gap.rounding import rounding_sds
 from shm.inference.priors import reading_sd_n
 from shm.models.effects import Conditions, Survey
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
@@ -81,6 +82,7 @@ def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
         np.concatenate([np.where(sd > 0, sd, np.nan), shape_sd]),
         np.concatenate([np.zeros_like(sd), turned]) if turned.any() else None,
         np.array([_damping(mode) for _, mode in modes]),
+        rounding_sds(tests),
     )
 
 

@@ -1,10 +1,11 @@
 """Errors that repeat in every mode and test, of sensors and of the section along the bar; scale,
 sign and direction of mode shapes.
 
-A sensor's gain is a little off, it sits some millimetres from where it should and is turned a
-little; a rolled bar is here and there a little thicker than on average. None of these is a gap, yet
-no repetition averages them out. They are normal and small, so that what one standard deviation of
-each does to the data (its load) is all there is to know of them.
+A sensor's gain is a little off, it sits some millimetres from where it should, is turned a little
+and reads some of one axis in the other; a rolled bar is here and there a little thicker than on
+average. None of these is a gap, yet no repetition averages them out. They are normal and small, so
+that what one standard deviation of each does to the data (its load) is all there is to know of
+them.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ Predict = Callable[[Design], FloatArray]
 """The data (data,) that the baseline, near the measured ones, predicts of another design."""
 
 
-SensorError: TypeAlias = tuple[Literal["gain", "place", "turn"], int, int]
+SensorError: TypeAlias = tuple[Literal["gain", "place", "turn", "cross"], int, int]
 """What a sensor errs in, the index of its place, and the component (of a gain; else 0)."""
 
 
@@ -110,11 +111,12 @@ def _influence(physical: PhysicalHanger, edges_m: FloatArray, orders: int) -> Fl
 def sensor_loads(
     observations: Observations, predict: Predict, hanger: Hanger
 ) -> tuple[FloatArray, tuple[SensorError, ...]]:
-    """Loads (S, k) of every channel's gain, every sensor's place, and every biaxial sensor's turn,
-    and which they are.
+    """Loads (S, k) of every channel's gain, every sensor's place, and every biaxial sensor's turn
+    and cross-axis sensitivity, and which they are.
 
-    Measured shapes say what a gain and a turn do to them, the shapes that the baseline predicts
-    what a place does. All are taken along the shapes' scaling, which hides a part of them.
+    Two axes' cross sensitivities are their mean and half their difference, which is a turn.
+    Measured shapes say what all but a place do to them, the shapes that the baseline predicts what
+    that does. All are taken along the shapes' scaling, which hides a part of them.
     """
     design, usual = observations.design, hanger.scatter
     place, component = design.shape_place, design.shape_component
@@ -125,29 +127,31 @@ def sensor_loads(
     of_channel = (2 * place + component)[:, None] == channel
     of_sensor = place[:, None] == sensor
     slopes = _slopes(observations, predict, hanger.length_m)
-    turned = np.radians(usual.sensor_turn_deg) * _turned(design, value)
+    beside = _beside(design, value)
+    turned = usual.sensor_turn * np.where(component == 0, beside, -beside)
     raw = np.column_stack(
         [
             usual.sensor_gain * value[:, None] * of_channel,
             usual.sensor_place_m * slopes[:, None] * of_sensor,
             turned[:, None] * of_sensor,
+            usual.sensor_cross_mean * beside[:, None] * of_sensor,
         ]
     )
     names: list[SensorError] = [("gain", each // 2, each % 2) for each in channel.tolist()]
     names += [("place", each, 0) for each in sensor.tolist()]
     names += [("turn", each, 0) for each in sensor.tolist()]
+    names += [("cross", each, 0) for each in sensor.tolist()]
     loads = _beside_scaling(observations, raw)
     felt = np.abs(loads).max(axis=0) > _LEAST_LOAD
     return np.asarray(loads[:, felt]), tuple(n for n, f in zip(names, felt, strict=True) if f)
 
 
-def _turned(design: Design, value: FloatArray) -> FloatArray:
-    """By which each component changes with a turn: the other component at its place, or 0 (S,)."""
+def _beside(design: Design, value: FloatArray) -> FloatArray:
+    """The other component at each component's place, or 0 (S,)."""
     key = design.shape_mode * (design.shape_place.max() + 1) + design.shape_place
     seen = {(k, c): v for k, c, v in zip(key, design.shape_component, value, strict=True)}
-    sign = np.where(design.shape_component == 0, 1.0, -1.0)
     other = [seen.get((k, 1 - c), 0.0) for k, c in zip(key, design.shape_component, strict=True)]
-    return np.asarray(sign * np.array(other))
+    return np.array(other)
 
 
 def _slopes(observations: Observations, predict: Predict, length_m: float) -> FloatArray:

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 import numpy as np
 import scipy
 
-from shm.gap.contract import Covariance, Design, Fit, Observations
+from shm.gap.contract import Covariance, Design, Fit, NoiseNode, Observations
 from shm.gap.cross_validation import HeldOut
-from shm.gap.likelihood import ShapeErrors
+from shm.gap.likelihood import Likelihood, ShapeErrors
 from shm.gap.problem import GapProblem
 from shm.values import NAN, PLANES, FloatArray, IntArray, Residual, Trend
 
@@ -27,17 +27,18 @@ def residuals(
 ) -> tuple[Residual, ...]:
     """The residual of each frequency from the baseline's fit `before`, in the data's order.
 
-    `z` is the residual over its own standard deviation, which is smaller than the
-    identification's: part of each error is absorbed by the tension and the other free parameters
-    (standardised residual, Cook and Weisberg 1982, 2.1; here with known variances and priors). It
-    equals the z-score of the measurement against a prediction from all other data. Shares are
-    parts of the frequencies' chi-square and add to 1; NaN where there is no misfit at all.
+    `z` is the residual over its own standard deviation, of which the tension and the other free
+    parameters absorb a part (standardised residual, Cook and Weisberg 1982, 2.1; here with known
+    variances and priors). Where the fit allows for no other errors it equals the z-score of the
+    measurement against a prediction from all other data. Shares are parts of the frequencies'
+    chi-square and add to 1; NaN where there is no misfit at all.
     """
     design = problem.observations.design
     frequencies = design.frequencies
     deviation = (problem.observations.value - before.predicted)[:frequencies]
-    sd = identification_sd(problem.observations, before if after is None else after)
-    z = deviation / sd[:frequencies] / np.sqrt(unabsorbed(before.slopes, sd)[:frequencies])
+    sd = identification_sd(problem, before if after is None else after)
+    left = np.maximum(np.diag(left_over(before, sd)), _LEAST_LEFT * sd[:frequencies] ** 2)
+    z = deviation / np.sqrt(left)
     misfit = (deviation / sd[:frequencies]) ** 2
     columns = np.column_stack(
         [
@@ -57,22 +58,28 @@ def residuals(
     )
 
 
-def identification_sd(observations: Observations, fit: Fit) -> FloatArray:
-    """Standard deviations (data,); those that nobody gave are what `fit` takes for the errors."""
-    total = np.concatenate([np.diag(fit.noise.frequency), fit.noise.shape_variance])
-    return np.where(np.isfinite(observations.sd), observations.sd, np.sqrt(total))
+def identification_sd(problem: GapProblem, fit: Fit) -> FloatArray:
+    """Standard deviations (data,); those that nobody gave are what `fit` takes for the errors.
 
-
-def unabsorbed(slopes: FloatArray, sd: FloatArray) -> FloatArray:
-    """The part (data,) of each datum's error variance that the free parameters do not absorb.
-
-    One less the leverage, for parameters with standard normal priors, `slopes` (data, d) and
-    independent errors `sd` (data,).
+    Less what repeats in any case, which is no error of identification.
     """
-    weighted = slopes / sd[:, None]
-    covariance = np.linalg.inv(np.eye(slopes.shape[1]) + weighted.T @ weighted)
-    leverage = np.einsum("ij,jk,ik->i", weighted, covariance, weighted)
-    return np.asarray(np.maximum(1 - leverage, _LEAST_LEFT))
+    sd, count = problem.observations.sd, problem.design.frequencies
+    own = np.diag(fit.noise.frequency - problem.repeated.frequency)
+    return np.concatenate([np.where(np.isfinite(sd[:count]), sd[:count], np.sqrt(own)), sd[count:]])
+
+
+def left_over(fit: Fit, sd: FloatArray) -> FloatArray:
+    """Covariance (F, F) of what a fit leaves of independent errors `sd` (data,) in frequencies.
+
+    A fit weighs the data by all errors that it allows for. Supports that give and a section that
+    varies keep its parameters from following the data as far as `sd` alone would let them.
+    """
+    noise = Likelihood([NoiseNode(fit.noise, 0.0, fit.model_error)]).weighed(fit.slopes)
+    weighed = np.concatenate([noise.frequency[0], noise.shape[0]])
+    information = np.eye(fit.slopes.shape[1]) + fit.slopes.T @ weighed
+    followed = fit.slopes @ np.linalg.solve(information, weighed.T)
+    kept = (np.eye(len(sd)) - followed)[: len(fit.noise.frequency)]
+    return np.asarray((kept * sd**2) @ kept.T)
 
 
 def _percent(observations: Observations, fit: Fit | None) -> FloatArray:
@@ -99,10 +106,10 @@ def trends(problem: GapProblem, before: Fit) -> tuple[Trend, ...]:
     """
     frequencies = problem.observations.design.frequencies
     residual = 100 * (problem.observations.value - before.predicted)[:frequencies]
-    sd = 100 * identification_sd(problem.observations, before)
-    covariance = _left_over(100 * before.slopes, sd, frequencies)
+    sd = identification_sd(problem, before)
+    covariance = 1e4 * left_over(before, sd)
     found = [
-        _trend(name, values, groups, residual, sd[:frequencies], covariance)
+        _trend(name, values, groups, residual, 100 * sd[:frequencies], covariance)
         for name, values, groups in _conditions(problem.observations.design)
         if _varies(values, groups)
     ]
@@ -154,14 +161,6 @@ def _centred(values: FloatArray, groups: IntArray, weight: FloatArray) -> FloatA
         rows = groups == group
         centred[rows] -= np.average(values[rows], weights=weight[rows])
     return centred
-
-
-def _left_over(slopes: FloatArray, sd: FloatArray, rows: int) -> FloatArray:
-    """Covariance (rows, rows) of the first residuals of a fit with standard normal priors."""
-    weighted = slopes / sd[:, None]
-    information = np.eye(slopes.shape[1]) + weighted.T @ weighted
-    absorbed = slopes[:rows] @ np.linalg.solve(information, slopes[:rows].T)
-    return np.asarray(np.diag(sd[:rows] ** 2) - absorbed)
 
 
 def predictive_p_value(

@@ -64,5 +64,8 @@ def _told(problem: GapProblem, error: SensorError, mean: float, sd: float) -> st
             end = "arch" if mean > 0 else "deck"
             return f"{at} sits {abs(off):.1f} +- {own:.1f} cm nearer to the {end} end"
         case "turn":
-            turned, own = usual.sensor_turn_deg * mean, usual.sensor_turn_deg * sd
+            turned, own = np.degrees(usual.sensor_turn) * mean, np.degrees(usual.sensor_turn) * sd
             return f"{at} is turned by {turned:.1f} +- {own:.1f} degrees"
+        case "cross":
+            percent, own = 100 * usual.sensor_cross_mean * mean, 100 * usual.sensor_cross_mean * sd
+            return f"{at} reads {percent:.1f} +- {own:.1f} % of each axis in the other"

@@ -20,6 +20,7 @@ from shm.values import Hanger
 MOVES_NOTHING = frozenset(
     {"id", "name", "thresholds", "limits", "models", "effect_priors"}
     | {"scatter.sensor_gain", "scatter.sensor_place_m", "scatter.sensor_turn_deg"}
+    | {"scatter.sensor_cross_axis"}
 )
 """What no posterior depends on: names, what an owner calls much, which classes may compete, and
 what is of the gap diagnosis alone."""

@@ -75,6 +75,8 @@ class Scatter:
     `sensor_gain` (a fraction), `sensor_place_m` and `sensor_turn_deg` are what sensors err by in
     all tests: three to five times what care gives (0.5 % by ISO 16063-21, a tape, a bubble level),
     for with less, careless mounting passes for skewed axes or a mass, and with more these hide.
+    `sensor_cross_axis` is what of one axis another reads, each axis on its own: about half of the
+    3 to 5 % that data sheets give as the most (PCB 352C33: 5 %).
     `effective_length` is by which the length that swings may differ from the taped one; NaN: by
     the tape's own error, and what `Hanger.fittings_m` leave open.
     """
@@ -90,6 +92,17 @@ class Scatter:
     sensor_gain: float = 0.015
     sensor_place_m: float = 0.01
     sensor_turn_deg: float = 1.5
+    sensor_cross_axis: float = 0.02
+
+    @property
+    def sensor_turn(self) -> float:
+        """In radians, with the part of both axes' cross sensitivities that looks like a turn."""
+        return math.hypot(math.radians(self.sensor_turn_deg), self.sensor_cross_mean)
+
+    @property
+    def sensor_cross_mean(self) -> float:
+        """Of the mean of both axes' cross sensitivities, and of half their difference."""
+        return self.sensor_cross_axis / math.sqrt(2)
 
     @property
     def swinging_length(self) -> float:

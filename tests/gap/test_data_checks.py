@@ -109,10 +109,11 @@ def test_an_irregular_mode_is_used_and_said() -> None:
 
 
 def test_frequencies_without_standard_deviation_are_said() -> None:
-    (remark,) = usable([_test(sd=NAN)], HANGER).remarks
+    remark, rounding = usable([_test(sd=NAN)], HANGER).remarks
     assert remark.startswith("No frequency has a standard deviation")
+    assert "rounded to 0.1 Hz: errors of 0.52 % of the lowest" in rounding
     some = replace(_test(), modes=(*_test().modes[:6], *_test(sd=NAN).modes[6:]))
-    (remark,) = usable([some], HANGER).remarks
+    remark, _ = usable([some], HANGER).remarks
     assert remark.startswith("6 of 12 frequencies have no standard deviation")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -78,10 +80,9 @@ def test_a_model_error_that_swallows_the_gap_does_not_hide_it():
 
 def test_unknown_standard_deviations_are_those_that_the_leading_fit_finds():
     problem = toy(lambda design: np.zeros(design.size))
-    unknown = Observations(
-        problem.observations.design, problem.observations.value, np.full(60, NAN)
-    )
-    assert identification_sd(unknown, problem.fit()) == pytest.approx(np.full(60, SD))
+    unknown = Observations(problem.design, problem.observations.value, np.full(60, NAN))
+    found = identification_sd(ToyProblem(unknown, problem.slopes), problem.fit())
+    assert found == pytest.approx(np.full(60, SD))
 
 
 def test_residuals_after_and_held_out_stand_beside_those_before():
@@ -138,3 +139,23 @@ def test_a_test_with_other_modes_does_not_pass_for_a_trend_with_its_temperature(
     found = {each.condition: each for each in trends(problem, problem.fit())}
     assert abs(found["temperature"].slope_percent) < 1e-3
     assert found["order"].slope_percent == pytest.approx(0.5, rel=1e-3)
+
+
+def test_errors_that_a_fit_allows_for_beside_those_stated_keep_it_from_absorbing_them():
+    """Slopes of 0.01 and supports that give (0.1) in a plane: hardly anything is absorbed."""
+    problem = toy(lambda design: np.zeros(design.size))
+    plane = (problem.design.frequency_plane == 1).astype(float)
+    steep = ToyProblem(
+        problem.observations, {Hypothesis(): lambda design: 0.01 * plane[: design.size, None]}
+    )
+    fit = steep.fit()
+    raw = 100 * SD * np.sqrt(4 / 60)
+    (alone,) = (t.slope_sd_percent for t in trends(steep, fit) if t.condition == "plane")
+    loose = replace(fit.noise, frequency=fit.noise.frequency + 0.1**2 * np.outer(plane, plane))
+    (beside,) = (
+        t.slope_sd_percent
+        for t in trends(steep, replace(fit, noise=loose))
+        if t.condition == "plane"
+    )
+    assert alone < 0.8 * raw
+    assert beside == pytest.approx(raw, rel=0.02)

@@ -16,6 +16,7 @@ from shm.gap.measurement_plan import (
     chance_of,
     chances,
     holds,
+    nothing_planned,
     planned,
 )
 from shm.gap.next_measurement import NO_GAP
@@ -62,6 +63,24 @@ def test_what_costs_too_much_is_not_planned(race: Race) -> None:
     assert "known mass" not in {step.kind for step in steps}
     assert sum(step.hours for step in steps) <= 40.0
     assert planned(race, budget_hours=0.1) == ()
+    said = nothing_planned(race, MEASUREMENT_HOURS, 0.1)
+    promising = [
+        each
+        for k, each in enumerate(race.offered)
+        if race.expected([k])[0] > race.expected([])[0] + 0.2
+    ]
+    least = min(MEASUREMENT_HOURS[each.kind] for each in promising)
+    assert "fits into 0.1 h" in said
+    assert said.endswith(f"takes {least:g} h.")
+
+
+def test_where_the_data_are_enough_an_empty_plan_says_so(race: Race) -> None:
+    first, *others = race.contenders
+    sure = [replace(first, probability=0.99)]
+    sure += [replace(each, probability=0.01 / len(others)) for each in others]
+    certain = replace(race, contenders=tuple(sure))
+    assert planned(certain) == ()
+    assert "data are enough" in nothing_planned(certain, MEASUREMENT_HOURS, np.inf)
 
 
 def test_before_any_measurement_the_odds_are_those_of_the_evidence(

@@ -95,7 +95,7 @@ def test_what_is_foreseen_of_a_linear_toy_is_its_exact_predictive_distribution()
     problem, error = toy(), 2e-3
     fit = problem.fit(STIFFER, model_error=error)
     new = like_the_present(problem.observations.design)
-    seen = foreseen(problem, fit, new, Errors.of(problem.observations, fit))
+    seen = foreseen(problem, fit, new, Errors.of(problem, fit))
     slopes = np.vstack([with_order(problem.observations.design), with_order(new)])
     joint = slopes @ slopes.T + SD**2 * np.eye(12) + error**2 * np.tile(np.eye(6), (2, 2))
     gain = joint[6:, :6] @ np.linalg.inv(joint[:6, :6])

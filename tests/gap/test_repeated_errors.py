@@ -54,11 +54,30 @@ def test_a_channels_gain_changes_what_its_load_says(problem: GapProblem) -> None
 
 def test_a_turned_sensor_changes_what_its_load_says(problem: GapProblem) -> None:
     design, value = problem.design, _shapes(problem.observations)
-    turned = np.radians(USUAL.sensor_turn_deg) * (design.shape_place == 2)
+    own = design.shape_place == 2
     other = value.reshape(-1, 2)[:, ::-1].ravel()
     sign = np.where(design.shape_component == 0, 1.0, -1.0)
-    change = _scaled(problem, value + sign * turned * other) - value
+    change = _scaled(problem, value + sign * USUAL.sensor_turn * own * other) - value
     assert _nearest(problem.repeated.sensors, change) < 0.02
+
+
+def test_axes_that_hear_each_other_vary_each_on_its_own(problem: GapProblem) -> None:
+    """Turn and cross-axis sensitivity together: the axes' own variances, correlated by a turn."""
+    design, value = problem.design, _shapes(problem.observations)
+    loads = {
+        kind: problem.repeated.sensors[:, k]
+        for k, (kind, place, _) in enumerate(problem.repeated.sensor_errors)
+        if place == 2
+    }
+    other = value.reshape(-1, 2)[:, ::-1].ravel() * (design.shape_place == 2)
+    for axis in (0, 1):
+        heard = _scaled(problem, value + 1e-3 * other * (design.shape_component == axis)) - value
+        both = 1e-3 * (loads["cross"] / USUAL.sensor_cross_mean) / 2
+        both += 1e-3 * (1, -1)[axis] * (loads["turn"] / USUAL.sensor_turn) / 2
+        assert np.linalg.norm(heard - both) < 0.02 * np.linalg.norm(heard)
+    variance = USUAL.sensor_turn**2 + USUAL.sensor_cross_mean**2
+    turn = np.radians(USUAL.sensor_turn_deg)
+    assert variance == pytest.approx(turn**2 + USUAL.sensor_cross_axis**2)
 
 
 def test_a_sensor_elsewhere_changes_what_its_load_says(problem: GapProblem) -> None:

@@ -51,7 +51,7 @@ def _told(test: ModalTest, hanger: Hanger = PLAIN) -> str:
 def test_a_turned_sensor_that_reads_too_much_is_told_with_its_errors() -> None:
     test = _measured(1)
     place = test.modes[0].shape[1].x_m
-    told = _told(_mounted(test, 1, 2.0, 0.03))
+    told = _told(_mounted(test, 1, 2.0, 0.04))
     assert "no part of the gap" in told
     turned = told.split(f"the sensor at {place:.2f} m is turned by ")[1].split(" degrees")[0]
     mean, sd = map(float, turned.split(" +- "))
@@ -68,6 +68,20 @@ def test_the_owners_figures_replace_the_usual_ones() -> None:
     """Who has aligned the sensors to a tenth of a degree does not hear that one is turned by two;
     what differs then is left to the hanger."""
     test = _mounted(_measured(1), 1, 2.0, 0.0)
-    exact = replace(PLAIN, scatter=Scatter(sensor_turn_deg=0.01))
+    exact = replace(PLAIN, scatter=Scatter(sensor_turn_deg=0.01, sensor_cross_axis=1e-4))
     assert "turned" in _told(test)
     assert "turned by 2" not in _told(test, exact)
+
+
+def test_an_axis_that_hears_the_other_is_told() -> None:
+    """Both by 2 %, which no turn does."""
+    (test, place) = (one := _measured(1)), one.modes[0].shape[1].x_m
+    modes = []
+    for mode in test.modes:
+        points = list(mode.shape)
+        value, cross = points[1].value, points[1].cross
+        points[1] = replace(points[1], value=value + 0.02 * cross, cross=cross + 0.02 * value)
+        modes.append(replace(mode, shape=tuple(points)))
+    told = _told(replace(test, modes=tuple(modes)))
+    assert f"the sensor at {place:.2f} m reads 2.0 +- " in told
+    assert "% of each axis in the other" in told

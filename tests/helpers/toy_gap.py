@@ -31,6 +31,10 @@ class ToyProblem:
         self.slopes = slopes
         self.hanger: Hanger = HANGER_3
 
+    @property
+    def design(self) -> Design:
+        return self.observations.design
+
     def predict(
         self, hypothesis: Hypothesis, z: FloatArray, design: Design | None = None
     ) -> FloatArray:
