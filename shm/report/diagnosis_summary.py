@@ -283,7 +283,7 @@ def _tension(diagnosis: Diagnosis) -> str:
         return f"For the tension {alone}{_with_care(diagnosis)}."
     off = 100 * (plain.mean / better.mean - 1)
     told = f"{AFTER.capitalize()}, the tension is {tension_words(better, unit)}"
-    return f"{told}; {alone}, {off:+.1f} %{_with_care(diagnosis)}."
+    return f"{told}; {alone}, {formatting.change(off)}{_with_care(diagnosis)}."
 
 
 def _with_care(diagnosis: Diagnosis) -> str:
