@@ -162,7 +162,6 @@ def diagnose(
         shown = _OfHanger(_of_workspace(ctx, hanger, count, options))
     else:
         tests, hanger = tests_and_hanger(ctx, files[0], hanger_file, hanger_id)
-        told_doubts(tests, hanger)
         shown = _OfHanger(DiagnosisSheet(_diagnosis(tests, hanger, options), hanger))
     if html is not None or figures is not None:
         with drawing():

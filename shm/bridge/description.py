@@ -349,7 +349,7 @@ def _hours(values: Any, path: Path) -> dict[str, float]:
     table = Table(values, "[measurement_hours]", path)
     keys = {re.sub(r"\W", "_", kind): kind for kind in MEASUREMENT_HOURS}
     table.refuse_unknown(keys)
-    own = {kind: table.positive(key) for key, kind in keys.items() if key in table}
+    own = {kind: table.positive(key, "hours") for key, kind in keys.items() if key in table}
     return {**MEASUREMENT_HOURS, **own}
 
 

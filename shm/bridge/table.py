@@ -63,9 +63,9 @@ class Table:
             pass  # the table says what is wrong in its own words
         raise self.refusal(f"{key} = {self.values[key]!r} {wrong}", remedy)
 
-    def positive(self, key: str) -> float:
+    def positive(self, key: str, unit: str = "SI units") -> float:
         """A number above 0; raises BadInput where it is missing or none."""
-        remedy, wrong = f"Give {key} in SI units.", "is not a positive number"
+        remedy, wrong = f"Give {key} in {unit}.", "is not a positive number"
         return float(self.value(key, float, wrong, remedy, holds=lambda value: value > 0))
 
     def not_negative(self, key: str) -> float:

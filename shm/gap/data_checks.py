@@ -196,7 +196,8 @@ def _irregular(tests: Sequence[ModalTest]) -> str:
 
 def _without_sd(tests: Sequence[ModalTest]) -> str:
     modes = [mode for test in tests for mode in test.modes]
-    missing = sum(math.isnan(mode.frequency_sd_hz) for mode in modes)
+    missing = sum(not mode.frequency_sd_hz > 0 for mode in modes)
+    zero = " (0 is none)" if any(mode.frequency_sd_hz == 0 for mode in modes) else ""
     if not missing:
         return ""
     which = (
@@ -206,9 +207,9 @@ def _without_sd(tests: Sequence[ModalTest]) -> str:
     )
     what = "a standard deviation" if missing == len(modes) else "standard deviation"
     return (
-        f"{which} {what}: how exact they are is estimated together with the cause, from 0.01 to "
-        f"3 %. A gap can then pass for scatter, and the fit cannot be judged by itself; identify "
-        f"the recordings, which gives each frequency its standard deviation."
+        f"{which} {what}{zero}: how exact they are is estimated together with the cause, from 0.01 "
+        f"to 3 %. A gap can then pass for scatter, and the fit cannot be judged by itself; "
+        f"identify the recordings, which gives each frequency its standard deviation."
     )
 
 

@@ -34,6 +34,7 @@ from shm.gap.sensor_errors import sensor_remarks
 from shm.models import check_baseline
 from shm.models.as_made import TENSION_RATIO
 from shm.models.effects import check_effect_priors
+from shm.plausibility.bars import Known, doubt_of
 from shm.values import (
     ENOUGH_EFFECTIVE,
     MOST_MISFIT_PERCENT,
@@ -96,6 +97,7 @@ def examined(
     compatible = compatibility(problem, attribution)
     any_ends_n = tension_of_any_ends_n(found.tests, hanger, options.seed)
     after_n = _tension(problem, possible(attribution), rng, any_ends_n)
+    before_n = _tension(problem, [(1.0, before)], rng)
     diagnosis = Diagnosis(
         hanger=hanger.id,
         baseline=options.baseline,
@@ -112,11 +114,12 @@ def examined(
         fit_p_value=attribution.p_value,
         model_error_percent=100 * answer[0][1].model_error,
         shrinkage=shrinkage(problem, before, after, held),
-        tension_before_n=_tension(problem, [(1.0, before)], rng),
+        tension_before_n=before_n,
         tension_after_n=after_n,
         next_measurements=following,
         remarks=(
-            *_states(problem, before, after, after_n),
+            *_of_another(found.tests, hanger),
+            *_states(problem, before, after, (before_n, after_n)),
             *dynamic,
             *_on_the_way(found, clear, aside, doubted, after or before),
         ),
@@ -169,8 +172,14 @@ def _on_the_way(
     return (*found.remarks, *clear.misnumbered, *gross, *measured)
 
 
+def _of_another(tests: Sequence[ModalTest], hanger: Hanger) -> tuple[str, ...]:
+    """Which tests are not of the hanger as described, before anything that else they would mean."""
+    doubts = {test.id: doubt_of(test, Known(hanger), []) for test in tests}
+    return tuple(f"Doubtful: test {id_}. {each.text}" for id_, each in doubts.items() if each)
+
+
 def _states(
-    problem: GapProblem, before: Fit, after: Fit | None, tension_n: TensionEstimate
+    problem: GapProblem, before: Fit, after: Fit | None, tensions_n: Sequence[TensionEstimate]
 ) -> tuple[str, ...]:
     """What keeps the answer from being taken at its word, to be read first."""
     found = []
@@ -182,9 +191,10 @@ def _states(
                 f"{ENOUGH_EFFECTIVE} are needed. Its probability and its tension are uncertain."
             )
     nominal_n = problem.hanger.nominal_tension_n
-    if nominal_n and (
-        tension_n.q95 > 0.98 * TENSION_RATIO[1] * nominal_n
-        or tension_n.q05 < 1.02 * TENSION_RATIO[0] * nominal_n
+    if nominal_n and any(
+        each.q95 > 0.98 * TENSION_RATIO[1] * nominal_n
+        or each.q05 < 1.02 * TENSION_RATIO[0] * nominal_n
+        for each in tensions_n
     ):
         found.append(
             f"The tension lies at the bound of its prior ({TENSION_RATIO[0]:g} to "

@@ -109,6 +109,11 @@ class Simulator:
         twice = sorted({name for name in names if names.count(name) > 1})
         for each in self.effects:
             twice += sorted(set(each.parameters) & set(self.parameters))
+            if not each.parameters:
+                raise UsageError(
+                    f"effect {each.name} has no parameters.",
+                    remedy="Give its size a prior; what has none belongs in the simulator.",
+                )
         if twice:
             raise UsageError(
                 f"Named twice in a simulator: {', '.join(twice)}.",
@@ -145,14 +150,17 @@ class SimulatorProblem:
         names = np.array([each.observable for each in self.readings])
         return np.asarray(names[:, None] == names, dtype=float)
 
-    def effect(self, hypothesis: Hypothesis) -> SimulatorEffect | None:
-        """The effect of a hypothesis; None of the simulator alone."""
-        return next((e for e in self.simulator.effects if (e.name,) == hypothesis.names), None)
+    def effects(self, hypothesis: Hypothesis) -> tuple[SimulatorEffect, ...]:
+        """The effects of a hypothesis; none of the simulator alone."""
+        return tuple(e for e in self.simulator.effects if e.name in hypothesis.names)
+
+    def own_priors(self, hypothesis: Hypothesis) -> dict[str, Prior]:
+        """Of its effects alone."""
+        return {n: p for each in self.effects(hypothesis) for n, p in each.parameters.items()}
 
     def priors(self, hypothesis: Hypothesis) -> dict[str, Prior]:
-        """Of the simulator, then of the effect: one coordinate z each, in this order."""
-        effect = self.effect(hypothesis)
-        return {**self.simulator.parameters, **(effect.parameters if effect else {})}
+        """Of the simulator, then of the effects: one coordinate z each, in this order."""
+        return {**self.simulator.parameters, **self.own_priors(hypothesis)}
 
     def predicted(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
         """Predictions (n, data) at z (n, d)."""
@@ -161,39 +169,63 @@ class SimulatorProblem:
     def predicted_of(
         self, hypothesis: Hypothesis, z: FloatArray, readings: Sequence[Reading]
     ) -> FloatArray:
-        """Predictions (n, readings) at z (n, d), be they measured or only planned."""
-        effect = self.effect(hypothesis)
-        predict = effect.predict if effect else self.simulator.predict
+        """Predictions (n, readings) at z (n, d), be they measured or only planned.
+
+        Two effects that are one function act together in it; others add what each does alone.
+        """
+        effects = self.effects(hypothesis)
         priors = self.priors(hypothesis)
         theta = {name: prior.value(z[:, j]) for j, (name, prior) in enumerate(priors.items())}
+        if len({each.predict for each in effects}) < 2:
+            return self._predicted_by(next(iter(effects), None), theta, readings, len(z))
+        alone = self._predicted_by(None, self._part(theta), readings, len(z))
+        each = [self._predicted_by(e, self._part(theta, e), readings, len(z)) for e in effects]
+        return np.asarray(sum(each) - (len(each) - 1) * alone)
+
+    def _part(
+        self, theta: dict[str, FloatArray], effect: SimulatorEffect | None = None
+    ) -> dict[str, FloatArray]:
+        names = {*self.simulator.parameters, *(effect.parameters if effect else ())}
+        return {name: values for name, values in theta.items() if name in names}
+
+    def _predicted_by(
+        self,
+        effect: SimulatorEffect | None,
+        theta: dict[str, FloatArray],
+        readings: Sequence[Reading],
+        count: int,
+    ) -> FloatArray:
+        predict = effect.predict if effect else self.simulator.predict
         rows: dict[tuple[tuple[str, float], ...], list[int]] = {}
         for i, each in enumerate(readings):
             rows.setdefault(tuple(sorted(each.condition.items())), []).append(i)
-        predicted = np.empty((len(z), len(readings)))
+        predicted = np.empty((count, len(readings)))
         for key, members in rows.items():
-            found = self._called(predict, theta, dict(key), len(z))
+            found = self._called(predict, theta, dict(key), _named(effect), count)
             for i in members:
-                predicted[:, i] = _observable(found, readings[i], effect, len(z))
-        if len(z) and not np.isfinite(predicted).any():
-            name = f"effect {effect.name}" if effect else "simulator"
+                predicted[:, i] = _observable(found, readings[i], effect, count)
+        if count and not np.isfinite(predicted).any():
             raise BadInput(
-                f"no prediction of the {name} is finite.",
+                f"no prediction of {_named(effect)} is finite.",
                 remedy="Let it return numbers for all that its priors allow.",
             )
         return predicted
 
     def _called(
-        self, predict: Predict, theta: dict[str, FloatArray], condition: Condition, count: int
+        self,
+        predict: Predict,
+        theta: dict[str, FloatArray],
+        condition: Condition,
+        of: str,
+        count: int,
     ) -> Mapping[str, Any]:
         if self.simulator.vectorised:
-            return _mapping(_of_arrays(predict, dict(theta), condition))
+            return _mapping(predict, dict(theta), condition, of)
         each = [
-            _mapping(
-                predict({name: float(values[row]) for name, values in theta.items()}, condition)
-            )
+            _mapping(predict, {n: float(v[row]) for n, v in theta.items()}, condition, of)
             for row in range(count)
         ]
-        return {name: np.array([one[name] for one in each]) for name in each[0]}
+        return {name: _together([one.get(name) for one in each]) for name in each[0]}
 
     def nodes(self) -> tuple[NoiseNode, ...]:
         """The unknown errors: stated deviations times a common factor, unstated ones by a share."""
@@ -247,38 +279,56 @@ def _node(covariance: FloatArray, log_weight: float) -> NoiseNode:
     return NoiseNode(Covariance(covariance, np.empty(0), np.empty((0, 0))), float(log_weight), 0.0)
 
 
-def _of_arrays(predict: Predict, theta: dict[str, Any], condition: Condition) -> object:
+def _named(effect: SimulatorEffect | None) -> str:
+    return f"effect {effect.name}" if effect else "the simulator"
+
+
+def _mapping(
+    predict: Predict, theta: dict[str, Any], condition: Condition, of: str
+) -> Mapping[str, Any]:
     try:
-        return predict(theta, condition)
-    except TypeError as error:
+        found: object = predict(theta, condition)
+    except Exception as error:
+        arrays = any(isinstance(each, np.ndarray) for each in theta.values())
+        first = ", ".join(f"{n} = {float(np.ravel(v)[0]):.5g}" for n, v in theta.items())
+        otherwise = ", or leave out vectorised=True" if arrays else ""
         raise UsageError(
-            f"the simulator fails on arrays: {error}.",
-            remedy="Compute with numpy, or leave out vectorised=True.",
+            f"{of} fails{' on arrays that begin' if arrays else ''} with {first} under "
+            f"{dict(condition)}: {type(error).__name__}: {error}.",
+            remedy=f"Let it return numbers for all that its priors allow{otherwise}.",
         ) from error
-
-
-def _mapping(found: object) -> Mapping[str, Any]:
     if not isinstance(found, Mapping):
         raise UsageError(
-            f"the simulator returned {type(found).__name__}, not observables by their names.",
+            f"{of} returned {type(found).__name__}, not observables by their names.",
             remedy='Return a dictionary, such as {"force_n": value}.',
         )
     return found
+
+
+def _together(values: list[Any]) -> Any:
+    """As one array; what has no common shape is no number."""
+    alike = len({np.shape(each) for each in values}) == 1
+    return np.array(values) if alike else np.full(len(values), None)
 
 
 def _observable(
     found: Mapping[str, Any], reading: Reading, effect: SimulatorEffect | None, count: int
 ) -> FloatArray:
     if reading.observable not in found:
-        of = f"effect {effect.name}" if effect else "the simulator"
         raise UsageError(
-            f"{of} predicts no {reading.observable!r} at {dict(reading.condition)}.",
+            f"{_named(effect)} predicts no {reading.observable!r} at {dict(reading.condition)}.",
             remedy=f"It gives {', '.join(found)}: return every observable that was read.",
         )
-    values = np.asarray(found[reading.observable], dtype=float)
+    values = np.asarray(found[reading.observable])
+    if values.dtype.kind not in "biuf":
+        raise UsageError(
+            f"{_named(effect)} predicts {reading.observable!r} as {values.dtype}, not as real "
+            "numbers.",
+            remedy="Return floats: the size of what is complex, a number for a text.",
+        )
     if values.shape not in ((), (count,)):
         raise UsageError(
             f"{reading.observable!r} came with shape {values.shape}, of {count} parameter sets.",
             remedy="Return one number for each set, in their order.",
         )
-    return values
+    return values.astype(float)

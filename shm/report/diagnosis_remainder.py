@@ -92,9 +92,8 @@ def like_tension(remainder: Remainder | None) -> str:
         return ""
     return (
         f"Of what something unknown would leave ({formatting.plain(remainder.rms_percent, 2)} % "
-        f"rms), {100 * remainder.like_tension:.0f} % looks like a change of the tension, of "
-        f"{formatting.number(remainder.tension_percent, '+z.1f')} %: the data cannot tell the two "
-        "apart."
+        f"rms), {100 * remainder.like_tension:.0f} % looks like a change of the tension, "
+        f"of {formatting.change(remainder.tension_percent)}: the data cannot tell the two apart."
     )
 
 
@@ -131,7 +130,8 @@ def _term(term: LawTerm) -> str:
         "level squared": ", and with the level of the motion squared",
         "above a level": f", and only above a level of {term.threshold:.2g}",
     }[term.over_tests]
-    size = f"{formatting.number(term.change_percent, '+z.2g')} % over its range"
+    sign = "+" if term.change_percent > 0 else ""
+    size = f"{sign}{formatting.plain(term.change_percent, 2)} % over its range"
     return f"{over} {plane}{tests} ({size}, log Bayes factor {term.log_bayes_factor:.0f})"
 
 

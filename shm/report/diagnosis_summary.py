@@ -28,6 +28,8 @@ _POOR_FIT = 0.01
 _FAIR_FIT = 0.05
 _WORTH_MEASURING = 1.0
 _CERTAIN = 20.0
+# Judgement: to rule a rival of less out, however surely, raises no gap by a ninth at most.
+_LEAST_RIVAL = 0.1
 _CERTAIN_ODDS = 1000
 _SHRUNK = 0.8
 """The largest share of a held-out gap that may remain where it is said to have shrunk."""
@@ -283,7 +285,7 @@ def _tension(diagnosis: Diagnosis) -> str:
         return f"For the tension {alone}{_with_care(diagnosis)}."
     off = 100 * (plain.mean / better.mean - 1)
     told = f"{AFTER.capitalize()}, the tension is {tension_words(better, unit)}"
-    return f"{told}; {alone}, {off:+.1f} %{_with_care(diagnosis)}."
+    return f"{told}; {alone}, {formatting.change(off)}{_with_care(diagnosis)}."
 
 
 def _with_care(diagnosis: Diagnosis) -> str:
@@ -298,8 +300,11 @@ def ranked_measurements(diagnosis: Diagnosis) -> list[NextMeasurement]:
 
 
 def next_step(diagnosis: Diagnosis) -> str:
-    """The measurement that tells most between the contenders."""
-    best = next(iter(ranked_measurements(diagnosis)), None)
+    """The measurement that tells most between the contenders; beside no gap, those that count."""
+    found = ranked_measurements(diagnosis)
+    if answer(diagnosis) is Answer.NO_GAP:
+        found = [each for each in found if _rival(diagnosis, each) >= _LEAST_RIVAL]
+    best = next(iter(found), None)
     if best is None:
         return ""
     one, other = (formatting.quantity(each) for each in best.separates)
@@ -309,6 +314,12 @@ def next_step(diagnosis: Diagnosis) -> str:
         f"To tell {one} from {other}, measure next: {best.what} (expected odds of "
         f"{_odds_to_expect(best)} to 1)."
     )
+
+
+def _rival(diagnosis: Diagnosis, measurement: NextMeasurement) -> float:
+    """The probability of the likeliest cause that a measurement tells from another answer."""
+    told = (e.probability for e in diagnosis.causes if e.effect in measurement.separates)
+    return max(told, default=0.0)
 
 
 def promise(measurement: NextMeasurement) -> str:

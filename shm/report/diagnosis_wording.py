@@ -318,4 +318,6 @@ def tension_words(estimate: TensionEstimate, unit: ForceUnit) -> str:
     tension_n = tension_of(estimate)
     if math.isnan(tension_n.width):
         return formatting.rounded_tension(estimate.mean, unit)
+    if not tension_n.low <= tension_n.mean <= tension_n.high:  # most draws at a bound, few far off
+        return f"{formatting.span(tension_n.in_unit(unit))} {unit.name} (90 % interval)"
     return formatting.tension(tension_n, unit)

@@ -193,6 +193,16 @@ def signed_percent(fraction: Interval) -> str:
     return f"{mean(percent, signed=True)} % (90 % interval {span(percent, signed=True)} %)"
 
 
+def change(percent: float) -> str:
+    """`+3.1 %`; beyond a factor of 2 `a factor of 5 up`: a person makes nothing of +50368 %."""
+    ratio = 1 + percent / 100
+    if ratio <= 0:  # taken as linear far beyond where it is
+        return "more than a factor of 2 down"
+    if 0.5 <= ratio <= 2 or not math.isfinite(ratio):
+        return f"{number(percent, '+z.1f')} %"
+    return f"a factor of {plain(max(ratio, 1 / ratio), 2)} {'up' if ratio > 1 else 'down'}"
+
+
 def number(value: float, form: str, absent: str = "not known") -> str:
     """`value` in format `form`; the words `absent` where it is NaN."""
     return format(value, form) if math.isfinite(value) else absent

@@ -101,6 +101,71 @@ def test_a_textbook_system_gives_up_its_cause(
     assert diagnose_simulator(replace(simulator, effects=rivals[-1:]), readings).named == ()
 
 
+TWO_CAUSES = Simulator(
+    lambda p, at: {"y": p["slope"] * at["x"] * (1 + p.get("warm", 0) * at["w"]) + p.get("off", 0)},
+    {"slope": Prior("lognormal", 10.0, 0.2)},
+    vectorised=True,
+)
+
+
+def two_causes(apart: bool, slip: float = 0.0) -> list[Reading]:
+    """Of a line with an offset and a slope that grows with warmth, or with one slip instead."""
+    rng = np.random.default_rng(1001)
+    x, w = rng.permutation(np.linspace(0.1, 2, 12)), rng.uniform(0, 20, 12)
+    y = 11 * x * (1 + apart * 0.005 * w) + apart * 0.8 + 0.1 * rng.standard_normal(12)
+    y[7] += slip
+    return [Reading({"x": float(x[i]), "w": float(w[i])}, "y", float(y[i]), 0.1) for i in range(12)]
+
+
+@pytest.mark.parametrize("one_function", [True, False])
+def test_two_causes_at_once_are_named_together_and_else_what_is_left_is_unknown(
+    one_function: bool,
+) -> None:
+    """Whether both are one function of the user's or each has its own."""
+    law = TWO_CAUSES.predict
+    other = law if one_function else lambda p, at: law(p, at)
+    warm = SimulatorEffect("warm", {"warm": Prior("uniform", -0.02, 0.02)}, law)
+    off = SimulatorEffect("off", {"off": Prior("logarithmic", 0.05, 20.0)}, other)
+    both = diagnose_simulator(replace(TWO_CAUSES, effects=[warm, off]), two_causes(True))
+    assert set(both.named[0].split(" + ")) == {"warm", "off"}
+    assert both.causes[0].probability < 0.96
+    assert both.shrinkage.after < 1.5
+    lacking = diagnose_simulator(replace(TWO_CAUSES, effects=[warm]), two_causes(True))
+    assert lacking.named == ()
+    assert lacking.unexplained_probability > 0.9
+
+
+def test_one_slip_and_copies_are_remarked() -> None:
+    answer = diagnose_simulator(TWO_CAUSES, two_causes(False, slip=1.0) * 3)
+    assert "24 of 36 readings repeat" in answer.remarks[0]
+    assert len(answer.gaps) == 12
+    at = dict(two_causes(False)[7].condition)
+    assert f"at {at} lies" in answer.remarks[1]
+    assert diagnose_simulator(TWO_CAUSES, two_causes(False)).remarks == ()
+
+
+def test_a_parameter_at_its_bound_has_no_spread_and_a_remark() -> None:
+    narrow = replace(LINE, parameters={"slope": Prior("uniform", 0.5, 1.0)}, effects=())
+    answer = diagnose_simulator(narrow, [replace(each, sd=0.02) for each in READINGS])
+    assert "slope lies at its bound, 0.999" in answer.remarks[0]
+    assert "± unknown alone" in answer.summary()
+
+
+@pytest.mark.parametrize("vectorised", [True, False])
+@pytest.mark.parametrize(
+    ("predict", "said"),
+    [
+        (lambda p, at: {"y": at["nothing"]}, "effect offset fails.* slope = .*KeyError"),
+        (lambda p, at: {"y": 1j * p["slope"]}, "effect offset predicts 'y' as complex"),
+        (lambda p, at: {"y": "3"}, "effect offset predicts 'y' as .*not as real numbers"),
+    ],
+)
+def test_an_effect_that_fails_is_named(predict: Predict, said: str, vectorised: bool) -> None:
+    broken = [replace(LINE.effects[0], predict=predict)]
+    with pytest.raises(UsageError, match=said):
+        diagnose_simulator(replace(LINE, effects=broken, vectorised=vectorised), READINGS)
+
+
 @pytest.mark.parametrize(
     ("predict", "said"),
     [
@@ -121,6 +186,8 @@ def test_what_cannot_be_is_refused_with_a_remedy() -> None:
         Prior("logarithmic", -1.0, 1.0)
     with pytest.raises(UsageError, match="Named twice in a simulator: slope"):
         replace(LINE, effects=[SimulatorEffect("turned", LINE.parameters, line)])
+    with pytest.raises(UsageError, match="effect same has no parameters"):
+        replace(LINE, effects=[SimulatorEffect("same", {}, line)])
     with pytest.raises(UsageError, match="predicts no 'z'"):
         diagnose_simulator(LINE, [*READINGS, Reading({"x": 1.0}, "z", 1.0, 0.1)])
     with pytest.raises(UsageError, match="too few"):

@@ -115,6 +115,8 @@ def test_frequencies_without_standard_deviation_are_said() -> None:
     some = replace(_test(), modes=(*_test().modes[:6], *_test(sd=NAN).modes[6:]))
     remark, _ = usable([some], HANGER).remarks
     assert remark.startswith("6 of 12 frequencies have no standard deviation")
+    (remark,) = usable([_test(sd=0.0)], HANGER).remarks
+    assert remark.startswith("No frequency has a standard deviation (0 is none): how exact")
 
 
 def test_modes_out_of_order_are_left_out_and_named() -> None:

@@ -123,6 +123,16 @@ def test_few_modes_are_answered_with_a_remark() -> None:
     assert np.isnan(found.shrinkage.held_out_before_percent)
 
 
+def test_a_description_in_other_units_is_doubted_before_anything_else(
+    untouched: Diagnosis,
+) -> None:
+    in_kilonewtons = replace(PLAIN, nominal_tension_n=711.0)
+    found = diagnose(planted(), in_kilonewtons, GapOptions(without=all_but("timebase")))
+    assert "right hanger, right description?" in found.remarks[0]
+    assert "at the bound of its prior" in found.remarks[1]
+    assert "Doubtful" not in "".join(untouched.remarks)
+
+
 def test_unknown_standard_deviations_are_estimated_and_said() -> None:
     (test,) = planted(CLAMP)
     unknown = replace(

@@ -40,6 +40,8 @@ def test_the_law_is_told_with_its_evidence_and_what_is_held_out() -> None:
     assert "held out it shrinks from 1.1 to 0.4 %" in said
     assert "30 % looks like a change of the tension, of -2.3 %" in said
     assert "What is left" not in consequences(LED)
+    large = replace(LEFT, law=(replace(WARM, change_percent=-207.0),))
+    assert "(-207 % over its range" in consequences(replace(WITH_LAW, remainder=large))
 
 
 def test_what_is_compatible_stands_in_the_table_and_in_a_sentence() -> None:

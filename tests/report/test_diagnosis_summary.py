@@ -133,6 +133,14 @@ def test_of_a_pair_that_fits_and_is_not_claimed_it_says_why() -> None:
     assert why not in said(replace(UNEXPLAINED, fit_p_value=0.4))
 
 
+def test_beside_no_gap_only_a_rival_that_counts_calls_for_a_measurement() -> None:
+    told = NextMeasurement("two-axis sensors at 3.1 m", ("no gap", "sag"), 39.0)
+    faint = replace(NO_GAP, causes=(make_cause("sag", 0.02),), next_measurements=(told,))
+    assert "measure next" not in said(faint)
+    rival = replace(faint, causes=(make_cause("sag", 0.2),), no_gap_probability=0.7)
+    assert "To tell no gap from sag, measure next: two-axis sensors" in said(rival)
+
+
 def test_a_gap_is_not_claimed_while_no_gap_keeps_one_in_twenty() -> None:
     faint = replace(ALIKE, no_gap_probability=0.06, unexplained_probability=0.0)
     assert claimed(faint) is None

@@ -94,3 +94,18 @@ def test_a_normal_interval_holds_ninety_percent() -> None:
 )
 def test_an_adopted_class_is_told_without_its_ranges(name: str, told: str) -> None:
     assert formatting.model_class(name) == told
+
+
+@pytest.mark.parametrize(
+    ("percent", "told"),
+    [
+        (3.14, "+3.1 %"),
+        (-45.0, "-45.0 %"),
+        (399.2, "a factor of 5 up"),
+        (-90.0, "a factor of 10 down"),
+        (50367.9, "a factor of 505 up"),
+        (-1991.6, "more than a factor of 2 down"),
+    ],
+)
+def test_a_change_beyond_a_factor_of_two_is_told_as_a_factor(percent: float, told: str) -> None:
+    assert formatting.change(percent) == told

@@ -299,7 +299,7 @@ def test_hours_of_measurements_are_the_owners_where_given_and_usual_elsewhere(
     ("hours", "fault"),
     [
         ("[measurement_hours]\nlunch = 1", "unknown key lunch"),
-        ("[measurement_hours]\nsensors = 0", "sensors = 0 is not a positive number"),
+        ("[measurement_hours]\nsensors = 0", "sensors = 0 is not .* Give sensors in hours"),
         ("measurement_hours = 3", "must be a table"),
     ],
 )
