@@ -141,7 +141,7 @@ def _said(*words: object) -> str:
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = run([str(word) for word in words])
     if code:
-        raise SystemExit(f"{' '.join(map(str, words))}: exit {code}: {err.getvalue()[-300:]}")
+        raise RuntimeError(f"{' '.join(map(str, words))}: exit {code}: {err.getvalue()[-300:]}")
     return out.getvalue()
 
 
