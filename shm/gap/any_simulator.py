@@ -26,12 +26,13 @@ from shm.gap.model_probabilities import (
 from shm.gap.search import SUPPORTED
 from shm.gap.simulator_fit import fitted, refitted
 from shm.gap.simulator_misfit import (
+    at_bounds,
     errors_of,
     in_sds,
     moments,
     p_value,
-    remarks,
     rms,
+    slips,
     without_copies,
 )
 from shm.gap.simulator_problem import Condition, Reading, Simulator, SimulatorProblem
@@ -48,6 +49,7 @@ _LEAVES_MUCH = 0.1  # judgement: a p-value at which a second cause, a quarter as
 _FLEXIBLE = 3  # technical: what leads is tried with something unknown beside; the others lose both
 _FOLDS = 5  # at most so many parts are held out in turn
 _SUPPORTED = 0.02  # judgement: a cause with less is in no group
+_OF_NOTE = 1e-3  # technical: less moves no average, but its spread may not be known
 _EVERYWHERE = Variant()
 # Of what looks like an effect with its law off: what is unknown passes for one.
 _MIMICS = CALIBRATION.mimics_one * UNKNOWN / (CALIBRATION.mimics_one * UNKNOWN + SINGLE)
@@ -215,7 +217,7 @@ def diagnose_simulator(
         parameters_before=moments(problem, alone, problem.simulator.parameters),
         parameters_after=_averaged(problem, answers, fits),
         next_readings=_planned(problem, fits, answers, candidates),
-        remarks=(*repeated, *remarks(problem, dict.fromkeys((alone, fits[first])))),
+        remarks=(*repeated, *at_bounds(problem, fits[first]), *slips(problem, alone, fits[first])),
     )
 
 
@@ -258,7 +260,10 @@ def _by_evidence(fits: Sequence[Fit]) -> list[Fit]:
 def _pairs(
     problem: SimulatorProblem, alone: Fit, singles: Sequence[Fit], rng: np.random.Generator
 ) -> list[Fit]:
-    """Of the leading singles, where these explain something and leave too much."""
+    """Of the leading singles, where these explain something and leave too much.
+
+    A pair that explains hardly more than one of its effects says nothing of a second one.
+    """
     leaders = [e for e in singles[:_LEADERS] if e.log_evidence > alone.log_evidence + SUPPORTED]
     if not leaders or p_value(problem, singles[0]) > _LEAVES_MUCH:
         return []
@@ -271,7 +276,12 @@ def _pairs(
             if names not in found and not set(one) & set(other.parameters):
                 pair = Hypothesis((*leader.hypothesis.effects, (other.name, _EVERYWHERE)))
                 found[names] = fitted(problem, pair, rng, leader.z[: len(alone.z)])
-    return list(found.values())
+    alone_of = {each.hypothesis.name: each.log_evidence + SUPPORTED for each in singles}
+    return [
+        each
+        for names, each in found.items()
+        if each.log_evidence > max(alone_of[name] for name in names)
+    ]
 
 
 def _cause(
@@ -294,24 +304,13 @@ def _groups(
     if no_gap >= NO_GAP_BELOW:
         return ()
     of = {h.name: fit for h, fit in fits.items() if not h.flexible}
-    supported = [
-        each.name
-        for each in causes
-        if each.probability > _SUPPORTED and not _idle(of[each.name], fits)
-    ]
+    supported = [each.name for each in causes if each.probability > _SUPPORTED]
     own = [of[name] for name in supported]
     best = max((each.log_evidence for each in own), default=0.0)
     near = [each.log_evidence > best - SAME_BELOW for each in own]
     return tuple(
         tuple(supported[i] for i in group) for group in grouped([(fit,) for fit in own], near)
     )
-
-
-def _idle(pair: Fit, fits: Mapping[Hypothesis, Fit]) -> bool:
-    """Whether one effect of a pair explains about as much without the other."""
-    names = pair.hypothesis.names
-    alone = [fits[_single(name)].log_evidence for name in names if len(names) > 1]
-    return any(each > pair.log_evidence - SUPPORTED for each in alone)
 
 
 def _shrinkage(problem: SimulatorProblem, alone: Fit, best: Fit) -> Shrinkage:
@@ -344,7 +343,9 @@ def _averaged(
     free = Hypothesis(flexible=True)
     weight[free] = weight.get(free, 0.0) + answers.unknown
     own = problem.simulator.parameters
-    found = {h: moments(problem, fits[h], own) for h in weight if weight[h] > 0}
+    found = {h: moments(problem, fits[h], own) for h in weight if weight[h] > _OF_NOTE}
+    whole = sum(weight[h] for h in found)
+    weight = {h: weight[h] / whole for h in found}
     averaged = {}
     for name in own:
         mean = sum(weight[h] * found[h][name][0] for h in found)

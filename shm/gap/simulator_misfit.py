@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import scipy
@@ -12,8 +12,8 @@ from shm.gap.simulator_fit import refitted
 from shm.gap.simulator_problem import Prior, Reading, SimulatorProblem
 from shm.values import FloatArray
 
-# Judgement, in a prior's standard deviations: a bound is nearer than a hundredth of the range; of a
-# prior without bounds no more than one in 150 000 lies beyond.
+# Judgement, in a prior's standard deviations: nearer to a bound than a hundredth of the range; so
+# far out that one in 150 000 lies beyond.
 _AT_BOUND, _FAR_OUT = 2.33, 4.5
 _FEWEST_EFFECTIVE = 20  # judgement: fewer draws tell a spread to no better than a sixth
 # Judgement: what does not fit, but for one of its three worst readings, holds a slip.
@@ -77,23 +77,27 @@ def moments(
 
 
 def _at_bound(prior: Prior, z: FloatArray) -> bool:
-    bounded = prior.spread in ("uniform", "logarithmic")
-    return bool(abs(z.mean()) > (_AT_BOUND if bounded else _FAR_OUT))
+    return prior.spread in ("uniform", "logarithmic") and bool(abs(z.mean()) > _AT_BOUND)
 
 
-def remarks(problem: SimulatorProblem, fits: Iterable[Fit]) -> tuple[str, ...]:
-    """Parameters of these fits that lie at a bound, and a reading with which alone none fits."""
+def at_bounds(problem: SimulatorProblem, fit: Fit) -> tuple[str, ...]:
+    """A remark on each parameter that lies at the bound of its prior, or far out of it."""
     said = []
-    for fit in fits:
-        beside = fit.hypothesis.name or "the simulator alone"
-        for j, (name, prior) in enumerate(problem.priors(fit.hypothesis).items()):
-            if _at_bound(prior, z := fit.draws[:, j]):
-                said.append(
-                    f"With {beside}, {name} lies at its bound, {float(prior.value(z).mean()):.4g}: "
-                    "widen its prior if it may lie beyond."
-                )
-    slips = [slip for fit in fits if (slip := _slip(problem, fit))]
-    return (*said, *slips[-1:])
+    for j, (name, prior) in enumerate(problem.priors(fit.hypothesis).items()):
+        z = fit.draws[:, j]
+        bound = _at_bound(prior, z)
+        if bound or abs(z.mean()) > _FAR_OUT:
+            where = "at its bound" if bound else "far out of its prior"
+            said.append(
+                f"{name} lies {where}, {float(prior.value(z).mean()):.4g}: widen its prior if it "
+                "may lie there."
+            )
+    return tuple(said)
+
+
+def slips(problem: SimulatorProblem, *fits: Fit) -> tuple[str, ...]:
+    """A remark on the reading with which alone the last of these does not fit, if any does not."""
+    return tuple(said for fit in fits if (said := _slip(problem, fit)))[-1:]
 
 
 def _slip(problem: SimulatorProblem, fit: Fit) -> str:

@@ -17,6 +17,7 @@ from shm.report.diagnosis_wording import (
     label,
     phrase,
     size,
+    tension_words,
 )
 from shm.values import (
     NAN,
@@ -26,7 +27,9 @@ from shm.values import (
     EffectEstimate,
     NextMeasurement,
     Shrinkage,
+    TensionEstimate,
 )
+from shm.values.force_units import force_unit
 from tests.report.diagnoses import (
     ALIKE,
     BLUNDER,
@@ -139,6 +142,12 @@ def test_beside_no_gap_only_a_rival_that_counts_calls_for_a_measurement() -> Non
     assert "measure next" not in said(faint)
     rival = replace(faint, causes=(make_cause("sag", 0.2),), no_gap_probability=0.7)
     assert "To tell no gap from sag, measure next: two-axis sensors" in said(rival)
+
+
+def test_a_mean_outside_its_interval_is_not_told() -> None:
+    """Most draws at a bound and a few far off: the mean lies below the 5 % quantile."""
+    piled = TensionEstimate(2099.2, 8.1, 2099.27, 2100.0)
+    assert tension_words(piled, force_unit(2099.2)) == "2.09927 to 2.10000 kN (90 % interval)"
 
 
 def test_a_gap_is_not_claimed_while_no_gap_keeps_one_in_twenty() -> None:
