@@ -37,8 +37,8 @@ from reportlab.platypus import (
 )
 from reportlab.platypus import Table as SetTable
 
-from shm.report.figures import style
 from shm.report.figures.specification import Illustration
+from shm.report.figures.style import GRID, INK, QUIET, STATUS_COLOURS, VERDICT_COLOURS
 from shm.report.paper import Fact, Paper, Part, Table
 
 # Layout of an A4 page, in points unless it says mm: margins for a binder, type that reads on paper.
@@ -53,7 +53,7 @@ _CELL_SIZE, _LINE_SIZE = 7.6, 7.4
 _PLAIN, _BOLD = "DejaVuSans", "DejaVuSans-Bold"
 _NUMBER_OF_PAGES = "number-of-pages"
 _UNDATED = "D:20000101000000Z"
-_INK, _QUIET, _GRID = (colors.HexColor(each) for each in (style.INK, style.QUIET, style.GRID))
+_INK, _QUIET, _GRID = (colors.HexColor(each) for each in (INK, QUIET, GRID))
 _PANEL = colors.HexColor("#f4f6f9")
 
 
@@ -167,16 +167,14 @@ def _cut(text: str) -> str:
 def _flowables(paper: Paper) -> list[Flowable]:
     """The title and all parts that have something, in order; figures and tables are numbered."""
     figures, tables = count(1), count(1)
-    colour = style.STATUS_COLOURS[paper.style]
+    colour = STATUS_COLOURS[paper.style]
     state = f' <font color="{colour}" size="12">● {escape(paper.status)}</font>'
     body, appendix = (
         [
             each
             for part in paper.parts
             if part.is_appendix is is_appendix
-            for each in _part(
-                part, style.STATUS_COLOURS[part.style or paper.style], figures, tables
-            )
+            for each in _part(part, STATUS_COLOURS[part.style or paper.style], figures, tables)
         ]
         for is_appendix in (False, True)
     )
@@ -340,8 +338,8 @@ def _rules(table: Table) -> list[tuple[Any, ...]]:
         ("BOTTOMPADDING", (0, 0), (-1, -1), 2.5),
     ]
     for row, mark in enumerate(table.marks, 1):
-        if mark in style.VERDICT_COLOURS and mark != "unknown":
-            colour, cell = colors.HexColor(style.VERDICT_COLOURS[mark]), (_marked(table), row)
+        if mark in VERDICT_COLOURS and mark != "unknown":
+            colour, cell = colors.HexColor(VERDICT_COLOURS[mark]), (_marked(table), row)
             rules.append(("LINEBEFORE", cell, cell, 1.5, colour))
             rules.append(("LEFTPADDING", cell, cell, _PADDING))
     return rules

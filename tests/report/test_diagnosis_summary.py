@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from shm.values.force_units import force_unit
 
 from shm.models.effects import EFFECTS, Survey
 from shm.report import formatting
@@ -29,7 +30,6 @@ from shm.values import (
     Shrinkage,
     TensionEstimate,
 )
-from shm.values.force_units import force_unit
 from tests.report.diagnoses import (
     ALIKE,
     BLUNDER,

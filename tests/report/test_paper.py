@@ -215,4 +215,5 @@ def test_the_model_and_its_renderers_know_no_kind_of_report(module: str) -> None
         for node in ast.walk(ast.parse(source))
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("shm.report.")
     }
-    assert imported <= {"shm.report.paper", "shm.report.figures.specification"}
+    figures = {"shm.report.figures.specification", "shm.report.figures.style"}
+    assert imported <= {"shm.report.paper", *figures}
