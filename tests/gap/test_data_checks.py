@@ -115,7 +115,7 @@ def test_frequencies_without_standard_deviation_are_said() -> None:
     some = replace(_test(), modes=(*_test().modes[:6], *_test(sd=NAN).modes[6:]))
     remark, _ = usable([some], HANGER).remarks
     assert remark.startswith("6 of 12 frequencies have no standard deviation")
-    (remark,) = usable([_test(sd=0.0)], HANGER).remarks
+    remark, _ = usable([_test(sd=0.0)], HANGER).remarks
     assert remark.startswith("No frequency has a standard deviation (0 is none): how exact")
 
 

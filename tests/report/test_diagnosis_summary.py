@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from shm.values.force_units import force_unit
 
 from shm.models.effects import EFFECTS, Survey
 from shm.report import formatting
@@ -30,6 +29,7 @@ from shm.values import (
     Shrinkage,
     TensionEstimate,
 )
+from shm.values.rounding import force_unit
 from tests.report.diagnoses import (
     ALIKE,
     BLUNDER,
