@@ -146,7 +146,7 @@ def reason_document(
 
 IDENTIFY_SETTINGS = tuple(identify_settings(Settings()))
 _ALL = (*IDENTIFY_SETTINGS, "models", "samples", "seed", "baseline_tests", "false_call_years")
-_LIBRARIES = ("numpy", "scipy", "pyOMA-2", "emcee")
+_LIBRARIES = ("numpy", "scipy", "emcee")
 
 
 def test_lineage(store: Store, test: StoredTest) -> dict[str, str]:

@@ -54,7 +54,6 @@ AS_FOUND = "any correction"
 STEPS: Mapping[str, Mapping[str, Any]] = {
     "all as it is": {},
     "without close pairs": {},
-    "identifier ssi-input": {"identifier": "ssi-input"},
     "identifier frf": {"identifier": "frf"},
 }
 Errors = dict[str, list[tuple[float, float]]]

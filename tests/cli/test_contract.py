@@ -69,7 +69,7 @@ def test_the_status_is_told_without_loading_what_reads_computes_or_delivers(
     bridge: Workspace,
 ) -> None:
     unused = {
-        "alembic", "h5py", "matplotlib", "nptdms", "pandas", "pymseed", "pyoma2", "requests",
+        "alembic", "h5py", "matplotlib", "nptdms", "pandas", "pymseed", "requests",
         "scipy.fft", "scipy.io", "scipy.linalg", "scipy.ndimage", "scipy.optimize", "scipy.signal",
         "scipy.sparse", "scipy.special", "scipy.stats", "shm.pipeline.flow", "shm.read.registry",
     }  # fmt: skip

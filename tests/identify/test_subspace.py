@@ -1,14 +1,10 @@
 from __future__ import annotations
 
-import logging
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
 from shm.identify.estimation.poles import collinearity, poles_of, real_shape
-from shm.identify.estimation.ssi import hankel, hankel_with_input, realised
+from shm.identify.estimation.ssi import hankel, realised
 
 RATE_HZ = 256.0
 
@@ -18,29 +14,6 @@ def _decay(frequency_hz: float = 20.0, damping_ratio: float = 0.004) -> np.ndarr
     pole = -damping_ratio * omega + 1j * omega * np.sqrt(1 - damping_ratio**2)
     motion = np.exp(pole * np.arange(1500) / RATE_HZ)
     return np.vstack([motion.real, 0.4 * motion.real, -0.7 * motion.real])
-
-
-def test_pyoma2_is_kept_quiet() -> None:
-    """No log handler, no numpy warning turned off, no word on either stream, no heavy import."""
-    script = (
-        "import logging, sys, numpy as np; before = np.geterr();"
-        "import shm.identify.estimation.ssi as s;"
-        "y, force = np.random.default_rng(0).normal(size=(2, 400)), np.ones((1, 400));"
-        "s.hankel_with_input(y, y, force, 20);"
-        "assert np.geterr() == before; assert not logging.getLogger('pyoma2').handlers;"
-        "assert logging.getLogger('matplotlib').level == 0;"
-        "assert not {'pandas', 'sklearn', 'matplotlib'} & set(sys.modules)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-
-
-def test_its_log_records_below_a_warning_go_nowhere(caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.INFO):
-        hankel_with_input(_decay(), _decay(), _decay()[:1], 10)
-    assert not caplog.records
 
 
 def test_the_hankel_matrix_of_one_decay_has_rank_two() -> None:

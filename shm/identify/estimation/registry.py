@@ -5,16 +5,15 @@ from __future__ import annotations
 from shm.errors import UsageError
 from shm.identify.contract import Identifier
 from shm.identify.estimation.response_fit import common_denominator_fit
-from shm.identify.estimation.ssi import summed_hankel_ssi, summed_hankel_ssi_with_input
+from shm.identify.estimation.ssi import summed_hankel_ssi
 
 IDENTIFIERS: dict[str, Identifier] = {
     "ssi": summed_hankel_ssi,
-    "ssi-input": summed_hankel_ssi_with_input,
     "frf": common_denominator_fit,
 }
 WITHOUT_FORCE = frozenset({"ssi"})
 """Those that can do with accelerations alone."""
-HIT_BY_HIT = frozenset({"ssi", "ssi-input"})
+HIT_BY_HIT = frozenset({"ssi"})
 """Those that see hits one by one, so that these need not be of one direction."""
 
 

@@ -5,37 +5,22 @@ stay from order to order, and stay when any one hit is left out, are modes. Freq
 are medians over a few high orders; standard deviations are the jackknife's. Ambient motion goes
 the same way: the covariances of white-noise-driven modes are sums of free decays.
 
-Subspace identification with the hammer's force as input, Hankel matrices summed over hits.
-
-Where the free decay is what follows the pulse, this one looks at each hit from before the hammer
-strikes. What the measured force explains is projected out of the future responses, so a second
-blow, or a force that does not end, does no harm; the pulse needs no end.
-
 Modes from Hankel matrices, one a hit, whose sum has the modes of all hits in its column space.
 
 State-space models of rising order are cut from the sum. Leaving out a hit need not cost a new
 decomposition: the Hankel matrix without it, times the leading right singular vectors of the whole
 one, spans the same columns but for terms of second order.
-
-The one door to pyOMA2, for the Hankel matrix with input, kept quiet.
-
-Importing pyOMA2 turns numpy's warnings off, attaches a log handler and mutes matplotlib's logger;
-all three are undone here. Only `pyoma2.functions.ssi` is
-imported: the rest of the package brings pandas and scikit-learn.
 """
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, reduce
-from types import ModuleType
+from functools import reduce
 
 import numpy as np
 import scipy
 
-from shm.errors import NotIdentifiable
 from shm.identify.contract import Finding, Measurement
 from shm.identify.estimation.poles import PoleSet, poles_of
 from shm.identify.estimation.repeats import LEAST_HITS
@@ -114,26 +99,6 @@ def summed_hankel_ssi(measurement: Measurement, options: IdentifyOptions) -> Fin
         return found
     every = windows(measurement.sampling_rate_hz, options)
     return completed(found, through_windows(measurement, options, every))
-
-
-def summed_hankel_ssi_with_input(measurement: Measurement, options: IdentifyOptions) -> Finding:
-    """Modes of a measurement by multi-hit SSI with the force as input.
-
-    Raises NotIdentifiable where the measurement holds no force over time.
-    """
-    if not measurement.driven:
-        raise NotIdentifiable(
-            "identifier 'ssi-input' needs the hammer's force over time.",
-            file=measurement.source,
-            remedy="Give time records with a force channel, or use the identifier 'ssi'.",
-        )
-    mixed = references(measurement.decays)
-    rows = block_rows(measurement, options)
-    matrices = [
-        hankel_with_input(driven[1:], mixed @ driven[1:], driven[:1], rows)
-        for driven in measurement.driven
-    ]
-    return modes_of_hankel(matrices, rows, measurement, options)
 
 
 def looked_at_again(
@@ -292,20 +257,6 @@ def _models_without_each_hit(
     return [_models(*part, size, orders) for part in parts]
 
 
-@cache
-def _pyoma2() -> ModuleType:
-    """The `ssi` module, loaded where it is called: it brings `scipy.linalg`."""
-    matplotlib_level = logging.getLogger("matplotlib").level
-    with np.errstate():
-        from pyoma2.functions import ssi
-    logger = logging.getLogger("pyoma2")
-    for handler in list(logger.handlers):
-        logger.removeHandler(handler)
-    logger.setLevel(logging.WARNING)
-    logging.getLogger("matplotlib").setLevel(matplotlib_level)
-    return ssi
-
-
 def hankel(response: FloatArray, reference: FloatArray, block_rows: int) -> FloatArray:
     """Sum over time of future responses times past references.
 
@@ -331,15 +282,3 @@ def hankel(response: FloatArray, reference: FloatArray, block_rows: int) -> Floa
             )
             sums = sums[..., :lags] + gained - lost
     return np.asarray(matrix.reshape(channels * block_rows, -1) * (samples / count))
-
-
-def hankel_with_input(
-    response: FloatArray, reference: FloatArray, force: FloatArray, block_rows: int
-) -> FloatArray:
-    """The same after what the future of `force` (1, samples) explains is projected out.
-
-    Its least squares are scaled by the force's own size; as future responses and past references
-    enter both with the share of a direction that the force has, weak ones do no harm.
-    """
-    matrix, _ = _pyoma2().build_hank(response, reference, block_rows, "IOcov", U=force)
-    return np.asarray(matrix * response.shape[1], dtype=np.float64)
