@@ -484,17 +484,17 @@ def every_case(cases: Sequence[Scored]) -> list[Row]:
     return rows
 
 
-def score(directory: Path, write: bool) -> None:
-    cases = scored(directory)
+def score(directories: Sequence[Path], write: bool) -> None:
+    cases = [case for directory in directories for case in scored(directory)]
     told = [("asked", "found (95 % interval)", "verdict"), *marks(cases)]
     for row in told:
         print(" | ".join(row))
     if write:
+        trials = [read_trial(directory) for directory in directories]
         lines = ["| " + " | ".join(row) + " |" for row in told]
-        head = (
-            f"{len(cases)} of {len(read_trial(directory).cases)} cases, {kinds(cases)}; SHA-256 of "
-            f"the key `{read_trial(directory).key_sha256}`."
-        )
+        keys = ", ".join(f"`{trial.key_sha256}`" for trial in trials)
+        made = sum(len(trial.cases) for trial in trials)
+        head = f"{len(cases)} of {made} cases, {kinds(cases)}; SHA-256 of the keys {keys}."
         table = "\n".join([lines[0], "|---|---|---|", *lines[1:]])
         fill_in(TRIALS / "blind_trial.md", "blind trial 2", f"{head}\n\n{table}")
         write_csv(TRIALS / "blind_trial_2" / "by_part.csv", by_part(cases))
@@ -512,7 +512,7 @@ def kinds(cases: Sequence[Scored]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("what", choices=["make", "solve", "score"])
-    parser.add_argument("directory", type=Path)
+    parser.add_argument("directory", type=Path, nargs="+", help="to score: one or several trials")
     parser.add_argument("--cases", type=int, default=96)
     parser.add_argument("--seed", type=int, default=20261126)
     parser.add_argument("--left-out", action="store_true")
@@ -521,9 +521,9 @@ def main() -> None:
     parser.add_argument("--write-docs", action="store_true")
     given = parser.parse_args()
     if given.what == "make":
-        make(given.directory, given.cases, given.seed)
+        make(given.directory[0], given.cases, given.seed)
     elif given.what == "solve":
-        solve(given.directory, given.left_out, moment(given.until), given.at_once)
+        solve(given.directory[0], given.left_out, moment(given.until), given.at_once)
     else:
         score(given.directory, given.write_docs)
 
