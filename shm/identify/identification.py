@@ -12,7 +12,7 @@ import numpy as np
 from shm.errors import NotIdentifiable, UsageError
 from shm.identify.contract import Dropped, Finding, FoundMode, Hit, Measurement, Poles, Tone
 from shm.identify.estimation.finished import finished
-from shm.identify.estimation.registry import HIT_BY_HIT, WITHOUT_FORCE, identifier
+from shm.identify.estimation.registry import WITHOUT_FORCE, identifier
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
 from shm.identify.estimation.sidebands import without_sidebands
 from shm.identify.estimation.ssi import looked_at_again
@@ -164,7 +164,7 @@ def _closer(
     found: Joined, measurements: Sequence[Measurement], options: IdentifyOptions
 ) -> Joined | None:
     """With what windows over the whole band show of one set-up; None where they show no more."""
-    if len(measurements) > 1 or options.identifier not in HIT_BY_HIT:
+    if len(measurements) > 1 or options.identifier not in WITHOUT_FORCE:
         return None
     again = looked_at_again(measurements[0], options)
     if again is None or not again.modes:
@@ -181,7 +181,7 @@ def _looked_at(
 ) -> tuple[tuple[FoundMode, ...], tuple[FoundMode, ...]]:
     """What windows show about the frequencies `at_hz`, of one set-up, and what may be a mode."""
     again = None
-    if len(measurements) == 1 and options.identifier in HIT_BY_HIT:
+    if len(measurements) == 1 and options.identifier in WITHOUT_FORCE:
         again = looked_at_again(measurements[0], options, at_hz)
     if again is None:
         return (), found.doubtful
@@ -266,7 +266,7 @@ def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOpti
     alone = options if len(measurements) == 1 else replace(options, frequency_allowance=0.0)
     findings = [finished(function(m, alone), m, options) for m in measurements]
     found = joined(measurements, findings, options)
-    if name in HIT_BY_HIT and alike(measurements):
+    if name in WITHOUT_FORCE and alike(measurements):
         every = together(measurements)
         whole = finished(function(every, options), every, options)
         found = sharpened(measurements, found, whole)

@@ -58,7 +58,7 @@ class Candidate:
 
     @property
     def collinearity(self) -> float:
-        return collinearity(self.poles[-1].shape)
+        return float(collinearity(self.poles[-1].shape))
 
     @property
     def frequency_spread(self) -> float:

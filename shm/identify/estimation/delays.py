@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.identify.estimation.candidates import Candidate
-from shm.identify.estimation.poles import PoleSet
+from shm.identify.estimation.poles import PoleSet, collinearity
 from shm.identify.estimation.repeats import FEW_HITS
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray, FloatArray
@@ -57,12 +57,8 @@ def delays_s(candidates: Sequence[Candidate], options: IdentifyOptions) -> Float
 
 
 def _realness(frequency_hz: FloatArray, shapes: ComplexArray, late_s: FloatArray) -> FloatArray:
-    """Phase collinearity of each of `shapes` (modes, channels) with the delays off: (modes,).
-
-    It is the square of |sum of v^2| over the sum of |v|^2.
-    """
-    v = shapes * np.exp(2j * np.pi * np.outer(frequency_hz, late_s))
-    return np.asarray(np.abs(np.sum(v**2, axis=1)) ** 2 / np.sum(np.abs(v) ** 2, axis=1) ** 2)
+    """Phase collinearity (modes,) of each of `shapes` (modes, channels) with the delays off."""
+    return collinearity(shapes * np.exp(2j * np.pi * np.outer(frequency_hz, late_s)))
 
 
 def _most_real(frequency_hz: FloatArray, shapes: ComplexArray, highest_hz: float) -> FloatArray:

@@ -71,15 +71,16 @@ def plausibly_damped(poles: PoleSet, options: IdentifyOptions) -> BoolArray:
     return np.asarray((poles.damping_ratio > 0) & (poles.damping_ratio < options.max_damping_ratio))
 
 
-def collinearity(shape: ComplexArray) -> float:
-    """Modal phase collinearity of a complex shape (channels,): 1 where all phases agree.
+def collinearity(shape: ComplexArray) -> FloatArray:
+    """Modal phase collinearity (...) of complex shapes (..., channels): 1 where all phases agree.
 
     Pappa, Elliott and Schenk (1993), eq. 3 to 7, without the removal of the mean.
     """
     real, imaginary = shape.real, shape.imag
-    xx, yy, xy = real @ real, imaginary @ imaginary, real @ imaginary
+    xx, yy = np.sum(real**2, axis=-1), np.sum(imaginary**2, axis=-1)
+    xy = np.sum(real * imaginary, axis=-1)
     total = xx + yy
-    return float(((xx - yy) ** 2 + 4 * xy**2) / total**2) if total > 0 else 0.0
+    return np.asarray(((xx - yy) ** 2 + 4 * xy**2) / np.where(total > 0, total, np.inf) ** 2)
 
 
 def real_shape(shape: ComplexArray) -> FloatArray:

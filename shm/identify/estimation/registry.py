@@ -12,9 +12,8 @@ IDENTIFIERS: dict[str, Identifier] = {
     "frf": common_denominator_fit,
 }
 WITHOUT_FORCE = frozenset({"ssi"})
-"""Those that can do with accelerations alone."""
-HIT_BY_HIT = frozenset({"ssi"})
-"""Those that see hits one by one, so that these need not be of one direction."""
+"""Those that can do with accelerations alone. They see hits one by one, so that these need not be
+of one direction."""
 
 
 def identifier(name: str) -> Identifier:
