@@ -64,7 +64,7 @@ def described(name: str, hanger: Hanger, priors: str = THESIS) -> Model:
     if is_adopted(name):
         return Adopted(name, hanger, priors)
     model = MODELS[name](hanger)
-    return AsMade(model) if priors == DESCRIPTION else model
+    return AsMade(model) if priors == DESCRIPTION else model.of_the_thesis()
 
 
 def class_of(posterior: Posterior, hanger: Hanger) -> Model:

@@ -63,6 +63,10 @@ class Model:
     def __init__(self, hanger: Hanger):
         self.hanger = hanger
 
+    def of_the_thesis(self) -> Model:
+        """The class with the thesis's reading of the description, where that is another."""
+        return self
+
     @classmethod
     def unfit(cls, hanger: Hanger) -> str:
         """Why this class cannot describe `hanger`; empty where it can."""

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy
 
+from shm.models import DESCRIPTION, THESIS, AsMade, build
 from shm.models.base import silent
+from shm.models.beam import Beam1
 from shm.models.solid import S1, S2, Solid0, Solid1, Solid2
 from shm.models.solid.assembly import Mesh, assembled
 from shm.models.solid.basis import transverse_basis
+from shm.models.solid.classes import SolidModel
 from shm.models.solid.reduction import AffineSystem, Modes, Reservoir, natural_modes
+from shm.values import Hanger
 from shm_cli import thesis
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.slow import few_of
@@ -35,7 +40,72 @@ def deviation_percent(found: np.ndarray, printed: list) -> float:
 
 
 def test_the_plain_rod_gives_table_a_1() -> None:
-    assert deviation_percent(transverse_hz(S1(HANGER_3)), TABLES["s1"]["converged"]) < 0.3
+    found = transverse_hz(S1(HANGER_3).of_the_thesis())
+    assert deviation_percent(found, TABLES["s1"]["converged"]) < 0.3
+    # Without the stretch it would be 0.065 to 0.096 %; mode 1 is printed to 0.09 %.
+    assert deviation_percent(found[:, 1:], TABLES["s1"]["converged"][1:]) < 0.06
+
+
+def stretched(hanger: Hanger, tension_ratio: float) -> Hanger:
+    """The rod as Hooke's law leaves it: longer, thinner, as heavy."""
+    strain = tension_ratio * hanger.nominal_tension_n / hanger.elastic_modulus_pa / hanger.area_m2
+    thinner = 1 - hanger.poissons_ratio * strain
+    return replace(
+        hanger,
+        length_m=hanger.length_m * (1 + strain),
+        diameter_m=hanger.diameter_m * thinner,
+        area_m2=hanger.area_m2 * thinner**2,
+        second_moment_m4=hanger.second_moment_m4 * thinner**4,
+        mass_per_length_kg_m=hanger.mass_per_length_kg_m / (1 + strain),
+    )
+
+
+# The thesis's hanger is drawn without tension, which stretches it before it swings. Of mode 6 the
+# stretch takes what issue and checklist ask: 0.05 % at nominal tension, 0.2 % at five times.
+@pytest.mark.parametrize(("ratio", "percent_of_mode_6"), [(1.0, 0.05), (5.0, 0.2)])
+def test_tension_stretches_a_bar_that_is_described_without_it(ratio, percent_of_mode_6) -> None:
+    theta, after = np.array([[ratio]]), stretched(HANGER_3, ratio)
+    drawn = S1(HANGER_3).of_the_thesis().reference_frequencies_hz(theta, 6)
+    meshed = S1(after).reference_frequencies_hz(theta, 6)
+    np.testing.assert_allclose(drawn, meshed, rtol=2e-6)
+    change = drawn / S1(HANGER_3).reference_frequencies_hz(theta, 6) - 1
+    clamped = [
+        Beam1(each).frequencies_hz(np.array([[ratio, 1.0]]), 6) for each in (after, HANGER_3)
+    ]
+    np.testing.assert_allclose(change, clamped[0] / clamped[1] - 1, atol=3e-5)
+    assert -100 * change[0, 0, 5] == pytest.approx(percent_of_mode_6, rel=0.1)
+
+
+def test_a_hanger_described_as_it_hangs_is_not_stretched_again() -> None:
+    hangs, drawn = (build("s1", HANGER_3, priors) for priors in (DESCRIPTION, THESIS))
+    assert isinstance(hangs, AsMade)
+    assert isinstance(hangs.model, SolidModel)
+    assert isinstance(drawn, SolidModel)
+    assert (hangs.model.is_unstressed, drawn.is_unstressed) == (False, True)
+
+
+# The table of docs/physics.md: least and largest change of modes 1 to 6 in percent.
+@pytest.mark.parametrize(
+    ("ratio", "density", "all_but_length", "all_of_it"),
+    [
+        (1.0, (0.005, 0.005), (-0.002, 0.005), (-0.05, -0.04)),
+        (5.0, (0.03, 0.03), (0.01, 0.05), (-0.22, -0.11)),
+    ],
+)
+def test_what_stretching_changes_is_as_the_page_says(
+    ratio, density, all_but_length, all_of_it
+) -> None:
+    after = stretched(HANGER_3, ratio)
+    volume = after.area_m2 * after.length_m / (HANGER_3.area_m2 * HANGER_3.length_m)
+    lighter = replace(HANGER_3, mass_per_length_kg_m=HANGER_3.mass_per_length_kg_m / volume)
+    taped = replace(after, length_m=HANGER_3.length_m)
+    before, *found = (
+        Beam1(each).frequencies_hz(np.array([[ratio, 1.0]]), 6)[0, 0]
+        for each in (HANGER_3, lighter, taped, after)
+    )
+    for hz, (least, largest) in zip(found, (density, all_but_length, all_of_it), strict=True):
+        percent = 100 * (hz / before - 1)
+        assert (percent.min(), percent.max()) == pytest.approx((least, largest), abs=0.006)
 
 
 def test_the_rod_between_the_plates_is_a_timoshenko_beam() -> None:
@@ -44,7 +114,8 @@ def test_the_rod_between_the_plates_is_a_timoshenko_beam() -> None:
 
 
 def test_the_hanger_with_plates_and_fixed_faces_gives_table_a_3() -> None:
-    assert deviation_percent(transverse_hz(Solid0(HANGER_3)), TABLES["solid0"]["converged"]) < 0.3
+    found = transverse_hz(Solid0(HANGER_3).of_the_thesis())
+    assert deviation_percent(found, TABLES["solid0"]["converged"]) < 0.3
 
 
 @pytest.mark.parametrize(
@@ -57,7 +128,7 @@ def test_the_hanger_with_plates_and_fixed_faces_gives_table_a_3() -> None:
     ],
 )
 def test_springs_give_tables_a_4_and_a_5(model_class, log10_k: list[int]) -> None:
-    found = transverse_hz(model_class(HANGER_3), *log10_k)
+    found = transverse_hz(model_class(HANGER_3).of_the_thesis(), *log10_k)
     printed = [TABLES[model_class.name][f"k1e{k}"] for k in log10_k]
     assert deviation_percent(found, printed) < 1.5
 
@@ -97,7 +168,7 @@ def test_the_mirrored_basis_is_the_longitudinal_plane() -> None:
 def test_the_reduced_basis_is_within_two_hundredths_of_a_percent(
     model_class, most_unknowns
 ) -> None:
-    model = model_class(HANGER_3)
+    model = model_class(HANGER_3).of_the_thesis()
     rng, prior = np.random.default_rng(42), model.prior
     inside = rng.uniform(prior.lower, prior.upper, (2, len(prior.names)))
     corners = np.where(rng.random(inside.shape) < 0.5, prior.lower, prior.upper)
@@ -113,7 +184,7 @@ def test_motions_whose_mass_is_lost_in_rounding_are_left_out_of_a_basis() -> Non
     energy = scipy.sparse.csc_array(np.eye(3))
     nothing = scipy.sparse.csr_array((0, 3))
     mass = scipy.sparse.csr_array(np.diag([1.0, 4e-14, -1e-17]))
-    system = AffineSystem(energy, energy, {}, mass, nothing, np.empty(0))
+    system = AffineSystem(energy, energy, energy, {}, mass, nothing, np.empty(0))
     reservoir = Reservoir(system, energy)
     reservoir.add(Modes(np.ones(3), np.eye(3)))
     basis, projected = reservoir.compressed(3)

@@ -9,7 +9,7 @@ vol. 2, 10.2. Unknown 3 n + i is the displacement of node n along axis i.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -45,6 +45,9 @@ _SHAPES = np.stack(
 )
 _SLOPES = np.stack([4 * _POINTS - 3, 4 - 8 * _POINTS, 4 * _POINTS - 1])
 
+# Numerical: that of hanger 3 at four times its tension, small enough for two orders.
+_STRAIN = 1e-3
+
 
 def assembled(
     geometry: Geometry, material: Material, support: Support, plane: Plane
@@ -65,7 +68,8 @@ def bending_plane(solid: Solid, support: Support, plane: Plane) -> AffineSystem:
     axis_deflection, axis_m = _deflections(solid, free, axis)
     return AffineSystem(
         kept(solid.stiffness),
-        kept(solid.initial_stress),
+        kept(solid.by_tension),
+        kept(solid.by_square),
         {name: kept(matrix) for name, matrix in springs.items()},
         kept(solid.mass),
         axis_deflection,
@@ -160,28 +164,47 @@ def _along(solid: Solid, axis: int, edges: list[Edge]) -> csr_array:
 class Solid:
     """Matrices (3 nodes, 3 nodes) of the free quarter.
 
-    `initial_stress` is the stiffness due to 1 N of tension in the whole hanger.
+    `by_tension` is the stiffness due to 1 N of tension in the whole hanger, `by_square` that due to
+    1 N^2 (see `AffineSystem`).
     """
 
     mesh: Mesh
     stiffness: csr_array
     mass: csr_array
-    initial_stress: csr_array
+    by_tension: csr_array
+    by_square: csr_array
 
     @classmethod
     def of(cls, mesh: Mesh, material: Material) -> Solid:
         """Assembles all; the tension acts as a uniform traction on both end faces."""
-        # Three points along the axis lock thin long cells: the curvature's quadratic term is
-        # then constrained by an axial strain that second-order cells cannot follow.
-        basis = Basis(mesh.cells, ElementHex2(), quadrature=_gauss(3, 3, 2))
-        gradients = [[_gradient_product(basis, i, j) for j in range(3)] for i in range(3)]
-        stiffness = _stiffness(gradients, material)
-        stress = _stress(basis, _pulled(mesh, stiffness), material)
-        exact = Basis(mesh.cells, ElementHex2(), quadrature=_gauss(3, 3, 3))
-        mass = BilinearForm(lambda u, v, _: material.density_kg_m3 * u * v).assemble(exact)
-        return cls(
-            mesh, stiffness, _each_axis(csr_array(mass)), _each_axis(_initial_stress(basis, stress))
-        )
+        stiffness, by_tension, pulled = _stiff(mesh, material)
+        # Steel is neither lost nor won when it is stretched: the mass is that of any tension.
+        basis = Basis(mesh.cells, ElementHex2(), quadrature=_gauss(3, 3, 3))
+        mass = BilinearForm(lambda u, v, _: material.density_kg_m3 * u * v).assemble(basis)
+        by_square = csr_array(stiffness.shape)
+        if material.is_unstressed:
+            pull_n = _STRAIN * mesh.geometry.length_m / np.ptp(pulled[2::3])
+            longer, shorter = (
+                _stiff(mesh.moved(each * pulled), material) for each in (pull_n, -pull_n)
+            )
+            # Bending leaves shear strain no energy, for rotations of the stretched bar: without the
+            # second order the string's part would be off by 0.65 of the strain.
+            bent = longer[0] + shorter[0] - 2 * stiffness
+            by_square = (longer[1] - shorter[1]) / (2 * pull_n) + bent / (2 * pull_n**2)
+            by_tension = by_tension + (longer[0] - shorter[0]) / (2 * pull_n)
+        return cls(mesh, stiffness, _each_axis(csr_array(mass)), by_tension, by_square)
+
+
+def _stiff(mesh: Mesh, material: Material) -> tuple[csr_array, csr_array, FloatArray]:
+    """Elastic and initial-stress stiffness, and displacements (3 nodes,), under 1 N of tension."""
+    # Three points along the axis lock thin long cells: the curvature's quadratic term is then
+    # constrained by an axial strain that second-order cells cannot follow.
+    basis = Basis(mesh.cells, ElementHex2(), quadrature=_gauss(3, 3, 2))
+    gradients = [[_gradient_product(basis, i, j) for j in range(3)] for i in range(3)]
+    stiffness = _stiffness(gradients, material)
+    pulled = _pulled(mesh, stiffness)
+    stress = _stress(basis, pulled, material)
+    return stiffness, _each_axis(_initial_stress(basis, stress)), pulled
 
 
 def _gauss(*points: int) -> tuple[FloatArray, FloatArray]:
@@ -268,6 +291,12 @@ class Mesh:
         linear = MeshHex1(*_by_column(points, index.reshape(len(corners), 8)), validate=False)
         grid = MeshHex2.from_mesh(linear).doflocs
         return cls(geometry, MeshHex2(geometry.place(grid), linear.t, validate=False), grid)
+
+    def moved(self, displacement_m: FloatArray) -> Mesh:
+        """The mesh with its nodes displaced by (3 nodes,)."""
+        places = self.cells.doflocs + displacement_m.reshape(-1, 3).T
+        cells = MeshHex2(np.ascontiguousarray(places), self.cells.t, validate=False)
+        return replace(self, cells=cells)
 
     @property
     def nodes(self) -> int:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from shm.models.solid.reduction import AffineSystem
 
 # To be raised whenever the same description gives another basis than before.
-_VERSION = 1
+_VERSION = 2
 _BATCH_OF_MODES = 6
 _CELLS_A_MODE = 6
 

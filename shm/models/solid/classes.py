@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from copy import copy
 from dataclasses import replace
 from typing import ClassVar
 
@@ -47,11 +48,20 @@ class SolidModel(Model):
 
     `frequencies_hz` uses a reduced basis, right to 0.02 % of the full model over the prior box;
     `reference_frequencies_hz` solves the full model.
+
+    The hanger is described as it hangs, stretched already; the thesis draws it without tension and
+    lets the nominal one stretch it (3.1.1, step 1): `is_unstressed`.
     """
 
     expensive = True
+    is_unstressed = False
     support: ClassVar[Support] = FIXED
     with_plates: ClassVar[bool] = True
+
+    def of_the_thesis(self) -> SolidModel:
+        other = copy(self)
+        other.is_unstressed = True
+        return other
 
     @classmethod
     def unfit(cls, hanger: Hanger) -> str:
@@ -148,6 +158,7 @@ class SolidModel(Model):
             self.hanger.elastic_modulus_pa,
             self.hanger.poissons_ratio,
             self.hanger.mass_per_length_kg_m / self.hanger.area_m2,
+            self.is_unstressed,
         )
         return Description(geometry, material, self.support, tuple(lower[kept]), tuple(upper[kept]))
 

@@ -162,11 +162,16 @@ class Geometry:
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic and linear elastic."""
+    """Isotropic and linear elastic, with these constants in the bar as tension has stretched it.
+
+    `is_unstressed` says that the geometry and the density are those without tension, which then
+    stretches the bar; else they are those of the hanger as it hangs.
+    """
 
     elastic_modulus_pa: float
     poissons_ratio: float
     density_kg_m3: float
+    is_unstressed: bool = False
 
     @property
     def lame_pa(self) -> tuple[float, float]:

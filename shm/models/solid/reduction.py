@@ -2,11 +2,12 @@
 
 Modes of the full model at a few points of the box span a reservoir. It is compressed by proper
 orthogonal decomposition in the energy of a reference stiffness (Kunisch and Volkwein 2001), and
-K(theta), which is affine in tension and springs, is projected once. Points are chosen greedily:
-the next one is where two compressions of the reservoir differ most, which estimates the error;
-the full model there tells the true one. It ends when that error was small several times running.
+K(theta), a polynomial of the tension and affine in springs, is projected once. Points are chosen
+greedily: the next one is where two compressions of the reservoir differ most, which estimates the
+error; the full model there tells the true one. It ends when that error was small several times
+running.
 
-A bending plane of the full solid model, affine in tension and springs, and its modes.
+A bending plane of the full solid model and its modes.
 """
 
 from __future__ import annotations
@@ -23,15 +24,18 @@ from shm.values import BoolArray, FloatArray
 
 @dataclass(frozen=True, eq=False)
 class AffineSystem:
-    """K(theta) = K_e + T K_sigma + sum of k_j S_j over the springs j, and the mass.
+    """K(theta) = K_e + T K_1 + T^2 K_2 + sum of k_j S_j over the springs j, and the mass.
 
-    Matrices are (unknowns, unknowns). `springs` belong to 1 N/m a node, by the name of their
-    parameter. `axis_deflection` (points, unknowns) gives the deflection of the hanger's axis at
-    `axis_m` (points,) from the deck end.
+    Matrices are (unknowns, unknowns). K_1 (`by_tension`) is the stiffness due to the stress of 1 N;
+    where tension stretches the bar beyond what is described, K_1 and K_2 (`by_square`) have the
+    change of K_e and of the stress's stiffness, too. Else K_2 is zero. `springs` belong to 1 N/m a
+    node, by the name of their parameter. `axis_deflection` (points, unknowns) gives the deflection
+    of the hanger's axis at `axis_m` (points,) from the deck end.
     """
 
     stiffness: scipy.sparse.csr_array
-    initial_stress: scipy.sparse.csr_array
+    by_tension: scipy.sparse.csr_array
+    by_square: scipy.sparse.csr_array
     springs: Mapping[str, scipy.sparse.csr_array]
     mass: scipy.sparse.csr_array
     axis_deflection: scipy.sparse.csr_array
@@ -58,7 +62,8 @@ def stiffness(
     system: AffineSystem, tension_n: float, springs_n_m: FloatArray
 ) -> scipy.sparse.csc_array:
     """K(theta) for the springs (springs,) per node, in the order of the system's."""
-    total = system.stiffness + tension_n * system.initial_stress
+    total = system.stiffness + tension_n * system.by_tension
+    total = total + tension_n**2 * system.by_square
     for spring, value in zip(system.springs.values(), springs_n_m, strict=True):
         total = total + value * spring
     return scipy.sparse.csc_array(total)
@@ -140,7 +145,7 @@ class Reservoir:
     def __post_init__(self) -> None:
         self.vectors = np.zeros((self.system.unknowns, 0))
         self.coordinates = np.zeros((0, 0))
-        self.matrices = np.zeros((3 + len(self.system.springs), 0, 0))
+        self.matrices = np.zeros((4 + len(self.system.springs), 0, 0))
 
     def add(self, modes: Modes) -> None:
         """Takes in further modes; what earlier ones span already adds no vector."""
@@ -167,7 +172,10 @@ class Reservoir:
         system, old, count = self.system, self.vectors.shape[1], added.shape[1]
         grown = np.zeros((len(self.matrices), old + count, old + count))
         grown[:, :old, :old] = self.matrices
-        full = (system.mass, system.stiffness, system.initial_stress, *system.springs.values())
+        full = (
+            system.mass, system.stiffness, system.by_tension, system.by_square,
+            *system.springs.values(),
+        )  # fmt: skip
         for target, matrix in zip(grown, full, strict=True):
             image = matrix @ added
             target[:old, old:] = self.vectors.T @ image
@@ -288,7 +296,8 @@ def _smallest(
 class Projected:
     """K(theta) on a basis whose mass matrix is the unit matrix.
 
-    `matrices` (2 + springs, n, n): stiffness, initial stress of 1 N, springs of 1 N/m per node.
+    `matrices` (3 + springs, n, n): stiffness, what 1 N and what 1 N^2 of tension adds, springs of
+    1 N/m per node.
     """
 
     matrices: FloatArray
@@ -299,7 +308,8 @@ class Projected:
 
     def stiffness(self, points: FloatArray) -> FloatArray:
         """K (m, n, n) at points (m, 1 + springs) of tension in N and log10 k."""
-        factors = np.column_stack([np.ones(len(points)), points[:, :1], 10 ** points[:, 1:]])
+        tension_n, springs = points[:, :1], 10 ** points[:, 1:]
+        factors = np.column_stack([np.ones(len(points)), tension_n, tension_n**2, springs])
         flat = self.matrices.reshape(len(self.matrices), -1)
         square = (len(points), self.unknowns, self.unknowns)
         return np.asarray((factors @ flat).reshape(square))
