@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,10 @@ import rich_click as click
 
 from shm.documents import selection_document
 from shm.errors import UsageError
-from shm.inference import Sigma, select
-from shm.models import applicable, build, competing_names
+from shm.inference import UpdateOptions, modal_groups, select, sigma_by_group
+from shm.models import applicable, build, class_of, competing_names
 from shm.settings import load_settings
-from shm.values import Limits, Selection
+from shm.values import Hanger, Limits, ModalTest, Selection, Summary
 from shm.values.rounding import force_unit
 from shm_cli import completion
 from shm_cli.common import (
@@ -60,10 +61,11 @@ from shm_cli.update import (
 )
 @click.option(
     "--sigma",
-    type=click.Choice(("one", "plane", "mode")),
-    default="one",
+    metavar="|".join((*modal_groups.NAMED, "1-3,4-6")),
+    default=modal_groups.ONE,
     show_default=True,
-    help="One model error of all modes, or one of each plane or mode; with --priors thesis.",
+    help="One model error of all modes, or of each plane, order, mode or group of orders; with "
+    "--priors thesis.",
 )
 @hanger_option()
 @hanger_file_option
@@ -80,7 +82,7 @@ def command(
     modes_file: Path | None,
     models: str | None,
     class_priors: str | None,
-    sigma: Sigma,
+    sigma: str,
     hanger_id: int | None,
     hanger_file: Path | None,
     seed: int,
@@ -101,6 +103,7 @@ def command(
     \b
     Example: shm select hanger3.modes.json --hanger-file H.toml --models beam1,beam2
     Example: shm select hanger3.modes.json --hanger-file H.toml --priors thesis --sigma plane
+    Example: shm select hanger3.modes.json --hanger-file H.toml --priors thesis --sigma 1-3,4-6
     """
     options = replace(update_options(samples, seed, repeat, method, priors), sigma=sigma)
     stated = None if class_priors is None else _stated_priors(class_priors)
@@ -114,13 +117,39 @@ def command(
         options = calibrated(options, calibrated_by, hanger, chosen, progress)
         selection = select(tests, chosen, options, progress, stated)
     tell_poor_fit(selection.selected)
+    errors = _errors_by_group(selection, tests, hanger, options)
     if as_json:
         document = selection_document(selection, hanger.limits)
+        if errors:
+            told = {m: {g: asdict(s) for g, s in own.items()} for m, own in errors.items()}
+            document["sigma_by_group"] = told
         show({**document, "not_applicable": not_applicable, "doubts": doubts})
         return
     show_selection(selection, hanger.limits)
+    if errors:
+        _show_errors(errors)
     for name, reason in not_applicable.items():
         click.echo(f"{name} does not apply: {reason}")
+
+
+def _errors_by_group(
+    selection: Selection, tests: Sequence[ModalTest], hanger: Hanger, options: UpdateOptions
+) -> dict[str, dict[str, Summary]]:
+    """By class; empty where one model error is of all modes."""
+    if options.sigma == modal_groups.ONE:
+        return {}
+    return {
+        each.model: sigma_by_group(each, tests, class_of(each, hanger), options)
+        for each in selection.posteriors
+    }
+
+
+def _show_errors(errors: dict[str, dict[str, Summary]]) -> None:
+    made = table("model error of each group of modes", "class", "group", "mean", "5 %", "95 %")
+    for model, own in errors.items():
+        for name, each in own.items():
+            made.add_row(model, name, *(f"{x:.2%}" for x in (each.mean, each.q05, each.q95)))
+    show_table(made)
 
 
 def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tuple[str, ...]:

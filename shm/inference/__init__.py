@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from shm.inference.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, Sigma, UpdateOptions
+from shm.inference.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, UpdateOptions
 from shm.resources import when_asked
 
 if TYPE_CHECKING:
     from shm.inference.ensemble import refresh
+    from shm.inference.likelihood import sigma_by_group
     from shm.inference.updating import BiasedEvidenceWarning, class_probabilities, select, update
 
 __all__ = [
@@ -17,11 +18,11 @@ __all__ = [
     "TEXTBOOK",
     "BiasedEvidenceWarning",
     "Progress",
-    "Sigma",
     "UpdateOptions",
     "class_probabilities",
     "refresh",
     "select",
+    "sigma_by_group",
     "update",
 ]
 
@@ -31,6 +32,7 @@ if not TYPE_CHECKING:
         __name__,
         {
             "refresh": "shm.inference.ensemble",
+            "sigma_by_group": "shm.inference.likelihood",
             "BiasedEvidenceWarning": "shm.inference.updating",
             **dict.fromkeys(("class_probabilities", "select", "update"), "shm.inference.updating"),
         },

@@ -17,10 +17,11 @@ import numpy as np
 import scipy
 
 from shm.errors import BadInput
-from shm.inference.options import Sigma
+from shm.inference.modal_groups import groups
+from shm.inference.options import UpdateOptions
 from shm.models import Model
 from shm.models.base import Conditions
-from shm.values import PLANES, FloatArray, IntArray, ModalTest, Mode
+from shm.values import PLANES, FloatArray, IntArray, ModalTest, Mode, Posterior, Summary
 
 # Numerical: the trapezoidal rule of a bell in steps of h sd is off by 2 exp(-2 pi^2/h^2), 2e-6; a
 # draw is spread over its step, which adds h^2/12 to the variance, 0.3 %.
@@ -145,17 +146,17 @@ class Likelihood:
 
 
 class GroupedLikelihood(Likelihood):
-    """A model error of its own for each plane, or each mode: thesis (4.7) to (4.12).
+    """A model error of its own for each group of modes: thesis (4.7) to (4.12).
 
     Each is uniform on [0, 1] and integrated out by itself, so that the marginal likelihood is a
     product over the groups. What the rest of the sampler calls sigma is their root mean square
     over the modes; `joint` stands for the parameters alone.
     """
 
-    def __init__(self, tests: Sequence[ModalTest], repeat: int, sigma: Sigma):
+    def __init__(self, tests: Sequence[ModalTest], repeat: int, sigma: str):
         super().__init__(tests, repeat)
-        keys = [(mode.plane, mode.order if sigma == "mode" else 0) for mode in self.modes]
-        self._groups = [np.flatnonzero([key == own for key in keys]) for own in dict.fromkeys(keys)]
+        self.by_name = groups(self.modes, sigma)
+        self._groups = list(self.by_name.values())
         self._parts = [Likelihood.part(self, own) for own in self._groups]
 
     def marginal(self, predicted: FloatArray, floor: float = 0.0) -> FloatArray:
@@ -167,8 +168,12 @@ class GroupedLikelihood(Likelihood):
         return self.marginal(predicted)
 
     def draw_sigma(self, predicted: FloatArray, rng: np.random.Generator) -> FloatArray:
-        parts = zip(self._parts, self._groups, strict=True)
-        return self._mean([part.draw_sigma(predicted[:, own], rng) for part, own in parts])
+        return self._mean([*self.draw_each(predicted, rng).values()])
+
+    def draw_each(self, predicted: FloatArray, rng: np.random.Generator) -> dict[str, FloatArray]:
+        """sigma (n,) of each group, by its name, given each prediction (n, measurements)."""
+        parts = zip(self._parts, self.by_name.items(), strict=True)
+        return {name: part.draw_sigma(predicted[:, own], rng) for part, (name, own) in parts}
 
     def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
         parts = zip(self._parts, self._groups, strict=True)
@@ -177,6 +182,18 @@ class GroupedLikelihood(Likelihood):
     def _mean(self, sigmas: Sequence[FloatArray]) -> FloatArray:
         weights = [len(own) for own in self._groups]
         return np.asarray(np.sqrt(np.average(np.square(sigmas), axis=0, weights=weights)))
+
+
+def sigma_by_group(
+    posterior: Posterior, tests: Sequence[ModalTest], model: Model, options: UpdateOptions
+) -> dict[str, Summary]:
+    """The model error of each group of modes, given what the posterior's draws predict."""
+    likelihood = GroupedLikelihood(tests, options.repeat, options.sigma)
+    theta = np.column_stack([posterior.parameter(name) for name in model.parameter_names])
+    drawn = likelihood.draw_each(
+        likelihood.predict(model, theta), np.random.default_rng(options.seed)
+    )
+    return {name: Summary.of(values) for name, values in drawn.items()}
 
 
 def conditions_of(tests: Sequence[ModalTest], model: Model) -> list[Conditions]:

@@ -12,7 +12,8 @@ from shm.inference.coordinates import Coordinates
 from shm.inference.described import DescribedCoordinates
 from shm.inference.field import FieldLikelihood
 from shm.inference.likelihood import GroupedLikelihood, Likelihood
-from shm.inference.options import Progress, Sigma
+from shm.inference.modal_groups import ONE
+from shm.inference.options import Progress
 from shm.inference.priors import Calibration, reading_of
 from shm.models import THESIS, AsMade, Model
 from shm.models.as_made import TENSION
@@ -81,7 +82,7 @@ class Problem:
         repeat: int,
         progress: Progress,
         calibration: Calibration | None = None,
-        sigma: Sigma = "one",
+        sigma: str = ONE,
     ) -> Problem:
         """The problem of `tests`, each of which the model can describe, the model made ready.
 
@@ -139,13 +140,13 @@ def _likelihood(
     model: Model,
     repeat: int,
     calibration: Calibration | None,
-    sigma: Sigma,
+    sigma: str,
 ) -> Likelihood | FieldLikelihood:
     if model.priors == THESIS:
-        if sigma == "one":
+        if sigma == ONE:
             return Likelihood(tests, repeat)
         return GroupedLikelihood(tests, repeat, sigma)
-    if sigma != "one":
+    if sigma != ONE:
         raise UsageError(
             f"a model error of each {sigma} is the thesis's: the noise of the field has its own.",
             remedy="Leave sigma out, or take the priors of the thesis.",
