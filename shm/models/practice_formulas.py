@@ -6,8 +6,9 @@ tension and what bending takes off it. Sag is left out: hangers stand upright, o
 A formula may fall into ranges of xi = L sqrt(T/EI) with coefficients of their own. The papers were
 not at hand; their coefficients were held against the exact clamped beam (tests/models/
 test_practice_formulas.py): without tension they give 0 within 2 EI/L^2, over their range the errors
-that `worst_error` states. Ceballos and Prato (2008) and Fang and Wang (2012) are not among
-them: their coefficients could be checked neither against the paper nor by a limit.
+that `worst_error` states. Fang and Wang (2012) is not among them: its coefficients could be checked
+neither against the paper nor by a limit. Ceballos and Prato (2008) take several frequencies:
+`shm.models.equal_springs`.
 """
 
 from __future__ import annotations

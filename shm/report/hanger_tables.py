@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from shm.models import equal_springs
 from shm.models.practice_formulas import FORMULAS
 from shm.report import formatting
 from shm.report.contents import HangerReport, TrendRow
@@ -202,18 +203,28 @@ def practice(data: HangerReport) -> Table:
     measured = {(mode.plane, mode.order): mode.frequency_hz for mode in data.latest.modes}
     if data.posterior.model == WITHOUT_MODEL or not np.isfinite(bar).all():
         return Table(title, (), ())
-    rows = []
-    for each in FORMULAS:
-        found = [each.tension_n(measured.get((p, each.order), np.nan), *bar) for p in PLANES]
+    rows: list[tuple[str, ...]] = []
+
+    def add(name: str, found: Sequence[float], *rest: str) -> None:
         if np.isfinite(found).any():
             told = [f"{unit.of(n):.0f}" if math.isfinite(n) else "unknown" for n in found]
-            rows.append((f"{each.name}, mode {each.order}", *told, each.ends, each.leaves_out))
+            rows.append((name, *told, *rest))
+
+    for each in FORMULAS:
+        found = [each.tension_n(measured.get((p, each.order), np.nan), *bar) for p in PLANES]
+        add(f"{each.name}, mode {each.order}", found, each.ends, each.leaves_out)
+    by_order = [{n: hz for (own, n), hz in measured.items() if own == plane} for plane in PLANES]
+    fitted = [equal_springs.tension_n(own, *bar) for own in by_order]
+    add(f"{equal_springs.NAME}, all modes", fitted, equal_springs.ENDS, equal_springs.LEAVES_OUT)
     if not rows:
         return Table(title, (), ())
     said = stated(data.averaged, unit)
     rows.append(("ours, all modes of both planes", said.tension, said.tension, "as found", ""))
     heads = ("formula", *(f"{plane} ({unit.name})" for plane in PLANES), "ends", "leaves out")
-    note = f"Each from one frequency. The 90 % interval of ours is {said.interval}."
+    note = (
+        "Each from the modes that it names, of one plane. "
+        f"The 90 % interval of ours is {said.interval}."
+    )
     return Table(title, heads, tuple(rows), note)
 
 

@@ -68,9 +68,13 @@ def test_formulas_stand_beside_ours(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(formulas, "update", lambda *_: replace(ours, nominal_tension_n=1.0))
     result = CliRunner().invoke(validate.command, ["--formulas", "--json"])
     assert result.exit_code == 0, result.output
-    clamped, springs = json.loads(result.output)[:2]
+    clamped, springs, unequal = json.loads(result.output)[:3]
     assert clamped["ours"] == pytest.approx(710 / 711 - 1)
     assert clamped["xi"] == pytest.approx(6.04, abs=0.01)
     # Ren and both of Zui suppose clamped ends: close there, half of the tension off on springs.
     assert all(abs(clamped["formulas"][n]) < 0.03 for n in CLAMPED_FORMULAS)
     assert all(springs["formulas"][n] < -0.5 for n in CLAMPED_FORMULAS)
+    # Springs of both ends alike are what the last row supposes; a tenth and more off on others.
+    fitted = [each["formulas"]["equal springs, fitted"] for each in (clamped, springs, unequal)]
+    assert fitted[:2] == pytest.approx([0.0, 0.0], abs=1e-4)
+    assert fitted[2] < -0.05
