@@ -13,7 +13,14 @@ from shm.errors import GateNotMet, UsageError
 from shm.values import Hanger
 from shm_cli import thesis
 from shm_cli.common import json_option, markdown, progress_bar, seed_option, show, show_table, table
-from shm_cli.validation import formulas, frequencies, selection, solid_figures, thesis_figures
+from shm_cli.validation import (
+    formulas,
+    frequencies,
+    selection,
+    solid_figures,
+    thesis_figures,
+    thesis_tables,
+)
 from shm_cli.validation.thesis_figures import Figure
 
 FIGURES: dict[str, Callable[[Hanger, Callable[[str, float], None], str], Figure]] = {
@@ -23,6 +30,8 @@ FIGURES: dict[str, Callable[[Hanger, Callable[[str, float], None], str], Figure]
     **dict.fromkeys(thesis_figures.MODE_SHAPES, thesis_figures.mode_shape),
 }
 """How each figure of the thesis is made, by its number."""
+
+TABLES = tuple(sorted((*frequencies.TABLES, *thesis_tables.TABLES)))
 
 
 @click.command()
@@ -37,7 +46,7 @@ FIGURES: dict[str, Callable[[Hanger, Callable[[str, float], None], str], Figure]
 @click.option(
     "--table",
     "wanted",
-    type=click.Choice(frequencies.TABLES),
+    type=click.Choice(TABLES),
     help="One table of the thesis alone.",
 )
 @click.option(
@@ -91,7 +100,7 @@ def command(
         _show_formulas(seed, as_json)
         return
     if wanted is not None:
-        _show_table(wanted, as_json)
+        _show_table(wanted, seed, as_json)
         return
     tables, chosen = compared(seed)
     parts = {
@@ -143,7 +152,16 @@ def _show_figure(number: str, out: Path | None, as_json: bool) -> None:
         raise GateNotMet(found.missed, remedy="Report this: the beam's solver is at fault.")
 
 
-def _show_table(wanted: str, as_json: bool) -> None:
+def _show_table(wanted: str, seed: int, as_json: bool) -> None:
+    if wanted in thesis_tables.TABLES:
+        with progress_bar("validating") as progress:
+            hanger = load_hanger(thesis.HANGER_FILE)
+            shown = thesis_tables.TABLES[wanted](hanger, seed, progress)
+        if as_json:
+            show(shown.document)
+        else:
+            _show(f"table {wanted} of the thesis", shown.heads, shown.cells)
+        return
     with progress_bar("validating") as progress:
         rows = frequencies.compared(load_hanger(thesis.HANGER_FILE), progress, wanted)
     if as_json:

@@ -34,7 +34,7 @@ def build() -> ModuleType:
 def test_the_page_of_the_thesis_has_every_item_and_links_its_pages(build: ModuleType) -> None:
     page = build.thesis_page()
     assert page.count("\n| ") == len(thesis.checklist()) + 1
-    assert "[trials/validation.md](trials/validation.md)" in page
+    assert "[physics.md](physics.md)" in page
     assert "`shm validate --table 3.1`" in page
 
 

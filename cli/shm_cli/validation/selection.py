@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,12 +56,16 @@ class SelectionRow:
 
 
 def compared(
-    hanger: Hanger, seed: int, progress: Callable[[str, float], None]
+    hanger: Hanger,
+    seed: int,
+    progress: Callable[[str, float], None],
+    printings: Sequence[str] = tuple(thesis.PRINTINGS),
+    repeats: Sequence[int] = _REPEATS,
 ) -> list[SelectionRow]:
-    """All classes on both printings, counted once and ten times."""
+    """All classes on the printings of the measured table, counted as often as each of `repeats`."""
     rows = []
-    for printing, path in thesis.PRINTINGS.items():
-        for repeat in _REPEATS:
+    for printing in printings:
+        for repeat in repeats:
             models = [build(name, hanger, THESIS) for name in thesis.EVIDENCE]
             options = UpdateOptions(samples=2000, seed=seed, repeat=repeat)
             label = f"{printing}, N_D = {repeat},"
@@ -69,7 +73,8 @@ def compared(
             def tell(name: str, fraction: float, label: str = label) -> None:
                 progress(f"{label} {name}", fraction)
 
-            selection = select(load_modes(path), models, options, tell)
+            tests = load_modes(thesis.PRINTINGS[printing])
+            selection = select(tests, models, options, tell)
             rows += _selection_rows(printing, repeat, selection)
     return rows
 
