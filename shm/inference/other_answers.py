@@ -39,6 +39,9 @@ prior of the ends has ruled out, not the data."""
 _MATERIAL = 0.1
 """Of the width of the interval, what lies farther beyond it is another answer."""
 
+_SEEN = 0.2
+"""Judgement: of 200 draws that see no more, the error of their mean would count twofold."""
+
 _STARTS = (0.3, 3.0, 30.0)
 """k L/EI at the start of a climb with other orders."""
 
@@ -81,14 +84,14 @@ class _Best:
 def other_answers(problem: Problem, outcome: Outcome, tests: Sequence[ModalTest]) -> OtherAnswers:
     """Of a bar as made; nothing of one with the priors of the thesis.
 
-    The description is off by the norm of the mean deviates, as far as frequencies see it.
+    The description is off as far as frequencies see it.
     """
     coordinates = problem.coordinates
     if not isinstance(coordinates, DescribedCoordinates):
         return OtherAnswers()
     places = coordinates.places(outcome.samples[:, :-1])
     _, seen = coordinates.smooth(places)
-    off_sd = float(np.linalg.norm(seen.mean(axis=0)))
+    off_sd = _description_off_sd(seen)
     if not coordinates.felt_springs:
         return OtherAnswers(description_off_sd=off_sd)
     fit = problem.likelihood.marginal(outcome.predicted) - 0.5 * (seen**2).sum(axis=1)
@@ -100,6 +103,19 @@ def other_answers(problem: Problem, outcome: Outcome, tests: Sequence[ModalTest]
         _tension_of_other_orders_n(problem, coordinates, best, ratio, tests),
         off_sd,
     )
+
+
+def _description_off_sd(seen: FloatArray) -> float:
+    """By how many standard deviations deviates (draws, seen) are off what a sound bar's would be.
+
+    Beforehand their mean is expected at 0 with the variance that the data take off the prior's 1.
+    Data that see little of a large error pull it little, but just as surely.
+    """
+    mean, left = seen.mean(axis=0), np.atleast_2d(np.cov(seen, rowvar=False))
+    taken, direction = np.linalg.eigh(np.eye(len(mean)) - left)
+    # Of directions that next to nothing is seen of, or with two answers, the spread says nothing.
+    spread = np.where(taken > _SEEN, taken.clip(max=1.0), 1.0)
+    return float(np.sqrt(((mean @ direction) ** 2 / spread).sum()))
 
 
 def _tension_of_other_ends_n(

@@ -250,7 +250,7 @@ class Posterior(Shown):
             found.append(
                 "The description does not fit: its section, density, modulus and length would be "
                 f"off by {self.description_off_sd:.0f} of their standard deviations. Check "
-                "diameter, length and material."
+                "diameter, length and material; `shm gap diagnose` says which would fit."
             )
         if math.isfinite(self.tension_of_other_orders_n):
             other_n = self.tension_of_other_orders_n

@@ -9,6 +9,7 @@ import pytest
 
 import shm
 from shm.inference import UpdateOptions, update
+from shm.inference.other_answers import _description_off_sd
 from shm.models import THESIS, build
 from shm.values import PLANES, Hanger, ModalTest, Mode, Posterior
 from tests.helpers.slow import few_of
@@ -71,6 +72,26 @@ def test_a_reading_is_held_against_the_frequencies(read: float, says: bool) -> N
     found = posterior(test)
     assert (found.reading_off_sd > 3) is says
     assert any("contradicts the frequencies" in each for each in found.faults) is says
+
+
+def test_the_description_is_off_by_what_a_sound_bar_would_scatter() -> None:
+    """Of normal prior and data: the mean, over the square root of what the data take off 1."""
+    rng = np.random.default_rng(1)
+    # Two deviates, seen through errors of 0.5 and 1; the bar is off by 4 and by 0.
+    left = np.array([0.5, 1.0]) ** 2 / (1 + np.array([0.5, 1.0]) ** 2)
+    draws = np.array([4.0, 0.0]) * (1 - left) + np.sqrt(left) * rng.standard_normal((4000, 2))
+    turned = draws @ np.array([[0.8, 0.6], [-0.6, 0.8]])
+    assert _description_off_sd(turned) == pytest.approx(4 / np.sqrt(1 + 0.5**2), rel=0.03)
+    unseen = rng.standard_normal((4000, 1)) - 1.5
+    assert _description_off_sd(unseen) == pytest.approx(1.5, rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_diameter_that_is_wrong_by_ten_of_its_standard_deviations_is_told() -> None:
+    thicker = shm.round_bar(3, diameter_m=1.05 * BAR.diameter_m, length_m=9.0, **STEEL)
+    found = posterior(a_test(range(1, 7)), thicker)
+    assert found.description_off_sd > 3
+    assert any("`shm gap diagnose`" in each for each in found.faults)
 
 
 @pytest.mark.slow
