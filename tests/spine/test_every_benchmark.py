@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+import csv
 import subprocess
 import sys
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from shm_cli.main import cli
 from tests.benchmarks import every
+
+# The proof of docs/trials/validation.md names a command a row: by its first word.
+PROOF: dict[str, list[str]] = defaultdict(list)
+with (every.ROOT / "docs/trials/proof.csv").open(newline="", encoding="utf-8") as file:
+    for row in csv.DictReader(file):
+        command = row["command"].strip("`")
+        PROOF[command.split()[0]].append(command)
 
 # Each as `__main__`, in one process, so that what they all import is imported once.
 BEGUN = """
-import argparse, contextlib, io, runpy, sys, traceback
+import argparse, contextlib, io, runpy, shlex, sys, traceback
 from pathlib import Path
 from tests.benchmarks import every
 
@@ -24,8 +35,10 @@ def parsed(parser, *given):
     raise Parsed
 
 parse, argparse.ArgumentParser.parse_args = argparse.ArgumentParser.parse_args, parsed
+proof = [shlex.split(command) for command in sys.argv[1:]]
 for name in every.benchmarks():
     rows = [row for short in (False, True) for row in every.commands(name, short, Path("none"))]
+    rows += [row for row in proof if Path(row[1]).stem == name]
     for sys.argv in [each[1:] for each in rows] + [[rows[0][1], "--help"]]:
         sys.path[:0] = [str(every.HERE)]
         said = io.StringIO()
@@ -46,7 +59,7 @@ for name in every.benchmarks():
 
 def test_every_benchmark_can_be_imported_and_takes_its_arguments() -> None:
     begun = subprocess.run(
-        [sys.executable, "-c", BEGUN], cwd=every.ROOT, env=every.ENVIRONMENT,
+        [sys.executable, "-c", BEGUN, *PROOF["python"]], cwd=every.ROOT, env=every.ENVIRONMENT,
         capture_output=True, text=True, timeout=200, check=False,
     )  # fmt: skip
     assert begun.stdout + begun.stderr == ""
@@ -67,8 +80,25 @@ def test_a_missed_mark_is_no_broken_benchmark(program: str, verdict: str, tmp_pa
     assert every.run([[sys.executable, "-c", program]], tmp_path / "log.txt", seconds) == verdict
 
 
+def test_every_command_of_the_proof_exists() -> None:
+    """Scripts take their arguments by the test above."""
+    assert set(PROOF) == {"make", "shm", "python"}
+    assert {command.split()[1] for command in PROOF["make"]} <= _targets()
+    words = [command.split() for command in PROOF["python"]]
+    assert all((every.ROOT / each[1]).is_file() for each in words)
+    # Of several commands one after the other, `every.py --only NAME` is the one.
+    named = {each[3] if "every.py" in each[1] else Path(each[1]).stem for each in words}
+    assert named <= set(every.benchmarks())
+    for command in PROOF["shm"]:
+        helped = CliRunner().invoke(cli, [*command.split()[1:], "--help"])
+        assert helped.exit_code == 0, helped.output
+
+
+def _targets() -> set[str]:
+    makefile = (every.ROOT / "Makefile").read_text(encoding="utf-8").splitlines()
+    return {line.partition(":")[0] for line in makefile}
+
+
 def test_the_table_of_arguments_names_benchmarks_and_targets() -> None:
     assert set(every.WHOLE | every.SHORT) <= set(every.benchmarks())
-    makefile = (every.ROOT / "Makefile").read_text(encoding="utf-8").splitlines()
-    targets = {line.partition(":")[0] for line in makefile}
-    assert set(every.TESTS) <= targets
+    assert set(every.TESTS) <= _targets()
