@@ -79,7 +79,8 @@ def command(
         raise UsageError("--figure draws a sweep.", remedy="Add --sweep theta_F=0.5:2:50, say.")
     if shape is not None and (figure is None or sweep is not None):
         raise UsageError("--shape is drawn.", remedy="Add --figure FILE.png, without --sweep.")
-    chosen = build(model, one_hanger(ctx, hanger_file, hanger_id), THESIS)
+    # The thesis's for its parameters alone: nobody asked for its reading of the description.
+    chosen = build(model, one_hanger(ctx, hanger_file, hanger_id), THESIS).as_it_hangs()
     nominal = {name: 1.0 for name in chosen.parameter_names if name.startswith("theta_")}
     values = nominal | dict(_pair(setting) for setting in settings)
     if shape is not None and figure is not None:

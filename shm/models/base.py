@@ -67,6 +67,10 @@ class Model:
         """The class with the thesis's reading of the description, where that is another."""
         return self
 
+    def as_it_hangs(self) -> Model:
+        """The class with the description read as one of the hanger under its tension."""
+        return self
+
     @classmethod
     def unfit(cls, hanger: Hanger) -> str:
         """Why this class cannot describe `hanger`; empty where it can."""

@@ -82,6 +82,7 @@ def test_a_hanger_described_as_it_hangs_is_not_stretched_again() -> None:
     assert isinstance(hangs.model, SolidModel)
     assert isinstance(drawn, SolidModel)
     assert (hangs.model.is_unstressed, drawn.is_unstressed) == (False, True)
+    assert not drawn.as_it_hangs().is_unstressed
 
 
 # The table of docs/physics.md: least and largest change of modes 1 to 6 in percent.

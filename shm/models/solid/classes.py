@@ -59,8 +59,14 @@ class SolidModel(Model):
     with_plates: ClassVar[bool] = True
 
     def of_the_thesis(self) -> SolidModel:
+        return self._described(is_unstressed=True)
+
+    def as_it_hangs(self) -> SolidModel:
+        return self._described(is_unstressed=False)
+
+    def _described(self, is_unstressed: bool) -> SolidModel:
         other = copy(self)
-        other.is_unstressed = True
+        other.is_unstressed = is_unstressed
         return other
 
     @classmethod
