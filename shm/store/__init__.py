@@ -26,6 +26,7 @@ from shm.store.list_rows import (
     WaitingTest,
     WatchedName,
 )
+from shm.store.people import Scope, StoredToken
 from shm.store.reprocessing import AGAIN_FROM
 from shm.store.rows import (
     ENDED,
@@ -51,7 +52,6 @@ from shm.store.rows import (
     StoredWatch,
 )
 from shm.store.store import Store
-from shm.store.upkeep import Scope, StoredToken
 from shm.store.workspace import Workspace
 
 __all__ = [

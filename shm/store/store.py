@@ -11,8 +11,7 @@ from sqlalchemy.engine import Engine
 
 from shm.errors import NothingThere
 from shm.store import schema
-from shm.store.audit import Actor, Audit, acting_as
-from shm.store.changed_settings import ChangedSettings
+from shm.store.audit import Actor, Audit, ChangedSettings, acting_as
 from shm.store.database import Database, make_engine
 from shm.store.notes import Notes
 from shm.store.people import People

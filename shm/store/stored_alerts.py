@@ -17,10 +17,11 @@ from sqlalchemy.engine import Connection, Row
 from shm.errors import NothingThere, UsageError
 from shm.store.audit import note
 from shm.store.database import Repository, insert
-from shm.store.deliveries import Deliveries, alert_in
 from shm.store.list_rows import AlertRow, DeliveryRow, EventKind, HangerEvent
 from shm.store.outbox import (
+    Deliveries,
     acknowledgement_of,
+    alert_in,
     raise_alert,
     resolution_of,
     resolve,
@@ -71,8 +72,7 @@ class Alerts(Deliveries):
             query = query.where(alerts.c.hanger == hanger)
         if baseline_id is not None:
             query = query.where(alerts.c.baseline_id == baseline_id)
-        with self.reading() as connection:
-            return tuple(stored_alert(row) for row in connection.execute(query))
+        return tuple(stored_alert(row) for row in self.rows(query))
 
     def list_rows(
         self,
@@ -154,8 +154,7 @@ class Alerts(Deliveries):
 
     def counts(self) -> tuple[int, int]:
         """How many alerts are open, and how many were acknowledged."""
-        with self.reading() as connection:
-            noted = connection.scalar(sa.select(sa.func.count()).select_from(acknowledgements))
+        noted = self.scalar(sa.select(sa.func.count()).select_from(acknowledgements))
         return sum(self.open_counts().values()), int(noted or 0)
 
     def open_counts(self) -> dict[int, int]:
@@ -169,9 +168,8 @@ class Alerts(Deliveries):
             .outerjoin(acknowledgements, acknowledgements.c.alert_id == alerts.c.id)
             .outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
         )
-        with self.reading() as connection:
-            rows = connection.execute(query.where(_is_open).group_by(alerts.c.hanger))
-            return {row[0]: int(row[1]) for row in rows}
+        rows = self.rows(query.where(_is_open).group_by(alerts.c.hanger))
+        return {row[0]: int(row[1]) for row in rows}
 
     def list_hanger_events(
         self, hanger: int, since: datetime | None = None
@@ -329,9 +327,7 @@ class Silences(Repository):
 
     def list_all(self) -> tuple[Silence, ...]:
         """All that were ever made, the oldest first."""
-        with self.reading() as connection:
-            rows = connection.execute(sa.select(*_COLUMNS).order_by(silences.c.id))
-            return tuple(_silence(row) for row in rows)
+        return tuple(map(_silence, self.rows(sa.select(*_COLUMNS).order_by(silences.c.id))))
 
     def list_current(self, at: datetime) -> tuple[Silence, ...]:
         """Those in force at a time or yet to come."""

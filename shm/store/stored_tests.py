@@ -118,8 +118,7 @@ class Tests(Repository):
         if before is not None:
             query = query.where(_is_before(before))
         newest = query.order_by(tests.c.time.desc(), tests.c.id.desc()).limit(limit)
-        with self.reading() as connection:
-            rows = connection.execute(newest).all()
+        rows = self.rows(newest)
         return tuple(
             TestRow(row.id, row.recording_id, row.hanger, row.name, row.time, Stage(row.stage))
             for row in rows
@@ -143,8 +142,7 @@ class Tests(Repository):
         chosen = sa.select(found).order_by(found.c.hanger, found.c.time, found.c.id)
         if limit is not None:
             chosen = chosen.where(found.c.place <= limit)
-        with self.reading() as connection:
-            rows = connection.execute(chosen).all()
+        rows = self.rows(chosen)
         return tuple(
             WaitingTest(r.id, r.recording_id, r.hanger, Stage(r.stage), r.name) for r in rows
         )
@@ -187,9 +185,8 @@ class Tests(Repository):
         """How many tests in force each hanger has, and when the latest was taken."""
         shown = counts(tests) & in_force(tests)
         counted = (tests.c.hanger, sa.func.count().label("tests"), sa.func.max(tests.c.time))
-        with self.reading() as connection:
-            rows = connection.execute(sa.select(*counted).where(shown).group_by(tests.c.hanger))
-            return {row[0]: LatestTest(int(row[1]), row[2]) for row in rows}
+        rows = self.rows(sa.select(*counted).where(shown).group_by(tests.c.hanger))
+        return {row[0]: LatestTest(int(row[1]), row[2]) for row in rows}
 
     def tested_hangers(self) -> frozenset[int]:
         """The numbers of hangers of which tests are in force: one look into the index for each."""
@@ -198,8 +195,7 @@ class Tests(Repository):
         hanger = found.c[0]
         following = least.where(tests.c.hanger > hanger).correlate(found).scalar_subquery()
         found = found.union_all(sa.select(following).where(hanger.is_not(None)))
-        with self.reading() as connection:
-            return frozenset(connection.scalars(sa.select(found.c[0]))) - {None}
+        return frozenset(self.scalars(sa.select(found.c[0]))) - {None}
 
     def latest_before(self, hanger: int, recording_id: int, limit: int) -> tuple[StoredTest, ...]:
         """The latest tests of a hanger that count, but for those of one recording, by time."""
@@ -245,8 +241,7 @@ class Tests(Repository):
     def weighed_among(self, ids: Collection[int]) -> frozenset[int]:
         """Which of these tests are of a tension that was read, too."""
         query = sa.select(tests.c.id).where(tests.c.id.in_(ids), WEIGHED)
-        with self.reading() as connection:
-            return frozenset(connection.scalars(query))
+        return frozenset(self.scalars(query))
 
     def beside(self, test: StoredTest) -> tuple[str | None, str | None]:
         """The names of the tests of the same hanger before and after one, by time."""
@@ -294,8 +289,7 @@ class Tests(Repository):
             .order_by(same_numbers.desc(), recordings.c.id.desc())
             .limit(_MOST_COMPARED)
         )
-        with self.reading() as connection:
-            rows = connection.execute(query).all()
+        rows = self.rows(query)
         return tuple(
             KnownSamples(
                 f"{row.file_name} (recording {row.recording_id})",

@@ -18,8 +18,7 @@ from shm.store.columns import (
     unique_where,
 )
 from shm.store.columns import metadata as metadata
-from shm.store.people_tables import users as _of_people  # noqa: F401 - all are there
-from shm.store.stream_tables import stream_windows as _of_streams  # noqa: F401 - all are there
+from shm.store.people_and_stream_tables import users as _of_people  # noqa: F401 - all are there
 
 SCHEMA = "0014"
 

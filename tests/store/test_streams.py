@@ -10,7 +10,7 @@ import sqlalchemy as sa
 
 from shm.errors import StoreError
 from shm.store import DeliveryState, Store
-from shm.store.stream_tables import stream_windows
+from shm.store.people_and_stream_tables import stream_windows
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import MODES, a_reading, a_window, an_event
 
