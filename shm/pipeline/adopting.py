@@ -30,8 +30,8 @@ from shm.models.adopted import (
     variant_of,
 )
 from shm.models.effects import EFFECTS, Parameter, Variant, parameters_of
-from shm.pipeline.calibrating import options_of
 from shm.pipeline.lineage import update_terms
+from shm.pipeline.steps import options_of
 from shm.store import (
     Adoption,
     Baseline,

@@ -12,13 +12,12 @@ from typing import Any
 from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
-from shm.pipeline.clock import Clock
+from shm.pipeline import Clock
 from shm.pipeline.ending import told_by_other
 from shm.pipeline.judging import judge
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import Opens, RemoteFile, WatchResult, registered, run_step
-from shm.pipeline.rejudging import settled
 from shm.pipeline.telling import (
     Terms,
     after_works,
@@ -27,7 +26,7 @@ from shm.pipeline.telling import (
     plan,
     works_before,
 )
-from shm.pipeline.watching import tests_beside, to_watch
+from shm.pipeline.watching import settled, tests_beside, to_watch
 from shm.settings import Settings
 from shm.store import (
     Delivery,

@@ -14,13 +14,15 @@ from datetime import datetime
 from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.messages import WEEK, Lead
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
-from shm.watch.alert_action import action_words, as_sentence, gravest
 from shm.watch.change_words import (
     CAUSES,
+    action_words,
+    as_sentence,
     beyond_words,
     each_frequency,
     factor,
     frequencies_state,
+    gravest,
     group_words,
     is_stiffness,
     probable_groups,

@@ -31,11 +31,9 @@ from shm.values import (
 )
 from shm.watch.causes import UNEXPLAINED, Columns, Direction, Layout, Structure
 from shm.watch.change_point import Evidence
-from shm.watch.conditions import DAYS_PER_YEAR, Warmth
-from shm.watch.options import WatchOptions
+from shm.watch.options import DAYS_PER_YEAR, Warmth, WatchOptions
 from shm.watch.quantities import MeasuredMode
-from shm.watch.state_sums import StateSums
-from shm.watch.watch_state import WatchState
+from shm.watch.state_sums import StateSums, WatchState
 from shm.watch.watcher import Watcher
 
 POOLED_DAYS = 3.0  # judgement: short beside three weeks in which an owner wants to know, and cheap

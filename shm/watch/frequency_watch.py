@@ -30,7 +30,7 @@ from shm.values import (
 from shm.watch.alert_state import AlertState
 from shm.watch.frequencies import POOLED_DAYS, FrequencyReader, FrequencyWatcher
 from shm.watch.options import WatchOptions
-from shm.watch.watch_state import WatchState
+from shm.watch.state_sums import WatchState
 from shm.watch.watching import DatedTest, Newest, after, options_of
 
 _POOL = timedelta(days=POOLED_DAYS)

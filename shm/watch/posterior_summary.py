@@ -27,8 +27,7 @@ from shm.values import (
 )
 from shm.values.drift import threshold_of
 from shm.watch.change_point import LOG_SHARES, SIZES, STEP, Evidence
-from shm.watch.conditions import DAYS_PER_YEAR
-from shm.watch.options import WatchOptions
+from shm.watch.options import DAYS_PER_YEAR, WatchOptions
 from shm.watch.quantities import value_at
 from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
 

@@ -62,8 +62,8 @@ from shm.watch.reading_corrections import (
     SeenModes,
     credible_share,
     loosening_of,
+    softening,
 )
-from shm.watch.steel_softening import softening
 
 # A frequency without a stated error is as good as a usual identification: its errors go from 1e-4
 # to 1e-3 of a frequency, and who states none is given the worse.

@@ -44,12 +44,12 @@ from shm.watch.isolated_tests import (
     FIRST_TESTS,
     alert_of_baseline,
     first_tests_against,
+    message_of_odd,
 )
 from shm.watch.mistaken_modes import news_of, notice_of, repeated_mistakes
-from shm.watch.odd_text import message_of_odd
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
-from shm.watch.watch_state import WatchState
+from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watch, Watcher, watch_of, watched
 
 DatedTest = tuple[ModalTest, datetime]

@@ -19,7 +19,7 @@ from shm.watch.neighbours import (
     bridge_pattern,
     shifts_of,
 )
-from shm.watch.neighbours.evidence import (
+from shm.watch.neighbours.hypotheses import (
     Bridge,
     independent,
     shed_factors,

@@ -14,8 +14,7 @@ import scipy
 from shm.errors import NothingThere
 from shm.values import NAN, TENSION, Drift, FloatArray
 from shm.values.rounding import NINETY_PERCENT
-from shm.watch.neighbours.evidence import Bridge
-from shm.watch.neighbours.hypotheses import AlikeCause, Part, alike_causes, hypotheses
+from shm.watch.neighbours.hypotheses import AlikeCause, Bridge, Part, alike_causes, hypotheses
 from shm.watch.neighbours.pattern_types import (
     BridgePattern,
     Explanation,

@@ -16,7 +16,7 @@ from shm.bridge.changes import HANGER_KEYS, HOOK_KEYS, SETTING_KEYS
 from shm.bridge.hooks import QUIET_HOURS, QuietHours
 from shm.errors import BadInput, UsageError
 from shm.pipeline import utc_now
-from shm.pipeline.rejudging import differences
+from shm.pipeline.watching import differences
 from shm.report import formatting
 from shm.settings import TABLE, Settings, load_settings
 from shm.store import Stage
