@@ -251,12 +251,6 @@ class Streams(Repository):
         row = self.first(query)
         return row.content if row is not None and whole(stream_watch, row) else None
 
-    def forget_watch(self, hanger: int) -> None:
-        """Drops what the watch of a hanger would go on from."""
-        with self.writing() as connection:
-            for table in (stream_watch, stream_watch_days):
-                connection.execute(sa.delete(table).where(table.c.hanger == hanger))
-
     def save_event(self, event: StreamEvent) -> None:
         """Notes something once; what was noted already is not noted again."""
         row = vars(event)

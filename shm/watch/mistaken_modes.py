@@ -57,11 +57,6 @@ def log_mixture(off: FloatArray, variance: FloatArray | float) -> FloatArray:
     return np.asarray(mixed)
 
 
-def good_probability(off: FloatArray, variance: FloatArray | float) -> FloatArray:
-    """Of modes that are `off` by so much, the probability of each of being no mistaken one."""
-    return np.exp(_log_good(off, variance) - log_mixture(off, variance))
-
-
 def _log_good(off: FloatArray, variance: FloatArray | float) -> FloatArray:
     return np.asarray(
         math.log(1 - MISTAKEN) - off**2 / variance / 2 - np.log(2 * np.pi * variance) / 2

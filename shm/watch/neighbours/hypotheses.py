@@ -199,7 +199,6 @@ _FIRST_OF_TWO = 3
 _NOBODY: IntArray = np.empty((0, 0), np.int64)
 _SWING_K = 5.0
 _SPREAD = 0.2
-_FEWEST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,10 +330,10 @@ class AlikeCause:
 def alike_causes(shifts: Sequence[HangerShift]) -> tuple[AlikeCause, ...]:
     """Every common cause that the data could tell from another.
 
-    All by one fraction; each as its temperature went, where those differ; each logger's hangers,
-    where there are several loggers. A rate that is off by e moves frequencies by e, tensions by 2e.
+    All by one fraction; each as its temperature went, where those differ. A rate that is off by e
+    moves frequencies by e, tensions by 2e.
     """
-    return (_common(shifts), *_by_temperature(shifts), *_by_logger(shifts))
+    return (_common(shifts), *_by_temperature(shifts))
 
 
 def _common(shifts: Sequence[HangerShift]) -> AlikeCause:
@@ -368,22 +367,6 @@ def _by_temperature(shifts: Sequence[HangerShift]) -> tuple[AlikeCause, ...]:
         return ()
     remedy = "the shifts go with the temperatures of the tests; check those readings"
     return (AlikeCause(changes / np.abs(changes).max(), "the temperature", remedy),)
-
-
-def _by_logger(shifts: Sequence[HangerShift]) -> tuple[AlikeCause, ...]:
-    names = np.array([each.logger for each in shifts])
-    known = sorted({name for name in names.tolist() if name})
-    if len(set(names.tolist())) < 2:
-        return ()
-    return tuple(
-        AlikeCause(
-            (names == name).astype(float),
-            f"logger {name}",
-            f"only hangers of logger {name} moved; check its clock, sampling rate and sensors",
-        )
-        for name in known
-        if np.count_nonzero(names == name) >= _FEWEST
-    )
 
 
 def _changes(shifts: Sequence[HangerShift]) -> FloatArray:

@@ -40,14 +40,13 @@ def shifts_of(
     order: Sequence[int],
     *,
     temperature_changes_k: Mapping[int, float] | None = None,
-    loggers: Mapping[int, str] | None = None,
 ) -> tuple[HangerShift, ...]:
     """The latest known tension shift of each hanger that has one, in their `order` on the bridge.
 
     `order` names all hangers, those without a test too: a place is an index into it. A drift whose
     numbers are unknown is passed over for the one before it.
     """
-    changes, names = temperature_changes_k or {}, loggers or {}
+    changes = temperature_changes_k or {}
     return tuple(
         HangerShift(
             hanger=hanger,
@@ -57,7 +56,6 @@ def shifts_of(
             shift_n=latest.shift_mean * latest.baseline,
             shift_sd_n=latest.shift_sd * latest.baseline,
             temperature_change_k=changes.get(hanger, NAN),
-            logger=names.get(hanger, ""),
         )
         for place, hanger in enumerate(order)
         if (latest := _latest(drifts_by_hanger.get(hanger, ()))) is not None
