@@ -18,14 +18,7 @@ from shm.pipeline.judging import judge
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import Opens, RemoteFile, WatchResult, registered, run_step
-from shm.pipeline.telling import (
-    Terms,
-    after_works,
-    held_messages,
-    message_of,
-    plan,
-    works_before,
-)
+from shm.pipeline.telling import Terms, after_works, held_messages, message_of, plan, works_before
 from shm.pipeline.watching import settled, tests_beside, to_watch
 from shm.settings import Settings
 from shm.store import (

@@ -274,10 +274,7 @@ def _of_the_past(alert: Alert | None, resolved: Sequence[StoredAlert]) -> list[S
 
 
 def _why_closed(
-    alert: Alert,
-    tests: Sequence[WatchedTest],
-    hanger: Hanger,
-    beyond: frozenset[tuple[str, str]],
+    alert: Alert, tests: Sequence[WatchedTest], hanger: Hanger, beyond: frozenset[tuple[str, str]]
 ) -> str:
     """Why an alert would not have been raised by what is in force now; empty where it would."""
     kinds = set(alert.kinds)

@@ -63,12 +63,7 @@ class Audit(Repository):
 
 
 def note(
-    connection: Connection,
-    at: datetime,
-    action: str,
-    subject: str,
-    detail: str = "",
-    who: str = "",
+    connection: Connection, at: datetime, action: str, subject: str, detail: str = "", who: str = ""
 ) -> None:
     """Notes a change in the transaction that makes it. `who` is whom the change itself names:
     noted where nobody is known to work with the store, and with the reason where it is another.

@@ -256,11 +256,7 @@ def insert_posterior(
 
 
 def posterior_values(
-    hanger: int,
-    posterior: Posterior,
-    chosen: Sequence[StoredTest],
-    lineage: Lineage,
-    at: datetime,
+    hanger: int, posterior: Posterior, chosen: Sequence[StoredTest], lineage: Lineage, at: datetime
 ) -> Mapping[str, Any]:
     """A posterior of tests, by column."""
     document = posterior_document(posterior)

@@ -24,14 +24,7 @@ from shm.store.rows import (
     StoredAlert,
     counts_by_name,
 )
-from shm.store.tables import (
-    acknowledgements,
-    alerts,
-    deliveries,
-    resolutions,
-    steps,
-    tests,
-)
+from shm.store.tables import acknowledgements, alerts, deliveries, resolutions, steps, tests
 from shm.values import Alert
 
 _HELD = 1024  # technical: those that stand on a large bridge, of some kilobytes each
@@ -338,9 +331,7 @@ def _note_notified(connection: Connection, delivery_id: int, at: datetime) -> No
     siblings = sa.select(deliveries.c.alert_id).where(deliveries.c.id == delivery_id)
     of_alert = deliveries.c.alert_id == siblings.scalar_subquery()
     waiting = sa.select(deliveries.c.id).where(
-        of_alert,
-        deliveries.c.state == DeliveryState.WAITING,
-        deliveries.c.news == News.RAISED,
+        of_alert, deliveries.c.state == DeliveryState.WAITING, deliveries.c.news == News.RAISED
     )
     if connection.execute(waiting).first() is not None:
         return

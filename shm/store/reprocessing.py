@@ -49,11 +49,7 @@ BEFORE = {Stage.UPDATED: Stage.IDENTIFIED, Stage.WATCHED: Stage.UPDATED}
 
 
 def reprocess(
-    connection: Connection,
-    recording_id: int,
-    stage: Stage,
-    at: datetime,
-    test: str | None = None,
+    connection: Connection, recording_id: int, stage: Stage, at: datetime, test: str | None = None
 ) -> Rerun:
     """Sends a recording back so that `stage` is reached anew; what came of it is superseded.
 

@@ -28,13 +28,7 @@ from shm.store.outbox import (
     stored_alert,
     stored_alerts,
 )
-from shm.store.rows import (
-    Acknowledgement,
-    DeliveryState,
-    News,
-    Silence,
-    StoredAlert,
-)
+from shm.store.rows import Acknowledgement, DeliveryState, News, Silence, StoredAlert
 from shm.store.tables import (
     acknowledgements,
     adoptions,

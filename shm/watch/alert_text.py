@@ -95,12 +95,7 @@ def _new(beyond: Sequence[Drift]) -> str:
 
 
 def _of_hanger(
-    test: WatchedTest,
-    change: Change | None,
-    beyond: Sequence[Drift],
-    sizes: str,
-    *,
-    is_call: bool,
+    test: WatchedTest, change: Change | None, beyond: Sequence[Drift], sizes: str, *, is_call: bool
 ) -> list[str]:
     tension = next((each for each in test.drifts if each.quantity == TENSION), None)
     spoken = {each.quantity for each in (*beyond, *(suspects(change) if change else ()))}
@@ -109,9 +104,7 @@ def _of_hanger(
         "This test itself is probably an outlier." if is_odd else "",
         _tension_now(tension) if tension and TENSION in spoken else "",
         _details(
-            sizes,
-            _probabilities(test, change, beyond),
-            _false_alarms(change) if is_call else "",
+            sizes, _probabilities(test, change, beyond), _false_alarms(change) if is_call else ""
         ),
     ]
 

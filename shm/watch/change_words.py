@@ -240,10 +240,7 @@ _LOOK_AT = "bearings, joints, cracks, new loads and the sensors"
 
 
 def urgency_of(
-    hanger: Hanger,
-    change: Change | None,
-    beyond: Sequence[Drift],
-    drifts: Sequence[Drift] = (),
+    hanger: Hanger, change: Change | None, beyond: Sequence[Drift], drifts: Sequence[Drift] = ()
 ) -> Urgency:
     """How soon: today for a loss beyond its threshold as surely as the owner asked to be told.
 
@@ -264,10 +261,7 @@ def _losses(hanger: Hanger, beyond: Sequence[Drift]) -> list[Drift]:
 
 
 def action_words(
-    hanger: Hanger,
-    change: Change | None,
-    beyond: Sequence[Drift],
-    drifts: Sequence[Drift] = (),
+    hanger: Hanger, change: Change | None, beyond: Sequence[Drift], drifts: Sequence[Drift] = ()
 ) -> str:
     """What to do and how soon, in a sentence."""
     urgency = urgency_of(hanger, change, beyond, drifts)

@@ -21,14 +21,7 @@ import numpy as np
 import scipy
 
 from shm.errors import BadInput
-from shm.values import (
-    FREQUENCY,
-    FloatArray,
-    ModalTest,
-    ModeReading,
-    Reading,
-    WatchedQuantity,
-)
+from shm.values import FREQUENCY, FloatArray, ModalTest, ModeReading, Reading, WatchedQuantity
 from shm.watch.causes import UNEXPLAINED, Columns, Direction, Layout, Structure
 from shm.watch.change_point import Evidence
 from shm.watch.options import DAYS_PER_YEAR, Warmth, WatchOptions

@@ -118,9 +118,7 @@ def _material(subject: Subject, evidence: Evidence) -> float:
 
 
 def _materials(
-    subject: Subject,
-    evidence: Evidence,
-    changes: Sequence[tuple[int, ...]],
+    subject: Subject, evidence: Evidence, changes: Sequence[tuple[int, ...]]
 ) -> FloatArray:
     """The same (changes,) of each; of any mode, where no doubt is left that something changed."""
     effects, least = subject.effects, subject.options.least_frequency_shift
@@ -264,12 +262,7 @@ def _company(
 
 
 def drifted(
-    subject: Subject,
-    evidence: Evidence,
-    causes: Evidence,
-    reading: Reading,
-    *,
-    is_baseline: bool,
+    subject: Subject, evidence: Evidence, causes: Evidence, reading: Reading, *, is_baseline: bool
 ) -> tuple[Drift, ...]:
     """The shift of each quantity since the baseline: slow creep, called changes, and a new one.
 

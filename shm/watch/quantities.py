@@ -218,10 +218,7 @@ def common_stiffness(log10_k: FloatArray) -> FloatArray:
 
 
 def _responses(
-    model: Model,
-    base: FloatArray,
-    held: Sequence[tuple[str, ...]],
-    modes: Sequence[MeasuredMode],
+    model: Model, base: FloatArray, held: Sequence[tuple[str, ...]], modes: Sequence[MeasuredMode]
 ) -> list[_Response]:
     """How the mean log frequency of `modes` goes with each of the springs `held` together."""
     if not held or not modes:

@@ -48,13 +48,7 @@ from shm.values import (
 )
 from shm.watch.causes import columns_of
 from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, sound_modes
-from shm.watch.quantities import (
-    MeasuredMode,
-    base_point,
-    moved,
-    shift_of,
-    watched_quantities,
-)
+from shm.watch.quantities import MeasuredMode, base_point, moved, shift_of, watched_quantities
 from shm.watch.reading_corrections import (
     SELDOM,
     AmplitudeSlopes,

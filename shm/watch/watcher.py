@@ -220,10 +220,7 @@ class Watcher:
             time=reading.time,
             temperature_c=reading.temperature_c,
             drifts=drifted(
-                subject,
-                *shifts,
-                reading,
-                is_baseline=state.tests <= self.options.baseline_tests,
+                subject, *shifts, reading, is_baseline=state.tests <= self.options.baseline_tests
             ),
             change=changed(
                 subject,

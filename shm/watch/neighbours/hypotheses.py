@@ -354,9 +354,7 @@ def _common(shifts: Sequence[HangerShift]) -> AlikeCause:
             f"check the temperature readings, and {clocks}",
         )
     return AlikeCause(
-        everywhere,
-        "a temperature or a clock",
-        f"{clocks}, and the temperatures of the tests",
+        everywhere, "a temperature or a clock", f"{clocks}, and the temperatures of the tests"
     )
 
 
