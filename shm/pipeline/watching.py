@@ -33,7 +33,7 @@ from shm.pipeline.ending import (
     why_over,
 )
 from shm.settings import Settings
-from shm.store import Baseline, Stage, Store, StoredAlert, StoredTest, WatchedName, Workspace
+from shm.store import Baseline, Stage, Store, StoredAlert, StoredTest, TestRow, Workspace
 from shm.store.rows import StoredWatch
 from shm.values import Alert, Beside, Hanger, ModalTest, WatchedTest
 from shm.values.drift import threshold_of
@@ -62,7 +62,7 @@ class ToWatch:
 def to_watch(store: Store, baseline: Baseline, newest: StoredTest) -> ToWatch:
     """What the watch of a test needs; how many tests there were before costs next to nothing."""
     before, kept = store.watch.list_watched(baseline, newest), store.watch.state(baseline)
-    key = _key([*before, WatchedName(newest.id, newest.test.id, newest.time)])
+    key = _key(before, newest)
     if kept is None or kept.key != _key(before):
         return ToWatch(*dated_tests(store, baseline, newest), None, key)
     return ToWatch(_dated(store.tests.of_baseline(baseline)), _dated([newest]), kept.content, key)
@@ -113,9 +113,11 @@ def _dated(tests: Sequence[StoredTest]) -> list[DatedTest]:
     return [(each.test, each.time) for each in tests]
 
 
-def _key(tests: Sequence[WatchedName]) -> str:
+def _key(tests: Sequence[TestRow], newest: StoredTest | None = None) -> str:
     """Of these tests in this order: one that came late, or is done again, makes another."""
-    told = "\n".join(f"{each.id} {each.name} {each.time.isoformat()}" for each in tests)
+    named = [(each.id, each.name, each.time) for each in tests]
+    named += [(newest.id, newest.test.id, newest.time)] if newest else []
+    told = "\n".join(f"{id_} {name} {time.isoformat()}" for id_, name, time in named)
     return f"{shm.__version__} {hashlib.sha256(told.encode()).hexdigest()}"
 
 

@@ -23,8 +23,6 @@ from shm.store.list_rows import (
     StoredRecording,
     TestRow,
     TrendPoint,
-    WaitingTest,
-    WatchedName,
 )
 from shm.store.people import Scope, StoredToken
 from shm.store.reprocessing import AGAIN_FROM
@@ -102,8 +100,6 @@ __all__ = [
     "StoredWatch",
     "TestRow",
     "TrendPoint",
-    "WaitingTest",
-    "WatchedName",
     "Withdrawal",
     "Workspace",
 ]

@@ -7,6 +7,7 @@ where it was taken nor anything that is no picture.
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from datetime import datetime, timedelta
 
 import sqlalchemy as sa
@@ -53,7 +54,7 @@ class Notes(Repository):
         del values["id"]
         with self.writing() as connection:
             number = insert(connection, notes, {**values, "photo": kept})
-            made = Note(**{**vars(written), "id": number})
+            made = replace(written, id=number)
             note(connection, now, "note written", f"note {number}, {made.of}", text, who)
         return made
 

@@ -13,6 +13,7 @@ from shm.documents import value_of
 from shm.store.blobs import posterior_from, test_from_document
 from shm.store.checksums import decoding, loads
 from shm.store.files import counts, in_force
+from shm.store.list_rows import TestRow
 from shm.store.rows import DESCRIBED, Baseline, Lineage, Stage, StoredSelection, StoredTest
 from shm.store.tables import (
     adoptions,
@@ -56,6 +57,16 @@ _OF_WORKS = (
     )
     .correlate(tests)
 ) & ~sa.exists().where(watches.c.test_id == tests.c.id, in_force(watches)).correlate(tests)
+
+
+test_columns = tuple(
+    tests.c[name] for name in ("id", "recording_id", "hanger", "name", "time", "stage")
+)
+
+
+def test_row(row: Row[Any]) -> TestRow:
+    """A test by its `test_columns`."""
+    return TestRow(row.id, row.recording_id, row.hanger, row.name, row.time, Stage(row.stage))
 
 
 def lineage_from(row: Row[Any]) -> Lineage:

@@ -289,7 +289,7 @@ class Silences(Repository):
         values = {name: value for name, value in vars(made).items() if name != "id"}
         with self.writing() as connection:
             number = insert(connection, silences, {**values, "ended_who": None})
-            found = self._one(number, made)
+            found = replace(made, id=number)
             told = f"{starts_at:%Y-%m-%d %H:%M} to {ends_at:%Y-%m-%d %H:%M} UTC"
             note(
                 connection,
@@ -317,7 +317,7 @@ class Silences(Repository):
             one = sa.update(silences).where(silences.c.id == silence_id)
             connection.execute(one.values(**ended))
             note(connection, at, f"{kind_of(found)} ended", _silence_named(found), who=who)
-            return self._one(silence_id, found, at, who)
+            return replace(found, ended_at=at, ended_who=who)
 
     def list_all(self) -> tuple[Silence, ...]:
         """All that were ever made, the oldest first."""
@@ -330,13 +330,6 @@ class Silences(Repository):
     def list_in_force(self, at: datetime) -> tuple[Silence, ...]:
         """Those in force at a time."""
         return tuple(each for each in self.list_current(at) if each.starts_at <= at)
-
-    @staticmethod
-    def _one(
-        id_: int, made: Silence, ended_at: datetime | None = None, ended_who: str = ""
-    ) -> Silence:
-        values = {**vars(made), "id": id_, "ended_at": ended_at, "ended_who": ended_who}
-        return Silence(**values)
 
 
 def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> datetime | None:

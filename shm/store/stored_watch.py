@@ -19,7 +19,7 @@ from shm.store.checksums import damaged, decoding, whole
 from shm.store.columns import Number
 from shm.store.database import insert
 from shm.store.files import all_at, in_force, insert_baseline, insert_posterior, move
-from shm.store.list_rows import BaselineGlance, WatchedName
+from shm.store.list_rows import BaselineGlance, TestRow
 from shm.store.outbox import raise_alert, resolve
 from shm.store.queries import (
     among,
@@ -28,6 +28,8 @@ from shm.store.queries import (
     compared_with,
     plain_tests,
     read_baseline,
+    test_columns,
+    test_row,
 )
 from shm.store.reprocessing import WatchedAgain
 from shm.store.rows import (
@@ -204,20 +206,17 @@ class Watch(WatchedAgain):
 
     def list_watched(
         self, baseline: Baseline, before: StoredTest | None = None
-    ) -> tuple[WatchedName, ...]:
+    ) -> tuple[TestRow, ...]:
         """The tests that were watched since a baseline, or those of them `before` a test, by time.
 
         Tests that were watched against an earlier baseline count, but for those before a day since
         which the hanger is compared anew.
         """
-        query = sa.select(tests.c.id, tests.c.name, tests.c.time).where(*compared_with(baseline))
+        query = sa.select(*test_columns).where(*compared_with(baseline))
         if before is not None:
             at_once = (tests.c.time == before.time) & (tests.c.id < before.id)
             query = query.where((tests.c.time < before.time) | at_once)
-        return tuple(
-            WatchedName(row.id, row.name, row.time)
-            for row in self.rows(query.order_by(tests.c.time, tests.c.id))
-        )
+        return tuple(map(test_row, self.rows(query.order_by(tests.c.time, tests.c.id))))
 
     def list_drifts(self, hanger: int | None = None) -> tuple[Drift, ...]:
         """Shifts from the baseline, by time; of one hanger where named."""
