@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from datetime import datetime
 
-from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
+from shm.values import TENSION, Alert, AlertKind, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.messages import WEEK, Lead
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
 from shm.watch.change_words import (
@@ -159,6 +159,21 @@ def short_name(test: str) -> str:
     if len(test) <= _LONGEST_TEST:
         return test
     return f"{test[:_LONGEST_TEST]}-{hashlib.sha256(test.encode()).hexdigest()[:_DIGITS]}"
+
+
+def alert_of(
+    hanger: Hanger,
+    test: tuple[str, datetime],
+    what: str,
+    message: str,
+    kinds: tuple[AlertKind, ...],
+    drifts: tuple[Drift, ...] = (),
+    change: Change | None = None,
+) -> Alert:
+    """An alert that a test, its name and time, calls for: its key names `what` it is of."""
+    name, time = test
+    key = f"hanger-{hanger.id}:{what}:{short_name(name)}"
+    return Alert(key, hanger.id, name, time, message, drifts, kinds, change)
 
 
 def watch_words(watched: Sequence[WatchedTest]) -> str:

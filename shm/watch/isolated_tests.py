@@ -51,7 +51,7 @@ from shm.watch.agreement import (
     read_alone,
     scatter_of,
 )
-from shm.watch.alert_text import against_baseline_words, short_name
+from shm.watch.alert_text import against_baseline_words, alert_of
 from shm.watch.change_words import (
     is_stiffness,
     look_again,
@@ -233,15 +233,9 @@ def _alert(
 ) -> Alert:
     """The alert where the tension moved further than by any load; else a notice."""
     is_alert = lead is not None and _is_no_load(lead)
-    return Alert(
-        key=f"hanger-{hanger.id}:{key}:{short_name(test[0])}",
-        hanger=hanger.id,
-        test=test[0],
-        time=test[1],
-        message=message,
-        drifts=(lead,) if lead is not None and is_alert else (),
-        kinds=("beyond threshold",) if is_alert else (_KIND,),
-    )
+    drifts = (lead,) if lead is not None and is_alert else ()
+    kind: AlertKind = "beyond threshold" if is_alert else _KIND
+    return alert_of(hanger, test, key, message, (kind,), drifts)
 
 
 def _common(
