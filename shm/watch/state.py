@@ -20,6 +20,7 @@ from shm.values import FloatArray
 from shm.values.drift import TENSION, Change, Reading, TemperatureCoefficient, WatchedQuantity
 from shm.values.kinds import NAN
 from shm.values.rounding import NINETY_PERCENT
+from shm.watch.options import reference_of
 from shm.watch.quantities import value_at
 
 if TYPE_CHECKING:
@@ -262,8 +263,7 @@ def _check(readings: Sequence[Reading], outlier: FloatArray) -> None:
 def _reference(readings: Sequence[Reading], options: StateOptions) -> float:
     if np.isfinite(options.reference_temperature_c):
         return options.reference_temperature_c
-    known = _known_temperatures_c(readings)
-    return float(known.mean()) if len(known) else NAN
+    return reference_of([reading.temperature_c for reading in readings])
 
 
 def _known_temperatures_c(readings: Sequence[Reading]) -> FloatArray:
