@@ -16,17 +16,13 @@ from shm.errors import NothingThere, StoreBusy, UsageError
 from shm.store.audit import note
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
-from shm.store.files import (
-    all_at,
-    in_force,
-    insert_baseline,
-    insert_posterior,
-    insert_selection,
-    move,
-)
+from shm.store.files import all_at, in_force, move
 from shm.store.queries import (
     counted_tests,
     hidden,
+    insert_baseline,
+    insert_posterior,
+    insert_selection,
     lineage_from,
     posterior_of_row,
     read_tests,

@@ -18,7 +18,7 @@ from shm.store.blobs import change_in, watch_document, watch_in
 from shm.store.checksums import damaged, decoding, whole
 from shm.store.columns import Number
 from shm.store.database import insert
-from shm.store.files import all_at, in_force, insert_baseline, insert_posterior, move
+from shm.store.files import all_at, in_force, move
 from shm.store.list_rows import BaselineGlance, TestRow
 from shm.store.outbox import raise_alert, resolve
 from shm.store.queries import (
@@ -26,6 +26,8 @@ from shm.store.queries import (
     baseline_in_force,
     baselines_now,
     compared_with,
+    insert_baseline,
+    insert_posterior,
     plain_tests,
     read_baseline,
     test_columns,

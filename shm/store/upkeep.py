@@ -33,10 +33,11 @@ from shm.store.checksums import (
 from shm.store.columns import Document
 from shm.store.copying import Rows, forget
 from shm.store.database import insert
-from shm.store.files import posterior_values, test_contents, write_event
+from shm.store.files import test_contents, write_event
 from shm.store.list_rows import StoredRecording
 from shm.store.missing import ACCEPTED, missing_rows
 from shm.store.people import Tokens
+from shm.store.queries import posterior_values
 from shm.store.rows import IdentifiedTest, Lineage, StoredTest
 from shm.store.tables import (
     APART,
