@@ -21,7 +21,7 @@ from shm.pipeline.stream_state import (
 from shm.read import write
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
-from shm.store.ring_recording import recording_of
+from shm.store.ring_pieces import recording_of
 from shm.values import NAN
 from shm.watch.ambient_hammer import AmbientBias
 from shm_cli import completion

@@ -14,8 +14,8 @@ from shm.errors import BadInput, UsageError
 from shm.inference import Progress, UpdateOptions, select, update
 from shm.models import DESCRIPTION, Model, build
 from shm.modes_document import load_modes
-from shm.pipeline.calibrating import calibration
 from shm.pipeline.lineage import Taught
+from shm.pipeline.steps import calibration
 from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior
 from shm.values.rounding import force_unit
 from shm.values.stated_tension import averaged_now, stated

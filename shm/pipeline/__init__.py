@@ -4,9 +4,10 @@
 wait, and `flow` begins them, keeps their results and refuses what fails.
 """
 
+from collections.abc import Callable
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
-from shm.pipeline.clock import Clock, utc_now
 from shm.resources import when_asked
 
 if TYPE_CHECKING:
@@ -16,14 +17,17 @@ if TYPE_CHECKING:
 
 __all__ = ["Clock", "DeliveryRefused", "Flow", "Notifier", "Sharing", "utc_now"]
 
+Clock = Callable[[], datetime]
+"""The time as the flow takes it."""
+
+
+def utc_now() -> datetime:
+    """The time, in UTC."""
+    return datetime.now(UTC)
+
+
 if not TYPE_CHECKING:
     # The flow brings all readers with it: who only asks the time does without.
-    __getattr__ = when_asked(
-        __name__,
-        {
-            "DeliveryRefused": "shm.pipeline.jobs",
-            "Flow": "shm.pipeline.flow",
-            "Notifier": "shm.pipeline.jobs",
-            "Sharing": "shm.pipeline.intake",
-        },
-    )
+    of_jobs = dict.fromkeys(("DeliveryRefused", "Notifier"), "shm.pipeline.jobs")
+    others = {"Flow": "shm.pipeline.flow", "Sharing": "shm.pipeline.intake"}
+    __getattr__ = when_asked(__name__, {**of_jobs, **others})

@@ -13,8 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
-import numpy as np
-
 from shm.errors import BadInput, NothingThere, UsageError
 from shm.inference import class_probabilities, update
 from shm.inference.options import Progress, silent
@@ -30,8 +28,8 @@ from shm.models.adopted import (
     variant_of,
 )
 from shm.models.effects import EFFECTS, Parameter, Variant, parameters_of
-from shm.pipeline.calibrating import options_of
 from shm.pipeline.lineage import update_terms
+from shm.pipeline.steps import options_of
 from shm.store import (
     Adoption,
     Baseline,
@@ -45,6 +43,7 @@ from shm.store import (
 from shm.values import BaselineCheck, Cause, EffectEstimate, Hanger
 from shm.values.diagnosis import joined
 from shm.watch import gap_percent, has_grown
+from shm.watch.options import reference_of
 
 
 @dataclass(frozen=True)
@@ -197,7 +196,7 @@ def adopted_name(
     cause = _cause(effects, stored)
     places = _places(effects, at, cause, hanger)
     diagnosed = [t for t in tests if stored is None or t.test.id in stored.diagnosis.tests]
-    reference_c = _mean_temperature_c(diagnosed)
+    reference_c = reference_of([each.test.temperature_c for each in diagnosed])
     parts = [
         _part(effect, place, reference_c, hanger, cause)
         for effect, place in zip(effects, places, strict=True)
@@ -236,11 +235,6 @@ def _only_place(effect: str, hanger: Hanger) -> str:
             f"{hanger.id}`.",
         )
     return keys[0]
-
-
-def _mean_temperature_c(tests: Sequence[StoredTest]) -> float:
-    known = [t.test.temperature_c for t in tests if math.isfinite(t.test.temperature_c)]
-    return float(np.mean(known)) if known else math.nan
 
 
 def _part(

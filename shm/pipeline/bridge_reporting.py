@@ -1,4 +1,7 @@
-"""From the store to what a report of the whole bridge is made of."""
+"""From the store to what a report of the whole bridge is made of; open warnings of its hangers.
+
+Nothing here imports what computes: `shm status` asks it, too.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +16,11 @@ from typing import TYPE_CHECKING
 import shm
 from shm.errors import DamagedRow, NothingThere
 from shm.pipeline.lineage import settings_words, software
-from shm.pipeline.open_warnings import warnings_from
 from shm.pipeline.unheard import blind_hangers, heard
 from shm.report.contents import BridgeReport, Course, HangerLine
 from shm.report.formatting import Interval
 from shm.report.hanger_status import Known, findings, hanger_message, still_detected
+from shm.report.open_warnings import nearly_slack, open_warnings, passed_over, standing_out
 from shm.report.states import Period, called_words
 from shm.store import (
     BaselineGlance,
@@ -29,13 +32,69 @@ from shm.store import (
     Workspace,
 )
 from shm.store.checksums import of_readable
-from shm.store.stored_alerts import silenced_until
+from shm.store.stored_alerts import said_of, silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, WatchedTest
 from shm.values.messages import WEEK, Lead
-from shm.watch.alert_action import look_again
+from shm.watch.change_words import look_again
 
 if TYPE_CHECKING:
     from shm.watch.neighbours import BridgePattern, HangerShift
+
+
+def warnings_of(
+    workspace: Workspace, store: Store, hangers: Sequence[Hanger]
+) -> dict[int, tuple[str, ...]]:
+    """The open warnings of each of `hangers` that has a baseline, by hanger."""
+    every = workspace.bridge.hangers
+    latest = of_readable(partial(store.watch.latest, hangers=hangers), {})
+    now, baselines = store.posteriors.latest_trends(hangers), store.watch.baselines_in_force(every)
+    works = [each for each in store.silences.list_all() if each.is_maintenance]
+    return warnings_from(every, hangers, baselines, latest, now, works)
+
+
+def warnings_from(
+    every: Sequence[Hanger],
+    hangers: Sequence[Hanger],
+    baselines: Mapping[int, BaselineGlance],
+    latest: Mapping[int, StoredWatch],
+    now: Mapping[int, TrendPoint],
+    works: Sequence[Silence],
+) -> dict[int, tuple[str, ...]]:
+    """The same of what was asked already: the `baselines` of `every` hanger of the bridge.
+
+    `works` are maintenance windows.
+    """
+    tensions = {id_: each.averaged.tension_n for id_, each in baselines.items()}
+
+    def slack(hanger: Hanger) -> str:
+        watched = latest[hanger.id].watched if hanger.id in latest else None
+        if hanger.id not in now or watched is None:
+            return ""
+        level = hanger.thresholds.alert_probability
+        is_told = any(d.quantity == TENSION and d.probability >= level for d in watched.drifts)
+        of_test = now[hanger.id].averaged.tension_n
+        return nearly_slack(hanger, tensions[hanger.id], of_test, is_told=is_told)
+
+    def of_works(hanger: Hanger) -> str:
+        point, watched = now.get(hanger.id), latest.get(hanger.id)
+        if point is None or point.test in baselines[hanger.id].tests:
+            return ""
+        if watched is not None and watched.watched.time >= point.time:
+            return ""
+        windows = [each for each in works if each.covers(hanger.id, point.time)]
+        return passed_over(hanger, said_of(windows[-1])) if windows else ""
+
+    return {
+        hanger.id: open_warnings(
+            hanger,
+            baselines[hanger.id].check,
+            standing_out(hanger, every, tensions),
+            latest[hanger.id].watched if hanger.id in latest else None,
+            (slack(hanger), of_works(hanger)),
+        )
+        for hanger in hangers
+        if hanger.id in baselines
+    }
 
 
 def bridge_report(

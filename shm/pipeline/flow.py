@@ -24,20 +24,12 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from shm.errors import DISK_FULL, DamagedRow, ShmError, StoreError, WorkerDied
-from shm.pipeline.clock import Clock, utc_now
+from shm.pipeline import Clock, utc_now
 from shm.pipeline.intake import Sharing, receive
-from shm.pipeline.jobs import (
-    DELIVERIES,
-    DeliveryRefused,
-    Job,
-    Jobs,
-    Notifier,
-    Step,
-    wait_after,
-)
+from shm.pipeline.jobs import DELIVERIES, DeliveryRefused, Job, Jobs, Notifier, Step, wait_after
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import competing, reason_document
-from shm.pipeline.rejudging import JudgedAgain
+from shm.pipeline.watching import JudgedAgain
 from shm.read import sidecar_path
 from shm.store import Death, Deaths, Delivery, Outcome, Receipt, Store, StoredAlert, Workspace
 from shm.store.archive import Meanwhile, nothing

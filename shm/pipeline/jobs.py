@@ -12,22 +12,14 @@ from typing import Any
 from shm.bridge import Hook
 from shm.errors import NothingThere, ShmError
 from shm.models import DESCRIPTION, competing_names
-from shm.pipeline.clock import Clock
+from shm.pipeline import Clock
 from shm.pipeline.ending import told_by_other
 from shm.pipeline.judging import judge
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import Opens, RemoteFile, WatchResult, registered, run_step
-from shm.pipeline.rejudging import settled
-from shm.pipeline.telling import (
-    Terms,
-    after_works,
-    held_messages,
-    message_of,
-    plan,
-    works_before,
-)
-from shm.pipeline.watching import tests_beside, to_watch
+from shm.pipeline.telling import Terms, after_works, held_messages, message_of, plan, works_before
+from shm.pipeline.watching import settled, tests_beside, to_watch
 from shm.settings import Settings
 from shm.store import (
     Delivery,
@@ -38,7 +30,7 @@ from shm.store import (
     Store,
     StoredRecording,
     StoredTest,
-    WaitingTest,
+    TestRow,
     Workspace,
 )
 from shm.store.archive import nothing
@@ -169,23 +161,21 @@ class Jobs:
         waiting = self.store.alerts.list_deliveries(DeliveryState.WAITING)
         return held_messages(waiting, hooks, now)
 
-    def _waiting_tests(
-        self, limit: int, held: Collection[int]
-    ) -> defaultdict[int, list[WaitingTest]]:
-        waiting: defaultdict[int, list[WaitingTest]] = defaultdict(list)
+    def _waiting_tests(self, limit: int, held: Collection[int]) -> defaultdict[int, list[TestRow]]:
+        waiting: defaultdict[int, list[TestRow]] = defaultdict(list)
         most = max(limit, self.workspace.settings.baseline_tests)
         for test in self.store.tests.list_waiting(most, excluding=held):
             waiting[test.hanger].append(test)
         return waiting
 
-    def _first_tests(self, hanger: Hanger, tests: Sequence[WaitingTest]) -> Iterator[Job]:
+    def _first_tests(self, hanger: Hanger, tests: Sequence[TestRow]) -> Iterator[Job]:
         needed = self.workspace.settings.baseline_tests
         if len(tests) >= needed:
             first = tests[:needed]
             yield _job("select", hanger.id, partial(self._select, hanger, first), first)
 
     def _later_tests(
-        self, hanger: Hanger, model: str, tests: Sequence[WaitingTest], oldest: int | None
+        self, hanger: Hanger, model: str, tests: Sequence[TestRow], oldest: int | None
     ) -> Iterator[Job]:
         to_update = [test for test in tests if test.stage is Stage.IDENTIFIED]
         for test in self._untaught(to_update):
@@ -195,7 +185,7 @@ class Jobs:
             if test.stage is Stage.UPDATED and (oldest is None or test.recording_id < oldest):
                 yield _job("watch", test.id, partial(self._watch, hanger, test), [test])
 
-    def _untaught(self, tests: Sequence[WaitingTest]) -> Iterator[WaitingTest]:
+    def _untaught(self, tests: Sequence[TestRow]) -> Iterator[TestRow]:
         """Tests up to the first whose tension was read: later ones learn from its posterior."""
         weighed = (
             self.store.tests.weighed_among([test.id for test in tests]) if len(tests) > 1 else ()
@@ -221,7 +211,7 @@ class Jobs:
         found, judged = judge(self.workspace, self.store, recording, found)
         return self.store.tests.save(recording.id, found, lineage, self.clock(), judged)
 
-    def _select(self, hanger: Hanger, first: Sequence[WaitingTest]) -> Step:
+    def _select(self, hanger: Hanger, first: Sequence[TestRow]) -> Step:
         tests = [self.store.tests.get(test.id) for test in first]
         names: tuple[str, ...] = (WITHOUT_MODEL,)
         if hanger.is_modelled:
@@ -238,7 +228,7 @@ class Jobs:
 
         return Step(run, keep)
 
-    def _update(self, hanger: Hanger, model: str, waiting: WaitingTest) -> Step:
+    def _update(self, hanger: Hanger, model: str, waiting: TestRow) -> Step:
         test, baseline = (
             self.store.tests.get(waiting.id),
             self.store.watch.baseline(hanger.id, model),
@@ -287,7 +277,7 @@ class Jobs:
         baseline = self.store.watch.baseline(test.hanger, model, test.time)
         return baseline is not None and test.test.id in baseline.posterior.tests
 
-    def _watch(self, hanger: Hanger, waiting: WaitingTest) -> Step:
+    def _watch(self, hanger: Hanger, waiting: TestRow) -> Step:
         test = self.store.tests.get(waiting.id)
         silences = self.store.silences.list_all()
         if any(each.is_maintenance and each.covers(hanger.id, test.time) for each in silences):
@@ -332,7 +322,7 @@ class Jobs:
         return Step(run, lambda _: self.store.alerts.save_delivery(delivery, self.clock()))
 
 
-def _job(kind: str, number: int, prepare: Callable[[], Step], tests: Sequence[WaitingTest]) -> Job:
+def _job(kind: str, number: int, prepare: Callable[[], Step], tests: Sequence[TestRow]) -> Job:
     recordings = tuple(dict.fromkeys(test.recording_id for test in tests))
     return Job(
         (kind, number),

@@ -32,10 +32,7 @@ _LATEST_OF_OTHERS = 2  # of every other hanger's: where its modes lie now
 
 
 def judge(
-    workspace: Workspace,
-    store: Store,
-    recording: StoredRecording,
-    found: Sequence[IdentifiedTest],
+    workspace: Workspace, store: Store, recording: StoredRecording, found: Sequence[IdentifiedTest]
 ) -> tuple[tuple[IdentifiedTest, ...], Judged]:
     """The tests to keep, and which of them to hold.
 

@@ -15,8 +15,8 @@ from shm.errors import BadInput, NothingThere
 from shm.inference import update
 from shm.inference.options import Progress, silent
 from shm.models import build
-from shm.pipeline.calibrating import checked, options_of
 from shm.pipeline.lineage import update_terms
+from shm.pipeline.steps import checked, options_of
 from shm.pipeline.watching import dated_tests
 from shm.store import Baseline, Stage, Store, StoredAlert, StoredTest, Workspace
 from shm.values import Change, Hanger

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, ParamSpec, Protocol, Self, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, Self, TypeAlias, TypeVar
 
 from shm.errors import StoreError
 from shm.read import sidecar_path
@@ -37,13 +37,6 @@ if TYPE_CHECKING:
     )
     from shm.watch import DatedTest
     from shm.watch.agreement import Way
-
-
-class Opens(Protocol):
-    """What shows a received file under the name it came with: the archive, or a remote file."""
-
-    def opened(self, file: ReceivedFile) -> AbstractContextManager[Path]:
-        """The file, its sidecar beside it, while the context lasts; raises StoreError."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +77,9 @@ class RemoteFile:
                 sidecar_path(path).write_bytes(self.sidecar)
             yield path
 
+
+Opens: TypeAlias = "Archive | RemoteFile"
+"""What shows a received file under the name it came with."""
 
 WatchResult: TypeAlias = "tuple[WatchedTest, Alert | None, bytes, frozenset[tuple[str, Way]]]"
 """What the watch says, the alert that it calls for, what to keep, and what stands beyond its

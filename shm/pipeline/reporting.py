@@ -10,16 +10,16 @@ import shm
 from shm.errors import NothingThere
 from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
-from shm.pipeline.bridge_reporting import notes_of, stored_pattern, unwatched
+from shm.pipeline.bridge_reporting import notes_of, stored_pattern, unwatched, warnings_of
 from shm.pipeline.lineage import (
     IDENTIFY_SETTINGS,
+    discarded_of,
     identify_lineage,
     read_limits,
+    redescribed,
     settings_words,
     test_lineage,
 )
-from shm.pipeline.open_warnings import warnings_of
-from shm.pipeline.redescribed import discarded_of, redescribed
 from shm.pipeline.steps import identify_options
 from shm.pipeline.unheard import blind_hangers, heard
 from shm.pipeline.watching import dated_tests

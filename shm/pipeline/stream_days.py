@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 
 from shm.documents import dump
 from shm.modes_document import modes_document
-from shm.pipeline.clock import Clock
+from shm.pipeline import Clock
 from shm.pipeline.ending import SHM, told_by_other
 from shm.read.atomic import replace_text
 from shm.store import Store, Workspace

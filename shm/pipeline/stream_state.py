@@ -1,4 +1,4 @@
-"""How each stream is: live or silent, what it has lost, what its last window and hour said."""
+"""How each stream is, and what it has shown over the last days."""
 
 from __future__ import annotations
 
@@ -7,16 +7,28 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
+import numpy as np
+
 from shm.documents import parse_time
 from shm.pipeline.unheard import LATELY, State, word_of
+from shm.report.figures.stream_course import Course
 from shm.store import Store, Workspace
 from shm.store.ring import Ring
 from shm.store.ring_files import PERIOD
 from shm.store.ring_notices import StreamState as RingState
-from shm.values import NAN
+from shm.values import NAN, FloatArray
 from shm.values.rounding import NINETY_PERCENT
-from shm.values.stream import PooledReading, Stream, StreamEvent, WindowReading, period_start
+from shm.values.stream import (
+    PERIODS,
+    Period,
+    PooledReading,
+    Stream,
+    StreamEvent,
+    WindowReading,
+    period_start,
+)
 from shm.watch.ambient_hammer import TOGETHER, AmbientBias, ambient_bias
+from shm.watch.state import Band
 
 _TESTS_COMPARED = 12
 """Judgement: of so many the mean is known to a tenth of what is taken for likely before any."""
@@ -155,3 +167,61 @@ def tension_words(hour: PooledReading | None) -> str:
     reach = 100 * NINETY_PERCENT * hour.compensated_sd
     digits = min(3, max(0, 1 - math.floor(math.log10(reach)))) if reach > 0 else 3
     return f"{100 * hour.compensated_shift:+.{digits}f} ± {reach:.{digits}f} %"
+
+
+_LONGEST_SPECTRA = timedelta(days=7)  # technical: a thousand windows of 200 lines
+
+
+_MOST_SPECTRA = 600  # technical: a spectrogram of more columns than a screen shows
+_MOST_READINGS = 800
+"""Technical: about as many as a screen shows: hours of a month, six hours of half a year, days."""
+
+
+def stream_course(store: Store, stream: Stream, since: datetime, until: datetime) -> Course | None:
+    """Hours from `since` to `until`, or what more of them are pooled to where they are too many,
+    and the spectra of the last week; None without any.
+    """
+    period: Period = next(
+        (each for each, long in PERIODS.items() if (until - since) / long <= _MOST_READINGS), "day"
+    )
+    hours = [
+        each
+        for each in store.streams.list_pooled(stream.hanger, period, since, until)
+        if each.stream == stream.name
+    ]
+    first = max(since, until - _LONGEST_SPECTRA)
+    windows = store.streams.list_spectra(stream.name, first, until, _MOST_SPECTRA)
+    if not hours and not windows:
+        return None
+    lines = len(windows[0][1]) if windows else 0
+    alike = [(at, spectrum) for at, spectrum in windows if len(spectrum) == lines]
+    return Course(
+        stream=stream.name,
+        window_times=[at for at, _ in alike],
+        line_hz=(np.arange(lines) + 0.5) * stream.sampling_rate_hz / 2 / max(1, lines),
+        spectrum_db=np.array([spectrum for _, spectrum in alike], dtype=float),
+        hours=[each.start + PERIODS[period] / 2 for each in hours],
+        period=period,
+        modes=_modes(hours),
+        tension=_tension(hours),
+        events=store.streams.list_events(stream.name, since),
+    )
+
+
+def _modes(hours: Sequence[PooledReading]) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Frequencies and their standard deviations (hours,) by mode, NaN where it was not followed."""
+    found: dict[str, tuple[FloatArray, FloatArray]] = {}
+    for number, hour in enumerate(hours):
+        for mode in hour.modes:
+            name = f"{mode.plane} {mode.order}"
+            if name not in found:
+                found[name] = (np.full(len(hours), np.nan), np.full(len(hours), np.nan))
+            found[name][0][number], found[name][1][number] = mode.frequency_hz, mode.frequency_sd_hz
+    return found
+
+
+def _tension(hours: Sequence[PooledReading]) -> Band:
+    """The change under the conditions of the beginning, in per cent, with its 90 % interval."""
+    shift = 100 * np.array([each.compensated_shift for each in hours], dtype=float)
+    reach = 100 * NINETY_PERCENT * np.array([each.compensated_sd for each in hours], dtype=float)
+    return Band(shift - reach, shift, shift + reach)

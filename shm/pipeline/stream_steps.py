@@ -14,7 +14,7 @@ from shm.identify.options import PASSED
 from shm.monitor import as_modal_test, offsets, pooled, read_window, sensor_faults
 from shm.values import Alert, Hanger, ModalTest, Mode, Posterior
 from shm.values.stream import Period, Piece, PooledReading, Stream, StreamEvent, WindowReading
-from shm.watch.stream_hints import led_by
+from shm.watch.stream_cause import led_by
 from shm.watch.stream_state import windows_as_mounted, with_believed
 from shm.watch.stream_watch import StreamOptions, watch_reading
 

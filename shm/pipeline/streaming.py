@@ -21,10 +21,9 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from shm.documents import format_time
-from shm.pipeline.clock import Clock, utc_now
-from shm.pipeline.silent_streams import heed_silences, note_blindness
+from shm.pipeline import Clock, utc_now
 from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day, is_told_already
-from shm.pipeline.thermometers import compare_thermometers
+from shm.pipeline.unheard import compare_thermometers, heed_silences, note_blindness
 from shm.store import Store, Workspace
 from shm.store.archive import nothing
 from shm.store.ring import ring_of

@@ -8,14 +8,9 @@ from __future__ import annotations
 
 from shm.plausibility import clock, copies
 from shm.plausibility.bars import of_another_bar, of_other_signals
-from shm.plausibility.candidate import (
-    Candidate,
-    Check,
-    implied_shift,
-)
+from shm.plausibility.candidate import Candidate, Check, implied_shift, notice_of
 from shm.plausibility.clock import FIRST_DAY, refuse_impossible
 from shm.plausibility.copies import fingerprint_of
-from shm.plausibility.notice import notice_of
 from shm.values import Doubt
 
 __all__ = [

@@ -17,9 +17,8 @@ from shm.report.formatting import Interval
 from shm.values import TENSION, Alert, Averaged, Change, Drift, Hanger, WatchedTest
 from shm.values.messages import NEXT_TEST, TODAY, URGENCIES, WEEK, Lead, Urgency
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
-from shm.watch.alert_action import look_again
 from shm.watch.alert_text import lead_of
-from shm.watch.change_words import quantity_words, size_words
+from shm.watch.change_words import look_again, quantity_words, size_words
 
 WATCH_PROBABILITY = 0.5  # likelier than not
 # Judgement: dead load and erection leave the hangers of sound bridges some 10 % off nominal. With

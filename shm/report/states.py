@@ -24,8 +24,7 @@ from shm.values import (
     WatchedQuantity,
 )
 from shm.watch.change_words import group_words, is_stiffness, probable_groups, quantity_words
-from shm.watch.history import Band, StateHistory
-from shm.watch.state import StateOptions, set_free, states
+from shm.watch.state import Band, StateHistory, StateOptions, set_free, states
 
 if TYPE_CHECKING:
     from shm.watch import Watched

@@ -23,9 +23,8 @@ from shm.store.list_rows import (
     StoredRecording,
     TestRow,
     TrendPoint,
-    WaitingTest,
-    WatchedName,
 )
+from shm.store.people import Scope, StoredToken
 from shm.store.reprocessing import AGAIN_FROM
 from shm.store.rows import (
     ENDED,
@@ -51,7 +50,6 @@ from shm.store.rows import (
     StoredWatch,
 )
 from shm.store.store import Store
-from shm.store.upkeep import Scope, StoredToken
 from shm.store.workspace import Workspace
 
 __all__ = [
@@ -102,8 +100,6 @@ __all__ = [
     "StoredWatch",
     "TestRow",
     "TrendPoint",
-    "WaitingTest",
-    "WatchedName",
     "Withdrawal",
     "Workspace",
 ]

@@ -12,7 +12,7 @@ import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection
@@ -24,22 +24,6 @@ Wait = Callable[[StoreError], bool]
 """Is told why the lock could not be had, waits, and says whether to try again."""
 
 
-class ActiveLock(Protocol):
-    """The right to ingest into one store."""
-
-    def take(self) -> None:
-        """Raises StoreBusy where another process is active, StoreError where none can tell."""
-
-    def held(self) -> bool:
-        """Whether it is still ours; who has lost it must stop ingesting at once."""
-
-    def release(self) -> None:
-        """Lets another have it."""
-
-    def holder(self) -> str | None:
-        """Who has it, told by one who does not ask for it; None where nobody has."""
-
-
 @contextmanager
 def active(location: str | Path, lock_file: Path, wait: Wait | None) -> Iterator[ActiveLock]:
     """Holds the lock of a store, once it can be had.
@@ -47,7 +31,7 @@ def active(location: str | Path, lock_file: Path, wait: Wait | None) -> Iterator
     Raises what kept it from being had where there is no `wait`, where `wait` gives up, or where
     waiting cannot help.
     """
-    lock: ActiveLock = ServerLock(location) if is_server(location) else FileLock(lock_file)
+    lock = ServerLock(location) if is_server(location) else FileLock(lock_file)
     try:
         _take(lock, wait)
         yield lock
@@ -83,6 +67,7 @@ class FileLock:
         self._file: IO[str] | None = None
 
     def take(self) -> None:
+        """Raises StoreBusy where another process is active, StoreError where none can tell."""
         try:
             file = self._path.open("a+", encoding="utf-8")
         except OSError as error:
@@ -110,7 +95,10 @@ class FileLock:
         self._file = file
 
     def held(self) -> bool:
-        """False too where the file was removed: the next process would lock another one."""
+        """Whether it is still ours; who has lost it must stop ingesting at once.
+
+        False too where the file was removed: the next process would lock another one.
+        """
         if self._file is None:
             return False
         try:
@@ -119,11 +107,13 @@ class FileLock:
             return False
 
     def release(self) -> None:
+        """Lets another have it."""
         if self._file is not None:
             self._file.close()
             self._file = None
 
     def holder(self) -> str | None:
+        """Who has it, told by one who does not ask for it; None where nobody has."""
         try:
             with self._path.open(encoding="utf-8") as file:
                 try:
@@ -193,6 +183,9 @@ class ServerLock:
                 connection.invalidate()
             connection.close()
 
+
+ActiveLock = FileLock | ServerLock
+"""The right to ingest into one store."""
 
 _KEY = {"active": ACTIVE_LOCK}
 _TAKE = sa.text("SELECT pg_try_advisory_lock(:active, hashtext(current_schema()))")

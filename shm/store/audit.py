@@ -1,10 +1,12 @@
-"""The audit log: who changed what, when, and by which way; written with the change itself.
+"""The audit log: who changed what, when and by which way; and settings changed by a page.
 
 What shm does by itself is in `events`, and none of it is noted here.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -12,8 +14,10 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Engine
 
+from shm.errors import UsageError
+from shm.store.checksums import decoding, loads, readable
 from shm.store.database import Repository, insert
-from shm.store.people_tables import audit
+from shm.store.people_and_stream_tables import audit, changed_settings
 
 COMMAND_LINE = "command line"
 _OPTION = "shm_actor"
@@ -55,17 +59,11 @@ class Audit(Repository):
         query = sa.select(*_COLUMNS).order_by(audit.c.id.desc()).limit(limit)
         if before is not None:
             query = query.where(audit.c.id < before)
-        with self.reading() as connection:
-            return tuple(AuditRow(*row) for row in connection.execute(query))
+        return tuple(AuditRow(*row) for row in self.rows(query))
 
 
 def note(
-    connection: Connection,
-    at: datetime,
-    action: str,
-    subject: str,
-    detail: str = "",
-    who: str = "",
+    connection: Connection, at: datetime, action: str, subject: str, detail: str = "", who: str = ""
 ) -> None:
     """Notes a change in the transaction that makes it. `who` is whom the change itself names:
     noted where nobody is known to work with the store, and with the reason where it is another.
@@ -85,3 +83,94 @@ def acting_as(engine: Engine, actor: Actor) -> Engine:
 
 
 _COLUMNS = tuple(audit.c[name] for name in AuditRow.__annotations__)
+
+
+@dataclass(frozen=True)
+class ChangedSetting:
+    """The value of a key of `bridge.toml` that holds instead of what the file says."""
+
+    key: str
+    value: float | str
+    at: datetime
+    who: str
+    id: int = 0
+
+    def __str__(self) -> str:
+        setting, by = self.key.replace(".", " "), f"{self.who} on {self.at:%Y-%m-%d}"
+        return f"{setting} = {said(self.value)} instead of what bridge.toml says, by {by}"
+
+    def is_of(self, hanger: int) -> bool:
+        """Whether it changes a hanger, or all of them."""
+        return self.key.startswith(("settings.", f"hanger.{hanger}."))
+
+
+def said(value: float | str | None) -> str:
+    """A value as people read it."""
+    if isinstance(value, str):
+        return value or "none"
+    return "not set" if value is None or math.isnan(value) else f"{value:.10g}"
+
+
+class ChangedSettings(Repository):
+    """Settings that the dashboard has changed; the newest row of a key holds."""
+
+    def change(
+        self,
+        key: str,
+        value: float | str | None,
+        who: str,
+        at: datetime,
+        *,
+        based_on: int | None = None,
+        in_file: str = "not set",
+    ) -> None:
+        """Has `value` hold instead of what `bridge.toml` says (`in_file`); None gives the key back,
+        an empty text says that there is none.
+
+        `based_on` is the number of the change that was in force when this was decided, 0 for the
+        file; raises UsageError where another is in force by now.
+        """
+        with self.writing() as connection:
+            current = _current(connection, changed_settings.c.key == key).get(key)
+            if based_on not in (None, current.id if current else 0):
+                raise _overtaken(key, current, value, in_file)
+            values = {"key": key, "document": value, "who": who, "at": at}
+            insert(connection, changed_settings, values)
+            before = in_file if current is None else said(current.value)
+            after = f"{in_file}, back to bridge.toml" if value is None else said(value)
+            detail = f"from {before} to {after}"
+            note(connection, at, "setting changed", key.replace(".", " "), detail, who)
+
+    def newest(self) -> int:
+        """The number of the last change; 0 where there was none."""
+        return self.scalar(sa.select(sa.func.max(changed_settings.c.id))) or 0
+
+    def list_current(self) -> Mapping[str, ChangedSetting]:
+        """What holds instead of `bridge.toml`, by its key."""
+        with self.reading() as connection:
+            return _current(connection)
+
+
+def _current(connection: Connection, *which: sa.ColumnElement[bool]) -> dict[str, ChangedSetting]:
+    newest = sa.select(sa.func.max(changed_settings.c.id)).group_by(changed_settings.c.key)
+    query = sa.select(changed_settings).where(changed_settings.c.id.in_(newest), *which)
+    rows = connection.execute(query.order_by(changed_settings.c.key)).all()
+    return {each.key: each for each in readable(rows, _changed) if each.value is not None}
+
+
+def _changed(row: sa.Row[Any]) -> ChangedSetting:
+    with decoding(changed_settings, row):
+        return ChangedSetting(row.key, loads(row.document), row.at, row.who, row.id)
+
+
+def _overtaken(
+    key: str, current: ChangedSetting | None, wanted: float | str | None, in_file: str
+) -> UsageError:
+    yours = "" if wanted is None else f", {said(wanted)},"
+    found = f"back at {in_file}, as in bridge.toml"
+    if current is not None:
+        found = f"{said(current.value)}, set by {current.who} at {current.at:%Y-%m-%d %H:%M} UTC"
+    return UsageError(
+        f"{key.replace('.', ' ')} was changed since you opened the page: it is {found}.",
+        remedy=f"Your change{yours} was not saved: make it again if it should still hold.",
+    )

@@ -15,14 +15,7 @@ from tempfile import TemporaryDirectory
 import sqlalchemy as sa
 from sqlalchemy.engine import Engine
 
-from shm.errors import (
-    NothingThere,
-    SchemaOutdated,
-    StoreDamaged,
-    StoreError,
-    UsageError,
-    sentence,
-)
+from shm.errors import NothingThere, SchemaOutdated, StoreDamaged, StoreError, UsageError, sentence
 from shm.store import schema
 from shm.store.archive import sync
 from shm.store.checking import CheckedStore, check_store

@@ -13,12 +13,12 @@ from shm.read.sidecar import SIDECAR_SUFFIX
 from shm.store.archive import Archive, checksum
 from shm.store.checksums import RESTORE
 from shm.store.copying import Rows, TableContent, Tell, contents
-from shm.store.damage import damaged_among
 from shm.store.database import Database
 from shm.store.missing import MissingRow, missing_rows
 from shm.store.schema import changed_objects
 from shm.store.store import Store
 from shm.store.tables import recordings
+from shm.store.upkeep import damaged_among
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ What a database's errors mean, what to do, and when trying again may help.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -324,6 +324,26 @@ class Repository:
         """One consistent view that holds up nobody; raises StoreError."""
         with reading(self.engine) as connection:
             yield connection
+
+    def rows(self, query: sa.Executable) -> Sequence[Any]:
+        """All rows of a query, of one view."""
+        with self.reading() as connection:
+            return connection.execute(query).all()
+
+    def first(self, query: sa.Executable) -> Any:
+        """The first row of a query; None where there is none."""
+        with self.reading() as connection:
+            return connection.execute(query).first()
+
+    def scalar(self, query: sa.Executable) -> Any:
+        """The first value of the first row of a query; None where there is none."""
+        with self.reading() as connection:
+            return connection.scalar(query)
+
+    def scalars(self, query: sa.Executable) -> Sequence[Any]:
+        """The first value of each row of a query."""
+        with self.reading() as connection:
+            return connection.scalars(query).all()
 
 
 class Database(Repository):

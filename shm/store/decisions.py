@@ -85,12 +85,7 @@ class Decisions(Repository):
             return _decided_with(connection, recording_id, sidecar_as)
 
     def confirm(
-        self,
-        recording_id: int,
-        who: str,
-        why: str,
-        at: datetime,
-        time: datetime | None = None,
+        self, recording_id: int, who: str, why: str, at: datetime, time: datetime | None = None
     ) -> Hold:
         """Lets the held tests of a recording count from now on; the hold with that decision.
 

@@ -1,10 +1,11 @@
-"""Rows of received files, their steps, events and results, and how far their tests have come,
-within the caller's transaction.
+"""Rows of received files, their steps and events, and how far their tests have come.
+
+Within the caller's transaction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import PurePath
@@ -14,28 +15,22 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 import shm
-from shm.documents import posterior_document
 from shm.errors import NothingThere
 from shm.modes_document import test_document
 from shm.store.archive import suffix_of
-from shm.store.blobs import pack_response, pack_samples
+from shm.store.blobs import pack_response
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
 from shm.store.list_rows import ReceivedFile, StoredRecording
-from shm.store.rows import DESCRIBED, IdentifiedTest, Lineage, Stage, StoredTest
+from shm.store.rows import IdentifiedTest, Stage, StoredTest
 from shm.store.tables import (
-    baselines,
     events,
     metadata,
     posterior_tests,
-    posteriors,
     recordings,
-    selection_entries,
-    selections,
     steps,
     tests,
 )
-from shm.values import Posterior
 
 ARCHIVED = "archived"
 NOTIFIED = "notified"
@@ -237,79 +232,3 @@ def test_contents(item: IdentifiedTest, name: str) -> dict[str, Any]:
         "taken_at": item.test.time,
         "temperature_c": item.test.temperature_c,
     }
-
-
-def insert_posterior(
-    connection: Connection,
-    hanger: int,
-    posterior: Posterior,
-    chosen: Sequence[StoredTest],
-    lineage: Lineage,
-    at: datetime,
-) -> int:
-    """Keeps a posterior of tests; its number."""
-    values = posterior_values(hanger, posterior, chosen, lineage, at)
-    posterior_id = insert(connection, posteriors, values)
-    pairs = [{"posterior_id": posterior_id, "test_id": test.id} for test in chosen]
-    connection.execute(sa.insert(posterior_tests), pairs)
-    return posterior_id
-
-
-def posterior_values(
-    hanger: int,
-    posterior: Posterior,
-    chosen: Sequence[StoredTest],
-    lineage: Lineage,
-    at: datetime,
-) -> Mapping[str, Any]:
-    """A posterior of tests, by column."""
-    document = posterior_document(posterior)
-    if lineage.described is not None:
-        document[DESCRIBED] = dict(lineage.described)
-    return {
-        **lineage.columns,
-        "hanger": hanger,
-        "model": posterior.model,
-        "time": max(test.time for test in chosen),
-        "document": document,
-        "samples": pack_samples(posterior),
-        "log_evidence": posterior.log_evidence,
-        "log_evidence_sd": posterior.log_evidence_sd,
-        "seed": posterior.seed,
-        "updated_at": at,
-    }
-
-
-def insert_selection(
-    connection: Connection,
-    hanger: int,
-    model: str,
-    probable: Sequence[tuple[int, float]],
-    at: datetime,
-) -> int:
-    """Keeps which class is in force and, that one first, what competed; its number.
-
-    `probable` holds the numbers of the posteriors with their probabilities.
-    """
-    row = {"hanger": hanger, "model": model, "selected_at": at}
-    selection_id = insert(connection, selections, row)
-    entries = [
-        {"selection_id": selection_id, "posterior_id": id_, "rank": rank, "probability": p}
-        for rank, (id_, p) in enumerate(probable)
-    ]
-    connection.execute(sa.insert(selection_entries), entries)
-    return selection_id
-
-
-def insert_baseline(
-    connection: Connection,
-    hanger: int,
-    posterior_id: int,
-    who: str,
-    why: str,
-    at: datetime,
-    since: datetime | None = None,
-) -> int:
-    """Keeps what later tests are compared with; its number."""
-    row = {"hanger": hanger, "posterior_id": posterior_id, "who": who, "why": why}
-    return insert(connection, baselines, {**row, "set_at": at, "since": since})

@@ -223,26 +223,6 @@ class TestRow:
 
 
 @dataclass(frozen=True)
-class WaitingTest:
-    """A test on its way, without its contents."""
-
-    id: int
-    recording_id: int
-    hanger: int
-    stage: Stage
-    name: str
-
-
-@dataclass(frozen=True)
-class WatchedName:
-    """A watched test, without its contents."""
-
-    id: int
-    name: str
-    time: datetime
-
-
-@dataclass(frozen=True)
 class LatestTest:
     """The number of a hanger's tests and the time of the latest."""
 

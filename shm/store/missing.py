@@ -17,14 +17,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row, RowMapping
 
 from shm.store.copying import skipped
-from shm.store.missing_rules import (
-    HISTORY,
-    RESTORE,
-    RULES,
-    WATCH_AGAIN,
-    WATCH_MISSING,
-    Rule,
-)
+from shm.store.missing_rules import HISTORY, RESTORE, RULES, WATCH_AGAIN, WATCH_MISSING, Rule
 from shm.store.tables import events, metadata
 
 ALERT_RULES = (

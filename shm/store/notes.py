@@ -7,6 +7,7 @@ where it was taken nor anything that is no picture.
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from datetime import datetime, timedelta
 
 import sqlalchemy as sa
@@ -16,7 +17,7 @@ from shm.errors import BadInput, NothingThere, UsageError
 from shm.store.audit import note
 from shm.store.checksums import content_checksum, damaged, decoding, readable
 from shm.store.database import Repository, insert
-from shm.store.people_tables import notes
+from shm.store.people_and_stream_tables import notes
 from shm.values.notes import Note, NoteKind
 
 LARGEST_PHOTO_BYTES = 5_000_000
@@ -53,7 +54,7 @@ class Notes(Repository):
         del values["id"]
         with self.writing() as connection:
             number = insert(connection, notes, {**values, "photo": kept})
-            made = Note(**{**vars(written), "id": number})
+            made = replace(written, id=number)
             note(connection, now, "note written", f"note {number}, {made.of}", text, who)
         return made
 
@@ -66,14 +67,12 @@ class Notes(Repository):
             query = query.where(sa.or_(notes.c.hanger == hanger, notes.c.hanger.is_(None)))
         elif of_bridge:
             query = query.where(notes.c.hanger.is_(None))
-        with self.reading() as connection:
-            return tuple(readable(connection.execute(query).all(), _note))
+        return tuple(readable(self.rows(query), _note))
 
     def photo(self, number: int) -> bytes:
         """The photo of a note, a JPEG; raises NothingThere, or DamagedRow where it is damaged."""
         query = sa.select(notes.c.photo, notes.c.photo_checksum).where(notes.c.id == number)
-        with self.reading() as connection:
-            row = connection.execute(query).one_or_none()
+        row = self.first(query)
         if row is None or row.photo is None:
             raise NothingThere(f"no photo of a note {number}.", remedy="See `shm note list`.")
         if row.photo_checksum != content_checksum(row.photo):

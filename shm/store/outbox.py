@@ -1,9 +1,9 @@
-"""Rows of alerts and what is owed of them to hooks, within the caller's transaction."""
+"""Alerts as rows, and the outbox: what each hook is owed of them, told, put off or given up."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from datetime import datetime
+from collections.abc import Collection, Mapping, Sequence
+from datetime import datetime, timedelta
 from functools import lru_cache
 from typing import Any
 
@@ -11,11 +11,20 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.documents import alert_document, value_of
-from shm.errors import DamagedRow
+from shm.errors import DamagedRow, NothingThere, UsageError
 from shm.store.checksums import decoding, loads, note_damage
-from shm.store.database import insert
-from shm.store.rows import Acknowledgement, DeliveryState, News, Resolution, StoredAlert
-from shm.store.tables import acknowledgements, alerts, deliveries, resolutions, tests
+from shm.store.database import Repository, insert
+from shm.store.files import NOTIFIED, write_step
+from shm.store.rows import (
+    Acknowledgement,
+    Delivery,
+    DeliveryState,
+    News,
+    Resolution,
+    StoredAlert,
+    counts_by_name,
+)
+from shm.store.tables import acknowledgements, alerts, deliveries, resolutions, steps, tests
 from shm.values import Alert
 
 _HELD = 1024  # technical: those that stand on a large bridge, of some kilobytes each
@@ -142,3 +151,213 @@ def resolution_of(row: Row[Any]) -> Resolution | None:
     if row.end_at is None:
         return None
     return Resolution(row.id, row.end_who, row.end_why, row.end_at)
+
+
+_OWED = (
+    "id",
+    "hook",
+    "news",
+    "state",
+    "attempts",
+    "next_attempt_at",
+    "last_error",
+    "ended_at",
+    "message_id",
+)
+_outbox = stored_alerts.add_columns(
+    *(deliveries.c[name].label(f"owed_{name}") for name in _OWED)
+).join(deliveries, deliveries.c.alert_id == alerts.c.id)
+_any_waits = sa.select(sa.exists().where(deliveries.c.state == DeliveryState.WAITING))
+
+
+class Deliveries(Repository):
+    """What hooks are owed; a part of the repository of alerts."""
+
+    def list_deliveries(self, state: DeliveryState | None = None) -> tuple[Delivery, ...]:
+        """The outbox: what was told to which hook, or is still owed."""
+        query = _outbox.order_by(deliveries.c.id)
+        if state is not None:
+            query = query.where(deliveries.c.state == state)
+        return self._deliveries(query)
+
+    def list_unsent(self) -> tuple[Delivery, ...]:
+        """Deliveries whose first attempt has not begun, in the order in which they were owed."""
+        waiting = deliveries.c.state == DeliveryState.WAITING
+        query = _outbox.where(waiting, deliveries.c.message_id.is_(None))
+        return self._deliveries(query.order_by(deliveries.c.id))
+
+    def list_of_messages(self, message_ids: Collection[int]) -> tuple[Delivery, ...]:
+        """The deliveries of messages, in their order."""
+        query = _outbox.where(deliveries.c.message_id.in_(message_ids))
+        return self._deliveries(query.order_by(deliveries.c.id))
+
+    def begin_messages(
+        self, messages: Sequence[Sequence[int]], not_needed: Mapping[int, str], at: datetime
+    ) -> None:
+        """Makes messages of deliveries for good, and ends those that nobody needs, with the reason.
+
+        From here on a message keeps its deliveries and its number, whatever is killed when.
+        """
+        if not messages and not not_needed:
+            return
+        unsent = (deliveries.c.state == DeliveryState.WAITING) & deliveries.c.message_id.is_(None)
+        with self.writing() as connection:
+            for ids in messages:
+                begun = sa.update(deliveries).where(deliveries.c.id.in_(ids), unsent)
+                connection.execute(begun.values(message_id=min(ids), next_attempt_at=at))
+            for id_, why in not_needed.items():
+                ended = {"state": DeliveryState.NOT_NEEDED, "last_error": why, "ended_at": at}
+                one = sa.update(deliveries).where(deliveries.c.id == id_, unsent)
+                if connection.execute(one.values(**ended)).rowcount:
+                    _note_notified(connection, id_, at)
+
+    def list_due_deliveries(
+        self,
+        now: datetime,
+        limit: int,
+        excluding: Collection[int] = (),
+        waits: Sequence[timedelta] = (),
+        *,
+        begun: bool = False,
+    ) -> tuple[Delivery, ...]:
+        """Deliveries whose time has come, the longest due first; of each message the first alone.
+
+        With `begun` only of messages: others, which may wait for months, must not fill the limit.
+
+        Also those that would wait longer than `waits` says for so many attempts, its last for more:
+        the clock was ahead when they were put off.
+        """
+        with self.reading() as connection:
+            if not connection.scalar(_any_waits):  # as a rule, and what follows takes six times it
+                return ()
+        at, tried = deliveries.c.next_attempt_at, deliveries.c.attempts
+        counts = [tried == count for count in range(len(waits) - 1)] + [tried >= len(waits) - 1]
+        too_far = [of & (at > now + wait) for of, wait in zip(counts, waits, strict=False)]
+        own = sa.func.coalesce(deliveries.c.message_id, deliveries.c.id) == deliveries.c.id
+        due = (deliveries.c.state == DeliveryState.WAITING) & own & sa.or_(at <= now, *too_far)
+        if begun:
+            due &= deliveries.c.message_id.is_not(None)
+        query = _outbox.where(due, deliveries.c.id.not_in(excluding))
+        return self._deliveries(query.order_by(deliveries.c.next_attempt_at).limit(limit))
+
+    def save_delivery(self, delivery: Delivery, at: datetime) -> None:
+        """Marks a delivery, with its whole message, as done; what has ended stays as it is."""
+        self._end(delivery, DeliveryState.DELIVERED, "", at)
+
+    def save_failure(
+        self, delivery: Delivery, error: str, at: datetime, next_attempt_at: datetime | None
+    ) -> None:
+        """Puts a delivery off, with its message, or gives it up where `next_attempt_at` is None."""
+        if next_attempt_at is None:
+            self._end(delivery, DeliveryState.GIVEN_UP, error, at)
+        else:
+            with self.writing() as connection:
+                waits = {"last_error": error, "next_attempt_at": next_attempt_at}
+                _note(connection, delivery, waits)
+
+    def resend(self, alert_id: int, at: datetime) -> tuple[Delivery, ...]:
+        """Owes an alert anew to the hooks that it was given up by, with the whole message that it
+        went as; the deliveries of the alert that wait again.
+
+        Raises NothingThere where there is none of that number, UsageError where none was given up.
+        """
+        given_up = deliveries.c.state == DeliveryState.GIVEN_UP
+        own = sa.select(deliveries.c.message_id).where(deliveries.c.alert_id == alert_id, given_up)
+        with self.writing() as connection:
+            alert_in(connection, alert_id)
+            of_alert = sa.select(deliveries.c.id).where(deliveries.c.alert_id == alert_id, given_up)
+            ids = connection.scalars(of_alert).all()
+            if not ids:
+                raise UsageError(
+                    f"alert {alert_id} was given up by no hook.", remedy="See `shm alerts`."
+                )
+            messages = [each for each in connection.scalars(own) if each is not None]
+            again = given_up & (deliveries.c.message_id.in_(messages) | deliveries.c.id.in_(ids))
+            waits = {
+                "state": DeliveryState.WAITING,
+                "attempts": 0,
+                "next_attempt_at": at,
+                "ended_at": None,
+            }
+            connection.execute(sa.update(deliveries).where(again).values(**waits))
+        return self._deliveries(_outbox.where(deliveries.c.id.in_(ids)).order_by(deliveries.c.id))
+
+    def delivery_counts(self) -> dict[str, int]:
+        """How many deliveries stand in each state; see `counts_by_name`."""
+        query = sa.select(deliveries.c.state, sa.func.count()).group_by(deliveries.c.state)
+        return counts_by_name(DeliveryState, self.rows(query))
+
+    def _end(self, delivery: Delivery, state: DeliveryState, error: str, at: datetime) -> None:
+        with self.writing() as connection:
+            ended = {"state": state, "last_error": error, "ended_at": at}
+            for row in _note(connection, delivery, ended):
+                if row.news == News.RAISED:
+                    _note_notified(connection, row.id, at)
+                    if state is DeliveryState.DELIVERED:
+                        owe_resolution(connection, row.alert_id, row.hook, at)
+
+    def _deliveries(self, query: sa.Select[Any]) -> tuple[Delivery, ...]:
+        return tuple(_delivery(row) for row in self.rows(query))
+
+
+def alert_in(connection: Connection, alert_id: int) -> StoredAlert:
+    """The alert of a number; raises NothingThere."""
+    row = connection.execute(stored_alerts.where(alerts.c.id == alert_id)).one_or_none()
+    if row is None:
+        raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
+    return stored_alert(row)
+
+
+def _note(connection: Connection, delivery: Delivery, values: dict[str, Any]) -> Sequence[Row[Any]]:
+    """Those of the message that were still owed: another process may have had an answer before.
+
+    What is tried is a message, if only of one alert.
+    """
+    first = deliveries.c.id if delivery.message_id is None else deliveries.c.message_id
+    owed = (first == (delivery.message_id or delivery.id)) & (
+        deliveries.c.state == DeliveryState.WAITING
+    )
+    columns = (deliveries.c[name] for name in ("id", "alert_id", "hook", "news"))
+    rows = connection.execute(sa.select(*columns).where(owed).order_by(deliveries.c.id)).all()
+    changed = sa.update(deliveries).where(owed)
+    message_id = sa.func.coalesce(deliveries.c.message_id, deliveries.c.id)
+    tried = {"attempts": deliveries.c.attempts + 1, "message_id": message_id}
+    connection.execute(changed.values(**tried, **values))
+    return rows
+
+
+def _note_notified(connection: Connection, delivery_id: int, at: datetime) -> None:
+    """The test of an alert has come to its end once no hook is owed it any more."""
+    siblings = sa.select(deliveries.c.alert_id).where(deliveries.c.id == delivery_id)
+    of_alert = deliveries.c.alert_id == siblings.scalar_subquery()
+    waiting = sa.select(deliveries.c.id).where(
+        of_alert, deliveries.c.state == DeliveryState.WAITING, deliveries.c.news == News.RAISED
+    )
+    if connection.execute(waiting).first() is not None:
+        return
+    about = sa.select(tests.c.recording_id, tests.c.id).join(alerts)
+    row = connection.execute(about.where(alerts.c.id == siblings.scalar_subquery())).one_or_none()
+    if row is None:  # raised by readings of a stream
+        return
+    if _notified_steps(connection, row.id) < _told_alerts(connection, row.id):
+        write_step(connection, row.recording_id, NOTIFIED, at, row.id)
+
+
+def _notified_steps(connection: Connection, test_id: int) -> int:
+    of_test = (steps.c.test_id == test_id) & (steps.c.stage == NOTIFIED)
+    return int(connection.scalar(sa.select(sa.func.count()).where(of_test)) or 0)
+
+
+def _told_alerts(connection: Connection, test_id: int) -> int:
+    """Alerts of a test that no hook is owed any more: one that is sent again was told before."""
+    raised = (deliveries.c.alert_id == alerts.c.id) & (deliveries.c.news == News.RAISED)
+    waiting = raised & (deliveries.c.state == DeliveryState.WAITING)
+    told = sa.exists().where(raised) & ~sa.exists().where(waiting)
+    query = sa.select(sa.func.count()).select_from(alerts)
+    return int(connection.scalar(query.where(alerts.c.test_id == test_id, told)) or 0)
+
+
+def _delivery(row: Row[Any]) -> Delivery:
+    owed = {name: getattr(row, f"owed_{name}") for name in _OWED}
+    as_named = {"state": DeliveryState(row.owed_state), "news": News(row.owed_news)}
+    return Delivery(stored=stored_alert(row), **{**owed, **as_named})

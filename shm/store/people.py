@@ -1,11 +1,13 @@
-"""People who sign in by name: their roles, passwords, and the browsers they have signed in with."""
+"""Who may come in: people who sign in by name, their roles, passwords and browsers; tokens."""
 
 from __future__ import annotations
 
 import hashlib
+import hmac
 import re
 import secrets
 import unicodedata
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
@@ -14,12 +16,13 @@ from typing import Any
 
 import argon2
 import sqlalchemy as sa
-from sqlalchemy.engine import Connection
+from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere, UsageError
 from shm.store.audit import note
 from shm.store.database import Repository, insert
-from shm.store.people_tables import sessions, users
+from shm.store.people_and_stream_tables import sessions, users
+from shm.store.tables import tokens
 
 SIGNED_IN_FOR = timedelta(days=30)  # judgement: a month; removing the user ends it at once
 SESSION = "session_"
@@ -27,6 +30,7 @@ SESSION = "session_"
 _SHORTEST, _LONGEST = 15, 1024  # NIST SP 800-63B-4, 3.1.1.2, of a password alone; technical: memory
 _LONGEST_NAME = 255  # technical: what a column and a line of a table take
 _SECRET_BYTES = 32  # 256 bits: nobody guesses it
+_NOTED_AGAIN_AFTER = timedelta(minutes=1)
 _UNSEEN = re.compile(
     "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\u3164\ufe00-\ufe0f\uffa0"
     "\U000e0100-\U000e01ef]"
@@ -108,9 +112,7 @@ class People(Repository):
 
     def list_all(self) -> tuple[User, ...]:
         """All users, those removed too, as they were made."""
-        with self.reading() as connection:
-            rows = connection.execute(sa.select(users).order_by(users.c.id)).all()
-        return tuple(_user(row) for row in rows)
+        return tuple(_user(row) for row in self.rows(sa.select(users).order_by(users.c.id)))
 
     def sign_in(self, name: str, password: str, at: datetime) -> str | None:
         """The secret of a new session; None where name or password is wrong.
@@ -124,8 +126,7 @@ class People(Repository):
         """The secret of a new session of whom a provider of ours names; None where no user has
         exactly this name: a provider may tell names apart that read alike.
         """
-        with self.reading() as connection:
-            row = connection.execute(_in_force.where(users.c.name == name)).first()
+        row = self.first(_in_force.where(users.c.name == name))
         # Once more, since a server's collation may take names for equal.
         return None if row is None or row.name != name else self._begin(row.id, at)
 
@@ -136,8 +137,7 @@ class People(Repository):
             sessions.c.ended_at.is_(None),
             sessions.c.began_at > at - SIGNED_IN_FOR,
         )
-        with self.reading() as connection:
-            row = connection.execute(query).first()
+        row = self.first(query)
         return None if row is None else _user(row)
 
     def sign_out(self, secret: str, at: datetime) -> None:
@@ -271,3 +271,97 @@ def _checksum(secret: str) -> str:
 
 def _user(row: sa.Row[Any]) -> User:
     return User(row.id, row.name, Role(row.role), row.made_at, row.removed_at)
+
+
+class Scope(StrEnum):
+    """What a token allows; one that may write may read."""
+
+    READ = "read"
+    WRITE = "write"
+
+
+@dataclass(frozen=True)
+class StoredToken:
+    """A token without its secret."""
+
+    id: int
+    name: str
+    scopes: frozenset[Scope]
+    created_at: datetime
+    revoked_at: datetime | None = None
+    last_used_at: datetime | None = None
+
+
+class Tokens(Repository):
+    """The tokens of programs; a part of the repository of upkeep."""
+
+    def create_token(self, name: str, scope: Scope, at: datetime) -> str:
+        """Makes a token and returns its secret, which is told this once and kept nowhere.
+
+        Raises UsageError where a token of that name is in force, or where the name is none.
+        """
+        if not name.strip() or len(name) > _LONGEST_NAME or not name.isprintable():
+            raise UsageError(
+                "the name of a token is a short text.", remedy="Name it after who uses it."
+            )
+        secret = f"shm_{_secret()}"
+        scopes = (Scope.READ,) if scope is Scope.READ else (Scope.READ, Scope.WRITE)
+        with self.writing() as connection:
+            if connection.execute(_valid_tokens.where(tokens.c.name == name)).first() is not None:
+                raise UsageError(
+                    f"a token named {name} is in force already.",
+                    remedy=f"Take another name, or revoke it: `shm token revoke {name}`.",
+                )
+            values = {"name": name, "token_sha256": _checksum(secret), "created_at": at}
+            insert(connection, tokens, {**values, "scopes": ",".join(scopes)})
+            note(connection, at, "token made", f"token {name}", f"may {scope}")
+        return secret
+
+    def list_tokens(self) -> tuple[StoredToken, ...]:
+        """All tokens, those revoked too, as they were made."""
+        return tuple(_token(row) for row in self.rows(sa.select(tokens).order_by(tokens.c.id)))
+
+    def revoke_token(self, name: str, at: datetime) -> None:
+        """Ends a token from now on; raises NothingThere where none of that name is in force."""
+        with self.writing() as connection:
+            ended = connection.execute(
+                sa.update(tokens)
+                .where(tokens.c.name == name, tokens.c.revoked_at.is_(None))
+                .values(revoked_at=at)
+            )
+            if ended.rowcount == 0:
+                raise NothingThere(
+                    f"no token named {name} is in force.", remedy="See `shm token list`."
+                )
+            note(connection, at, "token revoked", f"token {name}")
+
+    def token_of(self, secret: str, at: datetime) -> StoredToken | None:
+        """The token in force with this secret, and a note that it was used; None where none has.
+
+        Every token is compared, in constant time, so that the time taken tells nothing.
+        """
+        rows = self.rows(_valid_tokens)
+        found = _matching(rows, _checksum(secret))
+        if found is None:
+            return None
+        if found.last_used_at is None or at - found.last_used_at >= _NOTED_AGAIN_AFTER:
+            with self.writing() as connection:
+                noted = sa.update(tokens).where(tokens.c.id == found.id)
+                connection.execute(noted.values(last_used_at=at))
+        return _token(found)
+
+
+_valid_tokens = sa.select(tokens).where(tokens.c.revoked_at.is_(None))
+
+
+def _matching(rows: Collection[Row[Any]], hashed: str) -> Row[Any] | None:
+    found = None
+    for row in rows:
+        if hmac.compare_digest(row.token_sha256, hashed):
+            found = row
+    return found
+
+
+def _token(row: Row[Any]) -> StoredToken:
+    scopes = frozenset(Scope(scope) for scope in row.scopes.split(","))
+    return StoredToken(row.id, row.name, scopes, row.created_at, row.revoked_at, row.last_used_at)

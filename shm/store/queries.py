@@ -1,22 +1,25 @@
-"""Which tests, posteriors, selections and baselines are in force, and their rows."""
+"""Posteriors, selections, baselines and tests: kept as rows, read back, which are in force."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.documents import value_of
-from shm.store.blobs import posterior_from, test_from_document
+from shm.documents import posterior_document, value_of
+from shm.store.blobs import pack_samples, posterior_from, test_from_document
 from shm.store.checksums import decoding, loads
+from shm.store.database import insert
 from shm.store.files import counts, in_force
+from shm.store.list_rows import TestRow
 from shm.store.rows import DESCRIBED, Baseline, Lineage, Stage, StoredSelection, StoredTest
 from shm.store.tables import (
     adoptions,
     baselines,
+    posterior_tests,
     posteriors,
     recordings,
     selection_entries,
@@ -56,6 +59,16 @@ _OF_WORKS = (
     )
     .correlate(tests)
 ) & ~sa.exists().where(watches.c.test_id == tests.c.id, in_force(watches)).correlate(tests)
+
+
+test_columns = tuple(
+    tests.c[name] for name in ("id", "recording_id", "hanger", "name", "time", "stage")
+)
+
+
+def test_row(row: Row[Any]) -> TestRow:
+    """A test by its `test_columns`."""
+    return TestRow(row.id, row.recording_id, row.hanger, row.name, row.time, Stage(row.stage))
 
 
 def lineage_from(row: Row[Any]) -> Lineage:
@@ -224,3 +237,75 @@ def among(
     """Which rows are of `hangers`, or of any where None, and not of those left out."""
     chosen = (hanger.not_in(excluding),)
     return chosen if hangers is None else (*chosen, hanger.in_([each.id for each in hangers]))
+
+
+def insert_posterior(
+    connection: Connection,
+    hanger: int,
+    posterior: Posterior,
+    chosen: Sequence[StoredTest],
+    lineage: Lineage,
+    at: datetime,
+) -> int:
+    """Keeps a posterior of tests; its number."""
+    values = posterior_values(hanger, posterior, chosen, lineage, at)
+    posterior_id = insert(connection, posteriors, values)
+    pairs = [{"posterior_id": posterior_id, "test_id": test.id} for test in chosen]
+    connection.execute(sa.insert(posterior_tests), pairs)
+    return posterior_id
+
+
+def posterior_values(
+    hanger: int, posterior: Posterior, chosen: Sequence[StoredTest], lineage: Lineage, at: datetime
+) -> Mapping[str, Any]:
+    """A posterior of tests, by column."""
+    document = posterior_document(posterior)
+    if lineage.described is not None:
+        document[DESCRIBED] = dict(lineage.described)
+    return {
+        **lineage.columns,
+        "hanger": hanger,
+        "model": posterior.model,
+        "time": max(test.time for test in chosen),
+        "document": document,
+        "samples": pack_samples(posterior),
+        "log_evidence": posterior.log_evidence,
+        "log_evidence_sd": posterior.log_evidence_sd,
+        "seed": posterior.seed,
+        "updated_at": at,
+    }
+
+
+def insert_selection(
+    connection: Connection,
+    hanger: int,
+    model: str,
+    probable: Sequence[tuple[int, float]],
+    at: datetime,
+) -> int:
+    """Keeps which class is in force and, that one first, what competed; its number.
+
+    `probable` holds the numbers of the posteriors with their probabilities.
+    """
+    row = {"hanger": hanger, "model": model, "selected_at": at}
+    selection_id = insert(connection, selections, row)
+    entries = [
+        {"selection_id": selection_id, "posterior_id": id_, "rank": rank, "probability": p}
+        for rank, (id_, p) in enumerate(probable)
+    ]
+    connection.execute(sa.insert(selection_entries), entries)
+    return selection_id
+
+
+def insert_baseline(
+    connection: Connection,
+    hanger: int,
+    posterior_id: int,
+    who: str,
+    why: str,
+    at: datetime,
+    since: datetime | None = None,
+) -> int:
+    """Keeps what later tests are compared with; its number."""
+    row = {"hanger": hanger, "posterior_id": posterior_id, "who": who, "why": why}
+    return insert(connection, baselines, {**row, "set_at": at, "since": since})

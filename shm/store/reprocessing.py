@@ -49,11 +49,7 @@ BEFORE = {Stage.UPDATED: Stage.IDENTIFIED, Stage.WATCHED: Stage.UPDATED}
 
 
 def reprocess(
-    connection: Connection,
-    recording_id: int,
-    stage: Stage,
-    at: datetime,
-    test: str | None = None,
+    connection: Connection, recording_id: int, stage: Stage, at: datetime, test: str | None = None
 ) -> Rerun:
     """Sends a recording back so that `stage` is reached anew; what came of it is superseded.
 
@@ -222,8 +218,7 @@ class WatchedAgain(Repository):
     def is_again(self, test: StoredTest, baseline: Baseline) -> bool:
         """Whether a test has been compared with a baseline before."""
         own = (watches.c.test_id == test.id) & (watches.c.baseline_id == baseline.id)
-        with self.reading() as connection:
-            return connection.execute(sa.select(watches.c.id).where(own)).first() is not None
+        return self.first(sa.select(watches.c.id).where(own)) is not None
 
     def is_last(self, test: StoredTest, baseline: Baseline) -> bool:
         """Whether no later test that counts has ever been compared with a baseline."""
@@ -233,8 +228,7 @@ class WatchedAgain(Repository):
             .where(watches.c.baseline_id == baseline.id, tests.c.stage != Stage.REFUSED)
             .where(in_force(tests), tests.c.time > test.time)
         )
-        with self.reading() as connection:
-            return connection.execute(query).first() is None
+        return self.first(query) is None
 
 
 def send_back(

@@ -161,11 +161,7 @@ def _doubled(found: Mapping[ChunkKey, Chunk], new: Set[ChunkKey]) -> list[ChunkK
 
 
 def _set_doubled_aside(
-    folder: StreamFolder,
-    waiting: Sequence[WaitingChunk],
-    chunk: Chunk,
-    key: ChunkKey,
-    note: Note,
+    folder: StreamFolder, waiting: Sequence[WaitingChunk], chunk: Chunk, key: ChunkKey, note: Note
 ) -> None:
     said = f"{numbered(chunk.sequence)} came twice, with other samples; the first counts"
     note(StreamEvent(chunk.stream, "doubled", chunk.start, chunk.end, said))

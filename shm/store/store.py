@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from sqlalchemy.engine import Engine
 
 from shm.errors import NothingThere
 from shm.store import schema
-from shm.store.audit import Actor, Audit, acting_as
-from shm.store.changed_settings import ChangedSettings
+from shm.store.audit import Actor, Audit, ChangedSettings, acting_as
 from shm.store.database import Database, make_engine
 from shm.store.notes import Notes
 from shm.store.people import People
@@ -76,12 +74,7 @@ class Store(Database):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

@@ -17,23 +17,18 @@ from sqlalchemy.engine import Connection, Row
 from shm.errors import NothingThere, UsageError
 from shm.store.audit import note
 from shm.store.database import Repository, insert
-from shm.store.deliveries import Deliveries, alert_in
 from shm.store.list_rows import AlertRow, DeliveryRow, EventKind, HangerEvent
 from shm.store.outbox import (
+    Deliveries,
     acknowledgement_of,
+    alert_in,
     raise_alert,
     resolution_of,
     resolve,
     stored_alert,
     stored_alerts,
 )
-from shm.store.rows import (
-    Acknowledgement,
-    DeliveryState,
-    News,
-    Silence,
-    StoredAlert,
-)
+from shm.store.rows import Acknowledgement, DeliveryState, News, Silence, StoredAlert
 from shm.store.tables import (
     acknowledgements,
     adoptions,
@@ -71,8 +66,7 @@ class Alerts(Deliveries):
             query = query.where(alerts.c.hanger == hanger)
         if baseline_id is not None:
             query = query.where(alerts.c.baseline_id == baseline_id)
-        with self.reading() as connection:
-            return tuple(stored_alert(row) for row in connection.execute(query))
+        return tuple(stored_alert(row) for row in self.rows(query))
 
     def list_rows(
         self,
@@ -154,8 +148,7 @@ class Alerts(Deliveries):
 
     def counts(self) -> tuple[int, int]:
         """How many alerts are open, and how many were acknowledged."""
-        with self.reading() as connection:
-            noted = connection.scalar(sa.select(sa.func.count()).select_from(acknowledgements))
+        noted = self.scalar(sa.select(sa.func.count()).select_from(acknowledgements))
         return sum(self.open_counts().values()), int(noted or 0)
 
     def open_counts(self) -> dict[int, int]:
@@ -169,9 +162,8 @@ class Alerts(Deliveries):
             .outerjoin(acknowledgements, acknowledgements.c.alert_id == alerts.c.id)
             .outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
         )
-        with self.reading() as connection:
-            rows = connection.execute(query.where(_is_open).group_by(alerts.c.hanger))
-            return {row[0]: int(row[1]) for row in rows}
+        rows = self.rows(query.where(_is_open).group_by(alerts.c.hanger))
+        return {row[0]: int(row[1]) for row in rows}
 
     def list_hanger_events(
         self, hanger: int, since: datetime | None = None
@@ -297,7 +289,7 @@ class Silences(Repository):
         values = {name: value for name, value in vars(made).items() if name != "id"}
         with self.writing() as connection:
             number = insert(connection, silences, {**values, "ended_who": None})
-            found = self._one(number, made)
+            found = replace(made, id=number)
             told = f"{starts_at:%Y-%m-%d %H:%M} to {ends_at:%Y-%m-%d %H:%M} UTC"
             note(
                 connection,
@@ -325,13 +317,11 @@ class Silences(Repository):
             one = sa.update(silences).where(silences.c.id == silence_id)
             connection.execute(one.values(**ended))
             note(connection, at, f"{kind_of(found)} ended", _silence_named(found), who=who)
-            return self._one(silence_id, found, at, who)
+            return replace(found, ended_at=at, ended_who=who)
 
     def list_all(self) -> tuple[Silence, ...]:
         """All that were ever made, the oldest first."""
-        with self.reading() as connection:
-            rows = connection.execute(sa.select(*_COLUMNS).order_by(silences.c.id))
-            return tuple(_silence(row) for row in rows)
+        return tuple(map(_silence, self.rows(sa.select(*_COLUMNS).order_by(silences.c.id))))
 
     def list_current(self, at: datetime) -> tuple[Silence, ...]:
         """Those in force at a time or yet to come."""
@@ -340,13 +330,6 @@ class Silences(Repository):
     def list_in_force(self, at: datetime) -> tuple[Silence, ...]:
         """Those in force at a time."""
         return tuple(each for each in self.list_current(at) if each.starts_at <= at)
-
-    @staticmethod
-    def _one(
-        id_: int, made: Silence, ended_at: datetime | None = None, ended_who: str = ""
-    ) -> Silence:
-        values = {**vars(made), "id": id_, "ended_at": ended_at, "ended_who": ended_who}
-        return Silence(**values)
 
 
 def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> datetime | None:

@@ -16,17 +16,13 @@ from shm.errors import NothingThere, StoreBusy, UsageError
 from shm.store.audit import note
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
-from shm.store.files import (
-    all_at,
-    in_force,
-    insert_baseline,
-    insert_posterior,
-    insert_selection,
-    move,
-)
+from shm.store.files import all_at, in_force, move
 from shm.store.queries import (
     counted_tests,
     hidden,
+    insert_baseline,
+    insert_posterior,
+    insert_selection,
     lineage_from,
     posterior_of_row,
     read_tests,
@@ -113,8 +109,7 @@ class Posteriors(Trends):
         named = query.with_only_columns(posteriors.c.id)
         latest = named.order_by(posteriors.c.time.desc(), posteriors.c.id.desc()).limit(1)
         chosen = sa.select(posteriors).where(posteriors.c.id == latest.scalar_subquery())
-        with self.reading() as connection:
-            row = connection.execute(chosen).one_or_none()
+        row = self.first(chosen)
         if row is None:
             what = f"hanger {hanger}" + (f", test {test}" if test else "")
             raise NothingThere(f"no posterior of {what} yet.", remedy="Ingest a test of it.")
@@ -127,9 +122,10 @@ class Posteriors(Trends):
     def list_all(self, hanger: int) -> tuple[StoredPosterior, ...]:
         """The posteriors of a hanger in its selected class, by time."""
         query = _shown(hanger)
-        with self.reading() as connection:
-            rows = connection.execute(query.order_by(posteriors.c.time, posteriors.c.id)).all()
-        return tuple(_stored_posterior(row) for row in rows)
+        return tuple(
+            _stored_posterior(row)
+            for row in self.rows(query.order_by(posteriors.c.time, posteriors.c.id))
+        )
 
     def history(self, hanger: int) -> tuple[tuple[StoredTest, Posterior], ...]:
         """Each test of a hanger that has a posterior, with it, by time."""
@@ -176,8 +172,7 @@ class Posteriors(Trends):
     def latest_diagnosis(self, hanger: int) -> StoredDiagnosis | None:
         """The latest diagnosis of a hanger; None where there is none that this version reads."""
         query = sa.select(diagnoses).where(diagnoses.c.hanger == hanger)
-        with self.reading() as connection:
-            row = connection.execute(query.order_by(diagnoses.c.id.desc()).limit(1)).one_or_none()
+        row = self.first(query.order_by(diagnoses.c.id.desc()).limit(1))
         if row is None:
             return None
         with decoding(diagnoses, row, hanger):
@@ -257,8 +252,7 @@ class Posteriors(Trends):
             query = query.where(adoptions.c.hanger == hanger)
         if not undone:
             query = query.where(_in_force)
-        with self.reading() as connection:
-            return tuple(_adoption(row) for row in connection.execute(query))
+        return tuple(_adoption(row) for row in self.rows(query))
 
 
 def _has(connection: Connection, hanger: int) -> bool:

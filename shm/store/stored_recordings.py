@@ -169,8 +169,7 @@ class Recordings(Decisions):
             .group_by(recordings.c.id)
             .order_by(recordings.c.id)
         )
-        with self.reading() as connection:
-            rows = connection.execute(query).all()
+        rows = self.rows(query)
         return tuple(
             Standing(
                 row.id,
@@ -185,15 +184,13 @@ class Recordings(Decisions):
     def oldest_waiting(self) -> datetime | None:
         """When the oldest recording came in that is not through yet; None where all are."""
         query = sa.select(recordings.c.received_at).where(recordings.c.stage.in_(ON_THE_WAY))
-        with self.reading() as connection:
-            row = connection.execute(query.order_by(recordings.c.id).limit(1)).first()
+        row = self.first(query.order_by(recordings.c.id).limit(1))
         return None if row is None else row.received_at
 
     def stage_counts(self) -> dict[str, int]:
         """How many recordings stand at each stage; see `counts_by_name`."""
         query = sa.select(recordings.c.stage, sa.func.count()).group_by(recordings.c.stage)
-        with self.reading() as connection:
-            return counts_by_name(Stage, connection.execute(query))
+        return counts_by_name(Stage, self.rows(query))
 
     def stage_seconds(self, since: datetime) -> dict[str, list[float]]:
         """How long after the stage before each step was reached, of steps made since then.
@@ -205,14 +202,13 @@ class Recordings(Decisions):
         query = sa.select(steps).where(steps.c.recording_id.in_(lately)).order_by(steps.c.id)
         found: defaultdict[str, list[float]] = defaultdict(list)
         before: dict[tuple[int, int | None], datetime] = {}
-        with self.reading() as connection:
-            for row in connection.execute(query):
-                of_file, of_test = (row.recording_id, None), (row.recording_id, row.test_id)
-                began = before.get(of_test) or before.get(of_file)
-                if began is not None and row.at >= since and row.stage != Stage.RECEIVED:
-                    name = row.stage if row.stage in STEPS else OTHER
-                    found[name].append((row.at - began).total_seconds())
-                before[of_test] = row.at
+        for row in self.rows(query):
+            of_file, of_test = (row.recording_id, None), (row.recording_id, row.test_id)
+            began = before.get(of_test) or before.get(of_file)
+            if began is not None and row.at >= since and row.stage != Stage.RECEIVED:
+                name = row.stage if row.stage in STEPS else OTHER
+                found[name].append((row.at - began).total_seconds())
+            before[of_test] = row.at
         return dict(found)
 
     def note_death(self, recording_id: int, death: Death, message: str, at: datetime) -> None:
@@ -269,8 +265,7 @@ class Recordings(Decisions):
         for name, value in wanted.items():
             if value is not None:
                 query = query.where(events.c[name] == value)
-        with self.reading() as connection:
-            rows = connection.execute(query).all()
+        rows = self.rows(query)
         return tuple(Event(r.at, r.kind, r.file_name, r.message, r.recording_id) for r in rows)
 
     def list_steps(self, recording_id: int) -> tuple[Step, ...]:
@@ -281,13 +276,12 @@ class Recordings(Decisions):
             .where(steps.c.recording_id == recording_id)
             .order_by(steps.c.id)
         )
-        with self.reading() as connection:
-            rows = connection.execute(query).all()
-        return tuple(Step(row.stage, row.at, row.version, row.test_id, row.name) for row in rows)
+        return tuple(
+            Step(row.stage, row.at, row.version, row.test_id, row.name) for row in self.rows(query)
+        )
 
     def _recordings(self, query: sa.Select[Any]) -> tuple[StoredRecording, ...]:
-        with self.reading() as connection:
-            return tuple(readable(connection.execute(query), recording_from))
+        return tuple(readable(self.rows(query), recording_from))
 
 
 def _outcome(connection: Connection, known: Row[Any] | None, file: ReceivedFile) -> Outcome:

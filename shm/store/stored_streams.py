@@ -15,8 +15,7 @@ from shm.documents import compact, parse_time
 from shm.store.checksums import decoding, readable, whole
 from shm.store.database import Repository, insert
 from shm.store.outbox import raise_alert, resolve
-from shm.store.rows import StoredAlert
-from shm.store.stream_tables import (
+from shm.store.people_and_stream_tables import (
     pooled_readings,
     stream_events,
     stream_progress,
@@ -24,6 +23,7 @@ from shm.store.stream_tables import (
     stream_watch_days,
     stream_windows,
 )
+from shm.store.rows import StoredAlert
 from shm.store.tables import alerts
 from shm.values import NAN, Alert, Plane, ShapePoint
 from shm.values.modes import Mode
@@ -132,8 +132,7 @@ class Streams(Repository):
         """When the windows of a stream began that are done, from a time on."""
         table = stream_windows
         query = sa.select(table.c.start).where(table.c.stream == stream, table.c.start >= since)
-        with self.reading() as connection:
-            return frozenset(connection.scalars(query))
+        return frozenset(self.scalars(query))
 
     def first_unpooled(self, stream: str, since: datetime) -> datetime | None:
         """The first window with modes from `since` on of which, though later hours are pooled, its
@@ -234,8 +233,7 @@ class Streams(Repository):
         """The watch of a hanger as it was at its last kept time up to `until`, and that time."""
         table = stream_watch_days
         own = sa.select(table).where(table.c.hanger == hanger, table.c.reading_time <= until)
-        with self.reading() as connection:
-            rows = connection.execute(own.order_by(table.c.reading_time.desc())).all()
+        rows = self.rows(own.order_by(table.c.reading_time.desc()))
         return next(((r.reading_time, r.content) for r in rows if whole(table, r)), None)
 
     def go_back(self, hanger: int, to: datetime, content: bytes) -> None:
@@ -250,15 +248,8 @@ class Streams(Repository):
     def watch_state(self, hanger: int) -> bytes | None:
         """What the watch of a hanger goes on from; None where there is nothing, or only damage."""
         query = sa.select(stream_watch).where(stream_watch.c.hanger == hanger)
-        with self.reading() as connection:
-            row = connection.execute(query).one_or_none()
+        row = self.first(query)
         return row.content if row is not None and whole(stream_watch, row) else None
-
-    def forget_watch(self, hanger: int) -> None:
-        """Drops what the watch of a hanger would go on from."""
-        with self.writing() as connection:
-            for table in (stream_watch, stream_watch_days):
-                connection.execute(sa.delete(table).where(table.c.hanger == hanger))
 
     def save_event(self, event: StreamEvent) -> None:
         """Notes something once; what was noted already is not noted again."""
@@ -273,15 +264,13 @@ class Streams(Repository):
         query = sa.select(stream_events).where(stream_events.c.end >= since)
         if stream is not None:
             query = query.where(stream_events.c.stream == stream)
-        with self.reading() as connection:
-            rows = connection.execute(query.order_by(stream_events.c.start, stream_events.c.id))
-            return tuple(readable(rows.all(), _event))
+        rows = self.rows(query.order_by(stream_events.c.start, stream_events.c.id))
+        return tuple(readable(rows, _event))
 
     def progress(self, stream: str) -> datetime | None:
         """Up to when the windows of a stream are done; None where none is."""
         query = sa.select(stream_progress).where(stream_progress.c.stream == stream)
-        with self.reading() as connection:
-            row = connection.execute(query).one_or_none()
+        row = self.first(query)
         return row.done_until if row is not None and whole(stream_progress, row) else None
 
     def sweep(self, now: datetime, window_days: float) -> None:
@@ -302,8 +291,7 @@ class Streams(Repository):
                 connection.execute(chosen)
 
     def _moment(self, query: sa.Select[Any]) -> datetime | None:
-        with self.reading() as connection:
-            found: datetime | None = connection.scalar(query)
+        found: datetime | None = self.scalar(query)
         return found
 
     def _values(self, table: sa.Table, query: sa.Select[Any], kind: type[_T]) -> tuple[_T, ...]:
@@ -311,8 +299,7 @@ class Streams(Repository):
             with decoding(table, row, row.hanger):
                 return _reading(kind, json.loads(row.document))
 
-        with self.reading() as connection:
-            return tuple(readable(connection.execute(query).all(), value))
+        return tuple(readable(self.rows(query), value))
 
 
 def _reading(kind: type[_T], document: dict[str, Any]) -> _T:

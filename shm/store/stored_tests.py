@@ -16,7 +16,7 @@ from shm.store.checksums import content_checksum, damaged, decoding
 from shm.store.database import Repository, insert
 from shm.store.files import advance_recordings, counts, in_force, test_contents, write_step
 from shm.store.holding import Judged, fingerprint_from, keep_judgement
-from shm.store.list_rows import LatestTest, TestRow, WaitingTest
+from shm.store.list_rows import LatestTest, TestRow
 from shm.store.queries import (
     WEIGHED,
     compared_with,
@@ -24,6 +24,8 @@ from shm.store.queries import (
     lineage_from,
     plain_tests,
     read_tests,
+    test_columns,
+    test_row,
 )
 from shm.store.rows import (
     Baseline,
@@ -40,7 +42,6 @@ from shm.values import Fingerprint, FrequencyResponse, KnownSamples
 
 # Recordings of a hanger: some 20 MB, at most 110; older ones are found by their digest.
 _MOST_COMPARED = 1000
-_ROW = tuple(tests.c[name] for name in ("id", "recording_id", "hanger", "name", "time", "stage"))
 _LATEST = 3
 _WITHOUT_SAMPLES = ("id", "model", "updated_at", "superseded_at")
 _LINEAGE = ("input_sha256", "settings_sha256", "version")
@@ -114,40 +115,30 @@ class Tests(Repository):
         self, hanger: int, limit: int = 50, before: int | None = None
     ) -> tuple[TestRow, ...]:
         """Tests of a hanger by name, the newest first; `before` is the test to go on after."""
-        query = sa.select(*_ROW).where(_shown(hanger))
+        query = sa.select(*test_columns).where(_shown(hanger))
         if before is not None:
             query = query.where(_is_before(before))
         newest = query.order_by(tests.c.time.desc(), tests.c.id.desc()).limit(limit)
-        with self.reading() as connection:
-            rows = connection.execute(newest).all()
-        return tuple(
-            TestRow(row.id, row.recording_id, row.hanger, row.name, row.time, Stage(row.stage))
-            for row in rows
-        )
+        return tuple(map(test_row, self.rows(newest)))
 
     def list_waiting(
         self, limit: int | None = None, excluding: Collection[int] = ()
-    ) -> tuple[WaitingTest, ...]:
+    ) -> tuple[TestRow, ...]:
         """Tests identified or updated, not yet watched: by hanger, then by time.
 
         With a `limit` no more than the first so many of each hanger and stage; those of the
         recordings `excluding` are left out.
         """
-        names = ("id", "recording_id", "hanger", "stage", "name", "time")
         groups, by_time = (tests.c.hanger, tests.c.stage), (tests.c.time, tests.c.id)
         place = sa.func.row_number().over(partition_by=groups, order_by=by_time).label("place")
         on_the_way = tests.c.stage.in_([Stage.IDENTIFIED, Stage.UPDATED])
-        query = sa.select(*(tests.c[name] for name in names)).add_columns(place)
+        query = sa.select(*test_columns).add_columns(place)
         query = query.where(on_the_way, in_force(tests), tests.c.recording_id.not_in(excluding))
         found = query.subquery()
         chosen = sa.select(found).order_by(found.c.hanger, found.c.time, found.c.id)
         if limit is not None:
             chosen = chosen.where(found.c.place <= limit)
-        with self.reading() as connection:
-            rows = connection.execute(chosen).all()
-        return tuple(
-            WaitingTest(r.id, r.recording_id, r.hanger, Stage(r.stage), r.name) for r in rows
-        )
+        return tuple(map(test_row, self.rows(chosen)))
 
     def list_former(self, recording_id: int) -> tuple[FormerTest, ...]:
         """Every identification of a recording's tests and what was made of it, oldest first."""
@@ -187,9 +178,8 @@ class Tests(Repository):
         """How many tests in force each hanger has, and when the latest was taken."""
         shown = counts(tests) & in_force(tests)
         counted = (tests.c.hanger, sa.func.count().label("tests"), sa.func.max(tests.c.time))
-        with self.reading() as connection:
-            rows = connection.execute(sa.select(*counted).where(shown).group_by(tests.c.hanger))
-            return {row[0]: LatestTest(int(row[1]), row[2]) for row in rows}
+        rows = self.rows(sa.select(*counted).where(shown).group_by(tests.c.hanger))
+        return {row[0]: LatestTest(int(row[1]), row[2]) for row in rows}
 
     def tested_hangers(self) -> frozenset[int]:
         """The numbers of hangers of which tests are in force: one look into the index for each."""
@@ -198,8 +188,7 @@ class Tests(Repository):
         hanger = found.c[0]
         following = least.where(tests.c.hanger > hanger).correlate(found).scalar_subquery()
         found = found.union_all(sa.select(following).where(hanger.is_not(None)))
-        with self.reading() as connection:
-            return frozenset(connection.scalars(sa.select(found.c[0]))) - {None}
+        return frozenset(self.scalars(sa.select(found.c[0]))) - {None}
 
     def latest_before(self, hanger: int, recording_id: int, limit: int) -> tuple[StoredTest, ...]:
         """The latest tests of a hanger that count, but for those of one recording, by time."""
@@ -245,8 +234,7 @@ class Tests(Repository):
     def weighed_among(self, ids: Collection[int]) -> frozenset[int]:
         """Which of these tests are of a tension that was read, too."""
         query = sa.select(tests.c.id).where(tests.c.id.in_(ids), WEIGHED)
-        with self.reading() as connection:
-            return frozenset(connection.scalars(query))
+        return frozenset(self.scalars(query))
 
     def beside(self, test: StoredTest) -> tuple[str | None, str | None]:
         """The names of the tests of the same hanger before and after one, by time."""
@@ -294,8 +282,7 @@ class Tests(Repository):
             .order_by(same_numbers.desc(), recordings.c.id.desc())
             .limit(_MOST_COMPARED)
         )
-        with self.reading() as connection:
-            rows = connection.execute(query).all()
+        rows = self.rows(query)
         return tuple(
             KnownSamples(
                 f"{row.file_name} (recording {row.recording_id})",

@@ -18,16 +18,20 @@ from shm.store.blobs import change_in, watch_document, watch_in
 from shm.store.checksums import damaged, decoding, whole
 from shm.store.columns import Number
 from shm.store.database import insert
-from shm.store.files import all_at, in_force, insert_baseline, insert_posterior, move
-from shm.store.list_rows import BaselineGlance, WatchedName
+from shm.store.files import all_at, in_force, move
+from shm.store.list_rows import BaselineGlance, TestRow
 from shm.store.outbox import raise_alert, resolve
 from shm.store.queries import (
     among,
     baseline_in_force,
     baselines_now,
     compared_with,
+    insert_baseline,
+    insert_posterior,
     plain_tests,
     read_baseline,
+    test_columns,
+    test_row,
 )
 from shm.store.reprocessing import WatchedAgain
 from shm.store.rows import (
@@ -100,8 +104,7 @@ class Watch(WatchedAgain):
     def state(self, baseline: Baseline) -> KeptWatch | None:
         """What the watch goes on from at the next test that is compared with a baseline."""
         query = sa.select(watch_states).where(watch_states.c.baseline_id == baseline.id)
-        with self.reading() as connection:
-            row = connection.execute(query).one_or_none()
+        row = self.first(query)
         if row is None or not whole(watch_states, row):
             return None  # it may be thrown away at will
         return KeptWatch(row.key, row.last_test_time, row.content)
@@ -159,8 +162,7 @@ class Watch(WatchedAgain):
             .where(baselines.c.id.in_(baselines_now()))
             .group_by(baselines.c.hanger)
         )
-        with self.reading() as connection:
-            return {row.hanger: row.mean_c for row in connection.execute(query)}
+        return {row.hanger: row.mean_c for row in self.rows(query)}
 
     def rebaseline(
         self,
@@ -206,28 +208,24 @@ class Watch(WatchedAgain):
 
     def list_watched(
         self, baseline: Baseline, before: StoredTest | None = None
-    ) -> tuple[WatchedName, ...]:
+    ) -> tuple[TestRow, ...]:
         """The tests that were watched since a baseline, or those of them `before` a test, by time.
 
         Tests that were watched against an earlier baseline count, but for those before a day since
         which the hanger is compared anew.
         """
-        query = sa.select(tests.c.id, tests.c.name, tests.c.time).where(*compared_with(baseline))
+        query = sa.select(*test_columns).where(*compared_with(baseline))
         if before is not None:
             at_once = (tests.c.time == before.time) & (tests.c.id < before.id)
             query = query.where((tests.c.time < before.time) | at_once)
-        with self.reading() as connection:
-            rows = connection.execute(query.order_by(tests.c.time, tests.c.id)).all()
-        return tuple(WatchedName(row.id, row.name, row.time) for row in rows)
+        return tuple(map(test_row, self.rows(query.order_by(tests.c.time, tests.c.id))))
 
     def list_drifts(self, hanger: int | None = None) -> tuple[Drift, ...]:
         """Shifts from the baseline, by time; of one hanger where named."""
         query = sa.select(drifts, tests.c.name.label("test")).join(tests).where(in_force(drifts))
         if hanger is not None:
             query = query.where(drifts.c.hanger == hanger)
-        with self.reading() as connection:
-            rows = connection.execute(query.order_by(drifts.c.time, drifts.c.id)).all()
-        return tuple(_drift(row) for row in rows)
+        return tuple(_drift(row) for row in self.rows(query.order_by(drifts.c.time, drifts.c.id)))
 
     def list_all(
         self, hanger: int | None = None, baseline_id: int | None = None
@@ -245,8 +243,7 @@ class Watch(WatchedAgain):
         of_one = watches.c.hanger == baseline.hanger, watches.c.baseline_id == baseline.id
         query = sa.select(watches.c.id).where(*of_one, in_force(watches))
         latest = query.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(limit)
-        with self.reading() as connection:
-            ids = connection.scalars(latest).all()
+        ids = self.scalars(latest)
         return self._watches(ids)
 
     def latest(
@@ -270,8 +267,7 @@ class Watch(WatchedAgain):
         )
         wanted = held.c.id.in_(baselines_now()), *among(held.c.hanger, excluding, hangers)
         ids = sa.select(latest).select_from(held).where(*wanted)
-        with self.reading() as connection:
-            found = [id_ for id_ in connection.scalars(ids) if id_ is not None]
+        found = [id_ for id_ in self.scalars(ids) if id_ is not None]
         return {each.hanger: each for each in self._watches(found)}
 
     def list_detected(self, hanger: int) -> tuple[StoredWatch, ...]:
@@ -289,10 +285,9 @@ class Watch(WatchedAgain):
         chosen = among(watches.c.hanger, excluding, hangers)
         query = sa.select(watches).where(*_called(), *chosen)
         found = defaultdict[int, list[Change]](list)
-        with self.reading() as connection:
-            for row in connection.execute(query.order_by(watches.c.time, watches.c.id)):
-                with decoding(watches, row, row.hanger):
-                    found[row.hanger].append(change_in(row.document))
+        for row in self.rows(query.order_by(watches.c.time, watches.c.id)):
+            with decoding(watches, row, row.hanger):
+                found[row.hanger].append(change_in(row.document))
         return {hanger: tuple(changes) for hanger, changes in found.items()}
 
     def list_detected_and_latest(self, baseline: Baseline) -> tuple[StoredWatch, ...]:

@@ -18,8 +18,7 @@ from shm.store.columns import (
     unique_where,
 )
 from shm.store.columns import metadata as metadata
-from shm.store.people_tables import users as _of_people  # noqa: F401 - all are there
-from shm.store.stream_tables import stream_windows as _of_streams  # noqa: F401 - all are there
+from shm.store.people_and_stream_tables import users as _of_people  # noqa: F401 - all are there
 
 SCHEMA = "0014"
 
@@ -237,20 +236,10 @@ alerts = sa.Table(
 )
 
 # Who has taken note of an alert, when, and what they say to it: once an alert.
-acknowledgements = sa.Table(
-    "acknowledgements",
-    metadata,
-    identity(),
-    *note_on_alert(),
-)
+acknowledgements = sa.Table("acknowledgements", metadata, identity(), *note_on_alert())
 
 # When the condition that an alert tells of ended, and who found that: `shm`, or a person.
-resolutions = sa.Table(
-    "resolutions",
-    metadata,
-    identity(),
-    *note_on_alert(),
-)
+resolutions = sa.Table("resolutions", metadata, identity(), *note_on_alert())
 
 # From when until when hooks are not told of a hanger, of all where `hanger` is empty. A maintenance
 # window (`is_maintenance`) also keeps tests of then from the watch. `ended_at` is when a person

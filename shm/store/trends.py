@@ -75,8 +75,7 @@ class Trends(Repository):
             .correlate(of_hangers)
         )
         query = sa.select(latest.scalar_subquery()).select_from(of_hangers)
-        with self.reading() as connection:
-            ids = [id_ for id_ in connection.scalars(query) if id_ is not None]
+        ids = [id_ for id_ in self.scalars(query) if id_ is not None]
         return {point.hanger: point for point in self._points(ids, known)}
 
     def save_summaries(self, hanger: Hanger, tell: Callable[[float], None] = lambda _: None) -> int:
@@ -115,8 +114,7 @@ class Trends(Repository):
         query = sa.select(posteriors.c.id).where(
             posteriors.c.hanger == hanger.id, in_force(posteriors), looked_at, ~up_to_date
         )
-        with self.reading() as connection:
-            return list(connection.scalars(query.order_by(posteriors.c.id)))
+        return list(self.scalars(query.order_by(posteriors.c.id)))
 
     def _points(
         self, chosen: sa.Select[Any] | Sequence[int], hangers: Iterable[Hanger]

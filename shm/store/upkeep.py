@@ -1,30 +1,46 @@
-"""What keeps the store in order: who may come in, copies and backups, damaged and missing rows."""
+"""What keeps the store in order: copies and backups, rows that are missing, rows made whole again.
+
+What can be computed anew is written over the damaged row, whose number others refer to; what the
+next test makes anyway is thrown away.
+"""
 
 from __future__ import annotations
 
-import hashlib
-import hmac
-import secrets
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta
-from enum import StrEnum
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Connection, Row
+from sqlalchemy.engine import Connection
 
-from shm.errors import DamagedRow, NothingThere, UsageError
+from shm.documents import value_of
+from shm.errors import DamagedRow
 from shm.store.archive import Archive
 from shm.store.audit import note
-from shm.store.damage import damaged_ids, damaged_rows, drop_rows, overwrite
-from shm.store.database import Repository, insert
-from shm.store.files import posterior_values, test_contents, write_event
+from shm.store.blobs import change_in, posterior_from, test_from_document, unpack
+from shm.store.checksums import (
+    Values,
+    checksum_of,
+    content_checksum,
+    damaged,
+    healed,
+    key_of,
+    loads,
+    plain_table,
+)
+from shm.store.columns import Document
+from shm.store.copying import Rows, forget
+from shm.store.database import insert
+from shm.store.files import test_contents, write_event
 from shm.store.list_rows import StoredRecording
 from shm.store.missing import ACCEPTED, missing_rows
+from shm.store.people import Tokens
+from shm.store.queries import posterior_values
 from shm.store.rows import IdentifiedTest, Lineage, StoredTest
 from shm.store.tables import (
+    APART,
     archive_copies,
     drifts,
     events,
@@ -35,36 +51,13 @@ from shm.store.tables import (
     steps,
     summaries,
     tests,
-    tokens,
     watch_states,
     watches,
 )
-from shm.values import Posterior
+from shm.values import Alert, Posterior
 
-_SECRET_BYTES = 32  # 256 bits: nobody guesses it
-_LONGEST_NAME = 255  # technical: what a column and a line of a table take
-_NOTED_AGAIN_AFTER = timedelta(minutes=1)
 _REMOVED, _BACKUP = "removed", "backup"
 _KIND = "damaged"
-
-
-class Scope(StrEnum):
-    """What a token allows; one that may write may read."""
-
-    READ = "read"
-    WRITE = "write"
-
-
-@dataclass(frozen=True)
-class StoredToken:
-    """A token without its secret."""
-
-    id: int
-    name: str
-    scopes: frozenset[Scope]
-    created_at: datetime
-    revoked_at: datetime | None = None
-    last_used_at: datetime | None = None
 
 
 @dataclass(frozen=True)
@@ -85,69 +78,11 @@ class DamagedPosterior:
     tests: tuple[int, ...]
 
 
-class Upkeep(Repository):
-    """Tokens, copies of raw files, backups, and the healing of rows.
+class Upkeep(Tokens):
+    """Copies of raw files, backups, and the healing of rows.
 
     A raw file may be deleted here only once its recording has a copy.
     """
-
-    def create_token(self, name: str, scope: Scope, at: datetime) -> str:
-        """Makes a token and returns its secret, which is told this once and kept nowhere.
-
-        Raises UsageError where a token of that name is in force, or where the name is none.
-        """
-        if not name.strip() or len(name) > _LONGEST_NAME or not name.isprintable():
-            raise UsageError(
-                "the name of a token is a short text.", remedy="Name it after who uses it."
-            )
-        secret = f"shm_{secrets.token_urlsafe(_SECRET_BYTES)}"
-        scopes = (Scope.READ,) if scope is Scope.READ else (Scope.READ, Scope.WRITE)
-        with self.writing() as connection:
-            if connection.execute(_in_force.where(tokens.c.name == name)).first() is not None:
-                raise UsageError(
-                    f"a token named {name} is in force already.",
-                    remedy=f"Take another name, or revoke it: `shm token revoke {name}`.",
-                )
-            values = {"name": name, "token_sha256": _hashed(secret), "created_at": at}
-            insert(connection, tokens, {**values, "scopes": ",".join(scopes)})
-            note(connection, at, "token made", f"token {name}", f"may {scope}")
-        return secret
-
-    def list_tokens(self) -> tuple[StoredToken, ...]:
-        """All tokens, those revoked too, as they were made."""
-        with self.reading() as connection:
-            rows = connection.execute(sa.select(tokens).order_by(tokens.c.id)).all()
-        return tuple(_token(row) for row in rows)
-
-    def revoke_token(self, name: str, at: datetime) -> None:
-        """Ends a token from now on; raises NothingThere where none of that name is in force."""
-        with self.writing() as connection:
-            ended = connection.execute(
-                sa.update(tokens)
-                .where(tokens.c.name == name, tokens.c.revoked_at.is_(None))
-                .values(revoked_at=at)
-            )
-            if ended.rowcount == 0:
-                raise NothingThere(
-                    f"no token named {name} is in force.", remedy="See `shm token list`."
-                )
-            note(connection, at, "token revoked", f"token {name}")
-
-    def token_of(self, secret: str, at: datetime) -> StoredToken | None:
-        """The token in force with this secret, and a note that it was used; None where none has.
-
-        Every token is compared, in constant time, so that the time taken tells nothing.
-        """
-        with self.reading() as connection:
-            rows = connection.execute(_in_force).all()
-        found = _matching(rows, _hashed(secret))
-        if found is None:
-            return None
-        if found.last_used_at is None or at - found.last_used_at >= _NOTED_AGAIN_AFTER:
-            with self.writing() as connection:
-                noted = sa.update(tokens).where(tokens.c.id == found.id)
-                connection.execute(noted.values(last_used_at=at))
-        return _token(found)
 
     def note_copies(self, target: Archive, at: datetime) -> int:
         """Notes the recordings whose files are in `target`; how many were not noted before."""
@@ -167,9 +102,7 @@ class Upkeep(Repository):
     def list_copies(self) -> tuple[ArchiveCopy, ...]:
         """All copies that were noted, as they were made."""
         query = sa.select(archive_copies).order_by(archive_copies.c.id)
-        with self.reading() as connection:
-            rows = connection.execute(query).all()
-        return tuple(ArchiveCopy(row.recording_id, row.folder, row.at) for row in rows)
+        return tuple(ArchiveCopy(row.recording_id, row.folder, row.at) for row in self.rows(query))
 
     def note_removed(self, recording: StoredRecording, copy_folder: str, at: datetime) -> None:
         """Notes that a raw file is no longer here, and where its copy lies."""
@@ -181,15 +114,13 @@ class Upkeep(Repository):
     def removed_to(self) -> dict[int, str]:
         """Recordings whose raw files were taken out of the archive: where their copies lie."""
         query = sa.select(events.c.recording_id, events.c.message).where(events.c.kind == _REMOVED)
-        with self.reading() as connection:
-            return {row[0]: row[1] for row in connection.execute(query.order_by(events.c.id))}
+        return {row[0]: row[1] for row in self.rows(query.order_by(events.c.id))}
 
     def removed_names(self, archive: Archive) -> frozenset[str]:
         """Raw files, by their path in the archive, that were taken out of it and are not back."""
         ids = self.removed_to()
         query = sa.select(recordings.c.id, recordings.c.archived_as, recordings.c.sidecar_as)
-        with self.reading() as connection:
-            rows = connection.execute(query).all()
+        rows = self.rows(query)
         names = {name for row in rows if row[0] in ids for name in row[1:] if name is not None}
         return frozenset(name for name in names if not (archive.folder / name).exists())
 
@@ -202,14 +133,12 @@ class Upkeep(Repository):
     def last_backup(self) -> tuple[datetime, str] | None:
         """When and where the newest backup of the store was written; None where none was."""
         query = sa.select(events.c.at, events.c.file_name).where(events.c.kind == _BACKUP)
-        with self.reading() as connection:
-            row = connection.execute(query.order_by(events.c.id.desc()).limit(1)).first()
+        row = self.first(query.order_by(events.c.id.desc()).limit(1))
         return None if row is None else (row.at, row.file_name)
 
     def newest_row_at(self) -> datetime | None:
         """When the newest stage was reached, by the clock of then; None in an empty store."""
-        with self.reading() as connection:
-            found: datetime | None = connection.scalar(sa.select(sa.func.max(steps.c.at)))
+        found: datetime | None = self.scalar(sa.select(sa.func.max(steps.c.at)))
         return found
 
     def accept_missing(self, who: str, why: str, at: datetime) -> int:
@@ -314,27 +243,6 @@ class Upkeep(Repository):
         return dropped
 
 
-_in_force = sa.select(tokens).where(tokens.c.revoked_at.is_(None))
-
-
-def _hashed(secret: str) -> str:
-    """A secret is 256 random bits: a plain checksum of it cannot be searched for."""
-    return hashlib.sha256(secret.encode()).hexdigest()
-
-
-def _matching(rows: Collection[Row[Any]], hashed: str) -> Row[Any] | None:
-    found = None
-    for row in rows:
-        if hmac.compare_digest(row.token_sha256, hashed):
-            found = row
-    return found
-
-
-def _token(row: Row[Any]) -> StoredToken:
-    scopes = frozenset(Scope(scope) for scope in row.scopes.split(","))
-    return StoredToken(row.id, row.name, scopes, row.created_at, row.revoked_at, row.last_used_at)
-
-
 def _is_there(target: Archive, recording: sa.Row[Any]) -> bool:
     names = (recording.archived_as, recording.sidecar_as)
     return all((target.folder / name).is_file() for name in names if name is not None)
@@ -345,3 +253,85 @@ def _origin(connection: Connection, posterior_id: int) -> tuple[str, tuple[int, 
     of_it = posterior_tests.c.posterior_id == posterior_id
     query = sa.select(tests.c.id).join(posterior_tests).where(of_it)
     return str(model), tuple(connection.scalars(query.order_by(tests.c.time, tests.c.id)))
+
+
+def damaged_among(table: sa.Table, rows: Rows) -> Iterator[DamagedRow]:
+    """Those of some rows, read without types, that are damaged."""
+    for row in rows:
+        if not (_as_written(table, row) and _can_be_decoded(table, row)):
+            key = key_of(table, row)
+            yield damaged(table, key[0] if len(key) == 1 else key, _hanger(row))
+
+
+def _as_written(table: sa.Table, row: Values) -> bool:
+    """A row without a checksum was written by something else than shm, or lost it."""
+    apart = APART.get(table.name)
+    if apart and content_checksum(row[apart]) != row[f"{apart}_checksum"]:
+        return False
+    return bool(row["checksum"] == checksum_of(table, row))
+
+
+def _can_be_decoded(table: sa.Table, row: Values) -> bool:
+    """Whether its documents and arrays can be read: of a row that was damaged before there were
+    checksums that is all that can be told."""
+    try:
+        for column in table.columns:
+            if isinstance(column.type, Document):
+                loads(row[column.name])
+        if table.name in _DECODERS:
+            _DECODERS[table.name](row)
+    except Exception:  # noqa: BLE001 - damaged bytes fail in any way
+        return False
+    return True
+
+
+def _decode_test(row: Values) -> None:
+    test_from_document(loads(row["document"]), row["hanger"])
+    if row["frequency_response"] is not None:
+        unpack(row["frequency_response"])
+
+
+# What is made of the contents of a row. What the watch keeps is its own affair, and may be thrown
+# away at will; diagnoses of former versions are of other forms.
+_DECODERS: Mapping[str, Callable[[Values], object]] = {
+    "tests": _decode_test,
+    "posteriors": lambda row: posterior_from(loads(row["document"]), row["samples"]),
+    "watches": lambda row: change_in(row["document"]),
+    "alerts": lambda row: value_of(Alert, loads(row["document"])),
+}
+
+
+def _hanger(row: Values) -> int | None:
+    hanger = row.get("hanger")
+    return hanger if isinstance(hanger, int) else None
+
+
+def damaged_rows(connection: Connection, table: sa.Table, ids: Iterable[int]) -> list[DamagedRow]:
+    """Those of the rows with these numbers that are damaged."""
+    plain, key = plain_table(table.name), next(iter(table.primary_key)).name
+    found: list[DamagedRow] = []
+    for id_ in ids:
+        rows = connection.execute(sa.select(plain).where(plain.c[key] == id_)).mappings().all()
+        found.extend(damaged_among(table, rows))
+    return found
+
+
+def damaged_ids(connection: Connection, table: sa.Table, ids: Iterable[int]) -> list[int]:
+    """The numbers of those that are damaged."""
+    return [id_ for id_ in ids if damaged_rows(connection, table, [id_])]
+
+
+def drop_rows(connection: Connection, table: sa.Table, chosen: sa.Select[Any]) -> int:
+    """Throws away the damaged ones of the rows whose numbers are `chosen`; how many they are."""
+    key = next(iter(table.primary_key))
+    ids = damaged_ids(connection, table, connection.scalars(chosen).all())
+    if ids:
+        connection.execute(sa.delete(table).where(key.in_(ids)))
+        forget(connection, table.name)
+    return len(ids)
+
+
+def overwrite(connection: Connection, table: sa.Table, id_: int, values: Mapping[str, Any]) -> None:
+    """Writes what was made anew over a damaged row, which is whole from then on."""
+    connection.execute(sa.update(table).where(table.c.id == id_).values(**values))
+    healed(connection, table, id_)

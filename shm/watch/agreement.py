@@ -26,7 +26,7 @@ import numpy as np
 
 from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, WatchedQuantity
 from shm.values.drift import threshold_of
-from shm.watch.alert_text import message_of_agreeing, short_name
+from shm.watch.alert_text import alert_of, message_of_agreeing
 from shm.watch.options import WatchOptions
 from shm.watch.persistence import LARGE
 from shm.watch.quantities import shift_of, value_at
@@ -107,7 +107,11 @@ def agreement(
         if others and not is_old and not any(map(partial(_have_told, beside), runs, are_later)):
             other, shown = others[0]
             drift = _drift(quantity, newest, (mine, shown), hanger)
-            return _alert(drift, newest, other, hanger, is_held=other.id in beside.held)
+            what = f"two-tests-agree:{drift.quantity}-{way_of(drift.shift_mean)}"
+            tests = (other.id, newest[0].id)
+            said = message_of_agreeing(drift, hanger, tests, is_held=other.id in beside.held)
+            of_test = (newest[0].id, newest[1])
+            return alert_of(hanger, of_test, what, said, ("beyond threshold",), (drift,))
     return None
 
 
@@ -261,25 +265,4 @@ def drift_of(
         shift_sd=shift.sd,
         threshold=threshold,
         probability=beyond(quantity, alone, *at, threshold),
-    )
-
-
-def _alert(
-    drift: Drift,
-    newest: tuple[ModalTest, datetime],
-    other: ModalTest,
-    hanger: Hanger,
-    *,
-    is_held: bool,
-) -> Alert:
-    test, time = newest
-    way = way_of(drift.shift_mean)
-    return Alert(
-        key=f"hanger-{hanger.id}:two-tests-agree:{drift.quantity}-{way}:{short_name(test.id)}",
-        hanger=hanger.id,
-        test=test.id,
-        time=time,
-        message=message_of_agreeing(drift, hanger, (other.id, test.id), is_held=is_held),
-        drifts=(drift,),
-        kinds=("beyond threshold",),
     )

@@ -11,16 +11,18 @@ import math
 from collections.abc import Sequence
 from datetime import datetime
 
-from shm.values import TENSION, Change, Drift, Hanger, Moved, WatchedTest
+from shm.values import TENSION, Alert, AlertKind, Change, Drift, Hanger, Moved, WatchedTest
 from shm.values.messages import WEEK, Lead
 from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded_percent
-from shm.watch.alert_action import action_words, as_sentence, gravest
 from shm.watch.change_words import (
     CAUSES,
+    action_words,
+    as_sentence,
     beyond_words,
     each_frequency,
     factor,
     frequencies_state,
+    gravest,
     group_words,
     is_stiffness,
     probable_groups,
@@ -93,12 +95,7 @@ def _new(beyond: Sequence[Drift]) -> str:
 
 
 def _of_hanger(
-    test: WatchedTest,
-    change: Change | None,
-    beyond: Sequence[Drift],
-    sizes: str,
-    *,
-    is_call: bool,
+    test: WatchedTest, change: Change | None, beyond: Sequence[Drift], sizes: str, *, is_call: bool
 ) -> list[str]:
     tension = next((each for each in test.drifts if each.quantity == TENSION), None)
     spoken = {each.quantity for each in (*beyond, *(suspects(change) if change else ()))}
@@ -107,9 +104,7 @@ def _of_hanger(
         "This test itself is probably an outlier." if is_odd else "",
         _tension_now(tension) if tension and TENSION in spoken else "",
         _details(
-            sizes,
-            _probabilities(test, change, beyond),
-            _false_alarms(change) if is_call else "",
+            sizes, _probabilities(test, change, beyond), _false_alarms(change) if is_call else ""
         ),
     ]
 
@@ -164,6 +159,21 @@ def short_name(test: str) -> str:
     if len(test) <= _LONGEST_TEST:
         return test
     return f"{test[:_LONGEST_TEST]}-{hashlib.sha256(test.encode()).hexdigest()[:_DIGITS]}"
+
+
+def alert_of(
+    hanger: Hanger,
+    test: tuple[str, datetime],
+    what: str,
+    message: str,
+    kinds: tuple[AlertKind, ...],
+    drifts: tuple[Drift, ...] = (),
+    change: Change | None = None,
+) -> Alert:
+    """An alert that a test, its name and time, calls for: its key names `what` it is of."""
+    name, time = test
+    key = f"hanger-{hanger.id}:{what}:{short_name(name)}"
+    return Alert(key, hanger.id, name, time, message, drifts, kinds, change)
 
 
 def watch_words(watched: Sequence[WatchedTest]) -> str:

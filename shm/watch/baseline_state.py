@@ -27,11 +27,7 @@ _MODEL_SD = 0.01  # judgement: of a frequency, a class beside a bar as made
 
 
 def best_of(
-    model: Model,
-    measured: FloatArray,
-    planes: IntArray,
-    orders: IntArray,
-    conditions: Conditions,
+    model: Model, measured: FloatArray, planes: IntArray, orders: IntArray, conditions: Conditions
 ) -> tuple[FloatArray, FloatArray]:
     """The likeliest parameter set of the description, and what the modes (n,) are off from it."""
     rng = np.random.default_rng(0)

@@ -25,7 +25,7 @@ import numpy as np
 
 from shm.values import FloatArray, IntArray
 from shm.watch.causes import Direction, Layout, Told
-from shm.watch.conditions import OF_ONE_VISIT_YEARS
+from shm.watch.options import OF_ONE_VISIT_YEARS
 
 STEP, RAMP = 0, 1
 SIZES = np.array([1.0, 6.0])

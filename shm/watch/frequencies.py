@@ -21,21 +21,12 @@ import numpy as np
 import scipy
 
 from shm.errors import BadInput
-from shm.values import (
-    FREQUENCY,
-    FloatArray,
-    ModalTest,
-    ModeReading,
-    Reading,
-    WatchedQuantity,
-)
+from shm.values import FREQUENCY, FloatArray, ModalTest, ModeReading, Reading, WatchedQuantity
 from shm.watch.causes import UNEXPLAINED, Columns, Direction, Layout, Structure
 from shm.watch.change_point import Evidence
-from shm.watch.conditions import DAYS_PER_YEAR, Warmth
-from shm.watch.options import WatchOptions
+from shm.watch.options import DAYS_PER_YEAR, Warmth, WatchOptions, reference_of
 from shm.watch.quantities import MeasuredMode
-from shm.watch.state_sums import StateSums
-from shm.watch.watch_state import WatchState
+from shm.watch.state_sums import StateSums, WatchState
 from shm.watch.watcher import Watcher
 
 POOLED_DAYS = 3.0  # judgement: short beside three weeks in which an owner wants to know, and cheap
@@ -97,11 +88,10 @@ class FrequencyReader:
                 own = wider * float(np.mean([sd**2 for _, sd in seen])) / len(seen)
                 variances[j] = own + _ALLOWANCE**2
         levels = [math.log(test.amplitude) for test in tests if test.amplitude > 0]
-        temperatures = [test.temperature_c for test in tests if math.isfinite(test.temperature_c)]
         return Reading(
             test=tests[-1].id,
             time=time,
-            temperature_c=float(np.mean(temperatures)) if temperatures else math.nan,
+            temperature_c=reference_of([test.temperature_c for test in tests]),
             mean=values,
             information=np.diag(1 / variances),
             modes=ModeReading(values, variances, np.eye(n), np.zeros(n), np.zeros(n, dtype=bool)),

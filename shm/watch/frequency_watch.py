@@ -17,20 +17,11 @@ import numpy as np
 from shm.documents import dump, value_of
 from shm.errors import BadInput
 from shm.modes_document import modes_document, parse_modes
-from shm.values import (
-    NAN,
-    WITHOUT_MODEL,
-    Alert,
-    Hanger,
-    ModalTest,
-    Posterior,
-    Reading,
-    WatchedTest,
-)
+from shm.values import NAN, WITHOUT_MODEL, Alert, Hanger, ModalTest, Posterior, Reading, WatchedTest
 from shm.watch.alert_state import AlertState
 from shm.watch.frequencies import POOLED_DAYS, FrequencyReader, FrequencyWatcher
 from shm.watch.options import WatchOptions
-from shm.watch.watch_state import WatchState
+from shm.watch.state_sums import WatchState
 from shm.watch.watching import DatedTest, Newest, after, options_of
 
 _POOL = timedelta(days=POOLED_DAYS)

@@ -40,6 +40,7 @@ from shm.values import (
     WatchedTest,
 )
 from shm.values.drift import ENOUGH_AGAINST
+from shm.values.messages import WEEK
 from shm.values.rounding import force_unit
 from shm.watch.agreement import (
     BY_A_LOAD,
@@ -50,8 +51,14 @@ from shm.watch.agreement import (
     read_alone,
     scatter_of,
 )
-from shm.watch.alert_text import against_baseline_words, short_name
-from shm.watch.change_words import is_stiffness, quantity_words, size_words
+from shm.watch.alert_text import against_baseline_words, alert_of
+from shm.watch.change_words import (
+    is_stiffness,
+    look_again,
+    odd_frequencies,
+    quantity_words,
+    size_words,
+)
 from shm.watch.mistaken_modes import off_the_baseline
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
@@ -226,15 +233,9 @@ def _alert(
 ) -> Alert:
     """The alert where the tension moved further than by any load; else a notice."""
     is_alert = lead is not None and _is_no_load(lead)
-    return Alert(
-        key=f"hanger-{hanger.id}:{key}:{short_name(test[0])}",
-        hanger=hanger.id,
-        test=test[0],
-        time=test[1],
-        message=message,
-        drifts=(lead,) if lead is not None and is_alert else (),
-        kinds=("beyond threshold",) if is_alert else (_KIND,),
-    )
+    drifts = (lead,) if lead is not None and is_alert else ()
+    kind: AlertKind = "beyond threshold" if is_alert else _KIND
+    return alert_of(hanger, test, key, message, (kind,), drifts)
 
 
 def _common(
@@ -294,4 +295,37 @@ def message_of_baseline(test: WatchedTest, hanger: Hanger) -> str:
     return (
         f"{against_baseline_words(test.change, hanger)} Either the baseline was disturbed, by a "
         "load on the deck for one, or the hanger changed right after it; no test shows which."
+    )
+
+
+def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
+    """Of a test that agrees with none before it, or of so many in a row."""
+    if not hanger.is_modelled:
+        return odd_frequencies(test, hanger, in_a_row)
+    if hanger.has_sensors:
+        return _odd_days(test, hanger, in_a_row)
+    if in_a_row == 1:
+        return (
+            f"Hanger {hanger.id}: test {test.test} agrees with no test before it. Repeat it within "
+            "a week; it does not count until another test agrees with it. Another hanger may have "
+            "been hit, a sensor moved or the order of a mode mistaken; or the hanger has changed."
+        )
+    return (
+        f"Hanger {hanger.id}: {in_a_row} tests in a row agree neither with those before nor with "
+        "each other. Repeat the hammer test within a week, with the same people and sensors as at "
+        "the baseline. Until then the state of this hanger rests on older tests."
+    )
+
+
+def _odd_days(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
+    """The same of days of sensors that stay: the next day is another test by itself."""
+    state = (
+        f"test {test.test} agrees with no test before it"
+        if in_a_row == 1
+        else f"{in_a_row} tests in a row agree neither with those before nor with each other"
+    )
+    return (
+        f"Hanger {hanger.id}: {state}. {look_again(hanger)} {WEEK}. Until tests agree again, its "
+        "state rests on older ones. A sensor may have moved or the order of a mode been mistaken; "
+        "or the hanger has changed."
     )

@@ -35,7 +35,7 @@ from shm.values import (
 )
 from shm.values.drift import ENOUGH_FITS
 from shm.values.rounding import listed
-from shm.watch.alert_text import short_name
+from shm.watch.alert_text import alert_of
 from shm.watch.quantities import MeasuredMode
 
 # Of routine modes so many are mistaken: judgement, of hammer tests that were checked by hand.
@@ -55,11 +55,6 @@ def log_mixture(off: FloatArray, variance: FloatArray | float) -> FloatArray:
     with np.errstate(invalid="ignore"):
         mixed = np.logaddexp(_log_good(off, variance), math.log(MISTAKEN / MISTAKEN_RANGE))
     return np.asarray(mixed)
-
-
-def good_probability(off: FloatArray, variance: FloatArray | float) -> FloatArray:
-    """Of modes that are `off` by so much, the probability of each of being no mistaken one."""
-    return np.exp(_log_good(off, variance) - log_mixture(off, variance))
 
 
 def _log_good(off: FloatArray, variance: FloatArray | float) -> FloatArray:
@@ -261,12 +256,5 @@ def notice_of(test: WatchedTest, hanger: Hanger, news: Sequence[RepeatedMistake]
     """A notice of the modes `news` that tests keep having wrong."""
     kind: AlertKind = "check the modes"
     names = "+".join(f"{each.plane}-{each.order}" for each in news)
-    return Alert(
-        key=f"hanger-{hanger.id}:{kind.replace(' ', '-')}:{names}:{short_name(test.test)}",
-        hanger=hanger.id,
-        test=test.test,
-        time=test.time,
-        message=notice_words(news, hanger),
-        drifts=(),
-        kinds=(kind,),
-    )
+    what = f"{kind.replace(' ', '-')}:{names}"
+    return alert_of(hanger, (test.test, test.time), what, notice_words(news, hanger), (kind,))

@@ -27,8 +27,7 @@ from shm.values import (
 )
 from shm.values.drift import threshold_of
 from shm.watch.change_point import LOG_SHARES, SIZES, STEP, Evidence
-from shm.watch.conditions import DAYS_PER_YEAR
-from shm.watch.options import WatchOptions
+from shm.watch.options import DAYS_PER_YEAR, WatchOptions
 from shm.watch.quantities import value_at
 from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
 
@@ -119,9 +118,7 @@ def _material(subject: Subject, evidence: Evidence) -> float:
 
 
 def _materials(
-    subject: Subject,
-    evidence: Evidence,
-    changes: Sequence[tuple[int, ...]],
+    subject: Subject, evidence: Evidence, changes: Sequence[tuple[int, ...]]
 ) -> FloatArray:
     """The same (changes,) of each; of any mode, where no doubt is left that something changed."""
     effects, least = subject.effects, subject.options.least_frequency_shift
@@ -265,12 +262,7 @@ def _company(
 
 
 def drifted(
-    subject: Subject,
-    evidence: Evidence,
-    causes: Evidence,
-    reading: Reading,
-    *,
-    is_baseline: bool,
+    subject: Subject, evidence: Evidence, causes: Evidence, reading: Reading, *, is_baseline: bool
 ) -> tuple[Drift, ...]:
     """The shift of each quantity since the baseline: slow creep, called changes, and a new one.
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import overload
+from typing import TypeVar
 
 import numpy as np
 import scipy
@@ -37,6 +37,8 @@ from shm.values import (
 
 MeasuredMode = tuple[Plane, int]
 """Plane and order, which counts from 1."""
+
+_X = TypeVar("_X", float, FloatArray)
 
 _TENSION_RATIO = "theta_F"
 _STIFFNESS = "log10_k"
@@ -140,11 +142,7 @@ def base_point(baseline: Posterior, model: Model) -> FloatArray:
     return np.array([known[name] for name in model.parameter_names])
 
 
-@overload
-def value_at(quantity: WatchedQuantity, x: float) -> float: ...
-@overload
-def value_at(quantity: WatchedQuantity, x: FloatArray) -> FloatArray: ...
-def value_at(quantity: WatchedQuantity, x: float | FloatArray) -> float | FloatArray:
+def value_at(quantity: WatchedQuantity, x: _X) -> _X:
     """The tension in N or log10 of the stiffness at coordinate `x`, no further than the table."""
     if is_ratio(quantity.name):
         inside = np.clip(x, quantity.coordinates[0], quantity.coordinates[-1])
@@ -152,11 +150,7 @@ def value_at(quantity: WatchedQuantity, x: float | FloatArray) -> float | FloatA
     return _like(x, np.interp(x, quantity.coordinates, quantity.values))
 
 
-@overload
-def shift_of(quantity: WatchedQuantity, x: float) -> float: ...
-@overload
-def shift_of(quantity: WatchedQuantity, x: FloatArray) -> FloatArray: ...
-def shift_of(quantity: WatchedQuantity, x: float | FloatArray) -> float | FloatArray:
+def shift_of(quantity: WatchedQuantity, x: _X) -> _X:
     """The shift from the baseline: a fraction of the tension, or decades of the stiffness."""
     value = value_at(quantity, x)
     if is_ratio(quantity.name):
@@ -171,7 +165,7 @@ def coordinate_of(quantity: WatchedQuantity, value: float) -> float:
     return float(np.interp(value, quantity.values, quantity.coordinates))
 
 
-def _like(x: float | FloatArray, found: float | FloatArray) -> float | FloatArray:
+def _like(x: _X, found: float | FloatArray) -> _X:
     return np.asarray(found) if isinstance(x, np.ndarray) else float(found)
 
 
@@ -218,10 +212,7 @@ def common_stiffness(log10_k: FloatArray) -> FloatArray:
 
 
 def _responses(
-    model: Model,
-    base: FloatArray,
-    held: Sequence[tuple[str, ...]],
-    modes: Sequence[MeasuredMode],
+    model: Model, base: FloatArray, held: Sequence[tuple[str, ...]], modes: Sequence[MeasuredMode]
 ) -> list[_Response]:
     """How the mean log frequency of `modes` goes with each of the springs `held` together."""
     if not held or not modes:

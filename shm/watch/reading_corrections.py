@@ -1,5 +1,4 @@
-"""What the reading of a test rests on: the modes that its baseline has too, and two ways in which
-frequencies go otherwise than the baseline's slopes say.
+"""What a reading is corrected for: warm steel is softer, large motions slip, ends loosen.
 
 Amplitude: what the swing does to a hanger's frequencies where its joints slip or it stretches.
 
@@ -21,13 +20,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 
-from shm.models import Model
+from shm.models import Model, described
 from shm.models.base import Conditions
 from shm.values import (
     TENSION,
-    BoolArray,
     FloatArray,
     Hanger,
     IntArray,
@@ -36,6 +33,37 @@ from shm.values import (
     WatchedQuantity,
 )
 from shm.watch.quantities import MeasuredMode, log_frequencies, moved
+
+# Of steel's modulus: Ledbetter and Reed (1973), Elastic properties of metals and alloys, I.
+MODULUS_PER_KELVIN = -3e-4
+_STIFFER = 0.01
+_CLAMPED = "beam1"
+
+
+def softening(
+    model: Model, base: FloatArray, hanger: Hanger, modes: Sequence[MeasuredMode]
+) -> FloatArray:
+    """By what the log frequency of each mode (modes,) goes with a kelvin, as steel softens.
+
+    Nothing where the class follows the temperature itself: it was fitted to what softens, too.
+    Where the class is expensive, that of a clamped beam: it differs by a few percent.
+    """
+    mild, warm = (
+        model.frequencies_at(base[None], 1, Conditions(temperature_shift_k=kelvin))
+        for kelvin in (0.0, 1.0)
+    )
+    if not np.array_equal(mild, warm):
+        return np.zeros(len(modes))
+    if model.expensive:
+        known = dict(zip(model.parameter_names, base.tolist(), strict=True))
+        model = described(_CLAMPED, hanger)
+        base = np.array([known.get(each, 1.0) for each in model.parameter_names])
+    stiffer = replace(hanger, elastic_modulus_pa=hanger.elastic_modulus_pa * (1 + _STIFFER))
+    stiff = described(model.name, stiffer, model.priors)
+    change = log_frequencies(stiff, base[None], modes)
+    change = change - log_frequencies(model, base[None], modes)
+    return np.asarray(MODULUS_PER_KELVIN * change[0] / _STIFFER)
+
 
 # Of the slope, in a frequency that is not of small amplitude. The mean weighted with the energy of
 # a ring-down, while the amplitude falls as exp(-t), has 2/3 of it: the integral of exp(-3t) over
@@ -141,70 +169,3 @@ def _patterns(
     strength = strength / math.sqrt(max(len(like) - 1, 1))
     kept = strength > _OF_A_STEP * np.linalg.norm(like[0])
     return np.asarray(strength[kept, None] * axes[kept])
-
-
-SELDOM = 1e-3
-"""Of good tests, by their misfit (judgement): a worse one has larger errors than stated."""
-
-
-@dataclass(frozen=True, eq=False)
-class SeenModes:
-    """The modes (n,) of a test that the baseline has too: what is measured less its own residual.
-
-    `plane` and `order` index the model's frequencies, `own` the reader's modes; `log_frequency`
-    and its `variance` are (n,).
-    """
-
-    conditions: Conditions
-    plane: IntArray
-    order: IntArray
-    own: IntArray
-    log_frequency: FloatArray
-    variance: FloatArray
-
-    def taken(self, rows: BoolArray) -> SeenModes:
-        """Some of the modes."""
-        arrays = ("plane", "order", "own", "log_frequency", "variance")
-        return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
-
-
-@dataclass(frozen=True, eq=False)
-class LinearReading:
-    """The likelihood about coordinates `x` (q,): residuals (n,) and slopes (n, q), both over sd."""
-
-    x: FloatArray
-    residual: FloatArray
-    slopes: FloatArray
-    pull: FloatArray
-
-    @property
-    def information(self) -> FloatArray:
-        return self.slopes.T @ self.slopes
-
-    @property
-    def cost(self) -> float:
-        """What is made small: the misfit and the pull to the baseline."""
-        return float(self.residual @ self.residual + self.x @ (self.pull * self.x))
-
-    @property
-    def step(self) -> FloatArray:
-        """To where the cost is least, were it all linear."""
-        downhill = self.slopes.T @ self.residual - self.pull * self.x
-        return np.asarray(np.linalg.solve(self.information + np.diag(self.pull), downhill))
-
-    def gain(self, step: FloatArray) -> float:
-        """Of a step, in units of the variance."""
-        return float(step @ self.information @ step)
-
-
-def credible_share(misfit: FloatArray, fitted: int) -> float:
-    """The share of its stated information that a test deserves, by its misfit over sd (n,).
-
-    1 where the misfit is one that a thousandth of good tests exceed, or less. Where the modes fit
-    no state of the hanger, their errors are larger than stated by as much (Birge 1932).
-    """
-    free = len(misfit) - fitted
-    if free < 1:
-        return 1.0
-    most = float(scipy.special.chdtri(free, SELDOM))
-    return most / max(most, float(misfit @ misfit))

@@ -28,13 +28,11 @@ from dataclasses import replace
 from datetime import datetime
 
 import numpy as np
-import scipy
 
 from shm.errors import BadInput
 from shm.models import Model, class_of
 from shm.values import (
     PLANES,
-    TENSION,
     BoolArray,
     FloatArray,
     Hanger,
@@ -44,44 +42,17 @@ from shm.values import (
     ModeReading,
     Posterior,
     Reading,
-    WatchedQuantity,
 )
 from shm.watch.causes import columns_of
+from shm.watch.linear_reading import Likelihood, LinearReading, SeenModes
 from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, sound_modes
-from shm.watch.quantities import (
-    MeasuredMode,
-    base_point,
-    moved,
-    shift_of,
-    watched_quantities,
-)
-from shm.watch.reading_corrections import (
-    SELDOM,
-    AmplitudeSlopes,
-    LinearReading,
-    SeenModes,
-    credible_share,
-    loosening_of,
-)
-from shm.watch.steel_softening import softening
+from shm.watch.quantities import MeasuredMode, base_point, watched_quantities
+from shm.watch.reading_corrections import AmplitudeSlopes, loosening_of, softening
 
 # A frequency without a stated error is as good as a usual identification: its errors go from 1e-4
 # to 1e-3 of a frequency, and who states none is given the worse.
 _UNKNOWN_SD = 1e-3
 _FREQUENCY_ALLOWANCE = 1e-4
-_SLOPE_STEP = 0.1
-# Far above the rounding of a log frequency, far below what a test can tell.
-_LEAST_SLOPE_STEP = 1e-7
-_PULL_SD_IN_STEPS = 10.0
-_MOST_STEPS = 12
-_STARTS = 24  # technical: of a tension from a fiftieth to five times the nominal one
-# In units of the reading's variance: a last step of a tenth of its standard deviation is taken
-# along with the reading, which is linear about the place before it.
-_SETTLED = 1e-2
-# Information, per step_sd, of which 10,000 tests together say as much as the prior of a change.
-_UNSEEN = 1e-4
-# How far a search leaves the tables, in log frequency: more than noise, less than a blunder.
-_BEYOND = 0.05
 
 # Mode by mode two tests of one state differ by more than is stated: the sensors' mass and place, a
 # joint that gives. Judgement, the better end of what repeated tests of real hangers show.
@@ -129,11 +100,8 @@ class Reader:
         self.columns = replace(
             columns_of(self._model, self._base, hanger, self.modes), loosening=loosening
         )
-        self._columns = [_columns(each, self._model) for each in self.quantities]
-        self._scale: FloatArray = np.array([each.step_sd for each in self.quantities])
-        self._pull: FloatArray = 1 / (_PULL_SD_IN_STEPS * self._scale) ** 2
-        self._lowest = np.array([each.coordinates[0] for each in self.quantities])
-        self._highest = np.array([each.coordinates[-1] for each in self.quantities])
+        highest = max(order for _, order in self.modes)
+        self._likelihood = Likelihood(self._model, self._base, self.quantities, highest)
         self.reference_temperature_c = mean_temperature_c(usable)
         self._per_kelvin = softening(self._model, self._base, hanger, self.modes)
         self._per_amplitude = AmplitudeSlopes.of(usable, self.modes)
@@ -157,10 +125,10 @@ class Reader:
             return blind
         sound = self._sound(seen)
         mistaken, seen = seen.own[~sound], seen.taken(sound)
-        linear = self._settled(seen)
+        linear = self._likelihood.settled(seen)
         misfit = linear.residual + linear.slopes @ linear.x
         softer = self._per_kelvin[seen.own] / np.sqrt(seen.variance)
-        (mean, per_kelvin), information = self._read(linear, np.array([misfit, softer]))
+        (mean, per_kelvin), information = self._likelihood.read(linear, np.array([misfit, softer]))
         left = None if self._is_warmth_known(test) else per_kelvin
         modes = self._by_mode(seen, linear, mistaken, is_warmth_known=left is None)
         return replace(
@@ -207,7 +175,7 @@ class Reader:
         found = self._sound_by(seen, none, still)
         if found.sound.all():
             return every
-        slack = self._sound_by(seen, none, self._far_start(seen))
+        slack = self._sound_by(seen, none, self._likelihood.far_start(seen))
         if slack.log_evidence > found.log_evidence:
             found = slack
         if self._loosening.size:
@@ -221,14 +189,14 @@ class Reader:
         quantities are sought from `start` (q,) on."""
         variance, more = seen.variance + self._scatter**2, more[seen.own]
         wide, sd = replace(seen, variance=variance), np.sqrt(variance)
-        pull = np.append(self._pull, np.full(more.shape[1], 1 / _LOOSENED_STEPS**2))
+        pull = np.append(self._likelihood.pull, np.full(more.shape[1], 1 / _LOOSENED_STEPS**2))
         x = start
         for _ in range(_ROUNDS):
-            linear = self._linear(x, wide)
+            linear = self._likelihood.linear(x, wide)
             off = sd * (linear.residual + linear.slopes @ x)
             slopes = np.hstack([sd[:, None] * linear.slopes, more])
             found = sound_modes(off, slopes, variance, pull)
-            x = np.clip(found.x[: len(x)], self._lowest - _BEYOND, self._highest + _BEYOND)
+            x = self._likelihood.inside(found.x[: len(x)])
         is_near = np.abs(off - slopes @ found.x) < _LEAST_MISTAKE
         return replace(found, sound=found.sound | is_near)
 
@@ -243,7 +211,7 @@ class Reader:
         """
         own = np.concatenate([seen.own for seen in tests])
         base = np.zeros((1, len(self.quantities)))
-        off = [seen.log_frequency - self._predicted(base, seen)[0] for seen in tests]
+        off = [seen.log_frequency - self._likelihood.predicted(base, seen)[0] for seen in tests]
         if len(tests) < _ROUNDS:
             weight = 1 / np.concatenate([seen.variance for seen in tests])
             total = np.bincount(own, weight * np.concatenate(off), len(self.modes))
@@ -279,93 +247,6 @@ class Reader:
             variance=sd**2 + slip_sd**2 + self._allowance**2,
         )
 
-    def _far_start(self, seen: SeenModes) -> FloatArray:
-        """Where the tension alone fits best, over all that its table holds: half of the modes may
-        be anywhere."""
-        first = np.linspace(self._lowest[0], self._highest[0], _STARTS)
-        places = np.zeros((_STARTS, len(self.quantities)))
-        places[:, 0] = first
-        off = np.abs(seen.log_frequency - self._predicted(places, seen))
-        return np.asarray(places[int(np.median(off, axis=1).argmin())])
-
-    def _settled(self, seen: SeenModes) -> LinearReading:
-        """The likelihood about where it is largest, or very nearly.
-
-        Sought from the baseline on; where that fits badly, from where the tension alone fits best,
-        too: on the way to a slack hanger a descent may lose itself among stiffnesses.
-        """
-        near = self._descended(np.zeros(len(self.quantities)), seen)
-        misfit = float(near.residual @ near.residual)
-        if misfit <= scipy.special.chdtri(len(near.residual), SELDOM):
-            return near
-        far = self._descended(self._far_start(seen), seen)
-        return far if far.cost < near.cost else near
-
-    def _descended(self, start: FloatArray, seen: SeenModes) -> LinearReading:
-        """The same from `start` (q,) on; steps that overshoot halve."""
-        best = self._linear(start, seen)
-        step = best.step
-        for _ in range(_MOST_STEPS):
-            if best.gain(step) < _SETTLED:
-                break
-            near = np.clip(best.x + step, self._lowest - _BEYOND, self._highest + _BEYOND)
-            tried = self._linear(near, seen)
-            if tried.cost <= best.cost:
-                best, step = tried, tried.step
-            else:
-                step = step / 2
-        return best
-
-    def _linear(self, x: FloatArray, seen: SeenModes) -> LinearReading:
-        """One call of the model: at `x` and to both sides of it along each coordinate.
-
-        Beyond the end of a table the model stands still, and frequencies go on straight.
-        """
-        count, inside = len(x), np.clip(x, self._lowest, self._highest)
-        half = np.maximum(_SLOPE_STEP * self._scale, _LEAST_SLOPE_STEP)
-        low = np.maximum(inside - half, self._lowest)
-        high = np.minimum(inside + half, self._highest)
-        places = np.vstack([inside, *(_with_diagonal(inside, ends) for ends in (low, high))])
-        predicted = self._predicted(places, seen)
-        rise = predicted[1 + count :] - predicted[1 : 1 + count]
-        slopes = (rise / (high - low)[:, None]).T
-        sd = np.sqrt(seen.variance)
-        residual = seen.log_frequency - predicted[0] - slopes @ (x - inside)
-        return LinearReading(x, residual / sd, slopes / sd[:, None], self._pull)
-
-    def _read(self, linear: LinearReading, off: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What moves of the modes `off` (k, n), over sd, make of the coordinates (k, q).
-
-        And the information (q, q) of the likelihood alone, 0 along what is not seen.
-        """
-        slopes = linear.slopes * self._scale
-        shares, axes = np.linalg.eigh(slopes.T @ slopes)
-        seen = shares > _UNSEEN
-        steps = (off @ slopes @ axes)[:, seen] / shares[seen]
-        share = credible_share(linear.residual, int(seen.sum()))
-        kept = shares[seen] * share > _UNSEEN
-        shares, axes = shares[seen][kept] * share, axes[:, seen][:, kept]
-        information = (axes * shares) @ axes.T / np.outer(self._scale, self._scale)
-        return self._scale * (steps[:, kept] @ axes.T), np.asarray(information + information.T) / 2
-
-    def _predicted(self, x: FloatArray, seen: SeenModes) -> FloatArray:
-        """Log frequencies (n, modes) of the model at coordinates (n, q) within the tables."""
-        theta = np.tile(self._base, (len(x), 1))
-        for quantity, columns, values in zip(self.quantities, self._columns, x.T, strict=True):
-            shift = shift_of(quantity, values)
-            if quantity.name == TENSION:
-                theta[:, columns] *= 1 + shift[:, None]
-            else:
-                theta[:, columns] = moved(self._model, self._base, columns, shift)[:, columns]
-        highest = max(order for _, order in self.modes)
-        found = self._model.frequencies_at(theta, highest, seen.conditions)
-        return np.asarray(np.log(found[:, seen.plane, seen.order]))
-
-
-def _with_diagonal(row: FloatArray, diagonal: FloatArray) -> FloatArray:
-    """`row` (q,) once for each entry of `diagonal` (q,), which replaces its own: (q, q)."""
-    return np.where(np.eye(len(row), dtype=bool), diagonal, row)
-
 
 def mean_temperature_c(tests: Sequence[ModalTest]) -> float:
     """Of those tests that have one; NaN where none has."""
@@ -393,7 +274,3 @@ def _is_described(test: ModalTest, model: Model) -> bool:
     except BadInput:
         return False
     return True
-
-
-def _columns(quantity: WatchedQuantity, model: Model) -> list[int]:
-    return [model.parameter_names.index(name) for name in quantity.parameters]

@@ -24,8 +24,8 @@ import numpy as np
 import scipy
 
 from shm.values import FloatArray, IntArray
-from shm.watch.conditions import DAYS_PER_YEAR
 from shm.watch.local_level import corrected
+from shm.watch.options import DAYS_PER_YEAR
 
 _OVERSTATED = 100.0
 """By what evidence is too large where nobody records a hanger's warmth: in 52 quiet hanger-years of

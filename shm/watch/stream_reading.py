@@ -23,7 +23,7 @@ from shm.models.tensioned_beam import frequencies_hz
 from shm.values import PLANES, BoolArray, FloatArray, Hanger, Mode, Posterior
 from shm.values.stream import PooledReading
 from shm.watch.quantities import MeasuredMode, base_point, log_frequencies, moved
-from shm.watch.steel_softening import MODULUS_PER_KELVIN
+from shm.watch.reading_corrections import MODULUS_PER_KELVIN
 
 LEAST_SD = 3e-5
 """Of an hourly log frequency: 1 Hz is read to 1/30 mHz at best, and clocks wander by as much."""

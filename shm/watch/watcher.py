@@ -29,13 +29,11 @@ from shm.values import (
 from shm.values.drift import ENOUGH_AGAINST
 from shm.watch.causes import Columns, Structure, Told, structure_of
 from shm.watch.change_point import Evidence, evidence_of, log_probability_of_called
-from shm.watch.conditions import OF_ONE_VISIT_YEARS, reference_of, years_between
 from shm.watch.isolated_tests import counted, outlier_probability
-from shm.watch.options import WatchOptions
+from shm.watch.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of, years_between
 from shm.watch.persistence import what_stays
 from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
-from shm.watch.state_sums import StateSums, begun_of, size_of
-from shm.watch.watch_state import WatchState
+from shm.watch.state_sums import StateSums, WatchState, begun_of, size_of
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
 _VERSION = 13
@@ -222,10 +220,7 @@ class Watcher:
             time=reading.time,
             temperature_c=reading.temperature_c,
             drifts=drifted(
-                subject,
-                *shifts,
-                reading,
-                is_baseline=state.tests <= self.options.baseline_tests,
+                subject, *shifts, reading, is_baseline=state.tests <= self.options.baseline_tests
             ),
             change=changed(
                 subject,

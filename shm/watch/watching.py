@@ -37,19 +37,19 @@ from shm.values import (
 )
 from shm.watch.agreement import Way, agreement, way_of
 from shm.watch.alert_state import AlertState, conditions, still, with_beyond
-from shm.watch.alert_text import message_of, short_name
+from shm.watch.alert_text import alert_of, message_of
 from shm.watch.change_words import CAUSES, suspects
 from shm.watch.isolated_tests import (
     FEW_TESTS,
     FIRST_TESTS,
     alert_of_baseline,
     first_tests_against,
+    message_of_odd,
 )
 from shm.watch.mistaken_modes import news_of, notice_of, repeated_mistakes
-from shm.watch.odd_text import message_of_odd
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
-from shm.watch.watch_state import WatchState
+from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watch, Watcher, watch_of, watched
 
 DatedTest = tuple[ModalTest, datetime]
@@ -260,15 +260,8 @@ def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
     if in_a_row not in (1, _ODD_IN_A_ROW):
         return None
     kind: AlertKind = _REPEAT if in_a_row == 1 else "tests disagree"
-    return Alert(
-        key=f"hanger-{hanger.id}:{kind.replace(' ', '-')}:{short_name(test.test)}",
-        hanger=hanger.id,
-        test=test.test,
-        time=test.time,
-        message=message_of_odd(test, hanger, in_a_row),
-        drifts=(),
-        kinds=(kind,),
-    )
+    said = message_of_odd(test, hanger, in_a_row)
+    return alert_of(hanger, (test.test, test.time), kind.replace(" ", "-"), said, (kind,))
 
 
 def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
@@ -336,24 +329,18 @@ def _alert(
     )
     if not kinds:
         return None
-    return Alert(
-        key=_key(kinds, news, test, hanger),
-        hanger=hanger.id,
-        test=test.test,
-        time=test.time,
-        message=message_of(
-            test,
-            hanger,
-            change,
-            news.beyond,
-            is_call=news.call,
-            is_further=is_further,
-            standing=_standing(test, standing, hanger),
-        ),
-        drifts=news.beyond or _suspected(test),
-        kinds=kinds,
-        change=change,
+    said = message_of(
+        test,
+        hanger,
+        change,
+        news.beyond,
+        is_call=news.call,
+        is_further=is_further,
+        standing=_standing(test, standing, hanger),
     )
+    what = f"{'+'.join(kinds).replace(' ', '-')}:{_first_moved(news, test).replace(' ', '-')}"
+    drifts = news.beyond or _suspected(test)
+    return alert_of(hanger, (test.test, test.time), what, said, kinds, drifts, change)
 
 
 def _standing(test: WatchedTest, standing: AlertState, hanger: Hanger) -> list[Drift]:
@@ -374,12 +361,6 @@ def _suspected(test: WatchedTest) -> tuple[Drift, ...]:
     """The shifts of what may have changed."""
     by_name = {drift.quantity: drift for drift in test.drifts}
     return tuple(by_name[name] for name in _suspects(test.change) if name in by_name)
-
-
-def _key(kinds: Sequence[AlertKind], news: _News, test: WatchedTest, hanger: Hanger) -> str:
-    rules = "+".join(kind.replace(" ", "-") for kind in kinds)
-    moved = _first_moved(news, test).replace(" ", "-")
-    return f"hanger-{hanger.id}:{rules}:{moved}:{short_name(test.test)}"
 
 
 def _first_moved(news: _News, test: WatchedTest) -> str:

@@ -10,7 +10,7 @@ import pytest
 
 from shm.documents import dump
 from shm.modes_document import modes_document
-from shm.pipeline.redescribed import discarded_of
+from shm.pipeline.lineage import discarded_of
 from shm.store import Stage, Workspace
 from tests.cli.conftest import Shm
 from tests.helpers.taken_in import copied, ingest_quickly

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from shm.pipeline.redescribed import MOVES_NOTHING, redescribed
+from shm.pipeline.lineage import MOVES_NOTHING, redescribed
 from shm.pipeline.reporting import hanger_report
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text

@@ -17,7 +17,7 @@ from shm.report.states import NOTHING_WATCHED, QuantityOverTime, StatesOverTime
 from shm.store import BaselineGlance, EventKind, HangerEvent, TrendPoint
 from shm.values import NAN, Averaged, FloatArray, Summary
 from shm.values.notes import Note, NoteKind
-from shm.watch.history import Band
+from shm.watch.state import Band
 from shm_daemon.web.hanger_figures.over_time import STIFFNESS, TEMPERATURE, TREND
 from shm_daemon.web.hanger_view import HangerView
 from tests.helpers.workspaces import START

@@ -14,7 +14,7 @@ from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Workspace
 from shm.store.people import Role
-from shm.store.people_tables import users
+from shm.store.people_and_stream_tables import users
 from shm_daemon.web.access import engineering, reading, signed_in_person, writing
 from shm_daemon.web.address import Address
 from shm_daemon.web.app import load_pages

@@ -22,9 +22,8 @@ from shm.store import (
     Workspace,
 )
 from shm.store.checking import archived_names
-from shm.store.people import Role
+from shm.store.people import Role, Scope
 from shm.store.retention import copy_archive, removable, remove
-from shm.store.upkeep import Scope
 from shm.values import Fingerprint
 from shm.values.notes import NoteKind
 from tests.helpers import quick_update

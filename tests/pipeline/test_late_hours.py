@@ -14,7 +14,7 @@ import pytest
 
 from shm.models.tensioned_beam import frequencies_hz
 from shm.pipeline import stream_days, stream_steps
-from shm.pipeline.redescribed import discarded_of
+from shm.pipeline.lineage import discarded_of
 from shm.pipeline.stream_days import hand_on_day
 from shm.pipeline.streaming import Streaming
 from shm.store import Stage, Store, Workspace

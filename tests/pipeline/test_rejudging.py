@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from shm.pipeline.rejudging import differences
+from shm.pipeline.watching import differences
 from shm.store import Stage, StoredAlert, Workspace
 from shm.store.missing import missing_rows
 from tests.helpers.flows import Clock, Postman, a_flow, ingest, receive_all

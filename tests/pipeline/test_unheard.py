@@ -9,9 +9,17 @@ from pathlib import Path
 import pytest
 
 from shm.pipeline.bridge_reporting import hanger_lines, unwatched
-from shm.pipeline.silent_streams import heed_silences, note_blindness
-from shm.pipeline.thermometers import compare_thermometers
-from shm.pipeline.unheard import Heard, State, blind_hangers, heard, leads_of, word_of
+from shm.pipeline.unheard import (
+    Heard,
+    State,
+    blind_hangers,
+    compare_thermometers,
+    heard,
+    heed_silences,
+    leads_of,
+    note_blindness,
+    word_of,
+)
 from shm.read.chunk_document import chunk_document
 from shm.report.hanger_status import Status
 from shm.store.ring import ring_of

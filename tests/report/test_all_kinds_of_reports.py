@@ -30,7 +30,7 @@ from shm.report.hanger_status import Status
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.states import CalledChange, Period, QuantityOverTime, StatesOverTime
 from shm.values import NAN, Drift, FloatArray, QualityCheck, TemperatureCoefficient
-from shm.watch.history import Band
+from shm.watch.state import Band
 from tests.helpers.nouns import a_change, a_message
 from tests.helpers.pdf_words import Pdf
 from tests.report.conftest import START

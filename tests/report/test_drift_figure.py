@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from shm.report.figures.hanger_states import STATES
 from shm.report.states import CalledChange, QuantityOverTime, StatesOverTime, _over_time
 from shm.values import TENSION, FloatArray, WatchedQuantity
-from shm.watch.history import Band, StateHistory
+from shm.watch.state import Band, StateHistory
 from tests.helpers.hangers import HANGER_3
 
 TESTS = 60

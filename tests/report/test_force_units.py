@@ -28,8 +28,8 @@ from shm.report.shifts import shift_unit
 from shm.report.states import QuantityOverTime, StatesOverTime
 from shm.values import Hanger, Posterior, Selection, TensionEstimate
 from shm.values.rounding import force_unit
-from shm.watch.history import Band
 from shm.watch.neighbours import HangerShift, bridge_pattern
+from shm.watch.state import Band
 from tests.helpers.nouns import a_message
 from tests.helpers.slow import few_of
 from tests.report.diagnoses import HANGER, sheet

@@ -12,8 +12,8 @@ from shm.errors import DamagedRow
 from shm.store import Store
 from shm.store.checking import check_store
 from shm.store.checksums import plain_table
-from shm.store.damage import damaged_among
 from shm.store.tables import metadata, tokens
+from shm.store.upkeep import damaged_among
 from tests.helpers.contents import quiet
 from tests.helpers.damaging import change, flipped
 from tests.helpers.nouns import NOW

@@ -9,8 +9,7 @@ import pytest
 from shm.errors import NothingThere, UsageError
 from shm.store import Store
 from shm.store.audit import Actor, AuditRow
-from shm.store.people import SIGNED_IN_FOR, Role
-from shm.store.upkeep import Scope
+from shm.store.people import SIGNED_IN_FOR, Role, Scope
 
 NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)
 SECOND, DAY = timedelta(seconds=1), timedelta(days=1)
@@ -179,7 +178,7 @@ def test_a_token_is_good_for_what_it_was_made_for_until_it_is_revoked(store: Sto
 
 
 def test_the_use_of_a_token_is_noted_now_and_then(store: Store) -> None:
-    from shm.store.upkeep import _NOTED_AGAIN_AFTER as PAUSE
+    from shm.store.people import _NOTED_AGAIN_AFTER as PAUSE
 
     def used_at() -> datetime | None:
         return store.upkeep.list_tokens()[0].last_used_at

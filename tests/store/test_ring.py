@@ -23,7 +23,7 @@ from shm.read import read, ring_segment
 from shm.read.chunk_document import chunk_document
 from shm.store import ring as ring_module
 from shm.store.ring import Ring
-from shm.store.ring_recording import recording_of
+from shm.store.ring_pieces import recording_of
 from shm.values import Recording
 from shm.values.stream import Chunk, Stream, StreamChannel, StreamEvent
 from tests.helpers.nouns import NOW

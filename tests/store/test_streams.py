@@ -10,7 +10,7 @@ import sqlalchemy as sa
 
 from shm.errors import StoreError
 from shm.store import DeliveryState, Store
-from shm.store.stream_tables import stream_windows
+from shm.store.people_and_stream_tables import stream_windows
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import MODES, a_reading, a_window, an_event
 
@@ -193,7 +193,3 @@ def test_the_watch_goes_back_to_a_day_before(file_store: Store) -> None:
     streams.go_back(3, end[1], b"anew")
     assert (streams.watch_time(3), streams.watch_state(3)) == (end[1], b"anew")
     assert streams.watch_before(3, end[2]) == (end[1], b"day 1")
-    streams.forget_watch(4)
-    assert streams.watch_state(3) == b"anew"
-    streams.forget_watch(3)
-    assert streams.watch_time(3) is streams.watch_before(3, end[2]) is None

@@ -11,8 +11,6 @@ from scipy.stats import multivariate_normal
 from shm.watch.mistaken_modes import (
     MISTAKEN,
     MISTAKEN_RANGE,
-    good_probability,
-    log_mixture,
     sound_modes,
 )
 
@@ -75,12 +73,3 @@ def test_a_third_that_is_mistaken_by_little_is_no_misfit() -> None:
     found = sound_modes(off, slopes, np.full(12, 1e-6), PRECISION)
     assert not found.is_misfit
     assert np.flatnonzero(~found.sound).tolist() == planted
-
-
-def test_a_mode_is_as_likely_good_as_its_share_of_the_density_says() -> None:
-    off, variance = np.array([0.0, 0.003, 0.3]), 1e-6
-    good = good_probability(off, variance)
-    assert good[0] > 0.999
-    assert good[2] < 1e-6
-    wrong = MISTAKEN / MISTAKEN_RANGE
-    assert (1 - good) * np.exp(log_mixture(off, variance)) == pytest.approx(np.full(3, wrong))

@@ -19,7 +19,7 @@ from shm.watch.neighbours import (
     bridge_pattern,
     shifts_of,
 )
-from shm.watch.neighbours.evidence import (
+from shm.watch.neighbours.hypotheses import (
     Bridge,
     independent,
     shed_factors,
@@ -293,17 +293,6 @@ def test_shifts_that_go_with_the_temperatures_of_the_tests_name_the_temperature(
     assert pattern.alike_cause == "the temperature"
 
 
-def test_the_hangers_of_one_logger_name_that_logger() -> None:
-    shifts = [
-        replace(each, logger="B7", shift_n=each.shift_n - 9e3) if each.hanger % 3 == 0 else each
-        for each in sure({}, logger="A1")
-    ]
-    pattern = bridge_pattern(shifts)
-    assert named(pattern) == "common shift"
-    assert pattern.alike_cause == "logger B7"
-    assert pattern.alike_fraction == pytest.approx(-9 / 700, abs=2e-3)
-
-
 # ---------------------------------------------------------------- which tests are compared
 
 
@@ -339,10 +328,9 @@ def test_shifts_are_the_latest_known_drifts_of_the_tension_in_their_order() -> N
         9: [drift(9, 1, 0.01), drift(9, 2, float("nan"))],
         5: [drift(5, 1, 0.1, "log10_k1")],
     }
-    found = shifts_of(drifts, (9, 7, 5, 4), temperature_changes_k={9: 3.0}, loggers={4: "A"})
+    found = shifts_of(drifts, (9, 7, 5, 4), temperature_changes_k={9: 3.0})
     assert [(each.hanger, each.place) for each in found] == [(9, 0), (4, 3)]
     assert [each.shift_n for each in found] == pytest.approx([7e3, -21e3])
     assert [each.shift_sd_n for each in found] == pytest.approx([1.4e3, 1.4e3])
     assert found[0].temperature_change_k == 3.0
     assert np.isnan(found[1].temperature_change_k)
-    assert found[1].logger == "A"

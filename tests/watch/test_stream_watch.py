@@ -15,8 +15,7 @@ from shm.models.tensioned_beam import frequencies_hz
 from shm.values import FloatArray, Hanger, ModalTest, Mode, Thresholds
 from shm.values.stream import PooledReading, StreamEvent, Window, WindowReading
 from shm.watch.ambient_hammer import ambient_bias
-from shm.watch.stream_cause import cause_of
-from shm.watch.stream_hints import led_by
+from shm.watch.stream_cause import cause_of, led_by
 from shm.watch.stream_reading import ModeTable, exchanged, sensitivities
 from shm.watch.stream_state import windows_as_mounted
 from shm.watch.stream_watch import (

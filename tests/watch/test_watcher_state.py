@@ -11,7 +11,7 @@ import pytest
 from shm.errors import BadInput, UsageError
 from shm.values import Reading, WatchedTest
 from shm.watch.options import WatchOptions
-from shm.watch.watch_state import WatchState
+from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watcher
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.synthetic_readings import (

@@ -26,7 +26,7 @@ from shm.report.figures.specification import (
 from shm.report.states import QuantityOverTime, StatesOverTime
 from shm.values import BoolArray
 from shm.values.rounding import force_unit
-from shm.watch.history import Band as Bounds
+from shm.watch.state import Band as Bounds
 
 _TENSION_INCHES, _STIFFNESS_INCHES, _TEMPERATURE_INCHES = 2.3, 1.5, 0.75
 _REST_INCHES = 0.9

@@ -23,7 +23,7 @@ from shm.report.figures.specification import (
     stacked,
 )
 from shm.values import FloatArray
-from shm.watch.history import Band as Bounds
+from shm.watch.state import Band as Bounds
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,7 @@ from shm.values import FloatArray
 from shm.values.notes import Note, NoteKind
 from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import averaged_now
-from shm.watch.history import Band as Bounds
+from shm.watch.state import Band as Bounds
 
 _LONGEST_WORDS = 200  # layout: characters of a note in a hover; the page has all
 _AT_FOOT = 0.03  # layout: of the height, where signs of what people did stand

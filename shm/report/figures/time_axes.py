@@ -24,7 +24,7 @@ from shm.report.figures.specification import (
 from shm.report.formatting import Interval
 from shm.report.states import CalledChange
 from shm.values import FloatArray, IntArray
-from shm.watch.history import Band as Bounds
+from shm.watch.state import Band as Bounds
 
 TIME = "time of the test (UTC)"
 MOST_POINTS = 1_000

@@ -24,7 +24,7 @@ class HangerShift:
 
     `place` counts the hangers along the bridge, those without a test too; two rows of hangers stand
     in one count if three places or more are left free between them. `temperature_change_k` is that
-    of the latest test from the baseline's mean, NaN where unknown; `logger` is empty where unknown.
+    of the latest test from the baseline's mean, NaN where unknown.
     """
 
     hanger: int
@@ -35,7 +35,6 @@ class HangerShift:
     shift_sd_n: float
     position_m: float = NAN
     temperature_change_k: float = NAN
-    logger: str = ""
 
 
 # Judgement: why, says `NeighbourOptions`.
@@ -231,11 +230,9 @@ def _nothing(pattern: BridgePattern) -> str:
 
 def _alike(pattern: BridgePattern, remedy: str) -> str:
     size = rounded_percent(pattern.alike_fraction, NINETY_PERCENT * pattern.alike_sd, "+")
-    is_of_logger = pattern.alike_cause.startswith("logger")
-    who = "The hangers of one logger" if is_of_logger else "All hangers"
     return (
-        f"{who} shifted alike, by {size}. The probable cause is {pattern.alike_cause}, not the "
-        f"hangers. {remedy[0].upper()}{remedy[1:]}."
+        f"All hangers shifted alike, by {size}. The probable cause is {pattern.alike_cause}, not "
+        f"the hangers. {remedy[0].upper()}{remedy[1:]}."
     )
 
 

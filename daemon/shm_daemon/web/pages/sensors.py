@@ -12,10 +12,10 @@ from fastapi.responses import JSONResponse
 
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
-from shm.pipeline.stream_course import stream_course
 from shm.pipeline.stream_state import (
     StreamCondition,
     against_hammer,
+    stream_course,
     stream_states,
     tension_words,
 )

@@ -16,11 +16,11 @@ from shm.bridge.changes import HANGER_KEYS, HOOK_KEYS, SETTING_KEYS
 from shm.bridge.hooks import QUIET_HOURS, QuietHours
 from shm.errors import BadInput, UsageError
 from shm.pipeline import utc_now
-from shm.pipeline.rejudging import differences
+from shm.pipeline.watching import differences
 from shm.report import formatting
 from shm.settings import TABLE, Settings, load_settings
 from shm.store import Stage
-from shm.store.changed_settings import ChangedSetting, said
+from shm.store.audit import ChangedSetting, said
 from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.faults import Refused
