@@ -11,17 +11,15 @@ import numpy as np
 
 from shm.errors import NotIdentifiable, UsageError
 from shm.identify.contract import Dropped, Finding, FoundMode, Hit, Measurement, Poles, Tone
-from shm.identify.estimation.finished import finished
+from shm.identify.estimation.finished import finished, without_sidebands
 from shm.identify.estimation.registry import WITHOUT_FORCE, identifier
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
-from shm.identify.estimation.sidebands import without_sidebands
 from shm.identify.estimation.ssi import looked_at_again
 from shm.identify.estimation.stabilise import completed
-from shm.identify.measuring.sensor_places import refuse_off_the_hanger
-from shm.identify.measuring.setups import measured, without_unused_force
+from shm.identify.measuring.setups import measured, refuse_off_the_hanger, without_unused_force
 from shm.identify.mode_ordering.confirmed import placed_with_doubtful
-from shm.identify.mode_ordering.directions import directions
 from shm.identify.mode_ordering.placement import Placement, placed
+from shm.identify.mode_ordering.planes import directions
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
 from shm.identify.quality.of_modes import first_orders

@@ -19,16 +19,16 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput
-from shm.identify.measuring.sensor_places import fault_of_place
+from shm.identify.measuring.setups import fault_of_place
 from shm.pipeline.import_times import outline, rate_told, with_times
 from shm.pipeline.lineage import read_limits
 from shm.read import logger_words as words
 from shm.read.assemble import recording
+from shm.read.base import Survey, SurveyedColumn
 from shm.read.header import CHANNEL_KEYS, Entry, Header
 from shm.read.profiles import Described, Profile, completed, profile_for, save_profile
 from shm.read.sandbox import survey
 from shm.read.sidecar import document_beside
-from shm.read.survey import Survey, SurveyedColumn
 from shm.store import Workspace
 from shm.values import NAN, Channel, Plane, Quantity, Recording
 

@@ -30,10 +30,10 @@ from typing import Any
 from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read.atomic import replace_text
+from shm.read.base import Layout
 from shm.read.content import unreadable
 from shm.read.header import CHANNEL_KEYS
 from shm.read.logger_words import hanger_numbered
-from shm.read.survey import Layout
 
 FOLDER = "loggers"
 Described = Mapping[str, Any]

@@ -9,10 +9,18 @@ from pathlib import Path
 from shm.errors import BadInput
 from shm.read import logger_text
 from shm.read import logger_words as words
-from shm.read.base import Format, LoggerColumn, LoggerTable, Peek, PeekChannel
+from shm.read.base import (
+    Format,
+    Layout,
+    LoggerColumn,
+    LoggerTable,
+    Peek,
+    PeekChannel,
+    Survey,
+    SurveyedColumn,
+)
 from shm.read.bundles import holds_test
 from shm.read.registry import format_of
-from shm.read.survey import Layout, Survey, SurveyedColumn
 
 _FINGERPRINT_DIGITS = 16  # technical: of 64 bits; a workspace has a handful of loggers
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from shm.simulate.ambient import AmbientPlan, ambient_test
 from shm.simulate.campaign import (
     Campaign,
+    CampaignPlan,
     CampaignTruth,
     bar_in_test,
     campaign,
@@ -28,7 +29,6 @@ from shm.simulate.effects import (
 )
 from shm.simulate.elements import natural_frequencies
 from shm.simulate.hammer import SimulatedTest, hammer_test, simulated_test
-from shm.simulate.plan import CampaignPlan
 from shm.simulate.planted import PlantedModes, planted_modes
 from shm.simulate.reality import Deviations, Reality, SensorError, drawn_hanger
 from shm.simulate.state import HammerPlan, HangerState, spread_places_m

@@ -10,9 +10,8 @@ from functools import lru_cache
 import numpy as np
 
 from shm.errors import UsageError
-from shm.simulate.campaign import noiseless
+from shm.simulate.campaign import CampaignPlan, noiseless
 from shm.simulate.effects import PlantedEffect, ranges_of
-from shm.simulate.plan import CampaignPlan
 from shm.simulate.reality import GLOBAL, Deviations, SensorError, sd_factors, wave_sd
 from shm.simulate.state import HangerState
 from shm.values import PLANES, FloatArray, Hanger

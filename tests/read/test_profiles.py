@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from shm.errors import BadInput
+from shm.read.base import Layout
 from shm.read.profiles import (
     FOLDER,
     any_profile,
@@ -17,7 +18,6 @@ from shm.read.profiles import (
     save_profile,
     sidecar_text,
 )
-from shm.read.survey import Layout
 
 LAYOUT = Layout("0123456789ab", "logger text", ("Time [s]", "A 1"))
 SAID = {

@@ -22,8 +22,15 @@ import numpy as np
 import scipy
 
 from shm.identify.contract import Finding, FoundMode, Measurement
-from shm.identify.estimation.courses import OVERLAP, TINY, Course, Row, course_of, phases_of
-from shm.identify.estimation.drift import with_drift
+from shm.identify.estimation.courses import (
+    OVERLAP,
+    TINY,
+    Course,
+    Row,
+    course_of,
+    phases_of,
+    with_drift,
+)
 from shm.identify.estimation.repeats import LEAST_HITS
 from shm.values import NAN, FloatArray
 from shm.values.modes import MOST_SLOPE, SURE_SDS
