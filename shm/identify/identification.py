@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import compress
 
 import numpy as np
 
@@ -276,9 +277,7 @@ def _of_modes_alone(found: Joined) -> Joined:
     """Without the sidebands of modes."""
     finding = without_sidebands(found.finding)
     kept = [any(mode is own for own in finding.modes) for mode in found.finding.modes]
-    apart = tuple(
-        tuple(mode for mode, keep in zip(modes, kept, strict=True) if keep) for modes in found.apart
-    )
+    apart = tuple(tuple(compress(modes, kept)) for modes in found.apart)
     return replace(found, finding=finding, apart=apart)
 
 

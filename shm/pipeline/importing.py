@@ -26,9 +26,9 @@ from shm.read import logger_words as words
 from shm.read.assemble import recording
 from shm.read.base import Survey, SurveyedColumn
 from shm.read.header import CHANNEL_KEYS, Entry, Header
-from shm.read.profiles import Described, Profile, completed, profile_for, save_profile
+from shm.read.profiles import Profile, completed, profile_for, save_profile
 from shm.read.sandbox import survey
-from shm.read.sidecar import document_beside
+from shm.read.sidecar import Described, document_beside
 from shm.store import Workspace
 from shm.values import NAN, Channel, Plane, Quantity, Recording
 

@@ -47,6 +47,7 @@ from shm.read.comma_table import (
     cells_of,
     evened,
     header_of,
+    is_number,
     mark_between,
     parse_heading,
     parse_table,
@@ -300,16 +301,7 @@ def _names(line: str) -> bool:
 
 def _numbers(line: str, mark: str) -> bool:
     cells = [cell for cell in cells_of(line, mark) if cell]
-    plain = (cell.replace(",", ".") if mark != "," else cell for cell in cells)
-    return len(cells) > 2 and all(_is_number(cell) for cell in plain)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return len(cells) > 2 and all(map(is_number, cells))
 
 
 def _columns_of_points(

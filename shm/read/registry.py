@@ -128,7 +128,7 @@ def _single(channel: Channel) -> Channel:
 
 
 T = TypeVar("T")
-Found = TypeVar("Found", bound=Recording | FrequencyResponse | Peek)
+Found = TypeVar("Found", bound=Recording | FrequencyResponse | Peek | ModalTest)
 
 
 def read_test(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
@@ -137,7 +137,7 @@ def read_test(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
         return (read(path),)
     head_of(path)
     records = each_member(path, lambda file, name: replace(_named(read, file, name), source=name))
-    return tuple(_told(record, path) for record in records)
+    return tuple(_as_said(record, entries_of_test(path)) for record in records)
 
 
 def peek_test(path: Path) -> tuple[Peek, ...]:
@@ -145,7 +145,8 @@ def peek_test(path: Path) -> tuple[Peek, ...]:
     if not holds_test(path):
         return (peek(path),)
     head_of(path)
-    return tuple(_told(found, path) for found in each_member(path, _peek_member))
+    said = entries_of_test(path)
+    return tuple(_as_said(found, said) for found in each_member(path, _peek_member))
 
 
 def _peek_member(file: Path, name: str) -> Peek:
@@ -170,14 +171,6 @@ def _named(verb: Callable[[Path], T], file: Path, name: str) -> T:
         ) from refusal
 
 
-def _told(found: Found, path: Path) -> Found:
-    """A member with what the sidecar of its archive says of the whole test."""
-    said = entries_of_test(path)
-    known = [key for key in ("hanger", "time", "temperature_c") if key in said.entries]
-    told = replace(found, **{key: getattr(said, key) for key in known})
-    return told if said.added_mass is None else replace(told, added_mass=said.added_mass)
-
-
 def load_modes(path: Path) -> tuple[ModalTest, ...]:
     """The tests of a `*.modes.json` file; raises BadInput with file, test, mode and remedy.
 
@@ -190,13 +183,14 @@ def load_modes(path: Path) -> tuple[ModalTest, ...]:
     return tuple(_as_said(test, said) for test in tests)
 
 
-def _as_said(test: ModalTest, said: Header) -> ModalTest:
+def _as_said(found: Found, said: Header) -> Found:
+    """With what a sidecar says of the whole test; what it does not say stays."""
     return replace(
-        test,
-        hanger=test.hanger if said.hanger is None else said.hanger,
-        time=said.time or test.time,
-        temperature_c=test.temperature_c if math.isnan(said.temperature_c) else said.temperature_c,
-        added_mass=said.added_mass or test.added_mass,
+        found,
+        hanger=found.hanger if said.hanger is None else said.hanger,
+        time=said.time or found.time,
+        temperature_c=found.temperature_c if math.isnan(said.temperature_c) else said.temperature_c,
+        added_mass=said.added_mass or found.added_mass,
     )
 
 

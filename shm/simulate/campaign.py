@@ -14,7 +14,7 @@ import numpy as np
 from shm.errors import UsageError
 from shm.simulate.bar import Bar
 from shm.simulate.effects import PlantedEffect, TestConditions
-from shm.simulate.planted import PlantedModes, bar_under, planted_modes
+from shm.simulate.planted import PlantedModes, bar_under, modes_under
 from shm.simulate.reality import (
     Deviations,
     Reality,
@@ -210,33 +210,11 @@ def conditions_of(hanger: Hanger, plan: CampaignPlan, test: ModalTest) -> TestCo
 
 
 def noiseless(
-    hanger: Hanger,
-    state: HangerState,
-    effects: Sequence[PlantedEffect],
-    plan: CampaignPlan,
-    test: ModalTest,
-    deviations: Deviations,
-    sensors: Sequence[SensorError] = (),
-) -> PlantedModes:
-    """What one test of a plan would say without noise."""
-    return planted_modes(
-        hanger,
-        state,
-        effects,
-        conditions_of(hanger, plan, test),
-        plan.modes,
-        plan.places_m(hanger),
-        deviations=deviations,
-        sensors=sensors,
-        own_laws=plan.own_laws,
-    )
-
-
-def _of_test(
     hanger: Hanger, state: HangerState, truth: CampaignTruth, plan: CampaignPlan, test: ModalTest
 ) -> PlantedModes:
-    true_state = replace(state, tension_n=truth.tension_n)
-    return noiseless(hanger, true_state, truth.effects, plan, test, truth.deviations, truth.sensors)
+    """What one test of a campaign would say without noise."""
+    bar = bar_in_test(hanger, state, truth, plan, test)
+    return modes_under(bar, plan.modes, plan.places_m(hanger), truth.sensors)
 
 
 def _realised(
@@ -256,7 +234,7 @@ def _realised(
         sensors = drawn_sensors(plan.reality, plan.places_m(hanger), rng)
     tension_n = state.tension_n * factor
     truth = CampaignTruth(tension_n, deviations, tuple(effects), sensors=sensors)
-    exact = [_of_test(hanger, state, truth, plan, test) for test in tests]
+    exact = [noiseless(hanger, state, truth, plan, test) for test in tests]
     return replace(truth, frequencies=_frequencies(tests, exact, plan)), exact
 
 

@@ -16,8 +16,8 @@ from shm.read.profiles import (
     completed,
     profile_for,
     save_profile,
-    sidecar_text,
 )
+from shm.read.sidecar import sidecar_text
 
 LAYOUT = Layout("0123456789ab", "logger text", ("Time [s]", "A 1"))
 SAID = {

@@ -212,17 +212,31 @@ def _drift(
     values = np.concatenate([row[1] for row, _ in rows])
     weight = 1 / np.concatenate([row[2] for row, _ in rows])
     freedom = len(values) - matrix.shape[1]
-    weighted = matrix * weight[:, np.newaxis]
-    scale = np.linalg.norm(weighted, axis=0)
-    square = (weighted / scale).T @ (weighted / scale)
-    if freedom < 2 or np.linalg.cond(square) > _WORST:
+    solution = least_squares(matrix, values, weight) if freedom >= 2 else None
+    if solution is None:
         return None
-    inverse = np.linalg.inv(square) / np.outer(scale, scale)
-    solved = inverse @ (weighted.T @ (values * weight))
-    rest = (values - matrix @ solved) * weight
+    solved, inverse, rest = solution
     at = len(rows)
     variance = inverse[at, at] * max(1.0, float(rest @ rest) / freedom) * OVERLAP**2
     return float(solved[at]), math.sqrt(variance)
+
+
+def least_squares(
+    matrix: FloatArray, values: FloatArray, weight: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """What `matrix` (values, unknowns) makes of its unknowns, the inverse of the normal equations,
+    and what is left of `values`, weighted; None where it cannot tell the unknowns apart.
+    """
+    weighted = matrix * weight[:, np.newaxis]
+    scale = np.linalg.norm(weighted, axis=0)
+    if np.any(scale == 0):
+        return None
+    square = (weighted / scale).T @ (weighted / scale)
+    if np.linalg.cond(square) > _WORST:
+        return None
+    inverse = np.linalg.inv(square) / np.outer(scale, scale)
+    solved = inverse @ (weighted.T @ (values * weight))
+    return solved, inverse, (values - matrix @ solved) * weight
 
 
 def _grown(time_s: FloatArray, size: FloatArray, decay: float) -> FloatArray:

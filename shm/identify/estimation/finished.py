@@ -63,17 +63,14 @@ def coherent_only(found: Finding, measurement: Measurement, options: IdentifyOpt
     if measurement.hits or response is None or response.coherence is None:
         return found
     frequency_hz, coherence = response.frequency_hz, response.coherence
-    good = [
-        _coherence(mode, frequency_hz, coherence) >= options.min_coherence for mode in found.modes
-    ]
     reason = f"coherence below {options.min_coherence:g}"
-    dropped = tuple(
-        Dropped(f"mode at {mode.frequency_hz:.4g} Hz", 1, reason)
-        for mode, ok in zip(found.modes, good, strict=True)
-        if not ok
-    )
-    modes = tuple(mode for mode, ok in zip(found.modes, good, strict=True) if ok)
-    return replace(found, modes=modes, dropped=found.dropped + dropped)
+    modes, dropped = [], list(found.dropped)
+    for mode in found.modes:
+        if _coherence(mode, frequency_hz, coherence) >= options.min_coherence:
+            modes.append(mode)
+        else:
+            dropped.append(Dropped(f"mode at {mode.frequency_hz:.4g} Hz", 1, reason))
+    return replace(found, modes=tuple(modes), dropped=tuple(dropped))
 
 
 def _coherence(mode: FoundMode, frequency_hz: FloatArray, coherence: FloatArray) -> float:

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
+from dataclasses import replace
+from itertools import compress, pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -102,21 +103,14 @@ def _merged(
     good = np.all(np.isfinite(accelerance[:, lines]), axis=1)
     coherences = [r.coherence for r in responses if r.coherence is not None]
     known = len(coherences) == len(responses)
-    merged = FrequencyResponse(
-        source=first.source,
-        points=tuple(point for point, ok in zip(points, good, strict=True) if ok),
-        frequency_hz=first.frequency_hz,
+    merged = replace(
+        first,
+        points=tuple(compress(points, good)),
         accelerance=accelerance[good],
         coherence=np.vstack(coherences)[good] if known else None,
-        hanger=first.hanger,
-        time=first.time,
-        temperature_c=first.temperature_c,
-        added_mass=first.added_mass,
     )
     reason = "not-a-number lines in the band"
-    return merged, tuple(
-        Dropped(f"point {p.name}", 1, reason) for p, ok in zip(points, good, strict=True) if not ok
-    )
+    return merged, tuple(Dropped(f"point {p.name}", 1, reason) for p in compress(points, ~good))
 
 
 def _impulse_responses(

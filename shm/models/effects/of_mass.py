@@ -34,19 +34,16 @@ class DistributedMass(Effect):
         "section_size",
         "partial_mass",
     )
-
-    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        size = Parameter(
-            "mass_change",
-            "fraction",
-            0.002,
-            0.3,
-            0.0,
-            "0.2 to 30 % of the mass: from a coat of paint to a grouted pipe or glaze ice; things "
-            "are put on hangers, not taken off.",
-            spread="logarithmic",
-        )
-        return (size,)
+    size = Parameter(
+        "mass_change",
+        "fraction",
+        0.002,
+        0.3,
+        0.0,
+        "0.2 to 30 % of the mass: from a coat of paint to a grouted pipe or glaze ice; things "
+        "are put on hangers, not taken off.",
+        spread="logarithmic",
+    )
 
     def applied(
         self,
@@ -194,6 +191,15 @@ class SensorMass(Effect):
     seen_by = ("frequencies of many orders", "known places of the sensors")
     imitated_by = ("point_mass", "section_loss")
     of_the_hanger = False
+    size = Parameter(
+        "mass_kg",
+        "kg",
+        0.01,
+        20.0,
+        0.0,
+        "10 g to 20 kg each: from a piezo on wax to a boxed seismometer on a clamp.",
+        spread="logarithmic",
+    )
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         if survey.sensor_places_m:
@@ -202,18 +208,6 @@ class SensorMass(Effect):
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return (Variant("all sensors", places_m=survey.sensor_places_m),)
-
-    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        size = Parameter(
-            "mass_kg",
-            "kg",
-            0.01,
-            20.0,
-            0.0,
-            "10 g to 20 kg each: from a piezo on wax to a boxed seismometer on a clamp.",
-            spread="logarithmic",
-        )
-        return (size,)
 
     def applied(
         self,
