@@ -258,7 +258,7 @@ def _told(column: SurveyedColumn, described: Described) -> SurveyedColumn:
     """A column with what the sidecar says of it."""
     table = described.get("channel", {}).get(column.name, {})
     unit = str(table.get("unit", column.described_unit))
-    measured = words.measured_unit(unit)
+    measured = words.unit_of(unit)
     quantity = measured.quantity if measured is not None else None
     if "unit" not in table and quantity is None:
         quantity = column.quantity
@@ -298,7 +298,7 @@ def _open(columns: Sequence[SurveyedColumn]) -> list[SurveyedColumn]:
 
 def _is_in_doubt(column: SurveyedColumn) -> bool:
     """Whether nobody knows the unit, or it is not one of what the name says."""
-    return not words.is_unit(column.unit) or words.measured_unit(column.unit) is not None
+    return not words.is_unit(column.unit) or words.unit_of(column.unit) is not None
 
 
 def _of_unit(column: SurveyedColumn) -> Question:

@@ -12,10 +12,12 @@ import numpy as np
 import scipy
 
 from shm.identify.contract import Dropped, FoundMode
-from shm.identify.estimation.candidates import Candidate, Pole, continued
 from shm.identify.estimation.poles import (
+    Candidate,
+    Pole,
     PoleSet,
     aligned,
+    continued,
     median_shape,
     modal_assurance,
     real_shape,

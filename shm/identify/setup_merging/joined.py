@@ -15,8 +15,7 @@ import numpy as np
 import scipy
 
 from shm.identify.contract import Dropped, Finding, FoundMode, Measurement, Poles
-from shm.identify.estimation.candidates import FAR
-from shm.identify.estimation.poles import modal_assurance
+from shm.identify.estimation.poles import FAR, modal_assurance
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS, widening
 from shm.identify.measuring.responses import Place, place_of
 from shm.identify.mode_ordering.planes import transverse_share
