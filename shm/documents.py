@@ -229,29 +229,28 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
 
     A structure without a model has no tension: `tension_n` is null.
     """
+
+    def of(*names: str) -> dict[str, Any]:
+        return {name: getattr(posterior, name) for name in names}
+
     most_probable = dict(zip(posterior.names, posterior.most_probable, strict=True))
     tension = None
     if posterior.model != WITHOUT_MODEL:
         at = most_probable["theta_F"] * posterior.nominal_tension_n
         tension = summary(posterior.tension_n, at)
     return {
-        "model": posterior.model,
-        "hanger": posterior.hanger,
+        **of("model", "hanger"),
         "tests": list(posterior.tests),
         "tension_n": tension,
-        "repeatability_sd_n": posterior.repeatability_sd_n,
-        "nominal_tension_n": posterior.nominal_tension_n,
+        **of("repeatability_sd_n", "nominal_tension_n"),
         "parameters": {
             name: summary(posterior.parameter(name), most_probable[name])
             for name in posterior.names
         },
-        "log_evidence": posterior.log_evidence,
-        "log_evidence_sd": posterior.log_evidence_sd,
+        **of("log_evidence", "log_evidence_sd"),
         "probability": probability,
         "samples": len(posterior.samples),
-        "effective_sample_size": posterior.effective_sample_size,
-        "r_hat": posterior.r_hat,
-        "evaluations": posterior.evaluations,
+        **of("effective_sample_size", "r_hat", "evaluations"),
         "predicted": [
             {
                 "plane": p.plane,
@@ -261,17 +260,10 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
             }
             for p in posterior.predicted
         ],
-        "seconds": posterior.seconds,
-        "seed": posterior.seed,
-        "method": posterior.method,
-        "priors": posterior.priors,
+        **of("seconds", "seed", "method", "priors"),
         "at_bounds": list(posterior.at_bounds),
-        "misfit_percent": posterior.misfit_percent,
-        "log_occam": posterior.log_occam,
-        "tension_of_other_ends_n": posterior.tension_of_other_ends_n,
-        "tension_of_other_orders_n": posterior.tension_of_other_orders_n,
-        "description_off_sd": posterior.description_off_sd,
-        "reading_off_sd": posterior.reading_off_sd,
+        **of("misfit_percent", "log_occam", "tension_of_other_ends_n"),
+        **of("tension_of_other_orders_n", "description_off_sd", "reading_off_sd"),
         "caveats": list(posterior.caveats),
         "baseline_check": posterior.baseline_check and asdict(posterior.baseline_check),
     }

@@ -34,7 +34,7 @@ from shm.read.atomic import replace_text
 from shm.report.as_html import as_html
 from shm.report.hanger_report import hanger_paper
 from shm.simulate import HammerPlan, HangerState, hammer_test
-from shm.simulate.monitored import Loss, MonitoringPlan, described_stream
+from shm.simulate.ambient import Loss, MonitoringPlan, described_stream
 from shm.store import Stage, Store, StoredAlert, Workspace
 from shm.store.ring import ring_of
 from shm.values import Hanger, Posterior

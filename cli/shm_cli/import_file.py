@@ -37,7 +37,7 @@ from shm.pipeline.importing import (
 )
 from shm.pipeline.importing_modes import ImportedModes, keep_modes_profile, understand_modes
 from shm.pipeline.lineage import read_limits
-from shm.read.logger_words import measured_unit
+from shm.read.logger_words import unit_of
 from shm.read.modal_sets import ForeignModes, axes_of
 from shm.read.profiles import Profile
 from shm.read.sandbox import foreign_modes
@@ -254,7 +254,7 @@ def _accelerations(found: Import, tables: dict[str, dict[str, object]]) -> list[
     """The accelerations in the order of the file, with those that the options make such."""
     known = {column.name: column.quantity for column in found.columns}
     for name, given in tables.items():
-        unit = measured_unit(str(given.get("unit", "")))
+        unit = unit_of(str(given.get("unit", "")))
         if "leave_out" in given or unit is not None:
             known[name] = None if unit is None else unit.quantity
     return [name for name, quantity in known.items() if quantity == "acceleration"]

@@ -14,7 +14,7 @@ import rich_click as click
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
 from shm.read.chunk_document import chunk_document
-from shm.simulate.monitored import Loss, MonitoringPlan, streamed
+from shm.simulate.ambient import Loss, MonitoringPlan, streamed
 from shm.store import Workspace
 from shm.store.ring import ring_of
 from shm.values import Hanger

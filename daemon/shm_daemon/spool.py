@@ -28,8 +28,7 @@ from pathlib import Path, PurePosixPath
 
 from shm.errors import BadInput
 from shm.read import sidecar_path
-from shm.read.profiles import Described, sidecar_text
-from shm.read.sidecar import SIDECAR_SUFFIX
+from shm.read.sidecar import SIDECAR_SUFFIX, Described, sidecar_text
 from shm.store.archive import (
     MODES_SUFFIX,
     checksum,

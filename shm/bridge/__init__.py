@@ -4,15 +4,3 @@ from __future__ import annotations
 
 from shm.bridge.description import Bridge, Disturbance, OtherBridge, load_bridge, load_hanger
 from shm.bridge.hooks import AppriseHook, CommandHook, Hook, WebhookHook
-
-__all__ = [
-    "AppriseHook",
-    "Bridge",
-    "CommandHook",
-    "Disturbance",
-    "Hook",
-    "OtherBridge",
-    "WebhookHook",
-    "load_bridge",
-    "load_hanger",
-]

@@ -24,30 +24,36 @@ from shm.bridge.streams import stream_named, streams_of
 from shm.bridge.table import Table, is_loopback, web_address
 from shm.errors import BadInput
 from shm.values import MEASUREMENT_HOURS, Hanger, MonitoredHanger
-from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 from shm.values.stream import Stream
 
-_TEXTS = ("organisation", "prepared_by", "checked_by", "logo")
+_LETTERHEAD = ("organisation", "prepared_by", "checked_by", "logo")
 _SUFFIXES = (".png", ".jpg", ".jpeg")
+
+
+@dataclass(frozen=True)
+class Letterhead:
+    """Who makes the reports of a bridge, as their head and their signatures name them.
+
+    Empty texts and None: nothing is given. `logo` is an image file, which need not be there.
+    """
+
+    organisation: str = ""
+    prepared_by: str = ""
+    checked_by: str = ""
+    logo: Path | None = None
+
+
+NO_LETTERHEAD = Letterhead()
 
 
 def letterhead_of(document: Mapping[str, Any], path: Path) -> Letterhead:
     """What `[report]` says; raises BadInput for what it cannot hold. The logo is not opened."""
-    values = document.get("report", {})
-    if not isinstance(values, dict):
-        raise BadInput("report must be a table.", file=path, remedy="Write [report].")
-    table = Table(values, "[report]", path)
-    table.refuse_unknown(_TEXTS)
-    organisation, prepared_by, checked_by, logo = (
-        _text_of_letterhead(table, key) for key in _TEXTS
-    )
+    table = _table(document, "report", path) or Table({}, "[report]", path)
+    table.refuse_unknown(_LETTERHEAD)
+    organisation, prepared_by, checked_by, logo = (table.text(key, "") for key in _LETTERHEAD)
     if logo and Path(logo).suffix.lower() not in _SUFFIXES:
         raise table.refusal(f"logo = {logo!r} is no PNG or JPEG file", 'Write logo = "logo.png".')
     return Letterhead(organisation, prepared_by, checked_by, path.parent / logo if logo else None)
-
-
-def _text_of_letterhead(table: Table, key: str) -> str:
-    return str(table.value(key, str, "is not a text", f'Write {key} = "...".', usual="")).strip()
 
 
 _KNOWN = ("name", "address", "token_file", "certificate_file", "allow_http")
@@ -78,22 +84,15 @@ def other_bridge_of(values: Mapping[str, Any], path: Path) -> OtherBridge:
     if "token" in table:
         raise table.refusal("bridge.toml is no place for a token", _WHERE_TOKENS_STAND)
     table.refuse_unknown(_KNOWN)
-    name = _text_of_bridge(table, "name", 'Write name = "Arch bridge".', usual=None)
+    name = table.text("name", remedy='Write name = "Arch bridge".')
     address = web_address(table, "address", _ADDRESS, "a token in a file says who asks")
     if urlsplit(address).path.strip("/") or "?" in address or "#" in address:
         raise table.refusal("address is that of a page", _ADDRESS)
     token, certificate = (
-        _text_of_bridge(table, key, f'Write {key} = "arch.{suffix}".')
+        table.text(key, "", f'Write {key} = "arch.{suffix}".')
         for key, suffix in (("token_file", "token"), ("certificate_file", "pem"))
     )
     return OtherBridge(name, address.rstrip("/"), token, certificate)
-
-
-def _text_of_bridge(table: Table, key: str, remedy: str, usual: str | None = "") -> str:
-    def can_be_shown(text: str) -> bool:
-        return bool(text.strip()) and text.isprintable()
-
-    return str(table.value(key, str, "is not a text", remedy, usual, can_be_shown))
 
 
 EMAIL = "email"
@@ -122,26 +121,19 @@ class SingleSignOn:
 
 def single_sign_on_of(document: Mapping[str, Any], path: Path) -> SingleSignOn | None:
     """What `[single_sign_on]` says, None where there is none; raises BadInput."""
-    values = document.get("single_sign_on")
-    if values is None:
+    table = _table(document, "single_sign_on", path)
+    if table is None:
         return None
-    if not isinstance(values, dict):
-        raise BadInput("single_sign_on must be a table.", file=path, remedy="[single_sign_on]")
-    table = Table(values, "[single_sign_on]", path)
     if "client_secret" in table:
         raise table.refusal("bridge.toml is no place for a secret", _IN_A_FILE)
     table.refuse_unknown(_KEYS)
-    issuer = _text_of_sign_on(table, "issuer", "Write https://, as your provider states it.")
+    issuer = table.text("issuer", remedy="Write https://, as your provider states it.")
     if not is_safe(issuer):
         remedy = "Write https://; http:// is for a provider on this computer alone."
         raise table.refusal(f"issuer = {issuer!r} is not an encrypted address", remedy)
-    client_id = _text_of_sign_on(
-        table, "client_id", "Write the one that the provider gave this bridge."
-    )
-    secret_file = path.parent / _text_of_sign_on(table, "client_secret_file", _IN_A_FILE)
-    return SingleSignOn(
-        issuer, client_id, secret_file, _text_of_sign_on(table, "user_claim", "", usual=EMAIL)
-    )
+    client_id = table.text("client_id", remedy="Write the one that the provider gave this bridge.")
+    secret_file = path.parent / table.text("client_secret_file", remedy=_IN_A_FILE)
+    return SingleSignOn(issuer, client_id, secret_file, table.text("user_claim", EMAIL))
 
 
 def is_safe(address: str) -> bool:
@@ -154,12 +146,6 @@ def is_safe(address: str) -> bool:
     plain = not (parts.username or parts.password or parts.fragment) and address.isprintable()
     is_kept = parts.scheme == "https" or (parts.scheme == "http" and is_loopback(host))
     return bool(host) and plain and is_kept
-
-
-def _text_of_sign_on(table: Table, key: str, remedy: str, usual: str | None = None) -> str:
-    remedy = remedy or f'Write {key} = "...".'
-    found = table.value(key, str, "is not a text", remedy, usual, lambda text: bool(text.strip()))
-    return str(found).strip()
 
 
 @dataclass(frozen=True)
@@ -273,7 +259,7 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
         streams=streams,
         letterhead=letterhead_of(document, path),
         other_bridges=others,
-        measurement_hours=_hours(document.get("measurement_hours", {}), path),
+        measurement_hours=_hours(document, path),
         single_sign_on=single_sign_on_of(document, path),
     )
 
@@ -315,6 +301,16 @@ def _parse(path: Path) -> dict[str, Any]:
         ) from error
 
 
+def _table(document: Mapping[str, Any], name: str, path: Path) -> Table | None:
+    """The table of that name; None where there is none."""
+    values = document.get(name)
+    if values is None:
+        return None
+    if not isinstance(values, dict):
+        raise BadInput(f"{name} must be a table.", file=path, remedy=f"Write [{name}].")
+    return Table(values, f"[{name}]", path)
+
+
 def _tables(document: Mapping[str, Any], name: str, path: Path) -> list[dict[str, Any]]:
     tables = document.get(name, [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
@@ -340,13 +336,11 @@ def _built(values: dict[str, Any], path: Path) -> date | None:
     )
 
 
-def _hours(values: Any, path: Path) -> dict[str, float]:
+def _hours(document: Mapping[str, Any], path: Path) -> Mapping[str, float]:
     """What measurements cost, the usual where the table does not say."""
-    if not isinstance(values, dict):
-        raise BadInput(
-            "measurement_hours must be a table.", file=path, remedy="Write [measurement_hours]."
-        )
-    table = Table(values, "[measurement_hours]", path)
+    table = _table(document, "measurement_hours", path)
+    if table is None:
+        return MEASUREMENT_HOURS
     keys = {re.sub(r"\W", "_", kind): kind for kind in MEASUREMENT_HOURS}
     table.refuse_unknown(keys)
     own = {kind: table.positive(key, "hours") for key, kind in keys.items() if key in table}

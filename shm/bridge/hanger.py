@@ -159,11 +159,16 @@ def _fittings(table: Table, length_m: float) -> tuple[float, float]:
     return deck_m, arch_m
 
 
+def _positive(table: Table, kind: Any) -> dict[str, float]:
+    """Those of the numbers of a kind that stand in a table, which holds nothing else."""
+    table.refuse_unknown(field.name for field in fields(kind))
+    return {key: table.positive(key) for key in table.values}
+
+
 def _limits(table: Table | None) -> Limits:
     if table is None:
         return Limits()
-    table.refuse_unknown(field.name for field in fields(Limits))
-    limits = Limits(**{key: table.positive(key) for key in table.values})
+    limits = Limits(**_positive(table, Limits))
     if limits.tension_min_n >= limits.tension_max_n:
         raise table.refusal(
             f"tension_min_n = {limits.tension_min_n:g} is not below tension_max_n = "
@@ -202,8 +207,7 @@ def _models(table: Table) -> tuple[str, ...]:
 def _thresholds(table: Table | None) -> Thresholds:
     if table is None:
         return Thresholds()
-    table.refuse_unknown(field.name for field in fields(Thresholds))
-    values = {key: table.positive(key) for key in table.values}
+    values = _positive(table, Thresholds)
     if not 0.5 <= values.get("alert_probability", 0.5) < 1:
         raise table.refusal("alert_probability must be at least 0.5 and below 1", "Give 0.95, say.")
     if values.get("tension_shift_fraction", 0.5) >= 1:

@@ -63,6 +63,19 @@ class Table:
             pass  # the table says what is wrong in its own words
         raise self.refusal(f"{key} = {self.values[key]!r} {wrong}", remedy)
 
+    def text(self, key: str, usual: str | None = None, remedy: str = "") -> str:
+        """A text that one line can show, without blanks around it.
+
+        Where the key is missing it is `usual`. Raises BadInput, also where that is None; an empty
+        text is one only where that is `usual`.
+        """
+        remedy = remedy or f'Write {key} = "...".'
+
+        def can_be_shown(text: str) -> bool:
+            return text.isprintable() and (bool(text.strip()) or usual == "")
+
+        return str(self.value(key, str, "is not a text", remedy, usual, can_be_shown)).strip()
+
     def positive(self, key: str, unit: str = "SI units") -> float:
         """A number above 0; raises BadInput where it is missing or none."""
         remedy, wrong = f"Give {key} in {unit}.", "is not a positive number"

@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 from shm.identify.contract import Dropped, Hit, Poles
-from shm.identify.estimation.registry import IDENTIFIERS
-from shm.identify.identification import Identification, identify
+from shm.identify.identification import IDENTIFIERS, Identification, identify
 from shm.identify.options import IdentifyOptions
 
 __all__ = [

@@ -6,22 +6,30 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import compress
 
 import numpy as np
 
 from shm.errors import NotIdentifiable, UsageError
-from shm.identify.contract import Dropped, Finding, FoundMode, Hit, Measurement, Poles, Tone
-from shm.identify.estimation.finished import finished
-from shm.identify.estimation.registry import WITHOUT_FORCE, identifier
+from shm.identify.contract import (
+    Dropped,
+    Finding,
+    FoundMode,
+    Hit,
+    Identifier,
+    Measurement,
+    Poles,
+    Tone,
+)
+from shm.identify.estimation.finished import finished, without_sidebands
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
-from shm.identify.estimation.sidebands import without_sidebands
-from shm.identify.estimation.ssi import looked_at_again
+from shm.identify.estimation.response_fit import common_denominator_fit
+from shm.identify.estimation.ssi import looked_at_again, summed_hankel_ssi
 from shm.identify.estimation.stabilise import completed
-from shm.identify.measuring.sensor_places import refuse_off_the_hanger
-from shm.identify.measuring.setups import measured, without_unused_force
+from shm.identify.measuring.setups import measured, refuse_off_the_hanger, without_unused_force
 from shm.identify.mode_ordering.confirmed import placed_with_doubtful
-from shm.identify.mode_ordering.directions import directions
 from shm.identify.mode_ordering.placement import Placement, placed
+from shm.identify.mode_ordering.planes import directions
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
 from shm.identify.quality.of_modes import first_orders
@@ -278,9 +286,7 @@ def _of_modes_alone(found: Joined) -> Joined:
     """Without the sidebands of modes."""
     finding = without_sidebands(found.finding)
     kept = [any(mode is own for own in finding.modes) for mode in found.finding.modes]
-    apart = tuple(
-        tuple(mode for mode, keep in zip(modes, kept, strict=True) if keep) for modes in found.apart
-    )
+    apart = tuple(tuple(compress(modes, kept)) for modes in found.apart)
     return replace(found, finding=finding, apart=apart)
 
 
@@ -349,3 +355,21 @@ def _amplitude(hits: Sequence[Hit], options: IdentifyOptions) -> float:
     """Median peak force of the used hits over that of the reference level."""
     forces = [hit.peak_force_n for hit in hits if hit.used and math.isfinite(hit.peak_force_n)]
     return float(np.median(forces)) / options.reference_force_n if forces else NAN
+
+
+IDENTIFIERS: dict[str, Identifier] = {
+    "ssi": summed_hankel_ssi,
+    "frf": common_denominator_fit,
+}
+WITHOUT_FORCE = frozenset({"ssi"})
+"""Those that can do with accelerations alone. They see hits one by one, so that these need not be
+of one direction."""
+
+
+def identifier(name: str) -> Identifier:
+    """The identifier of that name; raises UsageError for an unknown one."""
+    if name not in IDENTIFIERS:
+        raise UsageError(
+            f"unknown identifier {name!r}.", remedy=f"Known: {', '.join(IDENTIFIERS)}."
+        )
+    return IDENTIFIERS[name]

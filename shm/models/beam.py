@@ -18,7 +18,7 @@ _POINTS_A_HALF_WAVE, _RISEN = 40, 0.01
 
 
 class Beam(Model):
-    """A tensioned Euler-Bernoulli beam; members say which rotational springs hold its ends.
+    """A tensioned Euler-Bernoulli beam; members say which rotational springs hold its ends, if any.
 
     With turnbuckles it is a case of the general model (`shm.models.end_effects`), and its ends can
     be exchanged only where the turnbuckles lie alike from both.
@@ -39,10 +39,6 @@ class Beam(Model):
             f"its turnbuckles are {together:g} m long together, as long as the shortest effective "
             f"length that it considers ({shortest:g} m)."
         )
-
-    def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Deck-end and arch-end springs of `theta` (n, parameters), each (n, planes)."""
-        raise TypeError(f"{type(self).__name__} does not say which springs hold its ends.")
 
     def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
         if self.hanger.turnbuckles:
@@ -92,10 +88,6 @@ class Beam1(Beam):
     name = "beam1"
     title = "Beam 1: clamped ends"
     bounds = {"theta_F": (0.5, 5.0), "theta_L": (0.5, 1.5)}  # noqa: RUF012
-
-    def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        clamped = np.full((len(theta), 2), np.inf)
-        return clamped, clamped
 
 
 class Beam2(Beam):

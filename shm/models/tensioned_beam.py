@@ -37,7 +37,7 @@ cosh p x, cos q x go with rotations P sinh p x, -Q sin q x:
     P = ((s + t) p^2 + Omega^2) / (s p),    Q = ((s + t) q^2 - Omega^2) / (s q).
 
 Ends: w = 0, psi'(0) = ka psi(0), psi'(1) = -kb psi(1), ka = k_a L/EI. As for the Euler-Bernoulli
-beam (`shm.models.tensioned_beam`, where P = p and Q = q) the four end conditions give
+beam (where P = p and Q = q) the four end conditions give
 
     A sin q - B cos q + C = 0,
     A = V^2 + (ka + kb) V P coth p + ka kb (P^2 - Q^2),
@@ -281,8 +281,15 @@ def timoshenko_frequencies_hz(
 
     `shear_stiffness_n` is kappa G A, `gyration_m` the radius of gyration sqrt(I/A).
     """
+
+    def solve(*sets: FloatArray) -> FloatArray:
+        t, s, r, ka, kb, scale = sets
+        return np.asarray(scale * _omega(t, s, r, ka, kb, modes))
+
     slenderness = length_m / bending_stiffness_n_m2
-    sets = np.broadcast_arrays(
+    return _in_blocks(
+        solve,
+        modes,
         tension_n * length_m * slenderness,
         shear_stiffness_n * length_m * slenderness,
         (gyration_m / length_m) ** 2,
@@ -290,13 +297,6 @@ def timoshenko_frequencies_hz(
         k_arch_n_m_rad * slenderness,
         np.sqrt(bending_stiffness_n_m2 / mass_per_length_kg_m) / (2 * np.pi * length_m**2),
     )
-    flat = np.array([each.ravel() for each in sets])
-    answer = np.empty((flat.shape[1], modes))
-    block = max(1, _BLOCK // modes)
-    for first in range(0, len(answer), block):
-        t, s, r, ka, kb, scale = flat[:, first : first + block]
-        answer[first : first + block] = (scale * _omega(t, s, r, ka, kb, modes)).T
-    return answer.reshape(*sets[0].shape, modes)
 
 
 def _omega(
@@ -305,7 +305,7 @@ def _omega(
     """Omega (modes, sets): q = n pi + phi(q) by secants from the string's phase."""
     order = np.arange(1.0, modes + 1)[:, None]
     sign, pinned = np.where(order % 2 == 0, 1.0, -1.0), order * np.pi
-    free_a, free_b = 1 / (1 + ka), 1 / (1 + kb)
+    free_a, free_b = _freedom(ka), _freedom(kb)
     held = (1 - free_a) * (1 - free_b)
     one = (1 - free_a) * free_b + (1 - free_b) * free_a
     ends = free_a * free_b, one, held

@@ -6,7 +6,7 @@ from typing import Any
 
 from shm.errors import UsageError
 from shm.pipeline.importing import WORTHS, Import, Question, Understood
-from shm.read.logger_words import KNOWN, measured_unit, seconds_of, sensitivity_of, volts_of
+from shm.read.logger_words import KNOWN, seconds_of, sensitivity_of, unit_of, volts_of
 from shm.values import PLANES, Plane
 
 _PLANES: dict[str, Plane] = {
@@ -28,7 +28,7 @@ def channel_answer(about: str, text: str, recorded_in: str = "") -> dict[str, ob
     if about == "plane":
         return {"plane": plane_named(text)}
     if about == "unit":
-        if measured_unit(text) is None and seconds_of(text) is None:
+        if unit_of(text) is None and seconds_of(text) is None:
             raise UsageError(f"{text!r} is no unit that is read.", remedy=f"Give one of {KNOWN}.")
         return {"unit": text}
     return _calibrated(text, recorded_in)
@@ -77,7 +77,7 @@ def _calibrated(text: str, recorded_in: str) -> dict[str, object]:
     if found is not None and volts is not None:
         return {"unit": found.unit, "calibration": found.unit_per_volt * volts}
     number, _, unit = text.strip().partition(" ")
-    if measured_unit(unit) is not None and volts is None:
+    if unit_of(unit) is not None and volts is None:
         return {"unit": unit, "calibration": _number(number)}
     raise UsageError(
         f"{text!r} is no sensitivity of a column in {recorded_in or 'no unit'}.",

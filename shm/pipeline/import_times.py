@@ -14,9 +14,9 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.read import logger_words as words
+from shm.read.base import Survey
 from shm.read.comma_table import REMEDY, rate_of
-from shm.read.profiles import Described
-from shm.read.survey import Survey
+from shm.read.sidecar import Described
 from shm.values import NAN, FloatArray
 
 

@@ -19,16 +19,16 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput
-from shm.identify.measuring.sensor_places import fault_of_place
+from shm.identify.measuring.setups import fault_of_place
 from shm.pipeline.import_times import outline, rate_told, with_times
 from shm.pipeline.lineage import read_limits
 from shm.read import logger_words as words
 from shm.read.assemble import recording
+from shm.read.base import Survey, SurveyedColumn
 from shm.read.header import CHANNEL_KEYS, Entry, Header
-from shm.read.profiles import Described, Profile, completed, profile_for, save_profile
+from shm.read.profiles import Profile, completed, profile_for, save_profile
 from shm.read.sandbox import survey
-from shm.read.sidecar import document_beside
-from shm.read.survey import Survey, SurveyedColumn
+from shm.read.sidecar import Described, document_beside
 from shm.store import Workspace
 from shm.values import NAN, Channel, Plane, Quantity, Recording
 
@@ -258,7 +258,7 @@ def _told(column: SurveyedColumn, described: Described) -> SurveyedColumn:
     """A column with what the sidecar says of it."""
     table = described.get("channel", {}).get(column.name, {})
     unit = str(table.get("unit", column.described_unit))
-    measured = words.measured_unit(unit)
+    measured = words.unit_of(unit)
     quantity = measured.quantity if measured is not None else None
     if "unit" not in table and quantity is None:
         quantity = column.quantity
@@ -298,7 +298,7 @@ def _open(columns: Sequence[SurveyedColumn]) -> list[SurveyedColumn]:
 
 def _is_in_doubt(column: SurveyedColumn) -> bool:
     """Whether nobody knows the unit, or it is not one of what the name says."""
-    return not words.is_unit(column.unit) or words.measured_unit(column.unit) is not None
+    return not words.is_unit(column.unit) or words.unit_of(column.unit) is not None
 
 
 def _of_unit(column: SurveyedColumn) -> Question:

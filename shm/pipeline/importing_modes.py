@@ -18,9 +18,9 @@ from shm.documents import dump
 from shm.errors import BadInput
 from shm.modes_document import modes_document
 from shm.pipeline.importing import Answers, Question
+from shm.read.base import Layout
 from shm.read.modal_sets import ForeignModalMode, ForeignModes, axes_of
 from shm.read.profiles import Profile, completed, profile_for, save_profile
-from shm.read.survey import Layout
 from shm.store import Workspace
 from shm.values import ModalTest, Mode, Plane, as_test_id
 

@@ -19,9 +19,9 @@ from pathlib import Path
 from shm.errors import BadInput, TooLarge
 from shm.pipeline.lineage import read_limits
 from shm.read import holds_test, sidecar_path
-from shm.read.profiles import any_profile, completed, profile_for, sidecar_text
+from shm.read.profiles import any_profile, completed, profile_for
 from shm.read.sandbox import layout_of
-from shm.read.sidecar import document_beside
+from shm.read.sidecar import document_beside, sidecar_text
 from shm.store import Receipt, ReceivedFile, Store, Workspace
 from shm.store.archive import (
     MODES_SUFFIX,

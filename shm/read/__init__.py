@@ -20,32 +20,17 @@ if TYPE_CHECKING:
     from shm.read.registry import FORMATS, peek, peek_test, read, read_test, write
     from shm.read.sidecar import sidecar_path
 
-__all__ = [
-    "FORMATS",
-    "Format",
-    "Limits",
-    "Peek",
-    "PeekChannel",
-    "bundle",
-    "holds_test",
-    "peek",
-    "peek_test",
-    "read",
-    "read_test",
-    "sidecar_path",
-    "write",
-]
+_HOMES = {
+    "base": ("Format", "Peek", "PeekChannel"),
+    "bundles": ("bundle", "holds_test"),
+    "limits": ("Limits",),
+    "registry": ("FORMATS", "peek", "peek_test", "read", "read_test", "write"),
+    "sidecar": ("sidecar_path",),
+}
+__all__ = sorted(name for names in _HOMES.values() for name in names)
 
 if not TYPE_CHECKING:
     # The formats bring their libraries: who only looks for a file's sidecar does without.
     __getattr__ = when_asked(
-        __name__,
-        {
-            **dict.fromkeys(("Format", "Peek", "PeekChannel"), "shm.read.base"),
-            **dict.fromkeys(("bundle", "holds_test"), "shm.read.bundles"),
-            "Limits": "shm.read.limits",
-            **dict.fromkeys(("FORMATS", "peek", "read", "write"), "shm.read.registry"),
-            "sidecar_path": "shm.read.sidecar",
-            **dict.fromkeys(("peek_test", "read_test"), "shm.read.registry"),
-        },
+        __name__, {name: f"{__name__}.{home}" for home, names in _HOMES.items() for name in names}
     )

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -18,7 +18,7 @@ import numpy as np
 from shm.errors import BadInput
 from shm.read import assemble
 from shm.read.arrays import Arrays, Variable, arranged
-from shm.read.base import LoggerColumn, LoggerTable, Peek
+from shm.read.base import Format, LoggerColumn, LoggerTable, Peek
 from shm.read.comma_table import REMEDY, evened, rate_of
 from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, quantity_named
 from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples
@@ -29,37 +29,33 @@ from shm.values import NAN, ComplexArray, FloatArray, FrequencyResponse, Recordi
 Opener = Callable[[Path], AbstractContextManager[Arrays]]
 
 
-def reader(opened: Opener) -> Callable[[Path], Recording | FrequencyResponse]:
-    """The verb `read` of a format whose files are opened so."""
+def format_of_arrays(
+    name: str,
+    suffixes: tuple[str, ...],
+    recognises: Callable[[bytes], bool],
+    opened: Opener,
+    library: str = "",
+) -> Format:
+    """The format whose files are opened so; to `peek` loads no channel."""
+
+    @contextmanager
+    def choosing(path: Path) -> Iterator[_Chosen]:
+        with opened(path) as arrays:
+            yield _chosen(arrays, path)
 
     def read(path: Path) -> Recording | FrequencyResponse:
-        with opened(path) as arrays:
-            chosen = _chosen(arrays, path)
+        with choosing(path) as chosen:
             return _response(chosen) if chosen.is_response else _recording(chosen)
 
-    return read
-
-
-def peeker(opened: Opener, name: str) -> Callable[[Path], Peek]:
-    """The verb `peek` of a format whose files are opened so; it loads no channel."""
-
     def peek(path: Path) -> Peek:
-        with opened(path) as arrays:
-            chosen = _chosen(arrays, path)
+        with choosing(path) as chosen:
             return _response_peek(chosen, name) if chosen.is_response else _peek(chosen, name)
 
-    return peek
-
-
-def tabler(opened: Opener, name: str) -> Callable[[Path], LoggerTable | None]:
-    """The verb `table` of a format whose files are opened so; None for frequency responses."""
-
     def table(path: Path) -> LoggerTable | None:
-        with opened(path) as arrays:
-            chosen = _chosen(arrays, path)
+        with choosing(path) as chosen:
             return None if chosen.is_response else _table(chosen, name)
 
-    return table
+    return Format(name, suffixes, recognises, peek, read, table=table, library=library)
 
 
 @dataclass(frozen=True, eq=False)

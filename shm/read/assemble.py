@@ -6,14 +6,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from shm.errors import BadInput
 from shm.read.base import Peek, PeekChannel
-from shm.read.header import Header
+from shm.read.header import OF_TEST, Header
 from shm.read.limits import limits, refuse_many_samples
 from shm.read.logger_words import ACCELERANCE
 from shm.values import (
@@ -55,15 +56,7 @@ def recording(header: Header, values: FloatArray, path: Path, file_rate_hz: floa
         if not header.leaves_out(name)
     )
     refuse_quantities([channel.quantity for channel in channels], path)
-    return Recording(
-        str(path),
-        channels,
-        rate,
-        header.hanger,
-        header.time,
-        header.temperature_c,
-        header.added_mass,
-    )
+    return Recording(str(path), channels, rate, **header.of_test)
 
 
 def checked_rate(header: Header, file_rate_hz: float, path: Path) -> float:
@@ -112,10 +105,7 @@ def peeked(
         channels=channels,
         samples=samples,
         sampling_rate_hz=rate,
-        hanger=attempt(lambda: header.hanger, None, found),
-        time=attempt(lambda: header.time, None, found),
-        temperature_c=attempt(lambda: header.temperature_c, NAN, found),
-        added_mass=attempt(lambda: header.added_mass, None, found),
+        **_of_test(header, found),
         problems=tuple(found),
         left_out=(*left_out, *out),
     )
@@ -183,6 +173,15 @@ def _peek_channel(header: Header, name: str, problems: list[str]) -> PeekChannel
     )
 
 
+def _of_test(header: Header, problems: list[str]) -> dict[str, Any]:
+    """What a header says of the whole test; None and NaN where that is faulty."""
+    unknown = dict.fromkeys(OF_TEST) | {"temperature_c": NAN}
+    return {
+        key: attempt(partial(getattr, header, key), nothing, problems)
+        for key, nothing in unknown.items()
+    }
+
+
 def _is_left_out(header: Header, name: str, problems: list[str]) -> bool:
     return attempt(lambda: header.leaves_out(name), False, problems)
 
@@ -230,10 +229,7 @@ def frequency_response(
         frequency,
         _from_zero(np.array(rows), skipped),
         None if coherence is None else _from_zero(_checked(coherence[used], path), skipped),
-        header.hanger,
-        header.time,
-        header.temperature_c,
-        header.added_mass,
+        **header.of_test,
     )
 
 
@@ -271,10 +267,7 @@ def peeked_response(
         format=file_format,
         channels=channels,
         samples=0,
-        hanger=attempt(lambda: header.hanger, None, problems),
-        time=attempt(lambda: header.time, None, problems),
-        temperature_c=attempt(lambda: header.temperature_c, NAN, problems),
-        added_mass=attempt(lambda: header.added_mass, None, problems),
+        **_of_test(header, problems),
         problems=tuple(problems),
         lines=len(frequency),
         frequency_step_hz=float(frequency[1]) if len(frequency) else NAN,

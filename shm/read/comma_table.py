@@ -96,7 +96,7 @@ def mark_between(line: str) -> str:
 
 
 def _refuse_columns(columns: tuple[str, ...], line: int, path: Path) -> None:
-    if all(_is_number(name) for name in columns if name):
+    if all(is_number(name) for name in columns if name):
         raise BadInput(
             "the names of the columns are missing.",
             file=path,
@@ -112,7 +112,8 @@ def _refuse_columns(columns: tuple[str, ...], line: int, path: Path) -> None:
             )
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Whether a cell is one, with a point or a decimal comma."""
     try:
         float(text.replace(",", "."))
     except ValueError:

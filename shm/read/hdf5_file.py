@@ -26,13 +26,11 @@ from h5py import h5d, h5g, h5l, h5o
 from numpy.typing import NDArray
 
 from shm.errors import BadInput
-from shm.read.array_reading import peeker, reader, tabler
+from shm.read.array_reading import format_of_arrays
 from shm.read.arrays import Arrays, Variable, attributes_of, named_apart, natural
-from shm.read.base import Format
 from shm.read.limits import guarded, refuse_large
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
-_NAME = "HDF5"
 # judgement: a recording has some tens of objects, two or three groups deep
 _DEEPEST, _MOST_OBJECTS = 8, 2000
 _LARGEST_ATTRIBUTE = 1 << 16  # 64 KB, HDF5's own limit of one in an object's header
@@ -60,14 +58,7 @@ def _general(nodes: list[Node]) -> dict[str, object]:
     return {key: value for group in groups for key, value in group.attributes.items()}
 
 
-FORMAT = Format(
-    name=_NAME,
-    suffixes=(".h5", ".hdf5"),
-    recognises=lambda head: head.startswith(_MAGIC),
-    peek=peeker(_opened, _NAME),
-    read=reader(_opened),
-    table=tabler(_opened, _NAME),
-)
+FORMAT = format_of_arrays("HDF5", (".h5", ".hdf5"), lambda head: head.startswith(_MAGIC), _opened)
 
 
 @dataclass(frozen=True, eq=False)

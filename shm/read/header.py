@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date, datetime
 from pathlib import Path
+from typing import Any
 
 from shm.documents import parse_time
 from shm.errors import BadInput
@@ -25,6 +26,9 @@ CHANNEL_KEYS = ("unit", "x_m", "plane", "calibration", "full_scale", "leave_out"
 _OF_ALL_CHANNELS = ("unit", "calibration", "full_scale")
 _FACTOR_REMEDY = "Give a number other than 0: units of `unit` per recorded volt or count."
 _SCALE_REMEDY = "Give the largest value that can be recorded, in the channel's unit."
+
+
+OF_TEST = ("hanger", "time", "temperature_c", "added_mass")
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,11 @@ class Header:
             name: {**own, **other.channels.get(name, {})} for name, own in self.channels.items()
         }
         return Header(self.file, channels, {**self.entries, **other.entries})
+
+    @property
+    def of_test(self) -> dict[str, Any]:
+        """What it says of the whole test: hanger, time, temperature, known mass."""
+        return {key: getattr(self, key) for key in OF_TEST}
 
     @property
     def hanger(self) -> int | None:

@@ -139,7 +139,7 @@ def _are_units(cells: Sequence[str], script: Script) -> bool:
     labelled = _label(cells[0]) in _UNIT_LABELS
     said = [_no_label(cell, place == 0) for place, cell in enumerate(cells) if cell]
     said = [cell for cell in said if cell]
-    measured = [cell for cell in said if words.measured_unit(cell) or words.volts_of(cell)]
+    measured = [cell for cell in said if words.unit_of(cell) or words.volts_of(cell)]
     if labelled:
         return bool(measured)
     known = sum(map(words.is_unit, said))

@@ -280,13 +280,13 @@ def header_of(table: LoggerTable, path: Path) -> tuple[Header, list[int], tuple[
 
 def is_measured(column: LoggerColumn) -> bool:
     """Whether a file itself says that a column is a force or an acceleration, and in what unit."""
-    measured = words.measured_unit(column.unit) is not None and not _is_doubtful(column)
+    measured = words.unit_of(column.unit) is not None and not _is_doubtful(column)
     return measured or (words.volts_of(column.unit) is not None and column.sensitivity is not None)
 
 
 def _is_doubtful(column: LoggerColumn) -> bool:
     """Whether a load cell, by its name, is in a unit of acceleration: g may be its grams."""
-    unit = words.measured_unit(column.unit)
+    unit = words.unit_of(column.unit)
     in_g = unit is not None and unit.quantity == "acceleration"
     return in_g and words.means_force_alone(column.name)
 
@@ -300,7 +300,7 @@ def _entries(column: LoggerColumn, line: int, path: Path) -> dict[str, Entry]:
     elif _is_doubtful(column) or (quantity_named(column.name) and not column.unit):
         said["unit"] = UNSAID  # a name such as force promises newtons in our own files alone
     plane = words.plane_meant(column.name)
-    if plane is not None and (unit := words.measured_unit(str(said["unit"]))) is not None:
+    if plane is not None and (unit := words.unit_of(str(said["unit"]))) is not None:
         said |= {"plane": plane} if unit.quantity == "acceleration" else {}
     return {key: Entry(value, path, line or None) for key, value in said.items() if value}
 

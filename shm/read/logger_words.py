@@ -9,6 +9,7 @@ Units of force and acceleration, and their factors to N and m/s^2.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from shm.values import Plane, Quantity
@@ -233,40 +234,7 @@ def means_counter(name: str) -> bool:
     return _COUNTERS.fullmatch(name.strip()) is not None
 
 
-def measured_unit(text: str) -> Unit | None:
-    """The unit of a force or an acceleration that a text is; None for any other."""
-    return unit_of(text)
-
-
 # ---------------------------------------------------------------- preambles
-
-_RATE = re.compile(
-    r"(standard)?(abtast|mess|sample|sampling|samples?|scan|data|acquisition|aufnahme|daq)?"
-    r"(ing)?(rate|frequenz|frequency|freq)(hz)?|fs|sps|samplespersec(ond)?|abtastratehz|fabtast"
-)
-_INTERVAL = re.compile(
-    r"delta[xt]|(x(axis)?)?delta|dt|xinc(rement)?|wfincrement|(abtast|sampling|sample|scan|mess|time|zeit)"
-    r"(intervall?|period|periode|step|schritt|schrittweite|zeit|inkrement|increment)|schrittweite"
-)
-_DATE = re.compile(
-    r"(mess|test|start|aufnahme|record(ing|ed)?|acquisition|trigger|creation)?(datum|date)"
-)
-_MOMENT = re.compile(
-    r"(mess|test|start|aufnahme|record(ing|ed)?|acquisition|trigger|begin(n)?|created?)*"
-    r"(zeit|time|uhrzeit|zeitpunkt|beginn|begin|start|datetime|datumzeit|datumuhrzeit|dateandtime"
-    r"|datetimestamp|dateutc|timeutc|recorded|acquired|on|am|ed)(utc)?"
-)
-_TEMPERATURE = re.compile(
-    r"(bauteil|stahl|luft|umgebungs|steel|air|ambient|hanger)?temp(eratur|erature)?(c|degc)?"
-)
-_HANGER = re.compile(r"h(a|ä|ae)nger(nr|no|nummer|number|id)?|seil(nr|nummer)?|cable(no|number)?")
-_NUMBERED = re.compile(
-    r"(?:h(?:a|ä|ae)nger|seil|cable)\s*(?:nr\.?|no\.?|#)?[\s_:=-]*0*(\d{1,3})(?!\d|[.-]\d)",
-    re.IGNORECASE,
-)
-_TITLE = re.compile(r"(title|titel|signal|channel|kanal)(name)?")
-_UNIT_KEY = re.compile(r"y?(axis|achse)?(unit|einheit)(label)?")
-_SERIAL = re.compile(r".*(serial|serien|^sn)(number|nummer|nr|no)?.*")
 
 
 def key_of(text: str) -> str:
@@ -274,40 +242,41 @@ def key_of(text: str) -> str:
     return "".join(c for c in text.lower() if c.isalpha())
 
 
-def means_rate(key: str) -> bool:
-    return _RATE.fullmatch(key_of(key)) is not None
+def _meaning(letters: str) -> Callable[[str], bool]:
+    """Whether the letters of a key mean a thing."""
+    meant = re.compile(letters)
+    return lambda key: meant.fullmatch(key_of(key)) is not None
 
 
-def means_interval(key: str) -> bool:
-    return _INTERVAL.fullmatch(key_of(key)) is not None
-
-
-def means_date(key: str) -> bool:
-    return _DATE.fullmatch(key_of(key)) is not None
-
-
-def means_moment(key: str) -> bool:
-    return _MOMENT.fullmatch(key_of(key)) is not None
-
-
-def means_temperature(key: str) -> bool:
-    return _TEMPERATURE.fullmatch(key_of(key)) is not None
-
-
-def means_hanger(key: str) -> bool:
-    return _HANGER.fullmatch(key_of(key)) is not None
-
-
-def means_title(key: str) -> bool:
-    return _TITLE.fullmatch(key_of(key)) is not None
-
-
-def means_unit(key: str) -> bool:
-    return _UNIT_KEY.fullmatch(key_of(key)) is not None
-
-
-def means_serial(key: str) -> bool:
-    return _SERIAL.fullmatch(key_of(key)) is not None
+means_rate = _meaning(
+    r"(standard)?(abtast|mess|sample|sampling|samples?|scan|data|acquisition|aufnahme|daq)?"
+    r"(ing)?(rate|frequenz|frequency|freq)(hz)?|fs|sps|samplespersec(ond)?|abtastratehz|fabtast"
+)
+means_interval = _meaning(
+    r"delta[xt]|(x(axis)?)?delta|dt|xinc(rement)?|wfincrement|(abtast|sampling|sample|scan|mess|time|zeit)"
+    r"(intervall?|period|periode|step|schritt|schrittweite|zeit|inkrement|increment)|schrittweite"
+)
+means_date = _meaning(
+    r"(mess|test|start|aufnahme|record(ing|ed)?|acquisition|trigger|creation)?(datum|date)"
+)
+means_moment = _meaning(
+    r"(mess|test|start|aufnahme|record(ing|ed)?|acquisition|trigger|begin(n)?|created?)*"
+    r"(zeit|time|uhrzeit|zeitpunkt|beginn|begin|start|datetime|datumzeit|datumuhrzeit|dateandtime"
+    r"|datetimestamp|dateutc|timeutc|recorded|acquired|on|am|ed)(utc)?"
+)
+means_temperature = _meaning(
+    r"(bauteil|stahl|luft|umgebungs|steel|air|ambient|hanger)?temp(eratur|erature)?(c|degc)?"
+)
+means_hanger = _meaning(
+    r"h(a|ä|ae)nger(nr|no|nummer|number|id)?|seil(nr|nummer)?|cable(no|number)?"
+)
+_NUMBERED = re.compile(
+    r"(?:h(?:a|ä|ae)nger|seil|cable)\s*(?:nr\.?|no\.?|#)?[\s_:=-]*0*(\d{1,3})(?!\d|[.-]\d)",
+    re.IGNORECASE,
+)
+means_title = _meaning(r"(title|titel|signal|channel|kanal)(name)?")
+means_unit = _meaning(r"y?(axis|achse)?(unit|einheit)(label)?")
+means_serial = _meaning(r".*(serial|serien|^sn)(number|nummer|nr|no)?.*")
 
 
 def hanger_numbered(text: str) -> int | None:

@@ -31,9 +31,8 @@ import scipy
 from numpy.typing import NDArray
 
 from shm.errors import BadInput
-from shm.read.array_reading import peeker, reader, tabler
+from shm.read.array_reading import format_of_arrays
 from shm.read.arrays import Arrays, Variable
-from shm.read.base import Format
 from shm.read.content import bytes_of
 from shm.read.hdf5_file import opened_nodes, variables
 from shm.read.limits import guarded, limits, refuse_large
@@ -74,16 +73,7 @@ def _text(codes: NDArray[Any]) -> NDArray[Any]:
     return np.array([chr(int(code)) for code in codes.ravel()])
 
 
-_NAME = "MATLAB"
-FORMAT = Format(
-    name=_NAME,
-    suffixes=(".mat",),
-    recognises=_recognises,
-    peek=peeker(_opened, _NAME),
-    read=reader(_opened),
-    table=tabler(_opened, _NAME),
-    library="scipy.io",
-)
+FORMAT = format_of_arrays("MATLAB", (".mat",), _recognises, _opened, "scipy.io")
 
 
 _scipy: Any = scipy  # the stubs of its `io` know no streams

@@ -10,6 +10,7 @@ import math
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,10 +19,9 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from shm.errors import BadInput, UsageError
-from shm.read.array_reading import peeker, reader, tabler
+from shm.read.array_reading import format_of_arrays
 from shm.read.arrays import Arrays, Variable, layout_of
 from shm.read.atomic import replace_file
-from shm.read.base import Format
 from shm.read.bundles import FIRST_DAY
 from shm.read.content import checked_members
 from shm.read.limits import guarded, refuse_large
@@ -108,13 +108,4 @@ def _save(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
                 npy.write_array(stream, values, allow_pickle=False)
 
 
-_NAME = "NumPy"
-FORMAT = Format(
-    name=_NAME,
-    suffixes=(".npz", ".npy"),
-    recognises=_recognises,
-    peek=peeker(_opened, _NAME),
-    read=reader(_opened),
-    table=tabler(_opened, _NAME),
-    write=_write,
-)
+FORMAT = replace(format_of_arrays("NumPy", (".npz", ".npy"), _recognises, _opened), write=_write)

@@ -18,26 +18,21 @@ hanger: each file must say its own.
 
 from __future__ import annotations
 
-import json
 import re
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read.atomic import replace_text
+from shm.read.base import Layout
 from shm.read.content import unreadable
 from shm.read.header import CHANNEL_KEYS
 from shm.read.logger_words import hanger_numbered
-from shm.read.survey import Layout
+from shm.read.sidecar import Described, sidecar_text
 
 FOLDER = "loggers"
-Described = Mapping[str, Any]
-"""Keys and values of a sidecar; `channel` holds a mapping for each channel by name."""
 _OF_PROFILE = ("hanger", "sampling_rate_hz", "channel")
 _COMMENT = (
     "# What the files of one logger do not say themselves, as `shm import` asked. It holds for\n"
@@ -157,31 +152,3 @@ def _load(path: Path) -> Profile:
     if roams:
         known.pop("hanger", None)
     return Profile(path, document["fingerprint"], known, roams)
-
-
-# ---------------------------------------------------------------- writing
-
-
-def sidecar_text(described: Described) -> str:
-    """The TOML of a sidecar: keys of the whole, then a table for each channel."""
-    lines = [f"{key} = {_toml(value)}" for key, value in described.items() if key != "channel"]
-    for name, table in described.get("channel", {}).items():
-        lines += ["", f"[channel.{_quoted(name)}]"]
-        lines += [f"{key} = {_toml(value)}" for key, value in table.items()]
-    return "\n".join(lines) + "\n"
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, datetime):
-        return str(format_time(value))
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    return _quoted(value) if isinstance(value, str) else repr(value)
-
-
-def _quoted(text: str) -> str:
-    """A text as TOML takes it: control characters and half pairs as blanks."""
-    plain = "".join(c if c.isprintable() else " " for c in text)
-    return json.dumps(plain, ensure_ascii=False)

@@ -1,4 +1,5 @@
-"""The formats that are known, and the verbs for a single file.
+"""The formats that are known, and the verbs for a single file: reading, a look at its headers, and
+a survey of all its columns before it is known which of them is what.
 
 A whole test: one file, or all files of an archive; a document of modal tests with the sidecar
 beside it, which goes before it.
@@ -6,8 +7,9 @@ beside it, which goes before it.
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar, cast
@@ -16,7 +18,18 @@ import numpy as np
 
 from shm import modes_document
 from shm.errors import BadInput, UsageError
-from shm.read.base import Format, Peek
+from shm.read import logger_text
+from shm.read import logger_words as words
+from shm.read.base import (
+    Format,
+    Layout,
+    LoggerColumn,
+    LoggerTable,
+    Peek,
+    PeekChannel,
+    Survey,
+    SurveyedColumn,
+)
 from shm.read.bundles import each_member, entries_of_test, holds_test
 from shm.read.comma_separated import FORMAT as CSV
 from shm.read.content import (
@@ -128,7 +141,7 @@ def _single(channel: Channel) -> Channel:
 
 
 T = TypeVar("T")
-Found = TypeVar("Found", bound=Recording | FrequencyResponse | Peek)
+Found = TypeVar("Found", bound=Recording | FrequencyResponse | Peek | ModalTest)
 
 
 def read_test(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
@@ -137,7 +150,7 @@ def read_test(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
         return (read(path),)
     head_of(path)
     records = each_member(path, lambda file, name: replace(_named(read, file, name), source=name))
-    return tuple(_told(record, path) for record in records)
+    return tuple(_as_said(record, entries_of_test(path)) for record in records)
 
 
 def peek_test(path: Path) -> tuple[Peek, ...]:
@@ -145,7 +158,8 @@ def peek_test(path: Path) -> tuple[Peek, ...]:
     if not holds_test(path):
         return (peek(path),)
     head_of(path)
-    return tuple(_told(found, path) for found in each_member(path, _peek_member))
+    said = entries_of_test(path)
+    return tuple(_as_said(found, said) for found in each_member(path, _peek_member))
 
 
 def _peek_member(file: Path, name: str) -> Peek:
@@ -170,14 +184,6 @@ def _named(verb: Callable[[Path], T], file: Path, name: str) -> T:
         ) from refusal
 
 
-def _told(found: Found, path: Path) -> Found:
-    """A member with what the sidecar of its archive says of the whole test."""
-    said = entries_of_test(path)
-    known = [key for key in ("hanger", "time", "temperature_c") if key in said.entries]
-    told = replace(found, **{key: getattr(said, key) for key in known})
-    return told if said.added_mass is None else replace(told, added_mass=said.added_mass)
-
-
 def load_modes(path: Path) -> tuple[ModalTest, ...]:
     """The tests of a `*.modes.json` file; raises BadInput with file, test, mode and remedy.
 
@@ -190,13 +196,14 @@ def load_modes(path: Path) -> tuple[ModalTest, ...]:
     return tuple(_as_said(test, said) for test in tests)
 
 
-def _as_said(test: ModalTest, said: Header) -> ModalTest:
+def _as_said(found: Found, said: Header) -> Found:
+    """With what a sidecar says of the whole test; what it does not say stays."""
     return replace(
-        test,
-        hanger=test.hanger if said.hanger is None else said.hanger,
-        time=said.time or test.time,
-        temperature_c=test.temperature_c if math.isnan(said.temperature_c) else said.temperature_c,
-        added_mass=said.added_mass or test.added_mass,
+        found,
+        hanger=found.hanger if said.hanger is None else said.hanger,
+        time=said.time or found.time,
+        temperature_c=found.temperature_c if math.isnan(said.temperature_c) else said.temperature_c,
+        added_mass=said.added_mass or found.added_mass,
     )
 
 
@@ -223,3 +230,98 @@ def _refuse_what_samples_have(said: Header, tests: tuple[ModalTest, ...], path: 
             file=sidecar,
             remedy=f"Give each test its own time in {path.name}.",
         )
+
+
+_FINGERPRINT_DIGITS = 16  # technical: of 64 bits; a workspace has a handful of loggers
+
+
+def survey(path: Path) -> Survey:
+    """All that can be found out about a file; raises BadInput where that is nothing."""
+    _refuse_archive(path)
+    found = format_of(path)
+    table = found.table(path) if found.table else None
+    look = (
+        logger_text.peeked(table, found.name, path)
+        if table is not None and table.is_text
+        else found.peek(path)
+    )
+    known = {channel.name: channel for channel in look.channels}
+    if table is None:
+        listed = look.channels if look.lines else ()
+        columns: Sequence[SurveyedColumn] = [_bare(channel) for channel in listed]
+    else:
+        columns = [_column(column, known.get(column.name)) for column in table.columns]
+    return Survey(
+        source=str(path),
+        format=found.name,
+        columns=tuple(columns),
+        samples=look.samples or (table.samples if table is not None else 0),
+        sampling_rate_hz=look.sampling_rate_hz,
+        hanger=look.hanger,
+        time=look.time,
+        temperature_c=look.temperature_c,
+        layout=_layout(found, table, look),
+        lines=look.lines,
+        remarks=table.remarks if table is not None else (),
+        problems=(*look.problems, *_left_out(look, columns)),
+    )
+
+
+def layout_of(path: Path) -> Layout:
+    """The layout of a file alone; raises BadInput where nothing can be made out."""
+    return survey(path).layout
+
+
+def _left_out(look: Peek, columns: Sequence[SurveyedColumn]) -> tuple[str, ...]:
+    """What a file holds that is not read, where that is all that it holds."""
+    if columns or not look.left_out:
+        return ()
+    return (f"it holds {', '.join(look.left_out)[:200]}, which is not read.",)
+
+
+def _refuse_archive(path: Path) -> None:
+    if holds_test(path):
+        raise BadInput(
+            "is an archive of several files.",
+            file=path,
+            remedy="Unpack it and import one of its files; those of the same logger need nothing"
+            " then.",
+        )
+
+
+def _column(column: LoggerColumn, known: PeekChannel | None) -> SurveyedColumn:
+    meant = words.quantity_meant(column.name)
+    plane = words.plane_meant(column.name)
+    if known is None:
+        return SurveyedColumn(
+            column.name, column.unit, column.values, column.overloads, None, meant, plane
+        )
+    return SurveyedColumn(
+        column.name, column.unit, column.values, column.overloads, known.quantity, meant,
+        known.plane or (plane if known.quantity == "acceleration" else None),
+        known.x_m, known.calibration, known.full_scale, known.unit,
+    )  # fmt: skip
+
+
+def _bare(channel: PeekChannel) -> SurveyedColumn:
+    return SurveyedColumn(
+        channel.name, channel.unit, None, 0, channel.quantity, channel.quantity, channel.plane,
+        channel.x_m, channel.calibration, channel.full_scale, channel.unit,
+    )  # fmt: skip
+
+
+def _layout(found: Format, table: LoggerTable | None, look: Peek) -> Layout:
+    said = table.layout if table is not None else tuple(c.name for c in look.channels)
+    digest = hashlib.sha256("\n".join((found.name, *said)).encode()).hexdigest()
+    columns = (
+        tuple(f"{c.name} [{c.unit}]" if c.unit else c.name for c in table.columns)
+        if table is not None
+        else said
+    )
+    return Layout(
+        digest[:_FINGERPRINT_DIGITS],
+        found.name,
+        columns,
+        table.hanger if table is not None else look.hanger,
+        table is not None and (table.said_rate_hz > 0 or table.times_rate_hz > 0),
+    )

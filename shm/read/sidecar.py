@@ -22,7 +22,7 @@ import json
 import math
 import os
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -163,25 +163,50 @@ def write_sidecar(
     path: Path,
 ) -> None:
     """Writes the sidecar of `path`, whole or not at all."""
-    lines = [
-        *_line("hanger", described.hanger),
-        *_line("time", described.time),
-        *_line("temperature_c", described.temperature_c),
-        *(line for pair in mass_entries(described.added_mass).items() for line in _line(*pair)),
-        *_line("sampling_rate_hz", sampling_rate_hz),
-    ]
-    for channel in channels:
-        lines += ["", f"[channel.{json.dumps(channel.name)}]"]
-        lines += [*_line("unit", channel.unit), *_line("plane", channel.plane)]
-        lines += [*_line("x_m", channel.x_m), *_line("full_scale", channel.full_scale)]
-    text = "\n".join(lines) + "\n"
-    replace_text(sidecar_path(path), text)
+    whole = {
+        "hanger": described.hanger,
+        "time": described.time,
+        "temperature_c": described.temperature_c,
+        **mass_entries(described.added_mass),
+        "sampling_rate_hz": sampling_rate_hz,
+    }
+    keys = ("unit", "plane", "x_m", "full_scale")
+    tables = {c.name: _known({key: getattr(c, key) for key in keys}) for c in channels}
+    replace_text(sidecar_path(path), sidecar_text({**_known(whole), "channel": tables}))
 
 
-def _line(key: str, value: object) -> list[str]:
-    """A TOML line, or none where the value is unknown."""
-    if value is None or value == "" or (isinstance(value, float) and math.isnan(value)):
-        return []
+def _known(said: Described) -> dict[str, Any]:
+    return {
+        key: value
+        for key, value in said.items()
+        if value not in (None, "") and not (isinstance(value, float) and math.isnan(value))
+    }
+
+
+Described = Mapping[str, Any]
+"""Keys and values of a sidecar; `channel` holds a mapping for each channel by name."""
+
+
+def sidecar_text(described: Described) -> str:
+    """The TOML of a sidecar: keys of the whole, then a table for each channel."""
+    lines = [f"{key} = {_toml(value)}" for key, value in described.items() if key != "channel"]
+    for name, table in described.get("channel", {}).items():
+        lines += ["", f"[channel.{_quoted(name)}]"]
+        lines += [f"{key} = {_toml(value)}" for key, value in table.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, datetime):
-        return [f"{key} = {format_time(value)}"]
-    return [f"{key} = {json.dumps(value) if isinstance(value, str) else repr(value)}"]
+        return str(format_time(value))
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    return _quoted(value) if isinstance(value, str) else repr(value)
+
+
+def _quoted(text: str) -> str:
+    """A text as TOML takes it: control characters and half pairs as blanks."""
+    plain = "".join(c if c.isprintable() else " " for c in text)
+    return json.dumps(plain, ensure_ascii=False)

@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput
-from shm.read.array_reading import peeker, reader, tabler
+from shm.read.array_reading import format_of_arrays
 from shm.read.arrays import Arrays, Variable, attributes_of, named_apart
-from shm.read.base import Format
 from shm.read.limits import guarded, refuse_large
 
 _MAGIC = b"TDSm"
@@ -97,13 +96,8 @@ def _variable(name: str, channel: Any, path: Path) -> Variable:
     )
 
 
-_NAME = "TDMS"
-FORMAT = Format(
-    name=_NAME,
-    suffixes=(".tdms",),
-    recognises=lambda head: head.startswith(_MAGIC),
-    peek=peeker(_opened, _NAME),
-    read=reader(_opened),
-    table=tabler(_opened, _NAME),
-    library="nptdms",
-)
+def _recognises(head: bytes) -> bool:
+    return head.startswith(_MAGIC)
+
+
+FORMAT = format_of_arrays("TDMS", (".tdms",), _recognises, _opened, "nptdms")

@@ -66,10 +66,7 @@ def frequency_response(content: Content, path: Path) -> FrequencyResponse:
         frequency,
         np.pad(accelerance, ((0, 0), (skipped, 0)), constant_values=np.nan),
         _coherence(list(used.values()), content, skipped),
-        header.hanger,
-        header.time,
-        header.temperature_c,
-        header.added_mass,
+        **header.of_test,
     )
 
 
@@ -85,10 +82,7 @@ def peek(content: Content, file_format: str, path: Path) -> Peek:
         format=file_format,
         channels=channels,
         samples=0,
-        hanger=header.hanger,
-        time=header.time,
-        temperature_c=header.temperature_c,
-        added_mass=header.added_mass,
+        **header.of_test,
         lines=sets[0].points,
         frequency_step_hz=_step(sets[0]) or NAN,
     )

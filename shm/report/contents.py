@@ -9,6 +9,7 @@ from datetime import datetime
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
+from shm.bridge.description import NO_LETTERHEAD, Letterhead
 from shm.models import end_stiffness
 from shm.report.formatting import Interval
 from shm.report.hanger_status import (
@@ -40,7 +41,6 @@ from shm.values import (
     Selection,
     Summary,
 )
-from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 from shm.values.messages import Lead
 from shm.values.notes import Note
 from shm.values.rounding import ForceUnit, force_unit

@@ -16,8 +16,8 @@ from pathlib import Path
 from string import ascii_uppercase
 from typing import TYPE_CHECKING
 
+from shm.bridge.description import NO_LETTERHEAD, Letterhead
 from shm.report import formatting
-from shm.values.letterhead import NO_LETTERHEAD, Letterhead
 
 if TYPE_CHECKING:
     from shm.report.figures.specification import Illustration

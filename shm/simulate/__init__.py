@@ -10,6 +10,7 @@ from __future__ import annotations
 from shm.simulate.ambient import AmbientPlan, ambient_test
 from shm.simulate.campaign import (
     Campaign,
+    CampaignPlan,
     CampaignTruth,
     bar_in_test,
     campaign,
@@ -28,43 +29,6 @@ from shm.simulate.effects import (
 )
 from shm.simulate.elements import natural_frequencies
 from shm.simulate.hammer import SimulatedTest, hammer_test, simulated_test
-from shm.simulate.plan import CampaignPlan
-from shm.simulate.planted import PlantedModes, planted_modes
+from shm.simulate.planted import PlantedModes, bar_under, modes_under
 from shm.simulate.reality import Deviations, Reality, SensorError, drawn_hanger
 from shm.simulate.state import HammerPlan, HangerState, spread_places_m
-
-__all__ = [
-    "DISTURBANCES",
-    "PLANTED",
-    "UNLISTED",
-    "AmbientPlan",
-    "Campaign",
-    "CampaignPlan",
-    "CampaignTruth",
-    "Deviations",
-    "HammerPlan",
-    "HangerState",
-    "Planted",
-    "PlantedEffect",
-    "PlantedModes",
-    "Reality",
-    "SensorError",
-    "SimulatedTest",
-    "TestConditions",
-    "ambient_test",
-    "at_share",
-    "bar_in_test",
-    "campaign",
-    "campaign_with_truth",
-    "choices",
-    "drawn",
-    "drawn_hanger",
-    "hammer_test",
-    "natural_frequencies",
-    "planted_modes",
-    "realised",
-    "scaled_to",
-    "simulated_test",
-    "size_of",
-    "spread_places_m",
-]

@@ -10,9 +10,8 @@ from functools import lru_cache
 import numpy as np
 
 from shm.errors import UsageError
-from shm.simulate.campaign import noiseless
+from shm.simulate.campaign import CampaignPlan, CampaignTruth, noiseless
 from shm.simulate.effects import PlantedEffect, ranges_of
-from shm.simulate.plan import CampaignPlan
 from shm.simulate.reality import GLOBAL, Deviations, SensorError, sd_factors, wave_sd
 from shm.simulate.state import HangerState
 from shm.values import PLANES, FloatArray, Hanger
@@ -227,9 +226,10 @@ def _data(
     sensors: Sequence[SensorError] = (),
 ) -> _Data:
     planes = [PLANES.index(plane) for plane in plan.planes]
+    truth = CampaignTruth(state.tension_n, deviations, tuple(effects), sensors=tuple(sensors))
     frequencies, shapes = [], []
     for test in plan.tests(hanger):
-        found = noiseless(hanger, state, effects, plan, test, deviations, sensors)
+        found = noiseless(hanger, state, truth, plan, test)
         frequencies.append(np.log(found.frequency_hz[planes]).ravel())
         seen = found.shape[planes] if plan.biaxial else _own(found.shape, planes)
         shapes.append(seen.reshape(len(planes) * plan.modes, -1))

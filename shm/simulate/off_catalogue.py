@@ -13,8 +13,8 @@ from dataclasses import replace
 
 from shm.simulate.bar.description import Attached, Bar, Beyond, Mass, PartTime, Spring, Stretch
 from shm.simulate.bar.modes import bar_modes
-from shm.simulate.effects.along import in_planes
 from shm.simulate.effects.base import Plantable, Range, Scene, Where
+from shm.simulate.effects.catalogue_laws import in_planes
 from shm.values import Hanger
 
 Values = Mapping[str, float]

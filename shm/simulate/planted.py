@@ -47,7 +47,8 @@ def bar_under(
 ) -> Bar:
     """The bar under the conditions of one test, as made, with effects and turned sensors.
 
-    Raises UsageError for an effect that cannot be.
+    With `own_laws` effects follow other laws than the catalogue's. Raises UsageError for an effect
+    that cannot be.
     """
     bar = as_made(bar_of(hanger, state), deviations or Deviations())
     bar = planted(bar, effects, conditions, hanger, places_m, own_laws=own_laws)
@@ -55,28 +56,13 @@ def bar_under(
     return replace(bar, turned_rad=bar.turned_rad + turned)
 
 
-def planted_modes(
-    hanger: Hanger,
-    state: HangerState,
-    effects: Sequence[PlantedEffect],
-    conditions: TestConditions,
-    modes: int,
-    places_m: Sequence[float],
-    *,
-    deviations: Deviations | None = None,
-    sensors: Sequence[SensorError] = (),
-    own_laws: bool = False,
+def modes_under(
+    bar: Bar, modes: int, places_m: Sequence[float], sensors: Sequence[SensorError] = ()
 ) -> PlantedModes:
-    """The lowest `modes` modes of each plane under the conditions of one test.
+    """The lowest `modes` modes of each plane of a bar; frequencies are right to 1e-5.
 
-    `sensors` are the errors of all sensors in the order of the places, or none; with `own_laws`
-    effects follow other laws than the catalogue's. Frequencies are right to 1e-5. Raises UsageError
-    for an effect that cannot be.
+    `sensors` are the errors of all sensors in the order of the places, or none.
     """
-    bar = bar_under(
-        hanger, state, effects, conditions, places_m,
-        deviations=deviations, sensors=sensors, own_laws=own_laws,
-    )  # fmt: skip
     true = [each.x_m + each.off_m for each in sensors] or places_m
     gain = np.array([each.gain for each in sensors] or 1.0)
     found = bar_modes(bar, modes, true)

@@ -17,7 +17,7 @@ from shm.simulate.state import HangerState
 from shm.values import FloatArray, Hanger
 
 if TYPE_CHECKING:
-    from shm.simulate.plan import CampaignPlan
+    from shm.simulate.campaign import CampaignPlan
 
 _HIT = 0.16  # of the length, where a hammer reaches
 _LEAST_SD, _MOST_SD = 0.5, 4.0

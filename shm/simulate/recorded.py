@@ -14,11 +14,10 @@ import numpy as np
 
 from shm.errors import UsageError
 from shm.simulate.bar import Bar
-from shm.simulate.campaign import CampaignTruth, bar_in_test, realised
+from shm.simulate.campaign import CampaignPlan, CampaignTruth, bar_in_test, realised
 from shm.simulate.effects import PlantedEffect
 from shm.simulate.elements import natural_frequencies
 from shm.simulate.hammer import struck
-from shm.simulate.plan import CampaignPlan
 from shm.simulate.reality import SensorError
 from shm.simulate.state import HammerPlan, HangerState
 from shm.values import NAN, PLANES, Channel, FloatArray, Hanger, ModalTest, Plane, Recording

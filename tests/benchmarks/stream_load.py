@@ -24,7 +24,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.read.chunk_document import chunk_document
-from shm.simulate.monitored import MonitoringPlan, streamed
+from shm.simulate.ambient import MonitoringPlan, streamed
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
 from shm.store.ring_files import PERIOD

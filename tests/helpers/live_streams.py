@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 
 from shm.pipeline.streaming import Streaming
 from shm.read.chunk_document import chunk_document
-from shm.simulate.monitored import MonitoringPlan, described_stream, streamed
+from shm.simulate.ambient import MonitoringPlan, described_stream, streamed
 from shm.store import Workspace
 from shm.store.ring import ring_of
 from tests.helpers.flows import Clock

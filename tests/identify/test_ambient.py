@@ -10,7 +10,7 @@ import pytest
 from shm.errors import NotIdentifiable, UsageError
 from shm.identify import Identification, IdentifyOptions, identify
 from shm.identify import identification as module
-from shm.identify.estimation.registry import IDENTIFIERS
+from shm.identify.identification import IDENTIFIERS
 from shm.identify.measuring.ambient import LEAST_PARTS, MOST_PARTS, ambient_measurement
 from shm.values import Recording
 from tests.identify.signals import Planted, Sensor, as_recording, response

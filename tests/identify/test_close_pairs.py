@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import FoundMode
-from shm.identify.estimation.candidates import Candidate, Pole
 from shm.identify.estimation.close_pairs import told_apart
-from shm.identify.estimation.poles import PoleSet
+from shm.identify.estimation.poles import Candidate, Pole, PoleSet
 from shm.identify.estimation.repeats import Repeats, doubt, find_again, proven
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray

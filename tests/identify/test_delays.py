@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from shm.identify import IdentifyOptions, identify
-from shm.identify.estimation.candidates import Candidate, Pole
-from shm.identify.estimation.delays import as_simultaneous, delays_s, simultaneous
-from shm.identify.estimation.poles import PoleSet, collinearity
+from shm.identify.estimation.poles import Candidate, Pole, PoleSet, collinearity
+from shm.identify.estimation.stabilise import as_simultaneous, delays_s, simultaneous
 from shm.values import Channel, FloatArray, Hanger, Recording
 
 OPTIONS = IdentifyOptions(2.0, 100.0)

@@ -12,8 +12,8 @@ import pytest
 from shm.errors import UsageError
 from shm.identify import IDENTIFIERS, IdentifyOptions
 from shm.identify.contract import Finding, Identifier, Measurement
-from shm.identify.estimation.registry import identifier
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR
+from shm.identify.identification import identifier
 from shm.identify.measuring.setups import measurement_of_recordings
 from shm.values import FloatArray, Recording
 from tests.identify.signals import Planted, Sensor, hanger_modes, recording

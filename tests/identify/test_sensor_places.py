@@ -10,7 +10,7 @@ import pytest
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify import Identification, IdentifyOptions, identify
 from shm.identify.contract import FoundMode
-from shm.identify.mode_ordering.directions import directions
+from shm.identify.mode_ordering.planes import directions
 from shm.identify.quality.of_sensors import sensor_places
 from shm.models.tensioned_beam import mode_shape
 from shm.simulate import HammerPlan, HangerState, hammer_test

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.identify.estimation.candidates import Candidate, Pole
+from shm.identify.estimation.poles import Candidate, Pole
 from shm.identify.estimation.repeats import Repeats, doubt
 from shm.identify.estimation.ssi import _few_sums
 from shm.identify.options import IdentifyOptions

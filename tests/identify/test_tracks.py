@@ -2,15 +2,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.identify.estimation.candidates import (
+from shm.identify.estimation.poles import (
     Candidate,
     Pole,
+    PoleSet,
     continued,
     link,
     resolved,
     stable_candidates,
 )
-from shm.identify.estimation.poles import PoleSet
 from shm.identify.options import IdentifyOptions
 
 X, Y = np.array([1.0 + 0j, 0.0]), np.array([0.0 + 0j, 1.0])

@@ -9,8 +9,7 @@ import pytest
 
 from shm.identify import IdentifyOptions
 from shm.identify.contract import Measurement
-from shm.identify.estimation.ssi import through_windows
-from shm.identify.estimation.zoom import Window, windows
+from shm.identify.estimation.ssi import Window, through_windows, windows
 from shm.values import FloatArray, ResponsePoint
 from tests.benchmarks.recordings_limit import ring_down_covariance
 from tests.worlds.recordings import ModeTruth

@@ -11,9 +11,10 @@ from shm.inference import UpdateOptions, update
 from shm.inference.likelihood import Likelihood
 from shm.models import THESIS, Model, build
 from shm.models.base import Conditions
-from shm.simulate import HangerState, TestConditions, planted_modes
+from shm.simulate import HangerState, TestConditions
 from shm.values import NAN, PLANES, AddedMass, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
+from tests.helpers.planted_modes import planted_modes
 
 WARMTH = "beam1+temperature_tension@everywhere:reference_c=10"
 SD = 1e-3

@@ -16,7 +16,7 @@ from shm.pipeline import stream_steps
 from shm.pipeline.stream_state import stream_states
 from shm.pipeline.streaming import Streaming
 from shm.read.chunk_document import chunk_document
-from shm.simulate.monitored import streamed
+from shm.simulate.ambient import streamed
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
 from shm.values.stream import PooledReading
@@ -80,7 +80,7 @@ def test_chunks_become_windows_hours_and_a_day_in_the_spool(two_hours: Workspace
 def test_a_day_gives_the_frequency_that_was_planted(two_hours: Workspace) -> None:
     """To a hundredth of a per cent: 1 % of tension moves it by 0.4 %."""
     from shm.simulate import HangerState, natural_frequencies
-    from shm.simulate.monitored import Weather
+    from shm.simulate.ambient import Weather
 
     with two_hours.store() as store:
         (day,) = hours_of(store, "day")

@@ -11,7 +11,7 @@ import pytest
 
 from shm.errors import BadInput
 from shm.read import peek, read
-from shm.read.surveying import survey
+from shm.read.registry import survey
 from tests.read.test_logger_text import SHAPES
 
 DAMAGES: dict[str, Callable[[random.Random, bytes], bytes]] = {

@@ -13,8 +13,8 @@ from scipy.io import wavfile
 from shm.errors import BadInput
 from shm.read import peek, read
 from shm.read.logger_words import hanger_numbered, name_and_unit, sensitivity_of
+from shm.read.registry import survey
 from shm.read.stamps import moment, parsed
-from shm.read.surveying import survey
 from shm.values import Recording
 
 ROWS, RATE = 400, 500.0
@@ -113,7 +113,7 @@ def test_every_shape_holds_the_same_numbers(shape: str, tmp_path: Path) -> None:
 
 
 def test_an_overload_is_a_gap_that_is_counted(tmp_path: Path) -> None:
-    from shm.read.surveying import survey
+    from shm.read.registry import survey
 
     text = "Time (s),Force (N),Acc (m/s2)\n" + PLAIN
     lines = text.splitlines()

@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 
 from shm.errors import BadInput
+from shm.read.base import Layout
 from shm.read.profiles import (
     FOLDER,
     any_profile,
     completed,
     profile_for,
     save_profile,
-    sidecar_text,
 )
-from shm.read.survey import Layout
+from shm.read.sidecar import sidecar_text
 
 LAYOUT = Layout("0123456789ab", "logger text", ("Time [s]", "A 1"))
 SAID = {

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from shm.errors import BadInput, UsageError
 from shm.read import peek, read, sidecar_path, write
-from shm.read.surveying import survey
+from shm.read.registry import survey
 from shm.values import FloatArray, FrequencyResponse, Recording
 
 POINTS = 64

@@ -22,11 +22,11 @@ from shm.simulate import (
     at_share,
     campaign,
     campaign_with_truth,
-    planted_modes,
     scaled_to,
     size_of,
 )
 from shm.values import AddedMass, FloatArray, Hanger, ModalTest
+from tests.helpers.planted_modes import planted_modes
 
 STATE = HangerState(711e3)
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})

@@ -11,7 +11,7 @@ import scipy
 
 from shm.bridge.hanger import hanger_of
 from shm.simulate import HangerState, natural_frequencies
-from shm.simulate.monitored import Loss, MonitoringPlan, Weather, described_stream, streamed
+from shm.simulate.ambient import Loss, MonitoringPlan, Weather, described_stream, streamed
 from shm.values import Hanger
 
 START = datetime(2026, 6, 1, 12, tzinfo=UTC)

@@ -20,13 +20,13 @@ from shm.simulate import (
     choices,
     drawn,
     natural_frequencies,
-    planted_modes,
     scaled_to,
     size_of,
 )
 from shm.simulate.effects import ranges_of
 from shm.simulate.elements import plane_modes
 from shm.values import FloatArray, Hanger
+from tests.helpers.planted_modes import planted_modes
 
 STATE = HangerState(711e3)
 PLACES = (1.56, 3.48, 5.4, 7.92)

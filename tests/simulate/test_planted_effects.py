@@ -18,11 +18,11 @@ from shm.simulate import (
     choices,
     drawn,
     natural_frequencies,
-    planted_modes,
 )
 from shm.simulate.effects import ranges_of
 from shm.simulate.elements import plane_modes
 from shm.values import AddedMass, FloatArray, Hanger, Turnbuckle
+from tests.helpers.planted_modes import planted_modes
 
 MODES = 8
 PLACES = (1.56, 3.48, 5.4, 7.92)

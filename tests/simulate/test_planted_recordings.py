@@ -14,11 +14,11 @@ from shm.simulate import (
     PlantedEffect,
     TestConditions,
     hammer_test,
-    planted_modes,
     simulated_test,
 )
 from shm.simulate.planted import planted_bar, planted_plane_modes
 from shm.values import AddedMass, FloatArray, Hanger, Recording
+from tests.helpers.planted_modes import planted_modes
 
 STATE = HangerState(711e3)
 PLAN = HammerPlan(hits=1, seconds_per_hit=16.0)

@@ -18,7 +18,6 @@ from shm.simulate import (
     campaign_with_truth,
     choices,
     drawn,
-    planted_modes,
     realised,
     scaled_to,
     size_of,
@@ -27,6 +26,7 @@ from shm.simulate.bar import bar_modes
 from shm.simulate.effects import LAWS, ranges_of
 from shm.simulate.reality import sd_factors
 from shm.values import AddedMass, FloatArray, Hanger, Scatter
+from tests.helpers.planted_modes import planted_modes
 
 STATE = HangerState(711e3)
 PLACES = (1.56, 3.48, 5.4, 7.92)

@@ -22,9 +22,17 @@ import numpy as np
 import scipy
 
 from shm.identify.contract import Finding, FoundMode, Measurement
-from shm.identify.estimation.courses import OVERLAP, TINY, Course, Row, course_of, phases_of
-from shm.identify.estimation.drift import with_drift
-from shm.identify.estimation.repeats import LEAST_HITS
+from shm.identify.estimation.courses import (
+    OVERLAP,
+    TINY,
+    Course,
+    Row,
+    course_of,
+    least_squares,
+    phases_of,
+    with_drift,
+)
+from shm.identify.estimation.repeats import LEAST_HITS, widening
 from shm.values import NAN, FloatArray
 from shm.values.modes import MOST_SLOPE, SURE_SDS
 
@@ -266,21 +274,17 @@ def _fit(mode: FoundMode, rows: Sequence[_Grown]) -> _Fit | None:
     freedom = len(values) - matrix.shape[1]
     if freedom < 2:
         return None
-    weighted = matrix * weight[:, np.newaxis]
-    scale = np.linalg.norm(weighted, axis=0)
-    if np.any(scale == 0):
+    solution = least_squares(matrix, values, weight)
+    if solution is None:
         return None
-    square = (weighted / scale).T @ (weighted / scale)
-    if np.linalg.cond(square) > 1e10:
-        return None
-    inverse = np.linalg.inv(square) / np.outer(scale, scale)
-    solved = inverse @ (weighted.T @ (values * weight))
-    left_over = (values - matrix @ solved) * weight
+    solved, inverse, left_over = solution
     misfit = float(left_over @ left_over)
     if misfit > (_MOST_ASTRAY * np.linalg.norm(weight)) ** 2:
         return None
-    spread = np.sqrt(np.diag(inverse) * max(1.0, misfit / freedom)) * _widening(freedom) * OVERLAP
-    spread = np.fmax(spread, _by_ring_downs(weighted, left_over, inverse, rows))
+    spread = np.sqrt(np.diag(inverse) * max(1.0, misfit / freedom)) * widening(freedom) * OVERLAP
+    spread = np.fmax(
+        spread, _by_ring_downs(matrix * weight[:, np.newaxis], left_over, inverse, rows)
+    )
     shift_hz, slope = solved[count:].tolist()
     left = slope * float(np.median([row[4] for row in rows]))
     slope_sd = math.hypot(float(spread[count + 1]), _SLOPE_ERROR * slope)
@@ -303,9 +307,4 @@ def _by_ring_downs(
         for part, rest in zip(np.split(weighted, ends), np.split(left_over, ends), strict=True)
     ])  # fmt: skip
     squares = np.sum((scores @ inverse) ** 2, axis=0)
-    return np.asarray(np.sqrt(squares * count / (count - 1)) * _widening(count - 1))
-
-
-def _widening(freedom: int) -> float:
-    """Student's 95 % quantile over the normal one."""
-    return float(scipy.special.stdtrit(freedom, 0.95) / scipy.special.ndtri(0.95))
+    return np.asarray(np.sqrt(squares * count / (count - 1)) * widening(count - 1))

@@ -17,8 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.identify.estimation.candidates import Candidate, Pole
-from shm.identify.estimation.poles import PoleSet
+from shm.identify.estimation.poles import Candidate, Pole, PoleSet
 from shm.identify.estimation.repeats import LEAST_HITS, Repeats, doubt, repeats_of
 from shm.identify.options import IdentifyOptions
 from shm.values import ComplexArray, FloatArray, IntArray

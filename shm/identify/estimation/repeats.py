@@ -12,10 +12,12 @@ import numpy as np
 import scipy
 
 from shm.identify.contract import Dropped, FoundMode
-from shm.identify.estimation.candidates import Candidate, Pole, continued
 from shm.identify.estimation.poles import (
+    Candidate,
+    Pole,
     PoleSet,
     aligned,
+    continued,
     median_shape,
     modal_assurance,
     real_shape,
@@ -266,7 +268,7 @@ def jackknife_sd(estimates: FloatArray) -> FloatArray:
     if hits < LEAST_HITS:
         return np.full(estimates.shape[1:], np.nan)
     spread = np.sum((estimates - estimates.mean(axis=0)) ** 2, axis=0)
-    return np.asarray(np.sqrt((hits - 1) / hits * spread) * _widening(hits))
+    return np.asarray(np.sqrt((hits - 1) / hits * spread) * widening(hits - 1))
 
 
 def order_sd(estimates: Sequence[float] | Sequence[FloatArray]) -> FloatArray:
@@ -302,8 +304,9 @@ def _beside(sds: FloatArray, index: int) -> float:
     return float(np.median(sds[near[near != index]]))
 
 
-def _widening(hits: int) -> float:
-    return float(scipy.special.stdtrit(hits - 1, 0.95) / scipy.special.ndtri(0.95))
+def widening(freedom: int) -> float:
+    """Student's 95 % quantile over the normal one."""
+    return float(scipy.special.stdtrit(freedom, 0.95) / scipy.special.ndtri(0.95))
 
 
 def frequency_sd(frequency_hz: float, estimates_hz: FloatArray) -> float:

@@ -1,12 +1,15 @@
-"""Finds the hammer hits in a force signal and judges each at the signal's own sampling rate."""
+"""Finds the hammer hits in a force signal, judges each at the signal's own sampling rate, and says
+which plane each struck.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from shm.values import FloatArray, IntArray
+from shm.values import PLANES, FloatArray, IntArray, Plane
 
 # judgement: normal noise reaches 5 sigmas once in a million samples, mains and steps of a converter
 # somewhat more; a second blow is sought only where one has struck, so that less may count
@@ -189,3 +192,24 @@ def _struck_again(after: FloatArray, fall: int, noise: float, sampling_rate_hz: 
     ringing = RINGING / np.arange(skip, len(after))
     limit = np.maximum(after[0] * np.maximum(DOUBLE_SHARE, ringing), DOUBLE_SIGMAS * noise)
     return np.asarray(skip + np.flatnonzero(after[skip:] > limit))
+
+
+_CLEARLY = 4.0
+"""Of powers: a hit within 27 degrees of a plane. A crew that means one plane strikes so."""
+_FEWEST = 2  # of a plane: one alone may have struck the wrong way
+
+
+def struck_planes(power: FloatArray, planes: Sequence[Plane | None]) -> dict[Plane, list[int]]:
+    """The hits of each plane by the motion after them; empty unless both were struck on purpose.
+
+    `power` (hits, channels) is that of the channels of `planes`.
+    """
+    if not len(power) or {*PLANES} - {*planes}:
+        return {}
+    share = {plane: power[:, [own == plane for own in planes]].mean(axis=1) for plane in PLANES}
+    one, other = PLANES
+    above = share[one] > _CLEARLY * share[other]
+    below = share[other] > _CLEARLY * share[one]
+    if not np.all(above | below) or min(above.sum(), below.sum()) < _FEWEST:
+        return {}
+    return {one: np.flatnonzero(above).tolist(), other: np.flatnonzero(below).tolist()}

@@ -26,6 +26,7 @@ from shm.identify.measuring.hits import (
     HitRecord,
     Pulse,
     find_pulses,
+    struck_planes,
 )
 from shm.identify.measuring.signal_faults import (
     CLIPPED,
@@ -37,7 +38,6 @@ from shm.identify.measuring.signal_faults import (
     faults_of_channels,
     until_disturbed,
 )
-from shm.identify.measuring.struck_planes import struck_planes
 from shm.identify.measuring.unforced_hits import find_unforced
 from shm.identify.options import IdentifyOptions
 from shm.values import BoolArray, Channel, ComplexArray, FloatArray, Plane, Recording

@@ -6,6 +6,8 @@ with a roving hammer or a roving sensor has several.
 Cuts what belongs to one hit out of its record, low-passed and thinned to the band.
 
 From time records of hits, as received, to the measurement of one set-up.
+
+Sensors stand on the hanger: what is said to be off it is mistyped.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ from shm.identify.measuring.responses import measurement_of_responses, point_of
 from shm.identify.measuring.screening import FEWEST_TO_COMPARE, Screening, pulses_of, screened
 from shm.identify.measuring.signal_faults import HITS_NOT_SHOWN, KNOCK
 from shm.identify.options import IdentifyOptions
-from shm.values import Channel, ComplexArray, FloatArray, FrequencyResponse, Recording
+from shm.values import Channel, ComplexArray, FloatArray, FrequencyResponse, Hanger, Recording
 
 _MOST_SECONDS_A_HIT = 90.0  # judgement: crews wait half a minute at most
 _SAME_RATE = 1e-5
@@ -340,3 +342,35 @@ def _response(
         added_mass=first.added_mass,
     )
     return response, average.spectra
+
+
+_ROUNDED = 0.01
+"""Judgement: a place that was taped at the very end, beside a length that was rounded."""
+
+
+def fault_of_place(x_m: float, hanger: Hanger) -> str:
+    """Why a place cannot be on a hanger; empty where it can, or is not known."""
+    if x_m < 0 or x_m > (1 + _ROUNDED) * hanger.length_m:
+        return (
+            f"it is said to be at {x_m:g} m from the deck end, and the hanger is "
+            f"{hanger.length_m:g} m long"
+        )
+    return ""
+
+
+def refuse_off_the_hanger(
+    records: Sequence[Recording | FrequencyResponse], hanger: Hanger | None
+) -> None:
+    """Raises BadInput naming the channel that cannot be where it is said to be."""
+    if hanger is None or not hanger.as_hanger:
+        return
+    for record in records:
+        points = record.channels if isinstance(record, Recording) else record.points
+        for each in points:
+            if fault := fault_of_place(each.x_m, hanger):
+                raise BadInput(
+                    f"{fault}.",
+                    file=record.source,
+                    channel=each.name,
+                    remedy="Correct its x_m, in metres from the deck end, or the hanger's length.",
+                )

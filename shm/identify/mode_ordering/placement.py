@@ -11,12 +11,6 @@ import numpy as np
 from shm.identify.contract import FoundMode, Tone
 from shm.identify.mode_ordering.alignment import PlaneModes
 from shm.identify.mode_ordering.bar_fit import described_orders
-from shm.identify.mode_ordering.both_planes import (
-    blurred,
-    moves_in_one_plane,
-    pair_note,
-    with_both_planes,
-)
 from shm.identify.mode_ordering.non_bending_modes import (
     askew_mode,
     doubts,
@@ -24,15 +18,26 @@ from shm.identify.mode_ordering.non_bending_modes import (
     unnumbered_mode,
     without_tones,
 )
-from shm.identify.mode_ordering.notes import basis_notes, plane_notes, support_notes
 from shm.identify.mode_ordering.one_axis import own_series
-from shm.identify.mode_ordering.order import LEAST_MARGIN, Expected, Numbering, assign_orders
+from shm.identify.mode_ordering.order import (
+    LEAST_MARGIN,
+    Expected,
+    Numbering,
+    assign_orders,
+    basis_notes,
+    plane_notes,
+    support_notes,
+)
 from shm.identify.mode_ordering.planes import (
+    blurred,
+    moves_in_one_plane,
+    pair_note,
     planes_of,
     principal_angle,
     sd_in_plane,
     shape_points,
     transverse_share,
+    with_both_planes,
 )
 from shm.values import (
     NAN,

@@ -10,7 +10,7 @@ import numpy as np
 from shm.identify.contract import Measurement
 from shm.identify.estimation.amplitude_dependence import is_sure
 from shm.identify.measuring.frf import response_of
-from shm.identify.measuring.struck_planes import struck_planes
+from shm.identify.measuring.hits import struck_planes
 from shm.identify.mode_ordering.alignment import log_frequency
 from shm.identify.mode_ordering.order import Expected
 from shm.identify.quality.inspection import Inspection

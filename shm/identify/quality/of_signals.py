@@ -8,7 +8,7 @@ import numpy as np
 
 from shm.identify.contract import Hit, Measurement
 from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES
-from shm.identify.measuring.recorded_window import recorded_window_rate
+from shm.identify.measuring.responses import recorded_window_rate
 from shm.identify.measuring.screening import LEAST_SAMPLES
 from shm.identify.measuring.signal_faults import (
     CABLE,

@@ -28,7 +28,7 @@ from shm.identify.estimation.repeats import LEAST_HITS
 from shm.identify.measuring.responses import place_of
 from shm.identify.mode_ordering.planes import transverse_share
 from shm.identify.setup_merging.joined import LARGEST_SHIFT, Joined, matched
-from shm.identify.setup_merging.modal_participation import levels, ringing
+from shm.identify.setup_merging.modal_participation import ringing, with_levels
 from shm.values import PLANES, FloatArray, ResponsePoint
 
 _MOST_TURN = 0.1
@@ -85,11 +85,7 @@ def _as_joined(measurements: Sequence[Measurement], found: Finding) -> Joined:
     """A finding over the points of all set-ups, with the levels at which its modes ring."""
     modes = found.modes
     if modes:
-        level_m_s2 = levels([ringing(m, modes, _struck(m, modes)) for m in measurements])
-        modes = tuple(
-            replace(mode, acceleration_m_s2=float(level))
-            for mode, level in zip(modes, level_m_s2, strict=True)
-        )
+        modes = with_levels(modes, [ringing(m, modes, _struck(m, modes)) for m in measurements])
     note = f"the hits of {len(measurements)} directions are identified together"
     apart = (modes,) * len(measurements)
     return Joined(measurements[0].points, replace(found, modes=modes), apart, (note,))

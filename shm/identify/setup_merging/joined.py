@@ -15,13 +15,12 @@ import numpy as np
 import scipy
 
 from shm.identify.contract import Dropped, Finding, FoundMode, Measurement, Poles
-from shm.identify.estimation.candidates import FAR
-from shm.identify.estimation.poles import modal_assurance
-from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
+from shm.identify.estimation.poles import FAR, modal_assurance
+from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS, widening
 from shm.identify.measuring.responses import Place, place_of
 from shm.identify.mode_ordering.planes import transverse_share
 from shm.identify.options import IdentifyOptions
-from shm.identify.setup_merging.modal_participation import levels, ringing
+from shm.identify.setup_merging.modal_participation import levels, ringing, with_levels
 from shm.identify.setup_merging.products import (
     Shapes,
     hammer_roves,
@@ -79,11 +78,7 @@ def joined(
 def _single(measurement: Measurement, found: Finding) -> Joined:
     modes = found.modes
     if measurement.driven and modes:
-        level_m_s2 = levels([ringing(measurement, modes)])
-        modes = tuple(
-            replace(mode, acceleration_m_s2=float(level))
-            for mode, level in zip(modes, level_m_s2, strict=True)
-        )
+        modes = with_levels(modes, [ringing(measurement, modes)])
     return Joined(measurement.points, replace(found, modes=modes), (modes,))
 
 
@@ -213,14 +208,14 @@ def pooled(values: FloatArray, sds: FloatArray) -> tuple[float, float]:
     if count == 1:
         return float(values[0]), float(sds[0])
     if np.all(np.isnan(sds)):
-        scatter = float(np.std(values, ddof=1)) / np.sqrt(count) * _widening(count)
+        scatter = float(np.std(values, ddof=1)) / np.sqrt(count) * widening(count - 1)
         return float(np.mean(values)), scatter if count >= LEAST_HITS else NAN
     own = np.where(np.isnan(sds), np.nanmax(sds), sds) ** 2
     own = np.maximum(own, max(float(np.nanmedian(sds**2)), np.finfo(float).tiny))
     between = _between(values, own)
     weights = 1 / (own + between)
     alone = 1 / np.sum(1 / own)
-    variance = alone + (1 / np.sum(weights) - alone) * _widening(count) ** 2
+    variance = alone + (1 / np.sum(weights) - alone) * widening(count - 1) ** 2
     return float(values @ weights / np.sum(weights)), float(np.sqrt(variance))
 
 
@@ -230,10 +225,6 @@ def _between(values: FloatArray, own: FloatArray) -> float:
     total = np.sum(weights)
     excess = weights @ (values - values @ weights / total) ** 2 - (len(values) - 1)
     return max(0.0, float(excess / (total - np.sum(weights**2) / total)))
-
-
-def _widening(count: int) -> float:
-    return float(scipy.special.stdtrit(count - 1, 0.95) / scipy.special.ndtri(0.95))
 
 
 @dataclass(frozen=True, eq=False)

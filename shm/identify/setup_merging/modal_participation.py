@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -104,6 +104,14 @@ def levels(rings: Sequence[Ringing]) -> FloatArray:
     """
     medians = [np.median(ring.amplitude_m_s2, axis=0).max(axis=0) for ring in rings]
     return np.asarray(np.max(medians, axis=0))
+
+
+def with_levels(modes: Sequence[FoundMode], rings: Sequence[Ringing]) -> tuple[FoundMode, ...]:
+    """The modes with these amplitudes."""
+    return tuple(
+        replace(mode, acceleration_m_s2=float(level))
+        for mode, level in zip(modes, levels(rings), strict=True)
+    )
 
 
 def poles_of_modes(modes: Sequence[FoundMode]) -> ComplexArray:

@@ -11,7 +11,6 @@ from dataclasses import replace
 from shm.errors import BadInput
 from shm.models.base import Conditions
 from shm.models.effects.base import Effect, Parameter, Survey, Variant
-from shm.models.effects.intermediate_support import IntermediateSupport
 from shm.models.effects.of_ends import (
     EffectiveLength,
     RotationalEndFlexibility,
@@ -21,6 +20,7 @@ from shm.models.effects.of_ends import (
 )
 from shm.models.effects.of_mass import (
     DistributedMass,
+    IntermediateSupport,
     PartialMass,
     SensorMass,
     UnknownPointMass,

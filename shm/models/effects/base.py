@@ -130,7 +130,8 @@ class Effect:
     words for either sign (`{x_change_m:longer|shorter}`), and `{log10_k}` also stands for the
     springs `log10_k1` to `log10_k4`. `source` is the literature it follows;
     `seen_by` are the measurements that show it, `imitated_by` the effects that it is easily taken
-    for. The first parameter is the effect's size. `follows` are the conditions of a test that it
+    for. The first parameter is the effect's size; `size` is the only one of an effect whose prior
+    is that of any hanger. `follows` are the conditions of a test that it
     depends on; where it `dissipates`, damping rises with the level. `of_the_hanger` is False where
     it is one of the measurement, that other sensors would not have. `other_laws` says in words by
     which other laws, about as likely as its own, the same parameters may act. `over_time` is None
@@ -144,6 +145,7 @@ class Effect:
     source: ClassVar[str]
     seen_by: ClassVar[tuple[str, ...]]
     imitated_by: ClassVar[tuple[str, ...]]
+    size: ClassVar[Parameter | None] = None
     follows: ClassVar[tuple[Literal["temperature", "amplitude"], ...]] = ()
     dissipates: ClassVar[bool] = False
     of_the_hanger: ClassVar[bool] = True
@@ -161,7 +163,9 @@ class Effect:
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         """Its parameters with the catalogue's priors, the size first."""
-        raise TypeError(f"{type(self).__name__} declares no parameters.")
+        if self.size is None:
+            raise TypeError(f"{type(self).__name__} declares no parameters.")
+        return (self.size,)
 
     def applied(
         self,

@@ -1,4 +1,6 @@
-"""Effects of mass that nobody described: all along, at one place, or that of the sensors."""
+"""Effects of what the bar carries and what holds it between its ends: mass all along, over a
+stretch, at one place or of the sensors, and a spring.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ import numpy as np
 from shm.models.base import Conditions
 from shm.models.effects import base
 from shm.models.effects.base import GRADUAL, STEEP, Effect, OverTime, Parameter, Survey, Variant
-from shm.models.hanger.physical import PhysicalHanger, PointMass
+from shm.models.hanger.physical import LateralSpring, PhysicalHanger, PointMass
 from shm.values import NAN, FloatArray, Hanger
 
 
@@ -32,19 +34,16 @@ class DistributedMass(Effect):
         "section_size",
         "partial_mass",
     )
-
-    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        size = Parameter(
-            "mass_change",
-            "fraction",
-            0.002,
-            0.3,
-            0.0,
-            "0.2 to 30 % of the mass: from a coat of paint to a grouted pipe or glaze ice; things "
-            "are put on hangers, not taken off.",
-            spread="logarithmic",
-        )
-        return (size,)
+    size = Parameter(
+        "mass_change",
+        "fraction",
+        0.002,
+        0.3,
+        0.0,
+        "0.2 to 30 % of the mass: from a coat of paint to a grouted pipe or glaze ice; things "
+        "are put on hangers, not taken off.",
+        spread="logarithmic",
+    )
 
     def applied(
         self,
@@ -192,6 +191,15 @@ class SensorMass(Effect):
     seen_by = ("frequencies of many orders", "known places of the sensors")
     imitated_by = ("point_mass", "section_loss")
     of_the_hanger = False
+    size = Parameter(
+        "mass_kg",
+        "kg",
+        0.01,
+        20.0,
+        0.0,
+        "10 g to 20 kg each: from a piezo on wax to a boxed seismometer on a clamp.",
+        spread="logarithmic",
+    )
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         if survey.sensor_places_m:
@@ -200,18 +208,6 @@ class SensorMass(Effect):
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return (Variant("all sensors", places_m=survey.sensor_places_m),)
-
-    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        size = Parameter(
-            "mass_kg",
-            "kg",
-            0.01,
-            20.0,
-            0.0,
-            "10 g to 20 kg each: from a piezo on wax to a boxed seismometer on a clamp.",
-            spread="logarithmic",
-        )
-        return (size,)
 
     def applied(
         self,
@@ -226,3 +222,54 @@ class SensorMass(Effect):
             PointMass(np.full_like(mass_kg, place_m), mass_kg) for place_m in variant.places_m
         )
         return replace(physical, masses=physical.masses + added)
+
+
+class IntermediateSupport(Effect):
+    """The hanger touches or is tied to something between its ends: a handrail, a tie, a damper.
+
+    A spring to a place that stands still, in both planes alike or in one.
+    """
+
+    name = "intermediate_support"
+    title = "Held between the ends"
+    localised_as = "lateral spring"
+    phrase = "an intermediate support of {stiffness_n_m} at {x_m}"
+    source = "Grossi and Albarracín (2003), Eigenfrequencies of generally restrained beams."
+    seen_by = ("frequencies of low orders", "the other plane", "shapes")
+    imitated_by = ("sag", "support_motion", "section_loss", "point_mass", "partial_mass")
+
+    def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
+        return base.planes(survey)
+
+    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
+        own = _lateral_stiffness_n_m(hanger)
+        size = Parameter(
+            "stiffness_n_m",
+            "N/m",
+            1e-3 * own,
+            100 * own,
+            0.0,
+            "0.001 to 100 times T/L, what the tension itself resists with (without any, 100 "
+            "EI/L^3, the bar): from a cable that leans on the hanger to a stiff tie.",
+            spread="logarithmic",
+        )
+        return size, base.place_along(hanger)
+
+    def applied(
+        self,
+        physical: PhysicalHanger,
+        values: FloatArray,
+        variant: Variant,
+        conditions: Conditions,
+        hanger: Hanger,
+    ) -> PhysicalHanger:
+        stiffness = np.zeros_like(physical.bending_stiffness_n_m2)
+        stiffness[:, list(variant.planes)] = values[:, :1]
+        spring = LateralSpring(values[:, 1], stiffness, np.zeros(len(values)))
+        return replace(physical, springs=(*physical.springs, spring))
+
+
+def _lateral_stiffness_n_m(hanger: Hanger) -> float:
+    if hanger.nominal_tension_n:
+        return hanger.nominal_tension_n / hanger.length_m
+    return 100 * hanger.bending_stiffness_n_m2 / hanger.length_m**3

@@ -43,25 +43,22 @@ class BendingStiffness(Effect):
         "rotational_end_flexibility",
         "section_size",
     )
+    size = Parameter(
+        "stiffness_change",
+        "fraction",
+        0.005,
+        0.8,
+        0.0,
+        "0.5 to 80 %, either way: from a rolling tolerance to wires that slide freely or a "
+        "grouted tube.",
+        spread="logarithmic",
+        signed=True,
+        most=0.99,
+    )
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         round_section = math.isfinite(hanger.diameter_m)
         return (Variant(),) if round_section else base.planes(survey)
-
-    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        size = Parameter(
-            "stiffness_change",
-            "fraction",
-            0.005,
-            0.8,
-            0.0,
-            "0.5 to 80 %, either way: from a rolling tolerance to wires that slide freely or a "
-            "grouted tube.",
-            spread="logarithmic",
-            signed=True,
-            most=0.99,
-        )
-        return (size,)
 
     def applied(
         self,
@@ -95,20 +92,17 @@ class SectionSize(Effect):
         "effective_length",
         "stiff_end_zones",
     )
-
-    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        size = Parameter(
-            "diameter_change",
-            "fraction",
-            0.003,
-            0.15,
-            0.0,
-            "0.3 to 15 %, either way: from a rolling tolerance to the next bar but one.",
-            spread="logarithmic",
-            signed=True,
-            most=0.9,
-        )
-        return (size,)
+    size = Parameter(
+        "diameter_change",
+        "fraction",
+        0.003,
+        0.15,
+        0.0,
+        "0.3 to 15 %, either way: from a rolling tolerance to the next bar but one.",
+        spread="logarithmic",
+        signed=True,
+        most=0.9,
+    )
 
     def applied(
         self,
@@ -210,19 +204,16 @@ class ShearAndRotaryInertia(Effect):
     )
     seen_by = ("frequencies of high orders",)
     imitated_by = ("translational_end_flexibility", "stiff_end_zones", "point_mass")
-
-    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        size = Parameter(
-            "share",
-            "of the theory",
-            0.5,
-            1.5,
-            0.0,
-            "Half to one and a half times the theory of a round bar: a tube or a flat bar has "
-            "another shear coefficient.",
-            least=0.0,
-        )
-        return (size,)
+    size = Parameter(
+        "share",
+        "of the theory",
+        0.5,
+        1.5,
+        0.0,
+        "Half to one and a half times the theory of a round bar: a tube or a flat bar has "
+        "another shear coefficient.",
+        least=0.0,
+    )
 
     def applied(
         self,

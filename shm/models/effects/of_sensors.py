@@ -42,25 +42,22 @@ class Timebase(Effect):
         "temperature_tension",
         "section_size",
     )
+    size = Parameter(
+        "clock_error",
+        "fraction",
+        1e-6,
+        0.05,
+        0.0,
+        "One millionth to 5 %, either way: from a quartz to a nominal rate that the logger "
+        "does not keep.",
+        spread="logarithmic",
+        signed=True,
+        most=0.99,
+    )
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         one = tuple(Variant(f"test {test}", test=test) for test in survey.tests)
         return (Variant("all tests"), *one) if len(one) > 1 else (Variant("all tests"),)
-
-    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        size = Parameter(
-            "clock_error",
-            "fraction",
-            1e-6,
-            0.05,
-            0.0,
-            "One millionth to 5 %, either way: from a quartz to a nominal rate that the logger "
-            "does not keep.",
-            spread="logarithmic",
-            signed=True,
-            most=0.99,
-        )
-        return (size,)
 
     def applied(
         self,
@@ -91,6 +88,17 @@ class SensorMisalignment(Effect):
     seen_by = ("shapes of biaxial sensors",)
     imitated_by = ("skewed_principal_axes",)
     of_the_hanger = False
+    size = Parameter(
+        "angle_deg",
+        "deg",
+        0.05,
+        60.0,
+        0.0,
+        "0.05 to 60 degrees, either way: from the play of a clamp to a sensor put on by eye.",
+        spread="logarithmic",
+        signed=True,
+        most=90.0,
+    )
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         if survey.biaxial and survey.sensor_places_m:
@@ -105,20 +113,6 @@ class SensorMisalignment(Effect):
             for index, place_m in enumerate(places_m)
         )
         return (Variant("all sensors"), *each) if len(places_m) > 1 else each
-
-    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        size = Parameter(
-            "angle_deg",
-            "deg",
-            0.05,
-            60.0,
-            0.0,
-            "0.05 to 60 degrees, either way: from the play of a clamp to a sensor put on by eye.",
-            spread="logarithmic",
-            signed=True,
-            most=90.0,
-        )
-        return (size,)
 
     def applied(
         self,
@@ -223,6 +217,18 @@ class LoadScale(Effect):
     seen_by = ("tensions that were read", "several tests")
     imitated_by = ("distributed_mass", "effective_length", "temperature_tension")
     of_the_hanger = False
+    size = Parameter(
+        "load_error",
+        "fraction",
+        0.005,
+        0.3,
+        0.0,
+        "0.5 to 30 %, either way: from a cell out of calibration, over 9.81 taken as 10 and "
+        "the friction of a jack, to the factor of another gauge.",
+        spread="logarithmic",
+        signed=True,
+        most=0.9,
+    )
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         if not hanger.nominal_tension_n:
@@ -236,21 +242,6 @@ class LoadScale(Effect):
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return (Variant("all readings"),)
-
-    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        size = Parameter(
-            "load_error",
-            "fraction",
-            0.005,
-            0.3,
-            0.0,
-            "0.5 to 30 %, either way: from a cell out of calibration, over 9.81 taken as 10 and "
-            "the friction of a jack, to the factor of another gauge.",
-            spread="logarithmic",
-            signed=True,
-            most=0.9,
-        )
-        return (size,)
 
     def applied(
         self,

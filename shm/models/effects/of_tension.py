@@ -101,24 +101,21 @@ class GeometricHardening(Effect):
     imitated_by = ("temperature_tension", "timebase")
     other_laws = ("the swing dies away the faster the wider it is: the power of the level is 1.5",)
     follows = ("amplitude",)
+    size = Parameter(
+        "hardening",
+        "fraction",
+        1e-6,
+        0.05,
+        0.0,
+        "One millionth to 5 % of the tension at the reference level: a hammer seldom moves a "
+        "hanger by more than a few millimetres.",
+        spread="logarithmic",
+    )
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         if hanger.nominal_tension_n == 0 or hanger.supports.ends("free"):
             return "It takes a tension between two ends that are held."
         return missing_levels(survey)
-
-    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        size = Parameter(
-            "hardening",
-            "fraction",
-            1e-6,
-            0.05,
-            0.0,
-            "One millionth to 5 % of the tension at the reference level: a hammer seldom moves a "
-            "hanger by more than a few millimetres.",
-            spread="logarithmic",
-        )
-        return (size,)
 
     def applied(
         self,
@@ -210,6 +207,16 @@ class Sag(Effect):
     seen_by = ("frequency of the first order", "the other plane")
     imitated_by = ("intermediate_support", "support_motion")
     other_laws = ("it sags as its bending and its ends let it, not as a string",)
+    size = Parameter(
+        "sag_parameter",
+        "lambda^2",
+        0.001,
+        20.0,
+        0.0,
+        "0.001 to 20: from a taut, nearly upright bar to a slack stay well below the first "
+        "crossing at 4 pi^2.",
+        spread="logarithmic",
+    )
 
     def invisible(self, hanger: Hanger, survey: Survey) -> str:
         if hanger.nominal_tension_n == 0 or hanger.supports.ends("free"):
@@ -218,19 +225,6 @@ class Sag(Effect):
 
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return base.single_planes(survey)
-
-    def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        size = Parameter(
-            "sag_parameter",
-            "lambda^2",
-            0.001,
-            20.0,
-            0.0,
-            "0.001 to 20: from a taut, nearly upright bar to a slack stay well below the first "
-            "crossing at 4 pi^2.",
-            spread="logarithmic",
-        )
-        return (size,)
 
     def applied(
         self,

@@ -12,14 +12,3 @@ from shm.models.hanger.physical import (
     Zone,
 )
 from shm.models.hanger.solution import solve
-
-__all__ = [
-    "HangerModes",
-    "LateralSpring",
-    "ModeLaw",
-    "PhysicalHanger",
-    "PointMass",
-    "SupportMode",
-    "Zone",
-    "solve",
-]

@@ -1,19 +1,23 @@
-"""Modes of the general hanger model, what sensors see of them, and how joints and springs damp
-them.
+"""Modes of the general hanger model, of one plane each though planes may be coupled; what sensors
+see of them, and how joints and springs damp them.
+
+The eigenvalues are mu = 1/omega^2 of A = L^-1 M L^-T with K = L L^T: the stiffness is factorised,
+not the mass, so that springs from soft to rigid do no harm and the lowest modes, which have the
+largest mu, come out best. Where supports let a hanger go, or it is in compression, K + shift M
+takes the place of K.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.models.hanger.bar import Bar, along, bar_of, by_plane
+from shm.models.hanger.bar import Bar, along, bar_of, by_plane, stiffness_ratio
 from shm.models.hanger.functions import SLOPES
-from shm.models.hanger.motion import Motion, motion
 from shm.models.hanger.physical import HangerModes, LateralSpring, PhysicalHanger, SupportMode
-from shm.models.hanger.system import System, are_coupled, rotational_n_m_rad, system
-from shm.values import PLANES, FloatArray
+from shm.models.hanger.system import Swing, System, are_coupled, rotational_n_m_rad, system
+from shm.values import PLANES, BoolArray, FloatArray, IntArray
 
 _PLANES = len(PLANES)
 
@@ -174,3 +178,222 @@ def damping_ratios(
         stiff = (spring.stiffness_n_m * spring.loss_factor[:, None])[:, None, :, None]
         lost += (stiff * moved**2).sum(axis=2)
     return np.asarray(lost / (2 * energy))
+
+
+_FREE_SHIFT = 1.0
+_SEARCHED = 4  # technical: times as many modes hold those of both planes, however they alternate
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """`omega_rad_s` (n, planes, modes); `vectors` (n, planes, axes, functions kept, modes) of unit
+    modal mass m L^3, None unless asked for. With coupled planes a mode moves along both axes."""
+
+    omega_rad_s: FloatArray
+    vectors: FloatArray | None
+
+
+def motion(physical: PhysicalHanger, parts: System, modes: int, with_vectors: bool) -> Motion:
+    """The first `modes` modes of each plane."""
+    if are_coupled(physical):
+        return _coupled(physical, parts, modes)
+    rows, planes, unknowns = parts.stiffness.shape[:3]
+    mass = np.broadcast_to(parts.mass, parts.stiffness.shape).reshape(-1, unknowns, unknowns)
+    stiffness = parts.stiffness.reshape(mass.shape)
+    supported = any(np.any(swing.mass) for swing in parts.swings)
+    found = spectrum(stiffness, mass, _shift(physical).ravel(), with_vectors or supported)
+    axes = None if found.vectors is None else found.vectors[:, None]
+    whole = _motions_as_a_whole(physical).ravel()
+    found = _without_supports(found, axes, parts.swings, whole).first(modes)
+    omega = np.sqrt(found.omega_squared).reshape(rows, planes, modes) * _unit(physical)[..., None]
+    if not with_vectors or found.vectors is None:
+        return Motion(omega, None)
+    own = found.vectors.reshape(rows, planes, unknowns, modes)[:, :, : len(parts.kept)]
+    vectors = np.zeros((rows, planes, *own.shape[1:]))
+    for plane in range(planes):
+        vectors[:, plane, plane] = own[:, plane]
+    return Motion(omega, vectors)
+
+
+def _coupled(physical: PhysicalHanger, parts: System, modes: int) -> Motion:
+    """Both planes as one system, in the units of the transverse plane."""
+    rows, _, unknowns = parts.stiffness.shape[:3]
+    bending = physical.bending_stiffness_n_m2
+    stiffness = np.zeros((rows, 2, unknowns, 2, unknowns))
+    mass = np.zeros_like(stiffness)
+    parts_mass = np.broadcast_to(parts.mass, parts.stiffness.shape)
+    for plane in range(2):
+        ratio = (bending[:, plane] / bending[:, 0])[:, None, None]
+        stiffness[:, plane, :, plane] = parts.stiffness[:, plane] * ratio
+        mass[:, plane, :, plane] = parts_mass[:, plane]
+    cross = rotational_n_m_rad(physical)[..., 0, 1] / (bending[:, 0] / physical.length_m)[:, None]
+    for end, slope in enumerate(SLOPES):
+        at = parts.unknown(slope)
+        if at is not None:
+            stiffness[:, 0, at, 1, at] = stiffness[:, 1, at, 0, at] = cross[:, end]
+    square = (rows, 2 * unknowns, 2 * unknowns)
+    shift = _shift(physical).max(axis=1)
+    found = spectrum(stiffness.reshape(square), mass.reshape(square), shift, True)
+    assert found.vectors is not None
+    axes = found.vectors.reshape(rows, 2, unknowns, -1)
+    whole = _motions_as_a_whole(physical).sum(axis=1)
+    found = _without_supports(found, axes, parts.swings, whole)
+    found = found.first(_SEARCHED * modes)
+    axes = _axes(found, unknowns)
+    share = np.einsum("num,nuv,nvm->nm", axes[:, 0], parts_mass[:, 0], axes[:, 0], optimize=True)
+    mine = [found.taken(order) for order in families(share, modes)]
+    omega = np.stack([np.sqrt(each.omega_squared) for each in mine], axis=1)
+    vectors = np.stack([_axes(each, unknowns)[:, :, : len(parts.kept)] for each in mine], axis=1)
+    return Motion(omega * _unit(physical)[:, :1, None], vectors)
+
+
+def _axes(found: Spectrum, unknowns: int) -> FloatArray:
+    """(rows, axes, unknowns, modes)."""
+    assert found.vectors is not None
+    return found.vectors.reshape(len(found.vectors), -1, unknowns, found.vectors.shape[-1])
+
+
+def _unit(physical: PhysicalHanger) -> FloatArray:
+    """sqrt(EI/(m L^4)) (n, planes)."""
+    inertia = physical.mass_per_length_kg_m * physical.length_m**4
+    return np.asarray(np.sqrt(physical.bending_stiffness_n_m2 / inertia[:, None]))
+
+
+def _is_free(physical: PhysicalHanger) -> bool:
+    return bool(np.any(np.isinf(physical.translational_compliance_m_n)))
+
+
+def _motions_as_a_whole(physical: PhysicalHanger) -> IntArray:
+    """In how many ways the ends let the bar move without bending it, (n, planes).
+
+    Sideways where both are free. It turns where one of them is, or both, nothing resists the ends'
+    turning and no tension pulls it straight.
+    """
+    free = np.isinf(physical.translational_compliance_m_n).sum(axis=1)
+    loose = np.isinf(np.einsum("nepp->nep", physical.rotational_compliance_rad_n_m)).all(axis=1)
+    turns = (free > 0) & loose & (physical.tension_n == 0)[:, None]
+    return np.asarray((free == 2) * 1 + turns)
+
+
+def _shift(physical: PhysicalHanger) -> FloatArray:
+    """What makes the stiffness definite (n, planes): k^4 - P k^2 + shift > 0 for compression P."""
+    squeezed = np.maximum(-stiffness_ratio(physical), 0.0)
+    return np.asarray(0.3 * squeezed**2 + (_FREE_SHIFT if _is_free(physical) else 0.0))
+
+
+def _without_supports(
+    found: Spectrum, axes: FloatArray | None, swings: tuple[Swing, ...], whole: IntArray
+) -> Spectrum:
+    """Without the `whole` (rows,) motions of a free bar as a whole and the supports' own modes.
+
+    `axes` (rows, axes, unknowns, modes) are the vectors.
+    """
+    out = np.arange(found.omega_squared.shape[1]) < whole[:, None]
+    if axes is not None:
+        for swing in swings:
+            mass = swing.mass.reshape(*axes.shape[:2], 1)
+            out = _largest_out(out, mass * swing.deflection(axes) ** 2)
+    return found.without(out) if out.any() else found
+
+
+def _largest_out(out: BoolArray, share: FloatArray) -> BoolArray:
+    """Leaves out the mode with the largest share (rows, axes, modes) of each axis that has any."""
+    for axis in range(share.shape[1]):
+        left = np.where(out, -1.0, share[:, axis])
+        worst = np.argmax(left, axis=1)
+        rows = np.flatnonzero(share[:, axis].any(axis=1))
+        out = out.copy()
+        out[rows, worst[rows]] = True
+    return out
+
+
+_UNDECIDED = 0.15  # share of the energy of a direction within 9 degrees of 45
+
+
+def families(transverse_share: FloatArray, modes: int) -> tuple[IntArray, IntArray]:
+    """Indices (n, modes) of the transverse and of the longitudinal modes, each ascending.
+
+    `transverse_share` (n, all modes, ascending) of the kinetic energy. A mode belongs to the plane
+    that holds more than half. Near principal axes at 45 degrees a pair of neighbours would fall to
+    one plane by chance: of two undecided neighbours each plane gets one.
+    """
+    transverse = transverse_share > 0.5
+    undecided = np.abs(transverse_share - 0.5) < _UNDECIDED
+    paired = np.zeros(len(transverse_share), dtype=bool)
+    for index in range(transverse.shape[1] - 1):
+        pair = undecided[:, index] & undecided[:, index + 1] & ~paired
+        first = transverse_share[:, index] >= transverse_share[:, index + 1]
+        transverse[pair, index] = first[pair]
+        transverse[pair, index + 1] = ~first[pair]
+        paired = pair
+    return _first(transverse, modes), _first(~transverse, modes)
+
+
+def _first(mine: np.ndarray, modes: int) -> IntArray:
+    return np.argsort(~mine, axis=1, kind="stable")[:, :modes]
+
+
+_LEAST = 1e-6
+"""What omega^2 is taken for where a bar buckles."""
+
+_ROUNDING = 1e-15
+"""Smaller mu than this share of the largest one are noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Modes of (rows) systems, lowest first: `omega_squared` (rows, modes), inf for those left out.
+
+    `vectors` (rows, unknowns, modes) have unit modal mass; None unless asked for.
+    """
+
+    omega_squared: FloatArray
+    vectors: FloatArray | None
+
+    def without(self, left_out: BoolArray) -> Spectrum:
+        """The modes `left_out` (rows, modes) become the last ones."""
+        squared = np.where(left_out, np.inf, self.omega_squared)
+        order = np.argsort(squared, axis=1, kind="stable")
+        return Spectrum(np.take_along_axis(squared, order, axis=1), self._vectors(order))
+
+    def taken(self, order: IntArray) -> Spectrum:
+        """The modes `order` (rows, fewer modes)."""
+        return Spectrum(np.take_along_axis(self.omega_squared, order, axis=1), self._vectors(order))
+
+    def first(self, modes: int) -> Spectrum:
+        vectors = None if self.vectors is None else self.vectors[:, :, :modes]
+        return Spectrum(self.omega_squared[:, :modes], vectors)
+
+    def _vectors(self, order: IntArray) -> FloatArray | None:
+        if self.vectors is None:
+            return None
+        return np.take_along_axis(self.vectors, order[:, None], axis=2)
+
+
+def spectrum(
+    stiffness: FloatArray, mass: FloatArray, shift: FloatArray, with_vectors: bool
+) -> Spectrum:
+    """All modes of systems (rows, unknowns, unknowns).
+
+    `shift` (rows,) makes K + shift M definite.
+    """
+    held = stiffness + shift[:, None, None] * mass if np.any(shift) else stiffness
+    inverse = np.linalg.inv(np.linalg.cholesky(held))
+    transposed = inverse.transpose(0, 2, 1)
+    reduced = inverse @ mass @ transposed
+    if not with_vectors:
+        lone = np.asarray(np.linalg.eigvalsh(reduced)[:, ::-1], dtype=float)
+        return Spectrum(_omega_squared(lone, shift), None)
+    rising, vectors = np.linalg.eigh(reduced)
+    mu = rising[:, ::-1]
+    unit = vectors[:, :, ::-1] / np.sqrt(_resolved(mu))[:, None]
+    return Spectrum(_omega_squared(mu, shift), transposed @ unit)
+
+
+def _omega_squared(mu: FloatArray, shift: FloatArray) -> FloatArray:
+    return np.asarray(np.maximum(1 / _resolved(mu) - shift[:, None], _LEAST))
+
+
+def _resolved(mu: FloatArray) -> FloatArray:
+    """Of falling mu (rows, modes): what rounding leaves of a motion without mass is none."""
+    return np.maximum(mu, _ROUNDING * mu[:, :1])

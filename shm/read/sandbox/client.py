@@ -18,14 +18,13 @@ import numpy as np
 from shm.errors import BadInput
 from shm.modes_document import parse_modes
 from shm.read.assemble import LARGEST
-from shm.read.base import Peek
+from shm.read.base import Layout, Peek, Survey
 from shm.read.bundles import holds_test
 from shm.read.content import is_gzipped
 from shm.read.limits import Limits
 from shm.read.modal_sets import ForeignModes
 from shm.read.sandbox.protocol import Answer, Refused, refusal_of, value_of
 from shm.read.sandbox.reading_process import Request, ask
-from shm.read.survey import Layout, Survey
 from shm.values import Channel, FloatArray, FrequencyResponse, ModalTest, Recording
 
 T = TypeVar("T")
@@ -53,7 +52,7 @@ def peek_test(path: Path, limits: Limits | None = None) -> tuple[Peek, ...]:
 
 
 def survey(path: Path, limits: Limits | None = None) -> Survey:
-    """What a file holds, as `shm.read.survey.survey` finds it; raises BadInput."""
+    """What a file holds, as `shm.read.base.survey` finds it; raises BadInput."""
     known = limits or Limits()
     answer = _answer("survey", path, known)
     with _believed(path):

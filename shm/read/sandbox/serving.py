@@ -25,12 +25,11 @@ from shm.modes_document import modes_document
 from shm.read.content import unpacking_in
 from shm.read.limits import Limits, limited, limits, too_large
 from shm.read.modal_sets import foreign_modes
-from shm.read.registry import libraries_for, load_modes, peek_test, read_test
+from shm.read.registry import layout_of, libraries_for, load_modes, peek_test, read_test, survey
 from shm.read.sandbox.confinement import Confinement, confine, pythons_own
 from shm.read.sandbox.protocol import BEGUN, LARGEST_HEADER, encoded, refusal_as_value
 from shm.read.sandbox.reading_process import ARRAYS_AT_ONCE, WALL_SECONDS
 from shm.read.sidecar import sidecar_path
-from shm.read.surveying import layout_of, survey
 
 _LARGEST_REQUEST = 1 << 16  # three paths of PATH_MAX, 4096 bytes, thrice as long in JSON
 

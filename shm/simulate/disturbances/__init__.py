@@ -6,16 +6,19 @@ A disturbance is one function and one line of `DISTURBANCES`.
 from __future__ import annotations
 
 from shm.simulate.disturbances.base import Channels, Disturbance, Lines, Motion, Planted
-from shm.simulate.disturbances.hitting import (
+from shm.simulate.disturbances.recording import (
+    cable,
+    clipping,
     cut_off,
     double_hit,
+    drop_out,
     no_pre_trigger,
     noise_only,
     outlier_hit,
+    overload,
     soft_hit,
 )
 from shm.simulate.disturbances.spurious_vibration import deck, harmonic, machine, mains
-from shm.simulate.disturbances.wiring import cable, clipping, drop_out, overload
 
 __all__ = ["DISTURBANCES", "Channels", "Disturbance", "Lines", "Motion", "Planted"]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from shm.errors import UsageError
 from shm.simulate.bar.description import Bar
-from shm.simulate.effects import along, conditions, ends
+from shm.simulate.effects import catalogue_laws as laws
 from shm.simulate.effects.alternative_laws import LAWS
 from shm.simulate.effects.base import (
     Plantable,
@@ -46,33 +46,27 @@ _ONE_END_AND_PLANE = tuple(
 _EVERYWHERE = ("everywhere",)
 _ONE_PLANE = tuple(f"everywhere{plane}" for plane in _BY_PLANE)
 _ALL = (
-    Plantable("rotational_end_flexibility", _AT_ENDS_BY_PLANE, ends.turning_ranges, ends.turning),
-    Plantable("translational_end_flexibility", _AT_ENDS_BY_PLANE, ends.moving_ranges, ends.moving),
-    Plantable("effective_length", _AT_ENDS, ends.length_ranges, ends.length),
-    Plantable(
-        "bending_stiffness", _EVERYWHERE, along.stiffness_ranges, along.stiffness, _ONE_PLANE
-    ),
-    Plantable("distributed_mass", _EVERYWHERE, along.heaviness_ranges, along.heaviness),
-    Plantable("point_mass", _EVERYWHERE, along.clamp_ranges, along.clamp),
-    Plantable("section_loss", _EVERYWHERE, along.loss_ranges, along.loss),
-    Plantable("stiff_end_zones", _AT_ENDS_BY_PLANE, ends.zone_ranges, ends.zone),
-    Plantable("shear_and_rotary_inertia", _EVERYWHERE, along.shear_ranges, along.shear),
-    Plantable("sag", _ONE_PLANE, along.sag_ranges, along.sag),
-    Plantable("intermediate_support", _EVERYWHERE + _ONE_PLANE, along.brace_ranges, along.brace),
-    Plantable("support_motion", _ONE_END_AND_PLANE, ends.support_ranges, ends.support),
-    Plantable("temperature_tension", _EVERYWHERE, conditions.warmth_ranges, conditions.warmth),
-    Plantable(
-        "geometric_hardening", _EVERYWHERE, conditions.hardening_ranges, conditions.hardening
-    ),
-    Plantable("joint_softening", _AT_ENDS, ends.joint_ranges, ends.joint),
-    Plantable("sensor_mass", ("all sensors",), conditions.sensor_ranges, conditions.sensor),
-    Plantable(
-        "sensor_misalignment", ("all sensors", "sensor"), conditions.turn_ranges, conditions.turn
-    ),
-    Plantable("skewed_principal_axes", _AT_ENDS, ends.skew_ranges, ends.skew),
-    Plantable("timebase", ("all tests", "test"), conditions.clock_ranges, conditions.clock),
-    Plantable("section_size", _EVERYWHERE, along.size_ranges, along.size),
-    Plantable("partial_mass", _EVERYWHERE, along.coat_ranges, along.coat),
+    Plantable("rotational_end_flexibility", _AT_ENDS_BY_PLANE, laws.turning_ranges, laws.turning),
+    Plantable("translational_end_flexibility", _AT_ENDS_BY_PLANE, laws.moving_ranges, laws.moving),
+    Plantable("effective_length", _AT_ENDS, laws.length_ranges, laws.length),
+    Plantable("bending_stiffness", _EVERYWHERE, laws.stiffness_ranges, laws.stiffness, _ONE_PLANE),
+    Plantable("distributed_mass", _EVERYWHERE, laws.heaviness_ranges, laws.heaviness),
+    Plantable("point_mass", _EVERYWHERE, laws.clamp_ranges, laws.clamp),
+    Plantable("section_loss", _EVERYWHERE, laws.loss_ranges, laws.loss),
+    Plantable("stiff_end_zones", _AT_ENDS_BY_PLANE, laws.zone_ranges, laws.zone),
+    Plantable("shear_and_rotary_inertia", _EVERYWHERE, laws.shear_ranges, laws.shear),
+    Plantable("sag", _ONE_PLANE, laws.sag_ranges, laws.sag),
+    Plantable("intermediate_support", _EVERYWHERE + _ONE_PLANE, laws.brace_ranges, laws.brace),
+    Plantable("support_motion", _ONE_END_AND_PLANE, laws.support_ranges, laws.support),
+    Plantable("temperature_tension", _EVERYWHERE, laws.warmth_ranges, laws.warmth),
+    Plantable("geometric_hardening", _EVERYWHERE, laws.hardening_ranges, laws.hardening),
+    Plantable("joint_softening", _AT_ENDS, laws.joint_ranges, laws.joint),
+    Plantable("sensor_mass", ("all sensors",), laws.sensor_ranges, laws.sensor),
+    Plantable("sensor_misalignment", ("all sensors", "sensor"), laws.turn_ranges, laws.turn),
+    Plantable("skewed_principal_axes", _AT_ENDS, laws.skew_ranges, laws.skew),
+    Plantable("timebase", ("all tests", "test"), laws.clock_ranges, laws.clock),
+    Plantable("section_size", _EVERYWHERE, laws.size_ranges, laws.size),
+    Plantable("partial_mass", _EVERYWHERE, laws.coat_ranges, laws.coat),
 )
 PLANTED = {each.name: each for each in _ALL}
 
@@ -100,7 +94,7 @@ def planted(
         bar = (law or _known(effect.name).apply)(bar, effect.values, own)
     if conditions.added_mass is not None:
         known = {"mass_kg": conditions.added_mass.mass_kg, "x_m": conditions.added_mass.x_m}
-        bar = along.clamp(bar, known, scene)
+        bar = laws.clamp(bar, known, scene)
     return bar
 
 

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from shm.simulate.bar.description import Bar, Mass, PartTime, Profile, Ringing
-from shm.simulate.effects import along, ends
-from shm.simulate.effects.along import in_planes
+from shm.simulate.effects import catalogue_laws as laws
 from shm.simulate.effects.base import Scene
+from shm.simulate.effects.catalogue_laws import in_planes
 from shm.values import FloatArray
 
 Values = Mapping[str, float]
@@ -103,7 +103,7 @@ def joint(bar: Bar, values: Values, scene: Scene) -> Bar:
     At the reference level it is what is stated.
     """
     slipping = replace(scene.conditions, amplitude=scene.conditions.amplitude**_SLIP)
-    return ends.joint(bar, values, replace(scene, conditions=slipping))
+    return laws.joint(bar, values, replace(scene, conditions=slipping))
 
 
 def hardening(bar: Bar, values: Values, scene: Scene) -> Bar:
@@ -126,7 +126,7 @@ def support(bar: Bar, values: Values, scene: Scene) -> Bar:
     mass = values["support_mass_kg"]
     if math.isinf(mass):
         return bar
-    bar = ends.support(bar, values, scene)
+    bar = laws.support(bar, values, scene)
     heavier, faster = _SECOND_MODE
     second = heavier * mass
     spring = second * (2 * math.pi * faster * values["support_frequency_hz"]) ** 2
@@ -145,7 +145,7 @@ def sag(bar: Bar, values: Values, scene: Scene) -> Bar:
     H. M. Irvine, Cable Structures (1981), 2.4 and 3.3: the stretch is the integral of y'' w, y the
     shape at rest. The parameter is the string's that stretches as much when moved by that shape.
     """
-    return replace(along.sag(bar, values, scene), sags_as_it_bends=True)
+    return replace(laws.sag(bar, values, scene), sags_as_it_bends=True)
 
 
 LAWS: dict[str, Callable[[Bar, Values, Scene], Bar]] = {
