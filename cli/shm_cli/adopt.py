@@ -12,22 +12,12 @@ from shm.pipeline.adopting import Wish, gap_watch
 from shm.pipeline.adopting import adopt as adopt_in_store
 from shm.report.formatting import model_class
 from shm.store import Store, StoredAdoption
-from shm_cli import completion
-from shm_cli.common import (
-    hanger_option,
-    json_option,
-    opened_store,
-    progress_bar,
-    show,
-    show_table,
-    table,
-    who_option,
-    why_option,
-)
+from shm_cli import completion, flags
+from shm_cli.common import opened_store, progress_bar, show, show_table, table
 
 
 @click.command()
-@hanger_option(required=True)
+@flags.hanger(required=True)
 @click.option(
     "--effect",
     "effects",
@@ -44,9 +34,9 @@ from shm_cli.common import (
     shell_complete=completion.models,
     help="A model class.",
 )
-@why_option
-@who_option
-@json_option
+@flags.why
+@flags.who
+@flags.json
 @click.pass_context
 def adopt(
     ctx: click.Context,
@@ -81,9 +71,9 @@ def adopt(
 
 
 @click.command()
-@hanger_option()
+@flags.hanger()
 @click.option("--all", "undone", is_flag=True, help="Those that were dropped too.")
-@json_option
+@flags.json
 @click.pass_context
 def adopted(ctx: click.Context, hanger_id: int | None, undone: bool, as_json: bool) -> None:
     """What was adopted, and what became of its gap.
@@ -113,11 +103,11 @@ def adopted(ctx: click.Context, hanger_id: int | None, undone: bool, as_json: bo
 
 
 @click.command()
-@hanger_option(required=True)
+@flags.hanger(required=True)
 @click.option("--number", type=int, show_default="the only one in force", help="Which adoption.")
-@why_option
-@who_option
-@json_option
+@flags.why
+@flags.who
+@flags.json
 @click.pass_context
 def drop(
     ctx: click.Context,

@@ -20,28 +20,17 @@ from shm.pipeline.telling import quiet_until
 from shm.store import DeliveryState, StoredAlert
 from shm.store.stored_alerts import silenced_until
 from shm.values import Alert
-from shm_cli import completion
-from shm_cli.common import (
-    hanger_option,
-    json_option,
-    open_workspace,
-    opened_store,
-    paragraph,
-    show,
-    show_table,
-    table,
-    who_option,
-)
-from shm_cli.parameter_types import Words
+from shm_cli import completion, flags
+from shm_cli.common import open_workspace, opened_store, paragraph, show, show_table, table
 from shm_cli.silences import silence, silences, unsilence
 
 
 @click.command("ack")
 @click.argument("alert_id", type=int, metavar="ID")
-@click.option("--why", type=Words(), required=True, help="What came of it, for the record.")
+@click.option("--why", type=flags.Words(), required=True, help="What came of it, for the record.")
 @click.option("--resolved", is_flag=True, help="Its cause is gone or explained: hooks hear of it.")
-@who_option
-@json_option
+@flags.who
+@flags.json
 @click.pass_context
 def acknowledge(
     ctx: click.Context, alert_id: int, why: str, resolved: bool, who: str, as_json: bool
@@ -88,8 +77,8 @@ if TYPE_CHECKING:
 
 
 @click.group(invoke_without_command=True)
-@hanger_option()
-@json_option
+@flags.hanger()
+@flags.json
 @click.pass_context
 def command(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
     """Alerts that were raised, and their deliveries.
@@ -103,7 +92,7 @@ def command(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
 
 @click.command()
 @click.argument("alert_id", type=int, metavar="ID")
-@json_option
+@flags.json
 @click.pass_context
 def resend(ctx: click.Context, alert_id: int, as_json: bool) -> None:
     """Send an alert again to the hooks that it was given up by.
@@ -136,7 +125,7 @@ for _verb in (acknowledge, resend, silence, silences, unsilence):
     shell_complete=completion.hooks,
     help="A hook of bridge.toml.",
 )
-@json_option
+@flags.json
 @click.pass_context
 def test(ctx: click.Context, name: str, as_json: bool) -> None:
     """Send a hook a marked test alert, now.

@@ -22,7 +22,8 @@ from shm.store.retention import (
     removable,
     remove,
 )
-from shm_cli.common import json_option, opened_store, progress_bar, show
+from shm_cli import flags
+from shm_cli.common import opened_store, progress_bar, show
 
 _DAYS = click.IntRange(1, 36500)  # technical: a century, which dates can bear
 
@@ -42,7 +43,7 @@ def command() -> None:
     "--quarantine-days", type=_DAYS, metavar="N", help="Refused files younger than that stay."
 )
 @click.option("--dry-run", is_flag=True, help="Only say what would go.")
-@json_option
+@flags.json
 @click.pass_context
 def prune(
     ctx: click.Context,
@@ -76,7 +77,7 @@ def prune(
 
 @command.command("fetch")
 @click.argument("which", metavar="ID")
-@json_option
+@flags.json
 @click.pass_context
 def fetch_command(ctx: click.Context, which: str, as_json: bool) -> None:
     """Bring the raw file of a recording (by number) or test (by name) back from its copy.

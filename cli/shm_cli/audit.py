@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import rich_click as click
 
-from shm_cli.common import json_option, opened_store, show, show_table, table
+from shm_cli import flags
+from shm_cli.common import opened_store, show, show_table, table
 
 
 @click.command()
 @click.option("--limit", type=click.IntRange(min=1), help="So many of the newest.")
-@json_option
+@flags.json
 @click.pass_context
 def command(ctx: click.Context, limit: int | None, as_json: bool) -> None:
     """Who changed what, when and how: the newest first.

@@ -12,17 +12,15 @@ import rich_click as click
 
 from shm.blind.layout import Told, key_beside, read_trial
 from shm.errors import GateNotMet
-from shm_cli.common import counting_bar, json_option, readable_width, show, show_table, table
-from shm_cli.parameter_types import NewFile
+from shm_cli import flags
+from shm_cli.common import counting_bar, readable_width, show, show_table, table
 
 if TYPE_CHECKING:
     from shm.blind.making import MadeTrial
     from shm.blind.solving import SolvedRound
     from shm.values import TrialScore
 
-_trial_argument = click.argument(
-    "directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path)
-)
+_trial_argument = click.argument("directory", metavar="DIR", type=flags.FOLDER)
 # Technical: more processes than that are a mistake of typing.
 _jobs_option = click.option(
     "--jobs",
@@ -73,7 +71,7 @@ def blind() -> None:
     help="Cases hold modal tests, or recordings that are still to be identified, or half of each.",
 )
 @_jobs_option
-@json_option
+@flags.json
 def make(
     directory: Path,
     cases: int,
@@ -133,7 +131,7 @@ _PLANTED = {
     "catalogue. The key tells which; no process that diagnoses sees it.",
 )
 @_jobs_option
-@json_option
+@flags.json
 def solve(directory: Path, left_out: Path | None, jobs: int, as_json: bool) -> None:
     """Diagnose all cases of a trial, and seal the answers with their SHA-256.
 
@@ -194,13 +192,10 @@ def _say_solved(solved: SolvedRound, seal: Path) -> None:
     "--key", type=_key_type(), metavar="FILE", show_default="DIR.key.json", help="The trial's key."
 )
 @click.option(
-    "--html",
-    type=NewFile(),
-    metavar="FILE",
-    help="Write a page with all figures here.",
+    "--html", type=flags.NewFile(), metavar="FILE", help="Write a page with all figures here."
 )
 @click.option("--gate", is_flag=True, help="Exit code 6 where a mark is missed.")
-@json_option
+@flags.json
 def score(directory: Path, key: Path | None, html: Path | None, gate: bool, as_json: bool) -> None:
     """Open the key and say how good the answers are, with intervals.
 

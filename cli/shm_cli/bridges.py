@@ -6,11 +6,12 @@ import rich_click as click
 
 from shm.pipeline import utc_now
 from shm.values import printable
-from shm_cli.common import json_option, open_workspace, paragraph, show
+from shm_cli import flags
+from shm_cli.common import open_workspace, paragraph, show
 
 
 @click.command()
-@json_option
+@flags.json
 @click.pass_context
 def command(ctx: click.Context, as_json: bool) -> None:
     """How this bridge and the others of bridge.toml are, the worst first.

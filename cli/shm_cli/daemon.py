@@ -8,7 +8,8 @@ from pathlib import Path
 import rich_click as click
 
 from shm.errors import UsageError
-from shm_cli.common import log_file_option, open_workspace, tls_options
+from shm_cli import flags
+from shm_cli.common import open_workspace
 from shm_cli.units import print_unit, print_unit_option, serving_words
 
 
@@ -22,9 +23,9 @@ from shm_cli.units import print_unit, print_unit_option, serving_words
 @click.option(
     "--port", type=click.IntRange(1, 65535), default=8400, show_default=True, help="Its port."
 )
-@tls_options
+@flags.tls
 @click.option("--workers", type=click.IntRange(1, 64), help="Processes that identify and update.")
-@log_file_option
+@flags.log_file
 @print_unit_option
 @click.pass_context
 def command(

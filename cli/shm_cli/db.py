@@ -25,9 +25,9 @@ from shm.store.checking import (
 from shm.store.copying import TableContent
 from shm.store.missing import MissingRow
 from shm.store.retention import CopiedArchive, copy_archive
+from shm_cli import flags
 from shm_cli.common import (
     counting_bar,
-    json_option,
     open_workspace,
     paragraph,
     progress_bar,
@@ -36,13 +36,12 @@ from shm_cli.common import (
     table,
     waiting,
 )
-from shm_cli.parameter_types import Words
 from shm_cli.units import print_unit, print_unit_option
 
 _copies_option = click.option(
     "--archive",
     "copies",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=flags.FOLDER,
     metavar="DIR",
     help="A folder for copies of the raw files.",
 )
@@ -58,7 +57,7 @@ def command() -> None:
 
 
 @command.command()
-@json_option
+@flags.json
 @click.pass_context
 def upgrade(ctx: click.Context, as_json: bool) -> None:
     """Bring the store to the schema of this version; make its tables where a server has none.
@@ -89,11 +88,11 @@ def upgrade(ctx: click.Context, as_json: bool) -> None:
 @click.option(
     "--accept",
     "accepted",
-    type=Words(),
+    type=flags.Words(),
     metavar="WHY",
     help="The rows that are missing are gone for good: they are missed no more.",
 )
-@json_option
+@flags.json
 @click.pass_context
 def check(ctx: click.Context, with_archive: bool, accepted: str | None, as_json: bool) -> None:
     """Read all that the store holds, and say whether it is whole; exit code 5 where it is not.
@@ -148,7 +147,7 @@ def check(ctx: click.Context, with_archive: bool, accepted: str | None, as_json:
 @click.option(
     "--print-timer", "as_timer", is_flag=True, help="Only print a timer that begins it each night."
 )
-@json_option
+@flags.json
 @click.pass_context
 def backup(
     ctx: click.Context,
@@ -220,7 +219,7 @@ def _print_backup_unit(workspace: Path, target: Path, copies: Path | None, timer
     "--replace", is_flag=True, help="Even where the store holds something; that is kept beside."
 )
 @_copies_option
-@json_option
+@flags.json
 @click.pass_context
 def restore_command(
     ctx: click.Context, file: Path, replace: bool, copies: Path | None, as_json: bool
@@ -253,7 +252,7 @@ def restore_command(
 
 @command.command()
 @click.option("--to", "target", required=True, metavar="URL", help="A PostgreSQL URL, or a file.")
-@json_option
+@flags.json
 @click.pass_context
 def copy(ctx: click.Context, target: str, as_json: bool) -> None:
     """Copy the store into an empty one of either kind, and compare rows and checksums.

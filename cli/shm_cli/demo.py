@@ -38,7 +38,7 @@ from shm.simulate.monitored import Loss, MonitoringPlan, described_stream
 from shm.store import Stage, Store, StoredAlert, Workspace
 from shm.store.ring import ring_of
 from shm.values import Hanger, Posterior
-from shm_cli import thesis
+from shm_cli import flags, thesis
 from shm_cli.common import counting_bar
 from shm_cli.simulate_stream import arriving, send
 
@@ -253,7 +253,7 @@ _POLL_S = 0.3  # technical: a bar that moves
 @click.command()
 @click.option(
     "--folder",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=flags.FOLDER,
     default="shm-demo",
     show_default=True,
     help="Where to make the workspace; an older demo is replaced.",

@@ -14,7 +14,8 @@ from rich.text import Text
 
 from shm.errors import StoreError
 from shm.pipeline import utc_now
-from shm_cli.common import json_option, show
+from shm_cli import flags
+from shm_cli.common import show
 from shm_daemon.doctor import Finding, Level, examine
 
 _STYLES = {
@@ -27,7 +28,7 @@ _FAULT = 1
 
 
 @click.command()
-@json_option
+@flags.json
 @click.pass_context
 def command(ctx: click.Context, as_json: bool) -> int:
     """Whether all is well, and what to do where it is not.

@@ -27,9 +27,8 @@ from shm.report.states import NOTHING_WATCHED
 from shm.store import Baseline
 from shm.values import Drift
 from shm.watch.repair_check import EVENT_KINDS
+from shm_cli import flags
 from shm_cli.common import (
-    hanger_option,
-    json_option,
     opened_store,
     paragraph,
     progress_bar,
@@ -37,19 +36,16 @@ from shm_cli.common import (
     show_table,
     show_texts,
     table,
-    who_option,
-    why_option,
 )
-from shm_cli.parameter_types import NewFile
 
 _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
 
 
 @click.command("bridge")
-@json_option
+@flags.json
 @click.option(
     "--figure",
-    type=NewFile(),
+    type=flags.NewFile(),
     metavar="FILE.png",
     help="Write the elevation of the bridge, hangers coloured by their shift, as a picture.",
 )
@@ -81,7 +77,7 @@ def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
 
 
 @click.command()
-@hanger_option(required=True)
+@flags.hanger(required=True)
 @click.option(
     "--since",
     type=click.DateTime(_FORMATS),
@@ -94,9 +90,9 @@ def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
     type=click.Choice(list(EVENT_KINDS)),
     help="What was done: ends only the alerts that this explains.",
 )
-@why_option
-@who_option
-@json_option
+@flags.why
+@flags.who
+@flags.json
 @click.pass_context
 def rebaseline(
     ctx: click.Context,
@@ -166,9 +162,9 @@ if TYPE_CHECKING:
 
 
 @click.group(invoke_without_command=True)
-@hanger_option()
+@flags.hanger()
 @click.option("--all", "all_tests", is_flag=True, help="All tests, not each hanger's latest.")
-@json_option
+@flags.json
 @click.pass_context
 def command(ctx: click.Context, hanger_id: int | None, all_tests: bool, as_json: bool) -> None:
     """How far tension and stiffness have moved.

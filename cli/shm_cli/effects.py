@@ -16,8 +16,8 @@ from rich.markup import escape
 from shm.bridge import load_hanger
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey
 from shm.values import PLANES
-from shm_cli import completion, thesis
-from shm_cli.common import json_option, markdown, show, show_table, table
+from shm_cli import completion, flags, thesis
+from shm_cli.common import markdown, show, show_table, table
 
 _HANGER = replace(load_hanger(thesis.HANGER_FILE), plate=None)
 
@@ -70,7 +70,7 @@ think of then. What imitates what:
     type=click.Choice(list(EFFECTS)),
     shell_complete=completion.effects,
 )
-@json_option
+@flags.json
 def effects(name: str | None, as_json: bool) -> None:
     """The catalogue of effects: what each does, its ranges, what shows it, what imitates it.
 

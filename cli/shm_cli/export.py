@@ -9,12 +9,12 @@ import rich_click as click
 from shm import export
 from shm.errors import BadInput
 from shm.values import Hanger, ModalTest, Posterior
-from shm_cli.common import hanger_option, json_option, opened_store, show, waiting
-from shm_cli.parameter_types import NewFile
+from shm_cli import flags
+from shm_cli.common import opened_store, show, waiting
 
 
 @click.command()
-@hanger_option(required=True)
+@flags.hanger(required=True)
 @click.option("--test", metavar="ID", help="A test; the latest if left out.")
 @click.option(
     "--format",
@@ -27,11 +27,11 @@ from shm_cli.parameter_types import NewFile
 @click.option(
     "--out",
     required=True,
-    type=NewFile(),
+    type=flags.NewFile(),
     metavar="FILE.csv|.nc|.json|.npz",
     help="Where to write.",
 )
-@json_option
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context,

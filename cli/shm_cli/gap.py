@@ -26,28 +26,22 @@ from shm.report.figures.every_figure import bridge_diagnosis_figures, diagnosis_
 from shm.report.figures.specification import Illustration
 from shm.report.paper import Paper
 from shm.values import Diagnosis, Hanger, ModalTest
-from shm_cli import completion
+from shm_cli import completion, flags
 from shm_cli.adopt import adopt, adopted, drop
 from shm_cli.blind import blind
 from shm_cli.common import (
     advancing_bar,
     drawing,
-    figures_option,
-    hanger_file_option,
-    hanger_option,
-    json_option,
     latest_tests,
     one_hanger,
     opened_store,
     readable_width,
-    seed_option,
     show,
     tests_and_hanger,
     told_doubts,
 )
 from shm_cli.effects import effects
 from shm_cli.gap_plan import plan
-from shm_cli.parameter_types import NewFile
 
 _DEFAULT = GapOptions()
 
@@ -63,13 +57,10 @@ def command() -> None:
 
 @command.command()
 @click.argument(
-    "files",
-    metavar="[MODES.json] [H.toml MODES.json H.toml ...]",
-    nargs=-1,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    "files", metavar="[MODES.json] [H.toml MODES.json H.toml ...]", nargs=-1, type=flags.FILE
 )
-@hanger_option()
-@hanger_file_option
+@flags.hanger()
+@flags.hanger_file
 @click.option("--bridge", is_flag=True, help="All hangers of the workspace together.")
 @click.option(
     "--baseline",
@@ -102,21 +93,18 @@ def command() -> None:
     metavar="N",
     help="How many of the latest tests of a hanger of the workspace.",
 )
-@seed_option
+@flags.seed
 @click.option(
-    "--html",
-    type=NewFile(),
-    metavar="FILE",
-    help="Write a page with all figures here.",
+    "--html", type=flags.NewFile(), metavar="FILE", help="Write a page with all figures here."
 )
 @click.option(
     "--write-effect",
-    type=NewFile(),
+    type=flags.NewFile(),
     metavar="FILE.py",
     help="Write the law of something unknown here, as the module of a new effect.",
 )
-@figures_option
-@json_option
+@flags.figures
+@flags.json
 @click.pass_context
 def diagnose(
     ctx: click.Context,

@@ -16,17 +16,13 @@ from shm.gap import GapOptions
 from shm.gap.diagnose import examined
 from shm.gap.measurement_plan import PlannedMeasurement, Race, nothing_planned, planned
 from shm.values import Hanger, ModalTest
-from shm_cli import completion
+from shm_cli import completion, flags
 from shm_cli.common import (
     advancing_bar,
-    hanger_file_option,
-    hanger_option,
-    json_option,
     latest_tests,
     one_hanger,
     open_workspace,
     opened_store,
-    seed_option,
     show,
     show_table,
     table,
@@ -39,14 +35,9 @@ _HEADS = ("measurement", "hours", "in all", "promised log odds", "then", "probab
 
 
 @click.command()
-@click.argument(
-    "file",
-    metavar="[MODES.json]",
-    required=False,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-)
-@hanger_option()
-@hanger_file_option
+@click.argument("file", metavar="[MODES.json]", required=False, type=flags.FILE)
+@flags.hanger()
+@flags.hanger_file
 @click.option(
     "--budget",
     "budget_hours",
@@ -69,8 +60,8 @@ _HEADS = ("measurement", "hours", "in all", "promised log odds", "then", "probab
     shell_complete=completion.effects,
     help="Take an effect out of the catalogue; may be given again.",
 )
-@seed_option
-@json_option
+@flags.seed
+@flags.json
 @click.pass_context
 def plan(
     ctx: click.Context,

@@ -21,21 +21,17 @@ from shm.report.contents import ModalTestReport
 from shm.report.modal_test_report import modal_test_paper
 from shm.settings import Settings
 from shm.values import FrequencyResponse, Hanger, Recording
+from shm_cli import flags
 from shm_cli.common import (
     counting_bar,
     drawing,
-    figures_option,
-    hanger_file_option,
-    hanger_option,
     is_workspace,
-    json_option,
     one_hanger,
     open_workspace,
     readable_width,
     show,
     told_doubts,
 )
-from shm_cli.parameter_types import NewFile
 
 if TYPE_CHECKING:
     from shm.store import Workspace
@@ -44,13 +40,7 @@ _DEFAULT = Settings()
 
 
 @click.command()
-@click.argument(
-    "files",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE...",
-)
+@click.argument("files", nargs=-1, required=True, type=flags.FILE, metavar="FILE...")
 @click.option("--together", is_flag=True, help="The files are one test: hits, or set-ups.")
 @click.option(
     "--band",
@@ -115,20 +105,20 @@ _DEFAULT = Settings()
 )
 @click.option(
     "--out",
-    type=NewFile(),
+    type=flags.NewFile(),
     metavar="T.modes.json",
     help="Write the modal-tests document here.",
 )
 @click.option(
     "--html",
-    type=NewFile(),
+    type=flags.NewFile(),
     metavar="SHEET.html",
     help="Write a page with all figures here; one test only.",
 )
-@figures_option
-@hanger_option()
-@hanger_file_option
-@json_option
+@flags.figures
+@flags.hanger()
+@flags.hanger_file
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context,

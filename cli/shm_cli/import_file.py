@@ -42,9 +42,9 @@ from shm.read.modal_sets import ForeignModes, axes_of
 from shm.read.profiles import Profile
 from shm.read.sandbox import foreign_modes
 from shm.store import Workspace
-from shm_cli.common import json_option, open_workspace, show, show_table, table
+from shm_cli import flags
+from shm_cli.common import open_workspace, show, show_table, table
 from shm_cli.import_prompts import asked, asked_if_it_stays
-from shm_cli.parameter_types import Time
 from shm_daemon.spool import Landed, incoming
 
 
@@ -141,7 +141,7 @@ UFF_SUFFIXES = (".uff", ".unv", ".uf")
 
 
 @click.command()
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("file", type=flags.FILE)
 @click.option("--hanger", type=click.IntRange(min=0), metavar="N", help="The hanger tested.")
 @click.option(
     "--each-time", is_flag=True, help="The logger goes from hanger to hanger: ask each time."
@@ -158,10 +158,10 @@ UFF_SUFFIXES = (".uff", ".unv", ".uf")
 )
 @click.option("--leave-out", multiple=True, metavar="NAME", help="A column that is no channel.")
 @click.option("--rate", type=float, metavar="HZ", help="Samples a second, if the file says none.")
-@click.option("--time", type=Time(), help="When the test was, if the file does not say.")
+@click.option("--time", type=flags.Time(), help="When the test was, if the file does not say.")
 @click.option("--temperature", type=float, metavar="C", help="Degrees Celsius of the steel.")
 @click.option("--dry-run", is_flag=True, help="Only show what is understood; keep nothing.")
-@json_option
+@flags.json
 @click.pass_context
 def command(ctx: click.Context, /, file: Path, dry_run: bool, as_json: bool, **said: Any) -> int:
     """Take a logger's file in for the first time, asking only what it does not say.

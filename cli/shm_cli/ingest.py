@@ -33,7 +33,8 @@ from shm.store import (
 )
 from shm.store.archive import refuse_oversize
 from shm.values import Alert
-from shm_cli.common import json_option, open_workspace, show, show_table, table
+from shm_cli import flags
+from shm_cli.common import open_workspace, show, show_table, table
 from shm_cli.held import (
     decide,
     decided_words,
@@ -41,18 +42,12 @@ from shm_cli.held import (
     hold_document,
     show_held,
 )
-from shm_cli.parameter_types import Time, Words
 from shm_cli.reprocess import rerun_document, send_back
 from shm_cli.working import finish, working
 
 
 @click.command()
-@click.argument(
-    "files",
-    nargs=-1,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE...",
-)
+@click.argument("files", nargs=-1, type=flags.FILE, metavar="FILE...")
 @click.option(
     "--together", is_flag=True, help="The files are one test: hits, or set-ups; kept as one .zip."
 )
@@ -79,10 +74,10 @@ from shm_cli.working import finish, working
     metavar="ID",
     help="Instead of files: what is held, or counts already, is not to count.",
 )
-@click.option("--time", type=Time(), help="With --confirm: the true time of the test.")
-@click.option("--why", type=Words(), help="With --confirm or --discard: for the record.")
+@click.option("--time", type=flags.Time(), help="With --confirm: the true time of the test.")
+@click.option("--why", type=flags.Words(), help="With --confirm or --discard: for the record.")
 @click.option("--who", show_default="the user's name", help="With --confirm or --discard.")
-@json_option
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context,

@@ -9,20 +9,21 @@ from pathlib import Path
 import rich_click as click
 
 from shm.store import Workspace
-from shm_cli.common import json_option, show
+from shm_cli import flags
+from shm_cli.common import show
 
 
 @click.command()
-@click.argument("folder", required=False, type=click.Path(file_okay=False, path_type=Path))
+@click.argument("folder", required=False, type=flags.FOLDER)
 @click.option(
     "--from",
     "config",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=flags.FILE,
     metavar="BRIDGE.toml",
     help="Copy this description instead of the commented one.",
 )
 @click.option("--bridge", "name", metavar="NAME", help="Name of the bridge.")
-@json_option
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context, folder: Path | None, config: Path | None, name: str | None, as_json: bool

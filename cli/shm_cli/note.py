@@ -10,16 +10,8 @@ import rich_click as click
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.values.notes import NoteKind
-from shm_cli.common import (
-    hanger_option,
-    json_option,
-    opened_store,
-    show,
-    show_table,
-    table,
-    who_option,
-)
-from shm_cli.parameter_types import Time, Words
+from shm_cli import flags
+from shm_cli.common import opened_store, show, show_table, table
 
 
 @click.group()
@@ -32,8 +24,8 @@ def command() -> None:
 
 
 @command.command()
-@click.argument("text", type=Words())
-@hanger_option()
+@click.argument("text", type=flags.Words())
+@flags.hanger()
 @click.option("--bridge", "whole", is_flag=True, help="Of the whole bridge.")
 @click.option(
     "--kind",
@@ -42,15 +34,15 @@ def command() -> None:
     show_default=True,
     help="What it was.",
 )
-@click.option("--at", type=Time(), show_default="now", help="When it was seen or done.")
+@click.option("--at", type=flags.Time(), show_default="now", help="When it was seen or done.")
 @click.option(
     "--photo",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=flags.FILE,
     metavar="FILE",
     help="A JPEG or PNG of 5 MB at most; the picture alone is kept.",
 )
-@who_option
-@json_option
+@flags.who
+@flags.json
 @click.pass_context
 def add(
     ctx: click.Context,
@@ -83,8 +75,8 @@ def add(
 
 
 @command.command("list")
-@hanger_option()
-@json_option
+@flags.hanger()
+@flags.json
 @click.pass_context
 def list_notes(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
     """All notes, or those of a hanger and of the bridge; what was seen or done last comes first.

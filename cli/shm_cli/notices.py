@@ -9,7 +9,8 @@ from importlib import metadata
 
 import rich_click as click
 
-from shm_cli.common import json_option, show, show_table, table
+from shm_cli import flags
+from shm_cli.common import show, show_table, table
 
 _REQUIREMENT = re.compile(r"([\w.-]+)\s*(?:\[([^\]]*)\])?[^;]*;?(.*)")
 _ONLY_FOR = re.compile(r"""extra\s*==\s*['"]([\w.-]+)['"]""")
@@ -27,7 +28,7 @@ class Notice:
 
 
 @click.command()
-@json_option
+@flags.json
 def command(as_json: bool) -> None:
     """Other people's packages that work here, with the licence that each declares.
 

@@ -15,17 +15,8 @@ from shm.report.figures import prediction_figures
 from shm.report.figures.prediction_figures import Curves, specify
 from shm.report.figures.prediction_figures import write_curves_png as write_png
 from shm.values import PLANES, FloatArray
-from shm_cli import completion
-from shm_cli.common import (
-    hanger_file_option,
-    hanger_option,
-    json_option,
-    one_hanger,
-    progress_bar,
-    show,
-    show_table,
-    table,
-)
+from shm_cli import completion, flags
+from shm_cli.common import one_hanger, progress_bar, show, show_table, table
 
 _MOST_DRAWN = 20  # technical: a mesh of a second
 _MOST_POINTS = 10_000  # technical: a table that a person can still open, in seconds
@@ -47,9 +38,9 @@ _MOST_POINTS = 10_000  # technical: a table that a person can still open, in sec
     help="A mode of a solid class, drawn in space: transverse:2, say.",
 )
 @click.option("--modes", type=click.IntRange(1, 100), default=6, show_default=True)
-@hanger_option()
-@hanger_file_option
-@json_option
+@flags.hanger()
+@flags.hanger_file
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context,

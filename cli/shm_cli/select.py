@@ -15,18 +15,10 @@ from shm.models import applicable, build, competing_names
 from shm.settings import load_settings
 from shm.values import Limits, Selection
 from shm.values.rounding import force_unit
-from shm_cli import completion
+from shm_cli import completion, flags
 from shm_cli.common import (
-    hanger_file_option,
-    hanger_option,
-    json_option,
-    method_option,
     opened_store,
-    priors_option,
     progress_bar,
-    repeat_option,
-    samples_option,
-    seed_option,
     show,
     show_table,
     table,
@@ -65,15 +57,15 @@ from shm_cli.update import (
     show_default=True,
     help="One model error of all modes, or one of each plane or mode; with --priors thesis.",
 )
-@hanger_option()
-@hanger_file_option
-@seed_option
-@samples_option
-@repeat_option
-@method_option
-@priors_option
+@flags.hanger()
+@flags.hanger_file
+@flags.seed
+@flags.samples
+@flags.repeat
+@flags.method
+@flags.priors
 @calibrated_by_option
-@json_option
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context,

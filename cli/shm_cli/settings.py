@@ -5,13 +5,14 @@ from __future__ import annotations
 import rich_click as click
 
 from shm.settings import TABLE, Setting
-from shm_cli.common import json_option, markdown, show, show_table, table
+from shm_cli import flags
+from shm_cli.common import markdown, show, show_table, table
 
 _HEADS = ("setting", "default", "unit", "range", "meaning")
 
 
 @click.command()
-@json_option
+@flags.json
 def command(as_json: bool) -> None:
     """Every setting: its default, its range, what it means.
 

@@ -10,27 +10,19 @@ from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Silence
 from shm.store.stored_alerts import hangers_of
-from shm_cli.common import (
-    hanger_option,
-    json_option,
-    opened_store,
-    show,
-    show_table,
-    table,
-    who_option,
-)
-from shm_cli.parameter_types import Time, Words
+from shm_cli import flags
+from shm_cli.common import opened_store, show, show_table, table
 
 
 @click.command()
-@hanger_option()
+@flags.hanger()
 @click.option("--bridge", "whole", is_flag=True, help="All hangers.")
-@click.option("--from", "since", type=Time(), show_default="now", help="When it begins.")
-@click.option("--until", type=Time(), required=True, help="When it ends, as 2026-12-01.")
+@click.option("--from", "since", type=flags.Time(), show_default="now", help="When it begins.")
+@click.option("--until", type=flags.Time(), required=True, help="When it ends, as 2026-12-01.")
 @click.option("--maintenance", is_flag=True, help="Planned works: tests of then are not watched.")
-@click.option("--why", type=Words(), required=True, help="For the record.")
-@who_option
-@json_option
+@click.option("--why", type=flags.Words(), required=True, help="For the record.")
+@flags.who
+@flags.json
 @click.pass_context
 def silence(
     ctx: click.Context,
@@ -79,7 +71,7 @@ def silence(
 
 
 @click.command()
-@json_option
+@flags.json
 @click.pass_context
 def silences(ctx: click.Context, as_json: bool) -> None:
     """Silences and maintenance windows, with who made them and why.
@@ -112,8 +104,8 @@ def silences(ctx: click.Context, as_json: bool) -> None:
 
 @click.command()
 @click.argument("silence_id", type=int, metavar="ID")
-@who_option
-@json_option
+@flags.who
+@flags.json
 @click.pass_context
 def unsilence(ctx: click.Context, silence_id: int, who: str, as_json: bool) -> None:
     """End a silence now, on the record.

@@ -26,16 +26,8 @@ from shm.simulate import (
     spread_places_m,
 )
 from shm.values import Hanger, Recording
-from shm_cli.common import (
-    counting_bar,
-    hanger_file_option,
-    hanger_option,
-    json_option,
-    one_hanger,
-    open_workspace,
-    seed_option,
-    show,
-)
+from shm_cli import flags
+from shm_cli.common import counting_bar, one_hanger, open_workspace, show
 from shm_cli.planting import LACKS, conditions_of, effect_of, mass_of, write_campaign
 from shm_cli.simulate_stream import Live, simulate_streams
 
@@ -74,8 +66,8 @@ class Chosen(TypedDict):
 
 
 @click.command()
-@hanger_option()
-@hanger_file_option
+@flags.hanger()
+@flags.hanger_file
 @click.option("--tension-n", type=float, help="Planted tension; the nominal one if left out.")
 @click.option("--k1", type=float, default=math.inf, help=f"Transverse, deck end. {_SPRING}")
 @click.option("--k2", type=float, default=math.inf, help=f"Longitudinal, deck end. {_SPRING}")
@@ -177,13 +169,10 @@ class Chosen(TypedDict):
 @click.option("--first", type=click.DateTime(), help="Time of the first test; then weekly.")
 @click.option("--format", "form", type=click.Choice(_SUFFIXES), default="csv", show_default=True)
 @click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="DIR",
-    help="Where the files go; a stream needs none.",
+    "--out", type=flags.FOLDER, metavar="DIR", help="Where the files go; a stream needs none."
 )
-@seed_option
-@json_option
+@flags.seed
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context,

@@ -34,7 +34,8 @@ from shm.store import (
 from shm.store.checksums import of_readable
 from shm.store.stored_alerts import said_of
 from shm.watch.change_words import frequency_words
-from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
+from shm_cli import flags
+from shm_cli.common import opened_store, paragraph, show, show_table, table
 from shm_cli.held import hold_document
 from shm_cli.stages import show_stages
 from shm_daemon.heartbeat import seconds_since_beat, told
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
 @click.option(
     "--of", "which", metavar="ID", help="The stages of one recording (by number) or test (by name)."
 )
-@json_option
+@flags.json
 @click.pass_context
 def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
     """What the workspace holds and what waits.

@@ -24,17 +24,8 @@ from shm.store.ring import ring_of
 from shm.store.ring_recording import recording_of
 from shm.values import NAN
 from shm.watch.ambient_hammer import AmbientBias
-from shm_cli import completion
-from shm_cli.common import (
-    json_option,
-    open_workspace,
-    opened_store,
-    show,
-    show_table,
-    table,
-    why_option,
-)
-from shm_cli.parameter_types import NewFile, Time
+from shm_cli import completion, flags
+from shm_cli.common import open_workspace, opened_store, show, show_table, table
 from shm_daemon.heartbeat import told
 
 
@@ -65,8 +56,8 @@ class StreamRow:
     hammer_tests: int
 
 
-_from = click.argument("start", type=Time(), metavar="FROM")
-_to = click.argument("end", type=Time(), metavar="TO")
+_from = click.argument("start", type=flags.Time(), metavar="FROM")
+_to = click.argument("end", type=flags.Time(), metavar="TO")
 _name = click.argument("name", metavar="NAME", shell_complete=completion.streams)
 
 
@@ -79,7 +70,7 @@ _name = click.argument("name", metavar="NAME", shell_complete=completion.streams
     show_default=True,
     help="How far back --events looks.",
 )
-@json_option
+@flags.json
 @click.pass_context
 def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> None:
     """Permanent sensors: what is live, and what was lost.
@@ -113,8 +104,8 @@ def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> Non
 @_name
 @_from
 @_to
-@why_option
-@json_option
+@flags.why
+@flags.json
 @click.pass_context
 def keep(
     ctx: click.Context, name: str, start: datetime, end: datetime, why: str, as_json: bool
@@ -140,8 +131,8 @@ def keep(
 @_name
 @_from
 @_to
-@click.argument("file", type=NewFile(), metavar="FILE")
-@json_option
+@click.argument("file", type=flags.NewFile(), metavar="FILE")
+@flags.json
 @click.pass_context
 def export(
     ctx: click.Context, name: str, start: datetime, end: datetime, file: Path, as_json: bool

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import rich_click as click
 
-from shm_cli.common import json_option, opened_store, show, show_table, table
+from shm_cli import flags
+from shm_cli.common import opened_store, show, show_table, table
 
 
 @click.group()
@@ -25,7 +26,7 @@ def command() -> None:
     show_default=True,
     help="`write` may upload and acknowledge, and read.",
 )
-@json_option
+@flags.json
 @click.pass_context
 def create(ctx: click.Context, name: str, scope: str, as_json: bool) -> None:
     """Make a token and print it, this once.
@@ -49,7 +50,7 @@ def create(ctx: click.Context, name: str, scope: str, as_json: bool) -> None:
 
 
 @command.command("list")
-@json_option
+@flags.json
 @click.pass_context
 def list_tokens(ctx: click.Context, as_json: bool) -> None:
     """Tokens, when they were last used, and which are revoked.
@@ -75,7 +76,7 @@ def list_tokens(ctx: click.Context, as_json: bool) -> None:
 
 @command.command()
 @click.argument("name")
-@json_option
+@flags.json
 @click.pass_context
 def revoke(ctx: click.Context, name: str, as_json: bool) -> None:
     """End a token, at once.

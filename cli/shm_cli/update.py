@@ -19,18 +19,10 @@ from shm.pipeline.lineage import Taught
 from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior
 from shm.values.rounding import force_unit
 from shm.values.stated_tension import averaged_now, stated
-from shm_cli import completion
+from shm_cli import completion, flags
 from shm_cli.common import (
-    hanger_file_option,
-    hanger_option,
-    json_option,
-    method_option,
     paragraph,
-    priors_option,
     progress_bar,
-    repeat_option,
-    samples_option,
-    seed_option,
     show,
     show_table,
     table,
@@ -41,7 +33,7 @@ from shm_cli.common import (
 
 calibrated_by_option = click.option(
     "--calibrated-by",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=flags.FILE,
     metavar="MODES.json",
     help="Tests with a measured tension (tension_read_n) of this hanger, or of one of its family.",
 )
@@ -92,10 +84,7 @@ _POOR_FIT_PERCENT = 5.0
 """Model errors beyond it are blunders: clamped ends where springs are right cost some 2 %."""
 
 modes_argument = click.argument(
-    "modes_file",
-    metavar="[MODES.json]",
-    required=False,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    "modes_file", metavar="[MODES.json]", required=False, type=flags.FILE
 )
 
 
@@ -108,15 +97,15 @@ modes_argument = click.argument(
     shell_complete=completion.models,
     help="The model class.",
 )
-@hanger_option()
-@hanger_file_option
-@seed_option
-@samples_option
-@repeat_option
-@method_option
-@priors_option
+@flags.hanger()
+@flags.hanger_file
+@flags.seed
+@flags.samples
+@flags.repeat
+@flags.method
+@flags.priors
 @calibrated_by_option
-@json_option
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context,

@@ -6,7 +6,8 @@ import sys
 
 import rich_click as click
 
-from shm_cli.common import json_option, opened_store, show, show_table, table
+from shm_cli import flags
+from shm_cli.common import opened_store, show, show_table, table
 
 
 @click.group()
@@ -28,7 +29,7 @@ def command() -> None:
     help="An operator also uploads and acknowledges, an engineer also sets limits and users.",
 )
 @click.option("--single-sign-on", "vouched", is_flag=True, help="No password: by that alone.")
-@json_option
+@flags.json
 @click.pass_context
 def add(ctx: click.Context, name: str, role: str, vouched: bool, as_json: bool) -> None:
     """Let a person sign in. The password is asked for, or is a line of stdin.
@@ -45,7 +46,7 @@ def add(ctx: click.Context, name: str, role: str, vouched: bool, as_json: bool) 
 
 
 @command.command("list")
-@json_option
+@flags.json
 @click.pass_context
 def list_users(ctx: click.Context, as_json: bool) -> None:
     """Users, their roles, and which were removed.
@@ -70,7 +71,7 @@ def list_users(ctx: click.Context, as_json: bool) -> None:
 
 @command.command()
 @click.argument("name")
-@json_option
+@flags.json
 @click.pass_context
 def remove(ctx: click.Context, name: str, as_json: bool) -> None:
     """End a user, in all browsers at once; the last engineer only after another is made.
@@ -87,7 +88,7 @@ def remove(ctx: click.Context, name: str, as_json: bool) -> None:
 
 @command.command()
 @click.argument("name")
-@json_option
+@flags.json
 @click.pass_context
 def password(ctx: click.Context, name: str, as_json: bool) -> None:
     """Give a user a new password, asked for or a line of stdin; all browsers are signed out.

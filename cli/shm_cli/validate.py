@@ -11,8 +11,8 @@ import rich_click as click
 from shm.bridge import load_hanger
 from shm.errors import GateNotMet, UsageError
 from shm.values import Hanger
-from shm_cli import thesis
-from shm_cli.common import json_option, markdown, progress_bar, seed_option, show, show_table, table
+from shm_cli import flags, thesis
+from shm_cli.common import markdown, progress_bar, show, show_table, table
 from shm_cli.validation import formulas, frequencies, selection, solid_figures, thesis_figures
 from shm_cli.validation.thesis_figures import Figure
 
@@ -55,8 +55,8 @@ FIGURES: dict[str, Callable[[Hanger, Callable[[str, float], None], str], Figure]
     metavar="FILE.png",
     help="Draw the --figure here.",
 )
-@seed_option
-@json_option
+@flags.seed
+@flags.json
 def command(
     as_markdown: bool,
     figure: str | None,

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm_cli.common import log_file_option, open_workspace, tls_options
+from shm_cli import flags
+from shm_cli.common import open_workspace
 from shm_cli.units import print_unit, print_unit_option, serving_words
 
 
@@ -16,8 +17,8 @@ from shm_cli.units import print_unit, print_unit_option, serving_words
 @click.option(
     "--port", type=click.IntRange(1, 65535), default=8400, show_default=True, help="The port."
 )
-@tls_options
-@log_file_option
+@flags.tls
+@flags.log_file
 @print_unit_option
 @click.pass_context
 def command(
