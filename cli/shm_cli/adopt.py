@@ -13,7 +13,7 @@ from shm.pipeline.adopting import adopt as adopt_in_store
 from shm.report.formatting import model_class
 from shm.store import Store, StoredAdoption
 from shm_cli import completion, flags
-from shm_cli.common import opened_store, progress_bar, show, show_table, table
+from shm_cli.common import answer, opened_store, progress_bar, show, show_rows
 
 
 @click.command()
@@ -46,7 +46,6 @@ def adopt(
     baseline: str,
     why: str,
     who: str,
-    as_json: bool,
 ) -> None:
     """Make an effect part of a hanger's model class.
 
@@ -63,11 +62,8 @@ def adopt(
         with progress_bar("adopting") as progress:
             made = adopt_in_store(workspace, store, hanger, wish, utc_now(), progress)
         watch = gap_watch(store, hanger_id)
-    if as_json:
-        show(_document(made))
-        return
-    click.echo(f"Hanger {hanger_id} has the model class {made.adoption.model} from now on.")
-    click.echo(str(watch))
+    said = f"Hanger {hanger_id} has the model class {made.adoption.model} from now on."
+    answer(_document(made), f"{said}\n{watch}")
 
 
 @click.command()
@@ -75,7 +71,7 @@ def adopt(
 @click.option("--all", "undone", is_flag=True, help="Those that were dropped too.")
 @flags.json
 @click.pass_context
-def adopted(ctx: click.Context, hanger_id: int | None, undone: bool, as_json: bool) -> None:
+def adopted(ctx: click.Context, hanger_id: int | None, undone: bool) -> None:
     """What was adopted, and what became of its gap.
 
     \b
@@ -86,20 +82,18 @@ def adopted(ctx: click.Context, hanger_id: int | None, undone: bool, as_json: bo
             workspace.bridge.hanger(hanger_id)
         found = store.posteriors.list_adoptions(hanger_id, undone=undone)
         documents = [_watched(store, each) for each in found]
-    if as_json:
+    if flags.wants_json():
         show({"adoptions": documents})
         return
     if not found:
         raise NothingThere(
             "no effect has been adopted.", remedy="Adopt one with `shm gap adopt --effect NAME`."
         )
-    made = table(
-        "adopted effects", "number", "hanger", "class", "adopted", "who", "why",
-        "gap before, with it, now (%)", "dropped",
+    headings = (
+        "number", "hanger", "class", "adopted", "who", "why", "gap before, with it, now (%)",
+        "dropped",
     )  # fmt: skip
-    for document in documents:
-        made.add_row(*_row(document))
-    show_table(made)
+    show_rows("adopted effects", headings, map(_row, documents))
 
 
 @click.command()
@@ -115,7 +109,6 @@ def drop(
     number: int | None,
     why: str,
     who: str,
-    as_json: bool,
 ) -> None:
     """Undo an adoption, on the record.
 
@@ -129,10 +122,10 @@ def drop(
         chosen = _chosen(store, hanger_id, number)
         made = store.posteriors.drop_adoption(chosen.id, why, who, utc_now())
         model = store.posteriors.selected_models()[hanger_id]
-    if as_json:
-        show(_document(made))
-        return
-    click.echo(f"Dropped {made.adoption.model}; hanger {hanger_id} has the class {model} again.")
+    answer(
+        _document(made),
+        f"Dropped {made.adoption.model}; hanger {hanger_id} has the class {model} again.",
+    )
 
 
 def _chosen(store: Store, hanger_id: int, number: int | None) -> StoredAdoption:

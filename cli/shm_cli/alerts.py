@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import time
 from datetime import datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import rich_click as click
 
@@ -17,11 +17,11 @@ from shm.documents import alert_document, format_time
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.telling import quiet_until
-from shm.store import DeliveryState, StoredAlert
+from shm.store import Delivery, DeliveryState, StoredAlert
 from shm.store.stored_alerts import silenced_until
 from shm.values import Alert
 from shm_cli import completion, flags
-from shm_cli.common import open_workspace, opened_store, paragraph, show, show_table, table
+from shm_cli.common import answer, open_workspace, opened_store, paragraph, show_rows
 from shm_cli.silences import silence, silences, unsilence
 
 
@@ -32,9 +32,7 @@ from shm_cli.silences import silence, silences, unsilence
 @flags.who
 @flags.json
 @click.pass_context
-def acknowledge(
-    ctx: click.Context, alert_id: int, why: str, resolved: bool, who: str, as_json: bool
-) -> None:
+def acknowledge(ctx: click.Context, alert_id: int, why: str, resolved: bool, who: str) -> None:
     """Take note of an alert, on the record.
 
     ID is the number that `shm alerts` shows. The alert is open no more; the watch goes on as it
@@ -48,11 +46,11 @@ def acknowledge(
     with opened_store(ctx) as (_, store):
         note = store.alerts.resolve if resolved else store.alerts.acknowledge
         noted = note(alert_id, who, why, utc_now())
-    if as_json:
-        show({"id": noted.id, **acknowledgement_row(noted), "alert": alert_document(noted.alert)})
-        return
     done = "resolved" if resolved else "acknowledged"
-    click.echo(f"Alert {alert_id} of hanger {noted.alert.hanger} is {done}.")
+    answer(
+        {"id": noted.id, **acknowledgement_row(noted), "alert": alert_document(noted.alert)},
+        f"Alert {alert_id} of hanger {noted.alert.hanger} is {done}.",
+    )
 
 
 def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
@@ -72,29 +70,25 @@ def acknowledgement_words(stored: StoredAlert) -> str:
     return said if ended is None else f"{said} (resolved {ended.at:%Y-%m-%d})"
 
 
-if TYPE_CHECKING:
-    from shm.store import Delivery, StoredAlert
-
-
 @click.group(invoke_without_command=True)
 @flags.hanger()
 @flags.json
 @click.pass_context
-def command(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
+def command(ctx: click.Context, hanger_id: int | None) -> None:
     """Alerts that were raised, and their deliveries.
 
     \b
     Example: shm alerts --hanger 7 --json
     """
     if ctx.invoked_subcommand is None:
-        _list(ctx, hanger_id, as_json)
+        _list(ctx, hanger_id)
 
 
 @click.command()
 @click.argument("alert_id", type=int, metavar="ID")
 @flags.json
 @click.pass_context
-def resend(ctx: click.Context, alert_id: int, as_json: bool) -> None:
+def resend(ctx: click.Context, alert_id: int) -> None:
     """Send an alert again to the hooks that it was given up by.
 
     A hook that keeps failing is given up after `hook_attempts` tries. Mend it, see that it works
@@ -106,10 +100,10 @@ def resend(ctx: click.Context, alert_id: int, as_json: bool) -> None:
     with opened_store(ctx) as (_, store):
         owed = store.alerts.resend(alert_id, utc_now())
     hooks = list(dict.fromkeys(each.hook for each in owed))
-    if as_json:
-        show({"id": alert_id, "hooks": hooks})
-        return
-    click.echo(f"Alert {alert_id} is owed again to {', '.join(hooks)}: the daemon sends it next.")
+    answer(
+        {"id": alert_id, "hooks": hooks},
+        f"Alert {alert_id} is owed again to {', '.join(hooks)}: the daemon sends it next.",
+    )
 
 
 for _verb in (acknowledge, resend, silence, silences, unsilence):
@@ -127,7 +121,7 @@ for _verb in (acknowledge, resend, silence, silences, unsilence):
 )
 @flags.json
 @click.pass_context
-def test(ctx: click.Context, name: str, as_json: bool) -> None:
+def test(ctx: click.Context, name: str) -> None:
     """Send a hook a marked test alert, now.
 
     It goes the way of every alert, once, whether the daemon runs or not, and is kept nowhere.
@@ -136,7 +130,6 @@ def test(ctx: click.Context, name: str, as_json: bool) -> None:
     \b
     Example: shm alerts test --hook mail
     """
-    from shm.pipeline import utc_now
     from shm_daemon import HookNotifier
 
     workspace = open_workspace(ctx)
@@ -145,15 +138,15 @@ def test(ctx: click.Context, name: str, as_json: bool) -> None:
     timeout_s = workspace.settings.hook_timeout_seconds
     notifier, began = HookNotifier(workspace.folder, timeout_s, os.environ), time.monotonic()
     try:
-        answer = notifier(hook, alert)
+        said = notifier(hook, alert)
     finally:
         notifier.close()
     seconds = time.monotonic() - began
-    if as_json:
-        told = {"hook": name, "kind": hook.kind, "key": alert.key, "answer": answer}
-        show({**told, "seconds": round(seconds, 3)})
-        return
-    click.echo(f"The hook {name} took the test alert in {seconds:.1f} s: {answer}.")
+    told = {"hook": name, "kind": hook.kind, "key": alert.key, "answer": said}
+    answer(
+        {**told, "seconds": round(seconds, 3)},
+        f"The hook {name} took the test alert in {seconds:.1f} s: {said}.",
+    )
 
 
 def a_test_alert(bridge: Bridge, hook: Hook, now: datetime) -> Alert:
@@ -182,7 +175,7 @@ def _described(bridge: Bridge, name: str) -> Hook:
     )
 
 
-def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
+def _list(ctx: click.Context, hanger_id: int | None) -> None:
     with opened_store(ctx) as (workspace, store):
         if hanger_id is not None:
             workspace.bridge.tested(hanger_id)
@@ -199,32 +192,31 @@ def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
         }
         for stored in alerts
     ]
-    if as_json:
-        show({"alerts": rows})
+    if flags.wants_json() or not alerts:
+        answer({"alerts": rows}, "No alert has been raised.")
         return
-    if not alerts:
-        click.echo("No alert has been raised.")
-        return
-    shown = table("alerts", "number", "hanger", "test of", "kind", "hooks", "acknowledged")
-    for stored, row in zip(alerts, rows, strict=True):
-        states = ", ".join(_delivery_words(each) for each in row["deliveries"])
-        if (until := row["silenced_until"]) is not None:
-            states = f"silenced until {until:%Y-%m-%d %H:%M}; {states}"
-        alert = stored.alert
-        shown.add_row(
-            str(stored.id),
-            str(alert.hanger),
-            f"{alert.time:%Y-%m-%d}",
-            ", ".join(alert.kinds),
-            states or "none",
-            acknowledgement_words(stored),
-        )
-    show_table(shown)
+    headings = ("number", "hanger", "test of", "kind", "hooks", "acknowledged")
+    show_rows("alerts", headings, map(_cells, alerts, rows))
     for stored, row in zip(alerts, rows, strict=True):
         click.echo("\n" + paragraph(f"{stored.id}. {stored.alert.message}"))
         for each in row["deliveries"]:
             if each["state"] == DeliveryState.GIVEN_UP:
                 click.echo(paragraph(_given_up_words(stored.id, each)))
+
+
+def _cells(stored: StoredAlert, row: dict[str, Any]) -> tuple[str, ...]:
+    states = ", ".join(_delivery_words(each) for each in row["deliveries"])
+    if (until := row["silenced_until"]) is not None:
+        states = f"silenced until {until:%Y-%m-%d %H:%M}; {states}"
+    alert = stored.alert
+    return (
+        str(stored.id),
+        str(alert.hanger),
+        f"{alert.time:%Y-%m-%d}",
+        ", ".join(alert.kinds),
+        states or "none",
+        acknowledgement_words(stored),
+    )
 
 
 def _given_up_words(alert_id: int, delivery: dict[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +14,7 @@ import rich_click as click
 from shm.blind.layout import Told, key_beside, read_trial
 from shm.errors import GateNotMet
 from shm_cli import flags
-from shm_cli.common import counting_bar, readable_width, show, show_table, table
+from shm_cli.common import counting_bar, readable_width, show, show_rows
 
 if TYPE_CHECKING:
     from shm.blind.making import MadeTrial
@@ -79,7 +80,6 @@ def make(
     key: Path | None,
     way: str,
     jobs: int,
-    as_json: bool,
 ) -> None:
     """Make a trial: hangers with hidden causes, and a key that is kept apart.
 
@@ -95,7 +95,7 @@ def make(
     ways = [each for each in WAYS if way in ("both", each)]
     with _told("making") as told:
         made = make_trial(directory, key, cases, seed=seed, ways=ways, jobs=jobs, told=told)
-    if as_json:
+    if flags.wants_json():
         told_of = {"directory": str(directory), "cases": len(made.cases), "key": str(key)}
         show({**told_of, "key_sha256": made.key_sha256})
         return
@@ -103,11 +103,10 @@ def make(
 
 
 def _show_made(made: MadeTrial, directory: Path, key: Path) -> None:
-    counts = table(f"{len(made.cases)} cases in {directory}", "planted", "modes", "recordings")
-    for kind, words in _PLANTED.items():
-        ways = [case.way for case in made.cases if case.kind == kind]
-        counts.add_row(words, str(ways.count("modes")), str(ways.count("recordings")))
-    show_table(counts)
+    ways = ("modes", "recordings")
+    counts: Counter[tuple[str, str]] = Counter((case.kind, case.way) for case in made.cases)
+    rows = [(words, *(str(counts[kind, way]) for way in ways)) for kind, words in _PLANTED.items()]
+    show_rows(f"{len(made.cases)} cases in {directory}", ("planted", *ways), rows)
     click.echo(f"Key: {key}")
     click.echo(f"Its SHA-256: {made.key_sha256}")
     click.echo(f"Keep the key away from whoever solves. Next: shm gap blind solve {directory}")
@@ -132,7 +131,7 @@ _PLANTED = {
 )
 @_jobs_option
 @flags.json
-def solve(directory: Path, left_out: Path | None, jobs: int, as_json: bool) -> None:
+def solve(directory: Path, left_out: Path | None, jobs: int) -> None:
     """Diagnose all cases of a trial, and seal the answers with their SHA-256.
 
     Each case is diagnosed in a process that can open nothing but the cases, so not the key. Each
@@ -156,7 +155,7 @@ def solve(directory: Path, left_out: Path | None, jobs: int, as_json: bool) -> N
         with _told("solving without the true effect") as told:
             solved = solve_left_out(trial, without, jobs=jobs, told=told)
         seal = trial.seal("left_out")
-    if as_json:
+    if flags.wants_json():
         show(_solved_document(solved, seal))
         return
     _say_solved(solved, seal)
@@ -196,7 +195,7 @@ def _say_solved(solved: SolvedRound, seal: Path) -> None:
 )
 @click.option("--gate", is_flag=True, help="Exit code 6 where a mark is missed.")
 @flags.json
-def score(directory: Path, key: Path | None, html: Path | None, gate: bool, as_json: bool) -> None:
+def score(directory: Path, key: Path | None, html: Path | None, gate: bool) -> None:
     """Open the key and say how good the answers are, with intervals.
 
     Key and answers are verified first: whoever changed either after it was sealed is found out.
@@ -214,7 +213,7 @@ def score(directory: Path, key: Path | None, html: Path | None, gate: bool, as_j
     found = opened(directory, key or key_beside(directory))
     if html is not None:
         html.write_text(as_html(trial_paper(found)), encoding="utf-8")
-    if as_json:
+    if flags.wants_json():
         show(trial_json(found))
     else:
         click.echo(as_text(trial_paper(found), readable_width()).rstrip())

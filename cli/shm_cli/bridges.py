@@ -13,7 +13,7 @@ from shm_cli.common import open_workspace, paragraph, show
 @click.command()
 @flags.json
 @click.pass_context
-def command(ctx: click.Context, as_json: bool) -> None:
+def command(ctx: click.Context) -> None:
     """How this bridge and the others of bridge.toml are, the worst first.
 
     The dashboard of each [[other_bridge]] is asked; one that does not answer is named, with what
@@ -34,7 +34,7 @@ def command(ctx: click.Context, as_json: bool) -> None:
         rows = worst_first((*own_row(site, utc_now()), *others))
     finally:
         site.close()
-    if as_json:
+    if flags.wants_json():
         documents = [row_document(row) for row in rows]
         show({"headline": headline(rows), "bridges": documents})
         return

@@ -1,4 +1,4 @@
-"""What verbs share: options, where they print, how they show progress and read their input."""
+"""What verbs share: where they print, how they show progress and read their input."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import rich_click as click
 from rich.console import Console, Group, RenderableType
@@ -36,6 +36,7 @@ from shm.inference import NOISE_FLOOR, UpdateOptions
 from shm.models import THESIS
 from shm.modes_document import load_modes
 from shm.values import Hanger, ModalTest
+from shm_cli.flags import wants_json
 
 if TYPE_CHECKING:
     from shm.report.paper import Table as Texts
@@ -44,8 +45,6 @@ if TYPE_CHECKING:
 # Technical: columns of a file, of no terminal at all, and of lines that are read with ease.
 _WIDTH_OF_A_FILE, _BEYOND_ANY = 120, 100_000
 _READABLE = 100
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 
 def update_options(samples: int, seed: int, repeat: int, method: str, priors: str) -> UpdateOptions:
@@ -66,6 +65,22 @@ def update_options(samples: int, seed: int, repeat: int, method: str, priors: st
 def show(document: object) -> None:
     """Prints one JSON document on stdout."""
     click.echo(dump(document))
+
+
+def answer(document: object, words: str) -> None:
+    """One JSON document on stdout where --json asks for it, else words for a person."""
+    if wants_json():
+        show(document)
+    else:
+        click.echo(words)
+
+
+def show_rows(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Prints rows of texts as a table; columns after the first are aligned to the right."""
+    made = table(title, *headings)
+    for row in rows:
+        made.add_row(*row)
+    show_table(made)
 
 
 def show_table(table: Table) -> None:
@@ -133,10 +148,7 @@ def show_texts(texts: Texts) -> None:
     from shm.report.as_text import in_terminal
 
     shown = in_terminal(texts)
-    made = table(shown.title, *shown.headings)
-    for row in shown.rows:
-        made.add_row(*row)
-    show_table(made)
+    show_rows(shown.title, shown.headings, shown.rows)
     if shown.note:
         click.echo(paragraph(shown.note))
 

@@ -30,7 +30,7 @@ _FAULT = 1
 @click.command()
 @flags.json
 @click.pass_context
-def command(ctx: click.Context, as_json: bool) -> int:
+def command(ctx: click.Context) -> int:
     """Whether all is well, and what to do where it is not.
 
     Looks at folders, disks, store, daemon, spool, recordings, backups, clock, hooks, hangers,
@@ -41,7 +41,7 @@ def command(ctx: click.Context, as_json: bool) -> int:
     Example: shm --workspace arch doctor
     """
     findings = examine(Path(ctx.obj), utc_now())
-    if as_json:
+    if flags.wants_json():
         show({"worst": _worst(findings), "findings": [asdict(each) for each in findings]})
     else:
         _show(findings)

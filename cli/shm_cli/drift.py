@@ -28,15 +28,7 @@ from shm.store import Baseline
 from shm.values import Drift
 from shm.watch.repair_check import EVENT_KINDS
 from shm_cli import flags
-from shm_cli.common import (
-    opened_store,
-    paragraph,
-    progress_bar,
-    show,
-    show_table,
-    show_texts,
-    table,
-)
+from shm_cli.common import opened_store, paragraph, progress_bar, show, show_rows, show_texts
 
 _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
 
@@ -50,7 +42,7 @@ _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
     help="Write the elevation of the bridge, hangers coloured by their shift, as a picture.",
 )
 @click.pass_context
-def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
+def bridge(ctx: click.Context, figure: Path | None) -> None:
     """Which hangers gained and which lost, and whether it is the bridge at all.
 
     Compares the latest tension shift of each hanger with its neighbours': one hanger whose
@@ -67,7 +59,7 @@ def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
     if figure is not None:
         figure.write_bytes(bridge_illustration(pattern).png())
         click.echo(f"Wrote {figure}.", err=True)
-    if as_json:
+    if flags.wants_json():
         show(pattern_json(pattern))
         return
     for each in pattern_tables(pattern):
@@ -101,7 +93,6 @@ def rebaseline(
     kind: str | None,
     why: str,
     who: str,
-    as_json: bool,
 ) -> None:
     """Compare a hanger with itself as it is since some day.
 
@@ -125,7 +116,7 @@ def rebaseline(
         hanger = workspace.bridge.hanger(hanger_id)
         with progress_bar("updating") as progress:
             found = set_baseline(workspace, store, hanger, order, utc_now(), progress)
-    if as_json:
+    if flags.wants_json():
         of_event = {"kind": kind, "alerts_explained": found.explained, "alerts_open": found.left}
         show(
             {
@@ -166,7 +157,7 @@ if TYPE_CHECKING:
 @click.option("--all", "all_tests", is_flag=True, help="All tests, not each hanger's latest.")
 @flags.json
 @click.pass_context
-def command(ctx: click.Context, hanger_id: int | None, all_tests: bool, as_json: bool) -> None:
+def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
     """How far tension and stiffness have moved.
 
     The shift of the latest test of each hanger from its baseline, if there is one at all: the
@@ -197,7 +188,7 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool, as_json:
             "no test has been compared with a baseline yet.",
             remedy="Take in more tests: the first ones of a hanger form its baseline.",
         )
-    if as_json:
+    if flags.wants_json():
         document: dict[str, object] = {"drifts": [drift_document(drift) for drift in shown]}
         if hanger_id is not None:
             document["temperature_coefficients"] = temperature_documents(states)
@@ -226,11 +217,9 @@ def _without_a_test(store: Store, hangers: Sequence[int]) -> list[Baseline]:
 
 
 def _show(drifts: Sequence[Drift]) -> None:
-    made = table(
-        "shift from the baseline, if there is one", "hanger", "test of", "quantity", "shift",
-        "90 % interval", "threshold", "probability beyond",
+    headings = (
+        "hanger", "test of", "quantity", "shift", "90 % interval", "threshold",
+        "probability beyond",
     )  # fmt: skip
-    for drift in drifts:
-        quantity, *cells = shift_cells(drift)
-        made.add_row(str(drift.hanger), f"{drift.time:%Y-%m-%d}", quantity, *cells)
-    show_table(made)
+    rows = [(str(each.hanger), f"{each.time:%Y-%m-%d}", *shift_cells(each)) for each in drifts]
+    show_rows("shift from the baseline, if there is one", headings, rows)

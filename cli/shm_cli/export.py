@@ -39,7 +39,6 @@ def command(
     test: str | None,
     form: str | None,
     out: Path,
-    as_json: bool,
 ) -> None:
     """Posterior samples for other programs.
 
@@ -56,7 +55,7 @@ def command(
         tests = [store.tests.named(hanger_id, name).test for name in posterior.tests]
     with waiting("writing the samples"):
         _write(posterior, out, form, tests, hanger)
-    if as_json:
+    if flags.wants_json():
         show({"file": str(out), "model": posterior.model, "samples": len(posterior.samples)})
         return
     click.echo(f"Wrote {len(posterior.samples)} samples of {posterior.model} to {out}.", err=True)

@@ -72,7 +72,25 @@ class NewFile(click.Path):
         return path
 
 
-json = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
+_JSON = "shm_cli.json"
+
+
+def _note_json(ctx: click.Context, _: click.Parameter, is_asked: bool) -> None:
+    ctx.meta[_JSON] = is_asked
+
+
+json = click.option(
+    "--json", "as_json", is_flag=True, expose_value=False, callback=_note_json,
+    help="One JSON document on stdout.",
+)  # fmt: skip
+
+
+def wants_json() -> bool:
+    """Whether the command that runs was given --json."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(_JSON))
+
+
 why = click.option("--why", type=Words(), required=True, help="For the record.")
 who = click.option(
     "--who",

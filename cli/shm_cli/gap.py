@@ -120,7 +120,6 @@ def diagnose(
     html: Path | None,
     write_effect: Path | None,
     figures: Path | None,
-    as_json: bool,
 ) -> None:
     """Where the gap lies, which effect causes it, how far it shrinks, what would tell.
 
@@ -154,7 +153,7 @@ def diagnose(
     if html is not None or figures is not None:
         with drawing():
             _write(shown, html, figures)
-    if as_json:
+    if flags.wants_json():
         show(shown.document())
     else:
         click.echo(as_text(shown.paper(), readable_width()).rstrip())

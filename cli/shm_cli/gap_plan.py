@@ -19,13 +19,12 @@ from shm.values import Hanger, ModalTest
 from shm_cli import completion, flags
 from shm_cli.common import (
     advancing_bar,
+    answer,
     latest_tests,
     one_hanger,
     open_workspace,
     opened_store,
-    show,
-    show_table,
-    table,
+    show_rows,
     tests_and_hanger,
 )
 
@@ -72,7 +71,6 @@ def plan(
     baseline: str,
     without: tuple[str, ...],
     seed: int,
-    as_json: bool,
 ) -> None:
     """The next measurements in order, each with its cost and what it promises.
 
@@ -88,26 +86,24 @@ def plan(
     with advancing_bar() as progress:
         diagnosis, attribution = examined(tests, hanger, options, progress)
     race = Race.of(attribution, np.random.default_rng(seed))
-    steps = planned(race, bridge.measurement_hours, budget_hours or np.inf)
-    if as_json:
-        show(
-            {"hanger": diagnosis.hanger, "baseline": baseline, "seed": seed, "steps": _rows(steps)}
+    most_hours = budget_hours or np.inf
+    steps = planned(race, bridge.measurement_hours, most_hours)
+    rows = _rows(steps)
+    if flags.wants_json() or not steps:
+        answer(
+            {"hanger": diagnosis.hanger, "baseline": baseline, "seed": seed, "steps": rows},
+            "" if steps else nothing_planned(race, bridge.measurement_hours, most_hours),
         )
         return
-    if not steps:
-        click.echo(nothing_planned(race, bridge.measurement_hours, budget_hours or np.inf))
-        return
-    shown = table("Next measurements", *_HEADS)
-    for row in _rows(steps):
-        shown.add_row(
-            row["what"],
-            f"{row['hours']:g}",
-            f"{row['hours_in_all']:g}",
-            f"{row['promised_log_odds']:+.1f}",
-            f"{row['log_odds']:.1f}",
+    cells = [
+        (
+            row["what"], f"{row['hours']:g}", f"{row['hours_in_all']:g}",
+            f"{row['promised_log_odds']:+.1f}", f"{row['log_odds']:.1f}",
             f"{row['probability']:.2f}",
         )
-    show_table(shown)
+        for row in rows
+    ]  # fmt: skip
+    show_rows("Next measurements", _HEADS, cells)
     click.echo(
         "Of the true explanation against all others, averaged over which it is; make the first, "
         "diagnose, and plan anew."

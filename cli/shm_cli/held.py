@@ -17,14 +17,15 @@ from shm.errors import StoreBusy, UsageError
 from shm.pipeline import utc_now
 from shm.store import Decision, Hold, Stage, Store, StoredAlert, Withdrawal, Workspace
 from shm.store.holding import discarded_reason, taking_back
+from shm_cli import flags
 from shm_cli.common import paragraph, show
 
 
-def show_held(workspace: Workspace, as_json: bool) -> int:
+def show_held(workspace: Workspace) -> int:
     """What nobody has decided on yet."""
     with workspace.store() as store:
         found = store.recordings.list_holds()
-    if as_json:
+    if flags.wants_json():
         show({"held": [hold_document(hold) for hold in found]})
         return 0
     if not found:

@@ -130,7 +130,6 @@ def command(
     figures: Path | None,
     hanger_id: int | None,
     hanger_file: Path | None,
-    as_json: bool,
     **chosen: Any,
 ) -> None:
     """Modal parameters of recordings.
@@ -160,7 +159,7 @@ def command(
     _refuse_several_hangers(sheets)
     with drawing():
         _write(sheets, out, html, figures)
-    if as_json:
+    if flags.wants_json():
         show(_document(sheets))
     else:
         for sheet in sheets:

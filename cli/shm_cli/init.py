@@ -10,7 +10,7 @@ import rich_click as click
 
 from shm.store import Workspace
 from shm_cli import flags
-from shm_cli.common import show
+from shm_cli.common import answer
 
 
 @click.command()
@@ -25,9 +25,7 @@ from shm_cli.common import show
 @click.option("--bridge", "name", metavar="NAME", help="Name of the bridge.")
 @flags.json
 @click.pass_context
-def command(
-    ctx: click.Context, folder: Path | None, config: Path | None, name: str | None, as_json: bool
-) -> None:
+def command(ctx: click.Context, folder: Path | None, config: Path | None, name: str | None) -> None:
     """Make a workspace for a bridge.
 
     It is a folder: bridge.toml (describe your hangers there), shm.db, spool/ (drop recordings
@@ -40,10 +38,10 @@ def command(
     if name is not None:
         _rename(Path(workspace.bridge.source), name)
     description = workspace.folder / "bridge.toml"
-    if as_json:
-        show({"workspace": str(workspace.folder), "description": str(description)})
-        return
-    click.echo(f"Made {workspace.folder}. Describe the bridge in {description}.")
+    answer(
+        {"workspace": str(workspace.folder), "description": str(description)},
+        f"Made {workspace.folder}. Describe the bridge in {description}.",
+    )
 
 
 def _rename(path: Path, name: str) -> None:

@@ -11,7 +11,7 @@ from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.values.notes import NoteKind
 from shm_cli import flags
-from shm_cli.common import opened_store, show, show_table, table
+from shm_cli.common import answer, opened_store, show_rows
 
 
 @click.group()
@@ -53,7 +53,6 @@ def add(
     at: datetime | None,
     photo: Path | None,
     who: str,
-    as_json: bool,
 ) -> None:
     """Write a note, for good: a later one corrects it.
 
@@ -68,17 +67,14 @@ def add(
             workspace.bridge.tested(hanger_id)
         image = photo.read_bytes() if photo else b""
         made = store.notes.add(hanger_id, at or now, NoteKind(kind), text, who, now, image)
-    if as_json:
-        show(vars(made))
-        return
-    click.echo(f"Note {made.id} of {made.of} is kept.")
+    answer(vars(made), f"Note {made.id} of {made.of} is kept.")
 
 
 @command.command("list")
 @flags.hanger()
 @flags.json
 @click.pass_context
-def list_notes(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
+def list_notes(ctx: click.Context, hanger_id: int | None) -> None:
     """All notes, or those of a hanger and of the bridge; what was seen or done last comes first.
 
     \b
@@ -88,14 +84,14 @@ def list_notes(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None
         if hanger_id is not None:
             workspace.bridge.tested(hanger_id)
         found = store.notes.list_all(hanger_id)
-    if as_json:
-        show({"notes": [vars(each) for each in found]})
+    if flags.wants_json() or not found:
+        answer({"notes": [vars(each) for each in found]}, "No note was written.")
         return
-    if not found:
-        click.echo("No note was written.")
-        return
-    made = table("notes", "date", "kind", "of", "by", "photo", "text")
-    for each in found:
-        has_photo = "yes" if each.has_photo else ""
-        made.add_row(f"{each.at:%Y-%m-%d}", each.kind, each.of, each.who, has_photo, each.text)
-    show_table(made)
+    rows = [
+        (
+            f"{each.at:%Y-%m-%d}", each.kind, each.of, each.who, "yes" if each.has_photo else "",
+            each.text,
+        )
+        for each in found
+    ]  # fmt: skip
+    show_rows("notes", ("date", "kind", "of", "by", "photo", "text"), rows)

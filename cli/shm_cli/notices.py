@@ -10,7 +10,7 @@ from importlib import metadata
 import rich_click as click
 
 from shm_cli import flags
-from shm_cli.common import show, show_table, table
+from shm_cli.common import show, show_rows
 
 _REQUIREMENT = re.compile(r"([\w.-]+)\s*(?:\[([^\]]*)\])?[^;]*;?(.*)")
 _ONLY_FOR = re.compile(r"""extra\s*==\s*['"]([\w.-]+)['"]""")
@@ -29,7 +29,7 @@ class Notice:
 
 @click.command()
 @flags.json
-def command(as_json: bool) -> None:
+def command() -> None:
     """Other people's packages that work here, with the licence that each declares.
 
     Those of an extra, such as `web`, are listed where they are installed. The texts of the licences
@@ -39,13 +39,11 @@ def command(as_json: bool) -> None:
     Example: shm notices
     """
     found = notices()
-    if as_json:
+    if flags.wants_json():
         show({"packages": [asdict(each) for each in found]})
-        return
-    shown = table("", "package", "version", "licence", "extra")
-    for each in found:
-        shown.add_row(each.package, each.version, each.licence, each.extra)
-    show_table(shown)
+    else:
+        heads = ("package", "version", "licence", "extra")
+        show_rows("", heads, [(e.package, e.version, e.licence, e.extra) for e in found])
 
 
 def notices() -> Sequence[Notice]:

@@ -20,8 +20,7 @@ from shm_cli.common import (
     opened_store,
     progress_bar,
     show,
-    show_table,
-    table,
+    show_rows,
     tests_and_hanger,
     told_doubts,
     update_options,
@@ -81,7 +80,6 @@ def command(
     method: str,
     priors: str,
     calibrated_by: Path | None,
-    as_json: bool,
 ) -> None:
     """Compare model classes by their evidence.
 
@@ -100,13 +98,13 @@ def command(
     names = _names(ctx, models, None if hanger_file else hanger.id)
     _, not_applicable = applicable(hanger, names)
     chosen = [build(name, hanger, priors) for name in competing_names(hanger, names)]
-    doubts = told_doubts(tests, hanger, apart=as_json)
+    doubts = told_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
     with progress_bar("updating") as progress:
         options = calibrated(options, calibrated_by, hanger, chosen, progress)
         selection = select(tests, chosen, options, progress, stated)
     tell_poor_fit(selection.selected)
-    if as_json:
+    if flags.wants_json():
         document = selection_document(selection, hanger.limits)
         show({**document, "not_applicable": not_applicable, "doubts": doubts})
         return
@@ -142,25 +140,25 @@ def show_selection(selection: Selection, limits: Limits | None = None) -> None:
     """The tension over all classes in words, and the classes as a table, most probable first."""
     show_stated(selection.averaged(limits))
     unit = force_unit(*(float(each.tension_n.mean()) for each in selection.posteriors))
-    made = table(
-        f"model classes of hanger {selection.selected.hanger}, most probable first",
+    headings = (
         "class", "probability", "log evidence", f"tension ({unit.name})",
         f"90 % interval ({unit.name})", "to nominal", "most probable values",
     )  # fmt: skip
+    rows = []
     for posterior, probability in zip(selection.posteriors, selection.probabilities, strict=True):
         low, high = unit.of(np.quantile(posterior.tension_n, [0.05, 0.95]))
         mean = float(posterior.tension_n.mean())
         places = unit.decimals(mean)
-        made.add_row(
+        best = zip(posterior.names, posterior.most_probable, strict=True)
+        cells = (
             posterior.model,
             f"{probability:.3f}",
             f"{posterior.log_evidence:.2f} ± {posterior.log_evidence_sd:.2f}",
             f"{unit.of(mean):.{places}f}",
             f"{low:.{places}f} to {high:.{places}f}",
             f"{mean / posterior.nominal_tension_n - 1:+.1%}",
-            ", ".join(
-                f"{name} {value:.3g}"
-                for name, value in zip(posterior.names, posterior.most_probable, strict=True)
-            ),
+            ", ".join(f"{name} {value:.3g}" for name, value in best),
         )
-    show_table(made)
+        rows.append(cells)
+    title = f"model classes of hanger {selection.selected.hanger}, most probable first"
+    show_rows(title, headings, rows)

@@ -6,14 +6,14 @@ import rich_click as click
 
 from shm.settings import TABLE, Setting
 from shm_cli import flags
-from shm_cli.common import markdown, show, show_table, table
+from shm_cli.common import markdown, show, show_rows
 
 _HEADS = ("setting", "default", "unit", "range", "meaning")
 
 
 @click.command()
 @flags.json
-def command(as_json: bool) -> None:
+def command() -> None:
     """Every setting: its default, its range, what it means.
 
     A value comes from the flag, else the environment (`workers` from SHM_WORKERS), else
@@ -22,13 +22,10 @@ def command(as_json: bool) -> None:
     \b
     Example: shm settings
     """
-    if as_json:
+    if flags.wants_json():
         show({"settings": [_document(row) for row in TABLE]})
-        return
-    shown = table("", *_HEADS)
-    for row in TABLE:
-        shown.add_row(row.name, *_cells(row))
-    show_table(shown)
+    else:
+        show_rows("", _HEADS, [(row.name, *_cells(row)) for row in TABLE])
 
 
 def settings_page() -> str:

@@ -11,7 +11,7 @@ from shm.pipeline import utc_now
 from shm.store import Silence
 from shm.store.stored_alerts import hangers_of
 from shm_cli import flags
-from shm_cli.common import opened_store, show, show_table, table
+from shm_cli.common import answer, opened_store, show_rows
 
 
 @click.command()
@@ -33,7 +33,6 @@ def silence(
     maintenance: bool,
     why: str,
     who: str,
-    as_json: bool,
 ) -> None:
     """Hold messages to hooks back until a time.
 
@@ -59,21 +58,19 @@ def silence(
             now,
             is_maintenance=maintenance,
         )
-    if as_json:
-        show(silence_row(made, now))
-        return
     kind = "Maintenance window" if maintenance else "Silence"
-    click.echo(
+    answer(
+        silence_row(made, now),
         f"{kind} {made.id}: hooks are told nothing of {hangers_of(made.hanger)} from "
         f"{_at(made.starts_at)} until {_at(made.until)} UTC. End it early: "
-        f"`shm alerts unsilence {made.id}`."
+        f"`shm alerts unsilence {made.id}`.",
     )
 
 
 @click.command()
 @flags.json
 @click.pass_context
-def silences(ctx: click.Context, as_json: bool) -> None:
+def silences(ctx: click.Context) -> None:
     """Silences and maintenance windows, with who made them and why.
 
     \b
@@ -82,24 +79,24 @@ def silences(ctx: click.Context, as_json: bool) -> None:
     now = utc_now()
     with opened_store(ctx) as (_, store):
         found = store.silences.list_all()
-    if as_json:
-        show({"silences": [silence_row(each, now) for each in found]})
+    if flags.wants_json() or not found:
+        document = {"silences": [silence_row(each, now) for each in found]}
+        answer(document, "No silence was ever made.")
         return
-    if not found:
-        click.echo("No silence was ever made.")
-        return
-    made = table("silences", "number", "of", "kind", "state", "from", "until", "by")
-    for each in found:
-        made.add_row(
-            str(each.id),
-            hangers_of(each.hanger),
-            "maintenance" if each.is_maintenance else "silence",
-            state_of(each, now),
-            _at(each.starts_at),
-            _at(each.until),
-            f"{each.who}: {each.why}" + (f" (ended by {each.ended_who})" if each.ended_at else ""),
-        )
-    show_table(made)
+    headings = ("number", "of", "kind", "state", "from", "until", "by")
+    show_rows("silences", headings, [_cells(each, now) for each in found])
+
+
+def _cells(each: Silence, now: datetime) -> tuple[str, ...]:
+    return (
+        str(each.id),
+        hangers_of(each.hanger),
+        "maintenance" if each.is_maintenance else "silence",
+        state_of(each, now),
+        _at(each.starts_at),
+        _at(each.until),
+        f"{each.who}: {each.why}" + (f" (ended by {each.ended_who})" if each.ended_at else ""),
+    )
 
 
 @click.command()
@@ -107,7 +104,7 @@ def silences(ctx: click.Context, as_json: bool) -> None:
 @flags.who
 @flags.json
 @click.pass_context
-def unsilence(ctx: click.Context, silence_id: int, who: str, as_json: bool) -> None:
+def unsilence(ctx: click.Context, silence_id: int, who: str) -> None:
     """End a silence now, on the record.
 
     \b
@@ -116,11 +113,9 @@ def unsilence(ctx: click.Context, silence_id: int, who: str, as_json: bool) -> N
     now = utc_now()
     with opened_store(ctx) as (_, store):
         ended = store.silences.end(silence_id, who, now)
-    if as_json:
-        show(silence_row(ended, now))
-        return
-    click.echo(
-        f"Silence {silence_id} has ended: hooks are told of {hangers_of(ended.hanger)} again."
+    answer(
+        silence_row(ended, now),
+        f"Silence {silence_id} has ended: hooks are told of {hangers_of(ended.hanger)} again.",
     )
 
 

@@ -189,7 +189,6 @@ def command(
     seed: int,
     campaign: bool,
     lacking: tuple[str, ...],
-    as_json: bool,
     **chosen: Unpack[Chosen],
 ) -> None:
     """Hammer tests of a hanger whose truth you choose.
@@ -204,7 +203,7 @@ def command(
     start = first.replace(tzinfo=UTC) if first else None
     if as_stream:
         live = Live(days, start, losses, speed, seed)
-        simulate_streams(open_workspace(ctx), live, as_json=as_json)
+        simulate_streams(open_workspace(ctx), live)
         return
     if out is None:
         raise UsageError("no folder is named for the files.", remedy="Add --out DIR.")
@@ -217,7 +216,7 @@ def command(
         effects = [effect_of(text) for text in chosen["effects"]]
         state = _state(hanger, chosen)
         sensors = chosen["sensors"]
-        _tell(write_campaign(hanger, state, effects, lacking, sensors, seed, out), as_json)
+        _tell(write_campaign(hanger, state, effects, lacking, sensors, seed, out))
         return
     written = []
     with counting_bar() as bar:
@@ -228,11 +227,11 @@ def command(
             recording = replace(_recording(hanger, chosen, rng), source=name, time=time)
             write(recording, out / name)
             written.append(out / name)
-    _tell(written, as_json)
+    _tell(written)
 
 
-def _tell(written: Sequence[Path], as_json: bool) -> None:
-    if as_json:
+def _tell(written: Sequence[Path]) -> None:
+    if flags.wants_json():
         show({"files": [str(path) for path in written]})
         return
     for path in written:

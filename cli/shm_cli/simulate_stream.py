@@ -19,6 +19,7 @@ from shm.store import Workspace
 from shm.store.ring import ring_of
 from shm.values import Hanger
 from shm.values.stream import Chunk, Stream
+from shm_cli import flags
 from shm_cli.common import advancing_bar, show
 
 _DAY_S = 86400.0
@@ -38,7 +39,7 @@ class Live:
     seed: int
 
 
-def simulate_streams(workspace: Workspace, chosen: Live, *, as_json: bool) -> None:
+def simulate_streams(workspace: Workspace, chosen: Live) -> None:
     """Sends the days of every stream that `bridge.toml` describes; the ends of all are alike.
 
     Raises NothingThere where it describes none.
@@ -61,7 +62,7 @@ def simulate_streams(workspace: Workspace, chosen: Live, *, as_json: bool) -> No
             chosen.speed,
             told=lambda at: bar("simulating", (at - first).total_seconds() / seconds),
         )
-    if as_json:
+    if flags.wants_json():
         ends = first + timedelta(seconds=seconds)
         show({"chunks": sent, "streams": len(streams), "from": first, "until": ends})
     else:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import rich_click as click
 
 from shm.store import Decision
-from shm_cli.common import opened_store, paragraph, show, show_table, table
+from shm_cli import flags
+from shm_cli.common import opened_store, paragraph, show, show_rows
 
 if TYPE_CHECKING:
     from shm.store import FormerPosterior, FormerTest
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 _OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
 
 
-def show_stages(ctx: click.Context, which: str, as_json: bool) -> None:
+def show_stages(ctx: click.Context, which: str) -> None:
     """Raises NothingThere where there is no such recording or test."""
     with opened_store(ctx) as (_, store):
         recording_id, _ = store.recordings.find(which)
@@ -29,7 +30,7 @@ def show_stages(ctx: click.Context, which: str, as_json: bool) -> None:
         other_names = [
             n for n in store.recordings.names_of(recording_id) if n != recording.file.file_name
         ]
-    if as_json:
+    if flags.wants_json():
         show(
             {
                 "recording": recording_id,
@@ -47,17 +48,12 @@ def show_stages(ctx: click.Context, which: str, as_json: bool) -> None:
         return
     also = f" (also came as {', '.join(other_names)})" if other_names else ""
     title = f"recording {recording_id}: {recording.file.file_name}{also}"
-    made = table(title, "stage", "test", "at")
-    made.add_column("shm", justify="right")
     by_a_person = {event.at: event.kind for event in noticed if event.kind in _OUT}
-    for step in steps:
-        made.add_row(
-            by_a_person.get(step.at, step.stage),
-            step.test or "",
-            f"{step.at:%Y-%m-%d %H:%M:%S}",
-            step.version,
-        )
-    show_table(made)
+    rows = [
+        (by_a_person.get(e.at, e.stage), e.test or "", f"{e.at:%Y-%m-%d %H:%M:%S}", e.version or "")
+        for e in steps
+    ]
+    show_rows(title, ("stage", "test", "at", "shm"), rows)
     for event in noticed:
         if event.message:
             kind = "" if event.message.startswith(event.kind) else f"{event.kind}: "

@@ -35,7 +35,7 @@ from shm.store.checksums import of_readable
 from shm.store.stored_alerts import said_of
 from shm.watch.change_words import frequency_words
 from shm_cli import flags
-from shm_cli.common import opened_store, paragraph, show, show_table, table
+from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document
 from shm_cli.stages import show_stages
 from shm_daemon.heartbeat import seconds_since_beat, told
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 )
 @flags.json
 @click.pass_context
-def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
+def command(ctx: click.Context, which: str | None) -> None:
     """What the workspace holds and what waits.
 
     \b
@@ -59,11 +59,11 @@ def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
     Example: shm --workspace arch status --of t7
     """
     if which is not None:
-        show_stages(ctx, which, as_json)
+        show_stages(ctx, which)
         return
     with opened_store(ctx) as (workspace, store):
         document = _status(workspace, store)
-    if as_json:
+    if flags.wants_json():
         show(document)
         return
     _show(document)
@@ -127,30 +127,25 @@ def _show(document: dict[str, Any]) -> None:
 
 
 def _show_hangers(document: dict[str, Any]) -> None:
-    made = table(
-        "hangers",
-        "hanger",
-        "state",
-        "tests",
-        "held",
-        "latest",
-        "model class",
-        "baseline since",
+    headings = (
+        "hanger", "state", "tests", "held", "latest", "model class", "baseline since",
         "open alerts",
+    )  # fmt: skip
+    show_rows("hangers", headings, map(_cells, document["hangers"]))
+
+
+def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
+    latest, since = row["latest_test"], row["baseline_since"]
+    return (
+        str(row["hanger"]),
+        Status[row["status"].upper()].value if row["status"] else "no test yet",
+        str(row["tests"]),
+        str(row["held"] or ""),
+        f"{latest:%Y-%m-%d %H:%M}" if latest else "none",
+        model_class(row["model"]) if row["model"] else "none yet",
+        f"{since:%Y-%m-%d %H:%M}" if since else "none yet",
+        str(row["open_alerts"] or ""),
     )
-    for row in document["hangers"]:
-        latest, since = row["latest_test"], row["baseline_since"]
-        made.add_row(
-            str(row["hanger"]),
-            Status[row["status"].upper()].value if row["status"] else "no test yet",
-            str(row["tests"]),
-            str(row["held"] or ""),
-            f"{latest:%Y-%m-%d %H:%M}" if latest else "none",
-            model_class(row["model"]) if row["model"] else "none yet",
-            f"{since:%Y-%m-%d %H:%M}" if since else "none yet",
-            str(row["open_alerts"] or ""),
-        )
-    show_table(made)
 
 
 def _told_of_structure(row: Mapping[str, Any]) -> str:

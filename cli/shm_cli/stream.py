@@ -25,7 +25,7 @@ from shm.store.ring_recording import recording_of
 from shm.values import NAN
 from shm.watch.ambient_hammer import AmbientBias
 from shm_cli import completion, flags
-from shm_cli.common import open_workspace, opened_store, show, show_table, table
+from shm_cli.common import answer, open_workspace, opened_store, show, show_rows
 from shm_daemon.heartbeat import told
 
 
@@ -72,7 +72,7 @@ _name = click.argument("name", metavar="NAME", shell_complete=completion.streams
 )
 @flags.json
 @click.pass_context
-def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> None:
+def command(ctx: click.Context, events: bool, days: float) -> None:
     """Permanent sensors: what is live, and what was lost.
 
     A stream is late once its last sample is 5 minutes old, silent after an hour. The share that was
@@ -95,9 +95,9 @@ def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> Non
                 remedy="Describe one there: docs/permanent_sensors.md shows how.",
             )
         if events:
-            _show_events(store, utc_now() - timedelta(days=days), as_json)
+            _show_events(store, utc_now() - timedelta(days=days))
         else:
-            _show_streams(workspace, store, utc_now(), as_json)
+            _show_streams(workspace, store, utc_now())
 
 
 @click.command()
@@ -107,9 +107,7 @@ def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> Non
 @flags.why
 @flags.json
 @click.pass_context
-def keep(
-    ctx: click.Context, name: str, start: datetime, end: datetime, why: str, as_json: bool
-) -> None:
+def keep(ctx: click.Context, name: str, start: datetime, end: datetime, why: str) -> None:
     """Keep the samples of a time for good.
 
     The ring takes out what is older than the setting `ring_days`, but for what is kept.
@@ -121,10 +119,10 @@ def keep(
     stream, ring = workspace.bridge.stream(name), ring_of(workspace)
     recording_of(ring, stream, start, end, workspace.settings.max_samples)
     ring.keep(name, start, end, why)
-    if as_json:
-        show({"stream": name, "start": start, "end": end, "why": why})
-        return
-    click.echo(f"The samples of {name} from {format_time(start)} to {format_time(end)} are kept.")
+    answer(
+        {"stream": name, "start": start, "end": end, "why": why},
+        f"The samples of {name} from {format_time(start)} to {format_time(end)} are kept.",
+    )
 
 
 @click.command()
@@ -134,9 +132,7 @@ def keep(
 @click.argument("file", type=flags.NewFile(), metavar="FILE")
 @flags.json
 @click.pass_context
-def export(
-    ctx: click.Context, name: str, start: datetime, end: datetime, file: Path, as_json: bool
-) -> None:
+def export(ctx: click.Context, name: str, start: datetime, end: datetime, file: Path) -> None:
     """Write the samples of a time as a recording, which `shm identify` takes.
 
     FILE ends with .csv, .npz or .uff. What is missing is an empty value.
@@ -148,7 +144,7 @@ def export(
     stream = workspace.bridge.stream(name)
     found = recording_of(ring_of(workspace), stream, start, end, workspace.settings.max_samples)
     write(found, file)
-    if as_json:
+    if flags.wants_json():
         about = {"file": str(file), "start": found.time, "samples": found.samples}
         show({"stream": name, "hanger": found.hanger, **about})
         return
@@ -159,18 +155,17 @@ command.add_command(keep)
 command.add_command(export)
 
 
-def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bool) -> None:
+def _show_streams(workspace: Workspace, store: Store, now: datetime) -> None:
     states = stream_states(workspace, ring_of(workspace), store, now)
     beside = [against_hammer(store, each.stream) for each in states]
     rows = [_row(*each) for each in zip(states, beside, strict=True)]
-    if as_json:
+    if flags.wants_json():
         show({"streams": [asdict(row) for row in rows]})
         return
     columns = ("stream", "hanger", "state", "last sample", "lag", "rate", "lost", "apart", "ring",
                "window", "tension")  # fmt: skip
-    made = table("Streams", *columns)
-    for row, state in zip(rows, states, strict=True):
-        made.add_row(
+    cells = [
+        (
             row.name,
             str(row.hanger),
             row.state,
@@ -183,7 +178,9 @@ def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bo
             f"{_time(row.last_window)} {row.last_window_kind}, {row.last_window_how}".strip(" ,"),
             tension_words(state.hour),
         )
-    show_table(made)
+        for row, state in zip(rows, states, strict=True)
+    ]
+    show_rows("Streams", columns, cells)
     for each in beside:
         if each.is_known:
             click.echo(each.text())
@@ -216,16 +213,16 @@ def _row(state: StreamCondition, beside: AmbientBias) -> StreamRow:
     )
 
 
-def _show_events(store: Store, since: datetime, as_json: bool) -> None:
+def _show_events(store: Store, since: datetime) -> None:
     found = store.streams.list_events(None, since)
-    if as_json:
+    if flags.wants_json():
         show({"events": [asdict(event) for event in found]})
         return
-    made = table("Events of streams", "stream", "what", "from", "to", "channel", "details")
-    for event in found:
-        times = _time(event.start), _time(event.end)
-        made.add_row(event.stream, event.kind, *times, event.channel, escape(event.detail))
-    show_table(made)
+    headings = ("stream", "what", "from", "to", "channel", "details")
+    rows = [
+        (e.stream, e.kind, _time(e.start), _time(e.end), e.channel, escape(e.detail)) for e in found
+    ]
+    show_rows("Events of streams", headings, rows)
 
 
 def _time(time: datetime | None) -> str:

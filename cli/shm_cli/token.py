@@ -5,7 +5,7 @@ from __future__ import annotations
 import rich_click as click
 
 from shm_cli import flags
-from shm_cli.common import opened_store, show, show_table, table
+from shm_cli.common import answer, opened_store, show, show_rows
 
 
 @click.group()
@@ -28,7 +28,7 @@ def command() -> None:
 )
 @flags.json
 @click.pass_context
-def create(ctx: click.Context, name: str, scope: str, as_json: bool) -> None:
+def create(ctx: click.Context, name: str, scope: str) -> None:
     """Make a token and print it, this once.
 
     It goes into the header `Authorization: Bearer TOKEN`. Only its checksum is kept: where it is
@@ -42,7 +42,7 @@ def create(ctx: click.Context, name: str, scope: str, as_json: bool) -> None:
 
     with opened_store(ctx) as (_, store):
         secret = store.upkeep.create_token(name, Scope(scope), utc_now())
-    if as_json:
+    if flags.wants_json():
         show({"name": name, "scope": scope, "token": secret})
         return
     click.echo(secret)
@@ -52,7 +52,7 @@ def create(ctx: click.Context, name: str, scope: str, as_json: bool) -> None:
 @command.command("list")
 @flags.json
 @click.pass_context
-def list_tokens(ctx: click.Context, as_json: bool) -> None:
+def list_tokens(ctx: click.Context) -> None:
     """Tokens, when they were last used, and which are revoked.
 
     \b
@@ -60,25 +60,23 @@ def list_tokens(ctx: click.Context, as_json: bool) -> None:
     """
     with opened_store(ctx) as (_, store):
         tokens = store.upkeep.list_tokens()
-    if as_json:
-        show({"tokens": [{**vars(each), "scopes": sorted(each.scopes)} for each in tokens]})
+    if flags.wants_json() or not tokens:
+        document = [{**vars(each), "scopes": sorted(each.scopes)} for each in tokens]
+        answer({"tokens": document}, "No token has been made.")
         return
-    if not tokens:
-        click.echo("No token has been made.")
-        return
-    made = table("tokens", "name", "may", "made", "last used", "revoked")
+    rows = []
     for each in tokens:
         times = (each.created_at, each.last_used_at, each.revoked_at)
         told = (f"{time:%Y-%m-%d %H:%M}" if time else "never" for time in times)
-        made.add_row(each.name, ", ".join(sorted(each.scopes)), *told)
-    show_table(made)
+        rows.append((each.name, ", ".join(sorted(each.scopes)), *told))
+    show_rows("tokens", ("name", "may", "made", "last used", "revoked"), rows)
 
 
 @command.command()
 @click.argument("name")
 @flags.json
 @click.pass_context
-def revoke(ctx: click.Context, name: str, as_json: bool) -> None:
+def revoke(ctx: click.Context, name: str) -> None:
     """End a token, at once.
 
     \b
@@ -88,7 +86,4 @@ def revoke(ctx: click.Context, name: str, as_json: bool) -> None:
 
     with opened_store(ctx) as (_, store):
         store.upkeep.revoke_token(name, utc_now())
-    if as_json:
-        show({"name": name, "revoked": True})
-        return
-    click.echo(f"Token {name} is revoked.")
+    answer({"name": name, "revoked": True}, f"Token {name} is revoked.")

@@ -24,8 +24,7 @@ from shm_cli.common import (
     paragraph,
     progress_bar,
     show,
-    show_table,
-    table,
+    show_rows,
     tests_and_hanger,
     told_doubts,
     update_options,
@@ -119,7 +118,6 @@ def command(
     method: str,
     priors: str,
     calibrated_by: Path | None,
-    as_json: bool,
 ) -> None:
     """Posterior of tension and end stiffness.
 
@@ -130,14 +128,14 @@ def command(
     """
     options = update_options(samples, seed, repeat, method, priors)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
-    doubts = told_doubts(tests, hanger, apart=as_json)
+    doubts = told_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
     with progress_bar("updating") as progress:
         chosen = build(model, hanger, priors)
         options = calibrated(options, calibrated_by, hanger, [chosen], progress)
         posterior = update(tests, chosen, options, progress)
     tell_poor_fit(posterior)
-    if as_json:
+    if flags.wants_json():
         show({**posterior_document(posterior), "doubts": doubts})
         return
     show_posterior(posterior, hanger.limits)
@@ -179,33 +177,34 @@ def show_stated(averaged: Averaged) -> None:
 def show_posterior(posterior: Posterior, limits: Limits | None = None) -> None:
     """The tension in words, parameters and predicted frequencies as tables."""
     show_stated(averaged_now(posterior, limits=limits))
-    made = table(
-        f"{posterior.model}: posterior of hanger {posterior.hanger}, "
-        f"log evidence {posterior.log_evidence:.2f} ± {posterior.log_evidence_sd:.2f}",
-        "parameter", "mean", "sd", "5 %", "median", "95 %", "most probable",
-    )  # fmt: skip
     tension_n = summary(
         posterior.tension_n, posterior.most_probable[0] * posterior.nominal_tension_n
     )
     unit = force_unit(tension_n["mean"])
     places = unit.decimals(tension_n["mean"])
-    made.add_row(
-        f"tension ({unit.name})", *(f"{unit.of(each):.{places}f}" for each in tension_n.values())
+    title = (
+        f"{posterior.model}: posterior of hanger {posterior.hanger}, "
+        f"log evidence {posterior.log_evidence:.2f} ± {posterior.log_evidence_sd:.2f}"
     )
+    rows = [
+        (f"tension ({unit.name})", *(f"{unit.of(e):.{places}f}" for e in tension_n.values())),
+    ]
     for name, best in zip(posterior.names, posterior.most_probable, strict=True):
         figures = summary(posterior.parameter(name), best)
-        made.add_row(name, *(f"{value:.4g}" for value in figures.values()))
-    show_table(made)
-    made = table("predicted frequencies", "mode", "measured (Hz)", "mean (Hz)", "sd (Hz)", "ratio")
-    for row in posterior.predicted:
-        made.add_row(
+        rows.append((name, *(f"{value:.4g}" for value in figures.values())))
+    show_rows(title, ("parameter", "mean", "sd", "5 %", "median", "95 %", "most probable"), rows)
+    predicted = [
+        (
             f"{row.plane} {row.order}",
             f"{row.measured_hz:.3f}",
             f"{row.mean_hz:.3f}",
             f"{row.sd_hz:.3f}",
             f"{row.mean_hz / row.measured_hz:.4f}",
         )
-    show_table(made)
+        for row in posterior.predicted
+    ]
+    headings = ("mode", "measured (Hz)", "mean (Hz)", "sd (Hz)", "ratio")
+    show_rows("predicted frequencies", headings, predicted)
     click.echo(
         f"{len(posterior.samples)} samples ({posterior.effective_sample_size:.0f} effective), "
         f"R-hat {posterior.r_hat:.3f}, {posterior.evaluations} model evaluations, "

@@ -7,7 +7,7 @@ import sys
 import rich_click as click
 
 from shm_cli import flags
-from shm_cli.common import opened_store, show, show_table, table
+from shm_cli.common import answer, opened_store, show_rows
 
 
 @click.group()
@@ -31,7 +31,7 @@ def command() -> None:
 @click.option("--single-sign-on", "vouched", is_flag=True, help="No password: by that alone.")
 @flags.json
 @click.pass_context
-def add(ctx: click.Context, name: str, role: str, vouched: bool, as_json: bool) -> None:
+def add(ctx: click.Context, name: str, role: str, vouched: bool) -> None:
     """Let a person sign in. The password is asked for, or is a line of stdin.
 
     \b
@@ -42,13 +42,13 @@ def add(ctx: click.Context, name: str, role: str, vouched: bool, as_json: bool) 
 
     with opened_store(ctx) as (_, store):
         store.people.add(name, Role(role), None if vouched else _asked(), utc_now())
-    _done(as_json, {"name": name, "role": role}, f"{name} may sign in as {role}.")
+    answer({"name": name, "role": role}, f"{name} may sign in as {role}.")
 
 
 @command.command("list")
 @flags.json
 @click.pass_context
-def list_users(ctx: click.Context, as_json: bool) -> None:
+def list_users(ctx: click.Context) -> None:
     """Users, their roles, and which were removed.
 
     \b
@@ -56,24 +56,21 @@ def list_users(ctx: click.Context, as_json: bool) -> None:
     """
     with opened_store(ctx) as (_, store):
         users = store.people.list_all()
-    if as_json:
-        show({"users": [vars(each) for each in users]})
+    if flags.wants_json() or not users:
+        answer({"users": [vars(each) for each in users]}, "No user has been made.")
         return
-    if not users:
-        click.echo("No user has been made.")
-        return
-    made = table("users", "name", "role", "made", "removed")
+    rows = []
     for each in users:
         times = (f"{t:%Y-%m-%d %H:%M}" if t else "" for t in (each.made_at, each.removed_at))
-        made.add_row(each.name, each.role, *times)
-    show_table(made)
+        rows.append((each.name, each.role, *times))
+    show_rows("users", ("name", "role", "made", "removed"), rows)
 
 
 @command.command()
 @click.argument("name")
 @flags.json
 @click.pass_context
-def remove(ctx: click.Context, name: str, as_json: bool) -> None:
+def remove(ctx: click.Context, name: str) -> None:
     """End a user, in all browsers at once; the last engineer only after another is made.
 
     \b
@@ -83,14 +80,14 @@ def remove(ctx: click.Context, name: str, as_json: bool) -> None:
 
     with opened_store(ctx) as (_, store):
         store.people.remove(name, utc_now())
-    _done(as_json, {"name": name, "removed": True}, f"{name} may not sign in any more.")
+    answer({"name": name, "removed": True}, f"{name} may not sign in any more.")
 
 
 @command.command()
 @click.argument("name")
 @flags.json
 @click.pass_context
-def password(ctx: click.Context, name: str, as_json: bool) -> None:
+def password(ctx: click.Context, name: str) -> None:
     """Give a user a new password, asked for or a line of stdin; all browsers are signed out.
 
     \b
@@ -100,7 +97,7 @@ def password(ctx: click.Context, name: str, as_json: bool) -> None:
 
     with opened_store(ctx) as (_, store):
         store.people.set_password(name, _asked(), utc_now())
-    _done(as_json, {"name": name, "changed": True}, f"{name} has a new password.")
+    answer({"name": name, "changed": True}, f"{name} has a new password.")
 
 
 def _asked() -> str:
@@ -108,10 +105,3 @@ def _asked() -> str:
     if not sys.stdin.isatty():
         return sys.stdin.readline().rstrip("\r\n")
     return str(click.prompt("Password", hide_input=True, confirmation_prompt=True, err=True))
-
-
-def _done(as_json: bool, document: dict[str, object], words: str) -> None:
-    if as_json:
-        show(document)
-    else:
-        click.echo(words)

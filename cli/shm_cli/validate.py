@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from shm.bridge import load_hanger
 from shm.errors import GateNotMet, UsageError
 from shm.values import Hanger
 from shm_cli import flags, thesis
-from shm_cli.common import markdown, progress_bar, show, show_table, table
+from shm_cli.common import markdown, progress_bar, show, show_rows
 from shm_cli.validation import formulas, frequencies, selection, solid_figures, thesis_figures
 from shm_cli.validation.thesis_figures import Figure
 
@@ -65,7 +65,6 @@ def command(
     listed: bool,
     out: Path | None,
     seed: int,
-    as_json: bool,
 ) -> None:
     """Our figures beside the thesis's, with a gate.
 
@@ -80,18 +79,18 @@ def command(
     Example: shm validate --formulas
     """
     if figure is not None:
-        _show_figure(figure, out, as_json)
+        _show_figure(figure, out)
         return
     if out is not None:
         raise UsageError("--out draws one figure.", remedy="Say which: --figure 2.4, say.")
     if listed:
-        _show_list(as_json)
+        _show_list()
         return
     if practice:
-        _show_formulas(seed, as_json)
+        _show_formulas(seed)
         return
     if wanted is not None:
-        _show_table(wanted, as_json)
+        _show_table(wanted)
         return
     tables, chosen = compared(seed)
     parts = {
@@ -101,7 +100,7 @@ def command(
         ),
         "hanger 3 of the thesis": (selection.HEADS, [*map(selection.cells, chosen)]),
     }
-    if as_json:
+    if flags.wants_json():
         show(
             {
                 "frequencies": [asdict(row) for row in tables],
@@ -112,7 +111,7 @@ def command(
         click.echo("\n\n".join(markdown(heads, rows) for heads, rows in parts.values()))
     else:
         for title, (heads, rows) in parts.items():
-            _show(title, heads, rows)
+            show_rows(title, heads, rows)
     misses = [*frequencies.misses(tables), *selection.misses(chosen)]
     if misses:
         message = "; ".join(misses)
@@ -129,57 +128,50 @@ def compared(
         return tables, selection.compared(hanger, seed, progress)
 
 
-def _show_figure(number: str, out: Path | None, as_json: bool) -> None:
+def _show_figure(number: str, out: Path | None) -> None:
     with progress_bar("validating") as progress:
         found = FIGURES[number](load_hanger(thesis.HANGER_FILE), progress, number)
     if out is not None:
         found.write(out)
-    if as_json:
+    if flags.wants_json():
         show(found.document)
     else:
-        _show(found.title, found.heads, found.cells)
+        show_rows(found.title, found.heads, found.cells)
         click.echo(found.statement)
     if found.missed:
         raise GateNotMet(found.missed, remedy="Report this: the beam's solver is at fault.")
 
 
-def _show_table(wanted: str, as_json: bool) -> None:
+def _show_table(wanted: str) -> None:
     with progress_bar("validating") as progress:
         rows = frequencies.compared(load_hanger(thesis.HANGER_FILE), progress, wanted)
-    if as_json:
+    if flags.wants_json():
         show([asdict(row) for row in rows])
     else:
         timed = any(row.thesis_time for row in rows)
         heads = frequencies.TIMED_HEADS if timed else frequencies.HEADS
         cells = map(frequencies.timed_cells if timed else frequencies.cells, rows)
-        _show(f"table {wanted} of the thesis", heads, [*cells])
+        show_rows(f"table {wanted} of the thesis", heads, cells)
     misses = frequencies.misses(rows)
     if misses:
         message = "; ".join(misses)
         raise GateNotMet(f"{message}.", remedy="See docs/trials/validation.md for the marks.")
 
 
-def _show_formulas(seed: int, as_json: bool) -> None:
+def _show_formulas(seed: int) -> None:
     with progress_bar("validating") as progress:
         rows = formulas.compared(load_hanger(thesis.HANGER_FILE), seed, progress)
-    if as_json:
+    if flags.wants_json():
         show([asdict(row) for row in rows])
         return
-    _show("formulas of practice", formulas.FORMULA_HEADS, formulas.formula_cells())
-    _show("error of the tension", formulas.HEADS, [*map(formulas.cells, rows)])
+    show_rows("formulas of practice", formulas.FORMULA_HEADS, formulas.formula_cells())
+    show_rows("error of the tension", formulas.HEADS, map(formulas.cells, rows))
 
 
-def _show_list(as_json: bool) -> None:
+def _show_list() -> None:
     items = thesis.checklist()
-    if as_json:
+    if flags.wants_json():
         show(items)
     else:
         heads = ("of", "what", "where")
-        _show("the thesis", heads, [tuple(item[head] for head in heads) for item in items])
-
-
-def _show(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    made = table(title, *heads)
-    for row in rows:
-        made.add_row(*row)
-    show_table(made)
+        show_rows("the thesis", heads, [tuple(item[head] for head in heads) for item in items])
