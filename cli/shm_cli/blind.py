@@ -14,7 +14,7 @@ import rich_click as click
 from shm.blind.layout import Told, key_beside, read_trial
 from shm.errors import GateNotMet
 from shm_cli import flags
-from shm_cli.common import counting_bar, readable_width, show, show_rows
+from shm_cli.common import answer, counting_bar, readable_width, show, show_rows
 
 if TYPE_CHECKING:
     from shm.blind.making import MadeTrial
@@ -213,10 +213,7 @@ def score(directory: Path, key: Path | None, html: Path | None, gate: bool) -> N
     found = opened(directory, key or key_beside(directory))
     if html is not None:
         html.write_text(as_html(trial_paper(found)), encoding="utf-8")
-    if flags.wants_json():
-        show(trial_json(found))
-    else:
-        click.echo(as_text(trial_paper(found), readable_width()).rstrip())
+    answer(trial_json(found), as_text(trial_paper(found), readable_width()).rstrip())
     if gate:
         _refuse_missed(found)
 

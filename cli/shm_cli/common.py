@@ -32,34 +32,18 @@ from rich.table import Column, Table
 from shm.bridge import load_hanger
 from shm.documents import dump
 from shm.errors import NothingThere, UsageError
-from shm.inference import NOISE_FLOOR, UpdateOptions
-from shm.models import THESIS
 from shm.modes_document import load_modes
 from shm.values import Hanger, ModalTest
 from shm_cli.flags import wants_json
 
 if TYPE_CHECKING:
+    from shm.report.figures.specification import Illustration
     from shm.report.paper import Table as Texts
     from shm.store import Store, StoredTest, Workspace
 
 # Technical: columns of a file, of no terminal at all, and of lines that are read with ease.
 _WIDTH_OF_A_FILE, _BEYOND_ANY = 120, 100_000
 _READABLE = 100
-
-
-def update_options(samples: int, seed: int, repeat: int, method: str, priors: str) -> UpdateOptions:
-    """How to update; raises UsageError for what the thesis's priors alone allow."""
-    if priors != THESIS:
-        asked = [f"--repeat {repeat}"] * (repeat != 1) + [f"--method {method}"] * (
-            method != NOISE_FLOOR
-        )
-        for option in asked:
-            raise UsageError(
-                f"{option} is the thesis's way: with priors of the description each test counts "
-                "once and the sampler works its own way.",
-                remedy=f"Add --priors {THESIS}, or leave {option} out.",
-            )
-    return UpdateOptions(samples, seed, repeat, method)
 
 
 def show(document: object) -> None:
@@ -316,6 +300,13 @@ def waiting(label: str) -> Iterator[None]:
     ) as sign:
         sign.add_task(label, total=None)
         yield
+
+
+def write_pictures(drawn: Iterable[Illustration], folder: Path, start: str = "") -> None:
+    """Each figure as a PNG in the folder, under its name after `start`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for each in drawn:
+        (folder / f"{start}{each.name}.png").write_bytes(each.png())
 
 
 def drawing() -> AbstractContextManager[None]:

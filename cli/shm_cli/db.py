@@ -36,7 +36,7 @@ from shm_cli.common import (
     show_rows,
     waiting,
 )
-from shm_cli.units import print_unit, print_unit_option
+from shm_cli.services import print_unit, print_unit_option
 
 _copies_option = click.option(
     "--archive",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import rich_click as click
 
@@ -31,14 +32,15 @@ from shm_cli.adopt import adopt, adopted, drop
 from shm_cli.blind import blind
 from shm_cli.common import (
     advancing_bar,
+    answer,
     drawing,
     latest_tests,
     one_hanger,
     opened_store,
     readable_width,
-    show,
     tests_and_hanger,
     told_doubts,
+    write_pictures,
 )
 from shm_cli.effects import effects
 from shm_cli.gap_plan import plan
@@ -137,37 +139,29 @@ def diagnose(
     """
     options = GapOptions(baseline, without, hold_out, seed=seed)
     effect = _effect_name(write_effect) if write_effect is not None else ""
-    shown: _Shown
     if bridge or len(files) > 1:
         if effect:
             raise UsageError(
                 "--write-effect writes what one hanger leaves open.", remedy="Diagnose it alone."
             )
-        shown = _OfBridge(_jointly(ctx, files, bridge, (hanger_id, hanger_file), count, options))
-    elif not files:
-        hanger = one_hanger(ctx, hanger_file, hanger_id)
-        shown = _OfHanger(_of_workspace(ctx, hanger, count, options))
+        joint = _jointly(ctx, files, bridge, (hanger_id, hanger_file), count, options)
+        draw = partial(bridge_diagnosis_figures, joint.diagnosis)
+        _show(bridge_diagnosis_paper(joint), bridge_diagnosis_json(joint), draw, html, figures)
+        return
+    if not files:
+        sheet = _of_workspace(ctx, one_hanger(ctx, hanger_file, hanger_id), count, options)
     else:
         tests, hanger = tests_and_hanger(ctx, files[0], hanger_file, hanger_id)
-        shown = _OfHanger(DiagnosisSheet(_diagnosis(tests, hanger, options), hanger))
-    if html is not None or figures is not None:
-        with drawing():
-            _write(shown, html, figures)
-    if flags.wants_json():
-        show(shown.document())
-    else:
-        click.echo(as_text(shown.paper(), readable_width()).rstrip())
-    if write_effect is not None and isinstance(shown, _OfHanger):
-        text = effect_file(shown.sheet.diagnosis, shown.sheet.hanger, effect)
+        sheet = DiagnosisSheet(_diagnosis(tests, hanger, options), hanger)
+    draw = partial(diagnosis_figures, sheet)
+    _show(diagnosis_paper(sheet), diagnosis_json(sheet), draw, html, figures)
+    if write_effect is not None:
+        text = effect_file(sheet.diagnosis, sheet.hanger, effect)
         write_effect.write_text(text, encoding="utf-8")
 
 
-command.add_command(adopt)
-command.add_command(adopted)
-command.add_command(drop)
-command.add_command(blind)
-command.add_command(effects)
-command.add_command(plan)
+for _verb in (adopt, adopted, drop, blind, effects, plan):
+    command.add_command(_verb)
 
 
 def _of_workspace(
@@ -245,41 +239,6 @@ def _of_bridge(ctx: click.Context, count: int, options: GapOptions) -> BridgeDia
     return BridgeDiagnosisSheet(found, workspace.bridge.name)
 
 
-@dataclass(frozen=True)
-class _OfHanger:
-    """The answer for one hanger, as it is shown."""
-
-    sheet: DiagnosisSheet
-
-    def document(self) -> dict[str, Any]:
-        return diagnosis_json(self.sheet)
-
-    def paper(self) -> Paper:
-        return diagnosis_paper(self.sheet)
-
-    def figures(self) -> Sequence[Illustration]:
-        return diagnosis_figures(self.sheet)
-
-
-@dataclass(frozen=True)
-class _OfBridge:
-    """The answer for several hangers, as it is shown."""
-
-    sheet: BridgeDiagnosisSheet
-
-    def document(self) -> dict[str, Any]:
-        return bridge_diagnosis_json(self.sheet)
-
-    def paper(self) -> Paper:
-        return bridge_diagnosis_paper(self.sheet)
-
-    def figures(self) -> Sequence[Illustration]:
-        return bridge_diagnosis_figures(self.sheet.diagnosis)
-
-
-_Shown: TypeAlias = _OfHanger | _OfBridge
-
-
 def _effect_name(file: Path) -> str:
     """The name of the effect that a file holds, which the catalogue must not have yet."""
     name = file.stem.lower()
@@ -291,10 +250,18 @@ def _effect_name(file: Path) -> str:
     return name
 
 
-def _write(shown: _Shown, html: Path | None, figures: Path | None) -> None:
-    if html is not None:
-        html.write_text(as_html(shown.paper()), encoding="utf-8")
-    if figures is not None:
-        figures.mkdir(parents=True, exist_ok=True)
-        for illustration in shown.figures():
-            (figures / f"{illustration.name}.png").write_bytes(illustration.png())
+def _show(
+    paper: Paper,
+    document: dict[str, Any],
+    draw: Callable[[], Sequence[Illustration]],
+    html: Path | None,
+    figures: Path | None,
+) -> None:
+    """Writes what is to be written, then answers."""
+    if html is not None or figures is not None:
+        with drawing():
+            if html is not None:
+                html.write_text(as_html(paper), encoding="utf-8")
+            if figures is not None:
+                write_pictures(draw(), figures)
+    answer(document, as_text(paper, readable_width()).rstrip())

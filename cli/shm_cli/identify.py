@@ -23,14 +23,15 @@ from shm.settings import Settings
 from shm.values import FrequencyResponse, Hanger, Recording
 from shm_cli import flags
 from shm_cli.common import (
+    answer,
     counting_bar,
     drawing,
     is_workspace,
     one_hanger,
     open_workspace,
     readable_width,
-    show,
     told_doubts,
+    write_pictures,
 )
 
 if TYPE_CHECKING:
@@ -159,11 +160,8 @@ def command(
     _refuse_several_hangers(sheets)
     with drawing():
         _write(sheets, out, html, figures)
-    if flags.wants_json():
-        show(_document(sheets))
-    else:
-        for sheet in sheets:
-            click.echo(as_text(modal_test_paper(sheet), readable_width()).rstrip())
+    said = [as_text(modal_test_paper(sheet), readable_width()).rstrip() for sheet in sheets]
+    answer(_document(sheets), "\n".join(said))
 
 
 def _options(
@@ -259,7 +257,4 @@ def _write(
     from shm.report.figures.every_figure import modal_test_figures
 
     for sheet in sheets:
-        for illustration in modal_test_figures(sheet):
-            figures.mkdir(parents=True, exist_ok=True)
-            name = f"{sheet.identification.test.id}-{illustration.name}.png"
-            (figures / name).write_bytes(illustration.png())
+        write_pictures(modal_test_figures(sheet), figures, f"{sheet.identification.test.id}-")

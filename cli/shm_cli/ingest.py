@@ -41,8 +41,7 @@ from shm_cli.held import (
     hold_document,
     show_held,
 )
-from shm_cli.reprocess import rerun_document, send_back
-from shm_cli.working import finish, working
+from shm_cli.working import finish, rerun_document, send_back, working
 
 
 @click.command()

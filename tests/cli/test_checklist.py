@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from shm_cli import select, thesis, validate
+from shm_cli import thesis, update, validate
 from shm_cli.validation import formulas, frequencies
 from tests.helpers.nouns import a_posterior
 
@@ -41,7 +41,7 @@ def test_every_table_and_figure_that_is_made_is_in_the_list() -> None:
 
 
 def test_every_other_command_of_it_has_that_option() -> None:
-    options = {option for parameter in select.command.params for option in parameter.opts}
+    options = {option for parameter in update.select_command.params for option in parameter.opts}
     assert OTHERS
     assert {each.split()[2] for each in OTHERS} <= options
 

@@ -1,4 +1,4 @@
-"""`shm note`: what people saw or did at a hanger or at the bridge."""
+"""`shm note` and `shm audit`: what people saw and did, and what they changed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from shm_cli.common import answer, opened_store, show_rows
 
 
 @click.group()
-def command() -> None:
+def note() -> None:
     """Notes, inspections and repairs of a hanger or of the bridge.
 
     \b
@@ -23,7 +23,7 @@ def command() -> None:
     """
 
 
-@command.command()
+@note.command()
 @click.argument("text", type=flags.Words())
 @flags.hanger()
 @click.option("--bridge", "whole", is_flag=True, help="Of the whole bridge.")
@@ -70,7 +70,7 @@ def add(
     answer(vars(made), f"Note {made.id} of {made.of} is kept.")
 
 
-@command.command("list")
+@note.command("list")
 @flags.hanger()
 @flags.json
 @click.pass_context
@@ -95,3 +95,24 @@ def list_notes(ctx: click.Context, hanger_id: int | None) -> None:
         for each in found
     ]  # fmt: skip
     show_rows("notes", ("date", "kind", "of", "by", "photo", "text"), rows)
+
+
+@click.command()
+@click.option("--limit", type=click.IntRange(min=1), help="So many of the newest.")
+@flags.json
+@click.pass_context
+def audit(ctx: click.Context, limit: int | None) -> None:
+    """Who changed what, when and how: the newest first.
+
+    What shm does by itself is not listed, nor what is edited in bridge.toml.
+
+    \b
+    Example: shm audit --limit 20
+    """
+    with opened_store(ctx) as (_, store):
+        rows = store.audit.list_rows(limit)
+    if flags.wants_json() or not rows:
+        answer({"changes": [vars(each) for each in rows]}, "Nothing was changed.")
+        return
+    cells = [(f"{each.at:%Y-%m-%d %H:%M}", *list(vars(each).values())[2:]) for each in rows]
+    show_rows("changes", ("time", "who", "by", "action", "of", "detail"), cells)
