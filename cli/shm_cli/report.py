@@ -18,11 +18,10 @@ from shm.pipeline.bridge_reporting import bridge_report
 from shm.pipeline.reporting import hanger_report, modal_test_report, structure_report
 from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_json, bridge_paper
-from shm.report.hanger_report import hanger_json, hanger_paper
+from shm.report.hanger_report import hanger_json, hanger_paper, structure_json, structure_paper
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.paper import Paper
 from shm.report.states import Period, period_since
-from shm.report.structure_report import structure_json, structure_paper
 from shm_cli import flags
 from shm_cli.common import drawing, opened_store, readable_width, waiting
 

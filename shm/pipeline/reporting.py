@@ -25,9 +25,9 @@ from shm.pipeline.unheard import blind_hangers, heard
 from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import read_test
 from shm.report.contents import HangerReport, ModalTestReport, trend_row_of
+from shm.report.hanger_report import StructureReport
 from shm.report.hanger_status import findings, still_detected
 from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_over_time
-from shm.report.structure_report import StructureReport
 from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
 from shm.values import Hanger, WatchedTest
 from shm.values.messages import Lead

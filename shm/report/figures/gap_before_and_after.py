@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
@@ -33,6 +32,10 @@ from shm.report.figures.specification import (
 )
 from shm.values import Plane, Residual, TensionEstimate
 from shm.values.rounding import ForceUnit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)

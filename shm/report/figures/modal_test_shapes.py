@@ -9,7 +9,7 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import ModalTestReport
-from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.modal_test_response import Shown
 from shm.report.figures.specification import (
     PLANE_HUES,
     PLANE_SYMBOLS,

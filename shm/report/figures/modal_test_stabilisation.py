@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.report.figures.modal_test_spectra import (
+from shm.report.figures.modal_test_response import (
     Shown,
     Spectrum,
     mode_marks,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shm.identify import Hit
 from shm.report import formatting
 from shm.report.contents import ModalTestReport
-from shm.report.figures.modal_test_signals import (
+from shm.report.figures.modal_test_hits import (
     HitRecord,
     borders_s,
     channel_of,
@@ -22,7 +22,7 @@ from shm.report.figures.modal_test_signals import (
     thinned,
     unknown_times_s,
 )
-from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.modal_test_response import Shown
 from shm.report.figures.specification import (
     Axis,
     Line,
@@ -36,6 +36,9 @@ from shm.report.figures.specification import (
     plane_colour,
 )
 from shm.values import FloatArray
+
+if TYPE_CHECKING:
+    from shm.identify import Hit
 
 _MOST_NUMBERS = 40
 _ZOOM_INCHES = 1.9

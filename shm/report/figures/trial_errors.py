@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from shm.report.figures import style
 from shm.report.figures.specification import Member
 from shm.report.figures.trial_answers import name_richness, of_richness, points
 from shm.report.trial_scores import find, judged, value
 from shm.values import CaseScore, MarkName, PlantedKind, Richness, TrialScore, Way
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 def _draw_reliability(score: TrialScore) -> Figure | None:
