@@ -19,7 +19,7 @@ from shm_cli.common import opened_store, show, waiting
 @click.option(
     "--format",
     "form",
-    type=click.Choice(list(export.FORMATS)),
+    type=click.Choice(export.FORMATS),
     show_default="the suffix of FILE",
     help="Table of samples (csv, npz), the document of `shm update` with its draws (json), or what "
     "ArviZ and xarray read (netcdf, needs shm[export]).",

@@ -27,7 +27,7 @@ from shm.report.figures.every_figure import bridge_diagnosis_figures, diagnosis_
 from shm.report.figures.specification import Illustration
 from shm.report.paper import Paper
 from shm.values import Diagnosis, Hanger, ModalTest
-from shm_cli import completion, flags
+from shm_cli import flags
 from shm_cli.adopt import adopt, adopted, drop
 from shm_cli.blind import blind
 from shm_cli.common import (
@@ -43,9 +43,7 @@ from shm_cli.common import (
     write_pictures,
 )
 from shm_cli.effects import effects
-from shm_cli.gap_plan import plan
-
-_DEFAULT = GapOptions()
+from shm_cli.gap_plan import baseline_option, plan, without_option
 
 
 @click.group()
@@ -64,21 +62,8 @@ def command() -> None:
 @flags.hanger()
 @flags.hanger_file
 @click.option("--bridge", is_flag=True, help="All hangers of the workspace together.")
-@click.option(
-    "--baseline",
-    metavar="NAME",
-    default=_DEFAULT.baseline,
-    show_default=True,
-    shell_complete=completion.models,
-    help="The model class whose gap is diagnosed.",
-)
-@click.option(
-    "--without",
-    multiple=True,
-    metavar="EFFECT",
-    shell_complete=completion.effects,
-    help="Take an effect out of the catalogue; may be given again.",
-)
+@baseline_option
+@without_option
 @click.option(
     "--hold-out",
     multiple=True,

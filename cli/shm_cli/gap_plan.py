@@ -28,7 +28,22 @@ from shm_cli.common import (
     tests_and_hanger,
 )
 
-_DEFAULT = GapOptions()
+baseline_option = click.option(
+    "--baseline",
+    metavar="NAME",
+    default=GapOptions().baseline,
+    show_default=True,
+    shell_complete=completion.models,
+    help="The model class whose gap is diagnosed.",
+)
+without_option = click.option(
+    "--without",
+    multiple=True,
+    metavar="EFFECT",
+    shell_complete=completion.effects,
+    help="Take an effect out of the catalogue; may be given again.",
+)
+
 _LATEST = 20  # as `shm gap diagnose`
 _HEADS = ("measurement", "hours", "in all", "promised log odds", "then", "probability")
 
@@ -44,21 +59,8 @@ _HEADS = ("measurement", "hours", "in all", "promised log odds", "then", "probab
     metavar="HOURS",
     help="Hours of a crew that the plan may cost.  [default: as many as it takes]",
 )
-@click.option(
-    "--baseline",
-    metavar="NAME",
-    default=_DEFAULT.baseline,
-    show_default=True,
-    shell_complete=completion.models,
-    help="The model class whose gap is diagnosed.",
-)
-@click.option(
-    "--without",
-    multiple=True,
-    metavar="EFFECT",
-    shell_complete=completion.effects,
-    help="Take an effect out of the catalogue; may be given again.",
-)
+@baseline_option
+@without_option
 @flags.seed
 @flags.json
 @click.pass_context

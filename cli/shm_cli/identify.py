@@ -75,6 +75,7 @@ _DEFAULT = Settings()
 )
 @click.option(
     "--reference-force",
+    "reference_force_n",
     type=float,
     default=_DEFAULT.reference_force_n,
     show_default=True,
@@ -90,6 +91,7 @@ _DEFAULT = Settings()
 )
 @click.option(
     "--mains",
+    "mains_hz",
     type=float,
     default=_DEFAULT.mains_hz,
     show_default=True,
@@ -98,6 +100,7 @@ _DEFAULT = Settings()
 )
 @click.option(
     "--window",
+    "window_time_constant_s",
     type=float,
     default=math.inf,
     show_default="none",
@@ -126,6 +129,7 @@ def command(
     /,
     files: tuple[Path, ...],
     together: bool,
+    band: tuple[float, float],
     out: Path | None,
     html: Path | None,
     figures: Path | None,
@@ -148,7 +152,7 @@ def command(
     groups = [files] if together else [(path,) for path in files]
     if html is not None and len(groups) > 1:
         raise UsageError("--html shows one test.", remedy="Give one file, or --together.")
-    options = _options(**chosen)
+    options = IdentifyOptions(band_low_hz=band[0], band_high_hz=band[1], **chosen)
     workspace = None
     if hanger_file is None and (hanger_id is not None or is_workspace(ctx)):
         workspace = open_workspace(ctx)
@@ -162,29 +166,6 @@ def command(
         _write(sheets, out, html, figures)
     said = [as_text(modal_test_paper(sheet), readable_width()).rstrip() for sheet in sheets]
     answer(_document(sheets), "\n".join(said))
-
-
-def _options(
-    band: tuple[float, float],
-    identifier: str,
-    cross_check: str,
-    estimator: Any,
-    reference_force: float,
-    frequency_allowance: float,
-    mains: float,
-    window: float,
-) -> IdentifyOptions:
-    return IdentifyOptions(
-        band_low_hz=band[0],
-        band_high_hz=band[1],
-        identifier=identifier,
-        cross_check=cross_check,
-        estimator=estimator,
-        reference_force_n=reference_force,
-        frequency_allowance=frequency_allowance,
-        mains_hz=mains,
-        window_time_constant_s=window,
-    )
 
 
 def _identified(

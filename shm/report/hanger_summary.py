@@ -126,15 +126,6 @@ def _misfit(each: PredictedFrequency, measured_sd_hz: float) -> Interval:
     return off.scaled(100 / each.measured_hz)
 
 
-def residuals_percent(predicted: tuple[PredictedFrequency, ...]) -> list[float]:
-    """Predicted over measured frequency less one, in percent, of the modes that were measured."""
-    return [
-        100 * (mode.mean_hz / mode.measured_hz - 1)
-        for mode in predicted
-        if math.isfinite(mode.measured_hz)
-    ]
-
-
 def _tension(data: HangerReport) -> str:
     tension = formatting.with_half(data.tension_n, data.tension_unit)
     day = f" of {data.latest.time:%Y-%m-%d}" if data.latest.time else ""
@@ -233,7 +224,7 @@ def _model(data: HangerReport) -> str:
 
 def _rms_percent(data: HangerReport) -> float:
     """Root mean square of the misfits; NaN where no mode was measured."""
-    residuals = residuals_percent(data.predicted)
+    residuals = [off.mean for _, off in misfits_percent(data)]
     return float(np.sqrt(np.mean(np.square(residuals)))) if residuals else math.nan
 
 

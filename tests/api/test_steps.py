@@ -23,10 +23,10 @@ COMMANDS = {
         "identifier": "identifier",
         "cross_check": "cross_check",
         "estimator": "estimator",
-        "reference_force": "reference_force_n",
+        "reference_force_n": "reference_force_n",
         "frequency_allowance": "frequency_allowance",
-        "mains": "mains_hz",
-        "window": "window_time_constant_s",
+        "mains_hz": "mains_hz",
+        "window_time_constant_s": "window_time_constant_s",
     },
     ("update", "command"): {
         "model": "model", "seed": "seed", "samples": "samples", "repeat": "repeat",

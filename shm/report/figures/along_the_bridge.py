@@ -227,9 +227,9 @@ def _draw_tensions(data: BridgeReport) -> Figure | None:
     shares = _shares(data)
     if not shares:
         return None
-    figure = style.new_figure(3.2)
-    axes = figure.subplots()
-    style.dress(axes, "hanger, in the order of the bridge", "tension (% of nominal)")
+    figure, axes = style.one_panel(
+        "hanger, in the order of the bridge", "tension (% of nominal)", 3.2
+    )
     axes.grid(False, axis="x")
     axes.axhline(100, color=style.INK, linestyle=":", label="nominal")
     for status in Status:

@@ -152,10 +152,8 @@ def _draw_gap_tension(sheet: DiagnosisSheet) -> Figure | None:
     rows = _rows(sheet)
     if not rows:
         return None
-    figure = style.new_figure(0.42 * len(rows) + 0.95)
-    axes = figure.subplots()
     unit = tension_unit(sheet.diagnosis)
-    style.dress(axes, f"tension ({unit.name})", "")
+    figure, axes = style.one_panel(f"tension ({unit.name})", "", 0.42 * len(rows) + 0.95)
     for row, (_, estimate, colour) in enumerate(rows):
         _interval(axes, row, estimate, unit, colour)
     axes.set_yticks(range(len(rows)), [told for told, _, _ in rows])

@@ -32,7 +32,7 @@ from shm.report.figures.specification import (
     stacked,
 )
 from shm.report.formatting import NORMAL_90, Interval
-from shm.report.hanger_summary import residuals_percent
+from shm.report.hanger_summary import misfits_percent
 from shm.values import (
     PLANES,
     FloatArray,
@@ -128,10 +128,10 @@ def _caption(data: HangerReport) -> str:
 
 
 def _alt(data: HangerReport) -> str:
-    residuals = residuals_percent(data.predicted)
+    offs = [off.mean / 100 for _, off in misfits_percent(data)]
     return (
-        f"Ratio of predicted to measured frequency of {len(residuals)} modes, between "
-        f"{1 + min(residuals) / 100:.4f} and {1 + max(residuals) / 100:.4f}."
+        f"Ratio of predicted to measured frequency of {len(offs)} modes, between "
+        f"{1 + min(offs):.4f} and {1 + max(offs):.4f}."
     )
 
 

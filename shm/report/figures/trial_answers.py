@@ -153,9 +153,7 @@ def _draw_confusion(score: TrialScore) -> Figure | None:
     shades = LinearSegmentedColormap.from_list("share", ["#ffffff00", style.BLUE])
     table = np.array([[counts[row, column] for column in columns] for row in rows], dtype=float)
     share = table / table.sum(axis=1, keepdims=True)
-    figure = style.new_figure(0.23 * len(rows) + 2.3)
-    axes = figure.subplots()
-    style.dress(axes, "said", "planted")
+    figure, axes = style.one_panel("said", "planted", 0.23 * len(rows) + 2.3)
     axes.grid(False)
     axes.imshow(share, cmap=shades, vmin=0, vmax=1, aspect="auto")
     for row, column in np.argwhere(table > 0):
@@ -230,9 +228,7 @@ def _draw_left_out(score: TrialScore) -> Figure | None:
     rows = _left_out(score)
     if not rows:
         return None
-    figure = style.new_figure(0.36 * len(rows) + 1.1)
-    axes = figure.subplots()
-    style.dress(axes, "share of the cases", "")
+    figure, axes = style.one_panel("share of the cases", "", 0.36 * len(rows) + 1.1)
     done = [0.0] * len(rows)
     for name, colour in _OUTCOMES.items():
         shares = [counts[name] / counts.total() for _, counts in rows]
