@@ -40,7 +40,7 @@ from shm.store.ring import ring_of
 from shm.values import Hanger, Posterior
 from shm_cli import flags, thesis
 from shm_cli.common import counting_bar
-from shm_cli.simulate_stream import arriving, send
+from shm_cli.planting import arriving, send
 
 # A story: three hangers, four days, of which the watch learns three; then one loses as much as
 # nobody sees. At 100 Hz, and in chunks of ten minutes, so that two cores are done in two minutes.

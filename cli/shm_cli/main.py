@@ -76,10 +76,14 @@ VERBS: dict[str, Verb] = {
     "archive": Verb(
         "shm_cli.archive", "Keep the archive and the quarantine from growing for ever."
     ),
-    "doctor": Verb("shm_cli.doctor", "Whether all is well, and what to do where it is not."),
+    "doctor": Verb(
+        "shm_cli.checkup", "Whether all is well, and what to do where it is not.", "doctor"
+    ),
     "status": Verb("shm_cli.status", "What the workspace holds and what waits."),
     "bridges": Verb(
-        "shm_cli.bridges", "How this bridge and the others of bridge.toml are, the worst first."
+        "shm_cli.checkup",
+        "How this bridge and the others of bridge.toml are, the worst first.",
+        "bridges",
     ),
     "settings": Verb("shm_cli.settings", "Every setting: its default, its range, what it means."),
     "notices": Verb(

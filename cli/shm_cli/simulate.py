@@ -28,8 +28,15 @@ from shm.simulate import (
 from shm.values import Hanger, Recording
 from shm_cli import flags
 from shm_cli.common import counting_bar, one_hanger, open_workspace, show
-from shm_cli.planting import LACKS, conditions_of, effect_of, mass_of, write_campaign
-from shm_cli.simulate_stream import Live, simulate_streams
+from shm_cli.planting import (
+    LACKS,
+    Live,
+    conditions_of,
+    effect_of,
+    mass_of,
+    simulate_streams,
+    write_campaign,
+)
 
 _FIRST = datetime(2026, 1, 5, 10, tzinfo=UTC)  # any: the same call gives the same files
 _SPRING = "End spring in N m/rad; clamped if left out."

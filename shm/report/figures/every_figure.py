@@ -17,11 +17,9 @@ from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
 from shm.report.figures.hanger_tension import FIGURE as TENSION
 from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.modal_test_hits import FIGURE as HITS
+from shm.report.figures.modal_test_modes import DAMPING, SHAPES, STABILISATION
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
 from shm.report.figures.modal_test_response import Shown
-from shm.report.figures.modal_test_shapes import FIGURE as SHAPES
-from shm.report.figures.modal_test_stabilisation import DAMPING
-from shm.report.figures.modal_test_stabilisation import FIGURE as STABILISATION
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
 from shm.report.figures.specification import Illustration, Member, drawn
 from shm.report.figures.trial_answers import CONFUSION, DETECTION, LEFT_OUT
