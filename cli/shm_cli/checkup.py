@@ -43,16 +43,12 @@ def doctor(ctx: click.Context) -> int:
     """
     findings = examine(Path(ctx.obj), utc_now())
     if flags.wants_json():
-        show({"worst": _worst(findings), "findings": [asdict(each) for each in findings]})
+        worst = max((each.level for each in findings), key=list(Level).index)
+        show({"worst": worst, "findings": [asdict(each) for each in findings]})
     else:
         _show_findings(findings)
     faults = {each.check for each in findings if each.level is Level.FAULT}
     return StoreError.exit_code if "store" in faults else _FAULT if faults else 0
-
-
-def _worst(findings: Sequence[Finding]) -> str:
-    order = list(Level)
-    return max((each.level for each in findings), key=order.index)
 
 
 def _show_findings(findings: Sequence[Finding]) -> None:

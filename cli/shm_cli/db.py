@@ -11,7 +11,7 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm.errors import DamagedRow, StoreError, UsageError, sentence
+from shm.errors import StoreError, UsageError, sentence
 from shm.store import Archive, Store, Workspace
 from shm.store.backups import back_up, copy_store, restore
 from shm.store.checking import (
@@ -23,7 +23,6 @@ from shm.store.checking import (
     unknown_files,
 )
 from shm.store.copying import TableContent
-from shm.store.missing import MissingRow
 from shm.store.retention import CopiedArchive, copy_archive
 from shm_cli import flags
 from shm_cli.common import (
@@ -118,8 +117,14 @@ def check(ctx: click.Context, with_archive: bool, accepted: str | None) -> None:
             "store": location,
             "tables": [asdict(each) for each in checked.tables],
             "archive": asdict(archive) if archive else None,
-            "damaged": [_damage_document(each) for each in checked.damaged],
-            "missing": [_missing_document(each) for each in checked.missing],
+            "damaged": [
+                {"table": e.table, "id": e.id, "hanger": e.hanger, "remedy": e.remedy}
+                for e in checked.damaged
+            ],
+            "missing": [
+                {"table": e.table, "id": e.id, "message": e.message, "remedy": e.remedy}
+                for e in checked.missing
+            ],
             "troubles": [*checked.troubles, *(archive.troubles if archive else ())],
             "findings": [asdict(each) for each in findings],
         }
@@ -269,14 +274,6 @@ def copy(ctx: click.Context, target: str) -> None:
     else:
         _show_tables(tables)
         click.echo("Both stores hold the same. Name the new one in SHM_STORE.")
-
-
-def _damage_document(row: DamagedRow) -> dict[str, object]:
-    return {"table": row.table, "id": row.id, "hanger": row.hanger, "remedy": row.remedy}
-
-
-def _missing_document(row: MissingRow) -> dict[str, object]:
-    return {"table": row.table, "id": row.id, "message": row.message, "remedy": row.remedy}
 
 
 def _fetch(workspace: Workspace, copies: Path | None) -> CopiedArchive | None:

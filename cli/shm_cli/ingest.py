@@ -311,9 +311,12 @@ def _modes(path: Path) -> Peek:
 
 def _show_channels(look: Peek) -> None:
     """A row a channel; calibration and full scale only where a channel has one."""
-    columns = [name for name in _COLUMNS if name not in _RARE or _has(look, name)]
-    rows = [[_COLUMNS[name](channel) for name in columns] for channel in look.channels]
-    show_rows(_title(look), columns, rows)
+    columns = {
+        name: cells
+        for name, told in _COLUMNS.items()
+        if any(cells := [told(channel) for channel in look.channels]) or name not in _RARE
+    }
+    show_rows(_title(look), tuple(columns), zip(*columns.values(), strict=True))
 
 
 def _number(value: float) -> str:
@@ -330,10 +333,6 @@ _COLUMNS: dict[str, Callable[[PeekChannel], str]] = {
     "full scale": lambda channel: _number(channel.full_scale),
 }
 _RARE = ("calibration", "full scale")
-
-
-def _has(look: Peek, column: str) -> bool:
-    return any(_COLUMNS[column](channel) for channel in look.channels)
 
 
 def _title(look: Peek) -> str:

@@ -1,4 +1,4 @@
-"""What `shm simulate` plants, writes and sends: effects, campaigns, streams of permanent sensors."""
+"""What `shm simulate` plants, writes and sends: effects, campaigns, streams of sensors."""
 
 from __future__ import annotations
 

@@ -160,17 +160,14 @@ def unit_text(name: str, workspace: Path, prefix: Path, words: Sequence[str], *w
         "ReadWritePaths": " ".join(room),
         "User": workspace.owner(),
     }
-    if any(map(_is_in_a_home, (workspace, prefix, *writes))):
+    paths = [each.resolve() for each in (workspace, prefix, *writes)]
+    if any(path.is_relative_to(home) for path in paths for home in _HOMES):
         values["ProtectHome"] = "read-only"  # hidden homes would hide what it works with
     text = unit_file(name).read_text(encoding="utf-8")
     for key, value in values.items():
         line = re.compile(rf"^{re.escape(key)}=.*$", re.MULTILINE)
         text = line.sub(lambda _, key=key, value=value: f"{key}={value}", text, count=1)  # type: ignore[misc]
     return text
-
-
-def _is_in_a_home(path: Path) -> bool:
-    return any(path.resolve().is_relative_to(home) for home in _HOMES)
 
 
 def _refuse_odd(texts: Sequence[str]) -> None:

@@ -12,7 +12,7 @@ from shm.bridge import load_hanger
 from shm.errors import GateNotMet, UsageError
 from shm.values import Hanger
 from shm_cli import flags, thesis
-from shm_cli.common import markdown, progress_bar, show, show_rows
+from shm_cli.common import progress_bar, show, show_rows
 from shm_cli.validation import formulas, frequencies, selection, solid_figures, thesis_figures
 from shm_cli.validation.thesis_figures import Figure
 
@@ -26,9 +26,6 @@ FIGURES: dict[str, Callable[[Hanger, Callable[[str, float], None], str], Figure]
 
 
 @click.command()
-@click.option(
-    "--markdown", "as_markdown", is_flag=True, help="The tables as Markdown, for the docs."
-)
 @click.option(
     "--figure",
     type=click.Choice(tuple(FIGURES)),
@@ -58,7 +55,6 @@ FIGURES: dict[str, Callable[[Hanger, Callable[[str, float], None], str], Figure]
 @flags.seed
 @flags.json
 def command(
-    as_markdown: bool,
     figure: str | None,
     wanted: str | None,
     practice: bool,
@@ -73,7 +69,7 @@ def command(
     by more than its mark, or the evidence does not prefer springs to fixed ends.
 
     \b
-    Example: shm validate --markdown
+    Example: shm validate
     Example: shm validate --figure 2.4 --out figure_2_4.png
     Example: shm validate --table A.5
     Example: shm validate --formulas
@@ -107,8 +103,6 @@ def command(
                 "selection": [asdict(row) for row in chosen],
             }
         )
-    elif as_markdown:
-        click.echo("\n\n".join(markdown(heads, rows) for heads, rows in parts.values()))
     else:
         for title, (heads, rows) in parts.items():
             show_rows(title, heads, rows)

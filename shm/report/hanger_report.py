@@ -232,6 +232,8 @@ def structure_paper(data: StructureReport) -> Paper:
         ("Baseline since", since, "its own first tests; no model, no tension"),
         ("Open alerts", str(data.open_alerts), f"of {len(data.alerts)}"),
     )
+    told = tuple((f"{each.time:%Y-%m-%d}", each.message) for each in data.alerts)
+    alerts = Table("Alerts", ("test of", "message"), told)
     return Paper(
         title=structure_words(data.structure),
         bridge=data.bridge,
@@ -239,7 +241,7 @@ def structure_paper(data: StructureReport) -> Paper:
         style="alert" if data.open_alerts else "first",
         parts=(
             Part("In short", summary=data.said or _NOT_WATCHED, facts=facts),
-            Part("Numbers", tables=filled(_structure_frequencies(data), _structure_alerts(data))),
+            Part("Numbers", tables=filled(_structure_frequencies(data), alerts)),
         ),
         generated_at=data.generated_at,
         version=data.version,
@@ -266,11 +268,6 @@ def _frequency_shift(drift: Drift | None) -> tuple[str, str]:
         return "not watched yet", ""
     shift = rounded_percent(drift.shift_mean, NINETY_PERCENT * drift.shift_sd, "+")
     return shift, f"{drift.probability:.2f} (of {100 * drift.threshold:.3g} %)"
-
-
-def _structure_alerts(data: StructureReport) -> Table:
-    rows = tuple((f"{each.time:%Y-%m-%d}", each.message) for each in data.alerts)
-    return Table("Alerts", ("test of", "message"), rows)
 
 
 def structure_json(data: StructureReport) -> dict[str, Any]:

@@ -64,7 +64,8 @@ def _sentences(data: HangerReport) -> tuple[str, ...]:
     found = (
         *_doubts(data),
         _tension(data),
-        *_repeats_and_limits(data),
+        # How well a test repeats it, and the probabilities that the owner's limits ask for.
+        *stated(data.averaged, data.tension_unit).sentences[1:],
         _against_nominal(data),
         _against_baseline(data),
         _unseen(data),
@@ -130,11 +131,6 @@ def _tension(data: HangerReport) -> str:
     tension = formatting.with_half(data.tension_n, data.tension_unit)
     day = f" of {data.latest.time:%Y-%m-%d}" if data.latest.time else ""
     return f"Its tension is {tension} by test {data.latest.id}{day}."
-
-
-def _repeats_and_limits(data: HangerReport) -> tuple[str, ...]:
-    """How well a test repeats it, and the probabilities that the owner's limits ask for."""
-    return stated(data.averaged, data.tension_unit).sentences[1:]
 
 
 def _against_nominal(data: HangerReport) -> str:
@@ -248,7 +244,9 @@ def _outside(data: HangerReport) -> str:
     outside = [mode for mode, off in misfits if not off.low <= 0 <= off.high]
     if not misfits:
         return ""
-    if len(outside) > _by_chance(len(misfits)):
+    # So many may well lie outside by chance: two standard deviations.
+    by_chance = 0.1 * len(misfits) + 2 * math.sqrt(0.09 * len(misfits))
+    if len(outside) > by_chance:
         return f"{_outliers(outside)}: the model does not explain these, and no diagnosis was made."
     chance = f"{_outliers(outside)}, no more than by chance" if outside else ""
     start = chance or "Each lies within its 90 % interval"
@@ -263,11 +261,6 @@ def _outliers(modes: Sequence[PredictedFrequency]) -> str:
     named = f"{told[0].upper()}{told[1:]}"
     who = named if len(modes) <= _MOST_NAMED else formatting.counted(len(modes), "mode")
     return f"{who} {'lies' if len(modes) == 1 else 'lie'} outside the 90 % interval"
-
-
-def _by_chance(modes: int) -> float:
-    """How many of so many may well lie outside their 90 % intervals: two standard deviations."""
-    return 0.1 * modes + 2 * math.sqrt(0.09 * modes)
 
 
 def _diagnosed_on(diagnosis: Diagnosis) -> str:

@@ -104,11 +104,8 @@ def settings(told: Mapping[str, str]) -> Table:
     return Table(
         "Settings in force",
         ("setting", "value", "what it is"),
-        tuple((name, _spaced(value), helps.get(name, "")) for name, value in told.items()),
+        tuple(
+            (name, value.replace(",", ", "), helps.get(name, "")) for name, value in told.items()
+        ),
         note="Of identification, updating and watch, as they stand now: given, without interval.",
     )
-
-
-def _spaced(value: str) -> str:
-    """`beam1,beam2` as a list that folds."""
-    return ", ".join(value.split(","))

@@ -169,7 +169,8 @@ def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:
     diagnosis = sheet.diagnosis
     shown = _MOST_ON_SCREEN if is_on_screen else len(_shown(diagnosis))
     left = len(diagnosis.causes) - shown
-    more = f" {formatting.counted(left, 'less probable cause')} {_are(left)} not drawn."
+    verb = "is" if left == 1 else "are"
+    more = f" {formatting.counted(left, 'less probable cause')} {verb} not drawn."
     alike = (
         "Causes with the same letter cannot be told apart with these data"
         if is_on_screen
@@ -180,10 +181,6 @@ def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:
         "Probability of each cause, of something that the catalogue does not hold, and of no gap; "
         f"all add to 1.{groups}{more if left > 0 else ''}"
     )
-
-
-def _are(count: int) -> str:
-    return "is" if count == 1 else "are"
 
 
 def _alt(sheet: DiagnosisSheet) -> str:

@@ -113,16 +113,13 @@ def _sigma(data: HangerReport) -> Interval:
     return Interval.of_samples(data.posterior.parameter("sigma"))
 
 
-def _model_error(data: HangerReport) -> str:
-    return "sigma " + formatting.with_interval(_sigma(data).scaled(100), "%")
-
-
 def _caption(data: HangerReport) -> str:
+    error = formatting.with_interval(_sigma(data).scaled(100), "%")
     return (
         f"Frequencies predicted by {formatting.model_class(data.posterior.model)} after updating, "
         "over the measured ones of the latest test. Bars: 90 % interval that the uncertainty of "
         "the parameters leaves; dark boxes: that of the measurement, where known; light band: "
-        f"model error ({_model_error(data)}). A mode outside the band is one that the model does "
+        f"model error (sigma {error}). A mode outside the band is one that the model does "
         "not explain."
     )
 

@@ -31,12 +31,11 @@ from shm.watch.history import Band as Bounds
 _TENSION_INCHES, _STIFFNESS_INCHES, _TEMPERATURE_INCHES = 2.3, 1.5, 0.75
 _REST_INCHES = 0.9
 _TENSION_TITLE = "tension by the selected model class: estimate to date and retrospective"
-_LEAST_TESTS = 2
-"""One test alone has no course: its numbers stand elsewhere."""
 
 
-def specify(data: StatesOverTime) -> Specification | None:
-    if not data.times or not data.quantities:
+def specify(data: StatesOverTime, least_tests: int = 1) -> Specification | None:
+    """None of fewer tests: of one alone a report gives the numbers elsewhere."""
+    if len(data.times) < least_tests or not data.quantities:
         return None
     panels = [_panel(data, quantity) for quantity in data.quantities]
     if np.any(np.isfinite(data.temperatures_c)):
@@ -180,15 +179,11 @@ def _last(quantity: QuantityOverTime) -> str:
     )
 
 
-def _specify_course(data: StatesOverTime) -> Specification | None:
-    return specify(data) if len(data.times) >= _LEAST_TESTS else None
-
-
 STATES = Member("drift", "States over time", specify, _caption, _alt)
 FIGURE = Member[HangerReport](
     STATES.name,
     STATES.title,
-    lambda data: _specify_course(data.states.within(data.period)),
+    lambda data: specify(data.states.within(data.period), least_tests=2),
     lambda data: _caption(data.states.within(data.period)),
     lambda data: _alt(data.states.within(data.period)),
 )

@@ -293,23 +293,18 @@ def alt(course: Course) -> str:
     return f"Tension over {count}, {first} at first, {last} at last.{called}"
 
 
-def _baseline_n(data: HangerReport) -> float | None:
-    if data.baseline is None:
-        return None
-    return averaged_now(data.baseline, data.selection).tension_n.mean
-
-
 def _course(data: HangerReport) -> Course:
     rows = time_axes.dated(data)
     alerted = {alert.test: alert.message for alert in data.alerts}
     undated = len(data.trend) - len(rows)
+    baseline = data.baseline and averaged_now(data.baseline, data.selection)
     left = f"{formatting.counted(undated, 'test')} without a time left out." if undated else ""
     return Course(
         times=[row.time for row in rows],
         names=[row.row.test for row in rows],
         tensions_n=[row.row.tension_n for row in rows],
         nominal_n=data.hanger.nominal_tension_n,
-        baseline_n=_baseline_n(data),
+        baseline_n=baseline.tension_n.mean if baseline else None,
         reach=data.hanger.thresholds.tension_shift_fraction,
         alerts={i: alerted[r.row.test] for i, r in enumerate(rows) if r.row.test in alerted},
         notes=data.inspections,
