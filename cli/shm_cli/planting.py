@@ -24,7 +24,6 @@ from shm.simulate import (
     CampaignTruth,
     HangerState,
     PlantedEffect,
-    TestConditions,
     campaign_with_truth,
 )
 from shm.simulate.monitored import Loss, MonitoringPlan, streamed
@@ -76,17 +75,6 @@ def mass_of(text: str | None) -> AddedMass | None:
             f"--added-mass {text!r} is not KG:X.", remedy="Write --added-mass 25:3.6."
         ) from None
     return AddedMass(mass_kg, x_m)
-
-
-def conditions_of(
-    temperature_c: float,
-    reference_c: float,
-    amplitude: float,
-    added_mass: AddedMass | None,
-) -> TestConditions:
-    """What a recording is made under; an unknown temperature is the reference."""
-    shift = 0.0 if np.isnan(temperature_c) else temperature_c - reference_c
-    return TestConditions("", shift, amplitude, added_mass)
 
 
 def write_campaign(

@@ -27,11 +27,10 @@ from shm.simulate import (
 )
 from shm.values import Hanger, Recording
 from shm_cli import flags
-from shm_cli.common import counting_bar, one_hanger, open_workspace, show
+from shm_cli.common import answer, counting_bar, one_hanger, open_workspace
 from shm_cli.planting import (
     LACKS,
     Live,
-    conditions_of,
     effect_of,
     mass_of,
     simulate_streams,
@@ -238,11 +237,8 @@ def command(
 
 
 def _tell(written: Sequence[Path]) -> None:
-    if flags.wants_json():
-        show({"files": [str(path) for path in written]})
-        return
-    for path in written:
-        click.echo(path)
+    files = [str(path) for path in written]
+    answer({"files": files}, "\n".join(files))
 
 
 def _refuse_what_does_not_go_together(
@@ -285,15 +281,10 @@ def _recording(hanger: Hanger, chosen: Chosen, rng: np.random.Generator) -> Reco
 
 
 def _state(hanger: Hanger, chosen: Chosen) -> HangerState:
-    tension_n = chosen["tension_n"]
-    return HangerState(
-        hanger.nominal_tension_n if tension_n is None else tension_n,
-        chosen["k1"],
-        chosen["k2"],
-        chosen["k3"],
-        chosen["k4"],
-        damping_ratio=chosen["damping"],
-    )
+    given_n = chosen["tension_n"]
+    tension_n = hanger.nominal_tension_n if given_n is None else given_n
+    springs = (chosen["k1"], chosen["k2"], chosen["k3"], chosen["k4"])
+    return HangerState(tension_n, *springs, damping_ratio=chosen["damping"])
 
 
 def _hit(hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Generator) -> Recording:
@@ -319,12 +310,10 @@ def _hit(hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Gene
 
 
 def _conditions(chosen: Chosen) -> TestConditions:
-    return conditions_of(
-        chosen["temperature_c"],
-        chosen["reference_c"],
-        chosen["amplitude"],
-        mass_of(chosen["added_mass"]),
-    )
+    """What a recording is made under; an unknown temperature is the reference."""
+    shift_k = chosen["temperature_c"] - chosen["reference_c"]
+    mass = mass_of(chosen["added_mass"])
+    return TestConditions("", 0.0 if math.isnan(shift_k) else shift_k, chosen["amplitude"], mass)
 
 
 def _listened(
