@@ -85,10 +85,15 @@ VERBS: dict[str, Verb] = {
         "How this bridge and the others of bridge.toml are, the worst first.",
         "bridges",
     ),
-    "settings": Verb("shm_cli.settings", "Every setting: its default, its range, what it means."),
+    "settings": Verb(
+        "shm_cli.installation",
+        "Every setting: its default, its range, what it means.",
+        "settings_command",
+    ),
     "notices": Verb(
-        "shm_cli.notices",
+        "shm_cli.installation",
         "Other people's packages that work here, with the licence that each declares.",
+        "notices_command",
     ),
     "completion": Verb(
         "shm_cli.completion", "Print the script that completes `shm` in bash or zsh."
