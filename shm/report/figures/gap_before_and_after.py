@@ -19,17 +19,9 @@ from shm.report.diagnosis_wording import (
     tension_unit,
     tension_words,
 )
+from shm.report.figures import specification as spec
 from shm.report.figures import style
 from shm.report.figures.gap_map import by_plane, kept, orders, planes
-from shm.report.figures.specification import (
-    PLANE_HUES,
-    Axis,
-    Member,
-    Points,
-    Specification,
-    Symbol,
-    limits,
-)
 from shm.values import Plane, Residual, TensionEstimate
 from shm.values.rounding import ForceUnit
 
@@ -44,7 +36,7 @@ class _Series:
 
     field: str
     label: str
-    symbol: Symbol
+    symbol: spec.Symbol
     filled: bool
     colour: str
     offset: float
@@ -58,7 +50,7 @@ _SERIES = (
 )
 
 
-def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> Specification | None:
+def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specification | None:
     residuals = [r for r in kept(sheet) if math.isfinite(r.after_percent)]
     if not residuals or claimed(sheet.diagnosis) is None:
         return None
@@ -72,11 +64,11 @@ def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> Specification 
     }
     label = "gap (%)" if is_on_screen else "measured / predicted - 1 (%)"
     ends = [end for marks in made.values() for each in marks for end in (each.low, each.high)]
-    rows = by_plane(made, residuals, Axis(label=label, range=limits(*ends)), is_on_screen)
-    return Specification(rows=rows, height_inches=3.0, legend_columns=3)
+    rows = by_plane(made, residuals, spec.Axis(label=label, range=spec.limits(*ends)), is_on_screen)
+    return spec.Specification(rows=rows, height_inches=3.0, legend_columns=3)
 
 
-def _points(residuals: Sequence[Residual], plane: Plane, series: _Series) -> Points | None:
+def _points(residuals: Sequence[Residual], plane: Plane, series: _Series) -> spec.Points | None:
     """The mean over the tests with a line from the least to the largest."""
     there = [
         (order, values)
@@ -85,12 +77,12 @@ def _points(residuals: Sequence[Residual], plane: Plane, series: _Series) -> Poi
     ]
     if not there:
         return None
-    return Points(
+    return spec.Points(
         x=[order + series.offset for order, _ in there],
         y=[float(np.mean(values)) for _, values in there],
         low=[min(values) for _, values in there], high=[max(values) for _, values in there],
         caps=False, symbol=series.symbol, filled=series.filled, name=series.label,
-        colour=series.colour or PLANE_HUES[plane],
+        colour=series.colour or spec.PLANE_HUES[plane],
         hover=f"{plane}, {series.label}: %{{y:.2f}} %",
     )  # fmt: skip
 
@@ -135,7 +127,7 @@ def _rms(residuals: Sequence[Residual], plane: Plane, field: str) -> str:
     return f"{formatting.plain(float(np.sqrt(np.mean(np.square(known)))), 2)} %"
 
 
-BEFORE_AND_AFTER = Member(
+BEFORE_AND_AFTER = spec.Member(
     "before_and_after",
     "The gap before and after by mode",
     specify,
@@ -222,7 +214,7 @@ def _alt_of_gap_tension(sheet: DiagnosisSheet) -> str:
     return f"Tension before and after, mean and 90 % interval: {'; '.join(told)}."
 
 
-GAP_TENSION = Member(
+GAP_TENSION = spec.Member(
     "gap_tension",
     "Tension before and after",
     _draw_gap_tension,

@@ -12,19 +12,8 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import ModalTestReport
+from shm.report.figures import specification as spec
 from shm.report.figures.modal_test_response import Shown, searched_range
-from shm.report.figures.specification import (
-    Axis,
-    Dash,
-    Line,
-    Member,
-    Panel,
-    Rule,
-    Span,
-    Specification,
-    envelope_places,
-    peak_places,
-)
 from shm.values import NAN, BoolArray, Channel, FloatArray, Recording
 
 if TYPE_CHECKING:
@@ -116,7 +105,7 @@ def thinned(records: Sequence[Recording], row: int | None) -> tuple[FloatArray, 
         channel = channel_of(record, row)
         if channel is not None and len(channel.values):
             bins = max(8, round(_BINS * record.duration_s / whole))
-            places = envelope_places(channel.values, bins)
+            places = spec.envelope_places(channel.values, bins)
             times += [offset + places / record.sampling_rate_hz, np.array([np.nan])]
             values += [channel.values[places], np.array([np.nan])]
     return np.concatenate(times), np.concatenate(values)
@@ -259,24 +248,24 @@ def _spectrum(force_n: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]
 def _fade(motion: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
     known = motion[np.isfinite(motion)]
     size = np.abs(motion - np.mean(known)) if len(known) else np.full(len(motion), np.nan)
-    places = peak_places(size, min(_FADE_BINS, len(size)))
+    places = spec.peak_places(size, min(_FADE_BINS, len(size)))
     return places / rate, size[places]
 
 
 _COLOURS = ("blue", "orange", "green", "purple")
-_DASHES: tuple[Dash, ...] = ("solid", "dash", "dot")
-_DROPPED_DASHES: tuple[Dash, ...] = ("dash", "dot", "dashdot", "longdash")
+_DASHES: tuple[spec.Dash, ...] = ("solid", "dash", "dot")
+_DROPPED_DASHES: tuple[spec.Dash, ...] = ("dash", "dot", "dashdot", "longdash")
 _FADE_ROOM = 1.3  # layout: room to the right of the last hit
 
 
-def _draw(shown: Shown) -> Specification | None:
+def _draw(shown: Shown) -> spec.Specification | None:
     hits = shown_hits(shown.sheet)
     if not hits:
         return None
     panels = [_pulses(hits), _force_spectra(shown, hits), _fades(hits)]
     rows = [[each] for each in panels] if shown.is_on_screen else [panels[:2], panels[2:]]
     columns = 6 if all(hit_record.hit.used for hit_record in hits) else 3
-    return Specification(rows=rows, height_inches=5.4, legend_columns=columns)
+    return spec.Specification(rows=rows, height_inches=5.4, legend_columns=columns)
 
 
 def _look(hit_record: HitRecord, place: int) -> dict[str, Any]:
@@ -290,28 +279,28 @@ def _look(hit_record: HitRecord, place: int) -> dict[str, Any]:
     return {"name": name, "colour": colour, "dash": dashes, "width": 0.9}
 
 
-def _pulses(hits: Sequence[HitRecord]) -> Panel:
+def _pulses(hits: Sequence[HitRecord]) -> spec.Panel:
     lines = []
     for place, hit_record in enumerate(hits):
-        kept = envelope_places(hit_record.force_n, CURVE_BINS)
+        kept = spec.envelope_places(hit_record.force_n, CURVE_BINS)
         lines.append(
-            Line(
+            spec.Line(
                 x=1e3 * hit_record.time_s[kept], y=hit_record.force_n[kept],
                 hover="%{x:.1f} ms: %{y:.4g} N",
                 **_look(hit_record, place),
             )
         )  # fmt: skip
     spans_ms = 1e3 * np.array([hit_record.near_s for hit_record in hits])
-    return Panel(
-        y=Axis(label="force (N)"), marks=lines,
-        x=Axis(
+    return spec.Panel(
+        y=spec.Axis(label="force (N)"), marks=lines,
+        x=spec.Axis(
             label="time from the start of the hit (ms)",
             range=(float(spans_ms[:, 0].min()), float(spans_ms[:, 1].max())),
         ),
     )  # fmt: skip
 
 
-def _force_spectra(shown: Shown, hits: Sequence[HitRecord]) -> Panel:
+def _force_spectra(shown: Shown, hits: Sequence[HitRecord]) -> spec.Panel:
     highest = float(hits[0].spectrum_hz[-1])
     low, high = searched_range(shown.sheet)
     high = min(high, highest)
@@ -321,37 +310,38 @@ def _force_spectra(shown: Shown, hits: Sequence[HitRecord]) -> Panel:
         # Far below the panel nothing is drawn, as lines to there would cross others outside it.
         kept = (hit_record.spectrum_hz <= end) & (hit_record.spectrum_db > LOWEST_DB - 20)
         found = np.where(kept, hit_record.spectrum_db, np.nan)
-        places = envelope_places(found, CURVE_BINS)
+        places = spec.envelope_places(found, CURVE_BINS)
         lines.append(
-            Line(
+            spec.Line(
                 x=hit_record.spectrum_hz[places], y=found[places], hover="%{x:.1f} Hz: %{y:.3g} dB",
                 **_look(hit_record, place),
             )
         )  # fmt: skip
-    level = Rule(at=REACH_DB, width=0.8, dash="dashdot", label="a tenth of the force")
-    band = Span(low=low, high=high, colour="green", opacity=0.10)
+    level = spec.Rule(at=REACH_DB, width=0.8, dash="dashdot", label="a tenth of the force")
+    band = spec.Span(low=low, high=high, colour="green", opacity=0.10)
     what = "band" if shown.sheet.band_hz else "where modes were found"
-    return Panel(
-        y=Axis(label="force, relative (dB)", range=(LOWEST_DB, 2)), marks=[*lines, level, band],
-        x=Axis(label="frequency (Hz)", range=(0, end)), title=f"shaded: {what}",
+    return spec.Panel(
+        y=spec.Axis(label="force, relative (dB)", range=(LOWEST_DB, 2)),
+        marks=[*lines, level, band],
+        x=spec.Axis(label="frequency (Hz)", range=(0, end)), title=f"shaded: {what}",
     )  # fmt: skip
 
 
-def _fades(hits: Sequence[HitRecord]) -> Panel:
+def _fades(hits: Sequence[HitRecord]) -> spec.Panel:
     values = np.concatenate([hit_record.fade_m_s2_n for hit_record in hits])
     known = values[np.isfinite(values) & (values > 0)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.1, 1.0)
-    axis = Axis(scale="log", range=(low / _FADE_ROOM, high * _FADE_ROOM))
-    return Panel(
+    axis = spec.Axis(scale="log", range=(low / _FADE_ROOM, high * _FADE_ROOM))
+    return spec.Panel(
         y=replace(axis, label="largest acceleration\nper peak force (m/s²/N)"),
         marks=[
-            Line(
+            spec.Line(
                 x=hit_record.fade_s, y=hit_record.fade_m_s2_n, hover="%{x:.2f} s: %{y:.3g} m/s²/N",
                 **_look(hit_record, place),
             )
             for place, hit_record in enumerate(hits)
         ],
-        x=Axis(
+        x=spec.Axis(
             label="time from the start of the hit (s)",
             range=(0, max(float(hit_record.fade_s[-1]) for hit_record in hits)),
         ),
@@ -380,4 +370,4 @@ def _alt(shown: Shown) -> str:
     )
 
 
-FIGURE = Member("hits", "Hits: pulses, force spectra, ring-downs", _draw, _caption, _alt)
+FIGURE = spec.Member("hits", "Hits: pulses, force spectra, ring-downs", _draw, _caption, _alt)

@@ -12,28 +12,13 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import ModalTestReport
+from shm.report.figures import specification as spec
 from shm.report.figures.modal_test_response import (
     Shown,
     Spectrum,
     mode_marks,
     shown_range,
     with_headroom,
-)
-from shm.report.figures.specification import (
-    PLANE_HUES,
-    PLANE_SYMBOLS,
-    Axis,
-    Line,
-    Mark,
-    Member,
-    Panel,
-    Points,
-    Rule,
-    Specification,
-    Symbol,
-    envelope_places,
-    log_axis,
-    stacked,
 )
 from shm.report.formatting import NORMAL_90
 from shm.values import PLANES, BoolArray, FloatArray, Mode
@@ -43,7 +28,7 @@ _BINS = 550
 _LEAST_SPAN = 2.0
 
 
-def _draw_poles(shown: Shown) -> Specification | None:
+def _draw_poles(shown: Shown) -> spec.Specification | None:
     poles = shown.sheet.identification.poles
     if not len(poles.order):
         return None
@@ -51,7 +36,7 @@ def _draw_poles(shown: Shown) -> Specification | None:
     lowest, highest = float(poles.order.min()), float(poles.order.max())
     bottom = lowest - 0.03 * max(highest - lowest, _LEAST_SPAN)
     step = next((each for each in (1, 2, 5, 10, 20, 50) if 6 * each >= highest), 100)
-    orders = Axis(
+    orders = spec.Axis(
         label="model order", range=with_headroom(bottom, 1.02 * highest),
         ticks=np.arange(0, highest + 1, step).tolist(),
     )  # fmt: skip
@@ -61,13 +46,15 @@ def _draw_poles(shown: Shown) -> Specification | None:
         _poles(shown, poles.stable, "stable pole", "circle", "green"),
         *mode_marks(shown.sheet, low, high),
     ]
-    across = Axis(label="frequency (Hz)", range=(low, high))
-    return stacked([Panel(y=orders, marks=marks, x=across)], 4.2, legend_columns=3)
+    across = spec.Axis(label="frequency (Hz)", range=(low, high))
+    return spec.stacked([spec.Panel(y=orders, marks=marks, x=across)], 4.2, legend_columns=3)
 
 
-def _poles(shown: Shown, which: BoolArray, name: str, symbol: Symbol, colour: str) -> Points:
+def _poles(
+    shown: Shown, which: BoolArray, name: str, symbol: spec.Symbol, colour: str
+) -> spec.Points:
     poles = shown.sheet.identification.poles
-    return Points(
+    return spec.Points(
         x=poles.frequency_hz[which], y=poles.order[which], symbol=symbol, size=3.0, colour=colour,
         name=name, texts=[f"{100 * ratio:.2g}" for ratio in poles.damping_ratio[which]],
         hover="%{x:.3f} Hz, order %{y}, damping %{text} %",
@@ -76,7 +63,7 @@ def _poles(shown: Shown, which: BoolArray, name: str, symbol: Symbol, colour: st
 
 def _background(
     found: Spectrum, low_hz: float, high_hz: float, bottom: float, top: float
-) -> list[Mark]:
+) -> list[spec.Mark]:
     """The spectrum over all points, its logarithm between the lowest order and the highest."""
     start, stop = np.searchsorted(found.frequency_hz, [low_hz, high_hz])
     lines = slice(max(1, int(start)), int(stop) + 1)
@@ -84,13 +71,13 @@ def _background(
     known = values[np.isfinite(values) & (values > 0)]
     if not len(known):
         return []
-    places = envelope_places(values, _BINS)
+    places = spec.envelope_places(values, _BINS)
     least, most = np.log10([0.5 * np.quantile(known, 0.01), known.max()])
     with np.errstate(divide="ignore", invalid="ignore"):
         share = (np.log10(values[places]) - least) / (most - least)
     name = "spectrum of all points (log scale)"
     return [
-        Line(
+        spec.Line(
             x=found.frequency_hz[lines][places], y=bottom + (top - bottom) * share, width=0.8,
             colour="quiet", opacity=0.6, name=name,
         )
@@ -112,7 +99,7 @@ def _poles_alt(shown: Shown) -> str:
     return f"Stabilisation diagram with {len(shown.sheet.modes)} chosen modes: {listed}."
 
 
-STABILISATION = Member(
+STABILISATION = spec.Member(
     "stabilisation", "Stabilisation diagram", _draw_poles, _poles_caption, _poles_alt
 )
 
@@ -121,45 +108,47 @@ _LEAST_DAMPING_SPAN = 30.0
 """Of the axis of intervals: equal ones shall look equal."""
 
 
-def _draw_damping(shown: Shown) -> Specification | None:
+def _draw_damping(shown: Shown) -> spec.Specification | None:
     damped = [m for m in shown.sheet.modes if math.isfinite(m.damping_ratio)]
     sure = [m for m in shown.sheet.modes if m.frequency_sd_hz > 0]
-    across = Axis(label="frequency (Hz)", range=shown_range(shown.sheet))
+    across = spec.Axis(label="frequency (Hz)", range=shown_range(shown.sheet))
     panels = []
     if damped:
         panels.append(_damping(damped, None if sure else across))
     if sure:
         panels.append(_uncertainty(sure, across))
-    return stacked(panels, 4.6 if sure else 2.9) if panels else None
+    return spec.stacked(panels, 4.6 if sure else 2.9) if panels else None
 
 
-def _damping(modes: Sequence[Mode], across: Axis | None) -> Panel:
+def _damping(modes: Sequence[Mode], across: spec.Axis | None) -> spec.Panel:
     value = np.array([100 * mode.damping_ratio for mode in modes])
     half = np.nan_to_num([100 * NORMAL_90 * mode.damping_sd for mode in modes])
-    axis = Axis(label="damping ratio (%)", range=(0, 1.1 * float(max(value + half))))
-    return Panel(y=axis, marks=_marks(modes, value, half), x=across)
+    axis = spec.Axis(label="damping ratio (%)", range=(0, 1.1 * float(max(value + half))))
+    return spec.Panel(y=axis, marks=_marks(modes, value, half), x=across)
 
 
-def _uncertainty(modes: Sequence[Mode], across: Axis) -> Panel:
+def _uncertainty(modes: Sequence[Mode], across: spec.Axis) -> spec.Panel:
     """Half the 90 % interval of each frequency, in percent of it."""
     value = np.array([100 * NORMAL_90 * m.frequency_sd_hz / m.frequency_hz for m in modes])
     low, high = float(min(value)), float(max(value))
     room = max(1.3, math.sqrt(_LEAST_DAMPING_SPAN * low / high))
-    axis = log_axis("90 % interval of\nthe frequency (± %)", low / room, high * room)
-    return Panel(y=axis, marks=_marks(modes, value), x=across)
+    axis = spec.log_axis("90 % interval of\nthe frequency (± %)", low / room, high * room)
+    return spec.Panel(y=axis, marks=_marks(modes, value), x=across)
 
 
-def _marks(modes: Sequence[Mode], value: FloatArray, half: FloatArray | None = None) -> list[Mark]:
-    found: list[Mark] = []
+def _marks(
+    modes: Sequence[Mode], value: FloatArray, half: FloatArray | None = None
+) -> list[spec.Mark]:
+    found: list[spec.Mark] = []
     for plane in PLANES:
         own = [place for place, mode in enumerate(modes) if mode.plane == plane]
         if own:
             found.append(
-                Points(
+                spec.Points(
                     x=[modes[place].frequency_hz for place in own], y=value[own],
                     low=None if half is None else (value - half)[own],
                     high=None if half is None else (value + half)[own],
-                    symbol=PLANE_SYMBOLS[plane], colour=PLANE_HUES[plane], name=plane,
+                    symbol=spec.PLANE_SYMBOLS[plane], colour=spec.PLANE_HUES[plane], name=plane,
                     texts=[f"{plane} {modes[place].order}" for place in own],
                     hover="%{text}: %{x:.4g} Hz, %{y:.3g} %",
                 )
@@ -184,7 +173,7 @@ def _damping_alt(shown: Shown) -> str:
     )
 
 
-DAMPING = Member(
+DAMPING = spec.Member(
     "damping", "Damping and uncertainty", _draw_damping, _damping_caption, _damping_alt
 )
 
@@ -263,14 +252,14 @@ _MOST_ON_SCREEN = 4
 _PANEL_INCHES = 1.12
 
 
-def _draw_shapes(shown: Shown) -> Specification | None:
+def _draw_shapes(shown: Shown) -> spec.Specification | None:
     sheet = shown.sheet
     if not shown_modes(sheet):
         return None
     rows = [
         [_shape_panel(sheet, mode) for mode in row] for row in rows_of(sheet, shown.is_on_screen)
     ]
-    return Specification(
+    return spec.Specification(
         rows=rows, height_inches=_PANEL_INCHES * len(rows) + 0.85, is_grid=True,
         x_label="position from the deck end (m)" if sheet.hanger else "position (m)",
     )  # fmt: skip
@@ -287,7 +276,7 @@ def rows_of(sheet: ModalTestReport, is_on_screen: bool) -> list[list[Mode]]:
     return [own[i : i + columns] for own in planes for i in range(0, len(own), columns)]
 
 
-def _shape_panel(sheet: ModalTestReport, mode: Mode) -> Panel:
+def _shape_panel(sheet: ModalTestReport, mode: Mode) -> spec.Panel:
     points = [p for p in mode.shape if math.isfinite(p.x_m)]
     x_m = [p.x_m for p in points]
     value, cross, sd = np.array([(p.value, p.cross, p.sd) for p in points]).reshape(-1, 3).T
@@ -295,32 +284,32 @@ def _shape_panel(sheet: ModalTestReport, mode: Mode) -> Panel:
     low, high = extent_m(sheet)
     margin = 0.03 * (high - low)
     ticks = (low, (low + high) / 2, high)
-    marks: list[Mark] = [Rule(at=0, width=0.5)]
+    marks: list[spec.Mark] = [spec.Rule(at=0, width=0.5)]
     if found := guide(sheet, mode):
         marks.append(
-            Line(x=found.x_m, y=found.value, colour="quiet", width=0.8, name=guide_name(sheet))
+            spec.Line(x=found.x_m, y=found.value, colour="quiet", width=0.8, name=guide_name(sheet))
         )
     marks.append(
-        Points(
+        spec.Points(
             x=x_m, y=value, low=value - half, high=value + half, size=3.8, name=mode.plane,
-            colour=PLANE_HUES[mode.plane], symbol=PLANE_SYMBOLS[mode.plane],
+            colour=spec.PLANE_HUES[mode.plane], symbol=spec.PLANE_SYMBOLS[mode.plane],
             hover="%{x:.4g} m: %{y:.3g}",
         )
     )  # fmt: skip
     if np.isfinite(cross).any():
         marks.append(
-            Points(
+            spec.Points(
                 x=x_m, y=cross, symbol="diamond", filled=False, size=3.4, name="other plane",
                 hover="%{x:.4g} m: %{y:.3g}",
             )
         )  # fmt: skip
-    return Panel(
-        y=Axis(range=(-ROOM, ROOM), ticks=(-1, 0, 1)),
-        x=Axis(
+    return spec.Panel(
+        y=spec.Axis(range=(-ROOM, ROOM), ticks=(-1, 0, 1)),
+        x=spec.Axis(
             range=(low - margin, high + margin), ticks=ticks,
             tick_labels=[f"{tick:.3g}" for tick in ticks],
         ),
-        marks=marks, title=panel_title(mode), title_colour=PLANE_HUES[mode.plane],
+        marks=marks, title=panel_title(mode), title_colour=spec.PLANE_HUES[mode.plane],
         title_side="left",
     )  # fmt: skip
 
@@ -348,4 +337,4 @@ def _shapes_alt(shown: Shown) -> str:
     return f"Shapes of {len(modes)} modes at {formatting.counted(places, 'place')}: {listed}."
 
 
-SHAPES = Member("shapes", "Mode shapes", _draw_shapes, _shapes_caption, _shapes_alt)
+SHAPES = spec.Member("shapes", "Mode shapes", _draw_shapes, _shapes_caption, _shapes_alt)

@@ -17,23 +17,7 @@ import scipy
 
 from shm.report import formatting
 from shm.report.contents import ModalTestReport
-from shm.report.figures.specification import (
-    PLANE_HUES,
-    PLANE_SYMBOLS,
-    Axis,
-    Dash,
-    Line,
-    Mark,
-    Member,
-    Panel,
-    Points,
-    Specification,
-    Symbol,
-    envelope_places,
-    peak_places,
-    plane_colour,
-    stacked,
-)
+from shm.report.figures import specification as spec
 from shm.values import (
     PLANES,
     ComplexArray,
@@ -175,10 +159,10 @@ _HEADROOM = 0.36
 """Share of the axes' height that the marks take."""
 
 
-def mode_marks(sheet: ModalTestReport, low_hz: float, high_hz: float) -> list[Mark]:
+def mode_marks(sheet: ModalTestReport, low_hz: float, high_hz: float) -> list[spec.Mark]:
     """A symbol and a line at each mode within the axis, a row for each plane, orders where there is
     room."""
-    found: list[Mark] = []
+    found: list[spec.Mark] = []
     for plane in PLANES:
         modes = sorted(
             (m for m in sheet.modes if m.plane == plane and low_hz <= m.frequency_hz <= high_hz),
@@ -188,7 +172,7 @@ def mode_marks(sheet: ModalTestReport, low_hz: float, high_hz: float) -> list[Ma
         is_lonely = np.diff([*at, math.inf]) >= _LABEL_ROOM * (high_hz - low_hz)
         labels = [str(m.order) if alone else "" for m, alone in zip(modes, is_lonely, strict=True)]
         texts = [f"{plane} {m.order}: {m.frequency_hz:.4g} Hz" for m in modes]
-        look = (PLANE_HUES[plane], PLANE_SYMBOLS[plane])
+        look = (spec.PLANE_HUES[plane], spec.PLANE_SYMBOLS[plane])
         found += _marked_row(at, _MARK_ROWS[plane], *look, f"{plane} mode", texts, labels)
     apart = [s for s in sheet.identification.set_aside if low_hz <= s.frequency_hz <= high_hz]
     at = [each.frequency_hz for each in apart]
@@ -198,16 +182,16 @@ def mode_marks(sheet: ModalTestReport, low_hz: float, high_hz: float) -> list[Ma
 
 
 def _marked_row(
-    at: Sequence[float], height: float, colour: str, symbol: Symbol, name: str,
-    texts: Sequence[str], labels: Sequence[str], dash: Dash = "solid",
-) -> list[Mark]:  # fmt: skip
+    at: Sequence[float], height: float, colour: str, symbol: spec.Symbol, name: str,
+    texts: Sequence[str], labels: Sequence[str], dash: spec.Dash = "solid",
+) -> list[spec.Mark]:  # fmt: skip
     if not at:
         return []
     x = [place for each in at for place in (each, each, math.nan)]
     stems = [0.0, height, math.nan] * len(at)
     return [
-        Line(x=x, y=stems, in_shares=True, colour=colour, opacity=0.45, width=0.5, dash=dash),
-        Points(
+        spec.Line(x=x, y=stems, in_shares=True, colour=colour, opacity=0.45, width=0.5, dash=dash),
+        spec.Points(
             x=at, y=[height] * len(at), in_shares=True, colour=colour, symbol=symbol, size=4.0,
             name=name, texts=texts, labels=labels,
         ),
@@ -231,7 +215,7 @@ _BINS = 550
 _HOVER = "%{x:.2f} Hz: %{y:.4g}"
 
 
-def _draw(shown: Shown) -> Specification | None:
+def _draw(shown: Shown) -> spec.Specification | None:
     found, points = shown.spectrum, _points(shown)
     if found is None or not points:
         return None
@@ -245,8 +229,8 @@ def _draw(shown: Shown) -> Specification | None:
             panels.append(_phase(shown, response, index, band_hz))
     if response is not None and response.coherence is not None:
         panels.append(_coherence(shown, response, points, band_hz))
-    panels[-1] = replace(panels[-1], x=Axis(label="frequency (Hz)", range=band_hz))
-    return stacked(panels, sum(panel.height for panel in panels) + 0.7, legend_columns=3)
+    panels[-1] = replace(panels[-1], x=spec.Axis(label="frequency (Hz)", range=band_hz))
+    return spec.stacked(panels, sum(panel.height for panel in panels) + 0.7, legend_columns=3)
 
 
 def _points(shown: Shown) -> list[int]:
@@ -266,11 +250,11 @@ def _lines(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> slice:
 
 def _magnitude(
     shown: Shown, found: Spectrum, index: int, band_hz: tuple[float, float]
-) -> Panel:  # fmt: skip
+) -> spec.Panel:  # fmt: skip
     point, fit = found.points[index], shown.sheet.identification.fit
     lines = _lines(found.frequency_hz, band_hz)
     frequency_hz, values = found.frequency_hz[lines], found.values[index, lines]
-    marks: list[Mark] = [_curve(frequency_hz, values, point, 1.7, "measured")]
+    marks: list[spec.Mark] = [_curve(frequency_hz, values, point, 1.7, "measured")]
     if fit is not None:
         fitted = np.abs(fit[index, lines])
         marks.append(_curve(frequency_hz, fitted, None, 0.6, "fit of the modes"))
@@ -278,8 +262,8 @@ def _magnitude(
     # From the floor of the curve to its top, with room above for the marks.
     extent = (0.5 * float(np.quantile(known, 0.02)), 1.5 * float(known.max())) if len(known) else ()
     label = found.quantity.replace(" (", "\n(", 1)
-    return Panel(
-        y=Axis(label=label, scale="log", range=with_headroom_log(*extent) if extent else None),
+    return spec.Panel(
+        y=spec.Axis(label=label, scale="log", range=with_headroom_log(*extent) if extent else None),
         marks=[*marks, *mode_marks(shown.sheet, *band_hz)],
         title="" if shown.is_on_screen else point_name(point), height=1.35,
     )  # fmt: skip
@@ -287,32 +271,32 @@ def _magnitude(
 
 def _curve(
     frequency_hz: FloatArray, values: FloatArray, point: ResponsePoint | None, width: float,
-    name: str = "", dash: Dash = "solid",
-) -> Line:  # fmt: skip
+    name: str = "", dash: spec.Dash = "solid",
+) -> spec.Line:  # fmt: skip
     """In the colour of the point's plane; dark without one."""
-    places = envelope_places(values, _BINS)
-    return Line(
+    places = spec.envelope_places(values, _BINS)
+    return spec.Line(
         x=frequency_hz[places], y=values[places], width=width, name=name, dash=dash, hover=_HOVER,
-        colour=plane_colour(point.plane) if point else "ink",
+        colour=spec.plane_colour(point.plane) if point else "ink",
     )  # fmt: skip
 
 
 def _phase(
     shown: Shown, response: FrequencyResponse, index: int, band_hz: tuple[float, float]
-) -> Panel:
+) -> spec.Panel:
     """Phase from -90 to 270 degrees, so that 0 and 180, between which it jumps, lie inside."""
     lines, fit = _lines(response.frequency_hz, band_hz), shown.sheet.identification.fit
     measured = response.accelerance[index, lines]
     # Of noise, phase fills the whole panel: the strongest line of each bin stands for it.
-    places = peak_places(np.abs(measured), min(2 * _BINS, len(measured)))
+    places = spec.peak_places(np.abs(measured), min(2 * _BINS, len(measured)))
     frequency_hz = response.frequency_hz[lines][places]
-    colour = plane_colour(response.points[index].plane)
+    colour = spec.plane_colour(response.points[index].plane)
     look: dict[str, Any] = {"x": frequency_hz, "hover": _HOVER}
-    marks = [Line(y=_degrees(measured[places]), colour=colour, width=1.3, **look)]
+    marks = [spec.Line(y=_degrees(measured[places]), colour=colour, width=1.3, **look)]
     if fit is not None:
-        marks.append(Line(y=_degrees(fit[index, lines][places]), width=0.6, **look))
-    axis = Axis(label="phase (°)", range=(-95, 275), ticks=(0, 180))
-    return Panel(y=axis, marks=marks, height=0.62)
+        marks.append(spec.Line(y=_degrees(fit[index, lines][places]), width=0.6, **look))
+    axis = spec.Axis(label="phase (°)", range=(-95, 275), ticks=(0, 180))
+    return spec.Panel(y=axis, marks=marks, height=0.62)
 
 
 def _degrees(values: ComplexArray) -> FloatArray:
@@ -321,16 +305,16 @@ def _degrees(values: ComplexArray) -> FloatArray:
 
 def _coherence(
     shown: Shown, response: FrequencyResponse, points: Sequence[int], band_hz: tuple[float, float]
-) -> Panel:
+) -> spec.Panel:
     assert response.coherence is not None
     lines, marks, seen = _lines(response.frequency_hz, band_hz), [], set()
     for index in points:
         point, values = response.points[index], response.coherence[index, lines]
-        dash: Dash = "dash" if point.plane in seen else "solid"
+        dash: spec.Dash = "dash" if point.plane in seen else "solid"
         seen.add(point.plane)
         marks.append(_curve(response.frequency_hz[lines], values, point, 0.7, dash=dash))
-    axis = Axis(label="coherence", range=(0, 1.05), ticks=(0, 0.5, 1))
-    return Panel(y=axis, marks=marks, height=0.7)
+    axis = spec.Axis(label="coherence", range=(0, 1.05), ticks=(0, 0.5, 1))
+    return spec.Panel(y=axis, marks=marks, height=0.7)
 
 
 def point_name(point: ResponsePoint) -> str:
@@ -382,4 +366,4 @@ def _alt(shown: Shown) -> str:
     return f"{kind} with {len(modes)} identified modes: {listed}."
 
 
-FIGURE = Member("response", "Response and modes", _draw, _caption, _alt)
+FIGURE = spec.Member("response", "Response and modes", _draw, _caption, _alt)
