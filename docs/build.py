@@ -46,7 +46,7 @@ def commands_page() -> str:
     parts = [
         "# Commands\n\nMade by `make docs` from the help texts; `shm VERB --help` says the same."
     ]
-    with click.Context(cli, info_name="shm") as context:
+    with click.Context(cli, info_name="shm", **cli.context_settings) as context:
         for verb in VERBS:
             command = cli.get_command(context, verb)
             assert command is not None

@@ -25,7 +25,6 @@ def token() -> None:
     "--scope",
     type=click.Choice(["read", "write"]),
     default="read",
-    show_default=True,
     help="`write` may upload and acknowledge, and read.",
 )
 @flags.json
@@ -106,7 +105,6 @@ def user() -> None:
     "--role",
     type=click.Choice(["reader", "operator", "engineer"]),
     default="reader",
-    show_default=True,
     help="An operator also uploads and acknowledges, an engineer also sets limits and users.",
 )
 @click.option("--single-sign-on", "vouched", is_flag=True, help="No password: by that alone.")

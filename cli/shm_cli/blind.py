@@ -48,9 +48,7 @@ def blind() -> None:
 
 @blind.command()
 @_trial_argument
-@click.option(
-    "--cases", type=click.IntRange(1, 9999), default=300, show_default=True, help="How many."
-)
+@click.option("--cases", type=click.IntRange(1, 9999), default=300, help="How many.")
 @click.option(
     "--seed",
     type=click.IntRange(min=0),
@@ -68,7 +66,6 @@ def blind() -> None:
     "--way",
     type=click.Choice(["both", "modes", "recordings"]),
     default="both",
-    show_default=True,
     help="Cases hold modal tests, or recordings that are still to be identified, or half of each.",
 )
 @_jobs_option

@@ -255,7 +255,6 @@ _POLL_S = 0.3  # technical: a bar that moves
     "--folder",
     type=flags.FOLDER,
     default="shm-demo",
-    show_default=True,
     help="Where to make the workspace; an older demo is replaced.",
 )
 @click.option("--live", is_flag=True, help="A bridge with permanent sensors instead of a hammer.")

@@ -101,29 +101,24 @@ who = click.option(
 figures = click.option(
     "--figures", type=FOLDER, metavar="DIR", help="Write each figure as a PNG here."
 )
-seed = click.option(
-    "--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Random seed."
-)
+seed = click.option("--seed", type=click.IntRange(min=0), default=1, help="Random seed.")
 # Judgement: below 100 no 90 % interval has five draws beyond each end; a million fill the memory.
 samples = click.option(
     "--samples",
     type=click.IntRange(100, 1_000_000),
     default=1000,
-    show_default=True,
     help="Posterior samples.",
 )
 repeat = click.option(
     "--repeat",
     type=click.IntRange(min=1),
     default=1,
-    show_default=True,
     help="How often the data set counts (N_D of the thesis).",
 )
 method = click.option(
     "--method",
     type=click.Choice(METHODS),
     default=METHODS[0],
-    show_default=True,
     help="How the sampler works; `textbook` is for fidelity, its evidence is biased.",
 )
 
@@ -131,7 +126,6 @@ priors = click.option(
     "--priors",
     type=click.Choice(PRIORS),
     default=PRIORS[0],
-    show_default=True,
     help="What is possible before the test: by the hanger's description, or by the thesis.",
 )
 

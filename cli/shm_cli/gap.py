@@ -55,7 +55,6 @@ _baseline = click.option(
     "--baseline",
     metavar="NAME",
     default=GapOptions().baseline,
-    show_default=True,
     shell_complete=completion.models,
     help="The model class whose gap is diagnosed.",
 )
@@ -183,7 +182,6 @@ def command() -> None:
     "count",
     type=click.IntRange(1, 100),
     default=20,
-    show_default=True,
     metavar="N",
     help="How many of the latest tests of a hanger of the workspace.",
 )

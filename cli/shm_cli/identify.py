@@ -48,7 +48,6 @@ _DEFAULT = Settings()
     nargs=2,
     type=float,
     default=(_DEFAULT.band_low_hz, _DEFAULT.band_high_hz),
-    show_default=True,
     metavar="LOW HIGH",
     help="Where to look for modes, in Hz.",
 )
@@ -56,21 +55,18 @@ _DEFAULT = Settings()
     "--identifier",
     type=click.Choice(list(IDENTIFIERS)),
     default=_DEFAULT.identifier,
-    show_default=True,
     help="How modes are found.",
 )
 @click.option(
     "--cross-check",
     type=click.Choice([*IDENTIFIERS, "none"]),
     default=_DEFAULT.cross_check,
-    show_default=True,
     help="A second identifier whose frequencies are compared.",
 )
 @click.option(
     "--estimator",
     type=click.Choice(["h1", "h2", "hv"]),
     default=_DEFAULT.estimator,
-    show_default=True,
     help="Of the frequency response: noise in the responses, the force, or both.",
 )
 @click.option(
@@ -78,7 +74,6 @@ _DEFAULT = Settings()
     "reference_force_n",
     type=float,
     default=_DEFAULT.reference_force_n,
-    show_default=True,
     metavar="N",
     help="A hit this hard, in N, has amplitude 1.",
 )
@@ -86,7 +81,6 @@ _DEFAULT = Settings()
     "--frequency-allowance",
     type=click.FloatRange(min=0, max=0.01),
     default=_DEFAULT.frequency_allowance,
-    show_default=True,
     help="Part of a frequency that differs from test to test unseen.",
 )
 @click.option(
@@ -94,7 +88,6 @@ _DEFAULT = Settings()
     "mains_hz",
     type=float,
     default=_DEFAULT.mains_hz,
-    show_default=True,
     metavar="HZ",
     help="Frequency of the power grid.",
 )

@@ -127,7 +127,9 @@ class Verbs(click.RichGroup):
         super().format_help(ctx, formatter)
 
 
-@click.group(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=Verbs, context_settings={"help_option_names": ["-h", "--help"], "show_default": True}
+)
 @click.option(
     "--workspace",
     metavar="DIR",

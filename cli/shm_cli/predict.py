@@ -37,7 +37,7 @@ _MOST_POINTS = 10_000  # technical: a table that a person can still open, in sec
     metavar="PLANE:ORDER",
     help="A mode of a solid class, drawn in space: transverse:2, say.",
 )
-@click.option("--modes", type=click.IntRange(1, 100), default=6, show_default=True)
+@click.option("--modes", type=click.IntRange(1, 100), default=6)
 @flags.hanger()
 @flags.hanger_file
 @flags.json

@@ -31,7 +31,6 @@ def note() -> None:
     "--kind",
     type=click.Choice([each.value for each in NoteKind]),
     default=NoteKind.NOTE.value,
-    show_default=True,
     help="What it was.",
 )
 @click.option("--at", type=flags.Time(), show_default="now", help="When it was seen or done.")

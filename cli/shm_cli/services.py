@@ -29,10 +29,8 @@ print_unit_option = click.option(
     "--standby", is_flag=True, help="Wait while another serves the store; take over when it ends."
 )
 @click.option("--web", "with_web", is_flag=True, help="Serve the web interface too: see `shm web`.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Where --web listens.")
-@click.option(
-    "--port", type=click.IntRange(1, 65535), default=8400, show_default=True, help="Its port."
-)
+@click.option("--host", default="127.0.0.1", help="Where --web listens.")
+@click.option("--port", type=click.IntRange(1, 65535), default=8400, help="Its port.")
 @flags.tls
 @click.option("--workers", type=click.IntRange(1, 64), help="Processes that identify and update.")
 @flags.log_file
@@ -85,10 +83,8 @@ def daemon(
 
 
 @click.command()
-@click.option("--host", default="127.0.0.1", show_default=True, help="The address to listen on.")
-@click.option(
-    "--port", type=click.IntRange(1, 65535), default=8400, show_default=True, help="The port."
-)
+@click.option("--host", default="127.0.0.1", help="The address to listen on.")
+@click.option("--port", type=click.IntRange(1, 65535), default=8400, help="The port.")
 @flags.tls
 @flags.log_file
 @print_unit_option

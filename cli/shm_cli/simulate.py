@@ -38,7 +38,6 @@ from shm_cli.planting import (
 )
 
 _FIRST = datetime(2026, 1, 5, 10, tzinfo=UTC)  # any: the same call gives the same files
-_SPRING = "End spring in N m/rad; clamped if left out."
 _SUFFIXES = sorted(known.suffixes[0].lstrip(".") for known in FORMATS if known.write)
 _WRONG = "; ".join(f"{each.name}: {each.help}" for each in DISTURBANCES.values())
 # Judgement: a hanger rings for some 20 s; 0.02 m/s^2 is a good accelerometer in calm air; two
@@ -71,30 +70,41 @@ class Chosen(TypedDict):
     added_mass: str | None
 
 
+def _springs(function: flags.F) -> flags.F:
+    """`--k1` to `--k4`."""
+    planes = ("Transverse", "Longitudinal")
+    for number in (4, 3, 2, 1):
+        where = f"{planes[(number - 1) % 2]}, {'deck' if number < 3 else 'arch'} end"
+        told = f"{where}. End spring in N m/rad; clamped if left out."
+        option = click.option(
+            f"--k{number}", type=float, default=math.inf, show_default=False, help=told
+        )
+        function = option(function)
+    return function
+
+
 @click.command()
 @flags.hanger()
 @flags.hanger_file
 @click.option("--tension-n", type=float, help="Planted tension; the nominal one if left out.")
-@click.option("--k1", type=float, default=math.inf, help=f"Transverse, deck end. {_SPRING}")
-@click.option("--k2", type=float, default=math.inf, help=f"Longitudinal, deck end. {_SPRING}")
-@click.option("--k3", type=float, default=math.inf, help=f"Transverse, arch end. {_SPRING}")
-@click.option("--k4", type=float, default=math.inf, help=f"Longitudinal, arch end. {_SPRING}")
-@click.option("--damping", type=float, default=0.001, show_default=True, help="Damping ratio.")
+@_springs
+@click.option("--damping", type=float, default=0.001, help="Damping ratio.")
 @click.option("--noise", type=float, help="In m/s^2; 0.02, or 0.002 where nobody hits.")
 @click.option(
     "--sensors",
     type=click.IntRange(1, 8),
     help="Places with a biaxial accelerometer each; 2, or 4 (at most) in a campaign.",
 )
-@click.option("--hits", type=click.IntRange(1, 50), default=5, show_default=True)
+@click.option("--hits", type=click.IntRange(1, 50), default=5)
 @click.option(
     "--hammer-x",
     type=float,
     default=math.nan,
+    show_default=False,
     help="Where the hammer hits, in m from the deck end; 0.16 of the length if left out.",
 )
 @click.option("--seconds", type=float, help="Seconds a hit; 20, or 600 in all where nobody hits.")
-@click.option("--rate", type=float, default=512.0, show_default=True, help="Samples a second.")
+@click.option("--rate", type=float, default=512.0, help="Samples a second.")
 @click.option("--ambient", is_flag=True, help="Wind and traffic drive the hanger, nobody hits.")
 @click.option(
     "--disturbance",
@@ -118,14 +128,12 @@ class Chosen(TypedDict):
     "--amplitude",
     type=float,
     default=1.0,
-    show_default=True,
     help="Level of the hits: effects follow it, and so does the force.",
 )
 @click.option(
     "--reference-c",
     type=float,
     default=10.0,
-    show_default=True,
     help="Temperature at which the tension is the planted one.",
 )
 @click.option("--added-mass", metavar="KG:X", help="A known mass, clamped on at X m.")
@@ -153,7 +161,6 @@ class Chosen(TypedDict):
     "--days",
     type=click.FloatRange(0.001, 3660),
     default=1.0,
-    show_default=True,
     help="How long a stream.",
 )
 @click.option(
@@ -167,13 +174,18 @@ class Chosen(TypedDict):
     "--speed",
     type=click.FloatRange(0),
     default=0.0,
-    show_default=True,
     help="Seconds of a stream sent a second; 1 is real time, 0 as fast as it goes.",
 )
-@click.option("--tests", type=click.IntRange(1, 10_000), default=1, show_default=True)
-@click.option("--temperature-c", type=float, default=math.nan, help="Unknown if left out.")
+@click.option("--tests", type=click.IntRange(1, 10_000), default=1)
+@click.option(
+    "--temperature-c",
+    type=float,
+    default=math.nan,
+    show_default=False,
+    help="Unknown if left out.",
+)
 @click.option("--first", type=click.DateTime(), help="Time of the first test; then weekly.")
-@click.option("--format", "form", type=click.Choice(_SUFFIXES), default="csv", show_default=True)
+@click.option("--format", "form", type=click.Choice(_SUFFIXES), default="csv")
 @click.option(
     "--out", type=flags.FOLDER, metavar="DIR", help="Where the files go; a stream needs none."
 )

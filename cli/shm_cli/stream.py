@@ -42,7 +42,6 @@ _name = click.argument("name", metavar="NAME", shell_complete=completion.streams
     "--days",
     type=click.FloatRange(0, min_open=True),
     default=7.0,
-    show_default=True,
     help="How far back --events looks.",
 )
 @flags.json

@@ -117,7 +117,6 @@ modes_argument = click.argument(
 @click.option(
     "--model",
     default="beam2",
-    show_default=True,
     shell_complete=completion.models,
     help="The model class.",
 )
@@ -247,7 +246,6 @@ def show_posterior(posterior: Posterior, limits: Limits | None = None) -> None:
     "--sigma",
     type=click.Choice(("one", "plane", "mode")),
     default="one",
-    show_default=True,
     help="One model error of all modes, or one of each plane or mode; with --priors thesis.",
 )
 @_updating
