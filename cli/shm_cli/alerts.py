@@ -24,7 +24,21 @@ from shm_cli import completion, flags
 from shm_cli.common import answer, open_workspace, opened_store, paragraph, show_rows
 
 
-@click.command()
+@click.group(invoke_without_command=True)
+@flags.hanger()
+@flags.json
+@click.pass_context
+def command(ctx: click.Context, hanger_id: int | None) -> None:
+    """Alerts that were raised, and their deliveries.
+
+    \b
+    Example: shm alerts --hanger 7 --json
+    """
+    if ctx.invoked_subcommand is None:
+        _list(ctx, hanger_id)
+
+
+@command.command()
 @flags.hanger()
 @click.option("--bridge", "whole", is_flag=True, help="All hangers.")
 @click.option("--from", "since", type=flags.Time(), show_default="now", help="When it begins.")
@@ -77,7 +91,7 @@ def silence(
     )
 
 
-@click.command()
+@command.command()
 @flags.json
 @click.pass_context
 def silences(ctx: click.Context) -> None:
@@ -109,7 +123,7 @@ def _silence_cells(each: Silence, now: datetime) -> tuple[str, ...]:
     )
 
 
-@click.command()
+@command.command()
 @click.argument("silence_id", type=int, metavar="ID")
 @flags.who
 @flags.json
@@ -145,7 +159,7 @@ def _at(time: datetime) -> str:
     return f"{time:%Y-%m-%d %H:%M}"
 
 
-@click.command("ack")
+@command.command("ack")
 @click.argument("alert_id", type=int, metavar="ID")
 @click.option("--why", type=flags.Words(), required=True, help="What came of it, for the record.")
 @click.option("--resolved", is_flag=True, help="Its cause is gone or explained: hooks hear of it.")
@@ -190,21 +204,7 @@ def acknowledgement_words(stored: StoredAlert) -> str:
     return said if ended is None else f"{said} (resolved {ended.at:%Y-%m-%d})"
 
 
-@click.group(invoke_without_command=True)
-@flags.hanger()
-@flags.json
-@click.pass_context
-def command(ctx: click.Context, hanger_id: int | None) -> None:
-    """Alerts that were raised, and their deliveries.
-
-    \b
-    Example: shm alerts --hanger 7 --json
-    """
-    if ctx.invoked_subcommand is None:
-        _list(ctx, hanger_id)
-
-
-@click.command()
+@command.command()
 @click.argument("alert_id", type=int, metavar="ID")
 @flags.json
 @click.pass_context
@@ -224,10 +224,6 @@ def resend(ctx: click.Context, alert_id: int) -> None:
         {"id": alert_id, "hooks": hooks},
         f"Alert {alert_id} is owed again to {', '.join(hooks)}: the daemon sends it next.",
     )
-
-
-for _verb in (acknowledge, resend, silence, silences, unsilence):
-    command.add_command(_verb)
 
 
 @command.command()

@@ -33,7 +33,59 @@ from shm_cli.common import opened_store, paragraph, progress_bar, show, show_row
 _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
 
 
-@click.command("bridge")
+@click.group(invoke_without_command=True)
+@flags.hanger()
+@click.option("--all", "all_tests", is_flag=True, help="All tests, not each hanger's latest.")
+@flags.json
+@click.pass_context
+def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
+    """How far tension and stiffness have moved.
+
+    The shift of the latest test of each hanger from its baseline, if there is one at all: the
+    tension in percent, an end stiffness as how many times what it was, with the probability that it
+    lies beyond the threshold. With --hanger also how each quantity goes with the temperature. In
+    JSON shifts are fractions of the tension and decades (powers of ten) of a stiffness.
+
+    \b
+    Example: shm drift --hanger 3 --all
+    """
+    if ctx.invoked_subcommand is not None:
+        return
+    states, hangers = NOTHING_WATCHED, []
+    with opened_store(ctx) as (workspace, store):
+        hangers = [each.id for each in workspace.bridge.hangers]
+        if hanger_id is not None:
+            hanger = workspace.bridge.hanger(hanger_id)
+            hangers = [hanger_id]
+            states = hanger_states(workspace, store, hanger, store.watch.baseline(hanger_id))
+        shown = (
+            store.watch.list_drifts(hanger_id)
+            if all_tests
+            else [drift for each in hangers for drift in latest_drifts(store, each)]
+        )
+        anew = [] if all_tests else _without_a_test(store, hangers)
+    if not shown and not anew:
+        raise NothingThere(
+            "no test has been compared with a baseline yet.",
+            remedy="Take in more tests: the first ones of a hanger form its baseline.",
+        )
+    if flags.wants_json():
+        document: dict[str, object] = {"drifts": [drift_document(drift) for drift in shown]}
+        if hanger_id is not None:
+            document["temperature_coefficients"] = temperature_documents(states)
+        show(document)
+        return
+    if shown:
+        _show(shown)
+    for each in anew:
+        said = f"Hanger {each.hanger} is compared anew since {each.since:%Y-%m-%d}; no test has "
+        click.echo(paragraph(f"{said}come in after that baseline was set."))
+    if states.temperature_coefficients:
+        click.echo()
+        show_texts(temperature_table(states))
+
+
+@command.command("bridge")
 @flags.json
 @click.option(
     "--figure",
@@ -68,7 +120,7 @@ def bridge(ctx: click.Context, figure: Path | None) -> None:
         click.echo(paragraph(sentence))
 
 
-@click.command()
+@command.command()
 @flags.hanger(required=True)
 @click.option(
     "--since",
@@ -150,62 +202,6 @@ def _document(made: Baseline) -> dict[str, object]:
 
 if TYPE_CHECKING:
     from shm.store import Baseline, Store
-
-
-@click.group(invoke_without_command=True)
-@flags.hanger()
-@click.option("--all", "all_tests", is_flag=True, help="All tests, not each hanger's latest.")
-@flags.json
-@click.pass_context
-def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
-    """How far tension and stiffness have moved.
-
-    The shift of the latest test of each hanger from its baseline, if there is one at all: the
-    tension in percent, an end stiffness as how many times what it was, with the probability that it
-    lies beyond the threshold. With --hanger also how each quantity goes with the temperature. In
-    JSON shifts are fractions of the tension and decades (powers of ten) of a stiffness.
-
-    \b
-    Example: shm drift --hanger 3 --all
-    """
-    if ctx.invoked_subcommand is not None:
-        return
-    states, hangers = NOTHING_WATCHED, []
-    with opened_store(ctx) as (workspace, store):
-        hangers = [each.id for each in workspace.bridge.hangers]
-        if hanger_id is not None:
-            hanger = workspace.bridge.hanger(hanger_id)
-            hangers = [hanger_id]
-            states = hanger_states(workspace, store, hanger, store.watch.baseline(hanger_id))
-        shown = (
-            store.watch.list_drifts(hanger_id)
-            if all_tests
-            else [drift for each in hangers for drift in latest_drifts(store, each)]
-        )
-        anew = [] if all_tests else _without_a_test(store, hangers)
-    if not shown and not anew:
-        raise NothingThere(
-            "no test has been compared with a baseline yet.",
-            remedy="Take in more tests: the first ones of a hanger form its baseline.",
-        )
-    if flags.wants_json():
-        document: dict[str, object] = {"drifts": [drift_document(drift) for drift in shown]}
-        if hanger_id is not None:
-            document["temperature_coefficients"] = temperature_documents(states)
-        show(document)
-        return
-    if shown:
-        _show(shown)
-    for each in anew:
-        said = f"Hanger {each.hanger} is compared anew since {each.since:%Y-%m-%d}; no test has "
-        click.echo(paragraph(f"{said}come in after that baseline was set."))
-    if states.temperature_coefficients:
-        click.echo()
-        show_texts(temperature_table(states))
-
-
-command.add_command(rebaseline)
-command.add_command(bridge)
 
 
 def _without_a_test(store: Store, hangers: Sequence[int]) -> list[Baseline]:

@@ -70,7 +70,16 @@ _LATEST = 20  # as `shm gap diagnose`
 _HEADS = ("measurement", "hours", "in all", "promised log odds", "then", "probability")
 
 
-@click.command()
+@click.group()
+def command() -> None:
+    """Why model and measurement differ, and what that does to tension.
+
+    \b
+    Example: shm gap diagnose hanger3.modes.json
+    """
+
+
+@command.command()
 @click.argument("file", metavar="[MODES.json]", required=False, type=flags.FILE)
 @flags.hanger()
 @flags.hanger_file
@@ -150,15 +159,6 @@ def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:
     return [
         asdict(step) | {"hours_in_all": hours} for step, hours in zip(steps, spent, strict=True)
     ]
-
-
-@click.group()
-def command() -> None:
-    """Why model and measurement differ, and what that does to tension.
-
-    \b
-    Example: shm gap diagnose hanger3.modes.json
-    """
 
 
 @command.command()
@@ -250,7 +250,7 @@ def diagnose(
         write_effect.write_text(text, encoding="utf-8")
 
 
-for _verb in (adopt, adopted, drop, blind, effects, plan):
+for _verb in (adopt, adopted, drop, blind, effects):
     command.add_command(_verb)
 
 

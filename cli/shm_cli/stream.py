@@ -74,7 +74,7 @@ def command(ctx: click.Context, events: bool, days: float) -> None:
             _show_streams(workspace, store, utc_now())
 
 
-@click.command()
+@command.command()
 @_name
 @_from
 @_to
@@ -99,7 +99,7 @@ def keep(ctx: click.Context, name: str, start: datetime, end: datetime, why: str
     )
 
 
-@click.command()
+@command.command()
 @_name
 @_from
 @_to
@@ -123,10 +123,6 @@ def export(ctx: click.Context, name: str, start: datetime, end: datetime, file: 
         show({"stream": name, "hanger": found.hanger, **about})
         return
     click.echo(f"{file}: {found.samples} samples of {len(found.channels)} channels.")
-
-
-command.add_command(keep)
-command.add_command(export)
 
 
 def _show_streams(workspace: Workspace, store: Store, now: datetime) -> None:
