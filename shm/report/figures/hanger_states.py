@@ -15,13 +15,14 @@ from shm.values import BoolArray
 from shm.values.rounding import force_unit
 from shm.watch.history import Band as Bounds
 
+# Layout: heights of the panels, and of what stands around them.
 _TENSION_INCHES, _STIFFNESS_INCHES, _TEMPERATURE_INCHES = 2.3, 1.5, 0.75
 _REST_INCHES = 0.9
 _TENSION_TITLE = "tension by the selected model class: estimate to date and retrospective"
 
 
 def specify(data: StatesOverTime, least_tests: int = 1) -> spec.Specification | None:
-    """None of fewer tests: of one alone a report gives the numbers elsewhere."""
+    """None of fewer tests."""
     if len(data.times) < least_tests or not data.quantities:
         return None
     panels = [_panel(data, quantity) for quantity in data.quantities]
@@ -167,6 +168,7 @@ def _last(quantity: QuantityOverTime) -> str:
 
 
 STATES = spec.Member("drift", "States over time", specify, _caption, _alt)
+# One test alone has no course: its numbers stand elsewhere in the report.
 FIGURE = spec.Member[HangerReport](
     STATES.name,
     STATES.title,
