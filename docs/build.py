@@ -33,8 +33,8 @@ from shm.models.registry import MODELS
 from shm_cli import thesis
 from shm_cli.common import markdown
 from shm_cli.effects import effects_page
+from shm_cli.installation import settings_page
 from shm_cli.main import VERBS, cli
-from shm_cli.settings import settings_page
 from shm_cli.validate import compared
 from shm_cli.validation import frequencies, selection
 
@@ -46,7 +46,7 @@ def commands_page() -> str:
     parts = [
         "# Commands\n\nMade by `make docs` from the help texts; `shm VERB --help` says the same."
     ]
-    with click.Context(cli, info_name="shm") as context:
+    with click.Context(cli, info_name="shm", **cli.context_settings) as context:
         for verb in VERBS:
             command = cli.get_command(context, verb)
             assert command is not None

@@ -23,10 +23,9 @@ from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
 from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
 from shm.report.figures.hanger_tension import FIGURE as TENSION
 from shm.report.figures.hanger_trend import FIGURE as TREND
+from shm.report.figures.modal_test_modes import SHAPES, STABILISATION
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
-from shm.report.figures.modal_test_shapes import FIGURE as SHAPES
-from shm.report.figures.modal_test_spectra import Shown
-from shm.report.figures.modal_test_stabilisation import FIGURE as STABILISATION
+from shm.report.figures.modal_test_response import Shown
 from shm.report.figures.parameter_pairs import FIGURE as PAIRS
 from shm.report.figures.specification import Member
 from shm.values import Diagnosis, Hanger, ModalTest, Posterior

@@ -1,1 +1,1 @@
-"""The shm command line: one module a verb."""
+"""The shm command line: one module a verb, or of verbs that share."""

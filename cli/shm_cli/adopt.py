@@ -12,22 +12,12 @@ from shm.pipeline.adopting import Wish, gap_watch
 from shm.pipeline.adopting import adopt as adopt_in_store
 from shm.report.formatting import model_class
 from shm.store import Store, StoredAdoption
-from shm_cli import completion
-from shm_cli.common import (
-    hanger_option,
-    json_option,
-    opened_store,
-    progress_bar,
-    show,
-    show_table,
-    table,
-    who_option,
-    why_option,
-)
+from shm_cli import completion, flags
+from shm_cli.common import answer, opened_store, progress_bar, show, show_rows
 
 
 @click.command()
-@hanger_option(required=True)
+@flags.hanger(required=True)
 @click.option(
     "--effect",
     "effects",
@@ -44,9 +34,9 @@ from shm_cli.common import (
     shell_complete=completion.models,
     help="A model class.",
 )
-@why_option
-@who_option
-@json_option
+@flags.why
+@flags.who
+@flags.json
 @click.pass_context
 def adopt(
     ctx: click.Context,
@@ -56,7 +46,6 @@ def adopt(
     baseline: str,
     why: str,
     who: str,
-    as_json: bool,
 ) -> None:
     """Make an effect part of a hanger's model class.
 
@@ -73,19 +62,16 @@ def adopt(
         with progress_bar("adopting") as progress:
             made = adopt_in_store(workspace, store, hanger, wish, utc_now(), progress)
         watch = gap_watch(store, hanger_id)
-    if as_json:
-        show(_document(made))
-        return
-    click.echo(f"Hanger {hanger_id} has the model class {made.adoption.model} from now on.")
-    click.echo(str(watch))
+    said = f"Hanger {hanger_id} has the model class {made.adoption.model} from now on."
+    answer(_document(made), f"{said}\n{watch}")
 
 
 @click.command()
-@hanger_option()
+@flags.hanger()
 @click.option("--all", "undone", is_flag=True, help="Those that were dropped too.")
-@json_option
+@flags.json
 @click.pass_context
-def adopted(ctx: click.Context, hanger_id: int | None, undone: bool, as_json: bool) -> None:
+def adopted(ctx: click.Context, hanger_id: int | None, undone: bool) -> None:
     """What was adopted, and what became of its gap.
 
     \b
@@ -96,28 +82,26 @@ def adopted(ctx: click.Context, hanger_id: int | None, undone: bool, as_json: bo
             workspace.bridge.hanger(hanger_id)
         found = store.posteriors.list_adoptions(hanger_id, undone=undone)
         documents = [_watched(store, each) for each in found]
-    if as_json:
+    if flags.wants_json():
         show({"adoptions": documents})
         return
     if not found:
         raise NothingThere(
             "no effect has been adopted.", remedy="Adopt one with `shm gap adopt --effect NAME`."
         )
-    made = table(
-        "adopted effects", "number", "hanger", "class", "adopted", "who", "why",
-        "gap before, with it, now (%)", "dropped",
+    headings = (
+        "number", "hanger", "class", "adopted", "who", "why", "gap before, with it, now (%)",
+        "dropped",
     )  # fmt: skip
-    for document in documents:
-        made.add_row(*_row(document))
-    show_table(made)
+    show_rows("adopted effects", headings, map(_row, documents))
 
 
 @click.command()
-@hanger_option(required=True)
+@flags.hanger(required=True)
 @click.option("--number", type=int, show_default="the only one in force", help="Which adoption.")
-@why_option
-@who_option
-@json_option
+@flags.why
+@flags.who
+@flags.json
 @click.pass_context
 def drop(
     ctx: click.Context,
@@ -125,7 +109,6 @@ def drop(
     number: int | None,
     why: str,
     who: str,
-    as_json: bool,
 ) -> None:
     """Undo an adoption, on the record.
 
@@ -139,10 +122,10 @@ def drop(
         chosen = _chosen(store, hanger_id, number)
         made = store.posteriors.drop_adoption(chosen.id, why, who, utc_now())
         model = store.posteriors.selected_models()[hanger_id]
-    if as_json:
-        show(_document(made))
-        return
-    click.echo(f"Dropped {made.adoption.model}; hanger {hanger_id} has the class {model} again.")
+    answer(
+        _document(made),
+        f"Dropped {made.adoption.model}; hanger {hanger_id} has the class {model} again.",
+    )
 
 
 def _chosen(store: Store, hanger_id: int, number: int | None) -> StoredAdoption:

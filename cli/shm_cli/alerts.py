@@ -1,6 +1,6 @@
 """`shm alerts`: what was raised, whether the hooks got it, and whether they work.
 
-`shm alerts ack`: a person takes note of an alert, on the record.
+A person takes note of an alert, or silences the hooks for a time, on the record.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import time
 from datetime import datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import rich_click as click
 
@@ -17,35 +17,156 @@ from shm.documents import alert_document, format_time
 from shm.errors import NothingThere, UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.telling import quiet_until
-from shm.store import DeliveryState, StoredAlert
-from shm.store.stored_alerts import silenced_until
+from shm.store import Delivery, DeliveryState, Silence, StoredAlert
+from shm.store.stored_alerts import hangers_of, silenced_until
 from shm.values import Alert
-from shm_cli import completion
-from shm_cli.common import (
-    hanger_option,
-    json_option,
-    open_workspace,
-    opened_store,
-    paragraph,
-    show,
-    show_table,
-    table,
-    who_option,
-)
-from shm_cli.parameter_types import Words
-from shm_cli.silences import silence, silences, unsilence
+from shm_cli import completion, flags
+from shm_cli.common import answer, open_workspace, opened_store, paragraph, show_rows
 
 
-@click.command("ack")
-@click.argument("alert_id", type=int, metavar="ID")
-@click.option("--why", type=Words(), required=True, help="What came of it, for the record.")
-@click.option("--resolved", is_flag=True, help="Its cause is gone or explained: hooks hear of it.")
-@who_option
-@json_option
+@click.group(invoke_without_command=True)
+@flags.hanger()
+@flags.json
 @click.pass_context
-def acknowledge(
-    ctx: click.Context, alert_id: int, why: str, resolved: bool, who: str, as_json: bool
+def command(ctx: click.Context, hanger_id: int | None) -> None:
+    """Alerts that were raised, and their deliveries.
+
+    \b
+    Example: shm alerts --hanger 7 --json
+    """
+    if ctx.invoked_subcommand is None:
+        _list(ctx, hanger_id)
+
+
+@command.command()
+@flags.hanger()
+@click.option("--bridge", "whole", is_flag=True, help="All hangers.")
+@click.option("--from", "since", type=flags.Time(), show_default="now", help="When it begins.")
+@click.option("--until", type=flags.Time(), required=True, help="When it ends, as 2026-12-01.")
+@click.option("--maintenance", is_flag=True, help="Planned works: tests of then are not watched.")
+@click.option("--why", type=flags.Words(), required=True, help="For the record.")
+@flags.who
+@flags.json
+@click.pass_context
+def silence(
+    ctx: click.Context,
+    hanger_id: int | None,
+    whole: bool,
+    since: datetime | None,
+    until: datetime,
+    maintenance: bool,
+    why: str,
+    who: str,
 ) -> None:
+    """Hold messages to hooks back until a time.
+
+    Alerts are raised and shown all the same; hooks are told of them at the end, unless they have
+    been acknowledged or resolved. Times without a zone are UTC. With --maintenance, tests made in
+    that time are taken in but not watched: record it before they come in.
+
+    \b
+    Example: shm alerts silence --hanger 7 --until 2026-12-01 --why "sensor is replaced"
+    Example: shm alerts silence --bridge --maintenance --until 2027-03-05 --why "new joints"
+    """
+    if whole == (hanger_id is not None):
+        raise UsageError("name one hanger, or all.", remedy="Give --hanger N or --bridge.")
+    now = utc_now()
+    with opened_store(ctx) as (workspace, store):
+        if hanger_id is not None:
+            workspace.bridge.tested(hanger_id)
+        made = store.silences.make(
+            hanger_id,
+            (since or now, until),
+            who,
+            why,
+            now,
+            is_maintenance=maintenance,
+        )
+    kind = "Maintenance window" if maintenance else "Silence"
+    answer(
+        silence_row(made, now),
+        f"{kind} {made.id}: hooks are told nothing of {hangers_of(made.hanger)} from "
+        f"{_at(made.starts_at)} until {_at(made.until)} UTC. End it early: "
+        f"`shm alerts unsilence {made.id}`.",
+    )
+
+
+@command.command()
+@flags.json
+@click.pass_context
+def silences(ctx: click.Context) -> None:
+    """Silences and maintenance windows, with who made them and why.
+
+    \b
+    Example: shm alerts silences --json
+    """
+    now = utc_now()
+    with opened_store(ctx) as (_, store):
+        found = store.silences.list_all()
+    if flags.wants_json() or not found:
+        document = {"silences": [silence_row(each, now) for each in found]}
+        answer(document, "No silence was ever made.")
+        return
+    headings = ("number", "of", "kind", "state", "from", "until", "by")
+    show_rows("silences", headings, [_silence_cells(each, now) for each in found])
+
+
+def _silence_cells(each: Silence, now: datetime) -> tuple[str, ...]:
+    return (
+        str(each.id),
+        hangers_of(each.hanger),
+        "maintenance" if each.is_maintenance else "silence",
+        state_of(each, now),
+        _at(each.starts_at),
+        _at(each.until),
+        f"{each.who}: {each.why}" + (f" (ended by {each.ended_who})" if each.ended_at else ""),
+    )
+
+
+@command.command()
+@click.argument("silence_id", type=int, metavar="ID")
+@flags.who
+@flags.json
+@click.pass_context
+def unsilence(ctx: click.Context, silence_id: int, who: str) -> None:
+    """End a silence now, on the record.
+
+    \b
+    Example: shm alerts unsilence 3
+    """
+    now = utc_now()
+    with opened_store(ctx) as (_, store):
+        ended = store.silences.end(silence_id, who, now)
+    answer(
+        silence_row(ended, now),
+        f"Silence {silence_id} has ended: hooks are told of {hangers_of(ended.hanger)} again.",
+    )
+
+
+def silence_row(silence: Silence, now: datetime) -> dict[str, object]:
+    """What `--json` says of a silence."""
+    return {**vars(silence), "state": state_of(silence, now), "until": silence.until}
+
+
+def state_of(silence: Silence, now: datetime) -> str:
+    """`in force`, `to come` or `over`."""
+    if silence.is_over(now):
+        return "over"
+    return "to come" if silence.starts_at > now else "in force"
+
+
+def _at(time: datetime) -> str:
+    return f"{time:%Y-%m-%d %H:%M}"
+
+
+@command.command("ack")
+@click.argument("alert_id", type=int, metavar="ID")
+@click.option("--why", type=flags.Words(), required=True, help="What came of it, for the record.")
+@click.option("--resolved", is_flag=True, help="Its cause is gone or explained: hooks hear of it.")
+@flags.who
+@flags.json
+@click.pass_context
+def acknowledge(ctx: click.Context, alert_id: int, why: str, resolved: bool, who: str) -> None:
     """Take note of an alert, on the record.
 
     ID is the number that `shm alerts` shows. The alert is open no more; the watch goes on as it
@@ -59,11 +180,11 @@ def acknowledge(
     with opened_store(ctx) as (_, store):
         note = store.alerts.resolve if resolved else store.alerts.acknowledge
         noted = note(alert_id, who, why, utc_now())
-    if as_json:
-        show({"id": noted.id, **acknowledgement_row(noted), "alert": alert_document(noted.alert)})
-        return
     done = "resolved" if resolved else "acknowledged"
-    click.echo(f"Alert {alert_id} of hanger {noted.alert.hanger} is {done}.")
+    answer(
+        {"id": noted.id, **acknowledgement_row(noted), "alert": alert_document(noted.alert)},
+        f"Alert {alert_id} of hanger {noted.alert.hanger} is {done}.",
+    )
 
 
 def acknowledgement_row(stored: StoredAlert) -> dict[str, object]:
@@ -83,29 +204,11 @@ def acknowledgement_words(stored: StoredAlert) -> str:
     return said if ended is None else f"{said} (resolved {ended.at:%Y-%m-%d})"
 
 
-if TYPE_CHECKING:
-    from shm.store import Delivery, StoredAlert
-
-
-@click.group(invoke_without_command=True)
-@hanger_option()
-@json_option
-@click.pass_context
-def command(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
-    """Alerts that were raised, and their deliveries.
-
-    \b
-    Example: shm alerts --hanger 7 --json
-    """
-    if ctx.invoked_subcommand is None:
-        _list(ctx, hanger_id, as_json)
-
-
-@click.command()
+@command.command()
 @click.argument("alert_id", type=int, metavar="ID")
-@json_option
+@flags.json
 @click.pass_context
-def resend(ctx: click.Context, alert_id: int, as_json: bool) -> None:
+def resend(ctx: click.Context, alert_id: int) -> None:
     """Send an alert again to the hooks that it was given up by.
 
     A hook that keeps failing is given up after `hook_attempts` tries. Mend it, see that it works
@@ -117,14 +220,10 @@ def resend(ctx: click.Context, alert_id: int, as_json: bool) -> None:
     with opened_store(ctx) as (_, store):
         owed = store.alerts.resend(alert_id, utc_now())
     hooks = list(dict.fromkeys(each.hook for each in owed))
-    if as_json:
-        show({"id": alert_id, "hooks": hooks})
-        return
-    click.echo(f"Alert {alert_id} is owed again to {', '.join(hooks)}: the daemon sends it next.")
-
-
-for _verb in (acknowledge, resend, silence, silences, unsilence):
-    command.add_command(_verb)
+    answer(
+        {"id": alert_id, "hooks": hooks},
+        f"Alert {alert_id} is owed again to {', '.join(hooks)}: the daemon sends it next.",
+    )
 
 
 @command.command()
@@ -136,9 +235,9 @@ for _verb in (acknowledge, resend, silence, silences, unsilence):
     shell_complete=completion.hooks,
     help="A hook of bridge.toml.",
 )
-@json_option
+@flags.json
 @click.pass_context
-def test(ctx: click.Context, name: str, as_json: bool) -> None:
+def test(ctx: click.Context, name: str) -> None:
     """Send a hook a marked test alert, now.
 
     It goes the way of every alert, once, whether the daemon runs or not, and is kept nowhere.
@@ -147,7 +246,6 @@ def test(ctx: click.Context, name: str, as_json: bool) -> None:
     \b
     Example: shm alerts test --hook mail
     """
-    from shm.pipeline import utc_now
     from shm_daemon import HookNotifier
 
     workspace = open_workspace(ctx)
@@ -156,15 +254,15 @@ def test(ctx: click.Context, name: str, as_json: bool) -> None:
     timeout_s = workspace.settings.hook_timeout_seconds
     notifier, began = HookNotifier(workspace.folder, timeout_s, os.environ), time.monotonic()
     try:
-        answer = notifier(hook, alert)
+        said = notifier(hook, alert)
     finally:
         notifier.close()
     seconds = time.monotonic() - began
-    if as_json:
-        told = {"hook": name, "kind": hook.kind, "key": alert.key, "answer": answer}
-        show({**told, "seconds": round(seconds, 3)})
-        return
-    click.echo(f"The hook {name} took the test alert in {seconds:.1f} s: {answer}.")
+    told = {"hook": name, "kind": hook.kind, "key": alert.key, "answer": said}
+    answer(
+        {**told, "seconds": round(seconds, 3)},
+        f"The hook {name} took the test alert in {seconds:.1f} s: {said}.",
+    )
 
 
 def a_test_alert(bridge: Bridge, hook: Hook, now: datetime) -> Alert:
@@ -193,7 +291,7 @@ def _described(bridge: Bridge, name: str) -> Hook:
     )
 
 
-def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
+def _list(ctx: click.Context, hanger_id: int | None) -> None:
     with opened_store(ctx) as (workspace, store):
         if hanger_id is not None:
             workspace.bridge.tested(hanger_id)
@@ -210,32 +308,31 @@ def _list(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
         }
         for stored in alerts
     ]
-    if as_json:
-        show({"alerts": rows})
+    if flags.wants_json() or not alerts:
+        answer({"alerts": rows}, "No alert has been raised.")
         return
-    if not alerts:
-        click.echo("No alert has been raised.")
-        return
-    shown = table("alerts", "number", "hanger", "test of", "kind", "hooks", "acknowledged")
-    for stored, row in zip(alerts, rows, strict=True):
-        states = ", ".join(_delivery_words(each) for each in row["deliveries"])
-        if (until := row["silenced_until"]) is not None:
-            states = f"silenced until {until:%Y-%m-%d %H:%M}; {states}"
-        alert = stored.alert
-        shown.add_row(
-            str(stored.id),
-            str(alert.hanger),
-            f"{alert.time:%Y-%m-%d}",
-            ", ".join(alert.kinds),
-            states or "none",
-            acknowledgement_words(stored),
-        )
-    show_table(shown)
+    headings = ("number", "hanger", "test of", "kind", "hooks", "acknowledged")
+    show_rows("alerts", headings, map(_cells, alerts, rows))
     for stored, row in zip(alerts, rows, strict=True):
         click.echo("\n" + paragraph(f"{stored.id}. {stored.alert.message}"))
         for each in row["deliveries"]:
             if each["state"] == DeliveryState.GIVEN_UP:
                 click.echo(paragraph(_given_up_words(stored.id, each)))
+
+
+def _cells(stored: StoredAlert, row: dict[str, Any]) -> tuple[str, ...]:
+    states = ", ".join(_delivery_words(each) for each in row["deliveries"])
+    if (until := row["silenced_until"]) is not None:
+        states = f"silenced until {until:%Y-%m-%d %H:%M}; {states}"
+    alert = stored.alert
+    return (
+        str(stored.id),
+        str(alert.hanger),
+        f"{alert.time:%Y-%m-%d}",
+        ", ".join(alert.kinds),
+        states or "none",
+        acknowledgement_words(stored),
+    )
 
 
 def _given_up_words(alert_id: int, delivery: dict[str, Any]) -> str:

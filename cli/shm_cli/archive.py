@@ -22,7 +22,8 @@ from shm.store.retention import (
     removable,
     remove,
 )
-from shm_cli.common import json_option, opened_store, progress_bar, show
+from shm_cli import flags
+from shm_cli.common import answer, opened_store, progress_bar
 
 _DAYS = click.IntRange(1, 36500)  # technical: a century, which dates can bear
 
@@ -42,14 +43,13 @@ def command() -> None:
     "--quarantine-days", type=_DAYS, metavar="N", help="Refused files younger than that stay."
 )
 @click.option("--dry-run", is_flag=True, help="Only say what would go.")
-@json_option
+@flags.json
 @click.pass_context
 def prune(
     ctx: click.Context,
     keep_days: int | None,
     quarantine_days: int | None,
     dry_run: bool,
-    as_json: bool,
 ) -> None:
     """Remove old raw files of which a whole copy lies elsewhere; rows and results stay.
 
@@ -66,19 +66,15 @@ def prune(
         raw = _prune_archive(workspace, store, keep_days, dry_run)
         refused = _prune_quarantine(workspace, store, quarantine_days, dry_run)
     document = {"dry_run": dry_run, "archive": raw.document, "quarantine": refused.document}
-    if as_json:
-        show(document)
-        return
-    for what, pruned in (("archive", raw), ("quarantine", refused)):
-        for said in pruned.sentences(what, dry_run):
-            click.echo(said)
+    said = [*raw.sentences("archive", dry_run), *refused.sentences("quarantine", dry_run)]
+    answer(document, "\n".join(said))
 
 
 @command.command("fetch")
 @click.argument("which", metavar="ID")
-@json_option
+@flags.json
 @click.pass_context
-def fetch_command(ctx: click.Context, which: str, as_json: bool) -> None:
+def fetch_command(ctx: click.Context, which: str) -> None:
     """Bring the raw file of a recording (by number) or test (by name) back from its copy.
 
     \b
@@ -88,12 +84,9 @@ def fetch_command(ctx: click.Context, which: str, as_json: bool) -> None:
         recording = store.recordings.get(store.recordings.find(which)[0])
         held = workspace.archive.holds_whole(recording.file)
         folder = None if held else fetch(store, workspace.archive, recording)
-    if as_json:
-        come_from = None if folder is None else str(folder)
-        show({"recording": recording.id, "file": recording.file.file_name, "from": come_from})
-        return
+    file, come_from = recording.file.file_name, None if folder is None else str(folder)
     where = "in the archive" if held else f"back in the archive, from {folder}"
-    click.echo(f"{recording.file.file_name} is {where}.")
+    answer({"recording": recording.id, "file": file, "from": come_from}, f"{file} is {where}.")
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,17 +13,15 @@ import rich_click as click
 
 from shm.blind.layout import Told, key_beside, read_trial
 from shm.errors import GateNotMet
-from shm_cli.common import counting_bar, json_option, readable_width, show, show_table, table
-from shm_cli.parameter_types import NewFile
+from shm_cli import flags
+from shm_cli.common import answer, counting_bar, readable_width, show, show_rows
 
 if TYPE_CHECKING:
     from shm.blind.making import MadeTrial
     from shm.blind.solving import SolvedRound
     from shm.values import TrialScore
 
-_trial_argument = click.argument(
-    "directory", metavar="DIR", type=click.Path(file_okay=False, path_type=Path)
-)
+_trial_argument = click.argument("directory", metavar="DIR", type=flags.FOLDER)
 # Technical: more processes than that are a mistake of typing.
 _jobs_option = click.option(
     "--jobs",
@@ -49,9 +48,7 @@ def blind() -> None:
 
 @blind.command()
 @_trial_argument
-@click.option(
-    "--cases", type=click.IntRange(1, 9999), default=300, show_default=True, help="How many."
-)
+@click.option("--cases", type=click.IntRange(1, 9999), default=300, help="How many.")
 @click.option(
     "--seed",
     type=click.IntRange(min=0),
@@ -69,11 +66,10 @@ def blind() -> None:
     "--way",
     type=click.Choice(["both", "modes", "recordings"]),
     default="both",
-    show_default=True,
     help="Cases hold modal tests, or recordings that are still to be identified, or half of each.",
 )
 @_jobs_option
-@json_option
+@flags.json
 def make(
     directory: Path,
     cases: int,
@@ -81,7 +77,6 @@ def make(
     key: Path | None,
     way: str,
     jobs: int,
-    as_json: bool,
 ) -> None:
     """Make a trial: hangers with hidden causes, and a key that is kept apart.
 
@@ -97,7 +92,7 @@ def make(
     ways = [each for each in WAYS if way in ("both", each)]
     with _told("making") as told:
         made = make_trial(directory, key, cases, seed=seed, ways=ways, jobs=jobs, told=told)
-    if as_json:
+    if flags.wants_json():
         told_of = {"directory": str(directory), "cases": len(made.cases), "key": str(key)}
         show({**told_of, "key_sha256": made.key_sha256})
         return
@@ -105,11 +100,10 @@ def make(
 
 
 def _show_made(made: MadeTrial, directory: Path, key: Path) -> None:
-    counts = table(f"{len(made.cases)} cases in {directory}", "planted", "modes", "recordings")
-    for kind, words in _PLANTED.items():
-        ways = [case.way for case in made.cases if case.kind == kind]
-        counts.add_row(words, str(ways.count("modes")), str(ways.count("recordings")))
-    show_table(counts)
+    ways = ("modes", "recordings")
+    counts: Counter[tuple[str, str]] = Counter((case.kind, case.way) for case in made.cases)
+    rows = [(words, *(str(counts[kind, way]) for way in ways)) for kind, words in _PLANTED.items()]
+    show_rows(f"{len(made.cases)} cases in {directory}", ("planted", *ways), rows)
     click.echo(f"Key: {key}")
     click.echo(f"Its SHA-256: {made.key_sha256}")
     click.echo(f"Keep the key away from whoever solves. Next: shm gap blind solve {directory}")
@@ -133,8 +127,8 @@ _PLANTED = {
     "catalogue. The key tells which; no process that diagnoses sees it.",
 )
 @_jobs_option
-@json_option
-def solve(directory: Path, left_out: Path | None, jobs: int, as_json: bool) -> None:
+@flags.json
+def solve(directory: Path, left_out: Path | None, jobs: int) -> None:
     """Diagnose all cases of a trial, and seal the answers with their SHA-256.
 
     Each case is diagnosed in a process that can open nothing but the cases, so not the key. Each
@@ -158,7 +152,7 @@ def solve(directory: Path, left_out: Path | None, jobs: int, as_json: bool) -> N
         with _told("solving without the true effect") as told:
             solved = solve_left_out(trial, without, jobs=jobs, told=told)
         seal = trial.seal("left_out")
-    if as_json:
+    if flags.wants_json():
         show(_solved_document(solved, seal))
         return
     _say_solved(solved, seal)
@@ -194,14 +188,11 @@ def _say_solved(solved: SolvedRound, seal: Path) -> None:
     "--key", type=_key_type(), metavar="FILE", show_default="DIR.key.json", help="The trial's key."
 )
 @click.option(
-    "--html",
-    type=NewFile(),
-    metavar="FILE",
-    help="Write a page with all figures here.",
+    "--html", type=flags.NewFile(), metavar="FILE", help="Write a page with all figures here."
 )
 @click.option("--gate", is_flag=True, help="Exit code 6 where a mark is missed.")
-@json_option
-def score(directory: Path, key: Path | None, html: Path | None, gate: bool, as_json: bool) -> None:
+@flags.json
+def score(directory: Path, key: Path | None, html: Path | None, gate: bool) -> None:
     """Open the key and say how good the answers are, with intervals.
 
     Key and answers are verified first: whoever changed either after it was sealed is found out.
@@ -219,10 +210,7 @@ def score(directory: Path, key: Path | None, html: Path | None, gate: bool, as_j
     found = opened(directory, key or key_beside(directory))
     if html is not None:
         html.write_text(as_html(trial_paper(found)), encoding="utf-8")
-    if as_json:
-        show(trial_json(found))
-    else:
-        click.echo(as_text(trial_paper(found), readable_width()).rstrip())
+    answer(trial_json(found), as_text(trial_paper(found), readable_width()).rstrip())
     if gate:
         _refuse_missed(found)
 

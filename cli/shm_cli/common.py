@@ -1,4 +1,4 @@
-"""What verbs share: options, where they print, how they show progress and read their input."""
+"""What verbs share: where they print, how they show progress and read their input."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import rich_click as click
 from rich.console import Console, Group, RenderableType
@@ -32,14 +32,12 @@ from rich.table import Column, Table
 from shm.bridge import load_hanger
 from shm.documents import dump
 from shm.errors import NothingThere, UsageError
-from shm.inference import METHODS, NOISE_FLOOR, UpdateOptions
-from shm.models import PRIORS, THESIS
 from shm.modes_document import load_modes
 from shm.values import Hanger, ModalTest
-from shm_cli import completion
-from shm_cli.parameter_types import Words
+from shm_cli.flags import wants_json
 
 if TYPE_CHECKING:
+    from shm.report.figures.specification import Illustration
     from shm.report.paper import Table as Texts
     from shm.store import Store, StoredTest, Workspace
 
@@ -47,114 +45,26 @@ if TYPE_CHECKING:
 _WIDTH_OF_A_FILE, _BEYOND_ANY = 120, 100_000
 _READABLE = 100
 
-F = TypeVar("F", bound=Callable[..., Any])
-
-json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
-why_option = click.option("--why", type=Words(), required=True, help="For the record.")
-who_option = click.option(
-    "--who",
-    callback=lambda *given: given[-1] or getpass.getuser(),
-    show_default="the user's name",
-    help="For the record.",
-)
-figures_option = click.option(
-    "--figures",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="DIR",
-    help="Write each figure as a PNG here.",
-)
-seed_option = click.option(
-    "--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Random seed."
-)
-# Judgement: below 100 no 90 % interval has five draws beyond each end; a million fill the memory.
-samples_option = click.option(
-    "--samples",
-    type=click.IntRange(100, 1_000_000),
-    default=1000,
-    show_default=True,
-    help="Posterior samples.",
-)
-repeat_option = click.option(
-    "--repeat",
-    type=click.IntRange(min=1),
-    default=1,
-    show_default=True,
-    help="How often the data set counts (N_D of the thesis).",
-)
-method_option = click.option(
-    "--method",
-    type=click.Choice(METHODS),
-    default=METHODS[0],
-    show_default=True,
-    help="How the sampler works; `textbook` is for fidelity, its evidence is biased.",
-)
-
-priors_option = click.option(
-    "--priors",
-    type=click.Choice(PRIORS),
-    default=PRIORS[0],
-    show_default=True,
-    help="What is possible before the test: by the hanger's description, or by the thesis.",
-)
-
-log_file_option = click.option(
-    "--log-file",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Write the log there, not on stderr; it is put aside as it grows (log_files of them).",
-)
-
-
-_PEM = click.Path(exists=True, dir_okay=False, path_type=Path)
-
-
-def tls_options(function: F) -> F:
-    """`--certificate PEM --key PEM` of whatever serves the web interface."""
-    texts = {"key": "The key of the certificate.", "certificate": "Serve HTTPS with this."}
-    for name, text in texts.items():
-        function = click.option(f"--{name}", type=_PEM, metavar="PEM", help=text)(function)
-    return function
-
-
-def hanger_option(required: bool = False) -> Callable[[F], F]:
-    """`--hanger N`: a hanger of the workspace, or one of several in --hanger-file."""
-    return click.option(
-        "--hanger",
-        "hanger_id",
-        type=int,
-        required=required,
-        metavar="N",
-        shell_complete=completion.hangers,
-        help="Hanger number.",
-    )
-
-
-hanger_file_option = click.option(
-    "--hanger-file",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="H.toml",
-    help="A [[hanger]] table, instead of a workspace.",
-)
-
-
-def update_options(samples: int, seed: int, repeat: int, method: str, priors: str) -> UpdateOptions:
-    """How to update; raises UsageError for what the thesis's priors alone allow."""
-    if priors != THESIS:
-        asked = [f"--repeat {repeat}"] * (repeat != 1) + [f"--method {method}"] * (
-            method != NOISE_FLOOR
-        )
-        for option in asked:
-            raise UsageError(
-                f"{option} is the thesis's way: with priors of the description each test counts "
-                "once and the sampler works its own way.",
-                remedy=f"Add --priors {THESIS}, or leave {option} out.",
-            )
-    return UpdateOptions(samples, seed, repeat, method)
-
 
 def show(document: object) -> None:
     """Prints one JSON document on stdout."""
     click.echo(dump(document))
+
+
+def answer(document: object, words: str) -> None:
+    """One JSON document on stdout where --json asks for it, else words for a person."""
+    if wants_json():
+        show(document)
+    else:
+        click.echo(words)
+
+
+def show_rows(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Prints rows of texts as a table; columns after the first are aligned to the right."""
+    made = table(title, *headings)
+    for row in rows:
+        made.add_row(*row)
+    show_table(made)
 
 
 def show_table(table: Table) -> None:
@@ -222,10 +132,7 @@ def show_texts(texts: Texts) -> None:
     from shm.report.as_text import in_terminal
 
     shown = in_terminal(texts)
-    made = table(shown.title, *shown.headings)
-    for row in shown.rows:
-        made.add_row(*row)
-    show_table(made)
+    show_rows(shown.title, shown.headings, shown.rows)
     if shown.note:
         click.echo(paragraph(shown.note))
 
@@ -393,6 +300,13 @@ def waiting(label: str) -> Iterator[None]:
     ) as sign:
         sign.add_task(label, total=None)
         yield
+
+
+def write_pictures(drawn: Iterable[Illustration], folder: Path, start: str = "") -> None:
+    """Each figure as a PNG in the folder, under its name after `start`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for each in drawn:
+        (folder / f"{start}{each.name}.png").write_bytes(each.png())
 
 
 def drawing() -> AbstractContextManager[None]:

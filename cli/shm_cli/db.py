@@ -11,7 +11,7 @@ from pathlib import Path
 
 import rich_click as click
 
-from shm.errors import DamagedRow, StoreError, UsageError, sentence
+from shm.errors import StoreError, UsageError, sentence
 from shm.store import Archive, Store, Workspace
 from shm.store.backups import back_up, copy_store, restore
 from shm.store.checking import (
@@ -23,26 +23,24 @@ from shm.store.checking import (
     unknown_files,
 )
 from shm.store.copying import TableContent
-from shm.store.missing import MissingRow
 from shm.store.retention import CopiedArchive, copy_archive
+from shm_cli import flags
 from shm_cli.common import (
+    answer,
     counting_bar,
-    json_option,
     open_workspace,
     paragraph,
     progress_bar,
     show,
-    show_table,
-    table,
+    show_rows,
     waiting,
 )
-from shm_cli.parameter_types import Words
-from shm_cli.units import print_unit, print_unit_option
+from shm_cli.services import print_unit, print_unit_option
 
 _copies_option = click.option(
     "--archive",
     "copies",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=flags.FOLDER,
     metavar="DIR",
     help="A folder for copies of the raw files.",
 )
@@ -58,9 +56,9 @@ def command() -> None:
 
 
 @command.command()
-@json_option
+@flags.json
 @click.pass_context
-def upgrade(ctx: click.Context, as_json: bool) -> None:
+def upgrade(ctx: click.Context) -> None:
     """Bring the store to the schema of this version; make its tables where a server has none.
 
     Then what the reports show of older tests is summed up once more, hanger by hanger. That may be
@@ -78,10 +76,10 @@ def upgrade(ctx: click.Context, as_json: bool) -> None:
             hangers = bar.track(workspace.bridge.hangers, description="summing up hangers")
             made = sum(store.posteriors.save_summaries(hanger) for hanger in hangers)
             location = store.location
-    if as_json:
-        show({"store": location, "upgraded": True, "summed_up": made})
-        return
-    click.echo("The store has the present schema.")
+    answer(
+        {"store": location, "upgraded": True, "summed_up": made},
+        "The store has the present schema.",
+    )
 
 
 @command.command()
@@ -89,13 +87,13 @@ def upgrade(ctx: click.Context, as_json: bool) -> None:
 @click.option(
     "--accept",
     "accepted",
-    type=Words(),
+    type=flags.Words(),
     metavar="WHY",
     help="The rows that are missing are gone for good: they are missed no more.",
 )
-@json_option
+@flags.json
 @click.pass_context
-def check(ctx: click.Context, with_archive: bool, accepted: str | None, as_json: bool) -> None:
+def check(ctx: click.Context, with_archive: bool, accepted: str | None) -> None:
     """Read all that the store holds, and say whether it is whole; exit code 5 where it is not.
 
     Rows that somebody took out are missed, by what others say of them, with what makes them again.
@@ -114,13 +112,19 @@ def check(ctx: click.Context, with_archive: bool, accepted: str | None, as_json:
         checked, location = check_store(store, tell), store.location
         archive = check_archive(store, workspace.archive, tell) if with_archive else None
     findings = (*checked.findings, *(archive.findings if archive else ()))
-    if as_json:
+    if flags.wants_json():
         document = {
             "store": location,
             "tables": [asdict(each) for each in checked.tables],
             "archive": asdict(archive) if archive else None,
-            "damaged": [_damage_document(each) for each in checked.damaged],
-            "missing": [_missing_document(each) for each in checked.missing],
+            "damaged": [
+                {"table": e.table, "id": e.id, "hanger": e.hanger, "remedy": e.remedy}
+                for e in checked.damaged
+            ],
+            "missing": [
+                {"table": e.table, "id": e.id, "message": e.message, "remedy": e.remedy}
+                for e in checked.missing
+            ],
             "troubles": [*checked.troubles, *(archive.troubles if archive else ())],
             "findings": [asdict(each) for each in findings],
         }
@@ -148,7 +152,7 @@ def check(ctx: click.Context, with_archive: bool, accepted: str | None, as_json:
 @click.option(
     "--print-timer", "as_timer", is_flag=True, help="Only print a timer that begins it each night."
 )
-@json_option
+@flags.json
 @click.pass_context
 def backup(
     ctx: click.Context,
@@ -156,7 +160,6 @@ def backup(
     copies: Path | None,
     as_unit: bool,
     as_timer: bool,
-    as_json: bool,
 ) -> None:
     """Write what the store holds into a new file, while the daemon goes on.
 
@@ -186,7 +189,7 @@ def backup(
             copied = copy_archive(workspace.archive, kept, names, tell)
             noted = store.upkeep.note_copies(kept, datetime.now(UTC))
         store.upkeep.note_backup(file.resolve(), datetime.now(UTC))
-    if as_json:
+    if flags.wants_json():
         document = {"file": str(file), **_document(written.tables, copied), "newly_noted": noted}
         show({**document, "troubles": list(written.troubles)})
     else:
@@ -220,11 +223,9 @@ def _print_backup_unit(workspace: Path, target: Path, copies: Path | None, timer
     "--replace", is_flag=True, help="Even where the store holds something; that is kept beside."
 )
 @_copies_option
-@json_option
+@flags.json
 @click.pass_context
-def restore_command(
-    ctx: click.Context, file: Path, replace: bool, copies: Path | None, as_json: bool
-) -> None:
+def restore_command(ctx: click.Context, file: Path, replace: bool, copies: Path | None) -> None:
     """Put a backup into the store, which must be empty or is kept as a file with --replace.
 
     No daemon may be active. A backup of an older schema is brought to the present one. With
@@ -238,7 +239,7 @@ def restore_command(
     with workspace.lock(), progress_bar("restore") as tell:
         restored = restore(workspace.location, file, keep_as, tell, replace=replace)
         copied = _fetch(workspace, copies)
-    if as_json:
+    if flags.wants_json():
         kept = str(restored.kept) if restored.kept else None
         show({"kept": kept, **_document(restored.tables, copied)})
     else:
@@ -253,9 +254,9 @@ def restore_command(
 
 @command.command()
 @click.option("--to", "target", required=True, metavar="URL", help="A PostgreSQL URL, or a file.")
-@json_option
+@flags.json
 @click.pass_context
-def copy(ctx: click.Context, target: str, as_json: bool) -> None:
+def copy(ctx: click.Context, target: str) -> None:
     """Copy the store into an empty one of either kind, and compare rows and checksums.
 
     Then name that one in SHM_STORE and put shm.db away. A password is better given by PGPASSWORD or
@@ -268,19 +269,11 @@ def copy(ctx: click.Context, target: str, as_json: bool) -> None:
     place = target if "://" in target else Path(target).resolve()
     with workspace.lock(), workspace.store() as store, progress_bar("copy") as tell:
         tables = copy_store(store, place, tell)
-    if as_json:
+    if flags.wants_json():
         show(_document(tables, None))
     else:
         _show_tables(tables)
         click.echo("Both stores hold the same. Name the new one in SHM_STORE.")
-
-
-def _damage_document(row: DamagedRow) -> dict[str, object]:
-    return {"table": row.table, "id": row.id, "hanger": row.hanger, "remedy": row.remedy}
-
-
-def _missing_document(row: MissingRow) -> dict[str, object]:
-    return {"table": row.table, "id": row.id, "message": row.message, "remedy": row.remedy}
 
 
 def _fetch(workspace: Workspace, copies: Path | None) -> CopiedArchive | None:
@@ -298,10 +291,8 @@ def _document(tables: Sequence[TableContent], copied: CopiedArchive | None) -> d
 
 
 def _show_tables(tables: Sequence[TableContent]) -> None:
-    made = table("store", "table", "rows", "checksum")
-    for each in tables:
-        made.add_row(each.table, str(each.rows), each.checksum[:16])
-    show_table(made)
+    rows = [(each.table, str(each.rows), each.checksum[:16]) for each in tables]
+    show_rows("store", ("table", "rows", "checksum"), rows)
 
 
 def _say_copied(copied: CopiedArchive | None) -> None:

@@ -38,9 +38,9 @@ from shm.simulate.ambient import Loss, MonitoringPlan, described_stream
 from shm.store import Stage, Store, StoredAlert, Workspace
 from shm.store.ring import ring_of
 from shm.values import Hanger, Posterior
-from shm_cli import thesis
+from shm_cli import flags, thesis
 from shm_cli.common import counting_bar
-from shm_cli.simulate_stream import arriving, send
+from shm_cli.planting import arriving, send
 
 # A story: three hangers, four days, of which the watch learns three; then one loses as much as
 # nobody sees. At 100 Hz, and in chunks of ten minutes, so that two cores are done in two minutes.
@@ -253,9 +253,8 @@ _POLL_S = 0.3  # technical: a bar that moves
 @click.command()
 @click.option(
     "--folder",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=flags.FOLDER,
     default="shm-demo",
-    show_default=True,
     help="Where to make the workspace; an older demo is replaced.",
 )
 @click.option("--live", is_flag=True, help="A bridge with permanent sensors instead of a hammer.")

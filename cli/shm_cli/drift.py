@@ -22,39 +22,79 @@ from shm.pipeline.rebaselining import Order, set_baseline
 from shm.pipeline.reporting import hanger_states
 from shm.report.bridge_report import pattern_json
 from shm.report.figures.along_the_bridge import bridge_illustration
-from shm.report.shifts import pattern_tables, shift_cells, temperature_documents, temperature_table
-from shm.report.states import NOTHING_WATCHED
+from shm.report.shifts import pattern_tables, shift_cells
+from shm.report.states import NOTHING_WATCHED, temperature_documents, temperature_table
 from shm.store import Baseline
 from shm.values import Drift
 from shm.watch.repair_check import EVENT_KINDS
-from shm_cli.common import (
-    hanger_option,
-    json_option,
-    opened_store,
-    paragraph,
-    progress_bar,
-    show,
-    show_table,
-    show_texts,
-    table,
-    who_option,
-    why_option,
-)
-from shm_cli.parameter_types import NewFile
+from shm_cli import flags
+from shm_cli.common import opened_store, paragraph, progress_bar, show, show_rows, show_texts
 
 _FORMATS = ["%Y-%m-%d", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%SZ"]
 
 
-@click.command("bridge")
-@json_option
+@click.group(invoke_without_command=True)
+@flags.hanger()
+@click.option("--all", "all_tests", is_flag=True, help="All tests, not each hanger's latest.")
+@flags.json
+@click.pass_context
+def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
+    """How far tension and stiffness have moved.
+
+    The shift of the latest test of each hanger from its baseline, if there is one at all: the
+    tension in percent, an end stiffness as how many times what it was, with the probability that it
+    lies beyond the threshold. With --hanger also how each quantity goes with the temperature. In
+    JSON shifts are fractions of the tension and decades (powers of ten) of a stiffness.
+
+    \b
+    Example: shm drift --hanger 3 --all
+    """
+    if ctx.invoked_subcommand is not None:
+        return
+    states, hangers = NOTHING_WATCHED, []
+    with opened_store(ctx) as (workspace, store):
+        hangers = [each.id for each in workspace.bridge.hangers]
+        if hanger_id is not None:
+            hanger = workspace.bridge.hanger(hanger_id)
+            hangers = [hanger_id]
+            states = hanger_states(workspace, store, hanger, store.watch.baseline(hanger_id))
+        shown = (
+            store.watch.list_drifts(hanger_id)
+            if all_tests
+            else [drift for each in hangers for drift in latest_drifts(store, each)]
+        )
+        anew = [] if all_tests else _without_a_test(store, hangers)
+    if not shown and not anew:
+        raise NothingThere(
+            "no test has been compared with a baseline yet.",
+            remedy="Take in more tests: the first ones of a hanger form its baseline.",
+        )
+    if flags.wants_json():
+        document: dict[str, object] = {"drifts": [drift_document(drift) for drift in shown]}
+        if hanger_id is not None:
+            document["temperature_coefficients"] = temperature_documents(states)
+        show(document)
+        return
+    if shown:
+        _show(shown)
+    for each in anew:
+        said = f"Hanger {each.hanger} is compared anew since {each.since:%Y-%m-%d}; no test has "
+        click.echo(paragraph(f"{said}come in after that baseline was set."))
+    if states.temperature_coefficients:
+        click.echo()
+        show_texts(temperature_table(states))
+
+
+@command.command("bridge")
+@flags.json
 @click.option(
     "--figure",
-    type=NewFile(),
+    type=flags.NewFile(),
     metavar="FILE.png",
     help="Write the elevation of the bridge, hangers coloured by their shift, as a picture.",
 )
 @click.pass_context
-def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
+def bridge(ctx: click.Context, figure: Path | None) -> None:
     """Which hangers gained and which lost, and whether it is the bridge at all.
 
     Compares the latest tension shift of each hanger with its neighbours': one hanger whose
@@ -71,7 +111,7 @@ def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
     if figure is not None:
         figure.write_bytes(bridge_illustration(pattern).png())
         click.echo(f"Wrote {figure}.", err=True)
-    if as_json:
+    if flags.wants_json():
         show(pattern_json(pattern))
         return
     for each in pattern_tables(pattern):
@@ -80,8 +120,8 @@ def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
         click.echo(paragraph(sentence))
 
 
-@click.command()
-@hanger_option(required=True)
+@command.command()
+@flags.hanger(required=True)
 @click.option(
     "--since",
     type=click.DateTime(_FORMATS),
@@ -94,9 +134,9 @@ def bridge(ctx: click.Context, as_json: bool, figure: Path | None) -> None:
     type=click.Choice(list(EVENT_KINDS)),
     help="What was done: ends only the alerts that this explains.",
 )
-@why_option
-@who_option
-@json_option
+@flags.why
+@flags.who
+@flags.json
 @click.pass_context
 def rebaseline(
     ctx: click.Context,
@@ -105,7 +145,6 @@ def rebaseline(
     kind: str | None,
     why: str,
     who: str,
-    as_json: bool,
 ) -> None:
     """Compare a hanger with itself as it is since some day.
 
@@ -129,7 +168,7 @@ def rebaseline(
         hanger = workspace.bridge.hanger(hanger_id)
         with progress_bar("updating") as progress:
             found = set_baseline(workspace, store, hanger, order, utc_now(), progress)
-    if as_json:
+    if flags.wants_json():
         of_event = {"kind": kind, "alerts_explained": found.explained, "alerts_open": found.left}
         show(
             {
@@ -165,62 +204,6 @@ if TYPE_CHECKING:
     from shm.store import Baseline, Store
 
 
-@click.group(invoke_without_command=True)
-@hanger_option()
-@click.option("--all", "all_tests", is_flag=True, help="All tests, not each hanger's latest.")
-@json_option
-@click.pass_context
-def command(ctx: click.Context, hanger_id: int | None, all_tests: bool, as_json: bool) -> None:
-    """How far tension and stiffness have moved.
-
-    The shift of the latest test of each hanger from its baseline, if there is one at all: the
-    tension in percent, an end stiffness as how many times what it was, with the probability that it
-    lies beyond the threshold. With --hanger also how each quantity goes with the temperature. In
-    JSON shifts are fractions of the tension and decades (powers of ten) of a stiffness.
-
-    \b
-    Example: shm drift --hanger 3 --all
-    """
-    if ctx.invoked_subcommand is not None:
-        return
-    states, hangers = NOTHING_WATCHED, []
-    with opened_store(ctx) as (workspace, store):
-        hangers = [each.id for each in workspace.bridge.hangers]
-        if hanger_id is not None:
-            hanger = workspace.bridge.hanger(hanger_id)
-            hangers = [hanger_id]
-            states = hanger_states(workspace, store, hanger, store.watch.baseline(hanger_id))
-        shown = (
-            store.watch.list_drifts(hanger_id)
-            if all_tests
-            else [drift for each in hangers for drift in latest_drifts(store, each)]
-        )
-        anew = [] if all_tests else _without_a_test(store, hangers)
-    if not shown and not anew:
-        raise NothingThere(
-            "no test has been compared with a baseline yet.",
-            remedy="Take in more tests: the first ones of a hanger form its baseline.",
-        )
-    if as_json:
-        document: dict[str, object] = {"drifts": [drift_document(drift) for drift in shown]}
-        if hanger_id is not None:
-            document["temperature_coefficients"] = temperature_documents(states)
-        show(document)
-        return
-    if shown:
-        _show(shown)
-    for each in anew:
-        said = f"Hanger {each.hanger} is compared anew since {each.since:%Y-%m-%d}; no test has "
-        click.echo(paragraph(f"{said}come in after that baseline was set."))
-    if states.temperature_coefficients:
-        click.echo()
-        show_texts(temperature_table(states))
-
-
-command.add_command(rebaseline)
-command.add_command(bridge)
-
-
 def _without_a_test(store: Store, hangers: Sequence[int]) -> list[Baseline]:
     """The baselines that were set by a person and with which no test has been compared yet."""
     baselines = [store.watch.baseline(hanger) for hanger in hangers]
@@ -230,11 +213,9 @@ def _without_a_test(store: Store, hangers: Sequence[int]) -> list[Baseline]:
 
 
 def _show(drifts: Sequence[Drift]) -> None:
-    made = table(
-        "shift from the baseline, if there is one", "hanger", "test of", "quantity", "shift",
-        "90 % interval", "threshold", "probability beyond",
+    headings = (
+        "hanger", "test of", "quantity", "shift", "90 % interval", "threshold",
+        "probability beyond",
     )  # fmt: skip
-    for drift in drifts:
-        quantity, *cells = shift_cells(drift)
-        made.add_row(str(drift.hanger), f"{drift.time:%Y-%m-%d}", quantity, *cells)
-    show_table(made)
+    rows = [(str(each.hanger), f"{each.time:%Y-%m-%d}", *shift_cells(each)) for each in drifts]
+    show_rows("shift from the baseline, if there is one", headings, rows)

@@ -16,8 +16,8 @@ from rich.markup import escape
 from shm.bridge import load_hanger
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey
 from shm.values import PLANES
-from shm_cli import completion, thesis
-from shm_cli.common import json_option, markdown, show, show_table, table
+from shm_cli import completion, flags, thesis
+from shm_cli.common import markdown, show, show_rows
 
 _HANGER = replace(load_hanger(thesis.HANGER_FILE), plate=None)
 
@@ -70,8 +70,8 @@ think of then. What imitates what:
     type=click.Choice(list(EFFECTS)),
     shell_complete=completion.effects,
 )
-@json_option
-def effects(name: str | None, as_json: bool) -> None:
+@flags.json
+def effects(name: str | None) -> None:
     """The catalogue of effects: what each does, its ranges, what shows it, what imitates it.
 
     The ranges are those of hanger 3 of the thesis, since they scale with the hanger.
@@ -80,7 +80,7 @@ def effects(name: str | None, as_json: bool) -> None:
     Example: shm gap effects point_mass
     """
     chosen = [EFFECTS[name]] if name else list(EFFECTS.values())
-    if as_json:
+    if flags.wants_json():
         show({"effects": [_document(effect) for effect in chosen]})
         return
     if name:
@@ -99,10 +99,7 @@ def _print(text: str) -> None:
 
 
 def _print_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    shown = table("", *heads)
-    for row in rows:
-        shown.add_row(*(escape(cell.replace("`", "")) for cell in row))
-    show_table(shown)
+    show_rows("", heads, [[escape(cell.replace("`", "")) for cell in row] for row in rows])
 
 
 def _document(effect: Effect) -> dict[str, object]:

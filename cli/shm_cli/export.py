@@ -9,17 +9,17 @@ import rich_click as click
 from shm import export
 from shm.errors import BadInput
 from shm.values import Hanger, ModalTest, Posterior
-from shm_cli.common import hanger_option, json_option, opened_store, show, waiting
-from shm_cli.parameter_types import NewFile
+from shm_cli import flags
+from shm_cli.common import opened_store, show, waiting
 
 
 @click.command()
-@hanger_option(required=True)
+@flags.hanger(required=True)
 @click.option("--test", metavar="ID", help="A test; the latest if left out.")
 @click.option(
     "--format",
     "form",
-    type=click.Choice(list(export.FORMATS)),
+    type=click.Choice(export.FORMATS),
     show_default="the suffix of FILE",
     help="Table of samples (csv, npz), the document of `shm update` with its draws (json), or what "
     "ArviZ and xarray read (netcdf, needs shm[export]).",
@@ -27,11 +27,11 @@ from shm_cli.parameter_types import NewFile
 @click.option(
     "--out",
     required=True,
-    type=NewFile(),
+    type=flags.NewFile(),
     metavar="FILE.csv|.nc|.json|.npz",
     help="Where to write.",
 )
-@json_option
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -39,7 +39,6 @@ def command(
     test: str | None,
     form: str | None,
     out: Path,
-    as_json: bool,
 ) -> None:
     """Posterior samples for other programs.
 
@@ -56,7 +55,7 @@ def command(
         tests = [store.tests.named(hanger_id, name).test for name in posterior.tests]
     with waiting("writing the samples"):
         _write(posterior, out, form, tests, hanger)
-    if as_json:
+    if flags.wants_json():
         show({"file": str(out), "model": posterior.model, "samples": len(posterior.samples)})
         return
     click.echo(f"Wrote {len(posterior.samples)} samples of {posterior.model} to {out}.", err=True)

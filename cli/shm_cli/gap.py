@@ -1,18 +1,24 @@
-"""`shm gap`: why model and measurement differ, and what that does to the tension."""
+"""`shm gap`: why model and measurement differ, what that does to tension, what to measure next."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from functools import partial
+from itertools import accumulate
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
+import numpy as np
 import rich_click as click
 
+from shm.bridge import load_bridge
 from shm.errors import NothingThere, UsageError
 from shm.gap import GapOptions, diagnose_bridge
 from shm.gap import diagnose as diagnosed
+from shm.gap.diagnose import examined
 from shm.gap.kin import LEAST
+from shm.gap.measurement_plan import PlannedMeasurement, Race, nothing_planned, planned
 from shm.models.effects import EFFECTS
 from shm.pipeline import utc_now
 from shm.pipeline.lineage import diagnosis_lineage
@@ -26,30 +32,42 @@ from shm.report.figures.every_figure import bridge_diagnosis_figures, diagnosis_
 from shm.report.figures.specification import Illustration
 from shm.report.paper import Paper
 from shm.values import Diagnosis, Hanger, ModalTest
-from shm_cli import completion
+from shm_cli import completion, flags
 from shm_cli.adopt import adopt, adopted, drop
 from shm_cli.blind import blind
 from shm_cli.common import (
     advancing_bar,
+    answer,
     drawing,
-    figures_option,
-    hanger_file_option,
-    hanger_option,
-    json_option,
     latest_tests,
     one_hanger,
+    open_workspace,
     opened_store,
     readable_width,
-    seed_option,
-    show,
+    show_rows,
     tests_and_hanger,
     told_doubts,
+    write_pictures,
 )
 from shm_cli.effects import effects
-from shm_cli.gap_plan import plan
-from shm_cli.parameter_types import NewFile
 
-_DEFAULT = GapOptions()
+_baseline = click.option(
+    "--baseline",
+    metavar="NAME",
+    default=GapOptions().baseline,
+    shell_complete=completion.models,
+    help="The model class whose gap is diagnosed.",
+)
+_without = click.option(
+    "--without",
+    multiple=True,
+    metavar="EFFECT",
+    shell_complete=completion.effects,
+    help="Take an effect out of the catalogue; may be given again.",
+)
+
+_LATEST = 20  # as `shm gap diagnose`
+_HEADS = ("measurement", "hours", "in all", "promised log odds", "then", "probability")
 
 
 @click.group()
@@ -62,30 +80,96 @@ def command() -> None:
 
 
 @command.command()
+@click.argument("file", metavar="[MODES.json]", required=False, type=flags.FILE)
+@flags.hanger()
+@flags.hanger_file
+@click.option(
+    "--budget",
+    "budget_hours",
+    type=click.FloatRange(0.0, min_open=True),
+    metavar="HOURS",
+    help="Hours of a crew that the plan may cost.  [default: as many as it takes]",
+)
+@_baseline
+@_without
+@flags.seed
+@flags.json
+@click.pass_context
+def plan(
+    ctx: click.Context,
+    file: Path | None,
+    hanger_id: int | None,
+    hanger_file: Path | None,
+    budget_hours: float | None,
+    baseline: str,
+    without: tuple[str, ...],
+    seed: int,
+) -> None:
+    """The next measurements in order, each with its cost and what it promises.
+
+    Of MODES.json, or of the latest 20 tests of a hanger of the workspace. Hours of each kind of
+    measurement stand in the table [measurement_hours] of the bridge file.
+
+    \b
+    Example: shm gap plan hanger3.modes.json --hanger-file H.toml --budget 8
+    """
+    tests, hanger = _measured(ctx, file, hanger_file, hanger_id)
+    bridge = load_bridge(hanger_file) if hanger_file is not None else open_workspace(ctx).bridge
+    options = GapOptions(baseline, without, seed=seed)
+    with advancing_bar() as progress:
+        diagnosis, attribution = examined(tests, hanger, options, progress)
+    race = Race.of(attribution, np.random.default_rng(seed))
+    most_hours = budget_hours or np.inf
+    steps = planned(race, bridge.measurement_hours, most_hours)
+    rows = _rows(steps)
+    if flags.wants_json() or not steps:
+        answer(
+            {"hanger": diagnosis.hanger, "baseline": baseline, "seed": seed, "steps": rows},
+            "" if steps else nothing_planned(race, bridge.measurement_hours, most_hours),
+        )
+        return
+    cells = [
+        (
+            row["what"], f"{row['hours']:g}", f"{row['hours_in_all']:g}",
+            f"{row['promised_log_odds']:+.1f}", f"{row['log_odds']:.1f}",
+            f"{row['probability']:.2f}",
+        )
+        for row in rows
+    ]  # fmt: skip
+    show_rows("Next measurements", _HEADS, cells)
+    click.echo(
+        "Of the true explanation against all others, averaged over which it is; make the first, "
+        "diagnose, and plan anew."
+    )
+
+
+def _measured(
+    ctx: click.Context, file: Path | None, hanger_file: Path | None, hanger_id: int | None
+) -> tuple[Sequence[ModalTest], Hanger]:
+    """The tests and their hanger, those of the workspace as `shm gap diagnose` takes them."""
+    if file is not None:
+        return tests_and_hanger(ctx, file, hanger_file, hanger_id)
+    hanger = one_hanger(ctx, hanger_file, hanger_id)
+    with opened_store(ctx) as (_, store):
+        return [each.test for each in latest_tests(store, hanger, _LATEST)], hanger
+
+
+def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:
+    spent = accumulate(step.hours for step in steps)
+    return [
+        asdict(step) | {"hours_in_all": hours} for step, hours in zip(steps, spent, strict=True)
+    ]
+
+
+@command.command()
 @click.argument(
-    "files",
-    metavar="[MODES.json] [H.toml MODES.json H.toml ...]",
-    nargs=-1,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    "files", metavar="[MODES.json] [H.toml MODES.json H.toml ...]", nargs=-1, type=flags.FILE
 )
-@hanger_option()
-@hanger_file_option
+@flags.hanger()
+@flags.hanger_file
 @click.option("--bridge", is_flag=True, help="All hangers of the workspace together.")
-@click.option(
-    "--baseline",
-    metavar="NAME",
-    default=_DEFAULT.baseline,
-    show_default=True,
-    shell_complete=completion.models,
-    help="The model class whose gap is diagnosed.",
-)
-@click.option(
-    "--without",
-    multiple=True,
-    metavar="EFFECT",
-    shell_complete=completion.effects,
-    help="Take an effect out of the catalogue; may be given again.",
-)
+@_baseline
+@_without
 @click.option(
     "--hold-out",
     multiple=True,
@@ -98,25 +182,21 @@ def command() -> None:
     "count",
     type=click.IntRange(1, 100),
     default=20,
-    show_default=True,
     metavar="N",
     help="How many of the latest tests of a hanger of the workspace.",
 )
-@seed_option
+@flags.seed
 @click.option(
-    "--html",
-    type=NewFile(),
-    metavar="FILE",
-    help="Write a page with all figures here.",
+    "--html", type=flags.NewFile(), metavar="FILE", help="Write a page with all figures here."
 )
 @click.option(
     "--write-effect",
-    type=NewFile(),
+    type=flags.NewFile(),
     metavar="FILE.py",
     help="Write the law of something unknown here, as the module of a new effect.",
 )
-@figures_option
-@json_option
+@flags.figures
+@flags.json
 @click.pass_context
 def diagnose(
     ctx: click.Context,
@@ -132,7 +212,6 @@ def diagnose(
     html: Path | None,
     write_effect: Path | None,
     figures: Path | None,
-    as_json: bool,
 ) -> None:
     """Where the gap lies, which effect causes it, how far it shrinks, what would tell.
 
@@ -150,37 +229,29 @@ def diagnose(
     """
     options = GapOptions(baseline, without, hold_out, seed=seed)
     effect = _effect_name(write_effect) if write_effect is not None else ""
-    shown: _Shown
     if bridge or len(files) > 1:
         if effect:
             raise UsageError(
                 "--write-effect writes what one hanger leaves open.", remedy="Diagnose it alone."
             )
-        shown = _OfBridge(_jointly(ctx, files, bridge, (hanger_id, hanger_file), count, options))
-    elif not files:
-        hanger = one_hanger(ctx, hanger_file, hanger_id)
-        shown = _OfHanger(_of_workspace(ctx, hanger, count, options))
+        joint = _jointly(ctx, files, bridge, (hanger_id, hanger_file), count, options)
+        draw = partial(bridge_diagnosis_figures, joint.diagnosis)
+        _show(bridge_diagnosis_paper(joint), bridge_diagnosis_json(joint), draw, html, figures)
+        return
+    if not files:
+        sheet = _of_workspace(ctx, one_hanger(ctx, hanger_file, hanger_id), count, options)
     else:
         tests, hanger = tests_and_hanger(ctx, files[0], hanger_file, hanger_id)
-        shown = _OfHanger(DiagnosisSheet(_diagnosis(tests, hanger, options), hanger))
-    if html is not None or figures is not None:
-        with drawing():
-            _write(shown, html, figures)
-    if as_json:
-        show(shown.document())
-    else:
-        click.echo(as_text(shown.paper(), readable_width()).rstrip())
-    if write_effect is not None and isinstance(shown, _OfHanger):
-        text = effect_file(shown.sheet.diagnosis, shown.sheet.hanger, effect)
+        sheet = DiagnosisSheet(_diagnosis(tests, hanger, options), hanger)
+    draw = partial(diagnosis_figures, sheet)
+    _show(diagnosis_paper(sheet), diagnosis_json(sheet), draw, html, figures)
+    if write_effect is not None:
+        text = effect_file(sheet.diagnosis, sheet.hanger, effect)
         write_effect.write_text(text, encoding="utf-8")
 
 
-command.add_command(adopt)
-command.add_command(adopted)
-command.add_command(drop)
-command.add_command(blind)
-command.add_command(effects)
-command.add_command(plan)
+for _verb in (adopt, adopted, drop, blind, effects):
+    command.add_command(_verb)
 
 
 def _of_workspace(
@@ -258,41 +329,6 @@ def _of_bridge(ctx: click.Context, count: int, options: GapOptions) -> BridgeDia
     return BridgeDiagnosisSheet(found, workspace.bridge.name)
 
 
-@dataclass(frozen=True)
-class _OfHanger:
-    """The answer for one hanger, as it is shown."""
-
-    sheet: DiagnosisSheet
-
-    def document(self) -> dict[str, Any]:
-        return diagnosis_json(self.sheet)
-
-    def paper(self) -> Paper:
-        return diagnosis_paper(self.sheet)
-
-    def figures(self) -> Sequence[Illustration]:
-        return diagnosis_figures(self.sheet)
-
-
-@dataclass(frozen=True)
-class _OfBridge:
-    """The answer for several hangers, as it is shown."""
-
-    sheet: BridgeDiagnosisSheet
-
-    def document(self) -> dict[str, Any]:
-        return bridge_diagnosis_json(self.sheet)
-
-    def paper(self) -> Paper:
-        return bridge_diagnosis_paper(self.sheet)
-
-    def figures(self) -> Sequence[Illustration]:
-        return bridge_diagnosis_figures(self.sheet.diagnosis)
-
-
-_Shown: TypeAlias = _OfHanger | _OfBridge
-
-
 def _effect_name(file: Path) -> str:
     """The name of the effect that a file holds, which the catalogue must not have yet."""
     name = file.stem.lower()
@@ -304,10 +340,18 @@ def _effect_name(file: Path) -> str:
     return name
 
 
-def _write(shown: _Shown, html: Path | None, figures: Path | None) -> None:
-    if html is not None:
-        html.write_text(as_html(shown.paper()), encoding="utf-8")
-    if figures is not None:
-        figures.mkdir(parents=True, exist_ok=True)
-        for illustration in shown.figures():
-            (figures / f"{illustration.name}.png").write_bytes(illustration.png())
+def _show(
+    paper: Paper,
+    document: dict[str, Any],
+    draw: Callable[[], Sequence[Illustration]],
+    html: Path | None,
+    figures: Path | None,
+) -> None:
+    """Writes what is to be written, then answers."""
+    if html is not None or figures is not None:
+        with drawing():
+            if html is not None:
+                html.write_text(as_html(paper), encoding="utf-8")
+            if figures is not None:
+                write_pictures(draw(), figures)
+    answer(document, as_text(paper, readable_width()).rstrip())

@@ -13,18 +13,19 @@ from typing import Any
 
 import rich_click as click
 
-from shm.errors import StoreBusy, UsageError
+from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Decision, Hold, Stage, Store, StoredAlert, Withdrawal, Workspace
 from shm.store.holding import discarded_reason, taking_back
+from shm_cli import flags
 from shm_cli.common import paragraph, show
 
 
-def show_held(workspace: Workspace, as_json: bool) -> int:
+def show_held(workspace: Workspace) -> int:
     """What nobody has decided on yet."""
     with workspace.store() as store:
         found = store.recordings.list_holds()
-    if as_json:
+    if flags.wants_json():
         show({"held": [hold_document(hold) for hold in found]})
         return 0
     if not found:
@@ -56,7 +57,7 @@ def decide(
     """
     # It brings the hooks' libraries; `shm status` and `shm ingest --held` only tell.
     from shm.plausibility import refuse_impossible
-    from shm_cli.working import LEFT_TO_IT, finish, working
+    from shm_cli.working import finish_now
 
     refuse_impossible(time, workspace.bridge.built)
     who, why = record[0] or getpass.getuser(), record[1] or ""
@@ -77,11 +78,7 @@ def decide(
             hold = store.recordings.confirm(recording_id, who, why, utc_now(), time)
         else:
             hold = store.recordings.reinstate(recording_id, who, why, utc_now(), time, test)
-        try:
-            with working(workspace) as flow:
-                finish(flow, [recording_id])
-        except StoreBusy:
-            click.echo(LEFT_TO_IT, err=True)
+        finish_now(workspace, recording_id)
         raised = [stored for stored in store.alerts.list_all() if stored.id not in known]
         return Decided(hold, raised, withdrawal)
 

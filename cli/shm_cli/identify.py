@@ -21,21 +21,18 @@ from shm.report.contents import ModalTestReport
 from shm.report.modal_test_report import modal_test_paper
 from shm.settings import Settings
 from shm.values import FrequencyResponse, Hanger, Recording
+from shm_cli import flags
 from shm_cli.common import (
+    answer,
     counting_bar,
     drawing,
-    figures_option,
-    hanger_file_option,
-    hanger_option,
     is_workspace,
-    json_option,
     one_hanger,
     open_workspace,
     readable_width,
-    show,
     told_doubts,
+    write_pictures,
 )
-from shm_cli.parameter_types import NewFile
 
 if TYPE_CHECKING:
     from shm.store import Workspace
@@ -44,20 +41,13 @@ _DEFAULT = Settings()
 
 
 @click.command()
-@click.argument(
-    "files",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE...",
-)
+@click.argument("files", nargs=-1, required=True, type=flags.FILE, metavar="FILE...")
 @click.option("--together", is_flag=True, help="The files are one test: hits, or set-ups.")
 @click.option(
     "--band",
     nargs=2,
     type=float,
     default=(_DEFAULT.band_low_hz, _DEFAULT.band_high_hz),
-    show_default=True,
     metavar="LOW HIGH",
     help="Where to look for modes, in Hz.",
 )
@@ -65,28 +55,25 @@ _DEFAULT = Settings()
     "--identifier",
     type=click.Choice(list(IDENTIFIERS)),
     default=_DEFAULT.identifier,
-    show_default=True,
     help="How modes are found.",
 )
 @click.option(
     "--cross-check",
     type=click.Choice([*IDENTIFIERS, "none"]),
     default=_DEFAULT.cross_check,
-    show_default=True,
     help="A second identifier whose frequencies are compared.",
 )
 @click.option(
     "--estimator",
     type=click.Choice(["h1", "h2", "hv"]),
     default=_DEFAULT.estimator,
-    show_default=True,
     help="Of the frequency response: noise in the responses, the force, or both.",
 )
 @click.option(
     "--reference-force",
+    "reference_force_n",
     type=float,
     default=_DEFAULT.reference_force_n,
-    show_default=True,
     metavar="N",
     help="A hit this hard, in N, has amplitude 1.",
 )
@@ -94,19 +81,19 @@ _DEFAULT = Settings()
     "--frequency-allowance",
     type=click.FloatRange(min=0, max=0.01),
     default=_DEFAULT.frequency_allowance,
-    show_default=True,
     help="Part of a frequency that differs from test to test unseen.",
 )
 @click.option(
     "--mains",
+    "mains_hz",
     type=float,
     default=_DEFAULT.mains_hz,
-    show_default=True,
     metavar="HZ",
     help="Frequency of the power grid.",
 )
 @click.option(
     "--window",
+    "window_time_constant_s",
     type=float,
     default=math.inf,
     show_default="none",
@@ -115,32 +102,32 @@ _DEFAULT = Settings()
 )
 @click.option(
     "--out",
-    type=NewFile(),
+    type=flags.NewFile(),
     metavar="T.modes.json",
     help="Write the modal-tests document here.",
 )
 @click.option(
     "--html",
-    type=NewFile(),
+    type=flags.NewFile(),
     metavar="SHEET.html",
     help="Write a page with all figures here; one test only.",
 )
-@figures_option
-@hanger_option()
-@hanger_file_option
-@json_option
+@flags.figures
+@flags.hanger()
+@flags.hanger_file
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context,
     /,
     files: tuple[Path, ...],
     together: bool,
+    band: tuple[float, float],
     out: Path | None,
     html: Path | None,
     figures: Path | None,
     hanger_id: int | None,
     hanger_file: Path | None,
-    as_json: bool,
     **chosen: Any,
 ) -> None:
     """Modal parameters of recordings.
@@ -158,7 +145,7 @@ def command(
     groups = [files] if together else [(path,) for path in files]
     if html is not None and len(groups) > 1:
         raise UsageError("--html shows one test.", remedy="Give one file, or --together.")
-    options = _options(**chosen)
+    options = IdentifyOptions(band_low_hz=band[0], band_high_hz=band[1], **chosen)
     workspace = None
     if hanger_file is None and (hanger_id is not None or is_workspace(ctx)):
         workspace = open_workspace(ctx)
@@ -170,34 +157,8 @@ def command(
     _refuse_several_hangers(sheets)
     with drawing():
         _write(sheets, out, html, figures)
-    if as_json:
-        show(_document(sheets))
-    else:
-        for sheet in sheets:
-            click.echo(as_text(modal_test_paper(sheet), readable_width()).rstrip())
-
-
-def _options(
-    band: tuple[float, float],
-    identifier: str,
-    cross_check: str,
-    estimator: Any,
-    reference_force: float,
-    frequency_allowance: float,
-    mains: float,
-    window: float,
-) -> IdentifyOptions:
-    return IdentifyOptions(
-        band_low_hz=band[0],
-        band_high_hz=band[1],
-        identifier=identifier,
-        cross_check=cross_check,
-        estimator=estimator,
-        reference_force_n=reference_force,
-        frequency_allowance=frequency_allowance,
-        mains_hz=mains,
-        window_time_constant_s=window,
-    )
+    said = [as_text(modal_test_paper(sheet), readable_width()).rstrip() for sheet in sheets]
+    answer(_document(sheets), "\n".join(said))
 
 
 def _identified(
@@ -270,7 +231,4 @@ def _write(
     from shm.report.figures.every_figure import modal_test_figures
 
     for sheet in sheets:
-        for illustration in modal_test_figures(sheet):
-            figures.mkdir(parents=True, exist_ok=True)
-            name = f"{sheet.identification.test.id}-{illustration.name}.png"
-            (figures / name).write_bytes(illustration.png())
+        write_pictures(modal_test_figures(sheet), figures, f"{sheet.identification.test.id}-")

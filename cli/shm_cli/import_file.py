@@ -42,15 +42,15 @@ from shm.read.modal_sets import ForeignModes, axes_of
 from shm.read.profiles import Profile
 from shm.read.sandbox import foreign_modes
 from shm.store import Workspace
-from shm_cli.common import json_option, open_workspace, show, show_table, table
+from shm_cli import flags
+from shm_cli.common import open_workspace, show, show_rows
 from shm_cli.import_prompts import asked, asked_if_it_stays
-from shm_cli.parameter_types import Time
 from shm_daemon.spool import Landed, incoming
 
 
 def import_modes(
     modes: ForeignModes, workspace: Workspace, answers: Answers, planes: Sequence[str], *,
-    dry_run: bool, as_json: bool, asks: bool,
+    dry_run: bool, asks: bool,
 ) -> int:  # fmt: skip
     """Takes the modes of a file in, or says what is open; the exit code."""
     answers = replace(answers, channels=_planes(planes, axes_of(modes.modes)))
@@ -65,7 +65,7 @@ def import_modes(
     if found.test is not None and not dry_run:
         keep_modes_profile(found, workspace, answers)
         landed = _land_modes(found, workspace)
-    if as_json:
+    if flags.wants_json():
         show(_modes_document(found, landed))
     else:
         _show_modes(found, landed)
@@ -94,19 +94,17 @@ def _land_modes(found: ImportedModes, workspace: Workspace) -> Landed:
 def _show_modes(found: ImportedModes, landed: Landed | None) -> None:
     program = found.found.program or "another program"
     name = Path(found.found.source).name
-    made = table(
-        f"{name}: modes of {program}", "Hz", "order", "axis", "plane", "damping (%)", "places"
-    )
-    for mode, order in zip(found.found.modes, found.orders, strict=True):
-        made.add_row(
-            f"{mode.frequency_hz:.4g}",
-            str(order or ""),
-            mode.axis,
+    rows = [
+        (
+            f"{mode.frequency_hz:.4g}", str(order or ""), mode.axis,
             found.planes.get(mode.axis, ""),
             f"{100 * mode.damping_ratio:.2g}" if math.isfinite(mode.damping_ratio) else "",
             str(len(mode.points)),
         )
-    show_table(made)
+        for mode, order in zip(found.found.modes, found.orders, strict=True)
+    ]  # fmt: skip
+    headings = ("Hz", "order", "axis", "plane", "damping (%)", "places")
+    show_rows(f"{name}: modes of {program}", headings, rows)
     for note in found.notes:
         click.echo(f"note: {note}")
     for question in found.questions:
@@ -141,7 +139,7 @@ UFF_SUFFIXES = (".uff", ".unv", ".uf")
 
 
 @click.command()
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("file", type=flags.FILE)
 @click.option("--hanger", type=click.IntRange(min=0), metavar="N", help="The hanger tested.")
 @click.option(
     "--each-time", is_flag=True, help="The logger goes from hanger to hanger: ask each time."
@@ -158,12 +156,12 @@ UFF_SUFFIXES = (".uff", ".unv", ".uf")
 )
 @click.option("--leave-out", multiple=True, metavar="NAME", help="A column that is no channel.")
 @click.option("--rate", type=float, metavar="HZ", help="Samples a second, if the file says none.")
-@click.option("--time", type=Time(), help="When the test was, if the file does not say.")
+@click.option("--time", type=flags.Time(), help="When the test was, if the file does not say.")
 @click.option("--temperature", type=float, metavar="C", help="Degrees Celsius of the steel.")
 @click.option("--dry-run", is_flag=True, help="Only show what is understood; keep nothing.")
-@json_option
+@flags.json
 @click.pass_context
-def command(ctx: click.Context, /, file: Path, dry_run: bool, as_json: bool, **said: Any) -> int:
+def command(ctx: click.Context, /, file: Path, dry_run: bool, **said: Any) -> int:
     """Take a logger's file in for the first time, asking only what it does not say.
 
     Shows each column, what it is taken for, its range, hits and clipping. What you answer (hanger,
@@ -178,13 +176,13 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, as_json: bool, **s
     Example: shm import export.csv --hanger 3 --place 4.2,4.2 --plane transverse,longitudinal
     """
     workspace = open_workspace(ctx)
-    asks = not as_json and sys.stdin.isatty() and sys.stdout.isatty()
+    asks = not flags.wants_json() and sys.stdin.isatty() and sys.stdout.isatty()
     first = look_into(file, workspace, _whole_file(said))
     modes = None if first.columns else _modes_in(file, workspace)
     if modes is not None:
         return import_modes(
             modes, workspace, _whole_file(said), said["plane"],
-            dry_run=dry_run, as_json=as_json, asks=asks,
+            dry_run=dry_run, asks=asks,
         )  # fmt: skip
     answers = _answers(said, first)
     found = understand(first.survey, workspace, answers) if answers != _whole_file(said) else first
@@ -198,7 +196,7 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, as_json: bool, **s
     if found.is_ready and not dry_run:
         profile = keep_profile(found, workspace, each_time=answers.each_time)
         landed = _land(file, workspace, found)
-    if as_json:
+    if flags.wants_json():
         show(_document(found, profile, landed))
     else:
         _show(found)
@@ -313,10 +311,8 @@ def _show(found: Import) -> None:
         f"{survey.samples} samples" if survey.samples else "",
         f"{survey.samples / rate:.1f} s at {rate:g} Hz" if rate > 0 else "rate not recorded",
     )
-    made = table(", ".join(part for part in parts if part), *_COLUMNS)
-    for column in found.columns:
-        made.add_row(*(told(column) for told in _COLUMNS.values()))
-    show_table(made)
+    rows = [[told(column) for told in _COLUMNS.values()] for column in found.columns]
+    show_rows(", ".join(part for part in parts if part), tuple(_COLUMNS), rows)
     for remark in found.remarks:
         click.echo(f"note: {remark}")
 

@@ -14,7 +14,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import rich_click as click
-from rich.table import Table
 
 from shm.documents import alert_document
 from shm.errors import BadInput, ShmError, StoreError, UsageError
@@ -33,7 +32,8 @@ from shm.store import (
 )
 from shm.store.archive import refuse_oversize
 from shm.values import Alert
-from shm_cli.common import json_option, open_workspace, show, show_table, table
+from shm_cli import flags
+from shm_cli.common import open_workspace, show, show_rows
 from shm_cli.held import (
     decide,
     decided_words,
@@ -41,18 +41,11 @@ from shm_cli.held import (
     hold_document,
     show_held,
 )
-from shm_cli.parameter_types import Time, Words
-from shm_cli.reprocess import rerun_document, send_back
-from shm_cli.working import finish, working
+from shm_cli.working import finish, rerun_document, send_back, working
 
 
 @click.command()
-@click.argument(
-    "files",
-    nargs=-1,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE...",
-)
+@click.argument("files", nargs=-1, type=flags.FILE, metavar="FILE...")
 @click.option(
     "--together", is_flag=True, help="The files are one test: hits, or set-ups; kept as one .zip."
 )
@@ -79,10 +72,10 @@ from shm_cli.working import finish, working
     metavar="ID",
     help="Instead of files: what is held, or counts already, is not to count.",
 )
-@click.option("--time", type=Time(), help="With --confirm: the true time of the test.")
-@click.option("--why", type=Words(), help="With --confirm or --discard: for the record.")
+@click.option("--time", type=flags.Time(), help="With --confirm: the true time of the test.")
+@click.option("--why", type=flags.Words(), help="With --confirm or --discard: for the record.")
 @click.option("--who", show_default="the user's name", help="With --confirm or --discard.")
-@json_option
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -90,7 +83,6 @@ def command(
     files: tuple[Path, ...],
     together: bool,
     look: bool,
-    as_json: bool,
     **about: Any,
 ) -> int:
     """Take recordings in, look into them with --peek, or do one again with --again.
@@ -108,16 +100,16 @@ def command(
     """
     _refuse_mixture(files, about, together or look)
     if look:
-        return show_peeks(files, as_json)
+        return show_peeks(files)
     logging.getLogger("shm").addHandler(logging.NullHandler())  # all is said in the table
     workspace = open_workspace(ctx)
     if about["held"]:
-        return show_held(workspace, as_json)
+        return show_held(workspace)
     if about["confirm"] or about["discard"]:
-        return _decide(workspace, about, as_json)
+        return _decide(workspace, about)
     if about["again"] is not None:
         stage = Stage(about["stage"] or Stage.IDENTIFIED)
-        return _again(workspace, about["again"], stage, as_json)
+        return _again(workspace, about["again"], stage)
     if together:
         folder = Path(ctx.with_resource(TemporaryDirectory()))
         most = workspace.settings.max_file_bytes
@@ -128,7 +120,7 @@ def command(
         receipts, unreadable = _ingest(workspace, files)
         rows = [_row_of(store, path, receipt) for path, receipt in receipts.items()]
         raised = [stored.alert for stored in store.alerts.list_all() if stored.id not in known]
-    _show(rows + unreadable, raised, as_json)
+    _show(rows + unreadable, raised)
     refused = any(row["outcome"] == _REFUSED for row in rows + unreadable)
     return BadInput.exit_code if refused else 0
 
@@ -162,13 +154,13 @@ def _refuse_mixture(files: Sequence[Path], about: Mapping[str, Any], about_files
         )
 
 
-def _decide(workspace: Workspace, about: Mapping[str, Any], as_json: bool) -> int:
+def _decide(workspace: Workspace, about: Mapping[str, Any]) -> int:
     decision = Decision.CONFIRMED if about["confirm"] else Decision.DISCARDED
     which, record = about["confirm"] or about["discard"], (about["who"], about["why"])
     made = decide(workspace, which, decision, record, about["time"])
     with workspace.store() as store:
         stage = store.recordings.get(made.hold.recording_id).stage
-    if as_json:
+    if flags.wants_json():
         alerts = [alert_document(stored.alert) for stored in made.alerts]
         show({**hold_document(made.hold), "stage": stage.value, "alerts": alerts})
         return 0
@@ -178,14 +170,14 @@ def _decide(workspace: Workspace, about: Mapping[str, Any], as_json: bool) -> in
     return 0
 
 
-def _again(workspace: Workspace, which: str, stage: Stage, as_json: bool) -> int:
+def _again(workspace: Workspace, which: str, stage: Stage) -> int:
     with workspace.store() as store:
         known = {stored.id for stored in store.alerts.list_all()}
         rerun = send_back(workspace, which, stage)
         recording = store.recordings.get(rerun.recording.id)
         row = _row(Path(recording.file.file_name), Outcome.REOPENED, recording)
         raised = [stored.alert for stored in store.alerts.list_all() if stored.id not in known]
-    _show([row], raised, as_json, again=rerun_document(rerun, stage))
+    _show([row], raised, again=rerun_document(rerun, stage))
     return BadInput.exit_code if row["outcome"] == _REFUSED else 0
 
 
@@ -257,18 +249,14 @@ _OUTCOMES = {
 }
 
 
-def _show(
-    rows: Sequence[dict[str, object]], raised: Sequence[Alert], as_json: bool, **more: object
-) -> None:
-    if as_json:
+def _show(rows: Sequence[dict[str, object]], raised: Sequence[Alert], **more: object) -> None:
+    if flags.wants_json():
         alerts = [alert_document(alert) for alert in raised]
         show({"files": list(rows), "alerts": alerts, **more})
         return
-    made = table("ingested", "file", "outcome", "hanger", "stage")
-    for row in rows:
-        values = (row.get(key) for key in ("outcome", "hanger", "stage"))
-        made.add_row(str(row["file"]), *("" if value is None else str(value) for value in values))
-    show_table(made)
+    keys = ("file", "outcome", "hanger", "stage")
+    values = [[row.get(key) for key in keys] for row in rows]
+    show_rows("ingested", keys, [["" if e is None else str(e) for e in row] for row in values])
     for row in rows:
         if row["reason"]:
             click.echo(f"{row['file']}: {row['reason']}", err=True)
@@ -280,15 +268,15 @@ def _show(
 _MODES_SUFFIX = ".modes.json"
 
 
-def show_peeks(files: Sequence[Path], as_json: bool) -> int:
+def show_peeks(files: Sequence[Path]) -> int:
     """Shows all files; exit code 3 where one cannot be read or its headers have faults."""
     looks = [look for path in files for look in _looks(path)]
-    if as_json:
+    if flags.wants_json():
         show({"files": [asdict(look) for look in looks]})
     else:
         for look in looks:
             if look.channels:
-                show_table(_table(look))
+                _show_channels(look)
             else:
                 click.echo(_title(look))
             if look.left_out:
@@ -321,13 +309,14 @@ def _modes(path: Path) -> Peek:
     )
 
 
-def _table(look: Peek) -> Table:
+def _show_channels(look: Peek) -> None:
     """A row a channel; calibration and full scale only where a channel has one."""
-    columns = [name for name in _COLUMNS if name not in _RARE or _has(look, name)]
-    made = table(_title(look), *columns)
-    for channel in look.channels:
-        made.add_row(*(_COLUMNS[name](channel) for name in columns))
-    return made
+    columns = {
+        name: cells
+        for name, told in _COLUMNS.items()
+        if any(cells := [told(channel) for channel in look.channels]) or name not in _RARE
+    }
+    show_rows(_title(look), tuple(columns), zip(*columns.values(), strict=True))
 
 
 def _number(value: float) -> str:
@@ -344,10 +333,6 @@ _COLUMNS: dict[str, Callable[[PeekChannel], str]] = {
     "full scale": lambda channel: _number(channel.full_scale),
 }
 _RARE = ("calibration", "full scale")
-
-
-def _has(look: Peek, column: str) -> bool:
-    return any(_COLUMNS[column](channel) for channel in look.channels)
 
 
 def _title(look: Peek) -> str:

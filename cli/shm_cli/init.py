@@ -9,24 +9,23 @@ from pathlib import Path
 import rich_click as click
 
 from shm.store import Workspace
-from shm_cli.common import json_option, show
+from shm_cli import flags
+from shm_cli.common import answer
 
 
 @click.command()
-@click.argument("folder", required=False, type=click.Path(file_okay=False, path_type=Path))
+@click.argument("folder", required=False, type=flags.FOLDER)
 @click.option(
     "--from",
     "config",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=flags.FILE,
     metavar="BRIDGE.toml",
     help="Copy this description instead of the commented one.",
 )
 @click.option("--bridge", "name", metavar="NAME", help="Name of the bridge.")
-@json_option
+@flags.json
 @click.pass_context
-def command(
-    ctx: click.Context, folder: Path | None, config: Path | None, name: str | None, as_json: bool
-) -> None:
+def command(ctx: click.Context, folder: Path | None, config: Path | None, name: str | None) -> None:
     """Make a workspace for a bridge.
 
     It is a folder: bridge.toml (describe your hangers there), shm.db, spool/ (drop recordings
@@ -39,10 +38,10 @@ def command(
     if name is not None:
         _rename(Path(workspace.bridge.source), name)
     description = workspace.folder / "bridge.toml"
-    if as_json:
-        show({"workspace": str(workspace.folder), "description": str(description)})
-        return
-    click.echo(f"Made {workspace.folder}. Describe the bridge in {description}.")
+    answer(
+        {"workspace": str(workspace.folder), "description": str(description)},
+        f"Made {workspace.folder}. Describe the bridge in {description}.",
+    )
 
 
 def _rename(path: Path, name: str) -> None:

@@ -28,10 +28,11 @@ _LISTING = "shm_cli.listing"
 
 @dataclass(frozen=True)
 class Verb:
-    """One verb: the module that holds its `command`, and a line for the list of verbs."""
+    """One verb: the module that holds it, a line for the list of verbs, its name in the module."""
 
     module: str
     summary: str
+    name: str = "command"
 
 
 VERBS: dict[str, Verb] = {
@@ -46,19 +47,24 @@ VERBS: dict[str, Verb] = {
         "Take recordings in, look into them with --peek, or do one again with --again.",
     ),
     "stream": Verb("shm_cli.stream", "Permanent sensors: what is live, and what was lost."),
-    "daemon": Verb("shm_cli.daemon", "Watch the spool and do the whole job, unattended."),
-    "web": Verb(
-        "shm_cli.web",
-        "The dashboard and its API: pages for people, upload, alerts, health and metrics.",
+    "daemon": Verb(
+        "shm_cli.services", "Watch the spool and do the whole job, unattended.", "daemon"
     ),
-    "token": Verb("shm_cli.token", "Who may read and write over the network."),
-    "user": Verb("shm_cli.user", "People who may sign in to the dashboard."),
-    "note": Verb("shm_cli.note", "Notes, inspections and repairs of a hanger or of the bridge."),
-    "audit": Verb("shm_cli.audit", "Who changed what, when and how: the newest first."),
+    "web": Verb(
+        "shm_cli.services",
+        "The dashboard and its API: pages for people, upload, alerts, health and metrics.",
+        "web",
+    ),
+    "token": Verb("shm_cli.access", "Who may read and write over the network.", "token"),
+    "user": Verb("shm_cli.access", "People who may sign in to the dashboard.", "user"),
+    "note": Verb(
+        "shm_cli.records", "Notes, inspections and repairs of a hanger or of the bridge.", "note"
+    ),
+    "audit": Verb("shm_cli.records", "Who changed what, when and how: the newest first.", "audit"),
     "identify": Verb("shm_cli.identify", "Modal parameters of recordings."),
     "predict": Verb("shm_cli.predict", "Frequencies of a model class for given parameters."),
     "update": Verb("shm_cli.update", "Posterior of tension and end stiffness."),
-    "select": Verb("shm_cli.select", "Compare model classes by their evidence."),
+    "select": Verb("shm_cli.update", "Compare model classes by their evidence.", "select_command"),
     "gap": Verb("shm_cli.gap", "Why model and measurement differ, and what that does to tension."),
     "report": Verb("shm_cli.report", "What an engineer files about a hanger, or the bridge."),
     "drift": Verb("shm_cli.drift", "How far tension and stiffness have moved."),
@@ -70,15 +76,24 @@ VERBS: dict[str, Verb] = {
     "archive": Verb(
         "shm_cli.archive", "Keep the archive and the quarantine from growing for ever."
     ),
-    "doctor": Verb("shm_cli.doctor", "Whether all is well, and what to do where it is not."),
+    "doctor": Verb(
+        "shm_cli.checkup", "Whether all is well, and what to do where it is not.", "doctor"
+    ),
     "status": Verb("shm_cli.status", "What the workspace holds and what waits."),
     "bridges": Verb(
-        "shm_cli.bridges", "How this bridge and the others of bridge.toml are, the worst first."
+        "shm_cli.checkup",
+        "How this bridge and the others of bridge.toml are, the worst first.",
+        "bridges",
     ),
-    "settings": Verb("shm_cli.settings", "Every setting: its default, its range, what it means."),
+    "settings": Verb(
+        "shm_cli.installation",
+        "Every setting: its default, its range, what it means.",
+        "settings_command",
+    ),
     "notices": Verb(
-        "shm_cli.notices",
+        "shm_cli.installation",
         "Other people's packages that work here, with the licence that each declares.",
+        "notices_command",
     ),
     "completion": Verb(
         "shm_cli.completion", "Print the script that completes `shm` in bash or zsh."
@@ -97,7 +112,8 @@ class Verbs(click.RichGroup):
             return None
         if _LISTING in ctx.meta:
             return click.RichCommand(name=cmd_name, help=VERBS[cmd_name].summary)
-        command: click.Command = import_module(VERBS[cmd_name].module).command
+        verb = VERBS[cmd_name]
+        command: click.Command = getattr(import_module(verb.module), verb.name)
         gc.enable()
         _take_workspace(command)
         return command
@@ -111,7 +127,9 @@ class Verbs(click.RichGroup):
         super().format_help(ctx, formatter)
 
 
-@click.group(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=Verbs, context_settings={"help_option_names": ["-h", "--help"], "show_default": True}
+)
 @click.option(
     "--workspace",
     metavar="DIR",

@@ -1,27 +1,39 @@
-"""What `shm simulate` reads and writes of planted effects and campaigns."""
+"""What `shm simulate` plants, writes and sends: effects, campaigns, streams of sensors."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import heapq
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import rich_click as click
 
 from shm.documents import dump
-from shm.errors import UsageError
+from shm.errors import NothingThere, UsageError
 from shm.modes_document import modes_document
+from shm.pipeline import utc_now
+from shm.read.chunk_document import chunk_document
 from shm.simulate import (
     CampaignPlan,
     CampaignTruth,
     HangerState,
     PlantedEffect,
-    TestConditions,
     campaign_with_truth,
 )
+from shm.simulate.ambient import Loss, MonitoringPlan, streamed
 from shm.simulate.reality import GLOBAL
+from shm.store import Workspace
+from shm.store.ring import ring_of
 from shm.values import AddedMass, Hanger
+from shm.values.stream import Chunk, Stream
+from shm_cli import flags
+from shm_cli.common import advancing_bar, show
 
 # Of the temperatures and levels of `CampaignPlan` the usual ones are left.
 LACKS: dict[str, dict[str, Any]] = {
@@ -65,17 +77,6 @@ def mass_of(text: str | None) -> AddedMass | None:
     return AddedMass(mass_kg, x_m)
 
 
-def conditions_of(
-    temperature_c: float,
-    reference_c: float,
-    amplitude: float,
-    added_mass: AddedMass | None,
-) -> TestConditions:
-    """What a recording is made under; an unknown temperature is the reference."""
-    shift = 0.0 if np.isnan(temperature_c) else temperature_c - reference_c
-    return TestConditions("", shift, amplitude, added_mass)
-
-
 def write_campaign(
     hanger: Hanger,
     state: HangerState,
@@ -117,3 +118,97 @@ def truth_document(truth: CampaignTruth, seed: int) -> dict[str, Any]:
         ],
         "seed": seed,
     }
+
+
+_DAY_S = 86400.0
+_LIVE_S, _FAST_S = 60.0, 600.0
+"""Technical: of a chunk; loggers send each minute, and each file costs a disk some 10 ms."""
+_AT_ONCE = 6  # technical: 20 MB of memory, and folders are synchronised once for all
+
+
+@dataclass(frozen=True)
+class Live:
+    """What is simulated; `speed` is how many seconds pass on the bridge in one of ours, 0: any."""
+
+    days: float
+    first: datetime | None
+    losses: tuple[str, ...]
+    speed: float
+    seed: int
+
+
+def simulate_streams(workspace: Workspace, chosen: Live) -> None:
+    """Sends the days of every stream that `bridge.toml` describes; the ends of all are alike.
+
+    Raises NothingThere where it describes none.
+    """
+    streams = workspace.bridge.streams
+    if not streams:
+        raise NothingThere(
+            "bridge.toml describes no stream.",
+            remedy="Describe one there: docs/permanent_sensors.md shows how.",
+        )
+    first = chosen.first or _whole_hour(utc_now() - timedelta(days=chosen.days))
+    losses = tuple(_loss(text, first) for text in chosen.losses)
+    plan = MonitoringPlan(losses=losses, chunk_s=_LIVE_S if chosen.speed > 0 else _FAST_S)
+    hangers = [workspace.bridge.hanger(stream.hanger) for stream in streams]
+    seconds = chosen.days * _DAY_S
+    with advancing_bar() as bar:
+        sent = send(
+            arriving(list(zip(hangers, streams, strict=True)), plan, first, seconds, chosen.seed),
+            ring_of(workspace).append_all,
+            chosen.speed,
+            told=lambda at: bar("simulating", (at - first).total_seconds() / seconds),
+        )
+    if flags.wants_json():
+        ends = first + timedelta(seconds=seconds)
+        show({"chunks": sent, "streams": len(streams), "from": first, "until": ends})
+    else:
+        click.echo(f"{sent} chunks of {len(streams)} streams sent; see `shm stream`.")
+
+
+def arriving(
+    sensed: Sequence[tuple[Hanger, Stream]],
+    plan: MonitoringPlan,
+    first: datetime,
+    seconds: float,
+    seed: int,
+) -> Iterator[Chunk]:
+    """The chunks of all streams in the order of time."""
+    each = [streamed(hanger, stream, plan, first, seconds, seed) for hanger, stream in sensed]
+    return heapq.merge(*each, key=lambda chunk: chunk.start)
+
+
+def send(
+    chunks: Iterator[Chunk],
+    take: Callable[[Sequence[bytes]], object],
+    speed: float,
+    told: Callable[[datetime], None],
+) -> int:
+    """How many were taken; with a `speed`, each once the bridge's clock has come to its end."""
+    begun, start, count = time.monotonic(), None, 0
+    while batch := list(islice(chunks, 1 if speed > 0 else _AT_ONCE)):
+        start, end = start or batch[0].start, batch[-1].end
+        if speed > 0:
+            due = (end - start).total_seconds() / speed
+            time.sleep(max(0.0, begun + due - time.monotonic()))
+        take([chunk_document(chunk) for chunk in batch])
+        count += len(batch)
+        told(end)
+    return count
+
+
+def _whole_hour(at: datetime) -> datetime:
+    return at.astimezone(UTC).replace(minute=0, second=0, microsecond=0)
+
+
+def _loss(text: str, first: datetime) -> Loss:
+    """Reads `HANGER:PERCENT:DAY`."""
+    try:
+        hanger, percent, day = text.split(":")
+        return Loss(int(hanger), float(percent) / 100, first + timedelta(days=float(day)))
+    except ValueError:
+        raise UsageError(
+            f"--loss {text!r} is not HANGER:PERCENT:DAY.",
+            remedy="Write --loss 7:2:1.5 for 2 % of hanger 7 after a day and a half.",
+        ) from None

@@ -15,17 +15,8 @@ from shm.report.figures import prediction_figures
 from shm.report.figures.prediction_figures import Curves, specify
 from shm.report.figures.prediction_figures import write_curves_png as write_png
 from shm.values import PLANES, FloatArray
-from shm_cli import completion
-from shm_cli.common import (
-    hanger_file_option,
-    hanger_option,
-    json_option,
-    one_hanger,
-    progress_bar,
-    show,
-    show_table,
-    table,
-)
+from shm_cli import completion, flags
+from shm_cli.common import one_hanger, progress_bar, show, show_rows
 
 _MOST_DRAWN = 20  # technical: a mesh of a second
 _MOST_POINTS = 10_000  # technical: a table that a person can still open, in seconds
@@ -46,10 +37,10 @@ _MOST_POINTS = 10_000  # technical: a table that a person can still open, in sec
     metavar="PLANE:ORDER",
     help="A mode of a solid class, drawn in space: transverse:2, say.",
 )
-@click.option("--modes", type=click.IntRange(1, 100), default=6, show_default=True)
-@hanger_option()
-@hanger_file_option
-@json_option
+@click.option("--modes", type=click.IntRange(1, 100), default=6)
+@flags.hanger()
+@flags.hanger_file
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -61,7 +52,6 @@ def command(
     modes: int,
     hanger_id: int | None,
     hanger_file: Path | None,
-    as_json: bool,
 ) -> None:
     """Frequencies of a model class for given parameters.
 
@@ -86,7 +76,7 @@ def command(
     if shape is not None and figure is not None:
         _draw_shape(chosen, values, shape, figure)
     elif sweep is None:
-        _show_one(chosen, values, modes, as_json)
+        _show_one(chosen, values, modes)
     else:
         name, points = _range(sweep)
         frequencies_hz = _swept(chosen, values, name, points, modes)
@@ -96,7 +86,7 @@ def command(
                 for place, plane in enumerate(PLANES)
             ]
             write_png(specify(parts, name, "frequency (Hz)"), figure)
-        _show_sweep(chosen, values, name, points, frequencies_hz, as_json)
+        _show_sweep(chosen, values, name, points, frequencies_hz)
 
 
 def _draw_shape(model: Model, values: dict[str, float], shape: str, path: Path) -> None:
@@ -118,15 +108,16 @@ def _draw_shape(model: Model, values: dict[str, float], shape: str, path: Path) 
     click.echo(f"Mode {order}, {plane}, of {model.title} is drawn in {path}.")
 
 
-def _show_one(model: Model, values: dict[str, float], modes: int, as_json: bool) -> None:
+def _show_one(model: Model, values: dict[str, float], modes: int) -> None:
     frequencies = _solved(model, model.pack(values), modes)
-    if as_json:
+    if flags.wants_json():
         show({"model": model.name, "parameters": values, "frequencies": _rows(frequencies)})
         return
-    made = table(model.title, "mode", *(f"{plane} (Hz)" for plane in PLANES))
-    for order, row in enumerate(frequencies.T, start=1):
-        made.add_row(str(order), *(f"{frequency:.4f}" for frequency in row))
-    show_table(made)
+    lines = [
+        (str(order), *(f"{frequency:.4f}" for frequency in row))
+        for order, row in enumerate(frequencies.T, start=1)
+    ]
+    show_rows(model.title, ("mode", *(f"{plane} (Hz)" for plane in PLANES)), lines)
 
 
 def _swept(
@@ -148,9 +139,8 @@ def _show_sweep(
     name: str,
     points: FloatArray,
     frequencies: FloatArray,
-    as_json: bool,
 ) -> None:
-    if as_json:
+    if flags.wants_json():
         rows: list[dict[str, Any]] = [
             {name: float(point), "frequencies": _rows(row)}
             for point, row in zip(points, frequencies, strict=True)
@@ -159,10 +149,12 @@ def _show_sweep(
         return
     orders = range(1, frequencies.shape[2] + 1)
     heads = [f"{plane[0].upper()}{order}" for plane in PLANES for order in orders]
-    made = table(f"{model.title}: frequencies in Hz (T transverse, L longitudinal)", name, *heads)
-    for point, row in zip(points, frequencies, strict=True):
-        made.add_row(f"{point:g}", *(f"{frequency:.3f}" for frequency in row.ravel()))
-    show_table(made)
+    lines = [
+        (f"{point:g}", *(f"{frequency:.3f}" for frequency in row.ravel()))
+        for point, row in zip(points, frequencies, strict=True)
+    ]
+    title = f"{model.title}: frequencies in Hz (T transverse, L longitudinal)"
+    show_rows(title, (name, *heads), lines)
 
 
 def _solved(model: Model, theta: FloatArray, modes: int) -> FloatArray:

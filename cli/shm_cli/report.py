@@ -18,13 +18,12 @@ from shm.pipeline.bridge_reporting import bridge_report
 from shm.pipeline.reporting import hanger_report, modal_test_report, structure_report
 from shm.report.as_text import as_text
 from shm.report.bridge_report import bridge_json, bridge_paper
-from shm.report.hanger_report import hanger_json, hanger_paper
+from shm.report.hanger_report import hanger_json, hanger_paper, structure_json, structure_paper
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
 from shm.report.paper import Paper
 from shm.report.states import Period, period_since
-from shm.report.structure_report import structure_json, structure_paper
-from shm_cli.common import drawing, hanger_option, opened_store, readable_width, waiting
-from shm_cli.parameter_types import NewFile
+from shm_cli import flags
+from shm_cli.common import drawing, opened_store, readable_width, waiting
 
 _SUFFIXES = {".html": "html", ".htm": "html", ".json": "json", ".pdf": "pdf"}
 
@@ -55,7 +54,7 @@ def _written(report: _Report, form: str) -> str | bytes:
 
 
 @click.command()
-@hanger_option()
+@flags.hanger()
 @click.option("--bridge", "of_bridge", is_flag=True, help="Of the whole bridge, not of one hanger.")
 @click.option(
     "--format",
@@ -70,12 +69,7 @@ def _written(report: _Report, form: str) -> str | bytes:
     help="Only the period since a date (2026-03-01) or over a span (90d, 12w, 6m, 1y).",
 )
 @click.option("--json", "as_json", is_flag=True, help="The same as --format json.")
-@click.option(
-    "--out",
-    type=NewFile(),
-    metavar="FILE",
-    help="Write here instead of stdout.",
-)
+@click.option("--out", type=flags.NewFile(), metavar="FILE", help="Write here instead of stdout.")
 @click.pass_context
 def command(
     ctx: click.Context,

@@ -26,21 +26,18 @@ from shm.simulate import (
     spread_places_m,
 )
 from shm.values import Hanger, Recording
-from shm_cli.common import (
-    counting_bar,
-    hanger_file_option,
-    hanger_option,
-    json_option,
-    one_hanger,
-    open_workspace,
-    seed_option,
-    show,
+from shm_cli import flags
+from shm_cli.common import answer, counting_bar, one_hanger, open_workspace
+from shm_cli.planting import (
+    LACKS,
+    Live,
+    effect_of,
+    mass_of,
+    simulate_streams,
+    write_campaign,
 )
-from shm_cli.planting import LACKS, conditions_of, effect_of, mass_of, write_campaign
-from shm_cli.simulate_stream import Live, simulate_streams
 
 _FIRST = datetime(2026, 1, 5, 10, tzinfo=UTC)  # any: the same call gives the same files
-_SPRING = "End spring in N m/rad; clamped if left out."
 _SUFFIXES = sorted(known.suffixes[0].lstrip(".") for known in FORMATS if known.write)
 _WRONG = "; ".join(f"{each.name}: {each.help}" for each in DISTURBANCES.values())
 # Judgement: a hanger rings for some 20 s; 0.02 m/s^2 is a good accelerometer in calm air; two
@@ -73,30 +70,41 @@ class Chosen(TypedDict):
     added_mass: str | None
 
 
+def _springs(function: flags.F) -> flags.F:
+    """`--k1` to `--k4`."""
+    planes = ("Transverse", "Longitudinal")
+    for number in (4, 3, 2, 1):
+        where = f"{planes[(number - 1) % 2]}, {'deck' if number < 3 else 'arch'} end"
+        told = f"{where}. End spring in N m/rad; clamped if left out."
+        option = click.option(
+            f"--k{number}", type=float, default=math.inf, show_default=False, help=told
+        )
+        function = option(function)
+    return function
+
+
 @click.command()
-@hanger_option()
-@hanger_file_option
+@flags.hanger()
+@flags.hanger_file
 @click.option("--tension-n", type=float, help="Planted tension; the nominal one if left out.")
-@click.option("--k1", type=float, default=math.inf, help=f"Transverse, deck end. {_SPRING}")
-@click.option("--k2", type=float, default=math.inf, help=f"Longitudinal, deck end. {_SPRING}")
-@click.option("--k3", type=float, default=math.inf, help=f"Transverse, arch end. {_SPRING}")
-@click.option("--k4", type=float, default=math.inf, help=f"Longitudinal, arch end. {_SPRING}")
-@click.option("--damping", type=float, default=0.001, show_default=True, help="Damping ratio.")
+@_springs
+@click.option("--damping", type=float, default=0.001, help="Damping ratio.")
 @click.option("--noise", type=float, help="In m/s^2; 0.02, or 0.002 where nobody hits.")
 @click.option(
     "--sensors",
     type=click.IntRange(1, 8),
     help="Places with a biaxial accelerometer each; 2, or 4 (at most) in a campaign.",
 )
-@click.option("--hits", type=click.IntRange(1, 50), default=5, show_default=True)
+@click.option("--hits", type=click.IntRange(1, 50), default=5)
 @click.option(
     "--hammer-x",
     type=float,
     default=math.nan,
+    show_default=False,
     help="Where the hammer hits, in m from the deck end; 0.16 of the length if left out.",
 )
 @click.option("--seconds", type=float, help="Seconds a hit; 20, or 600 in all where nobody hits.")
-@click.option("--rate", type=float, default=512.0, show_default=True, help="Samples a second.")
+@click.option("--rate", type=float, default=512.0, help="Samples a second.")
 @click.option("--ambient", is_flag=True, help="Wind and traffic drive the hanger, nobody hits.")
 @click.option(
     "--disturbance",
@@ -120,14 +128,12 @@ class Chosen(TypedDict):
     "--amplitude",
     type=float,
     default=1.0,
-    show_default=True,
     help="Level of the hits: effects follow it, and so does the force.",
 )
 @click.option(
     "--reference-c",
     type=float,
     default=10.0,
-    show_default=True,
     help="Temperature at which the tension is the planted one.",
 )
 @click.option("--added-mass", metavar="KG:X", help="A known mass, clamped on at X m.")
@@ -155,7 +161,6 @@ class Chosen(TypedDict):
     "--days",
     type=click.FloatRange(0.001, 3660),
     default=1.0,
-    show_default=True,
     help="How long a stream.",
 )
 @click.option(
@@ -169,21 +174,23 @@ class Chosen(TypedDict):
     "--speed",
     type=click.FloatRange(0),
     default=0.0,
-    show_default=True,
     help="Seconds of a stream sent a second; 1 is real time, 0 as fast as it goes.",
 )
-@click.option("--tests", type=click.IntRange(1, 10_000), default=1, show_default=True)
-@click.option("--temperature-c", type=float, default=math.nan, help="Unknown if left out.")
-@click.option("--first", type=click.DateTime(), help="Time of the first test; then weekly.")
-@click.option("--format", "form", type=click.Choice(_SUFFIXES), default="csv", show_default=True)
+@click.option("--tests", type=click.IntRange(1, 10_000), default=1)
 @click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="DIR",
-    help="Where the files go; a stream needs none.",
+    "--temperature-c",
+    type=float,
+    default=math.nan,
+    show_default=False,
+    help="Unknown if left out.",
 )
-@seed_option
-@json_option
+@click.option("--first", type=click.DateTime(), help="Time of the first test; then weekly.")
+@click.option("--format", "form", type=click.Choice(_SUFFIXES), default="csv")
+@click.option(
+    "--out", type=flags.FOLDER, metavar="DIR", help="Where the files go; a stream needs none."
+)
+@flags.seed
+@flags.json
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -200,7 +207,6 @@ def command(
     seed: int,
     campaign: bool,
     lacking: tuple[str, ...],
-    as_json: bool,
     **chosen: Unpack[Chosen],
 ) -> None:
     """Hammer tests of a hanger whose truth you choose.
@@ -215,7 +221,7 @@ def command(
     start = first.replace(tzinfo=UTC) if first else None
     if as_stream:
         live = Live(days, start, losses, speed, seed)
-        simulate_streams(open_workspace(ctx), live, as_json=as_json)
+        simulate_streams(open_workspace(ctx), live)
         return
     if out is None:
         raise UsageError("no folder is named for the files.", remedy="Add --out DIR.")
@@ -228,7 +234,7 @@ def command(
         effects = [effect_of(text) for text in chosen["effects"]]
         state = _state(hanger, chosen)
         sensors = chosen["sensors"]
-        _tell(write_campaign(hanger, state, effects, lacking, sensors, seed, out), as_json)
+        _tell(write_campaign(hanger, state, effects, lacking, sensors, seed, out))
         return
     written = []
     with counting_bar() as bar:
@@ -239,15 +245,12 @@ def command(
             recording = replace(_recording(hanger, chosen, rng), source=name, time=time)
             write(recording, out / name)
             written.append(out / name)
-    _tell(written, as_json)
+    _tell(written)
 
 
-def _tell(written: Sequence[Path], as_json: bool) -> None:
-    if as_json:
-        show({"files": [str(path) for path in written]})
-        return
-    for path in written:
-        click.echo(path)
+def _tell(written: Sequence[Path]) -> None:
+    files = [str(path) for path in written]
+    answer({"files": files}, "\n".join(files))
 
 
 def _refuse_what_does_not_go_together(
@@ -290,15 +293,10 @@ def _recording(hanger: Hanger, chosen: Chosen, rng: np.random.Generator) -> Reco
 
 
 def _state(hanger: Hanger, chosen: Chosen) -> HangerState:
-    tension_n = chosen["tension_n"]
-    return HangerState(
-        hanger.nominal_tension_n if tension_n is None else tension_n,
-        chosen["k1"],
-        chosen["k2"],
-        chosen["k3"],
-        chosen["k4"],
-        damping_ratio=chosen["damping"],
-    )
+    given_n = chosen["tension_n"]
+    tension_n = hanger.nominal_tension_n if given_n is None else given_n
+    springs = (chosen["k1"], chosen["k2"], chosen["k3"], chosen["k4"])
+    return HangerState(tension_n, *springs, damping_ratio=chosen["damping"])
 
 
 def _hit(hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Generator) -> Recording:
@@ -324,12 +322,10 @@ def _hit(hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Gene
 
 
 def _conditions(chosen: Chosen) -> TestConditions:
-    return conditions_of(
-        chosen["temperature_c"],
-        chosen["reference_c"],
-        chosen["amplitude"],
-        mass_of(chosen["added_mass"]),
-    )
+    """What a recording is made under; an unknown temperature is the reference."""
+    shift_k = chosen["temperature_c"] - chosen["reference_c"]
+    mass = mass_of(chosen["added_mass"])
+    return TestConditions("", 0.0 if math.isnan(shift_k) else shift_k, chosen["amplitude"], mass)
 
 
 def _listened(

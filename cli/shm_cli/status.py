@@ -1,6 +1,6 @@
 """`shm status`: what the workspace holds and what waits.
 
-`shm status --of ID`: each stage that a recording has reached, and every result it ever had.
+With --of ID, each stage that a recording or test has gone through, and every result it ever had.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import math
 import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ from shm.report.formatting import model_class
 from shm.report.hanger_status import Status, bridge_message
 from shm.store import (
     ENDED,
+    Decision,
     DeliveryState,
     Store,
     StoredTest,
@@ -34,23 +36,23 @@ from shm.store import (
 from shm.store.checksums import of_readable
 from shm.store.stored_alerts import said_of
 from shm.watch.change_words import frequency_words
-from shm_cli.common import json_option, opened_store, paragraph, show, show_table, table
+from shm_cli import flags
+from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document
-from shm_cli.stages import show_stages
 from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import never_taken, scan
 
 if TYPE_CHECKING:
-    from shm.pipeline.adopting import GapWatch
+    from shm.store import FormerPosterior, FormerTest
 
 
 @click.command()
 @click.option(
     "--of", "which", metavar="ID", help="The stages of one recording (by number) or test (by name)."
 )
-@json_option
+@flags.json
 @click.pass_context
-def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
+def command(ctx: click.Context, which: str | None) -> None:
     """What the workspace holds and what waits.
 
     \b
@@ -58,11 +60,11 @@ def command(ctx: click.Context, which: str | None, as_json: bool) -> None:
     Example: shm --workspace arch status --of t7
     """
     if which is not None:
-        show_stages(ctx, which, as_json)
+        show_stages(ctx, which)
         return
     with opened_store(ctx) as (workspace, store):
         document = _status(workspace, store)
-    if as_json:
+    if flags.wants_json():
         show(document)
         return
     _show(document)
@@ -126,30 +128,25 @@ def _show(document: dict[str, Any]) -> None:
 
 
 def _show_hangers(document: dict[str, Any]) -> None:
-    made = table(
-        "hangers",
-        "hanger",
-        "state",
-        "tests",
-        "held",
-        "latest",
-        "model class",
-        "baseline since",
+    headings = (
+        "hanger", "state", "tests", "held", "latest", "model class", "baseline since",
         "open alerts",
+    )  # fmt: skip
+    show_rows("hangers", headings, map(_cells, document["hangers"]))
+
+
+def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
+    latest, since = row["latest_test"], row["baseline_since"]
+    return (
+        str(row["hanger"]),
+        Status[row["status"].upper()].value if row["status"] else "no test yet",
+        str(row["tests"]),
+        str(row["held"] or ""),
+        f"{latest:%Y-%m-%d %H:%M}" if latest else "none",
+        model_class(row["model"]) if row["model"] else "none yet",
+        f"{since:%Y-%m-%d %H:%M}" if since else "none yet",
+        str(row["open_alerts"] or ""),
     )
-    for row in document["hangers"]:
-        latest, since = row["latest_test"], row["baseline_since"]
-        made.add_row(
-            str(row["hanger"]),
-            Status[row["status"].upper()].value if row["status"] else "no test yet",
-            str(row["tests"]),
-            str(row["held"] or ""),
-            f"{latest:%Y-%m-%d %H:%M}" if latest else "none",
-            model_class(row["model"]) if row["model"] else "none yet",
-            f"{since:%Y-%m-%d %H:%M}" if since else "none yet",
-            str(row["open_alerts"] or ""),
-        )
-    show_table(made)
 
 
 def _told_of_structure(row: Mapping[str, Any]) -> str:
@@ -181,8 +178,12 @@ def _shift(held: Mapping[str, Any]) -> float:
     return max((shift for shift in shifts if not math.isnan(shift)), default=0.0)
 
 
-def _gap(watch: GapWatch | None) -> dict[str, Any] | None:
+def _gap(store: Store, hanger: int) -> dict[str, Any] | None:
     """How the gap has gone since an effect was adopted; None where none is."""
+    # It brings the whole pipeline, and of few hangers an effect is adopted.
+    from shm.pipeline.adopting import gap_watch
+
+    watch = gap_watch(store, hanger)
     if watch is None:
         return None
     return {
@@ -192,13 +193,6 @@ def _gap(watch: GapWatch | None) -> dict[str, Any] | None:
         "has_grown": watch.has_grown,
         "said": str(watch),
     }
-
-
-def _gap_watch(store: Store, hanger: int) -> GapWatch | None:
-    # It brings the whole pipeline, and of few hangers an effect is adopted.
-    from shm.pipeline.adopting import gap_watch
-
-    return gap_watch(store, hanger)
 
 
 def _competitions(rows: list[dict[str, Any]]) -> dict[str, str]:
@@ -314,10 +308,10 @@ def _hangers(
     watches = of_readable(store.watch.latest, {})
     for hanger in workspace.bridge.hangers:
         found, baseline = latest.get(hanger.id), baselines.get(hanger.id)
-        watch, adopted = None, []
+        gap, adopted = None, []
         try:
             adopted = [each.adoption.model for each in store.posteriors.list_adoptions(hanger.id)]
-            watch = _gap_watch(store, hanger.id) if adopted else None
+            gap = _gap(store, hanger.id) if adopted else None
         except DamagedRow as error:
             damage[hanger.id] = str(error)
         check = baseline.check if baseline else None
@@ -340,8 +334,64 @@ def _hangers(
                 "held": held[hanger.id],
                 "warnings": list(lines[hanger.id].warnings),
                 "left_out": list(check.left_out) if check else [],
-                "gap": _gap(watch),
+                "gap": gap,
                 "damage": damage.get(hanger.id),
             }
         )
     return rows
+
+
+_OUT = (Decision.DISCARDED, Decision.WITHDRAWN)
+
+
+def show_stages(ctx: click.Context, which: str) -> None:
+    """Raises NothingThere where there is no such recording or test."""
+    with opened_store(ctx) as (_, store):
+        recording_id, _ = store.recordings.find(which)
+        recording = store.recordings.get(recording_id)
+        steps, tests = (
+            store.recordings.list_steps(recording_id),
+            store.tests.list_former(recording_id),
+        )
+        noticed = store.recordings.list_events(recording_id=recording_id)
+        other_names = [
+            n for n in store.recordings.names_of(recording_id) if n != recording.file.file_name
+        ]
+    if flags.wants_json():
+        show(
+            {
+                "recording": recording_id,
+                "file": recording.file.file_name,
+                "also_came_as": other_names,
+                "stage": recording.stage.value,
+                "steps": [asdict(step) for step in steps],
+                "noticed": [
+                    {"at": event.at, "kind": event.kind, "message": event.message}
+                    for event in noticed
+                ],
+                "results": [asdict(test) for test in tests],
+            }
+        )
+        return
+    also = f" (also came as {', '.join(other_names)})" if other_names else ""
+    title = f"recording {recording_id}: {recording.file.file_name}{also}"
+    by_a_person = {event.at: event.kind for event in noticed if event.kind in _OUT}
+    rows = [
+        (by_a_person.get(e.at, e.stage), e.test or "", f"{e.at:%Y-%m-%d %H:%M:%S}", e.version or "")
+        for e in steps
+    ]
+    show_rows(title, ("stage", "test", "at", "shm"), rows)
+    for event in noticed:
+        if event.message:
+            kind = "" if event.message.startswith(event.kind) else f"{event.kind}: "
+            said = f"{event.at:%Y-%m-%d %H:%M:%S} {kind}{event.message}"
+            click.echo(paragraph(said))
+    for test in tests:
+        click.echo(f"{test.name}: identified by shm {test.lineage.version}{_until(test)}")
+        for made in test.posteriors:
+            click.echo(f"  posterior of {made.model} by shm {made.lineage.version}{_until(made)}")
+
+
+def _until(result: FormerTest | FormerPosterior) -> str:
+    superseded_at = result.superseded_at
+    return f", superseded {superseded_at:%Y-%m-%d %H:%M:%S}" if superseded_at else ""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+import math
+from dataclasses import asdict
 from datetime import datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import rich_click as click
 from rich.markup import escape
@@ -19,54 +21,18 @@ from shm.pipeline.stream_state import (
     tension_words,
 )
 from shm.read import write
+from shm.report.formatting import number
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
 from shm.store.ring_pieces import recording_of
 from shm.values import NAN
 from shm.watch.ambient_hammer import AmbientBias
-from shm_cli import completion
-from shm_cli.common import (
-    json_option,
-    open_workspace,
-    opened_store,
-    show,
-    show_table,
-    table,
-    why_option,
-)
-from shm_cli.parameter_types import NewFile, Time
+from shm_cli import completion, flags
+from shm_cli.common import answer, open_workspace, opened_store, show, show_rows
 from shm_daemon.heartbeat import told
 
-
-@dataclass(frozen=True)
-class StreamRow:
-    """A line of the table, and an entry of `--json`; unknown numbers are NaN."""
-
-    name: str
-    hanger: int
-    state: str
-    last_sample: datetime | None
-    lag_s: float
-    behind_s: float
-    sampling_rate_hz: float
-    received_hz: float
-    lost_share_24h: float
-    apart_s_24h: float
-    ring_bytes: int
-    last_window: datetime | None
-    last_window_kind: str
-    last_window_how: str
-    last_window_modes: int
-    tension_shift: float
-    tension_shift_sd: float
-    learning: str
-    ambient_bias: float
-    ambient_bias_sd: float
-    hammer_tests: int
-
-
-_from = click.argument("start", type=Time(), metavar="FROM")
-_to = click.argument("end", type=Time(), metavar="TO")
+_from = click.argument("start", type=flags.Time(), metavar="FROM")
+_to = click.argument("end", type=flags.Time(), metavar="TO")
 _name = click.argument("name", metavar="NAME", shell_complete=completion.streams)
 
 
@@ -76,12 +42,11 @@ _name = click.argument("name", metavar="NAME", shell_complete=completion.streams
     "--days",
     type=click.FloatRange(0, min_open=True),
     default=7.0,
-    show_default=True,
     help="How far back --events looks.",
 )
-@json_option
+@flags.json
 @click.pass_context
-def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> None:
+def command(ctx: click.Context, events: bool, days: float) -> None:
     """Permanent sensors: what is live, and what was lost.
 
     A stream is late once its last sample is 5 minutes old, silent after an hour. The share that was
@@ -104,21 +69,19 @@ def command(ctx: click.Context, events: bool, days: float, as_json: bool) -> Non
                 remedy="Describe one there: docs/permanent_sensors.md shows how.",
             )
         if events:
-            _show_events(store, utc_now() - timedelta(days=days), as_json)
+            _show_events(store, utc_now() - timedelta(days=days))
         else:
-            _show_streams(workspace, store, utc_now(), as_json)
+            _show_streams(workspace, store, utc_now())
 
 
-@click.command()
+@command.command()
 @_name
 @_from
 @_to
-@why_option
-@json_option
+@flags.why
+@flags.json
 @click.pass_context
-def keep(
-    ctx: click.Context, name: str, start: datetime, end: datetime, why: str, as_json: bool
-) -> None:
+def keep(ctx: click.Context, name: str, start: datetime, end: datetime, why: str) -> None:
     """Keep the samples of a time for good.
 
     The ring takes out what is older than the setting `ring_days`, but for what is kept.
@@ -130,22 +93,20 @@ def keep(
     stream, ring = workspace.bridge.stream(name), ring_of(workspace)
     recording_of(ring, stream, start, end, workspace.settings.max_samples)
     ring.keep(name, start, end, why)
-    if as_json:
-        show({"stream": name, "start": start, "end": end, "why": why})
-        return
-    click.echo(f"The samples of {name} from {format_time(start)} to {format_time(end)} are kept.")
+    answer(
+        {"stream": name, "start": start, "end": end, "why": why},
+        f"The samples of {name} from {format_time(start)} to {format_time(end)} are kept.",
+    )
 
 
-@click.command()
+@command.command()
 @_name
 @_from
 @_to
-@click.argument("file", type=NewFile(), metavar="FILE")
-@json_option
+@click.argument("file", type=flags.NewFile(), metavar="FILE")
+@flags.json
 @click.pass_context
-def export(
-    ctx: click.Context, name: str, start: datetime, end: datetime, file: Path, as_json: bool
-) -> None:
+def export(ctx: click.Context, name: str, start: datetime, end: datetime, file: Path) -> None:
     """Write the samples of a time as a recording, which `shm identify` takes.
 
     FILE ends with .csv, .npz or .uff. What is missing is an empty value.
@@ -157,84 +118,83 @@ def export(
     stream = workspace.bridge.stream(name)
     found = recording_of(ring_of(workspace), stream, start, end, workspace.settings.max_samples)
     write(found, file)
-    if as_json:
+    if flags.wants_json():
         about = {"file": str(file), "start": found.time, "samples": found.samples}
         show({"stream": name, "hanger": found.hanger, **about})
         return
     click.echo(f"{file}: {found.samples} samples of {len(found.channels)} channels.")
 
 
-command.add_command(keep)
-command.add_command(export)
-
-
-def _show_streams(workspace: Workspace, store: Store, now: datetime, as_json: bool) -> None:
+def _show_streams(workspace: Workspace, store: Store, now: datetime) -> None:
     states = stream_states(workspace, ring_of(workspace), store, now)
     beside = [against_hammer(store, each.stream) for each in states]
-    rows = [_row(*each) for each in zip(states, beside, strict=True)]
-    if as_json:
-        show({"streams": [asdict(row) for row in rows]})
+    if flags.wants_json():
+        show({"streams": [_document(*each) for each in zip(states, beside, strict=True)]})
         return
     columns = ("stream", "hanger", "state", "last sample", "lag", "rate", "lost", "apart", "ring",
                "window", "tension")  # fmt: skip
-    made = table("Streams", *columns)
-    for row, state in zip(rows, states, strict=True):
-        made.add_row(
-            row.name,
-            str(row.hanger),
-            row.state,
-            _time(row.last_sample),
-            "" if state.lag is None else told(state.lag),
-            f"{row.received_hz:.4g} Hz" if row.received_hz == row.received_hz else "",
-            f"{row.lost_share_24h:.2%}" if row.lost_share_24h == row.lost_share_24h else "",
-            f"{row.apart_s_24h:.0f} s" if row.apart_s_24h else "",
-            f"{row.ring_bytes / 1e6:.1f} MB",
-            f"{_time(row.last_window)} {row.last_window_kind}, {row.last_window_how}".strip(" ,"),
-            tension_words(state.hour),
-        )
-    show_table(made)
+    show_rows("Streams", columns, map(_cells, states))
     for each in beside:
         if each.is_known:
             click.echo(each.text())
 
 
-def _row(state: StreamCondition, beside: AmbientBias) -> StreamRow:
-    window, hour = state.window, state.hour
-    return StreamRow(
-        name=state.stream.name,
-        hanger=state.stream.hanger,
-        state=state.state,
-        last_sample=state.last_sample,
-        lag_s=NAN if state.lag is None else state.lag.total_seconds(),
-        behind_s=NAN if state.behind is None else state.behind.total_seconds(),
-        sampling_rate_hz=state.stream.sampling_rate_hz,
-        received_hz=state.received_hz,
-        lost_share_24h=state.lost_share,
-        apart_s_24h=state.apart_s,
-        ring_bytes=state.ring_bytes,
-        last_window=window.window.start if window else None,
-        last_window_kind=window.window.kind if window else "",
-        last_window_how=window.how if window else "",
-        last_window_modes=len(window.modes) if window else 0,
-        tension_shift=hour.compensated_shift if hour else NAN,
-        tension_shift_sd=hour.compensated_sd if hour else NAN,
-        learning=hour.learning if hour else "",
-        ambient_bias=beside.common,
-        ambient_bias_sd=beside.common_sd,
-        hammer_tests=beside.most_tests,
+def _cells(state: StreamCondition) -> tuple[str, ...]:
+    window = state.window
+    last = f"{_time(window.window.start)} {window.window.kind}, {window.how}" if window else ""
+    return (
+        state.stream.name,
+        str(state.stream.hanger),
+        state.state,
+        _time(state.last_sample),
+        "" if state.lag is None else told(state.lag),
+        number(state.received_hz, ".4g", "") + (" Hz" if math.isfinite(state.received_hz) else ""),
+        number(state.lost_share, ".2%", ""),
+        f"{state.apart_s:.0f} s" if state.apart_s else "",
+        f"{state.ring_bytes / 1e6:.1f} MB",
+        last.strip(" ,"),
+        tension_words(state.hour),
     )
 
 
-def _show_events(store: Store, since: datetime, as_json: bool) -> None:
+def _document(state: StreamCondition, beside: AmbientBias) -> dict[str, Any]:
+    """An entry of `--json`; unknown numbers are NaN."""
+    window, hour = state.window, state.hour
+    return {
+        "name": state.stream.name,
+        "hanger": state.stream.hanger,
+        "state": state.state,
+        "last_sample": state.last_sample,
+        "lag_s": NAN if state.lag is None else state.lag.total_seconds(),
+        "behind_s": NAN if state.behind is None else state.behind.total_seconds(),
+        "sampling_rate_hz": state.stream.sampling_rate_hz,
+        "received_hz": state.received_hz,
+        "lost_share_24h": state.lost_share,
+        "apart_s_24h": state.apart_s,
+        "ring_bytes": state.ring_bytes,
+        "last_window": window.window.start if window else None,
+        "last_window_kind": window.window.kind if window else "",
+        "last_window_how": window.how if window else "",
+        "last_window_modes": len(window.modes) if window else 0,
+        "tension_shift": hour.compensated_shift if hour else NAN,
+        "tension_shift_sd": hour.compensated_sd if hour else NAN,
+        "learning": hour.learning if hour else "",
+        "ambient_bias": beside.common,
+        "ambient_bias_sd": beside.common_sd,
+        "hammer_tests": beside.most_tests,
+    }
+
+
+def _show_events(store: Store, since: datetime) -> None:
     found = store.streams.list_events(None, since)
-    if as_json:
+    if flags.wants_json():
         show({"events": [asdict(event) for event in found]})
         return
-    made = table("Events of streams", "stream", "what", "from", "to", "channel", "details")
-    for event in found:
-        times = _time(event.start), _time(event.end)
-        made.add_row(event.stream, event.kind, *times, event.channel, escape(event.detail))
-    show_table(made)
+    headings = ("stream", "what", "from", "to", "channel", "details")
+    rows = [
+        (e.stream, e.kind, _time(e.start), _time(e.end), e.channel, escape(e.detail)) for e in found
+    ]
+    show_rows("Events of streams", headings, rows)
 
 
 def _time(time: datetime | None) -> str:

@@ -1,50 +1,67 @@
-"""`shm update`: the posterior of one model class."""
+"""`shm update` and `shm select`: the posterior of one model class, or of several compared."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
+import numpy as np
 import rich_click as click
 
-from shm.documents import posterior_document, summary
+from shm.documents import posterior_document, selection_document, summary
 from shm.errors import BadInput, UsageError
-from shm.inference import Progress, UpdateOptions, select, update
-from shm.models import DESCRIPTION, Model, build
+from shm.inference import (
+    NOISE_FLOOR,
+    Progress,
+    UpdateOptions,
+    modal_groups,
+    select,
+    sigma_by_group,
+    update,
+)
+from shm.models import (
+    DESCRIPTION,
+    THESIS,
+    Model,
+    applicable,
+    build,
+    class_of,
+    competing_names,
+)
 from shm.modes_document import load_modes
 from shm.pipeline.lineage import Taught
 from shm.pipeline.steps import calibration
-from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior
+from shm.settings import load_settings
+from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior, Selection, Summary
 from shm.values.rounding import force_unit
 from shm.values.stated_tension import averaged_now, stated
-from shm_cli import completion
+from shm_cli import completion, flags
 from shm_cli.common import (
-    hanger_file_option,
-    hanger_option,
-    json_option,
-    method_option,
+    opened_store,
     paragraph,
-    priors_option,
     progress_bar,
-    repeat_option,
-    samples_option,
-    seed_option,
     show,
-    show_table,
-    table,
+    show_rows,
     tests_and_hanger,
     told_doubts,
-    update_options,
 )
 
-calibrated_by_option = click.option(
+_calibrated_by = click.option(
     "--calibrated-by",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=flags.FILE,
     metavar="MODES.json",
     help="Tests with a measured tension (tension_read_n) of this hanger, or of one of its family.",
 )
+
+
+def _updating(function: flags.F) -> flags.F:
+    """The options that both have."""
+    updating = (flags.seed, flags.samples, flags.repeat, flags.method, flags.priors, _calibrated_by)
+    for option in reversed((flags.hanger(), flags.hanger_file, *updating, flags.json)):
+        function = option(function)
+    return function
 
 
 def calibrated(
@@ -88,14 +105,26 @@ def calibrated(
     return replace(options, calibration=calibration(Taught(posterior, own), hanger))
 
 
+def update_options(samples: int, seed: int, repeat: int, method: str, priors: str) -> UpdateOptions:
+    """How to update; raises UsageError for what the thesis's priors alone allow."""
+    if priors != THESIS:
+        asked = [f"--repeat {repeat}"] * (repeat != 1) + [f"--method {method}"] * (
+            method != NOISE_FLOOR
+        )
+        for option in asked:
+            raise UsageError(
+                f"{option} is the thesis's way: with priors of the description each test counts "
+                "once and the sampler works its own way.",
+                remedy=f"Add --priors {THESIS}, or leave {option} out.",
+            )
+    return UpdateOptions(samples, seed, repeat, method)
+
+
 _POOR_FIT_PERCENT = 5.0
 """Model errors beyond it are blunders: clamped ends where springs are right cost some 2 %."""
 
 modes_argument = click.argument(
-    "modes_file",
-    metavar="[MODES.json]",
-    required=False,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    "modes_file", metavar="[MODES.json]", required=False, type=flags.FILE
 )
 
 
@@ -104,19 +133,10 @@ modes_argument = click.argument(
 @click.option(
     "--model",
     default="beam2",
-    show_default=True,
     shell_complete=completion.models,
     help="The model class.",
 )
-@hanger_option()
-@hanger_file_option
-@seed_option
-@samples_option
-@repeat_option
-@method_option
-@priors_option
-@calibrated_by_option
-@json_option
+@_updating
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -130,7 +150,6 @@ def command(
     method: str,
     priors: str,
     calibrated_by: Path | None,
-    as_json: bool,
 ) -> None:
     """Posterior of tension and end stiffness.
 
@@ -141,14 +160,14 @@ def command(
     """
     options = update_options(samples, seed, repeat, method, priors)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
-    doubts = told_doubts(tests, hanger, apart=as_json)
+    doubts = told_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
     with progress_bar("updating") as progress:
         chosen = build(model, hanger, priors)
         options = calibrated(options, calibrated_by, hanger, [chosen], progress)
         posterior = update(tests, chosen, options, progress)
     tell_poor_fit(posterior)
-    if as_json:
+    if flags.wants_json():
         show({**posterior_document(posterior), "doubts": doubts})
         return
     show_posterior(posterior, hanger.limits)
@@ -190,35 +209,182 @@ def show_stated(averaged: Averaged) -> None:
 def show_posterior(posterior: Posterior, limits: Limits | None = None) -> None:
     """The tension in words, parameters and predicted frequencies as tables."""
     show_stated(averaged_now(posterior, limits=limits))
-    made = table(
-        f"{posterior.model}: posterior of hanger {posterior.hanger}, "
-        f"log evidence {posterior.log_evidence:.2f} ± {posterior.log_evidence_sd:.2f}",
-        "parameter", "mean", "sd", "5 %", "median", "95 %", "most probable",
-    )  # fmt: skip
     tension_n = summary(
         posterior.tension_n, posterior.most_probable[0] * posterior.nominal_tension_n
     )
     unit = force_unit(tension_n["mean"])
     places = unit.decimals(tension_n["mean"])
-    made.add_row(
-        f"tension ({unit.name})", *(f"{unit.of(each):.{places}f}" for each in tension_n.values())
+    title = (
+        f"{posterior.model}: posterior of hanger {posterior.hanger}, "
+        f"log evidence {posterior.log_evidence:.2f} ± {posterior.log_evidence_sd:.2f}"
     )
+    rows = [
+        (f"tension ({unit.name})", *(f"{unit.of(e):.{places}f}" for e in tension_n.values())),
+    ]
     for name, best in zip(posterior.names, posterior.most_probable, strict=True):
         figures = summary(posterior.parameter(name), best)
-        made.add_row(name, *(f"{value:.4g}" for value in figures.values()))
-    show_table(made)
-    made = table("predicted frequencies", "mode", "measured (Hz)", "mean (Hz)", "sd (Hz)", "ratio")
-    for row in posterior.predicted:
-        made.add_row(
+        rows.append((name, *(f"{value:.4g}" for value in figures.values())))
+    show_rows(title, ("parameter", "mean", "sd", "5 %", "median", "95 %", "most probable"), rows)
+    predicted = [
+        (
             f"{row.plane} {row.order}",
             f"{row.measured_hz:.3f}",
             f"{row.mean_hz:.3f}",
             f"{row.sd_hz:.3f}",
             f"{row.mean_hz / row.measured_hz:.4f}",
         )
-    show_table(made)
+        for row in posterior.predicted
+    ]
+    headings = ("mode", "measured (Hz)", "mean (Hz)", "sd (Hz)", "ratio")
+    show_rows("predicted frequencies", headings, predicted)
     click.echo(
         f"{len(posterior.samples)} samples ({posterior.effective_sample_size:.0f} effective), "
         f"R-hat {posterior.r_hat:.3f}, {posterior.evaluations} model evaluations, "
         f"{posterior.seconds:.1f} s, seed {posterior.seed}"
     )
+
+
+@click.command("select")
+@modes_argument
+@click.option(
+    "--models",
+    show_default="the setting `models`",
+    shell_complete=completion.models,
+    help="Classes, separated by commas.",
+)
+@click.option(
+    "--prior",
+    "class_priors",
+    metavar="CLASS=P,...",
+    help="How probable each class is beforehand, such as beam1=0.25,beam2=0.75.",
+)
+@click.option(
+    "--sigma",
+    metavar="|".join((*modal_groups.NAMED, "1-3,4-6")),
+    default=modal_groups.ONE,
+    help="One model error of all modes, or of each plane, order, mode or group of orders; with "
+    "--priors thesis.",
+)
+@_updating
+@click.pass_context
+def select_command(
+    ctx: click.Context,
+    modes_file: Path | None,
+    models: str | None,
+    class_priors: str | None,
+    sigma: str,
+    hanger_id: int | None,
+    hanger_file: Path | None,
+    seed: int,
+    samples: int,
+    repeat: int,
+    method: str,
+    priors: str,
+    calibrated_by: Path | None,
+) -> None:
+    """Compare model classes by their evidence.
+
+    The classes are equally probable beforehand, but for clamped ones, which weigh 0.15 to 0.22
+    beside one with springs; --priors thesis has all equal, and --prior says otherwise. Those that
+    do not apply to the hanger are left out and say why. The tests come from MODES.json, or are the
+    latest of a hanger of the workspace, which brings the classes that it has adopted.
+
+    \b
+    Example: shm select hanger3.modes.json --hanger-file H.toml --models beam1,beam2
+    Example: shm select hanger3.modes.json --hanger-file H.toml --priors thesis --sigma plane
+    Example: shm select hanger3.modes.json --hanger-file H.toml --priors thesis --sigma 1-3,4-6
+    """
+    options = replace(update_options(samples, seed, repeat, method, priors), sigma=sigma)
+    stated = None if class_priors is None else _stated_priors(class_priors)
+    tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
+    names = _names(ctx, models, None if hanger_file else hanger.id)
+    _, not_applicable = applicable(hanger, names)
+    chosen = [build(name, hanger, priors) for name in competing_names(hanger, names)]
+    doubts = told_doubts(tests, hanger, apart=flags.wants_json())
+    tell_irregular(tests)
+    with progress_bar("updating") as progress:
+        options = calibrated(options, calibrated_by, hanger, chosen, progress)
+        selection = select(tests, chosen, options, progress, stated)
+    tell_poor_fit(selection.selected)
+    errors = _errors_by_group(selection, tests, hanger, options)
+    if flags.wants_json():
+        document = selection_document(selection, hanger.limits)
+        if errors:
+            told = {m: {g: asdict(s) for g, s in own.items()} for m, own in errors.items()}
+            document["sigma_by_group"] = told
+        show({**document, "not_applicable": not_applicable, "doubts": doubts})
+        return
+    show_selection(selection, hanger.limits)
+    if errors:
+        rows = [
+            (model, group, *(f"{share:.2%}" for share in (each.mean, each.q05, each.q95)))
+            for model, own in errors.items()
+            for group, each in own.items()
+        ]
+        headings = ("class", "group", "mean", "5 %", "95 %")
+        show_rows("model error of each group of modes", headings, rows)
+    for name, reason in not_applicable.items():
+        click.echo(f"{name} does not apply: {reason}")
+
+
+def _errors_by_group(
+    selection: Selection, tests: Sequence[ModalTest], hanger: Hanger, options: UpdateOptions
+) -> dict[str, dict[str, Summary]]:
+    """By class; empty where one model error is of all modes."""
+    if options.sigma == modal_groups.ONE:
+        return {}
+    return {
+        each.model: sigma_by_group(each, tests, class_of(each, hanger), options)
+        for each in selection.posteriors
+    }
+
+
+def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tuple[str, ...]:
+    """The classes asked for, or those of the setting and, of a workspace's hanger, the adopted."""
+    if models is not None:
+        return load_settings({"models": models}, environment={}).model_names
+    if hanger_id is None:
+        return load_settings().model_names
+    with opened_store(ctx) as (workspace, store):
+        adopted = [each.adoption.model for each in store.posteriors.list_adoptions(hanger_id)]
+    return tuple(dict.fromkeys([*workspace.settings.model_names, *adopted]))
+
+
+def _stated_priors(text: str) -> dict[str, float]:
+    """beam1=0.25,beam2=0.75 as numbers by class."""
+    pairs = [part.partition("=") for part in text.split(",")]
+    try:
+        return {name.strip(): float(value) for name, _, value in pairs}
+    except ValueError as error:
+        raise UsageError(
+            f"--prior {text}: not one number a class.",
+            remedy="Write beam1=0.25,beam2=0.75, say.",
+        ) from error
+
+
+def show_selection(selection: Selection, limits: Limits | None = None) -> None:
+    """The tension over all classes in words, and the classes as a table, most probable first."""
+    show_stated(selection.averaged(limits))
+    unit = force_unit(*(float(each.tension_n.mean()) for each in selection.posteriors))
+    headings = (
+        "class", "probability", "log evidence", f"tension ({unit.name})",
+        f"90 % interval ({unit.name})", "to nominal", "most probable values",
+    )  # fmt: skip
+    rows = []
+    for posterior, probability in zip(selection.posteriors, selection.probabilities, strict=True):
+        low, high = unit.of(np.quantile(posterior.tension_n, [0.05, 0.95]))
+        mean = float(posterior.tension_n.mean())
+        places = unit.decimals(mean)
+        best = zip(posterior.names, posterior.most_probable, strict=True)
+        cells = (
+            posterior.model,
+            f"{probability:.3f}",
+            f"{posterior.log_evidence:.2f} ± {posterior.log_evidence_sd:.2f}",
+            f"{unit.of(mean):.{places}f}",
+            f"{low:.{places}f} to {high:.{places}f}",
+            f"{mean / posterior.nominal_tension_n - 1:+.1%}",
+            ", ".join(f"{name} {value:.3g}" for name, value in best),
+        )
+        rows.append(cells)
+    title = f"model classes of hanger {selection.selected.hanger}, most probable first"
+    show_rows(title, headings, rows)

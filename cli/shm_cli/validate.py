@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -11,8 +11,8 @@ import rich_click as click
 from shm.bridge import load_hanger
 from shm.errors import GateNotMet, UsageError
 from shm.values import Hanger
-from shm_cli import thesis
-from shm_cli.common import json_option, markdown, progress_bar, seed_option, show, show_table, table
+from shm_cli import flags, thesis
+from shm_cli.common import progress_bar, show, show_rows
 from shm_cli.validation import (
     formulas,
     frequencies,
@@ -35,9 +35,6 @@ TABLES = tuple(sorted((*frequencies.TABLES, *thesis_tables.TABLES)))
 
 
 @click.command()
-@click.option(
-    "--markdown", "as_markdown", is_flag=True, help="The tables as Markdown, for the docs."
-)
 @click.option(
     "--figure",
     type=click.Choice(tuple(FIGURES)),
@@ -64,17 +61,15 @@ TABLES = tuple(sorted((*frequencies.TABLES, *thesis_tables.TABLES)))
     metavar="FILE.png",
     help="Draw the --figure here.",
 )
-@seed_option
-@json_option
+@flags.seed
+@flags.json
 def command(
-    as_markdown: bool,
     figure: str | None,
     wanted: str | None,
     practice: bool,
     listed: bool,
     out: Path | None,
     seed: int,
-    as_json: bool,
 ) -> None:
     """Our figures beside the thesis's, with a gate.
 
@@ -83,24 +78,24 @@ def command(
     by more than its mark, or the evidence does not prefer springs to fixed ends.
 
     \b
-    Example: shm validate --markdown
+    Example: shm validate
     Example: shm validate --figure 2.4 --out figure_2_4.png
     Example: shm validate --table A.5
     Example: shm validate --formulas
     """
     if figure is not None:
-        _show_figure(figure, out, as_json)
+        _show_figure(figure, out)
         return
     if out is not None:
         raise UsageError("--out draws one figure.", remedy="Say which: --figure 2.4, say.")
     if listed:
-        _show_list(as_json)
+        _show_list()
         return
     if practice:
-        _show_formulas(seed, as_json)
+        _show_formulas(seed)
         return
     if wanted is not None:
-        _show_table(wanted, seed, as_json)
+        _show_table(wanted, seed)
         return
     tables, chosen = compared(seed)
     parts = {
@@ -110,18 +105,16 @@ def command(
         ),
         "hanger 3 of the thesis": (selection.HEADS, [*map(selection.cells, chosen)]),
     }
-    if as_json:
+    if flags.wants_json():
         show(
             {
                 "frequencies": [asdict(row) for row in tables],
                 "selection": [asdict(row) for row in chosen],
             }
         )
-    elif as_markdown:
-        click.echo("\n\n".join(markdown(heads, rows) for heads, rows in parts.values()))
     else:
         for title, (heads, rows) in parts.items():
-            _show(title, heads, rows)
+            show_rows(title, heads, rows)
     misses = [*frequencies.misses(tables), *selection.misses(chosen)]
     if misses:
         message = "; ".join(misses)
@@ -138,66 +131,59 @@ def compared(
         return tables, selection.compared(hanger, seed, progress)
 
 
-def _show_figure(number: str, out: Path | None, as_json: bool) -> None:
+def _show_figure(number: str, out: Path | None) -> None:
     with progress_bar("validating") as progress:
         found = FIGURES[number](load_hanger(thesis.HANGER_FILE), progress, number)
     if out is not None:
         found.write(out)
-    if as_json:
+    if flags.wants_json():
         show(found.document)
     else:
-        _show(found.title, found.heads, found.cells)
+        show_rows(found.title, found.heads, found.cells)
         click.echo(found.statement)
     if found.missed:
         raise GateNotMet(found.missed, remedy="Report this: the beam's solver is at fault.")
 
 
-def _show_table(wanted: str, seed: int, as_json: bool) -> None:
+def _show_table(wanted: str, seed: int) -> None:
     if wanted in thesis_tables.TABLES:
         with progress_bar("validating") as progress:
             hanger = load_hanger(thesis.HANGER_FILE)
             shown = thesis_tables.TABLES[wanted](hanger, seed, progress)
-        if as_json:
+        if flags.wants_json():
             show(shown.document)
         else:
-            _show(f"table {wanted} of the thesis", shown.heads, shown.cells)
+            show_rows(f"table {wanted} of the thesis", shown.heads, shown.cells)
         return
     with progress_bar("validating") as progress:
         rows = frequencies.compared(load_hanger(thesis.HANGER_FILE), progress, wanted)
-    if as_json:
+    if flags.wants_json():
         show([asdict(row) for row in rows])
     else:
         timed = any(row.thesis_time for row in rows)
         heads = frequencies.TIMED_HEADS if timed else frequencies.HEADS
         cells = map(frequencies.timed_cells if timed else frequencies.cells, rows)
-        _show(f"table {wanted} of the thesis", heads, [*cells])
+        show_rows(f"table {wanted} of the thesis", heads, cells)
     misses = frequencies.misses(rows)
     if misses:
         message = "; ".join(misses)
         raise GateNotMet(f"{message}.", remedy="See docs/trials/validation.md for the marks.")
 
 
-def _show_formulas(seed: int, as_json: bool) -> None:
+def _show_formulas(seed: int) -> None:
     with progress_bar("validating") as progress:
         rows = formulas.compared(load_hanger(thesis.HANGER_FILE), seed, progress)
-    if as_json:
+    if flags.wants_json():
         show([asdict(row) for row in rows])
         return
-    _show("formulas of practice", formulas.FORMULA_HEADS, formulas.formula_cells())
-    _show("error of the tension", formulas.HEADS, [*map(formulas.cells, rows)])
+    show_rows("formulas of practice", formulas.FORMULA_HEADS, formulas.formula_cells())
+    show_rows("error of the tension", formulas.HEADS, map(formulas.cells, rows))
 
 
-def _show_list(as_json: bool) -> None:
+def _show_list() -> None:
     items = thesis.checklist()
-    if as_json:
+    if flags.wants_json():
         show(items)
     else:
         heads = ("of", "what", "where")
-        _show("the thesis", heads, [tuple(item[head] for head in heads) for item in items])
-
-
-def _show(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    made = table(title, *heads)
-    for row in rows:
-        made.add_row(*row)
-    show_table(made)
+        show_rows("the thesis", heads, [tuple(item[head] for head in heads) for item in items])

@@ -7,30 +7,393 @@ and model classes as objects; these here take names and numbers.
 
 from __future__ import annotations
 
-from shm.api.analysing import (
-    diagnose,
-    identify,
-    load_hanger,
-    load_modes,
-    read,
-    round_bar,
-    select,
-    update,
-)
-from shm.api.simulating import simulate
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from shm import bridge
 from shm.api.stored import Store
+from shm.bridge.hanger import hanger_of
+from shm.errors import BadInput, UsageError
+from shm.gap import GapOptions, Progress
+from shm.gap import diagnose as diagnosed
 from shm.gap.any_simulator import diagnose_simulator
+from shm.gap.contract import silent
+from shm.identify import Identification, IdentifyOptions
+from shm.identify.identification import identify as identified
+from shm.inference import METHODS, UpdateOptions, updating
+from shm.models import DESCRIPTION, build, competing_names
+from shm.read import read as read_file
+from shm.read import registry
+from shm.settings import Settings, load_settings
+from shm.simulate import (
+    HammerPlan,
+    HangerState,
+    PlantedEffect,
+    TestConditions,
+    hammer_test,
+    spread_places_m,
+)
+from shm.values import (
+    NAN,
+    AddedMass,
+    Diagnosis,
+    FrequencyResponse,
+    Hanger,
+    ModalTest,
+    Posterior,
+    Recording,
+    Selection,
+)
 
 __all__ = [
-    "Store",
-    "diagnose",
-    "diagnose_simulator",
-    "identify",
-    "load_hanger",
-    "load_modes",
-    "read",
-    "round_bar",
-    "select",
-    "simulate",
-    "update",
-]
+    "Store", "diagnose", "diagnose_simulator", "identify", "load_hanger", "load_modes", "read",
+    "round_bar", "select", "simulate", "update",
+]  # fmt: skip
+
+
+def read(path: str | Path) -> Recording | FrequencyResponse:
+    """The content of one file, in SI units, gaps as NaN.
+
+    CSV, UFF58, HDF5, MATLAB, TDMS, miniSEED or npz; a sidecar NAME.toml beside NAME.csv says what
+    the file does not. Time histories are a Recording, frequency responses a FrequencyResponse.
+    Raises BadInput naming file, line, channel and remedy. A .zip holds several files of one test:
+    `shm.read.read_test` gives them all.
+
+    Example:
+        >>> recording = shm.read("hanger3.csv")
+        >>> [channel.name for channel in recording.channels]
+        ['force', 'acc_1', 'acc_2']
+    """
+    return read_file(Path(path))
+
+
+def load_modes(path: str | Path) -> tuple[ModalTest, ...]:
+    """The modal tests of a `*.modes.json` document, as `shm identify --out` writes it.
+
+    One test each, modes in Hz by plane and order. A sidecar NAME.modes.toml may say hanger, time
+    and temperature. Raises BadInput naming test, mode and remedy.
+
+    Example:
+        >>> tests = shm.load_modes("hanger3.modes.json")
+        >>> tests[0].modes[0].frequency_hz
+        5.82
+    """
+    return registry.load_modes(Path(path))
+
+
+Test: TypeAlias = ModalTest | Identification
+Tests: TypeAlias = Test | Sequence[Test]
+"""What `update`, `select` and `diagnose` take."""
+
+
+def modal_tests(tests: Tests) -> tuple[ModalTest, ...]:
+    """The modal tests, one or many."""
+    given = (tests,) if isinstance(tests, ModalTest | Identification) else tests
+    return tuple(each.test if isinstance(each, Identification) else each for each in given)
+
+
+def load_hanger(path: str | Path, hanger_id: int | None = None) -> Hanger:
+    """A hanger described in a TOML file: a `bridge.toml`, or a file with one `[[hanger]]` table.
+
+    `hanger_id` says which, and may be left out where the file has one only. Raises BadInput naming
+    the table and key at fault, or the hangers that there are.
+
+    Example:
+        >>> hanger = shm.load_hanger("bridge.toml", 3)
+        >>> hanger.length_m
+        12.0
+    """
+    return bridge.load_hanger(Path(path), hanger_id)
+
+
+def round_bar(
+    id: int,
+    *,
+    diameter_m: float,
+    length_m: float,
+    elastic_modulus_pa: float,
+    density_kg_m3: float,
+    nominal_tension_n: float,
+    name: str = "",
+) -> Hanger:
+    """A solid round bar, clamped at both ends: section and mass follow from diameter and density.
+
+    The same checks are made as of a `[[hanger]]` table, which can say more (end plates,
+    turnbuckles, strands, supports). A nominal tension of 0 is a bar without any. Raises BadInput
+    naming the figure that cannot be.
+
+    Example:
+        >>> hanger = shm.round_bar(
+        ...     3, diameter_m=0.130, length_m=12.0, elastic_modulus_pa=200e9,
+        ...     density_kg_m3=7800, nominal_tension_n=711e3,
+        ... )
+        >>> round(hanger.mass_per_length_kg_m, 1)
+        103.5
+    """
+    values = {
+        "id": id,
+        "diameter_m": diameter_m,
+        "length_m": length_m,
+        "elastic_modulus_pa": elastic_modulus_pa,
+        "density_kg_m3": density_kg_m3,
+        "nominal_tension_n": nominal_tension_n,
+        "name": name,
+    }
+    return hanger_of(values, Path())
+
+
+Record: TypeAlias = Recording | FrequencyResponse
+_DEFAULT = Settings()
+
+
+def identify(
+    records: Record | Sequence[Record],
+    *,
+    hanger: Hanger | None = None,
+    test_id: str | None = None,
+    band_hz: tuple[float, float] = (_DEFAULT.band_low_hz, _DEFAULT.band_high_hz),
+    identifier: str = _DEFAULT.identifier,
+    cross_check: str = _DEFAULT.cross_check,
+    estimator: Literal["h1", "h2", "hv"] = "h1",
+    reference_force_n: float = _DEFAULT.reference_force_n,
+    frequency_allowance: float = _DEFAULT.frequency_allowance,
+    mains_hz: float = _DEFAULT.mains_hz,
+    window_time_constant_s: float = math.inf,
+) -> Identification:
+    """The modes of one test, each with its standard deviations, and how they were found.
+
+    `records` are those of one test: hits, set-ups, or frequency responses. The description of the
+    `hanger`, where known, helps to number the modes. `test_id` names the test; left out, the name
+    of its first file. Modes are looked for within `band_hz`. `identifier` and `cross_check` are
+    names of `shm.identify.IDENTIFIERS` (`ssi`, `frf`; the latter also `none`).
+    `estimator` of the frequency response allows for noise in the responses (`h1`), the force
+    (`h2`) or both (`hv`). A hit of `reference_force_n` has amplitude 1. `frequency_allowance` is
+    the part of a frequency by which it differs from test to test unseen. `window_time_constant_s`
+    is that of an exponential window already in given frequency responses.
+
+    `Identification.test` holds the modes; beside it stand quality, hits, the frequency response and
+    what was dropped and why. Raises BadInput where the records cannot be used together or are of
+    another hanger, NotIdentifiable where no mode can be trusted, UsageError for an unknown name.
+
+    Example:
+        >>> test = shm.identify(shm.read("hanger3.csv"), hanger=hanger)
+        >>> [(mode.plane, mode.order, mode.frequency_hz) for mode in test.test.modes[:2]]
+        [('transverse', 1, 5.83), ('transverse', 2, 14.17)]
+    """
+    given = [records] if isinstance(records, Recording | FrequencyResponse) else list(records)
+    if not given:
+        raise UsageError("no record to identify modes in.", remedy="Give at least one.")
+    options = IdentifyOptions(
+        band_low_hz=band_hz[0],
+        band_high_hz=band_hz[1],
+        identifier=identifier,
+        cross_check=cross_check,
+        estimator=estimator,
+        reference_force_n=reference_force_n,
+        frequency_allowance=frequency_allowance,
+        mains_hz=mains_hz,
+        window_time_constant_s=window_time_constant_s,
+    )
+    name = test_id or Path(given[0].source).stem
+    found = identified(given, options, test_id=name, hanger=hanger)
+    return found if hanger is None else _of(found, hanger, given[0].source)
+
+
+def _of(found: Identification, hanger: Hanger, source: str) -> Identification:
+    """The test as one of `hanger`, where its records do not say that it is of another."""
+    named = found.test.hanger
+    if named not in (None, hanger.id):
+        raise BadInput(
+            f"the file says hanger {named}, the description is of hanger {hanger.id}.",
+            file=source,
+            remedy="Give the description of its hanger, or correct the file.",
+        )
+    return replace(found, test=replace(found.test, hanger=hanger.id))
+
+
+def update(
+    tests: Tests,
+    hanger: Hanger,
+    model: str = "beam2",
+    *,
+    seed: int = 1,
+    samples: int = 1000,
+    repeat: int = 1,
+    method: str = METHODS[0],
+    priors: str = DESCRIPTION,
+    progress: Progress = updating.silent,
+) -> Posterior:
+    """The posterior of tension and end stiffness of one model class, given all modes of `tests`.
+
+    `model` is a name of `shm.models.MODELS` (`beam1`, `beam2`, `beam3`, `s1`, `s2`, `solid0`,
+    `solid1`, `solid2`), or a baseline with an adopted effect (`beam1+point_mass@everywhere`).
+    `priors` say what is possible before the test: by the hanger's `description` (tension from slack
+    to 5 times nominal, ends from pinned to clamped, the tolerances of its `scatter`), or by the
+    `thesis`: its ranges, an exact description and f_hat ~ N(f(theta), (sigma f_hat)^2 + sd^2),
+    thesis (4.5), with the unknown fractional model error sigma and the identification's standard
+    deviation sd. With the thesis's, `repeat` counts the data set N_D times and `method` may be any
+    of `shm.inference.METHODS`. `progress` hears a label and the fraction done.
+
+    `Posterior.samples` (samples, parameters) are equally weighted draws, `Posterior.tension_n`
+    (samples,) is in N; its interval is absolute, `Posterior.repeatability_sd_n` is for shifts and
+    `Posterior.caveats` say what keeps it from being taken at its word. Raises UsageError where the
+    class does not apply to the hanger, BadInput where a test has no modes or conditions that the
+    class cannot describe.
+
+    Example:
+        >>> posterior = shm.update(test, hanger, model="beam2", seed=1)
+        >>> posterior.tension_n.mean(), posterior.tension_n.std()
+        (711000.0, 4000.0)
+    """
+    options = UpdateOptions(samples, seed, repeat, method)
+    return updating.update(modal_tests(tests), build(model, hanger, priors), options, progress)
+
+
+def select(
+    tests: Tests,
+    hanger: Hanger,
+    models: Sequence[str] | None = None,
+    *,
+    seed: int = 1,
+    samples: int = 1000,
+    repeat: int = 1,
+    method: str = METHODS[0],
+    priors: str = DESCRIPTION,
+    progress: Progress = updating.silent,
+) -> Selection:
+    """Model classes compared by their evidence, the most probable first.
+
+    The classes are equally probable beforehand, thesis (4.15) to (4.17), but for clamped ones
+    beside one with springs unless the `priors` are the thesis's. Without `models` they are
+    those of the setting `models` that apply to this hanger (`shm.models.applicable` says why
+    another does not). `Selection.averaged(hanger.limits)` is the tension over all of them. The
+    other options are those of `update`. Raises UsageError where one of `models` does not apply,
+    BadInput as `update` does.
+
+    Example:
+        >>> choice = shm.select(test, hanger, models=["beam1", "beam2"])
+        >>> choice.selected.model, choice.probabilities
+        ('beam2', (0.98, 0.02))
+    """
+    usual = () if models else competing_names(hanger, load_settings().model_names)
+    classes = [build(name, hanger, priors) for name in models or usual]
+    options = UpdateOptions(samples, seed, repeat, method)
+    return updating.select(modal_tests(tests), classes, options, progress)
+
+
+_OF_GAP = GapOptions()
+
+
+def diagnose(
+    tests: Tests,
+    hanger: Hanger,
+    baseline: str = _OF_GAP.baseline,
+    *,
+    without: Sequence[str] = _OF_GAP.without,
+    hold_out: Sequence[str] = _OF_GAP.hold_out,
+    draws: int = _OF_GAP.draws,
+    seed: int = _OF_GAP.seed,
+    progress: Progress = silent,
+) -> Diagnosis:
+    """Where the baseline and the tests of a hanger differ, which effect causes it, what it changes.
+
+    `baseline` is the model class whose gap is diagnosed. `without` are effects taken out of the
+    catalogue; `hold_out` what is left out of the fit and predicted: ids of tests or orders of modes
+    (empty: every one in turn). `draws` are kept of each posterior. `progress` hears a label and the
+    fraction done.
+
+    The probabilities of `Diagnosis.causes`, of no gap and of something unknown add to 1;
+    `Diagnosis.leading` is the likeliest cause, None where none leads; tensions are in N, residuals
+    in percent of a frequency. Raises BadInput where the tests cannot be used, UsageError for a
+    model class, effect, test or order that is not there.
+
+    Example:
+        >>> diagnosis = shm.diagnose(tests, hanger, baseline="beam1")
+        >>> diagnosis.leading.effect
+        'point_mass'
+    """
+    options = GapOptions(baseline, tuple(without), tuple(hold_out), draws, seed)
+    return diagnosed(modal_tests(tests), hanger, options, progress)
+
+
+def simulate(
+    hanger: Hanger,
+    *,
+    tension_n: float | None = None,
+    k1_n_m_rad: float = math.inf,
+    k2_n_m_rad: float = math.inf,
+    k3_n_m_rad: float = math.inf,
+    k4_n_m_rad: float = math.inf,
+    damping_ratio: float = 0.001,
+    hits: int = 5,
+    seconds_per_hit: float = 20.0,
+    sampling_rate_hz: float = 512.0,
+    sensors: int = 2,
+    hammer_x_m: float = NAN,
+    acceleration_noise_m_s2: float = 0.02,
+    effects: Sequence[PlantedEffect] = (),
+    disturbances: Sequence[str] = (),
+    amplitude: float = 1.0,
+    temperature_c: float = NAN,
+    reference_c: float = 10.0,
+    added_mass: AddedMass | None = None,
+    time: datetime | None = None,
+    seed: int = 1,
+) -> Recording:
+    """The recording of a hammer test of a hanger whose truth you choose.
+
+    Beam finite elements and modal superposition, no code of `shm.models`: what is planted here and
+    found there agrees only if both are right. Left out, `tension_n` is the nominal one, the end
+    springs (k1, k3 transverse at deck and arch end; k2, k4 longitudinal) are clamped, and the
+    hammer hits at 0.16 of the length. Each of 1 to 8 `sensors` is biaxial, two channels in m/s^2.
+    Effects of the gap diagnosis are planted as `PlantedEffect(name, at, values)`; `disturbances`
+    are names of `shm.simulate.DISTURBANCES`. The level of the hits is `amplitude`; the tension is
+    the planted one at `reference_c`. The same seed gives the same recording, that of
+    `shm simulate --seed`.
+
+    `Recording.channels` are `force`, then `acc_1`, `acc_2`, ..., each (hits x seconds x rate,).
+    Raises UsageError for what cannot be, and for a hanger that is not clamped and in tension.
+    `shm.simulate` holds more: ambient records, campaigns of modal tests.
+
+    Example:
+        >>> recording = shm.simulate(hanger, tension_n=650e3, k1_n_m_rad=1e7, seed=1)
+        >>> len(recording.channels), recording.duration_s
+        (5, 100.0)
+    """
+    if not hanger.as_hanger:
+        raise UsageError(
+            f"hanger {hanger.id} is not clamped at both ends, or carries no tension: it cannot be "
+            "simulated.",
+            remedy="Describe it clamped and in tension; soft ends are k1_n_m_rad to k4_n_m_rad.",
+        )
+    plan = HammerPlan(
+        hits=hits,
+        seconds_per_hit=seconds_per_hit,
+        sampling_rate_hz=sampling_rate_hz,
+        sensors_x_m=spread_places_m(hanger, sensors),
+        hammer_x_m=hammer_x_m,
+        acceleration_noise_m_s2=acceleration_noise_m_s2,
+    )
+    shift_k = 0.0 if math.isnan(temperature_c) else temperature_c - reference_c
+    recording = hammer_test(
+        hanger,
+        HangerState(
+            hanger.nominal_tension_n if tension_n is None else tension_n,
+            k1_n_m_rad, k2_n_m_rad, k3_n_m_rad, k4_n_m_rad,
+            damping_ratio=damping_ratio,
+        ),
+        replace(plan, peak_force_n=plan.peak_force_n * amplitude),
+        np.random.default_rng([seed, 0]),
+        time=time,
+        temperature_c=temperature_c,
+        disturbances=disturbances,
+        effects=effects,
+        conditions=TestConditions("", shift_k, amplitude, added_mass),
+    )  # fmt: skip
+    return replace(recording, added_mass=added_mass)

@@ -8,7 +8,7 @@ DataTree and in the names of a table's columns.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +25,7 @@ __all__ = [
 
 
 SAMPLES_SCHEMA = "shm.samples/1"
-Writer = Callable[[Posterior, Path, Sequence[ModalTest], Hanger | None], None]
+FORMATS = ("csv", "json", "netcdf", "npz")
 
 
 def write(
@@ -48,7 +48,19 @@ def write(
         >>> arviz.summary(arviz.from_netcdf("hanger3.nc"))
     """
     path = Path(path)
-    FORMATS[check_format(path, format)](posterior, path, tests, hanger)
+    match check_format(path, format):
+        case "csv":
+            samples(posterior).to_csv(path, index=False)
+        case "npz":
+            buffer = io.BytesIO()
+            np.savez_compressed(buffer, allow_pickle=False, **columns(posterior))
+            path.write_bytes(buffer.getvalue())
+        case "json":
+            draws = {name: values.tolist() for name, values in columns(posterior).items()}
+            head = {"schema": SAMPLES_SCHEMA, **posterior_document(posterior)}
+            path.write_text(dump({**head, "draws": draws}) + "\n", encoding="utf-8")
+        case _:
+            write_netcdf(datatree(posterior, tests, hanger), path)
 
 
 def check_format(path: Path, format: str | None = None) -> str:
@@ -59,46 +71,6 @@ def check_format(path: Path, format: str | None = None) -> str:
         what = f"suffix {path.suffix!r}" if format is None else f"format {format!r}"
         raise UsageError(f"{path.name}: unknown {what}.", remedy="Use .csv, .nc, .json or .npz.")
     return named
-
-
-def _write_csv(
-    posterior: Posterior, path: Path, tests: Sequence[ModalTest], hanger: Hanger | None
-) -> None:
-    samples(posterior).to_csv(path, index=False)
-
-
-def _write_npz(
-    posterior: Posterior, path: Path, tests: Sequence[ModalTest], hanger: Hanger | None
-) -> None:
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, **columns(posterior))
-    path.write_bytes(buffer.getvalue())
-
-
-def _write_json(
-    posterior: Posterior, path: Path, tests: Sequence[ModalTest], hanger: Hanger | None
-) -> None:
-    document = {
-        "schema": SAMPLES_SCHEMA,
-        **posterior_document(posterior),
-        "draws": {name: values.tolist() for name, values in columns(posterior).items()},
-    }
-    path.write_text(dump(document) + "\n", encoding="utf-8")
-
-
-def _write_netcdf(
-    posterior: Posterior, path: Path, tests: Sequence[ModalTest], hanger: Hanger | None
-) -> None:
-    write_netcdf(datatree(posterior, tests, hanger), path)
-
-
-FORMATS: dict[str, Writer] = {
-    "csv": _write_csv,
-    "json": _write_json,
-    "netcdf": _write_netcdf,
-    "npz": _write_npz,
-}
-"""What writes a format, by its name."""
 
 
 if TYPE_CHECKING:

@@ -24,10 +24,11 @@ from shm.pipeline.steps import identify_options
 from shm.pipeline.unheard import blind_hangers, heard
 from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import read_test
-from shm.report.contents import HangerReport, ModalTestReport, trend_row_of
+from shm.report.contents import HangerReport, ModalTestReport, TrendRow
+from shm.report.formatting import Interval
+from shm.report.hanger_report import StructureReport
 from shm.report.hanger_status import findings, still_detected
 from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_over_time
-from shm.report.structure_report import StructureReport
 from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
 from shm.values import Hanger, WatchedTest
 from shm.values.messages import Lead
@@ -122,7 +123,7 @@ def hanger_now(
         posterior=posterior,
         generated_at=generated_at,
         version=shm.__version__,
-        trend=tuple(trend_row_of(point) for point in trend),
+        trend=tuple(_trend_row(point) for point in trend),
         baseline=baseline.posterior if baseline else None,
         selection=selection.selection if selection else None,
         drifts=watched[-1].told if watched else (),
@@ -161,6 +162,18 @@ def _changed(store: Store, hanger: Hanger) -> dict[str, str]:
     """What holds of a hanger instead of what `bridge.toml` says."""
     current = store.settings.list_current().values()
     return {f"changed: {each.key}": str(each) for each in current if each.is_of(hanger.id)}
+
+
+def _trend_row(point: TrendPoint) -> TrendRow:
+    """The row of one test from its numbers, without its samples."""
+    return TrendRow(
+        test=point.test,
+        model=point.model,
+        tension_n=Interval.of_averaged(point.averaged),
+        stiffness={name: Interval.of_summary(each) for name, each in point.stiffness.items()},
+        time=point.taken_at,
+        temperature_c=point.temperature_c,
+    )
 
 
 def _trend(store: Store, hanger: Hanger, period: Period | None) -> tuple[TrendPoint, ...]:

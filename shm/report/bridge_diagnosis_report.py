@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shm.diagnosis_document import bridge_diagnosis_document
 from shm.report import formatting
 from shm.report.contents import BridgeDiagnosisSheet
 from shm.report.diagnosis_summary import verdict
 from shm.report.diagnosis_wording import effect_phrase, quantity, size, tension_of
+from shm.report.figures.every_figure import bridge_diagnosis_figures
 from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
 from shm.values import BridgeDiagnosis, SharedCause, TensionEstimate, effect_label
 from shm.values.rounding import ForceUnit, force_unit
-
-if TYPE_CHECKING:
-    from shm.report.figures.specification import Illustration
 
 _STATES = {
     "shared cause": ("A shared cause", "first"),
@@ -41,7 +39,7 @@ def bridge_diagnosis_paper(sheet: BridgeDiagnosisSheet) -> Paper:
         style=style,
         parts=(
             Part("In short", lead=shared_verdict(diagnosis), summary=_consequences(diagnosis)),
-            Part("Who has it", figures=lambda: _figures(diagnosis)),
+            Part("Who has it", figures=lambda: bridge_diagnosis_figures(diagnosis)),
             Part(
                 "The answer in numbers",
                 tables=filled(_causes(diagnosis), _members(diagnosis), _tensions(diagnosis)),
@@ -122,12 +120,6 @@ def _consequences(diagnosis: BridgeDiagnosis) -> str:
     if moved:
         told += f" It changes their tensions by {min(moved):+.1f} to {max(moved):+.1f} %."
     return told
-
-
-def _figures(diagnosis: BridgeDiagnosis) -> Sequence[Illustration]:
-    from shm.report.figures.every_figure import bridge_diagnosis_figures
-
-    return bridge_diagnosis_figures(diagnosis)
 
 
 def _causes(diagnosis: BridgeDiagnosis) -> Table:

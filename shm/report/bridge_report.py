@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shm.documents import averaged_document, drift_document
 from shm.report import formatting
 from shm.report.contents import BridgeReport, Course, HangerLine, hangers_unit
+from shm.report.figures.every_figure import bridge_figures
 from shm.report.formatting import Interval
 from shm.report.hanger_status import Status
-from shm.report.origin import lineage, settings
 from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, filled
+from shm.report.shared_tables import lineage, settings
 from shm.report.shifts import _day, pattern_tables, shift_cells
 from shm.report.states import period_json
 from shm.values import Drift
@@ -20,9 +21,6 @@ from shm.values.messages import NEXT_TEST
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm.values.stated_tension import stated
 from shm.watch.neighbours import BridgePattern
-
-if TYPE_CHECKING:
-    from shm.report.figures.specification import Illustration
 
 
 def bridge_paper(data: BridgeReport) -> Paper:
@@ -34,19 +32,13 @@ def bridge_paper(data: BridgeReport) -> Paper:
         style=data.worst.name.lower() if data.worst else "first",
         parts=(
             Part("In short", lead=data.message.words, summary=details(data), facts=facts(data)),
-            Part("Along the bridge", figures=lambda: _figures(data)),
+            Part("Along the bridge", figures=lambda: bridge_figures(data)),
             Part("Numbers", tables=tables(data)),
         ),
         generated_at=data.generated_at,
         version=data.version,
         closing=f"{CREDIBLE}; times are UTC.",
     )
-
-
-def _figures(data: BridgeReport) -> Sequence[Illustration]:
-    from shm.report.figures.every_figure import bridge_figures
-
-    return bridge_figures(data)
 
 
 def facts(data: BridgeReport) -> tuple[Fact, ...]:

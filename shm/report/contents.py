@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar
 
 from shm.bridge.description import NO_LETTERHEAD, Letterhead
 from shm.models import end_stiffness
@@ -39,7 +39,6 @@ from shm.values import (
     QualityCheck,
     Recording,
     Selection,
-    Summary,
 )
 from shm.values.messages import Lead
 from shm.values.notes import Note
@@ -82,35 +81,6 @@ def trend_row(
         },
         time=test.time,
         temperature_c=test.temperature_c,
-    )
-
-
-class Numbers(Protocol):
-    """One test in the history of a hanger in numbers, as the store keeps it."""
-
-    @property
-    def test(self) -> str: ...
-    @property
-    def model(self) -> str: ...
-    @property
-    def taken_at(self) -> datetime | None: ...
-    @property
-    def temperature_c(self) -> float: ...
-    @property
-    def averaged(self) -> Averaged: ...
-    @property
-    def stiffness(self) -> Mapping[str, Summary]: ...
-
-
-def trend_row_of(kept: Numbers) -> TrendRow:
-    """The row of one test from its numbers, without its samples."""
-    return TrendRow(
-        test=kept.test,
-        model=kept.model,
-        tension_n=Interval.of_averaged(kept.averaged),
-        stiffness={name: Interval.of_summary(each) for name, each in kept.stiffness.items()},
-        time=kept.taken_at,
-        temperature_c=kept.temperature_c,
     )
 
 

@@ -230,7 +230,7 @@ def effect_file(diagnosis: Diagnosis, hanger: Hanger, name: str) -> str:
     follows = [each for each, on in (("temperature", warm), ("amplitude", level)) if on]
     numbered = list(enumerate(found.law))
     return _HEAD.format(
-        said=_wrapped(law(found)),
+        said=law(found).partition(" (")[0] + ".",
         hanger=hanger_name(hanger.id, hanger.name),
         tests=f"{len(diagnosis.tests)} tests, baseline {diagnosis.baseline}",
         name=name,
@@ -245,11 +245,6 @@ def effect_file(diagnosis: Diagnosis, hanger: Hanger, name: str) -> str:
 
 
 _SEEN = {"temperature": "temperatures", "amplitude": "levels"}
-
-
-def _wrapped(text: str) -> str:
-    """Its first clause, which heads a docstring."""
-    return text.partition(" (")[0] + "."
 
 
 def _parameter(number: int) -> str:

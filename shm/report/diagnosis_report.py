@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shm.diagnosis_document import diagnosis_document
 from shm.report import formatting
@@ -33,12 +33,10 @@ from shm.report.diagnosis_wording import (
     tension_of,
     tension_unit,
 )
+from shm.report.figures.every_figure import diagnosis_figures
 from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
 from shm.values import NO_GAP, Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
 from shm.values.rounding import ForceUnit
-
-if TYPE_CHECKING:
-    from shm.report.figures.specification import Illustration
 
 _STYLES = {
     Answer.EXPLAINED: "first",
@@ -77,17 +75,11 @@ def diagnosis_part(sheet: DiagnosisSheet, title: str, paragraphs: Sequence[str] 
         summary=consequences(sheet.diagnosis),
         facts=facts(sheet),
         remarks=sheet.diagnosis.remarks,
-        figures=lambda: _figures(sheet),
+        figures=lambda: diagnosis_figures(sheet),
         tables=(*answers(sheet), *evidence(sheet)),
         status=found.value,
         style=_STYLES[found],
     )
-
-
-def _figures(sheet: DiagnosisSheet) -> Sequence[Illustration]:
-    from shm.report.figures.every_figure import diagnosis_figures
-
-    return diagnosis_figures(sheet)
 
 
 def _origin(sheet: DiagnosisSheet) -> str:

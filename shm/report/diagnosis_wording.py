@@ -47,11 +47,8 @@ class Claim:
         """Whether all that it names are faults of sensors, clock or what was clamped on to
         measure."""
         names = {effect for cause in self.causes for effect in cause.effects}
-        return all(name == "timebase" or _of_no_hanger(name) for name in names)
-
-
-def _of_no_hanger(effect: str) -> bool:
-    return effect in EFFECTS and not EFFECTS[effect].of_the_hanger
+        known = [EFFECTS.get(name) for name in names if name != "timebase"]
+        return all(effect is not None and not effect.of_the_hanger for effect in known)
 
 
 def claims(diagnosis: Diagnosis) -> tuple[Claim, ...]:
@@ -220,13 +217,10 @@ def size(estimate: EffectEstimate) -> Size:
         )
     scale, unit = _FACTORS.get(estimate.unit, (1.0, estimate.unit))
     if unit in _SCALED_UNITS:
-        divisor, prefix = _prefix(interval.mean)
+        sizes = (pair for pair in _PREFIXES if abs(interval.mean) >= pair[0])
+        divisor, prefix = next(sizes, (1.0, ""))
         scale, unit = 1 / divisor, prefix + unit
     return Size(interval.scaled(scale), unit, logarithmic)
-
-
-def _prefix(value: float) -> tuple[float, str]:
-    return next((pair for pair in _PREFIXES if abs(value) >= pair[0]), (1.0, ""))
 
 
 def _texts(interval: Interval, sign: str, logarithmic: bool) -> tuple[str, str, str]:

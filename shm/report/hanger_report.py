@@ -1,26 +1,26 @@
-"""The report of one hanger: what an engineer files about it."""
+"""The report of one hanger, or of a structure without a model: what an engineer files about it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from typing import Any
 
 from shm import documents, modes_document
+from shm.documents import alert_document, drift_document
 from shm.report import formatting
 from shm.report.bridge_report import pattern_json
 from shm.report.contents import DiagnosisSheet, HangerReport, message, of_nominal, status
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_part
+from shm.report.figures.every_figure import OF_HANGER_NAMES, hanger_figures
 from shm.report.hanger_summary import advice, further, is_found, summary, tension_change, why
 from shm.report.hanger_tables import numbers, origins, results
-from shm.report.paper import CREDIBLE, Fact, Paper, Part, appendices
-from shm.report.shifts import temperature_documents
-from shm.report.states import period_json
-from shm.values import FrequencyResponse
+from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, appendices, filled
+from shm.report.states import period_json, temperature_documents
+from shm.values import Alert, Drift, FrequencyResponse, Hanger
+from shm.values.rounding import NINETY_PERCENT, rounded_percent
 from shm.values.stated_tension import StatedTension, stated
-
-if TYPE_CHECKING:
-    from shm.report.figures.specification import Illustration
+from shm.watch.change_words import structure_words
 
 
 def hanger_paper(data: HangerReport) -> Paper:
@@ -34,11 +34,11 @@ def hanger_paper(data: HangerReport) -> Paper:
         style=state.name.lower(),
         parts=(
             Part("In short", lead=message(data).words, summary=why(data), facts=facts(data)),
-            Part("Results", figures=lambda: _figures(data, TREND), tables=(results(data),)),
-            Part("Fit of the model", figures=lambda: _figures(data, FIT)),
+            Part("Results", figures=lambda: hanger_figures(data, TREND), tables=(results(data),)),
+            Part("Fit of the model", figures=lambda: hanger_figures(data, FIT)),
             Part("Details", paragraphs=[further(data)]),
             *appendices(
-                Part("Figures", figures=lambda: _further_figures(data)),
+                Part("Figures", figures=lambda: hanger_figures(data, FURTHER)),
                 Part("Numbers", tables=numbers(data)),
                 gap_part(data),
                 Part("Origin", tables=origins(data)),
@@ -61,19 +61,8 @@ def gap_part(data: HangerReport) -> Part:
 
 
 TREND, FIT = frozenset({"trend"}), frozenset({"frequencies"})
-
-
-def _figures(data: HangerReport, names: frozenset[str]) -> Sequence[Illustration]:
-    from shm.report.figures.every_figure import hanger_figures
-
-    return hanger_figures(data, names)
-
-
-def _further_figures(data: HangerReport) -> Sequence[Illustration]:
-    """All that do not lead: a new figure is among them by itself."""
-    from shm.report.figures.every_figure import OF_HANGER_NAMES, hanger_figures
-
-    return hanger_figures(data, OF_HANGER_NAMES - TREND - FIT)
+FURTHER = OF_HANGER_NAMES - TREND - FIT
+"""All that do not lead: a new figure is among them by itself."""
 
 
 def diagnosed(data: HangerReport) -> DiagnosisSheet | None:
@@ -209,4 +198,92 @@ def _response(response: FrequencyResponse | None) -> dict[str, Any] | None:
         "points": [asdict(point) for point in response.points],
         "lines": len(response.frequency_hz),
         "highest_frequency_hz": float(response.frequency_hz[-1]),
+    }
+
+
+_NOT_WATCHED = "No test was watched yet: its first tests make the baseline."
+
+
+@dataclass(frozen=True, eq=False)
+class StructureReport:
+    """What is known of a structure; `baseline_hz` are its first frequencies by name, `said` is what
+    the watch says after the latest of its tests, empty before one was watched."""
+
+    bridge: str
+    structure: Hanger
+    tests: int
+    latest: datetime | None
+    baseline_since: datetime | None
+    baseline_hz: dict[str, float]
+    said: str
+    drifts: tuple[Drift, ...]
+    alerts: tuple[Alert, ...]
+    open_alerts: int
+    generated_at: datetime
+    version: str
+
+
+def structure_paper(data: StructureReport) -> Paper:
+    """What the watch says, each frequency, the alerts."""
+    latest = f"{data.latest:%Y-%m-%d %H:%M}" if data.latest else "none"
+    since = f"{data.baseline_since:%Y-%m-%d}" if data.baseline_since else "none yet"
+    facts = (
+        ("Tests", str(data.tests), f"the latest {latest}"),
+        ("Baseline since", since, "its own first tests; no model, no tension"),
+        ("Open alerts", str(data.open_alerts), f"of {len(data.alerts)}"),
+    )
+    told = tuple((f"{each.time:%Y-%m-%d}", each.message) for each in data.alerts)
+    alerts = Table("Alerts", ("test of", "message"), told)
+    return Paper(
+        title=structure_words(data.structure),
+        bridge=data.bridge,
+        status="Alert" if data.open_alerts else "",
+        style="alert" if data.open_alerts else "first",
+        parts=(
+            Part("In short", summary=data.said or _NOT_WATCHED, facts=facts),
+            Part("Numbers", tables=filled(_structure_frequencies(data), alerts)),
+        ),
+        generated_at=data.generated_at,
+        version=data.version,
+        closing="± is half the 90 % interval; times are UTC.",
+    )
+
+
+def _structure_frequencies(data: StructureReport) -> Table:
+    by_name = {each.quantity: each for each in data.drifts}
+    rows = tuple(
+        (name, f"{hz:.4g} Hz", *_frequency_shift(by_name.get(name)))
+        for name, hz in data.baseline_hz.items()
+    )
+    return Table(
+        "Frequencies",
+        ("frequency", "baseline", "shift if it changed", "probability beyond threshold"),
+        rows,
+        note="Temperature, frost and excitation are taken off.",
+    )
+
+
+def _frequency_shift(drift: Drift | None) -> tuple[str, str]:
+    if drift is None:
+        return "not watched yet", ""
+    shift = rounded_percent(drift.shift_mean, NINETY_PERCENT * drift.shift_sd, "+")
+    return shift, f"{drift.probability:.2f} (of {100 * drift.threshold:.3g} %)"
+
+
+def structure_json(data: StructureReport) -> dict[str, Any]:
+    """The same as one document."""
+    return {
+        "bridge": data.bridge,
+        "structure": data.structure.id,
+        "name": data.structure.name,
+        "tests": data.tests,
+        "latest_test": data.latest,
+        "baseline_since": data.baseline_since,
+        "baseline_hz": data.baseline_hz,
+        "said": data.said,
+        "drifts": [drift_document(each) for each in data.drifts],
+        "alerts": [alert_document(each) for each in data.alerts],
+        "open_alerts": data.open_alerts,
+        "generated_at": data.generated_at,
+        "version": data.version,
     }

@@ -64,7 +64,8 @@ def _sentences(data: HangerReport) -> tuple[str, ...]:
     found = (
         *_doubts(data),
         _tension(data),
-        *_repeats_and_limits(data),
+        # How well a test repeats it, and the probabilities that the owner's limits ask for.
+        *stated(data.averaged, data.tension_unit).sentences[1:],
         _against_nominal(data),
         _against_baseline(data),
         _unseen(data),
@@ -126,24 +127,10 @@ def _misfit(each: PredictedFrequency, measured_sd_hz: float) -> Interval:
     return off.scaled(100 / each.measured_hz)
 
 
-def residuals_percent(predicted: tuple[PredictedFrequency, ...]) -> list[float]:
-    """Predicted over measured frequency less one, in percent, of the modes that were measured."""
-    return [
-        100 * (mode.mean_hz / mode.measured_hz - 1)
-        for mode in predicted
-        if math.isfinite(mode.measured_hz)
-    ]
-
-
 def _tension(data: HangerReport) -> str:
     tension = formatting.with_half(data.tension_n, data.tension_unit)
     day = f" of {data.latest.time:%Y-%m-%d}" if data.latest.time else ""
     return f"Its tension is {tension} by test {data.latest.id}{day}."
-
-
-def _repeats_and_limits(data: HangerReport) -> tuple[str, ...]:
-    """How well a test repeats it, and the probabilities that the owner's limits ask for."""
-    return stated(data.averaged, data.tension_unit).sentences[1:]
 
 
 def _against_nominal(data: HangerReport) -> str:
@@ -233,7 +220,7 @@ def _model(data: HangerReport) -> str:
 
 def _rms_percent(data: HangerReport) -> float:
     """Root mean square of the misfits; NaN where no mode was measured."""
-    residuals = residuals_percent(data.predicted)
+    residuals = [off.mean for _, off in misfits_percent(data)]
     return float(np.sqrt(np.mean(np.square(residuals)))) if residuals else math.nan
 
 
@@ -257,7 +244,9 @@ def _outside(data: HangerReport) -> str:
     outside = [mode for mode, off in misfits if not off.low <= 0 <= off.high]
     if not misfits:
         return ""
-    if len(outside) > _by_chance(len(misfits)):
+    # So many may well lie outside by chance: two standard deviations.
+    by_chance = 0.1 * len(misfits) + 2 * math.sqrt(0.09 * len(misfits))
+    if len(outside) > by_chance:
         return f"{_outliers(outside)}: the model does not explain these, and no diagnosis was made."
     chance = f"{_outliers(outside)}, no more than by chance" if outside else ""
     start = chance or "Each lies within its 90 % interval"
@@ -272,11 +261,6 @@ def _outliers(modes: Sequence[PredictedFrequency]) -> str:
     named = f"{told[0].upper()}{told[1:]}"
     who = named if len(modes) <= _MOST_NAMED else formatting.counted(len(modes), "mode")
     return f"{who} {'lies' if len(modes) == 1 else 'lie'} outside the 90 % interval"
-
-
-def _by_chance(modes: int) -> float:
-    """How many of so many may well lie outside their 90 % intervals: two standard deviations."""
-    return 0.1 * modes + 2 * math.sqrt(0.09 * modes)
 
 
 def _diagnosed_on(diagnosis: Diagnosis) -> str:

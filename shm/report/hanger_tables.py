@@ -14,10 +14,10 @@ from shm.report import formatting
 from shm.report.contents import HangerReport, TrendRow
 from shm.report.formatting import Interval
 from shm.report.hanger_summary import counted_tests, misfits_percent
-from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Table, filled
-from shm.report.quality_table import quality_table
-from shm.report.shifts import shift_cells, shift_table, temperature_table
+from shm.report.shared_tables import added_mass, lineage, quality_table, settings
+from shm.report.shifts import shift_cells, shift_table
+from shm.report.states import temperature_table
 from shm.values import PLANES, WITHOUT_MODEL, Alert, Mode, Posterior, PredictedFrequency
 from shm.values.rounding import ForceUnit, force_unit
 from shm.values.stated_tension import stated

@@ -7,20 +7,17 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shm import modes_document
 from shm.report import formatting
 from shm.report.contents import ModalTestReport
+from shm.report.figures.every_figure import modal_test_figures
 from shm.report.figures.style import VERDICT_STYLES
-from shm.report.origin import added_mass, lineage, settings
 from shm.report.paper import Fact, Paper, Part, Table, filled
-from shm.report.quality_table import headline, overall, quality_table
+from shm.report.shared_tables import added_mass, headline, lineage, overall, quality_table, settings
 from shm.values import PLANES, FrequencyResponse, Mode, Plane, QualityCheck, Recording, Verdict
 from shm.values.rounding import force_unit
-
-if TYPE_CHECKING:
-    from shm.report.figures.specification import Illustration
 
 
 def modal_test_paper(sheet: ModalTestReport) -> Paper:
@@ -34,19 +31,13 @@ def modal_test_paper(sheet: ModalTestReport) -> Paper:
         parts=(
             Part("In short", summary=summary(sheet), facts=facts(sheet)),
             Part("Modes and quality", tables=results(sheet)),
-            Part("Figures", figures=lambda: _figures(sheet)),
+            Part("Figures", figures=lambda: modal_test_figures(sheet)),
             Part("How it came about", tables=details(sheet)),
         ),
         generated_at=sheet.generated_at,
         version=sheet.version,
         closing="Intervals are central 90 %; standard deviations are of one test; times are UTC.",
     )
-
-
-def _figures(sheet: ModalTestReport) -> Sequence[Illustration]:
-    from shm.report.figures.every_figure import modal_test_page_figures
-
-    return modal_test_page_figures(sheet)
 
 
 def facts(sheet: ModalTestReport) -> tuple[Fact, ...]:

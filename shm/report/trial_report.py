@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shm.report import formatting
+from shm.report.figures.every_figure import trial_figures
 from shm.report.paper import Fact, Paper, Part, Table, filled
 from shm.report.trial_scores import (
     PHRASES,
@@ -28,9 +29,6 @@ from shm.report.trial_scores import (
     value,
 )
 from shm.values import CaseScore, Mark, MarkName, TrialScore
-
-if TYPE_CHECKING:
-    from shm.report.figures.specification import Illustration
 
 _FACTS: tuple[tuple[MarkName, str], ...] = (
     ("detected", "Gaps seen"),
@@ -58,7 +56,7 @@ def trial_paper(score: TrialScore) -> Paper:
                 remarks=misses(score),
                 remarks_title="Marks that are missed",
             ),
-            Part("Figures", figures=lambda: _figures(score)),
+            Part("Figures", figures=lambda: trial_figures(score)),
             Part("The scores", tables=answers(score)),
             Part("Every answer that was wrong", tables=evidence(score)),
         ),
@@ -66,12 +64,6 @@ def trial_paper(score: TrialScore) -> Paper:
         f"{score.key_sha256}, of the answers {score.answers_sha256}. Intervals are 90 % bootstrap "
         "intervals over the cases; where all cases of a share agree, Jeffreys' interval.",
     )
-
-
-def _figures(score: TrialScore) -> Sequence[Illustration]:
-    from shm.report.figures.every_figure import trial_figures
-
-    return trial_figures(score)
 
 
 def facts(score: TrialScore) -> tuple[Fact, ...]:

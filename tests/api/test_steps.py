@@ -23,16 +23,16 @@ COMMANDS = {
         "identifier": "identifier",
         "cross_check": "cross_check",
         "estimator": "estimator",
-        "reference_force": "reference_force_n",
+        "reference_force_n": "reference_force_n",
         "frequency_allowance": "frequency_allowance",
-        "mains": "mains_hz",
-        "window": "window_time_constant_s",
+        "mains_hz": "mains_hz",
+        "window_time_constant_s": "window_time_constant_s",
     },
     ("update", "command"): {
         "model": "model", "seed": "seed", "samples": "samples", "repeat": "repeat",
         "method": "method",
     },
-    ("select", "command"): {
+    ("update", "select_command"): {
         "models": "models", "seed": "seed", "samples": "samples", "repeat": "repeat",
         "method": "method",
     },
@@ -58,7 +58,7 @@ FOLLOWED = [
 def test_a_default_is_that_of_the_command(verb: str, name: str, option: str, argument: str) -> None:
     command: click.Command = getattr(import_module(f"shm_cli.{verb}"), name)
     theirs = command.make_context(verb, [], resilient_parsing=True).params[option]
-    step = getattr(shm, "diagnose" if verb == "gap" else verb)
+    step = getattr(shm, {"diagnose": "diagnose", "select_command": "select"}.get(name, verb))
     default = inspect.signature(step).parameters[argument].default
     same = isinstance(default, float) and math.isnan(default) and math.isnan(theirs)
     assert same or default == theirs

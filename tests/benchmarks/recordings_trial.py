@@ -38,7 +38,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.errors import ShmError
 from shm.identify import Identification, IdentifyOptions, identify
-from shm.report.quality_table import overall
+from shm.report.shared_tables import overall
 from shm.values import PLANES, Channel, Hanger, Mode, Recording
 from tests.benchmarks.recordings_limit import bounds
 from tests.worlds import recordings as world

@@ -123,7 +123,7 @@ def test_the_gap_now_stands_beside_the_adoption_that_is_watched_and_no_other(
 def test_select_lets_the_adopted_classes_of_the_hanger_compete(
     shm: Shm, workspace: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("shm_cli.select.select", lambda t, m, o, *_: quick_update.select(t, m, o))
+    monkeypatch.setattr("shm_cli.update.select", lambda t, m, o, *_: quick_update.select(t, m, o))
     shm("--workspace", workspace, *ADOPT, "--why", "a strand")
     ended = shm("--workspace", workspace, "select", "--hanger", 3, "--json")
     assert ended.code == 0, ended.err

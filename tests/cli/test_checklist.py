@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from shm_cli import select, thesis, validate
+from shm_cli import thesis, update, validate
 from shm_cli.validation import formulas, selection
 from tests.helpers.nouns import a_posterior
 
@@ -113,7 +113,7 @@ def test_a_selection_of_it_runs(command: str) -> None:
     arguments = [files.get(word, word) for word in command.split()[2:]]
     classes = ["--models", "beam1,beam2" if "--prior" in arguments else "beam1"]
     result = CliRunner().invoke(
-        select.command, [*arguments, *classes, "--samples", "200", "--json"], obj={}
+        update.select_command, [*arguments, *classes, "--samples", "200", "--json"], obj={}
     )
     assert result.exit_code == 0, result.output
 

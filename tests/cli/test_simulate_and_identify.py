@@ -73,7 +73,7 @@ def test_a_page_and_figures_let_a_person_check_the_modes(
     assert checks["cross-check"] == checks["noise"] == "good"
     assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
     drawn = {path.stem.rpartition("-")[2] for path in figures.glob("*.png")}
-    assert drawn >= {"time_history", "hits", "response", "stabilisation", "shapes", "quality"}
+    assert drawn >= {"time_history", "hits", "response", "stabilisation", "shapes"}
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 
 import pytest
 
-from shm_cli import simulate_stream
+from shm_cli import planting
 from tests.helpers.nouns import NOW
 from tests.helpers.streams import a_chunk
 
@@ -28,7 +28,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(simulate_stream, "time", clock)
+    monkeypatch.setattr(planting, "time", clock)
     return clock
 
 
@@ -41,7 +41,7 @@ def test_a_chunk_is_sent_when_the_clock_of_the_bridge_has_come_to_its_end(clock:
     def take(_: object) -> None:
         clock.now += 0.25
 
-    assert simulate_stream.send(iter(chunks), take, length / 2, told.append) == 3
+    assert planting.send(iter(chunks), take, length / 2, told.append) == 3
     assert clock.slept == pytest.approx([2.0, 1.75, 1.75])
     assert told == [chunk.end for chunk in chunks]
 
@@ -50,13 +50,13 @@ def test_without_a_speed_chunks_go_in_batches_and_nobody_waits(clock: Clock) -> 
     chunks = [a_chunk(n) for n in range(8)]
     batches: list[int] = []
     take = lambda batch: batches.append(len(batch))  # noqa: E731
-    assert simulate_stream.send(iter(chunks), take, 0.0, lambda _: None) == 8
+    assert planting.send(iter(chunks), take, 0.0, lambda _: None) == 8
     assert (batches, clock.slept) == ([6, 2], [])
 
 
 def test_a_loss_is_read_by_hanger_percent_and_day() -> None:
-    loss = simulate_stream._loss("7:2:1.5", NOW)
+    loss = planting._loss("7:2:1.5", NOW)
     assert list(vars(loss).values()) == [7, 0.02, NOW + timedelta(days=1.5)]
     with pytest.raises(Exception, match="is not HANGER:PERCENT:DAY"):
-        simulate_stream._loss("7:2", NOW)
-    assert simulate_stream._whole_hour(NOW + timedelta(minutes=59, seconds=3)) == NOW
+        planting._loss("7:2", NOW)
+    assert planting._whole_hour(NOW + timedelta(minutes=59, seconds=3)) == NOW

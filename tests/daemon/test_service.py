@@ -15,7 +15,7 @@ import pytest
 from shm.errors import UsageError
 from shm.resources import unit_file
 from shm.store import Workspace
-from shm_cli.units import unit_text
+from shm_cli.services import unit_text
 from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import LONGEST_REST_S, longest_wait_s, tell_systemd
 from tests.helpers.flows import threads

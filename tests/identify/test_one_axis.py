@@ -12,7 +12,7 @@ from shm.identify import Identification
 from shm.identify.contract import FoundMode, Poles, Tone
 from shm.identify.mode_ordering.order import LEAST_MARGIN
 from shm.identify.mode_ordering.placement import Placement, placed
-from shm.report.quality_table import headline
+from shm.report.shared_tables import headline
 from shm.simulate.elements import plane_modes
 from shm.values import NAN, PLANES, Hanger, ModalTest, ResponsePoint
 from shm.values.modes import NUMBERING

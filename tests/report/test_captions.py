@@ -12,7 +12,7 @@ from typing import Any
 
 from shm.report.contents import HangerReport
 from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_MODAL_TEST, OF_TRIAL
-from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.modal_test_response import Shown
 from tests.report.conftest import bare, hanger, season
 from tests.report.diagnoses import sheet
 from tests.report.test_modal_test_figures import CASES as SHEETS

@@ -13,7 +13,7 @@ import pytest
 from shm.report.contents import HangerReport
 from shm.report.figures import gap_before_and_after, gap_causes, gap_map, parameter_pairs
 from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_MODAL_TEST
-from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.modal_test_response import Shown
 from shm.report.figures.specification import Panel, Points, Rule, Specification
 from tests.report.diagnoses import CASES, sheet
 from tests.report.test_modal_test_figures import CASES as SHEETS

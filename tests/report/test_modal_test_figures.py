@@ -6,7 +6,6 @@ import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 import pytest
@@ -18,11 +17,11 @@ from shm.report.contents import ModalTestReport
 from shm.report.figures import style
 from shm.report.figures.every_figure import OF_MODAL_TEST
 from shm.report.figures.every_figure import modal_test_figures as report_test_figures
-from shm.report.figures.modal_test_spectra import Shown
+from shm.report.figures.modal_test_response import Shown
 from shm.report.figures.specification import Illustration
 from shm.report.figures.specification import drawn as members_drawn
 from shm.report.figures.style import PALETTE
-from shm.values import NAN, PLANES, Channel, ForeignMode, QualityCheck
+from shm.values import NAN, PLANES, Channel, ForeignMode
 from tests.report.sheets import (
     ambient,
     given_responses,
@@ -58,8 +57,8 @@ DRAWN = {
     "given responses": [*SPECTRAL, "shapes", "damping"],
     "one sensor": [*TIMED, *SPECTRAL, "damping"],
     "ambient": ["time_history", *SPECTRAL, "shapes", "damping"],
-    "warned": ["quality", *TIMED, *SPECTRAL, "shapes", "damping"],
-    "refused": ["quality", *TIMED, *SPECTRAL, "shapes", "damping"],
+    "warned": [*TIMED, *SPECTRAL, "shapes", "damping"],
+    "refused": [*TIMED, *SPECTRAL, "shapes", "damping"],
     "no records": [*SPECTRAL, "shapes", "damping"],
 }
 Drawn = dict[str, dict[str, Illustration]]
@@ -344,41 +343,6 @@ def test_damping_is_shown_with_its_interval(drawn: Drawn) -> None:
     assert "its uncertainty is not known" in drawn["given responses"]["damping"].caption
 
 
-def test_the_quality_sheet_says_each_verdict_by_symbol_word_and_colour(drawn: Drawn) -> None:
-    texts = {t.get_text(): t for t in drawn["warned"]["quality"].figure.axes[0].texts}
-    for verdict, symbol, colour in (
-        ("good", "✓", style.GREEN),
-        ("warning", "!", style.ORANGE),
-        ("unknown", "?", style.QUIET),
-    ):
-        assert texts[f"{symbol} {verdict}"].get_color() == colour
-    assert {"double hits", "14 dB", "10 dB", "not known", "→ Hit freely."} <= set(texts)
-    assert "✗ refused" in words_of(drawn["refused"]["quality"].figure)
-
-
-def test_no_word_of_the_quality_sheet_runs_into_another() -> None:
-    names = (
-        "double hits", "clipping", "cable", "drop-outs", "pre-trigger", "ring-down",
-        "force spectrum", "coherence", "tones", "repeatability", "hits", "noise", "cross-check",
-    )  # fmt: skip
-    sheet = make_sheet()
-    checks = tuple(
-        QualityCheck(name, "unknown", 1250.0, 0.00012, "samples", "found " * 25, "Do this. " * 20)
-        for name in names
-    )
-    found = replace(sheet.identification, quality=checks)
-    item = alone("quality", replace(sheet, identification=found))
-    item.figure.draw_without_rendering()
-    boxes = [t.get_window_extent() for t in item.figure.axes[0].texts if t.get_text()]
-    overlapping = [
-        pair
-        for pair in combinations(boxes, 2)
-        if min(pair[0].x1, pair[1].x1) - max(pair[0].x0, pair[1].x0) > 1
-        and min(pair[0].y1, pair[1].y1) - max(pair[0].y0, pair[1].y0) > 1
-    ]
-    assert not overlapping
-
-
 def test_planes_differ_by_colour_and_by_marker(drawn: Drawn) -> None:
     axes = drawn["two sensors"]["stabilisation"].figure.axes[0]
     looks = {
@@ -391,7 +355,7 @@ def test_planes_differ_by_colour_and_by_marker(drawn: Drawn) -> None:
 
 
 def test_svgs_are_well_formed_with_own_ids_and_colours_of_the_page(drawn: Drawn) -> None:
-    elements = [drawn["warned"][name].svg() for name in ("quality", "hits", "stabilisation")]
+    elements = [drawn["warned"][name].svg() for name in ("time_history", "hits", "stabilisation")]
     for element in elements:
         assert ElementTree.fromstring(element).get("role") == "img"
         plain = re.sub(r"var\(--\w+, #[0-9a-f]{6}\)", "", element)

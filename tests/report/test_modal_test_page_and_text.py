@@ -15,7 +15,7 @@ from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.contents import ModalTestReport
 from shm.report.modal_test_report import modal_test_json, modal_test_paper
-from shm.report.quality_table import headline
+from shm.report.shared_tables import headline
 from shm.values import ModalTest, QualityCheck
 from tests.report.outline import Outline
 from tests.report.sheets import (

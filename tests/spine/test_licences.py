@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from shm_cli.notices import notices
+from shm_cli.installation import notices
 
 # GPL, LGPL and AGPL bind whoever passes the software on: such packages are extras (npTDMS is one).
 _COPYLEFT = re.compile(r"\b[AL]?GPL|GNU .*General Public", re.IGNORECASE)

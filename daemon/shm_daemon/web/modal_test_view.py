@@ -23,12 +23,9 @@ from shm.pipeline.lineage import identify_lineage
 from shm.pipeline.reporting import modal_test_report
 from shm.report.contents import ModalTestReport
 from shm.report.figures.modal_test_hits import FIGURE as HITS
+from shm.report.figures.modal_test_modes import DAMPING, SHAPES, STABILISATION, rows_of
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
-from shm.report.figures.modal_test_shapes import FIGURE as SHAPES
-from shm.report.figures.modal_test_shapes import rows_of
-from shm.report.figures.modal_test_spectra import Shown, Spectrum
-from shm.report.figures.modal_test_stabilisation import DAMPING
-from shm.report.figures.modal_test_stabilisation import FIGURE as STABILISATION
+from shm.report.figures.modal_test_response import Shown, Spectrum
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
 from shm.report.figures.specification import Member, Specification
 from shm.report.modal_test_report import advice, conditions, dropped, hits, summary, trust

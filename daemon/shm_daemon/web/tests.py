@@ -19,7 +19,7 @@ from shm import modes_document
 from shm.errors import NothingThere
 from shm.report import formatting
 from shm.report.paper import Table
-from shm.report.quality_table import overall
+from shm.report.shared_tables import overall
 from shm.store import FormerPosterior, FormerTest, Lineage, Step
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import name_in

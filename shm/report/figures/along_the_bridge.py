@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LinearSegmentedColormap, Normalize
-from matplotlib.figure import Figure
 
 from shm.report import formatting
 from shm.report.contents import BridgeReport, HangerLine
@@ -22,13 +18,16 @@ from shm.report.shifts import shift_unit
 from shm.values import FloatArray
 from shm.watch.neighbours import BridgePattern, HangerRow
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.figure import Figure
+
 Along = TypeVar("Along", float, FloatArray)
 
 # Vermilion and blue differ in hue and lightness for every kind of colour blindness; the middle is a
 # grey that still shows as a line.
-_SHIFTS = LinearSegmentedColormap.from_list(
-    "lost to gained", ["#8c3d00", style.ORANGE, "#c9ccd2", style.BLUE, "#003f63"]
-)
+_LOST_TO_GAINED = ("#8c3d00", style.ORANGE, "#c9ccd2", style.BLUE, "#003f63")
 _RISE = 1.0
 _DECK = 0.0
 _CLEARANCE = 0.12
@@ -45,12 +44,17 @@ def bridge_illustration(pattern: BridgePattern) -> Illustration:
 
 
 def _draw_shifts(pattern: BridgePattern) -> Figure | None:
+    # What draws is loaded where something is drawn.
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LinearSegmentedColormap, Normalize
+
     figure = style.new_figure(_INCHES)
     above, below = style.stacked(figure, (1.0, 1.0))
     places = _places(pattern)
     widest = max(abs(100 * row.shift_fraction) for row in pattern.rows)
     limit = max(widest, _LEAST_RANGE_PERCENT)
-    scale = Normalize(-limit, limit)
+    colours = LinearSegmentedColormap.from_list("lost to gained", _LOST_TO_GAINED)
+    scale = ScalarMappable(Normalize(-limit, limit), colours)
     _elevation(above, pattern, places, scale)
     _bars(below, pattern, places, scale)
     _colour_bar(figure, [above, below], scale)
@@ -73,8 +77,9 @@ def _in_metres(pattern: BridgePattern) -> bool:
     return all(math.isfinite(row.position_m) for row in pattern.rows)
 
 
-def _colours(rows: Sequence[HangerRow], scale: Normalize) -> list[tuple[float, ...]]:
-    return [tuple(_SHIFTS(scale(100 * row.shift_fraction))) for row in rows]
+def _colours(rows: Sequence[HangerRow], scale: ScalarMappable) -> list[tuple[float, ...]]:
+    shifts = np.array([100 * row.shift_fraction for row in rows])
+    return [tuple(each) for each in scale.to_rgba(shifts)]
 
 
 def _ends(places: dict[int, float]) -> tuple[float, float]:
@@ -88,7 +93,7 @@ def _step(places: dict[int, float]) -> float:
 
 
 def _elevation(
-    axes: Axes, pattern: BridgePattern, places: dict[int, float], scale: Normalize
+    axes: Axes, pattern: BridgePattern, places: dict[int, float], scale: ScalarMappable
 ) -> None:
     ends = _ends(places)
     along = np.linspace(*ends, 200)
@@ -145,7 +150,9 @@ def _with_room(hangers: Sequence[int], places: dict[int, float]) -> list[int]:
     return shown
 
 
-def _bars(axes: Axes, pattern: BridgePattern, places: dict[int, float], scale: Normalize) -> None:
+def _bars(
+    axes: Axes, pattern: BridgePattern, places: dict[int, float], scale: ScalarMappable
+) -> None:
     metres = _in_metres(pattern)
     unit, _ = shift_unit(pattern)
     along = "along the bridge (m)" if metres else "hanger"
@@ -168,10 +175,8 @@ def _bars(axes: Axes, pattern: BridgePattern, places: dict[int, float], scale: N
         axes.set_xticks([places[hanger] for hanger in shown], [str(hanger) for hanger in shown])
 
 
-def _colour_bar(figure: Figure, panels: Sequence[Axes], scale: Normalize) -> None:
-    bar = figure.colorbar(
-        ScalarMappable(scale, _SHIFTS), ax=list(panels), fraction=0.03, pad=0.02, aspect=34
-    )
+def _colour_bar(figure: Figure, panels: Sequence[Axes], scale: ScalarMappable) -> None:
+    bar = figure.colorbar(scale, ax=list(panels), fraction=0.03, pad=0.02, aspect=34)
     bar.set_label("shift of the tension (%)", fontsize=9.0, color=style.INK)
     bar.ax.tick_params(labelsize=9.0, colors=style.INK)
     bar.outline.set_visible(False)
@@ -222,9 +227,9 @@ def _draw_tensions(data: BridgeReport) -> Figure | None:
     shares = _shares(data)
     if not shares:
         return None
-    figure = style.new_figure(3.2)
-    axes = figure.subplots()
-    style.dress(axes, "hanger, in the order of the bridge", "tension (% of nominal)")
+    figure, axes = style.one_panel(
+        "hanger, in the order of the bridge", "tension (% of nominal)", 3.2
+    )
     axes.grid(False, axis="x")
     axes.axhline(100, color=style.INK, linestyle=":", label="nominal")
     for status in Status:

@@ -7,21 +7,12 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from shm.report import formatting
-from shm.report.figures.specification import (
-    Axis,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Specification,
-    Symbol,
-    stacked,
-)
+from shm.report.figures import specification as spec
 from shm.report.figures.time_axes import bounds_of, level, part, places, thinned_words, time_axis
 from shm.report.formatting import Interval
 from shm.values.rounding import rounded_percent
 
-_MARKS: tuple[tuple[str, Symbol], ...] = (
+_MARKS: tuple[tuple[str, spec.Symbol], ...] = (
     ("blue", "circle"),
     ("orange", "square"),
     ("green", "diamond"),
@@ -43,17 +34,17 @@ class Course:
     shifts: Sequence[Interval]
 
 
-def specify(courses: Sequence[Course]) -> Specification:
+def specify(courses: Sequence[Course]) -> spec.Specification:
     """One panel; a hanger has its own colour and symbol."""
-    marks: list[Mark] = [level(0.0, "baseline", "quiet", "dot")]
+    marks: list[spec.Mark] = [level(0.0, "baseline", "quiet", "dot")]
     for course, (colour, symbol) in zip(courses, _MARKS, strict=False):
         marks += _marks(course, colour, symbol)
-    axis = Axis(label="tension since the baseline (%)")
+    axis = spec.Axis(label="tension since the baseline (%)")
     times = [time for course in courses for time in course.times]
-    return stacked([Panel(y=axis, marks=marks, x=time_axis(times))], 3.8, MOST + 1)
+    return spec.stacked([spec.Panel(y=axis, marks=marks, x=time_axis(times))], 3.8, MOST + 1)
 
 
-def _marks(course: Course, colour: str, symbol: Symbol) -> list[Mark]:
+def _marks(course: Course, colour: str, symbol: spec.Symbol) -> list[spec.Mark]:
     bounds = bounds_of(course.shifts)
     chosen = places(bounds.middle, bounds.low, bounds.high)
     shown = part(bounds, chosen, 100)  # in percent
@@ -63,8 +54,8 @@ def _marks(course: Course, colour: str, symbol: Symbol) -> list[Mark]:
         for place in chosen.tolist()
     ]
     return [
-        Line(x=when, y=shown.middle, colour=colour, width=0.9, opacity=0.5),
-        Points(
+        spec.Line(x=when, y=shown.middle, colour=colour, width=0.9, opacity=0.5),
+        spec.Points(
             x=when, y=shown.middle, low=shown.low, high=shown.high, caps=False, colour=colour,
             symbol=symbol, name=course.name, texts=texts,
         ),

@@ -17,12 +17,9 @@ from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
 from shm.report.figures.hanger_tension import FIGURE as TENSION
 from shm.report.figures.hanger_trend import FIGURE as TREND
 from shm.report.figures.modal_test_hits import FIGURE as HITS
-from shm.report.figures.modal_test_quality import FIGURE as QUALITY
+from shm.report.figures.modal_test_modes import DAMPING, SHAPES, STABILISATION
 from shm.report.figures.modal_test_response import FIGURE as RESPONSE
-from shm.report.figures.modal_test_shapes import FIGURE as SHAPES
-from shm.report.figures.modal_test_spectra import Shown
-from shm.report.figures.modal_test_stabilisation import DAMPING
-from shm.report.figures.modal_test_stabilisation import FIGURE as STABILISATION
+from shm.report.figures.modal_test_response import Shown
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
 from shm.report.figures.specification import Illustration, Member, drawn
 from shm.report.figures.trial_answers import CONFUSION, DETECTION, LEFT_OUT
@@ -38,11 +35,9 @@ from shm.values import BridgeDiagnosis, TrialScore
 OF_HANGER: tuple[Member[HangerReport], ...] = (
     TREND, STATES, TENSION, FREQUENCIES, RESPONSE_OF_LATEST, STIFFNESS
 )  # fmt: skip
-# The quality stands on a page as a table of words, which can be searched and read aloud.
-_ON_A_SHEET: tuple[Member[Shown], ...] = (
+OF_MODAL_TEST: tuple[Member[Shown], ...] = (
     TIME_HISTORY, HITS, RESPONSE, STABILISATION, SHAPES, DAMPING
 )  # fmt: skip
-OF_MODAL_TEST = (QUALITY, *_ON_A_SHEET)
 OF_DIAGNOSIS: tuple[Member[DiagnosisSheet], ...] = (CAUSES, GAP_MAP, BEFORE_AND_AFTER, GAP_TENSION)
 OF_BRIDGE_DIAGNOSIS: tuple[Member[BridgeDiagnosis], ...] = (SHARED,)
 OF_TRIAL: tuple[Member[TrialScore], ...] = (
@@ -67,11 +62,6 @@ def bridge_figures(data: BridgeReport) -> tuple[Illustration, ...]:
 def modal_test_figures(sheet: ModalTestReport) -> tuple[Illustration, ...]:
     """All of one hammer test."""
     return drawn(OF_MODAL_TEST, Shown.of(sheet))
-
-
-def modal_test_page_figures(sheet: ModalTestReport) -> tuple[Illustration, ...]:
-    """Those of them that are no table."""
-    return drawn(_ON_A_SHEET, Shown.of(sheet))
 
 
 def diagnosis_figures(sheet: DiagnosisSheet) -> tuple[Illustration, ...]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
@@ -20,19 +19,15 @@ from shm.report.diagnosis_wording import (
     tension_unit,
     tension_words,
 )
+from shm.report.figures import specification as spec
 from shm.report.figures import style
 from shm.report.figures.gap_map import by_plane, kept, orders, planes
-from shm.report.figures.specification import (
-    PLANE_HUES,
-    Axis,
-    Member,
-    Points,
-    Specification,
-    Symbol,
-    limits,
-)
 from shm.values import Plane, Residual, TensionEstimate
 from shm.values.rounding import ForceUnit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -41,7 +36,7 @@ class _Series:
 
     field: str
     label: str
-    symbol: Symbol
+    symbol: spec.Symbol
     filled: bool
     colour: str
     offset: float
@@ -55,7 +50,7 @@ _SERIES = (
 )
 
 
-def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> Specification | None:
+def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specification | None:
     residuals = [r for r in kept(sheet) if math.isfinite(r.after_percent)]
     if not residuals or claimed(sheet.diagnosis) is None:
         return None
@@ -69,11 +64,11 @@ def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> Specification 
     }
     label = "gap (%)" if is_on_screen else "measured / predicted - 1 (%)"
     ends = [end for marks in made.values() for each in marks for end in (each.low, each.high)]
-    rows = by_plane(made, residuals, Axis(label=label, range=limits(*ends)), is_on_screen)
-    return Specification(rows=rows, height_inches=3.0, legend_columns=3)
+    rows = by_plane(made, residuals, spec.Axis(label=label, range=spec.limits(*ends)), is_on_screen)
+    return spec.Specification(rows=rows, height_inches=3.0, legend_columns=3)
 
 
-def _points(residuals: Sequence[Residual], plane: Plane, series: _Series) -> Points | None:
+def _points(residuals: Sequence[Residual], plane: Plane, series: _Series) -> spec.Points | None:
     """The mean over the tests with a line from the least to the largest."""
     there = [
         (order, values)
@@ -82,12 +77,12 @@ def _points(residuals: Sequence[Residual], plane: Plane, series: _Series) -> Poi
     ]
     if not there:
         return None
-    return Points(
+    return spec.Points(
         x=[order + series.offset for order, _ in there],
         y=[float(np.mean(values)) for _, values in there],
         low=[min(values) for _, values in there], high=[max(values) for _, values in there],
         caps=False, symbol=series.symbol, filled=series.filled, name=series.label,
-        colour=series.colour or PLANE_HUES[plane],
+        colour=series.colour or spec.PLANE_HUES[plane],
         hover=f"{plane}, {series.label}: %{{y:.2f}} %",
     )  # fmt: skip
 
@@ -132,7 +127,7 @@ def _rms(residuals: Sequence[Residual], plane: Plane, field: str) -> str:
     return f"{formatting.plain(float(np.sqrt(np.mean(np.square(known)))), 2)} %"
 
 
-BEFORE_AND_AFTER = Member(
+BEFORE_AND_AFTER = spec.Member(
     "before_and_after",
     "The gap before and after by mode",
     specify,
@@ -149,10 +144,8 @@ def _draw_gap_tension(sheet: DiagnosisSheet) -> Figure | None:
     rows = _rows(sheet)
     if not rows:
         return None
-    figure = style.new_figure(0.42 * len(rows) + 0.95)
-    axes = figure.subplots()
     unit = tension_unit(sheet.diagnosis)
-    style.dress(axes, f"tension ({unit.name})", "")
+    figure, axes = style.one_panel(f"tension ({unit.name})", "", 0.42 * len(rows) + 0.95)
     for row, (_, estimate, colour) in enumerate(rows):
         _interval(axes, row, estimate, unit, colour)
     axes.set_yticks(range(len(rows)), [told for told, _, _ in rows])
@@ -221,7 +214,7 @@ def _alt_of_gap_tension(sheet: DiagnosisSheet) -> str:
     return f"Tension before and after, mean and 90 % interval: {'; '.join(told)}."
 
 
-GAP_TENSION = Member(
+GAP_TENSION = spec.Member(
     "gap_tension",
     "Tension before and after",
     _draw_gap_tension,

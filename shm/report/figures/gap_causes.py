@@ -13,20 +13,7 @@ from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_summary import verdict
 from shm.report.diagnosis_wording import Claim, claims, label, quantity, size
-from shm.report.figures.specification import (
-    Axis,
-    Band,
-    Bars,
-    Line,
-    Mark,
-    Member,
-    Panel,
-    Points,
-    Rule,
-    Side,
-    Specification,
-    stacked,
-)
+from shm.report.figures import specification as spec
 from shm.values import BridgeDiagnosis, Cause, Diagnosis, effect_label
 
 _MOST, _MOST_ON_SCREEN = 10, 8
@@ -50,7 +37,7 @@ class Bar:
     claim: Claim | None = None
 
 
-def specify(sheet: DiagnosisSheet) -> Specification | None:
+def specify(sheet: DiagnosisSheet) -> spec.Specification | None:
     """With the Bayes factors, and brackets around causes that the data cannot tell apart."""
     bars = _bars(sheet.diagnosis)
     if not any(bar.probability > 0 for bar in bars):
@@ -62,7 +49,7 @@ def specify(sheet: DiagnosisSheet) -> Specification | None:
     return probability_bars(bars, _LABEL, (-1.2, right), [*brackets, column])
 
 
-def specify_on_screen(sheet: DiagnosisSheet) -> Specification:
+def specify_on_screen(sheet: DiagnosisSheet) -> spec.Specification:
     """Where those alike share a letter, and fewer are shown."""
     pairs = [(claim, cause) for claim in claims(sheet.diagnosis) for cause in claim.causes]
     bars = [
@@ -78,8 +65,8 @@ def _letter(group: int | None) -> str:
 
 def probability_bars(
     bars: Sequence[Bar], longest: int = _LABEL_ON_SCREEN,
-    ends: tuple[float, float] = (-0.6, 1.15), marks: Sequence[Mark] = (),
-) -> Specification:  # fmt: skip
+    ends: tuple[float, float] = (-0.6, 1.15), marks: Sequence[spec.Mark] = (),
+) -> spec.Specification:  # fmt: skip
     """Bars one below the other, their labels in lines of at most so many letters.
 
     `ends` are the upper end of the one axis and the right one of the other.
@@ -87,22 +74,22 @@ def probability_bars(
     labels = [textwrap.fill(bar.label, longest) for bar in bars]
     is_tall = any(label.count("\n") > 1 for label in labels)
     drawn = [
-        Bars(
+        spec.Bars(
             x=[row], y=[bar.probability], lying=True, width=0.62, colour=bar.colour,
             labels=[formatting.probability(bar.probability)],
             texts=[f"{bar.label}: {formatting.probability(bar.probability)}"],
         )
         for row, bar in enumerate(bars)
     ]  # fmt: skip
-    panel = Panel(
-        y=Axis(
+    panel = spec.Panel(
+        y=spec.Axis(
             range=(len(bars) - 0.45, ends[0]), ticks=range(len(bars)), tick_labels=labels,
             grid=False,
         ),
-        x=Axis(label="probability", range=(0, ends[1]), ticks=(0, 0.2, 0.4, 0.6, 0.8, 1)),
+        x=spec.Axis(label="probability", range=(0, ends[1]), ticks=(0, 0.2, 0.4, 0.6, 0.8, 1)),
         marks=[*drawn, *marks],
     )  # fmt: skip
-    return stacked([panel], (_TALL_ROW_INCHES if is_tall else _ROW_INCHES) * len(bars) + 1.0)
+    return spec.stacked([panel], (_TALL_ROW_INCHES if is_tall else _ROW_INCHES) * len(bars) + 1.0)
 
 
 def _bars(diagnosis: Diagnosis) -> list[Bar]:
@@ -133,13 +120,13 @@ def _shown(diagnosis: Diagnosis) -> list[tuple[Claim, Cause]]:
     return probable[:_MOST] if len(probable) >= 3 else all_causes[:3]
 
 
-def _brackets(bars: Sequence[Bar]) -> tuple[list[Mark], float]:
+def _brackets(bars: Sequence[Bar]) -> tuple[list[spec.Mark], float]:
     """A bracket around causes that the data cannot tell apart, with what they have together.
 
     And the place of the outermost bracket.
     """
     outermost = 0.0
-    marks: list[Mark] = []
+    marks: list[spec.Mark] = []
     found: dict[int, tuple[Claim, list[int]]] = {}
     for row, bar in enumerate(bars):
         if bar.claim is not None:
@@ -150,7 +137,7 @@ def _brackets(bars: Sequence[Bar]) -> tuple[list[Mark], float]:
         sides, heights = [x - 0.012, x, x, x - 0.012], [top, top, bottom, bottom]
         told = f"not told apart:\n{formatting.probability(claim.probability)} together"
         marks += [
-            Line(x=sides, y=heights, colour="purple", width=1.4),
+            spec.Line(x=sides, y=heights, colour="purple", width=1.4),
             _notes([x + 0.01], [(top + bottom) / 2], [told], "purple", "right"),
         ]
         outermost = max(outermost, x)
@@ -159,17 +146,18 @@ def _brackets(bars: Sequence[Bar]) -> tuple[list[Mark], float]:
 
 def _notes(
     x: Sequence[float], y: Sequence[float], told: Sequence[str], colour: str = "quiet",
-    side: Side = "left",
-) -> Points:  # fmt: skip
+    side: spec.Side = "left",
+) -> spec.Points:  # fmt: skip
     """Words alone."""
-    return Points(x=x, y=y, size=0, labels=told, label_side=side, colour=colour)
+    return spec.Points(x=x, y=y, size=0, labels=told, label_side=side, colour=colour)
 
 
 def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:
     diagnosis = sheet.diagnosis
     shown = _MOST_ON_SCREEN if is_on_screen else len(_shown(diagnosis))
     left = len(diagnosis.causes) - shown
-    more = f" {formatting.counted(left, 'less probable cause')} {_are(left)} not drawn."
+    verb = "is" if left == 1 else "are"
+    more = f" {formatting.counted(left, 'less probable cause')} {verb} not drawn."
     alike = (
         "Causes with the same letter cannot be told apart with these data"
         if is_on_screen
@@ -182,10 +170,6 @@ def caption(sheet: DiagnosisSheet, is_on_screen: bool = False) -> str:
     )
 
 
-def _are(count: int) -> str:
-    return "is" if count == 1 else "are"
-
-
 def _alt(sheet: DiagnosisSheet) -> str:
     bars = [
         f"{bar.label} {formatting.probability(bar.probability)}" for bar in _bars(sheet.diagnosis)
@@ -193,7 +177,7 @@ def _alt(sheet: DiagnosisSheet) -> str:
     return f"{verdict(sheet.diagnosis)} Probabilities: {'; '.join(bars)}."
 
 
-FIGURE = Member("causes", "What causes the gap", specify, caption, _alt)
+FIGURE = spec.Member("causes", "What causes the gap", specify, caption, _alt)
 
 
 _INCHES = 4.2  # technical: two panels of the height that others have
@@ -201,7 +185,7 @@ _LIKELIER_THAN_NOT = 0.5  # even odds
 _MOST_TICKS = 24  # numbers of hangers that a page has room for
 
 
-def specify_shared(diagnosis: BridgeDiagnosis) -> Specification | None:
+def specify_shared(diagnosis: BridgeDiagnosis) -> spec.Specification | None:
     """Above the probability of each hanger to have it, below its size with the family's own."""
     if (leading := diagnosis.leading) is None:
         return None
@@ -209,12 +193,12 @@ def specify_shared(diagnosis: BridgeDiagnosis) -> Specification | None:
     step = 1 + (len(leading.members) - 1) // _MOST_TICKS
     ticks = list(at)[::step]
     labels = [str(leading.members[tick].hanger) for tick in ticks]
-    across = Axis(
+    across = spec.Axis(
         label="hanger", range=(-0.7, len(leading.members) - 0.3), ticks=ticks,
         tick_labels=labels, grid=False,
     )  # fmt: skip
     named = [i for i in at if leading.members[i].probability > _LIKELIER_THAN_NOT]
-    marks: list[Mark] = []
+    marks: list[spec.Mark] = []
     for colour, rows in (("blue", named), ("quiet", [i for i in at if i not in named])):
         shares = [leading.members[i].probability for i in rows]
         texts = [
@@ -222,24 +206,28 @@ def specify_shared(diagnosis: BridgeDiagnosis) -> Specification | None:
             for i in rows
         ]
         if rows:
-            marks.append(Bars(x=rows, y=shares, width=0.62, colour=colour, texts=texts))
+            marks.append(spec.Bars(x=rows, y=shares, width=0.62, colour=colour, texts=texts))
     sizes = [leading.members[i].size for i in named]
     common = leading.size
     unit = f" (log10, {common.unit})" if common.name.startswith("log10_") else f" ({common.unit})"
     ends = [-0.7, len(leading.members) - 0.3]
     below = [
-        Band(x=ends, low=[common.q05] * 2, high=[common.q95] * 2, colour="orange", opacity=0.25,
-             name="the family's own, 90 %"),
-        Points(x=named, y=[each.mean for each in sizes], low=[each.q05 for each in sizes],
-               high=[each.q95 for each in sizes], colour="blue", name="hanger, 90 %"),
+        spec.Band(
+            x=ends, low=[common.q05] * 2, high=[common.q95] * 2, colour="orange", opacity=0.25,
+            name="the family's own, 90 %",
+        ),
+        spec.Points(
+            x=named, y=[each.mean for each in sizes], low=[each.q05 for each in sizes],
+            high=[each.q95 for each in sizes], colour="blue", name="hanger, 90 %",
+        ),
     ]  # fmt: skip
-    return stacked(
+    return spec.stacked(
         [
-            Panel(
-                y=Axis(label="probability", range=(0, 1.05)),
-                marks=[*marks, Rule(at=_LIKELIER_THAN_NOT, dash="dot", colour="ink")],
+            spec.Panel(
+                y=spec.Axis(label="probability", range=(0, 1.05)),
+                marks=[*marks, spec.Rule(at=_LIKELIER_THAN_NOT, dash="dot", colour="ink")],
             ),
-            Panel(y=Axis(label=quantity(common.name) + unit), x=across, marks=below),
+            spec.Panel(y=spec.Axis(label=quantity(common.name) + unit), x=across, marks=below),
         ],
         _INCHES,
     )
@@ -266,6 +254,6 @@ def _shared_alt(diagnosis: BridgeDiagnosis) -> str:
     return f"Probability of {what}: {', '.join(told)}."
 
 
-SHARED = Member(
+SHARED = spec.Member(
     "shared", "Who has it, and of which size", specify_shared, shared_caption, _shared_alt
 )

@@ -11,23 +11,7 @@ import numpy as np
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_wording import is_set_aside
-from shm.report.figures.specification import (
-    PLANE_HUES,
-    PLANE_SYMBOLS,
-    Axis,
-    Band,
-    Bars,
-    Dash,
-    Line,
-    Mark,
-    Member,
-    Panel,
-    Points,
-    Rule,
-    Specification,
-    Symbol,
-    limits,
-)
+from shm.report.figures import specification as spec
 from shm.report.formatting import NORMAL_90
 from shm.values import PLANES, GapPlace, Plane, Residual, Trend
 
@@ -56,28 +40,29 @@ def orders(residuals: Sequence[Residual], plane: Plane) -> list[int]:
 
 
 def by_plane(
-    made: Mapping[Plane, Sequence[Mark]],
+    made: Mapping[Plane, Sequence[spec.Mark]],
     residuals: Sequence[Residual],
-    y: Axis,
+    y: spec.Axis,
     is_on_screen: bool,
-) -> list[list[Panel]]:
+) -> list[list[spec.Panel]]:
     """A panel of marks for each plane over its orders, with one vertical axis.
 
     They stand side by side on paper, one below the other on a screen, which may be narrow."""
-    panels: list[Panel] = []
+    panels: list[spec.Panel] = []
     for plane, marks in made.items():
         there = orders(residuals, plane)
         if is_on_screen:
             there = sorted({r.order for r in residuals})
         is_alone = is_on_screen or not panels
         panels.append(
-            Panel(
-                y=y if is_alone else replace(y, label=""), marks=[Rule(at=0, width=0.8), *marks],
-                x=Axis(
+            spec.Panel(
+                y=y if is_alone else replace(y, label=""),
+                marks=[spec.Rule(at=0, width=0.8), *marks],
+                x=spec.Axis(
                     label="order of the mode", range=(there[0] - 0.6, there[-1] + 0.6), grid=False,
                     ticks=there[:: math.ceil(len(there) / 12)],
                 ),
-                title=f"{plane} plane", title_colour=PLANE_HUES[plane], title_side="left",
+                title=f"{plane} plane", title_colour=spec.PLANE_HUES[plane], title_side="left",
                 shares_y=bool(panels),
             )
         )  # fmt: skip
@@ -94,7 +79,7 @@ _CLEAR_SD = 2.0
 """Standard deviations beyond which a gap or a trend is drawn as clear."""
 # Layout: places that have room for their words, and inches of the map and of what stands below.
 _FEW_PLACES = 4
-_LOOKS: tuple[tuple[str, Dash], ...] = (
+_LOOKS: tuple[tuple[str, spec.Dash], ...] = (
     ("purple", "solid"),
     ("green", "dash"),
     ("ink", "dashdot"),
@@ -104,7 +89,7 @@ _MAP_INCHES = 2.7
 _BELOW_INCHES = 2.2
 
 
-def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> Specification | None:
+def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specification | None:
     """The map; on paper with what stands below it."""
     residuals = measured(sheet)
     if not residuals:
@@ -112,7 +97,9 @@ def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> Specification 
     ordinary, gross = kept(sheet), aside(sheet)
     halves = np.nan_to_num([NORMAL_90 * _sd_percent(r) for r in ordinary])
     inside = np.array([r.residual_percent for r in ordinary or gross])
-    low, high = limits(inside - halves, inside + halves, [0.0]) if ordinary else limits(inside)
+    low, high = (
+        spec.limits(inside - halves, inside + halves, [0.0]) if ordinary else spec.limits(inside)
+    )
     made = {
         plane: [
             *_marks([r for r in ordinary if r.plane == plane], plane, sheet.diagnosis.tests),
@@ -122,35 +109,35 @@ def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> Specification 
     }
     margin = (_EDGE if gross else 0.0) * (high - low)
     label = "gap (%)" if is_on_screen else "measured / baseline - 1 (%)"
-    axis = Axis(label=label, range=(low - margin, high + margin))
+    axis = spec.Axis(label=label, range=(low - margin, high + margin))
     rows = by_plane(made, residuals, axis, is_on_screen)
     below = [draw(sheet) for draw, there in ((profiles, local), (goes_with, known)) if there(sheet)]
     if is_on_screen or not below:
-        return Specification(rows=rows, height_inches=_MAP_INCHES, legend_columns=3)
+        return spec.Specification(rows=rows, height_inches=_MAP_INCHES, legend_columns=3)
     inches = _BELOW_INCHES if local(sheet) else 0.9 + 0.3 * len(known(sheet))
     rows = [[replace(panel, height=_MAP_INCHES) for panel in rows[0]],
             [replace(panel, height=inches) for panel in below]]  # fmt: skip
-    return Specification(rows=rows, height_inches=_MAP_INCHES + inches, legend_columns=3)
+    return spec.Specification(rows=rows, height_inches=_MAP_INCHES + inches, legend_columns=3)
 
 
-def _marks(residuals: Sequence[Residual], plane: Plane, tests: Sequence[str]) -> list[Mark]:
+def _marks(residuals: Sequence[Residual], plane: Plane, tests: Sequence[str]) -> list[spec.Mark]:
     """A mark for each test beside the others of its mode, filled where the gap is clear."""
-    own = PLANE_SYMBOLS[plane]
-    kinds: tuple[tuple[list[Residual], Symbol, bool, str], ...] = (
+    own = spec.PLANE_SYMBOLS[plane]
+    kinds: tuple[tuple[list[Residual], spec.Symbol, bool, str], ...] = (
         ([r for r in residuals if abs(r.z) >= _CLEAR_SD], own, True, "beyond 2 sd"),
         ([r for r in residuals if abs(r.z) < _CLEAR_SD], own, False, "within 2 sd"),
         ([r for r in residuals if math.isnan(r.z)], "thin cross", True, "sd not known"),
     )
-    found: list[Mark] = []
+    found: list[spec.Mark] = []
     for chosen, symbol, filled, name in kinds:
         if chosen:
             y = np.array([r.residual_percent for r in chosen])
             half = np.array([NORMAL_90 * _sd_percent(r) for r in chosen])
             found.append(
-                Points(
+                spec.Points(
                     x=[r.order + _offset(r.test, tests) for r in chosen], y=y, low=y - half,
                     high=y + half, caps=False, symbol=symbol, filled=filled, name=name,
-                    size=4.6 if len(tests) <= 6 else 3.2, colour=PLANE_HUES[plane],
+                    size=4.6 if len(tests) <= 6 else 3.2, colour=spec.PLANE_HUES[plane],
                     texts=_told(chosen),
                 )
             )  # fmt: skip
@@ -159,11 +146,11 @@ def _marks(residuals: Sequence[Residual], plane: Plane, tests: Sequence[str]) ->
 
 def _set_aside(
     residuals: Sequence[Residual], sheet: DiagnosisSheet, low: float, high: float
-) -> list[Mark]:
+) -> list[spec.Mark]:
     """Gross errors as crosses with their size, at the edge where they lie beyond the others."""
     last = max(r.order for r in measured(sheet))
     return [
-        Points(
+        spec.Points(
             x=[r.order + _offset(r.test, sheet.diagnosis.tests)],
             y=[min(max(r.residual_percent, low), high)], symbol="cross", size=7, colour="red",
             name="set aside", labels=[f"{r.residual_percent:+z.2f} %"],
@@ -198,30 +185,32 @@ def local(sheet: DiagnosisSheet) -> list[GapPlace]:
     return sorted(found, key=lambda place: -place.share)[: len(_LOOKS)]
 
 
-def profiles(sheet: DiagnosisSheet) -> Panel:
+def profiles(sheet: DiagnosisSheet) -> spec.Panel:
     """The density of the place along the hanger of each kind of local cause, largest 1."""
     looks = zip(local(sheet), _LOOKS, strict=False)
-    return Panel(
-        y=Axis(label="density, largest 1", range=(0, 1.08), ticks=(0, 0.5, 1)),
+    return spec.Panel(
+        y=spec.Axis(label="density, largest 1", range=(0, 1.08), ticks=(0, 0.5, 1)),
         marks=[mark for place, look in looks for mark in _profile(place, *look)],
-        x=Axis(label="position from the deck end (m)", range=(0, sheet.hanger.length_m)),
+        x=spec.Axis(label="position from the deck end (m)", range=(0, sheet.hanger.length_m)),
         width=1.6, has_own_legend=True,
     )  # fmt: skip
 
 
-def _profile(place: GapPlace, colour: str, dash: Dash) -> list[Mark]:
+def _profile(place: GapPlace, colour: str, dash: spec.Dash) -> list[spec.Mark]:
     """One kind of cause as a curve, or as bars where it may only sit at a few places."""
     x_m, density = np.array(place.profile).T
     density = density / max(float(np.nanmax(density)), 1e-300)
     name, hover = f"{formatting.quantity(place.kind)} ({_share(place)})", "%{x:.2f} m"
     if len(x_m) <= _FEW_PLACES:
-        return [Bars(x=x_m, y=density, width=0.12, colour=colour, name=name, hover=hover)]
-    found: list[Mark] = [
-        Band(x=x_m, low=np.zeros(len(x_m)), high=density, colour=colour, opacity=0.1),
-        Line(x=x_m, y=density, colour=colour, dash=dash, width=1.4, name=name, hover=hover),
+        return [spec.Bars(x=x_m, y=density, width=0.12, colour=colour, name=name, hover=hover)]
+    found: list[spec.Mark] = [
+        spec.Band(x=x_m, low=np.zeros(len(x_m)), high=density, colour=colour, opacity=0.1),
+        spec.Line(x=x_m, y=density, colour=colour, dash=dash, width=1.4, name=name, hover=hover),
     ]
     if math.isfinite(place.x_m):
-        at = Points(x=[place.x_m], y=[0], symbol="triangle", size=6, colour=colour, hover=hover)
+        at = spec.Points(
+            x=[place.x_m], y=[0], symbol="triangle", size=6, colour=colour, hover=hover
+        )
         found.append(at)
     return found
 
@@ -234,7 +223,7 @@ def known(sheet: DiagnosisSheet) -> list[Trend]:
     return [trend for trend in sheet.diagnosis.trends if math.isfinite(trend.slope_percent)]
 
 
-def goes_with(sheet: DiagnosisSheet) -> Panel:
+def goes_with(sheet: DiagnosisSheet) -> spec.Panel:
     """How the mean residual changes over the range of each condition."""
     found = known(sheet)
     rows = np.arange(len(found))
@@ -242,16 +231,19 @@ def goes_with(sheet: DiagnosisSheet) -> Panel:
     sd = np.nan_to_num([trend.slope_sd_percent for trend in found])
     clear = np.abs(slope) >= _CLEAR_SD * np.array([trend.slope_sd_percent for trend in found])
     ends = np.column_stack([slope - NORMAL_90 * sd, slope + NORMAL_90 * sd, [np.nan] * len(found)])
-    marks: list[Mark] = [Rule(at=0, axis="x", width=0.8), Line(x=ends.ravel(), y=rows.repeat(3))]
+    marks: list[spec.Mark] = [
+        spec.Rule(at=0, axis="x", width=0.8),
+        spec.Line(x=ends.ravel(), y=rows.repeat(3)),
+    ]
     for chosen, filled in ((clear, True), (~clear, False)):
         look = {"symbol": "diamond", "filled": filled}
-        marks.append(Points(x=slope[chosen], y=rows[chosen], **look))  # type: ignore[arg-type]
-    return Panel(
-        y=Axis(
+        marks.append(spec.Points(x=slope[chosen], y=rows[chosen], **look))  # type: ignore[arg-type]
+    return spec.Panel(
+        y=spec.Axis(
             range=(len(found) - 0.4, -0.6), ticks=rows.tolist(), grid=False,
             tick_labels=[trend.condition for trend in found],
         ),
-        marks=marks, x=Axis(label="change over its range (%)"), title="goes with",
+        marks=marks, x=spec.Axis(label="change over its range (%)"), title="goes with",
         title_side="left",
     )  # fmt: skip
 
@@ -303,4 +295,4 @@ def _alt(sheet: DiagnosisSheet) -> str:
     return f"{count} of frequencies; the largest: {told}.{set_aside}{there}"
 
 
-FIGURE = Member("gap_map", "Where the gap lies", specify, caption, _alt)
+FIGURE = spec.Member("gap_map", "Where the gap lies", specify, caption, _alt)

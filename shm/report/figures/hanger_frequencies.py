@@ -14,25 +14,9 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import HangerReport
-from shm.report.figures.specification import (
-    PLANE_HUES,
-    PLANE_SYMBOLS,
-    Axis,
-    Bars,
-    Line,
-    Mark,
-    Member,
-    Panel,
-    Points,
-    Rule,
-    Span,
-    Specification,
-    limits,
-    plane_colour,
-    stacked,
-)
+from shm.report.figures import specification as spec
 from shm.report.formatting import NORMAL_90, Interval
-from shm.report.hanger_summary import residuals_percent
+from shm.report.hanger_summary import misfits_percent
 from shm.values import (
     PLANES,
     FloatArray,
@@ -46,34 +30,34 @@ from shm.values import (
 _BESIDE = {"transverse": -0.12, "longitudinal": 0.12}  # layout: beside a mode, apart by a mark
 
 
-def specify(data: HangerReport) -> Specification | None:
+def specify(data: HangerReport) -> spec.Specification | None:
     compared = compared_modes(data)
     if not compared:
         return None
     half = NORMAL_90 * _sigma(data).mean
     known = [mode for mode in data.latest.modes if math.isfinite(mode.frequency_sd_hz)]
     points = [p for plane in PLANES if (p := _points(plane, compared))]
-    marks: list[Mark] = [
-        Span(low=1 - half, high=1 + half, axis="y", opacity=0.07, name="model error"),
-        Rule(at=1.0),
+    marks: list[spec.Mark] = [
+        spec.Span(low=1 - half, high=1 + half, axis="y", opacity=0.07, name="model error"),
+        spec.Rule(at=1.0),
         *([_measurement(known)] if known else []),
         *points,
     ]
     highest = max(mode.order for mode in compared)
     ends = [end for each in points for end in (each.low, each.high)]
     step = 1 if highest <= 16 else 2
-    panel = Panel(
-        y=Axis(
+    panel = spec.Panel(
+        y=spec.Axis(
             label="predicted / measured frequency",
-            range=limits([1 - half, 1 + half], *ends),
+            range=spec.limits([1 - half, 1 + half], *ends),
         ),
         marks=marks,
-        x=Axis(
+        x=spec.Axis(
             label="mode number in its plane", range=(0.5, highest + 0.5), grid=False,
             ticks=range(1, highest + 1, step),
         ),
     )  # fmt: skip
-    return stacked([panel], 3.4)
+    return spec.stacked([panel], 3.4)
 
 
 def compared_modes(data: HangerReport) -> list[PredictedFrequency]:
@@ -81,16 +65,16 @@ def compared_modes(data: HangerReport) -> list[PredictedFrequency]:
     return [mode for mode in data.predicted if math.isfinite(mode.measured_hz)]
 
 
-def _points(plane: Plane, compared: Sequence[PredictedFrequency]) -> Points | None:
+def _points(plane: Plane, compared: Sequence[PredictedFrequency]) -> spec.Points | None:
     modes = [mode for mode in compared if mode.plane == plane]
     if not modes:
         return None
     measured = np.array([mode.measured_hz for mode in modes])
     ratio = np.array([mode.mean_hz for mode in modes]) / measured
     half = NORMAL_90 * np.array([mode.sd_hz for mode in modes]) / measured
-    return Points(
+    return spec.Points(
         x=[mode.order + _BESIDE[plane] for mode in modes], y=ratio, low=ratio - half,
-        high=ratio + half, symbol=PLANE_SYMBOLS[plane], colour=PLANE_HUES[plane], size=5,
+        high=ratio + half, symbol=spec.PLANE_SYMBOLS[plane], colour=spec.PLANE_HUES[plane], size=5,
         name=plane,
         texts=[
             f"{plane} {mode.order}: predicted {mode.mean_hz:.3f} ± {mode.sd_hz:.3f} Hz, measured "
@@ -100,10 +84,10 @@ def _points(plane: Plane, compared: Sequence[PredictedFrequency]) -> Points | No
     )  # fmt: skip
 
 
-def _measurement(known: Sequence[Mode]) -> Bars:
+def _measurement(known: Sequence[Mode]) -> spec.Bars:
     """The measurement's own 90 % interval around 1, where its standard deviation is known."""
     half = np.array([NORMAL_90 * mode.frequency_sd_hz / mode.frequency_hz for mode in known])
-    return Bars(
+    return spec.Bars(
         x=[mode.order + _BESIDE[mode.plane] for mode in known], y=2 * half, base=1 - half,
         width=0.2, opacity=0.25, name="measurement, 90 %",
     )  # fmt: skip
@@ -113,29 +97,26 @@ def _sigma(data: HangerReport) -> Interval:
     return Interval.of_samples(data.posterior.parameter("sigma"))
 
 
-def _model_error(data: HangerReport) -> str:
-    return "sigma " + formatting.with_interval(_sigma(data).scaled(100), "%")
-
-
 def _caption(data: HangerReport) -> str:
+    error = formatting.with_interval(_sigma(data).scaled(100), "%")
     return (
         f"Frequencies predicted by {formatting.model_class(data.posterior.model)} after updating, "
         "over the measured ones of the latest test. Bars: 90 % interval that the uncertainty of "
         "the parameters leaves; dark boxes: that of the measurement, where known; light band: "
-        f"model error ({_model_error(data)}). A mode outside the band is one that the model does "
+        f"model error (sigma {error}). A mode outside the band is one that the model does "
         "not explain."
     )
 
 
 def _alt(data: HangerReport) -> str:
-    residuals = residuals_percent(data.predicted)
+    offs = [off.mean / 100 for _, off in misfits_percent(data)]
     return (
-        f"Ratio of predicted to measured frequency of {len(residuals)} modes, between "
-        f"{1 + min(residuals) / 100:.4f} and {1 + max(residuals) / 100:.4f}."
+        f"Ratio of predicted to measured frequency of {len(offs)} modes, between "
+        f"{1 + min(offs):.4f} and {1 + max(offs):.4f}."
     )
 
 
-FIGURE = Member("frequencies", "Predicted over measured frequencies", specify, _caption, _alt)
+FIGURE = spec.Member("frequencies", "Predicted over measured frequencies", specify, _caption, _alt)
 
 
 # Layout: curves that can be told apart, room above them for names in rows, and a name that fits.
@@ -145,25 +126,27 @@ _ROWS = {"transverse": 0.98, "longitudinal": 0.93}
 _LONGEST_NAME = 14
 
 
-def specify_response(data: HangerReport) -> Specification | None:
+def specify_response(data: HangerReport) -> spec.Specification | None:
     response = data.frequency_response
     if response is None or not response.points:
         return None
     shown = _shown(response, data.latest.modes)
     frequency_hz = response.frequency_hz[shown]
-    across = Axis(
+    across = spec.Axis(
         label="frequency (Hz)", range=(float(frequency_hz[0]), float(frequency_hz[-1]))
     )  # fmt: skip
     curves = _curves(response, shown, np.abs(response.accelerance))
-    magnitude = Axis(label="accelerance (m/s²/N)", scale="log")
+    magnitude = spec.Axis(label="accelerance (m/s²/N)", scale="log")
     marks = [*curves, *_marks(data.latest.modes)]
     if response.coherence is None:
-        return stacked([Panel(y=magnitude, marks=marks, x=across)], 3.6, legend_columns=3)
-    below = Panel(
-        y=Axis(label="coherence", range=(0, 1.05)), x=across,
+        return spec.stacked([spec.Panel(y=magnitude, marks=marks, x=across)], 3.6, legend_columns=3)
+    below = spec.Panel(
+        y=spec.Axis(label="coherence", range=(0, 1.05)), x=across,
         marks=_curves(response, shown, response.coherence),
     )  # fmt: skip
-    return stacked([Panel(y=magnitude, marks=marks, height=3), below], 4.8, legend_columns=3)
+    return spec.stacked(
+        [spec.Panel(y=magnitude, marks=marks, height=3), below], 4.8, legend_columns=3
+    )
 
 
 def _shown(response: FrequencyResponse, modes: Sequence[Mode]) -> slice:
@@ -173,11 +156,11 @@ def _shown(response: FrequencyResponse, modes: Sequence[Mode]) -> slice:
     return slice(1, max(stop, 3))
 
 
-def _curves(response: FrequencyResponse, shown: slice, values: FloatArray) -> list[Mark]:
+def _curves(response: FrequencyResponse, shown: slice, values: FloatArray) -> list[spec.Mark]:
     return [
-        Line(
+        spec.Line(
             x=response.frequency_hz[shown], y=values[index, shown], width=0.9, name=_label(point),
-            colour=plane_colour(point.plane), dash="solid" if index < 2 else "dash",
+            colour=spec.plane_colour(point.plane), dash="solid" if index < 2 else "dash",
         )
         for index, point in enumerate(response.points[:_POINTS_SHOWN])
     ]  # fmt: skip
@@ -188,17 +171,19 @@ def _label(point: ResponsePoint) -> str:
     return name if np.isnan(point.x_m) else f"{name} at {point.x_m:.2f} m"
 
 
-def _marks(modes: Sequence[Mode]) -> list[Mark]:
+def _marks(modes: Sequence[Mode]) -> list[spec.Mark]:
     """A mark above the curves at each identified mode, a row for each plane."""
-    found: list[Mark] = []
+    found: list[spec.Mark] = []
     for plane in PLANES:
         at = [mode.frequency_hz for mode in modes if mode.plane == plane]
-        look: dict[str, Any] = {"colour": PLANE_HUES[plane]}
-        found += [Rule(at=each, axis="x", width=0.5, opacity=0.6, **look) for each in at]
+        look: dict[str, Any] = {"colour": spec.PLANE_HUES[plane]}
+        found += [spec.Rule(at=each, axis="x", width=0.5, opacity=0.6, **look) for each in at]
         if at:
             rows = [_ROWS[plane]] * len(at)
-            symbol, name = PLANE_SYMBOLS[plane], f"{plane} mode"
-            found.append(Points(x=at, y=rows, in_shares=True, symbol=symbol, name=name, **look))
+            symbol, name = spec.PLANE_SYMBOLS[plane], f"{plane} mode"
+            found.append(
+                spec.Points(x=at, y=rows, in_shares=True, symbol=symbol, name=name, **look)
+            )
     return found
 
 
@@ -223,7 +208,7 @@ def _response_alt(data: HangerReport) -> str:
     return f"Frequency response with {len(modes)} identified modes: {listed}."
 
 
-RESPONSE = Member(
+RESPONSE = spec.Member(
     "response",
     "Frequency response and identified modes",
     specify_response,

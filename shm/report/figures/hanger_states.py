@@ -8,44 +8,31 @@ from typing import Any
 import numpy as np
 
 from shm.report.contents import HangerReport
+from shm.report.figures import specification as spec
 from shm.report.figures import time_axes
-from shm.report.figures.specification import (
-    Axis,
-    Band,
-    Line,
-    Mark,
-    Member,
-    Panel,
-    Points,
-    Rule,
-    Specification,
-    Symbol,
-    limits,
-    stacked,
-)
 from shm.report.states import QuantityOverTime, StatesOverTime
 from shm.values import BoolArray
 from shm.values.rounding import force_unit
 from shm.watch.state import Band as Bounds
 
+# Layout: heights of the panels, and of what stands around them.
 _TENSION_INCHES, _STIFFNESS_INCHES, _TEMPERATURE_INCHES = 2.3, 1.5, 0.75
 _REST_INCHES = 0.9
 _TENSION_TITLE = "tension by the selected model class: estimate to date and retrospective"
-_LEAST_TESTS = 2
-"""One test alone has no course: its numbers stand elsewhere."""
 
 
-def specify(data: StatesOverTime) -> Specification | None:
-    if not data.times or not data.quantities:
+def specify(data: StatesOverTime, least_tests: int = 1) -> spec.Specification | None:
+    """None of fewer tests."""
+    if len(data.times) < least_tests or not data.quantities:
         return None
     panels = [_panel(data, quantity) for quantity in data.quantities]
     if np.any(np.isfinite(data.temperatures_c)):
         panels.append(_temperature(data))
     panels[-1] = replace(panels[-1], x=time_axes.time_axis(data.times))
-    return stacked(panels, sum(panel.height for panel in panels) + _REST_INCHES, 5)
+    return spec.stacked(panels, sum(panel.height for panel in panels) + _REST_INCHES, 5)
 
 
-def _panel(data: StatesOverTime, quantity: QuantityOverTime) -> Panel:
+def _panel(data: StatesOverTime, quantity: QuantityOverTime) -> spec.Panel:
     scale, unit = _scale(quantity)
     whole = np.arange(len(data.times))
     read = time_axes.part(quantity.read, whole, scale)
@@ -56,18 +43,18 @@ def _panel(data: StatesOverTime, quantity: QuantityOverTime) -> Panel:
     # Lone readings and wide bands may lie beyond.
     bounds = [time_axes.inner(each) for each in (filtered.low, filtered.high)]
     seen = time_axes.inner(read.middle[~data.outlier])
-    low, high = limits(filtered.middle, smoothed.middle, *bounds, seen, levels, [baseline])
+    low, high = spec.limits(filtered.middle, smoothed.middle, *bounds, seen, levels, [baseline])
     is_first = quantity is data.quantities[0]
     changes = time_axes.changes(data.changes, data.times, is_first)
     high += time_axes.LABEL_ROOM * (high - low) * (len(changes) if is_first else 0)
     times: Any = data.times
     look: dict[str, Any] = {"x": times, "colour": "blue"}
-    marks: list[Mark] = [
+    marks: list[spec.Mark] = [
         *changes,
-        Band(low=filtered.low, high=filtered.high, opacity=0.22, name="90 % band", **look),
+        spec.Band(low=filtered.low, high=filtered.high, opacity=0.22, name="90 % band", **look),
         *_readings(data, read, low, high),
-        Line(y=filtered.middle, width=1.5, name="estimate to date", **look),
-        Line(
+        spec.Line(y=filtered.middle, width=1.5, name="estimate to date", **look),
+        spec.Line(
             x=times,
             y=smoothed.middle,
             colour="orange",
@@ -83,8 +70,8 @@ def _panel(data: StatesOverTime, quantity: QuantityOverTime) -> Panel:
     ]
     is_tension = quantity.is_tension
     label = f"tension ({unit})" if is_tension else f"log10 of\n{unit}"
-    return Panel(
-        y=Axis(label=label, range=(low, high)), marks=marks,
+    return spec.Panel(
+        y=spec.Axis(label=label, range=(low, high)), marks=marks,
         title=_TENSION_TITLE if is_tension else quantity.title, title_side="left",
         height=_TENSION_INCHES if is_tension else _STIFFNESS_INCHES,
     )  # fmt: skip
@@ -98,9 +85,9 @@ def _scale(quantity: QuantityOverTime) -> tuple[float, str]:
     return 1 / unit.newtons, unit.name
 
 
-def _readings(data: StatesOverTime, read: Bounds, low: float, high: float) -> list[Mark]:
+def _readings(data: StatesOverTime, read: Bounds, low: float, high: float) -> list[spec.Mark]:
     """Single tests, hollow where taken as outliers, triangles at the edge beyond which they lie."""
-    found: list[Mark] = []
+    found: list[spec.Mark] = []
     known = np.isfinite(read.middle)
     for chosen, filled, name in (
         (known & ~data.outlier, True, "test by itself"),
@@ -109,20 +96,20 @@ def _readings(data: StatesOverTime, read: Bounds, low: float, high: float) -> li
         if places := np.flatnonzero(chosen).tolist():
             part = time_axes.part(read, np.array(places))
             found.append(
-                Points(
+                spec.Points(
                     x=[data.times[place] for place in places], y=part.middle, low=part.low,
                     high=part.high, filled=filled, size=2.8 if filled else 4.2, colour="quiet",
                     opacity=0.7, caps=False, name=name,
                 )
             )  # fmt: skip
-    beyond: tuple[tuple[BoolArray, float, Symbol], ...] = (
+    beyond: tuple[tuple[BoolArray, float, spec.Symbol], ...] = (
         (read.middle > high, high, "triangle"),
         (read.middle < low, low, "triangle down"),
     )
     for chosen, edge, symbol in beyond:
         if places := np.flatnonzero(chosen).tolist():
             found.append(
-                Points(
+                spec.Points(
                     x=[data.times[place] for place in places], y=[edge] * len(places), size=5,
                     symbol=symbol, filled=False, clipped=False, colour="quiet",
                     name="test out of view",
@@ -131,16 +118,16 @@ def _readings(data: StatesOverTime, read: Bounds, low: float, high: float) -> li
     return found
 
 
-def _temperature(data: StatesOverTime) -> Panel:
+def _temperature(data: StatesOverTime) -> spec.Panel:
     known = np.flatnonzero(np.isfinite(data.temperatures_c)).tolist()
     times = [data.times[place] for place in known]
-    curve = Line(
+    curve = spec.Line(
         x=times, y=data.temperatures_c[known], colour="quiet", width=0.8, dots=True
     )  # fmt: skip
-    marks: list[Mark] = [curve]
+    marks: list[spec.Mark] = [curve]
     if np.isfinite(data.reference_temperature_c):
-        marks.append(Rule(at=data.reference_temperature_c, colour="green", dash="dash"))
-    return Panel(y=Axis(label="temp.\n(°C)"), marks=marks, height=_TEMPERATURE_INCHES)
+        marks.append(spec.Rule(at=data.reference_temperature_c, colour="green", dash="dash"))
+    return spec.Panel(y=spec.Axis(label="temp.\n(°C)"), marks=marks, height=_TEMPERATURE_INCHES)
 
 
 def _caption(data: StatesOverTime) -> str:
@@ -180,15 +167,12 @@ def _last(quantity: QuantityOverTime) -> str:
     )
 
 
-def _specify_course(data: StatesOverTime) -> Specification | None:
-    return specify(data) if len(data.times) >= _LEAST_TESTS else None
-
-
-STATES = Member("drift", "States over time", specify, _caption, _alt)
-FIGURE = Member[HangerReport](
+STATES = spec.Member("drift", "States over time", specify, _caption, _alt)
+# One test alone has no course: its numbers stand elsewhere in the report.
+FIGURE = spec.Member[HangerReport](
     STATES.name,
     STATES.title,
-    lambda data: _specify_course(data.states.within(data.period)),
+    lambda data: specify(data.states.within(data.period), least_tests=2),
     lambda data: _caption(data.states.within(data.period)),
     lambda data: _alt(data.states.within(data.period)),
 )

@@ -12,16 +12,8 @@ import numpy as np
 from shm.models import end_stiffness
 from shm.report import formatting
 from shm.report.contents import HangerReport
+from shm.report.figures import specification as spec
 from shm.report.figures import time_axes
-from shm.report.figures.specification import (
-    Axis,
-    Mark,
-    Member,
-    Panel,
-    Specification,
-    limits,
-    stacked,
-)
 from shm.values import FloatArray
 from shm.watch.state import Band as Bounds
 
@@ -43,30 +35,30 @@ class Course:
 
 def specify(
     courses: Sequence[Course], reach_decades: float, is_on_screen: bool = False
-) -> Specification | None:
+) -> spec.Specification | None:
     """Side by side on paper, one below the other on a screen, which may be narrow."""
     if not courses:
         return None
     panels = [_panel(course, reach_decades, is_on_screen) for course in courses]
     if is_on_screen:
-        return stacked([*(replace(each, x=None) for each in panels[:-1]), panels[-1]], 3.0)
-    label = Axis(label="log10 of stiffness in N m/rad")
+        return spec.stacked([*(replace(each, x=None) for each in panels[:-1]), panels[-1]], 3.0)
+    label = spec.Axis(label="log10 of stiffness in N m/rad")
     ends = [end for panel in panels for end in panel.y.range or ()]
     shared = [
-        replace(each, y=Axis(range=(min(ends), max(ends))), shares_y=place > 0)
+        replace(each, y=spec.Axis(range=(min(ends), max(ends))), shares_y=place > 0)
         for place, each in enumerate(panels)
     ]
     shared[0] = replace(shared[0], y=replace(shared[0].y, label=label.label))
-    return Specification(rows=[shared], height_inches=3.0)
+    return spec.Specification(rows=[shared], height_inches=3.0)
 
 
-def _panel(course: Course, reach: float, is_on_screen: bool) -> Panel:
+def _panel(course: Course, reach: float, is_on_screen: bool) -> spec.Panel:
     alone = course.alone
     chosen = time_axes.places(alone.middle, alone.low, alone.high)
     when = [course.times[place] for place in chosen.tolist()]
     shown, names = time_axes.part(alone, chosen), [course.tests[i] for i in chosen.tolist()]
     state = None if course.state is None else time_axes.part(course.state, chosen)
-    marks: list[Mark] = [
+    marks: list[spec.Mark] = [
         *(
             time_axes.band(when, shown, "purple")
             if state is None
@@ -86,8 +78,8 @@ def _panel(course: Course, reach: float, is_on_screen: bool) -> Panel:
     bounds = course.alone if course.state is None else course.state
     seen: list[FloatArray] = [time_axes.inner(each) for each in (bounds.low, bounds.high)]
     seen += [time_axes.inner(alone.middle), course.baseline + np.array([-reach, reach])]
-    return Panel(
-        y=Axis(label="log10 of stiffness", range=limits(*seen)), marks=marks,
+    return spec.Panel(
+        y=spec.Axis(label="log10 of stiffness", range=spec.limits(*seen)), marks=marks,
         x=time_axes.time_axis(course.times), title=course.title, title_side="left",
     )  # fmt: skip
 
@@ -151,7 +143,7 @@ def _reach(data: HangerReport) -> float:
     return data.hanger.thresholds.stiffness_shift_decades
 
 
-FIGURE = Member[HangerReport](
+FIGURE = spec.Member[HangerReport](
     "stiffness",
     "Trend of the end stiffness",
     lambda data: specify(_courses(data), _reach(data)),

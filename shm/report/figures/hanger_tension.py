@@ -21,10 +21,8 @@ _NEAR = 1.5
 
 
 def _draw(data: HangerReport) -> Figure:
-    figure = style.new_figure()
-    axes = figure.subplots()
     unit = data.tension_unit
-    style.dress(axes, f"tension ({unit.name})", f"probability density (1/{unit.name})")
+    figure, axes = style.one_panel(f"tension ({unit.name})", f"probability density (1/{unit.name})")
     _histogram(axes, data)
     _see(axes, data)
     _line(axes, data.hanger.nominal_tension_n, unit, "nominal", style.INK, ":", 0.9)

@@ -12,18 +12,8 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import HangerReport
+from shm.report.figures import specification as spec
 from shm.report.figures import time_axes
-from shm.report.figures.specification import (
-    Axis,
-    Mark,
-    Member,
-    Panel,
-    Points,
-    Specification,
-    Symbol,
-    limits,
-    stacked,
-)
 from shm.report.formatting import Interval
 from shm.report.states import CalledChange, QuantityOverTime
 from shm.values import FloatArray
@@ -34,7 +24,7 @@ from shm.watch.state import Band as Bounds
 
 _LONGEST_WORDS = 200  # layout: characters of a note in a hover; the page has all
 _AT_FOOT = 0.03  # layout: of the height, where signs of what people did stand
-_SYMBOLS: dict[NoteKind, tuple[Symbol, bool]] = {
+_SYMBOLS: dict[NoteKind, tuple[spec.Symbol, bool]] = {
     NoteKind.NOTE: ("thin cross", True),
     NoteKind.INSPECTION: ("circle", False),
     NoteKind.REPAIR: ("cross", True),
@@ -47,7 +37,7 @@ class Deed:
     """What somebody did, and why: it stands at the foot of the figure."""
 
     kind: str
-    symbol: Symbol
+    symbol: spec.Symbol
     filled: bool
     colour: str
     at: datetime
@@ -87,7 +77,7 @@ class Course:
         return force_unit(*(each.mean for each in self.tensions_n))
 
 
-def specify(course: Course) -> Specification | None:
+def specify(course: Course) -> spec.Specification | None:
     if not course.times:
         return None
     scale, bounds = 1 / course.unit.newtons, course.bounds_n
@@ -109,8 +99,10 @@ def specify(course: Course) -> Specification | None:
         *_repeats(course, chosen.tolist(), scale),
         *time_axes.changes(course.changes or (), _shown(course)),
     ]
-    axis = Axis(label=f"tension ({course.unit.name})", range=_range(course, scale))
-    return stacked([Panel(y=axis, marks=marks, x=time_axes.time_axis(_shown(course)))], 3.4, 5)
+    axis = spec.Axis(label=f"tension ({course.unit.name})", range=_range(course, scale))
+    return spec.stacked(
+        [spec.Panel(y=axis, marks=marks, x=time_axes.time_axis(_shown(course)))], 3.4, 5
+    )
 
 
 def _shown(course: Course) -> list[datetime]:
@@ -123,7 +115,7 @@ def _picked(times: Sequence[datetime], chosen: list[int]) -> list[datetime]:
     return [times[place] for place in chosen]
 
 
-def _state(course: Course, scale: float) -> list[Mark]:
+def _state(course: Course, scale: float) -> list[spec.Mark]:
     if course.state is None:
         return []
     band = course.state.filtered
@@ -136,7 +128,7 @@ def _has_repeats(course: Course) -> bool:
     return course.state is None and any(e.repeatability_sd is not None for e in course.tensions_n)
 
 
-def _repeats(course: Course, chosen: list[int], scale: float) -> list[Mark]:
+def _repeats(course: Course, chosen: list[int], scale: float) -> list[spec.Mark]:
     """The interval in which the same test would repeat, within the absolute one."""
     if not _has_repeats(course):
         return []
@@ -148,7 +140,7 @@ def _repeats(course: Course, chosen: list[int], scale: float) -> list[Mark]:
     ]
     bounds = time_axes.part(time_axes.bounds_of(inner), np.arange(len(inner)), scale)
     return [
-        Points(
+        spec.Points(
             x=_picked(course.times, chosen), y=bounds.middle, low=bounds.low, high=bounds.high,
             colour="orange", size=5.5, filled=False,
             name="90 % repeatability", texts=time_axes.spans(bounds),
@@ -156,8 +148,8 @@ def _repeats(course: Course, chosen: list[int], scale: float) -> list[Mark]:
     ]  # fmt: skip
 
 
-def _levels(course: Course, scale: float) -> list[Mark]:
-    levels: list[Mark] = [time_axes.level(scale * course.nominal_n, "nominal", "ink", "dot")]
+def _levels(course: Course, scale: float) -> list[spec.Mark]:
+    levels: list[spec.Mark] = [time_axes.level(scale * course.nominal_n, "nominal", "ink", "dot")]
     if course.baseline_n is not None:
         mean = scale * course.baseline_n
         levels.append(time_axes.level(mean, "baseline", "green", "dash"))
@@ -168,13 +160,13 @@ def _levels(course: Course, scale: float) -> list[Mark]:
     return levels
 
 
-def _alerts(course: Course, scale: float) -> list[Mark]:
+def _alerts(course: Course, scale: float) -> list[spec.Mark]:
     """A triangle at each test that raised an alert."""
     if not course.alerts:
         return []
     raised = list(course.alerts)
     return [
-        Points(
+        spec.Points(
             x=_picked(course.times, raised), y=scale * course.bounds_n.middle[raised],
             symbol="triangle down", filled=False, size=10, colour="red", name="alert",
             texts=list(course.alerts.values()),
@@ -182,12 +174,12 @@ def _alerts(course: Course, scale: float) -> list[Mark]:
     ]  # fmt: skip
 
 
-def _deeds(course: Course) -> list[Mark]:
+def _deeds(course: Course) -> list[spec.Mark]:
     """What people did and noted, by kind."""
     deeds = [*course.deeds, *_noted(course.notes)]
     kinds = {deed.kind: deed for deed in deeds}
     return [
-        Points(
+        spec.Points(
             x=[deed.at for deed in deeds if deed.kind == kind],
             y=[_AT_FOOT for deed in deeds if deed.kind == kind], in_shares=True,
             symbol=like.symbol, filled=like.filled, size=7, colour=like.colour, name=kind,
@@ -218,9 +210,9 @@ def _range(course: Course, scale: float) -> tuple[float, float]:
         seen.append(course.baseline_n * np.array([1 - course.reach, 1 + course.reach]))
     bounds = course.bounds_n if course.state is None else course.state.filtered
     seen += [time_axes.inner(bounds.low), time_axes.inner(bounds.high)]
-    low, high = limits(*seen)
+    low, high = spec.limits(*seen)
     if 2 * low - high < course.nominal_n < 2 * high - low:
-        low, high = limits(*seen, [course.nominal_n])
+        low, high = spec.limits(*seen, [course.nominal_n])
     written = time_axes.LABEL_ROOM * len(course.changes or ())
     return scale * low, scale * (high + written * (high - low))
 
@@ -293,23 +285,18 @@ def alt(course: Course) -> str:
     return f"Tension over {count}, {first} at first, {last} at last.{called}"
 
 
-def _baseline_n(data: HangerReport) -> float | None:
-    if data.baseline is None:
-        return None
-    return averaged_now(data.baseline, data.selection).tension_n.mean
-
-
 def _course(data: HangerReport) -> Course:
     rows = time_axes.dated(data)
     alerted = {alert.test: alert.message for alert in data.alerts}
     undated = len(data.trend) - len(rows)
+    baseline = data.baseline and averaged_now(data.baseline, data.selection)
     left = f"{formatting.counted(undated, 'test')} without a time left out." if undated else ""
     return Course(
         times=[row.time for row in rows],
         names=[row.row.test for row in rows],
         tensions_n=[row.row.tension_n for row in rows],
         nominal_n=data.hanger.nominal_tension_n,
-        baseline_n=_baseline_n(data),
+        baseline_n=baseline.tension_n.mean if baseline else None,
         reach=data.hanger.thresholds.tension_shift_fraction,
         alerts={i: alerted[r.row.test] for i, r in enumerate(rows) if r.row.test in alerted},
         notes=data.inspections,
@@ -317,7 +304,7 @@ def _course(data: HangerReport) -> Course:
     )
 
 
-FIGURE = Member[HangerReport](
+FIGURE = spec.Member[HangerReport](
     "trend",
     "Trend of the tension",
     lambda data: specify(_course(data)),

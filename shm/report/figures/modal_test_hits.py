@@ -1,49 +1,271 @@
-"""The hits laid over each other: pulse, force spectrum, ring-down."""
+"""The records of a test on one axis of time, what each hit left in them, and the hits themselves
+laid over each other: pulse, force spectrum, ring-down.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shm.report import formatting
-from shm.report.figures.modal_test_signals import (
-    CURVE_BINS,
-    LOWEST_DB,
-    REACH_DB,
-    HitRecord,
-    hit_name,
-    shown_hits,
-)
-from shm.report.figures.modal_test_spectra import Shown, searched_range
-from shm.report.figures.specification import (
-    Axis,
-    Dash,
-    Line,
-    Member,
-    Panel,
-    Rule,
-    Span,
-    Specification,
-    envelope_places,
-)
+from shm.report.contents import ModalTestReport
+from shm.report.figures import specification as spec
+from shm.report.figures.modal_test_response import Shown, searched_range
+from shm.values import NAN, BoolArray, Channel, FloatArray, Recording
+
+if TYPE_CHECKING:
+    from shm.identify import Hit
+
+# Layout: channels drawn, and of these at most that are not sound.
+_MOST_CHANNELS, _MOST_FAULTY = 4, 2
+
+
+def shown_rows(sheet: ModalTestReport) -> list[int]:
+    """Rows of the accelerations to draw: a few that were left out, then of each plane in turn
+    the first, the last, those between."""
+    channels = sheet.recordings[0].accelerations
+    faults = sheet.channel_faults
+    faulty = [row for row, channel in enumerate(channels) if channel.name in faults]
+    sound = [row for row in range(len(channels)) if row not in faulty]
+    chosen = faulty[:_MOST_FAULTY]
+    chosen += _in_turn(channels, sound)[: max(1, _MOST_CHANNELS - len(chosen))]
+    return sorted(chosen)
+
+
+def _in_turn(channels: tuple[Channel, ...], rows: list[int]) -> list[int]:
+    planes = list(dict.fromkeys(channels[row].plane for row in rows))
+    queues = [_ends_first([r for r in rows if channels[r].plane == plane]) for plane in planes]
+    longest = max((len(queue) for queue in queues), default=0)
+    return [queue[turn] for turn in range(longest) for queue in queues if turn < len(queue)]
+
+
+def _ends_first(rows: list[int]) -> list[int]:
+    return [rows[0], *rows[:0:-1]] if rows else []
+
+
+def strongest_row(sheet: ModalTestReport) -> int:
+    """Row of the acceleration that moves most in the first record, faulty ones aside."""
+    faults = sheet.channel_faults
+    peaks = [
+        -1.0 if channel.name in faults else float(np.nanmax(np.abs(channel.values), initial=0.0))
+        for channel in sheet.recordings[0].accelerations
+    ]
+    return int(np.argmax(peaks))
+
+
+_BINS = 700
+_GAP_SHARE = 0.015
+"""Between two records, as a share of their whole length."""
+
+
+def offsets_s(records: Sequence[Recording]) -> list[float]:
+    """Where each record begins on the common axis, in s."""
+    whole = sum(record.duration_s for record in records)
+    gap = _GAP_SHARE * whole if len(records) > 1 else 0.0
+    ends = np.cumsum([record.duration_s + gap for record in records])
+    return [0.0, *ends[:-1].tolist()]
+
+
+def borders_s(records: Sequence[Recording]) -> list[float]:
+    """The middle of the gap between each two records on the common axis, in s."""
+    starts = offsets_s(records)
+    ends = [start + record.duration_s for start, record in zip(starts, records, strict=True)]
+    return [(end + start) / 2 for end, start in zip(ends[:-1], starts[1:], strict=True)]
+
+
+def hit_time_s(sheet: ModalTestReport, hit: Hit) -> float:
+    """When a hit fell on the common axis, in s."""
+    return offsets_s(sheet.recordings)[hit.record] + hit.start_s
+
+
+def located_hits(sheet: ModalTestReport) -> list[tuple[int, Hit]]:
+    """The hits whose records are at hand, each with its number from 1."""
+    numbered = enumerate(sheet.hits, 1)
+    return [(number, hit) for number, hit in numbered if hit.record < len(sheet.recordings)]
+
+
+def channel_of(record: Recording, row: int | None) -> Channel | None:
+    """The force (`row` None) or the acceleration of that row; None where it has none."""
+    if row is None:
+        return record.force
+    return record.accelerations[row] if row < len(record.accelerations) else None
+
+
+def thinned(records: Sequence[Recording], row: int | None) -> tuple[FloatArray, FloatArray]:
+    """Time in s and values of one channel over all records, thinned by their envelope; both (m,).
+
+    NaN where samples are, and between the records, so that a line drawn through them breaks.
+    """
+    whole = sum(record.duration_s for record in records)
+    times, values = [], []
+    for offset, record in zip(offsets_s(records), records, strict=True):
+        channel = channel_of(record, row)
+        if channel is not None and len(channel.values):
+            bins = max(8, round(_BINS * record.duration_s / whole))
+            places = spec.envelope_places(channel.values, bins)
+            times += [offset + places / record.sampling_rate_hz, np.array([np.nan])]
+            values += [channel.values[places], np.array([np.nan])]
+    return np.concatenate(times), np.concatenate(values)
+
+
+def unknown_times_s(records: Sequence[Recording], row: int | None) -> FloatArray:
+    """The middle of each bin with samples that are not a number, on the common axis, in s."""
+    found: list[float] = []
+    for offset, record in zip(offsets_s(records), records, strict=True):
+        channel = channel_of(record, row)
+        if channel is not None:
+            bad = np.flatnonzero(np.isnan(channel.values))
+            width = max(1, record.samples * len(records) // _BINS)
+            found += (offset + np.unique(bad // width) * width / record.sampling_rate_hz).tolist()
+    return np.array(found)
+
+
+REACH_DB = -20.0
+LOWEST_DB = -40.0
+"""Below which no spectrum of a force is drawn."""
+CURVE_BINS = 300
+"""Into which a curve of a hit is thinned."""
+_MOST_SHOWN = 12
+_BEFORE_S, _AFTER_S = 0.006, 0.02
+_FILTER_SAMPLES = 16
+"""An anti-aliasing filter spreads a pulse over so many samples on either side."""
+_SECOND_STRIKE_S = 0.5
+_STRIKES = 0.05
+_TRANSFORM_S = 0.5
+_LEAD, _TAIL = 0.7, 3.0
+"""Room before and after a pulse in a figure, in widths of it."""
+_TINY = 1e-9  # stands for a level of 0 on an axis of dB
+_FADE_BINS = 80  # layout: steps that the eye takes for a line
+
+
+@dataclass(frozen=True, eq=False)
+class HitRecord:
+    """One hit. `time_s` and `force_n` (samples,) of its pulse, 0 s where it begins;
+    `spectrum_hz` and `spectrum_db` (lines,), relative to the spectrum's largest value;
+    `fade_s` and `fade_m_s2_n` (bins,): largest accelerations after the hit per peak force.
+    """
+
+    number: int
+    hit: Hit
+    time_s: FloatArray
+    force_n: FloatArray
+    spectrum_hz: FloatArray
+    spectrum_db: FloatArray
+    fade_s: FloatArray
+    fade_m_s2_n: FloatArray
+
+    @property
+    def near_s(self) -> tuple[float, float]:
+        """From a little before the pulse to a little after the last strike."""
+        struck = self.force_n > _STRIKES * np.nanmax(self.force_n)
+        peak = int(np.nanargmax(self.force_n))
+        width = _run(struck[peak:]) + _run(struck[peak::-1])
+        step_s = float(self.time_s[1] - self.time_s[0])
+        last_s = float(self.time_s[np.flatnonzero(struck)[-1]])
+        return -_LEAD * width * step_s, max(_TAIL * width * step_s, 1.1 * last_s)
+
+    @property
+    def reach_hz(self) -> float:
+        """Where the force first falls to a tenth of its largest; NaN where it never does."""
+        top = int(np.argmax(self.spectrum_db))
+        below = np.flatnonzero(self.spectrum_db[top:] < REACH_DB)
+        return float(self.spectrum_hz[top + below[0]]) if len(below) else NAN
+
+
+def hit_records(sheet: ModalTestReport) -> list[HitRecord]:
+    """Every hit whose record is at hand, in the order of the hits."""
+    row = strongest_row(sheet) if sheet.recordings else 0
+    found = [_hit_record(sheet, number, hit, row) for number, hit in located_hits(sheet)]
+    return [hit_record for hit_record in found if hit_record is not None]
+
+
+def shown_hits(sheet: ModalTestReport) -> list[HitRecord]:
+    """All hits, or some of them with every dropped one first."""
+    dropped_first = sorted(hit_records(sheet), key=lambda hit_record: hit_record.hit.used)
+    return sorted(dropped_first[:_MOST_SHOWN], key=lambda hit_record: hit_record.number)
+
+
+def hit_name(hit_record: HitRecord) -> str:
+    """`hit 2, dropped: double hit`."""
+    reason = "" if hit_record.hit.used else f", dropped: {hit_record.hit.reason}"
+    return f"hit {hit_record.number}{reason}"
+
+
+def _hit_record(sheet: ModalTestReport, number: int, hit: Hit, row: int) -> HitRecord | None:
+    record = sheet.recordings[hit.record]
+    force, motion = record.force, channel_of(record, row)
+    if force is None or motion is None:
+        return None
+    rate, stop = record.sampling_rate_hz, _stop(sheet, hit)
+    time_s, force_n = _pulse(force.values[:stop], hit, rate)
+    spectrum_hz, spectrum_db = _spectrum(force_n, rate)
+    fade_s, fade = _fade(motion.values[hit.start : stop], rate)
+    return HitRecord(
+        number, hit, time_s, force_n, spectrum_hz, spectrum_db, fade_s, fade / hit.peak_force_n
+    )
+
+
+def _run(struck: BoolArray) -> int:
+    """How many of the first samples are true."""
+    return len(struck) if np.all(struck) else int(np.argmin(struck))
+
+
+def _stop(sheet: ModalTestReport, hit: Hit) -> int:
+    """Shortly before the next hit of the same record begins, or where the record ends."""
+    record = sheet.recordings[hit.record]
+    margin = int(_BEFORE_S * record.sampling_rate_hz) + _FILTER_SAMPLES
+    later = [h.start for h in sheet.hits if h.record == hit.record and h.start > hit.start]
+    stop = min([each - margin for each in later], default=record.samples)
+    return max(stop, hit.start + 2)
+
+
+def _pulse(force: FloatArray, hit: Hit, rate: float) -> tuple[FloatArray, FloatArray]:
+    """The pulse free of its offset, long enough for a second strike to be in it."""
+    before = int(_BEFORE_S * rate) + _FILTER_SAMPLES
+    first = max(0, hit.start - before)
+    part = force[first : hit.start + int(_SECOND_STRIKE_S * rate)]
+    part = part - np.nanmedian(part)
+    if part[np.nanargmax(np.abs(part))] < 0:
+        part = -part
+    least = hit.start - first + int(_AFTER_S * rate) + _FILTER_SAMPLES
+    struck = np.flatnonzero(part > _STRIKES * np.nanmax(part))
+    last = max(least, int(1.1 * struck[-1])) if len(struck) else least
+    places = np.arange(min(last, len(part)))
+    return (first + places - hit.start) / rate, np.asarray(part[places])
+
+
+def _spectrum(force_n: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+    """NaN throughout, so that nothing is drawn, where samples of the pulse are missing."""
+    length = max(len(force_n), int(_TRANSFORM_S * rate))
+    size = np.abs(np.fft.rfft(force_n, n=length))
+    decibel = 20 * np.log10(np.maximum(size / max(float(size.max()), _TINY), _TINY))
+    return np.fft.rfftfreq(length, 1 / rate).astype(np.float64), np.asarray(decibel)
+
+
+def _fade(motion: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+    known = motion[np.isfinite(motion)]
+    size = np.abs(motion - np.mean(known)) if len(known) else np.full(len(motion), np.nan)
+    places = spec.peak_places(size, min(_FADE_BINS, len(size)))
+    return places / rate, size[places]
+
 
 _COLOURS = ("blue", "orange", "green", "purple")
-_DASHES: tuple[Dash, ...] = ("solid", "dash", "dot")
-_DROPPED_DASHES: tuple[Dash, ...] = ("dash", "dot", "dashdot", "longdash")
+_DASHES: tuple[spec.Dash, ...] = ("solid", "dash", "dot")
+_DROPPED_DASHES: tuple[spec.Dash, ...] = ("dash", "dot", "dashdot", "longdash")
 _FADE_ROOM = 1.3  # layout: room to the right of the last hit
 
 
-def _draw(shown: Shown) -> Specification | None:
+def _draw(shown: Shown) -> spec.Specification | None:
     hits = shown_hits(shown.sheet)
     if not hits:
         return None
-    panels = [_pulses(hits), _spectra(shown, hits), _fades(hits)]
+    panels = [_pulses(hits), _force_spectra(shown, hits), _fades(hits)]
     rows = [[each] for each in panels] if shown.is_on_screen else [panels[:2], panels[2:]]
     columns = 6 if all(hit_record.hit.used for hit_record in hits) else 3
-    return Specification(rows=rows, height_inches=5.4, legend_columns=columns)
+    return spec.Specification(rows=rows, height_inches=5.4, legend_columns=columns)
 
 
 def _look(hit_record: HitRecord, place: int) -> dict[str, Any]:
@@ -57,28 +279,28 @@ def _look(hit_record: HitRecord, place: int) -> dict[str, Any]:
     return {"name": name, "colour": colour, "dash": dashes, "width": 0.9}
 
 
-def _pulses(hits: Sequence[HitRecord]) -> Panel:
+def _pulses(hits: Sequence[HitRecord]) -> spec.Panel:
     lines = []
     for place, hit_record in enumerate(hits):
-        kept = envelope_places(hit_record.force_n, CURVE_BINS)
+        kept = spec.envelope_places(hit_record.force_n, CURVE_BINS)
         lines.append(
-            Line(
+            spec.Line(
                 x=1e3 * hit_record.time_s[kept], y=hit_record.force_n[kept],
                 hover="%{x:.1f} ms: %{y:.4g} N",
                 **_look(hit_record, place),
             )
         )  # fmt: skip
     spans_ms = 1e3 * np.array([hit_record.near_s for hit_record in hits])
-    return Panel(
-        y=Axis(label="force (N)"), marks=lines,
-        x=Axis(
+    return spec.Panel(
+        y=spec.Axis(label="force (N)"), marks=lines,
+        x=spec.Axis(
             label="time from the start of the hit (ms)",
             range=(float(spans_ms[:, 0].min()), float(spans_ms[:, 1].max())),
         ),
     )  # fmt: skip
 
 
-def _spectra(shown: Shown, hits: Sequence[HitRecord]) -> Panel:
+def _force_spectra(shown: Shown, hits: Sequence[HitRecord]) -> spec.Panel:
     highest = float(hits[0].spectrum_hz[-1])
     low, high = searched_range(shown.sheet)
     high = min(high, highest)
@@ -88,37 +310,38 @@ def _spectra(shown: Shown, hits: Sequence[HitRecord]) -> Panel:
         # Far below the panel nothing is drawn, as lines to there would cross others outside it.
         kept = (hit_record.spectrum_hz <= end) & (hit_record.spectrum_db > LOWEST_DB - 20)
         found = np.where(kept, hit_record.spectrum_db, np.nan)
-        places = envelope_places(found, CURVE_BINS)
+        places = spec.envelope_places(found, CURVE_BINS)
         lines.append(
-            Line(
+            spec.Line(
                 x=hit_record.spectrum_hz[places], y=found[places], hover="%{x:.1f} Hz: %{y:.3g} dB",
                 **_look(hit_record, place),
             )
         )  # fmt: skip
-    level = Rule(at=REACH_DB, width=0.8, dash="dashdot", label="a tenth of the force")
-    band = Span(low=low, high=high, colour="green", opacity=0.10)
+    level = spec.Rule(at=REACH_DB, width=0.8, dash="dashdot", label="a tenth of the force")
+    band = spec.Span(low=low, high=high, colour="green", opacity=0.10)
     what = "band" if shown.sheet.band_hz else "where modes were found"
-    return Panel(
-        y=Axis(label="force, relative (dB)", range=(LOWEST_DB, 2)), marks=[*lines, level, band],
-        x=Axis(label="frequency (Hz)", range=(0, end)), title=f"shaded: {what}",
+    return spec.Panel(
+        y=spec.Axis(label="force, relative (dB)", range=(LOWEST_DB, 2)),
+        marks=[*lines, level, band],
+        x=spec.Axis(label="frequency (Hz)", range=(0, end)), title=f"shaded: {what}",
     )  # fmt: skip
 
 
-def _fades(hits: Sequence[HitRecord]) -> Panel:
+def _fades(hits: Sequence[HitRecord]) -> spec.Panel:
     values = np.concatenate([hit_record.fade_m_s2_n for hit_record in hits])
     known = values[np.isfinite(values) & (values > 0)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.1, 1.0)
-    axis = Axis(scale="log", range=(low / _FADE_ROOM, high * _FADE_ROOM))
-    return Panel(
+    axis = spec.Axis(scale="log", range=(low / _FADE_ROOM, high * _FADE_ROOM))
+    return spec.Panel(
         y=replace(axis, label="largest acceleration\nper peak force (m/s²/N)"),
         marks=[
-            Line(
+            spec.Line(
                 x=hit_record.fade_s, y=hit_record.fade_m_s2_n, hover="%{x:.2f} s: %{y:.3g} m/s²/N",
                 **_look(hit_record, place),
             )
             for place, hit_record in enumerate(hits)
         ],
-        x=Axis(
+        x=spec.Axis(
             label="time from the start of the hit (s)",
             range=(0, max(float(hit_record.fade_s[-1]) for hit_record in hits)),
         ),
@@ -147,4 +370,4 @@ def _alt(shown: Shown) -> str:
     )
 
 
-FIGURE = Member("hits", "Hits: pulses, force spectra, ring-downs", _draw, _caption, _alt)
+FIGURE = spec.Member("hits", "Hits: pulses, force spectra, ring-downs", _draw, _caption, _alt)

@@ -1,4 +1,5 @@
-"""Frequency response at a few points with the modal fit over it, phase and coherence.
+"""The curve in which the modes of a test are peaks: the response at a few points with the modal fit
+over it, phase and coherence; how modes are marked over frequency.
 
 Of an ambient test, in which nobody hit, the spectral density stands instead. A screen shows the one
 point that is asked for.
@@ -6,35 +7,207 @@ point that is asked for.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 
 from shm.report import formatting
-from shm.report.figures.modal_test_spectra import (
-    Shown,
-    Spectrum,
-    mode_marks,
-    shown_points,
-    shown_range,
-    with_headroom_log,
+from shm.report.contents import ModalTestReport
+from shm.report.figures import specification as spec
+from shm.values import (
+    PLANES,
+    ComplexArray,
+    FloatArray,
+    FrequencyResponse,
+    Mode,
+    Recording,
+    ResponsePoint,
 )
-from shm.report.figures.specification import (
-    Axis,
-    Dash,
-    Line,
-    Mark,
-    Member,
-    Panel,
-    Specification,
-    envelope_places,
-    peak_places,
-    plane_colour,
-    stacked,
-)
-from shm.values import ComplexArray, FloatArray, FrequencyResponse, ResponsePoint
+
+# Eight segments smooth a spectrum to a third (1 / sqrt 8); 20 s resolve 0.05 Hz.
+_LEAST_SEGMENT_S = 20.0
+_SEGMENTS = 8
+_MARGIN = 0.06  # layout: of the width
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """`values` (points, lines), not negative, on `frequency_hz` (lines,)."""
+
+    points: tuple[ResponsePoint, ...]
+    frequency_hz: FloatArray
+    values: FloatArray
+    quantity: str
+
+    @property
+    def together(self) -> FloatArray:
+        """Root mean square over the points, (lines,)."""
+        return np.asarray(np.sqrt(np.mean(np.square(self.values), axis=0)))
+
+
+def spectrum(sheet: ModalTestReport) -> Spectrum | None:
+    """The accelerance where somebody hit, else the power spectral density of the records."""
+    response = sheet.identification.frequency_response
+    if response is not None and response.points:
+        values = np.abs(response.accelerance)
+        return Spectrum(response.points, response.frequency_hz, values, "accelerance (m/s²/N)")
+    if response is None and sheet.recordings:
+        return _density(sheet.recordings)
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A sheet, the curve its modes are peaks of, and on screen which response of it is asked for.
+
+    `point` is an index into the points of `spectrum`; None on paper, where several are shown.
+    """
+
+    sheet: ModalTestReport
+    spectrum: Spectrum | None
+    point: int | None = None
+
+    @classmethod
+    def of(cls, sheet: ModalTestReport, point: int | None = None) -> Shown:
+        """With the curve worked out from the sheet, whose records must be there."""
+        return cls(sheet, spectrum(sheet), point)
+
+    @property
+    def is_on_screen(self) -> bool:
+        return self.point is not None
+
+
+def _density(records: Sequence[Recording]) -> Spectrum | None:
+    """Welch's estimate (1967), averaged over the records that have the sensors of the first."""
+    first = records[0]
+    alike = [r for r in records if len(r.accelerations) == len(first.accelerations)]
+    length = min(record.samples for record in alike)
+    wanted = max(length // _SEGMENTS, int(_LEAST_SEGMENT_S * first.sampling_rate_hz))
+    if not first.accelerations or length < 2:
+        return None
+    estimates = [_welch(record, min(length, wanted)) for record in alike]
+    points = tuple(ResponsePoint(c.name, c.plane, c.x_m) for c in first.accelerations)
+    values = np.mean([values for _, values in estimates], axis=0)
+    return Spectrum(points, estimates[0][0], values, "spectral density ((m/s²)²/Hz)")
+
+
+def _welch(record: Recording, segment: int) -> tuple[FloatArray, FloatArray]:
+    signals = np.array([channel.values for channel in record.accelerations])
+    known = np.isfinite(signals)
+    # A gap counts as rest: it lowers the level a little and hides no peak.
+    rest = np.nan_to_num(signals - np.mean(signals, axis=1, where=known, keepdims=True))
+    frequency_hz, values = scipy.signal.welch(
+        rest, record.sampling_rate_hz, nperseg=segment, axis=1
+    )
+    return frequency_hz, values
+
+
+def shown_range(sheet: ModalTestReport) -> tuple[float, float]:
+    """Lowest and highest frequency to draw, in Hz."""
+    low, high = searched_range(sheet)
+    return (0.0 if low < 0.15 * high else low - _MARGIN * (high - low), high * (1 + _MARGIN / 2))
+
+
+def searched_range(sheet: ModalTestReport) -> tuple[float, float]:
+    """The band in Hz; where it is not known, from the lowest to the highest that was found."""
+    if sheet.band_hz is not None:
+        return sheet.band_hz
+    found = [mode.frequency_hz for mode in sheet.modes]
+    found += [each.frequency_hz for each in sheet.identification.set_aside]
+    found += sheet.identification.poles.frequency_hz.tolist()
+    return (min(found), max(found)) if found else (0.0, math.inf)
+
+
+def telling_points(
+    points: Sequence[ResponsePoint], modes: Sequence[Mode], values: FloatArray, most: int
+) -> list[int]:
+    """Indices of at most `most` points that between them show the modes best, in their order.
+
+    `values` (points, modes) is how strongly each point shows each mode. Planes take turns.
+    """
+    share = values / np.maximum(np.max(values, axis=0, initial=0.0), np.finfo(float).tiny)
+    planes = list(dict.fromkeys(point.plane for point in points))
+    covered = np.zeros((len(planes), len(modes)))
+    chosen: list[int] = []
+    for turn in range(len(points)):
+        plane = turn % len(planes)
+        left = [i for i, p in enumerate(points) if p.plane == planes[plane] and i not in chosen]
+        if left and len(chosen) < most:
+            best = max(left, key=lambda i: float(np.sum(np.maximum(covered[plane], share[i]))))
+            covered[plane] = np.maximum(covered[plane], share[best])
+            chosen.append(best)
+    return sorted(chosen)
+
+
+def shown_points(sheet: ModalTestReport, found: Spectrum, most: int) -> list[int]:
+    """Indices of the points of `found` that are drawn."""
+    lines = np.searchsorted(found.frequency_hz, [mode.frequency_hz for mode in sheet.modes])
+    lines = np.minimum(lines, len(found.frequency_hz) - 1)
+    values = np.nan_to_num(found.values[:, lines])
+    return telling_points(found.points, sheet.modes, values, most)
+
+
+_MARK_ROWS = {"transverse": 0.94, "longitudinal": 0.83}
+_SET_ASIDE_ROW = 0.72
+_LABEL_ROOM = 0.026
+"""Least distance of two numbers, as a share of the axis."""
+_HEADROOM = 0.36
+"""Share of the axes' height that the marks take."""
+
+
+def mode_marks(sheet: ModalTestReport, low_hz: float, high_hz: float) -> list[spec.Mark]:
+    """A symbol and a line at each mode within the axis, a row for each plane, orders where there is
+    room."""
+    found: list[spec.Mark] = []
+    for plane in PLANES:
+        modes = sorted(
+            (m for m in sheet.modes if m.plane == plane and low_hz <= m.frequency_hz <= high_hz),
+            key=lambda mode: mode.frequency_hz,
+        )
+        at = [mode.frequency_hz for mode in modes]
+        is_lonely = np.diff([*at, math.inf]) >= _LABEL_ROOM * (high_hz - low_hz)
+        labels = [str(m.order) if alone else "" for m, alone in zip(modes, is_lonely, strict=True)]
+        texts = [f"{plane} {m.order}: {m.frequency_hz:.4g} Hz" for m in modes]
+        look = (spec.PLANE_HUES[plane], spec.PLANE_SYMBOLS[plane])
+        found += _marked_row(at, _MARK_ROWS[plane], *look, f"{plane} mode", texts, labels)
+    apart = [s for s in sheet.identification.set_aside if low_hz <= s.frequency_hz <= high_hz]
+    at = [each.frequency_hz for each in apart]
+    texts = [f"{each.kind}, {each.frequency_hz:.4g} Hz: {each.reason}" for each in apart]
+    name = "set aside"
+    return found + _marked_row(at, _SET_ASIDE_ROW, "red", "cross", name, texts, [], "dot")
+
+
+def _marked_row(
+    at: Sequence[float], height: float, colour: str, symbol: spec.Symbol, name: str,
+    texts: Sequence[str], labels: Sequence[str], dash: spec.Dash = "solid",
+) -> list[spec.Mark]:  # fmt: skip
+    if not at:
+        return []
+    x = [place for each in at for place in (each, each, math.nan)]
+    stems = [0.0, height, math.nan] * len(at)
+    return [
+        spec.Line(x=x, y=stems, in_shares=True, colour=colour, opacity=0.45, width=0.5, dash=dash),
+        spec.Points(
+            x=at, y=[height] * len(at), in_shares=True, colour=colour, symbol=symbol, size=4.0,
+            name=name, texts=texts, labels=labels,
+        ),
+    ]  # fmt: skip
+
+
+def with_headroom(low: float, high: float) -> tuple[float, float]:
+    """A range of which the upper part is left to the marks."""
+    return low, high + (high - low) * _HEADROOM / (1 - _HEADROOM)
+
+
+def with_headroom_log(low: float, high: float) -> tuple[float, float]:
+    """The same of a logarithmic axis."""
+    lowest, highest = with_headroom(math.log10(low), math.log10(high))
+    return 10**lowest, 10**highest
+
 
 # Layout: curves that can be told apart, and as many bins as a page has dots.
 _MOST_POINTS = 4
@@ -42,7 +215,7 @@ _BINS = 550
 _HOVER = "%{x:.2f} Hz: %{y:.4g}"
 
 
-def _draw(shown: Shown) -> Specification | None:
+def _draw(shown: Shown) -> spec.Specification | None:
     found, points = shown.spectrum, _points(shown)
     if found is None or not points:
         return None
@@ -56,8 +229,8 @@ def _draw(shown: Shown) -> Specification | None:
             panels.append(_phase(shown, response, index, band_hz))
     if response is not None and response.coherence is not None:
         panels.append(_coherence(shown, response, points, band_hz))
-    panels[-1] = replace(panels[-1], x=Axis(label="frequency (Hz)", range=band_hz))
-    return stacked(panels, sum(panel.height for panel in panels) + 0.7, legend_columns=3)
+    panels[-1] = replace(panels[-1], x=spec.Axis(label="frequency (Hz)", range=band_hz))
+    return spec.stacked(panels, sum(panel.height for panel in panels) + 0.7, legend_columns=3)
 
 
 def _points(shown: Shown) -> list[int]:
@@ -77,11 +250,11 @@ def _lines(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> slice:
 
 def _magnitude(
     shown: Shown, found: Spectrum, index: int, band_hz: tuple[float, float]
-) -> Panel:  # fmt: skip
+) -> spec.Panel:  # fmt: skip
     point, fit = found.points[index], shown.sheet.identification.fit
     lines = _lines(found.frequency_hz, band_hz)
     frequency_hz, values = found.frequency_hz[lines], found.values[index, lines]
-    marks: list[Mark] = [_curve(frequency_hz, values, point, 1.7, "measured")]
+    marks: list[spec.Mark] = [_curve(frequency_hz, values, point, 1.7, "measured")]
     if fit is not None:
         fitted = np.abs(fit[index, lines])
         marks.append(_curve(frequency_hz, fitted, None, 0.6, "fit of the modes"))
@@ -89,8 +262,8 @@ def _magnitude(
     # From the floor of the curve to its top, with room above for the marks.
     extent = (0.5 * float(np.quantile(known, 0.02)), 1.5 * float(known.max())) if len(known) else ()
     label = found.quantity.replace(" (", "\n(", 1)
-    return Panel(
-        y=Axis(label=label, scale="log", range=with_headroom_log(*extent) if extent else None),
+    return spec.Panel(
+        y=spec.Axis(label=label, scale="log", range=with_headroom_log(*extent) if extent else None),
         marks=[*marks, *mode_marks(shown.sheet, *band_hz)],
         title="" if shown.is_on_screen else point_name(point), height=1.35,
     )  # fmt: skip
@@ -98,32 +271,32 @@ def _magnitude(
 
 def _curve(
     frequency_hz: FloatArray, values: FloatArray, point: ResponsePoint | None, width: float,
-    name: str = "", dash: Dash = "solid",
-) -> Line:  # fmt: skip
+    name: str = "", dash: spec.Dash = "solid",
+) -> spec.Line:  # fmt: skip
     """In the colour of the point's plane; dark without one."""
-    places = envelope_places(values, _BINS)
-    return Line(
+    places = spec.envelope_places(values, _BINS)
+    return spec.Line(
         x=frequency_hz[places], y=values[places], width=width, name=name, dash=dash, hover=_HOVER,
-        colour=plane_colour(point.plane) if point else "ink",
+        colour=spec.plane_colour(point.plane) if point else "ink",
     )  # fmt: skip
 
 
 def _phase(
     shown: Shown, response: FrequencyResponse, index: int, band_hz: tuple[float, float]
-) -> Panel:
+) -> spec.Panel:
     """Phase from -90 to 270 degrees, so that 0 and 180, between which it jumps, lie inside."""
     lines, fit = _lines(response.frequency_hz, band_hz), shown.sheet.identification.fit
     measured = response.accelerance[index, lines]
     # Of noise, phase fills the whole panel: the strongest line of each bin stands for it.
-    places = peak_places(np.abs(measured), min(2 * _BINS, len(measured)))
+    places = spec.peak_places(np.abs(measured), min(2 * _BINS, len(measured)))
     frequency_hz = response.frequency_hz[lines][places]
-    colour = plane_colour(response.points[index].plane)
+    colour = spec.plane_colour(response.points[index].plane)
     look: dict[str, Any] = {"x": frequency_hz, "hover": _HOVER}
-    marks = [Line(y=_degrees(measured[places]), colour=colour, width=1.3, **look)]
+    marks = [spec.Line(y=_degrees(measured[places]), colour=colour, width=1.3, **look)]
     if fit is not None:
-        marks.append(Line(y=_degrees(fit[index, lines][places]), width=0.6, **look))
-    axis = Axis(label="phase (°)", range=(-95, 275), ticks=(0, 180))
-    return Panel(y=axis, marks=marks, height=0.62)
+        marks.append(spec.Line(y=_degrees(fit[index, lines][places]), width=0.6, **look))
+    axis = spec.Axis(label="phase (°)", range=(-95, 275), ticks=(0, 180))
+    return spec.Panel(y=axis, marks=marks, height=0.62)
 
 
 def _degrees(values: ComplexArray) -> FloatArray:
@@ -132,16 +305,16 @@ def _degrees(values: ComplexArray) -> FloatArray:
 
 def _coherence(
     shown: Shown, response: FrequencyResponse, points: Sequence[int], band_hz: tuple[float, float]
-) -> Panel:
+) -> spec.Panel:
     assert response.coherence is not None
     lines, marks, seen = _lines(response.frequency_hz, band_hz), [], set()
     for index in points:
         point, values = response.points[index], response.coherence[index, lines]
-        dash: Dash = "dash" if point.plane in seen else "solid"
+        dash: spec.Dash = "dash" if point.plane in seen else "solid"
         seen.add(point.plane)
         marks.append(_curve(response.frequency_hz[lines], values, point, 0.7, dash=dash))
-    axis = Axis(label="coherence", range=(0, 1.05), ticks=(0, 0.5, 1))
-    return Panel(y=axis, marks=marks, height=0.7)
+    axis = spec.Axis(label="coherence", range=(0, 1.05), ticks=(0, 0.5, 1))
+    return spec.Panel(y=axis, marks=marks, height=0.7)
 
 
 def point_name(point: ResponsePoint) -> str:
@@ -193,4 +366,4 @@ def _alt(shown: Shown) -> str:
     return f"{kind} with {len(modes)} identified modes: {listed}."
 
 
-FIGURE = Member("response", "Response and modes", _draw, _caption, _alt)
+FIGURE = spec.Member("response", "Response and modes", _draw, _caption, _alt)

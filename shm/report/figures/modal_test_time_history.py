@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shm.identify import Hit
 from shm.report import formatting
 from shm.report.contents import ModalTestReport
-from shm.report.figures.modal_test_signals import (
+from shm.report.figures import specification as spec
+from shm.report.figures.modal_test_hits import (
     HitRecord,
     borders_s,
     channel_of,
@@ -22,20 +23,11 @@ from shm.report.figures.modal_test_signals import (
     thinned,
     unknown_times_s,
 )
-from shm.report.figures.modal_test_spectra import Shown
-from shm.report.figures.specification import (
-    Axis,
-    Line,
-    Mark,
-    Member,
-    Panel,
-    Points,
-    Rule,
-    Specification,
-    envelope_places,
-    plane_colour,
-)
+from shm.report.figures.modal_test_response import Shown
 from shm.values import FloatArray
+
+if TYPE_CHECKING:
+    from shm.identify import Hit
 
 _MOST_NUMBERS = 40
 _ZOOM_INCHES = 1.9
@@ -49,7 +41,7 @@ _MARKS_AT, _ROOM = 0.84, 0.35
 above the curve that is left to them, as a share of the curve's."""
 
 
-def _draw(shown: Shown) -> Specification | None:
+def _draw(shown: Shown) -> spec.Specification | None:
     sheet, records = shown.sheet, shown.sheet.recordings
     if not records or not records[0].accelerations:
         return None
@@ -59,45 +51,47 @@ def _draw(shown: Shown) -> Specification | None:
     panels = [_history(sheet, row, is_top=place == 0) for place, row in enumerate(rows)]
     end_s = offsets_s(records)[-1] + records[-1].duration_s
     several = "" if len(records) == 1 else ", the records one after the other"
-    across = Axis(label=f"time{several} (s)", range=(-_LEAD * end_s, end_s))
+    across = spec.Axis(label=f"time{several} (s)", range=(-_LEAD * end_s, end_s))
     panels[-1] = replace(panels[-1], x=across)
     typical = None if shown.is_on_screen else _typical(sheet)
     near = [_near(sheet, typical)] if typical else []
     height = sum(p.height for p in panels) + 0.9 + (_ZOOM_INCHES if near else 0)
-    return Specification(
+    return spec.Specification(
         rows=[*([panel] for panel in panels), *near], height_inches=height, legend_columns=3
     )
 
 
-def _history(sheet: ModalTestReport, row: int | None, is_top: bool) -> Panel:
+def _history(sheet: ModalTestReport, row: int | None, is_top: bool) -> spec.Panel:
     records, channel = sheet.recordings, channel_of(sheet.recordings[0], row)
     assert channel is not None
     time_s, values = thinned(records, row)
-    colour = "ink" if row is None else plane_colour(channel.plane)
+    colour = "ink" if row is None else spec.plane_colour(channel.plane)
     unit = "N" if row is None else "m/s²"
-    marks: list[Mark] = [
-        Line(x=time_s, y=values, colour=colour, width=0.6, hover=f"%{{x:.3f}} s: %{{y:.4g}} {unit}")
+    marks: list[spec.Mark] = [
+        spec.Line(
+            x=time_s, y=values, colour=colour, width=0.6, hover=f"%{{x:.3f}} s: %{{y:.4g}} {unit}"
+        )
     ]
     # The largest value that can be recorded, where the signal comes near.
     if np.nanmax(np.abs(values), initial=0.0) > 0.5 * channel.full_scale:
         ends = (-channel.full_scale, channel.full_scale)
-        marks += [Rule(at=end, colour="red", width=0.8, dash="dash") for end in ends]
+        marks += [spec.Rule(at=end, colour="red", width=0.8, dash="dash") for end in ends]
     if len(unknown := unknown_times_s(records, row)):
         marks.append(
-            Points(
+            spec.Points(
                 x=unknown, y=np.full(len(unknown), 0.04), in_shares=True, symbol="tick", size=5,
                 colour="red", name="not a number", hover="%{x:.3f} s",
             )
         )  # fmt: skip
     marks += [
-        Rule(at=at_s, axis="x", colour="quiet", width=0.8, dash="dot")
+        spec.Rule(at=at_s, axis="x", colour="quiet", width=0.8, dash="dot")
         for at_s in borders_s(records)
     ]
     marks += _hit_marks(sheet) if is_top else _hit_lines(sheet)
     title, title_colour = _title(sheet, row)
     label = "force (N)" if row is None else "m/s²"
-    return Panel(
-        y=Axis(label=label, range=_range(values, row, _ROOM if is_top else 0.0)), marks=marks,
+    return spec.Panel(
+        y=spec.Axis(label=label, range=_range(values, row, _ROOM if is_top else 0.0)), marks=marks,
         title=title, title_colour=title_colour, height=1.25 if row is None else 0.95,
     )  # fmt: skip
 
@@ -123,9 +117,9 @@ def _title(sheet: ModalTestReport, row: int | None) -> tuple[str, str]:
     return (f"{title}, left out: {fault}", "red") if fault else (title, "ink")
 
 
-def _hit_lines(sheet: ModalTestReport) -> list[Mark]:
+def _hit_lines(sheet: ModalTestReport) -> list[spec.Mark]:
     return [
-        Rule(
+        spec.Rule(
             at=hit_time_s(sheet, hit), axis="x", colour="green" if hit.used else "red", width=0.7,
             opacity=0.7, dash="solid" if hit.used else "dash",
         )
@@ -133,17 +127,17 @@ def _hit_lines(sheet: ModalTestReport) -> list[Mark]:
     ]  # fmt: skip
 
 
-def _hit_marks(sheet: ModalTestReport) -> list[Mark]:
+def _hit_marks(sheet: ModalTestReport) -> list[spec.Mark]:
     """A row of numbered symbols for the hits that were used, and for each reason to drop some."""
     located = located_hits(sheet)
     groups: dict[str, list[tuple[int, Hit]]] = {}
     for number, hit in located:
         groups.setdefault("" if hit.used else hit.reason, []).append((number, hit))
-    found: list[Mark] = []
+    found: list[spec.Mark] = []
     for reason, hits in groups.items():
         counted = formatting.counted(len(hits), "hit")
         found.append(
-            Points(
+            spec.Points(
                 x=[hit_time_s(sheet, hit) for _, hit in hits], y=[_MARKS_AT] * len(hits),
                 in_shares=True, symbol="cross" if reason else "triangle down", size=5,
                 colour="red" if reason else "green",
@@ -170,35 +164,35 @@ def _typical(sheet: ModalTestReport) -> HitRecord | None:
     return hits[len(hits) // 2] if hits else None
 
 
-def _near(sheet: ModalTestReport, near: HitRecord) -> list[Panel]:
+def _near(sheet: ModalTestReport, near: HitRecord) -> list[spec.Panel]:
     record, start = sheet.recordings[near.hit.record], near.hit.start
     force, motion = record.force, channel_of(record, strongest_row(sheet))
     assert force is not None
     assert motion is not None
     rate = record.sampling_rate_hz
-    across = Axis(label=f"time from the start of hit {near.number} (ms)")
+    across = spec.Axis(label=f"time from the start of hit {near.number} (ms)")
     name = formatting.place(motion.name, motion.plane, motion.x_m)
     return [
-        Panel(
-            y=Axis(label="force (N)"), marks=_zoom(force.values, rate, start, near.near_s),
+        spec.Panel(
+            y=spec.Axis(label="force (N)"), marks=_zoom(force.values, rate, start, near.near_s),
             x=across, height=_ZOOM_INCHES,
         ),
-        Panel(
-            y=Axis(label="m/s²"), marks=_zoom(motion.values, rate, start, _MOTION_NEAR_S), x=across,
-            title=name,
+        spec.Panel(
+            y=spec.Axis(label="m/s²"), marks=_zoom(motion.values, rate, start, _MOTION_NEAR_S),
+            x=across, title=name,
         ),
     ]  # fmt: skip
 
 
 def _zoom(
     values: FloatArray, rate: float, start: int, span_s: tuple[float, float]
-) -> list[Mark]:  # fmt: skip
+) -> list[spec.Mark]:  # fmt: skip
     first = max(0, start + int(span_s[0] * rate))
     part = values[first : start + int(span_s[1] * rate) + 2]
-    places = envelope_places(part, _NEAR_BINS)
+    places = spec.envelope_places(part, _NEAR_BINS)
     time_ms = 1e3 * (first + places - start) / rate
-    curve = Line(x=time_ms, y=part[places], width=0.8, dots=len(part) <= _MOST_DOTS)
-    return [curve, Rule(at=0, axis="x", colour="green", width=0.7)]
+    curve = spec.Line(x=time_ms, y=part[places], width=0.8, dots=len(part) <= _MOST_DOTS)
+    return [curve, spec.Rule(at=0, axis="x", colour="green", width=0.7)]
 
 
 def _caption(shown: Shown) -> str:
@@ -231,4 +225,4 @@ def _alt(shown: Shown) -> str:
     return f"The signals of {seconds:.3g} s of records; {used} used{left}."
 
 
-FIGURE = Member("time_history", "Time histories with the hits", _draw, _caption, _alt)
+FIGURE = spec.Member("time_history", "Time histories with the hits", _draw, _caption, _alt)

@@ -9,16 +9,7 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import HangerReport
-from shm.report.figures.specification import (
-    Axis,
-    Bars,
-    Mark,
-    Member,
-    Panel,
-    Points,
-    Specification,
-    limits,
-)
+from shm.report.figures import specification as spec
 from shm.report.figures.style import WIDTH_INCHES
 from shm.values import FloatArray, Posterior
 from shm.values.rounding import force_unit
@@ -48,10 +39,10 @@ class _Column:
 
     @property
     def range(self) -> tuple[float, float]:
-        return limits(self.samples, room=0.03)
+        return spec.limits(self.samples, room=0.03)
 
 
-def specify(posterior: Posterior) -> Specification:
+def specify(posterior: Posterior) -> spec.Specification:
     """A histogram of each parameter on the diagonal, draws of each two below it.
 
     Their correlation stands above the diagonal. A cross is the most probable value.
@@ -70,37 +61,37 @@ def specify(posterior: Posterior) -> Specification:
         for row in range(len(columns))
     ]
     height = min(WIDTH_INCHES, _PANEL_INCHES * len(columns))
-    return Specification(rows=rows, height_inches=height, is_grid=True)
+    return spec.Specification(rows=rows, height_inches=height, is_grid=True)
 
 
-def marginals(posterior: Posterior, names: Sequence[str]) -> Specification:
+def marginals(posterior: Posterior, names: Sequence[str]) -> spec.Specification:
     """A histogram of each of these parameters, side by side."""
     columns = [_column(posterior, name) for name in names]
     panels = [_histogram([each], 0) for each in columns]
-    return Specification(rows=[panels], height_inches=_ALONE_INCHES)
+    return spec.Specification(rows=[panels], height_inches=_ALONE_INCHES)
 
 
-def pair(posterior: Posterior, x_name: str, y_name: str) -> Specification:
+def pair(posterior: Posterior, x_name: str, y_name: str) -> spec.Specification:
     """All draws of two parameters, coloured by their likelihood: under even priors, the posterior
     density with the other parameters as drawn."""
     x, y = _column(posterior, x_name), _column(posterior, y_name)
     share = np.argsort(np.argsort(posterior.log_likelihood)) / len(x.samples)
     bounds = np.linspace(0, 1, len(_BY_DENSITY) + 1)
-    clouds: list[Mark] = []
+    clouds: list[spec.Mark] = []
     for place, (name, colour) in enumerate(_BY_DENSITY.items()):
         own = (share >= bounds[place]) & (share < bounds[place + 1])
         clouds.append(
-            Points(x=x.samples[own], y=y.samples[own], size=2.5, colour=colour, name=name)
+            spec.Points(x=x.samples[own], y=y.samples[own], size=2.5, colour=colour, name=name)
         )
-    best = Points(
+    best = spec.Points(
         x=[x.most_probable], y=[y.most_probable], symbol="cross", size=7, name="most probable"
     )
-    panel = Panel(
-        x=Axis(label=x.label, range=x.range),
-        y=Axis(label=y.label, range=y.range),
+    panel = spec.Panel(
+        x=spec.Axis(label=x.label, range=x.range),
+        y=spec.Axis(label=y.label, range=y.range),
         marks=[*clouds, best],
     )
-    return Specification(rows=[[panel]], height_inches=2 * _ALONE_INCHES, legend_columns=5)
+    return spec.Specification(rows=[[panel]], height_inches=2 * _ALONE_INCHES, legend_columns=5)
 
 
 def _columns(posterior: Posterior) -> list[_Column]:
@@ -120,40 +111,41 @@ def _column(posterior: Posterior, name: str) -> _Column:
     return _Column(name.replace("log10_", "log10 "), samples, best)
 
 
-def _draws(columns: list[_Column], row: int, column: int) -> Panel:
+def _draws(columns: list[_Column], row: int, column: int) -> spec.Panel:
     x, y = columns[column], columns[row]
     chosen = slice(None, None, max(1, -(-len(x.samples) // _MOST_SAMPLES)))
     hover = f"{x.label} %{{x:.4g}}<br>{y.label} %{{y:.4g}}"
-    cloud = Points(
+    cloud = spec.Points(
         x=x.samples[chosen], y=y.samples[chosen], size=2.0, colour="blue", opacity=0.5, hover=hover
     )
-    best = Points(
+    best = spec.Points(
         x=[x.most_probable], y=[y.most_probable], symbol="cross", size=5, colour="orange",
         hover=f"most probable:<br>{hover}",
     )  # fmt: skip
     is_lowest = row == len(columns) - 1
-    return Panel(
-        y=Axis(label="" if column else y.label, range=y.range, most_ticks=3), marks=[cloud, best],
-        x=Axis(label=x.label if is_lowest else "", range=x.range, most_ticks=3),
+    return spec.Panel(
+        y=spec.Axis(label="" if column else y.label, range=y.range, most_ticks=3),
+        marks=[cloud, best],
+        x=spec.Axis(label=x.label if is_lowest else "", range=x.range, most_ticks=3),
         shares_y=column > 0,
     )  # fmt: skip
 
 
-def _histogram(columns: list[_Column], number: int) -> Panel:
+def _histogram(columns: list[_Column], number: int) -> spec.Panel:
     own = columns[number]
     heights, edges = np.histogram(own.samples, bins=_BINS)
-    bars = Bars(
+    bars = spec.Bars(
         x=(edges[:-1] + edges[1:]) / 2, y=heights / max(heights.max(), 1), colour="blue",
         width=float(edges[1] - edges[0]), opacity=0.75, hover=f"{own.label} %{{x:.4g}}",
     )  # fmt: skip
     label = own.label if number == len(columns) - 1 else ""
-    across = Axis(label=label, range=own.range, most_ticks=3)
-    return Panel(y=Axis(range=(0, 1.08), ticks=(), grid=False), marks=[bars], x=across)
+    across = spec.Axis(label=label, range=own.range, most_ticks=3)
+    return spec.Panel(y=spec.Axis(range=(0, 1.08), ticks=(), grid=False), marks=[bars], x=across)
 
 
-def _in_words(correlation: float) -> Panel:
+def _in_words(correlation: float) -> spec.Panel:
     told = f"{correlation:+z.2f}" if np.isfinite(correlation) else "constant"
-    return Panel(y=Axis(), marks=[], x=Axis(), words=told)
+    return spec.Panel(y=spec.Axis(), marks=[], x=spec.Axis(), words=told)
 
 
 def _correlation(columns: list[_Column]) -> FloatArray:
@@ -195,7 +187,7 @@ def alt(posterior: Posterior) -> str:
     return f"Samples of {len(columns)} parameters; the strongest correlations: {told}."
 
 
-FIGURE = Member[HangerReport](
+FIGURE = spec.Member[HangerReport](
     "pairs",
     "What the latest posterior leaves open",
     lambda data: specify(data.posterior),

@@ -9,19 +9,7 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from shm.report import formatting
-from shm.report.figures.specification import (
-    Axis,
-    Band,
-    Heat,
-    Line,
-    Mark,
-    Panel,
-    Rule,
-    Span,
-    Specification,
-    limits,
-    stacked,
-)
+from shm.report.figures import specification as spec
 from shm.values import FloatArray
 from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PERIODS, Period, StreamEvent
@@ -66,63 +54,69 @@ class Course:
         return {name: self.modes[name] for name in names if seen[name]}
 
 
-def specify(course: Course) -> Specification:
+def specify(course: Course) -> spec.Specification:
     """Panels over one time axis: spectrum, frequencies, tension with what befell the sensors."""
     when = [*course.window_times, *course.hours]
-    time = Axis(label="time (UTC)", scale="date", range=(min(when), max(when)))
+    time = spec.Axis(label="time (UTC)", scale="date", range=(min(when), max(when)))
     panels = [_spectrogram(course)] if course.spectrum_db.size else []
     panels += [_frequencies(course)]
     panels += [_tension(course)] if course.has_tension else []
-    panels[-1] = Panel(**{**vars(panels[-1]), "x": time})
-    return stacked(panels, 6.4)
+    panels[-1] = spec.Panel(**{**vars(panels[-1]), "x": time})
+    return spec.stacked(panels, 6.4)
 
 
-def _spectrogram(course: Course) -> Panel:
+def _spectrogram(course: Course) -> spec.Panel:
     z = course.spectrum_db.T
     floor, top = np.nanquantile(z, [0.1, 0.995])
-    heat = Heat(x=course.window_times, y=course.line_hz, z=np.clip(z, floor, top), colour="ink")
-    return Panel(
-        y=Axis(label="frequency (Hz)", grid=False), marks=[heat], height=1.4, title_side="left",
-        title="Spectrum",
+    heat = spec.Heat(
+        x=course.window_times, y=course.line_hz, z=np.clip(z, floor, top), colour="ink"
+    )
+    return spec.Panel(
+        y=spec.Axis(label="frequency (Hz)", grid=False), marks=[heat], height=1.4,
+        title_side="left", title="Spectrum",
     )  # fmt: skip
 
 
-def _frequencies(course: Course) -> Panel:
-    marks: list[Mark] = []
+def _frequencies(course: Course) -> spec.Panel:
+    marks: list[spec.Mark] = []
     for (name, (hz, sd)), hue in zip(course.followed.items(), _HUES, strict=False):
         middle = float(np.nanmedian(hz))
         shift, reach = 100 * (hz / middle - 1), 100 * NINETY_PERCENT * sd / middle
         times, shift, reach = _broken(course, shift, reach)
-        marks.append(Band(x=times, low=shift - reach, high=shift + reach, colour=hue, opacity=0.2))
+        marks.append(
+            spec.Band(x=times, low=shift - reach, high=shift + reach, colour=hue, opacity=0.2)
+        )
         texts = [f"{name}: {middle * (1 + each / 100):.4f} Hz" for each in shift]
-        marks.append(Line(x=times, y=shift, colour=hue, name=f"{name} ({middle:.3g} Hz)",
-                          texts=texts))  # fmt: skip
-    return Panel(
-        y=Axis(label="change (%)"), marks=marks, title="Tracked frequencies", title_side="left"
+        label = f"{name} ({middle:.3g} Hz)"
+        marks.append(spec.Line(x=times, y=shift, colour=hue, name=label, texts=texts))
+    return spec.Panel(
+        y=spec.Axis(label="change (%)"), marks=marks, title="Tracked frequencies", title_side="left"
     )
 
 
-def _tension(course: Course) -> Panel:
+def _tension(course: Course) -> spec.Panel:
     low, middle, high = course.tension.low, course.tension.middle, course.tension.high
     times, middle, reach = _broken(course, middle, (high - low) / 2)
     texts = [f"{each:+.2f} %" for each in middle]
-    marks: list[Mark] = [
-        Rule(at=0.0, colour="quiet", dash="dash"),
-        Band(x=times, low=middle - reach, high=middle + reach, colour="ink", opacity=0.15),
-        Line(x=times, y=middle, colour="ink", width=1.3, name="tension", texts=texts),
+    marks: list[spec.Mark] = [
+        spec.Rule(at=0.0, colour="quiet", dash="dash"),
+        spec.Band(x=times, low=middle - reach, high=middle + reach, colour="ink", opacity=0.15),
+        spec.Line(x=times, y=middle, colour="ink", width=1.3, name="tension", texts=texts),
         *_health(course.events),
     ]
-    return Panel(
-        y=Axis(label="change (%)", range=limits(low, high, [-0.5, 0.5])), marks=marks,
+    return spec.Panel(
+        y=spec.Axis(label="change (%)", range=spec.limits(low, high, [-0.5, 0.5])), marks=marks,
         title="Tension since the beginning, 90 % interval", title_side="left", height=1.2,
     )  # fmt: skip
 
 
-def _health(events: Sequence[StreamEvent]) -> list[Span]:
+def _health(events: Sequence[StreamEvent]) -> list[spec.Span]:
     told = [each for each in events if each.kind in _OF_HEALTH]
     return [
-        Span(low=each.start, high=max(each.end, each.start + timedelta(minutes=10)), opacity=0.15,
-             colour="red", name="sensor or clock at fault")
+        spec.Span(
+            low=each.start, high=max(each.end, each.start + timedelta(minutes=10)), opacity=0.15,
+            colour="red", name="sensor or clock at fault",
+        )
         for each in told
     ]  # fmt: skip
 

@@ -5,7 +5,7 @@ a word stands beside each.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from shm.values import Verdict
 
@@ -71,6 +71,14 @@ def new_figure(height_inches: float = 3.4) -> Figure:
     return Figure(figsize=(WIDTH_INCHES, height_inches), layout="constrained", facecolor="none")
 
 
+def one_panel(x_label: str, y_label: str, height_inches: float = 3.4) -> tuple[Figure, Axes]:
+    """A figure of one panel, dressed."""
+    figure = new_figure(height_inches)
+    axes = figure.subplots()
+    dress(axes, x_label, y_label)
+    return figure, axes
+
+
 def stacked(figure: FigureBase, heights: Sequence[float]) -> list[Axes]:
     """Panels one below the other over one horizontal axis, with these shares of the height."""
     panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights, squeeze=False)
@@ -90,19 +98,17 @@ def dress(axes: Axes, x_label: str, y_label: str) -> None:
         spine.set_visible(side in ("left", "bottom"))
 
 
+_QUIET_LEGEND: dict[str, Any] = {
+    "labelcolor": INK, "frameon": False, "borderaxespad": 0.2, "columnspacing": 1.4
+}  # fmt: skip
+
+
 def legend_above(axes: Axes, columns: int = 4) -> Legend:
     """A legend over the plot, where it hides no data."""
     return axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=columns,
-        fontsize=_SMALL,
-        labelcolor=INK,
-        frameon=False,
-        borderaxespad=0.2,
-        handlelength=1.6,
-        columnspacing=1.4,
-    )
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, fontsize=_SMALL,
+        handlelength=1.6, **_QUIET_LEGEND,
+    )  # fmt: skip
 
 
 def legend_of_figure(
@@ -120,9 +126,6 @@ def legend_of_figure(
             loc=where,  # type: ignore[call-overload]
             ncols=columns,
             fontsize=TINY + 1,
-            labelcolor=INK,
-            frameon=False,
-            borderaxespad=0.2,
             handlelength=2.0,
-            columnspacing=1.4,
+            **_QUIET_LEGEND,
         )

@@ -9,18 +9,7 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from shm.report.contents import HangerReport, TrendRow
-from shm.report.figures.specification import (
-    Axis,
-    Band,
-    Dash,
-    Line,
-    Mark,
-    Points,
-    Rule,
-    Span,
-    Values,
-    envelope_places,
-)
+from shm.report.figures import specification as spec
 from shm.report.formatting import Interval
 from shm.report.states import CalledChange
 from shm.values import FloatArray, IntArray
@@ -61,7 +50,7 @@ def places(*curves: FloatArray, always: Collection[int] = ()) -> IntArray:
     count = len(curves[0])
     if count <= MOST_POINTS:
         return np.arange(count)
-    chosen = [envelope_places(curve, _BINS) for curve in curves]
+    chosen = [spec.envelope_places(curve, _BINS) for curve in curves]
     kept = np.array(sorted({0, count - 1, *always}), dtype=np.int64)
     return np.unique(np.concatenate([*chosen, kept]))
 
@@ -85,14 +74,14 @@ def part(bounds: Bounds, chosen: IntArray, scale: float = 1.0) -> Bounds:
     return Bounds(scale * low, scale * middle, scale * high)
 
 
-def band(times: Sequence[datetime], bounds: Bounds, colour: str, name: str = "") -> list[Mark]:
+def band(times: Sequence[datetime], bounds: Bounds, colour: str, name: str = "") -> list[spec.Mark]:
     """A band and, under a name, its middle line."""
-    marks: list[Mark] = [
-        Band(x=times, low=bounds.low, high=bounds.high, colour=colour, opacity=0.2)
+    marks: list[spec.Mark] = [
+        spec.Band(x=times, low=bounds.low, high=bounds.high, colour=colour, opacity=0.2)
     ]
     if name:
         marks.append(
-            Line(
+            spec.Line(
                 x=times, y=bounds.middle, colour=colour, width=1.5, name=name, hover="%{text}",
                 texts=spans(bounds),
             )
@@ -107,29 +96,29 @@ def spans(bounds: Bounds) -> list[str]:
 
 
 def single_tests(
-    x: Values, bounds: Bounds, names: Sequence[str], colour: str,
+    x: spec.Values, bounds: Bounds, names: Sequence[str], colour: str,
     name: str = "test by itself", size: float = 3.6,
-) -> Points:  # fmt: skip
+) -> spec.Points:  # fmt: skip
     """Single tests as marks with their 90 % intervals."""
     told = zip(names, spans(bounds), strict=True)
-    return Points(
+    return spec.Points(
         x=x, y=bounds.middle, low=bounds.low, high=bounds.high, caps=False, colour=colour,
         size=size, name=name, texts=[f"{test}: {span}" for test, span in told],
     )  # fmt: skip
 
 
-def level(value: float, name: str, colour: str, dash: Dash) -> Rule:
-    return Rule(at=value, name=name, colour=colour, dash=dash, width=1.1, hover="%{y:.4g}")
+def level(value: float, name: str, colour: str, dash: spec.Dash) -> spec.Rule:
+    return spec.Rule(at=value, name=name, colour=colour, dash=dash, width=1.1, hover="%{y:.4g}")
 
 
 def changes(
     called: Sequence[CalledChange], times: Sequence[datetime], with_words: bool = True
-) -> list[Span]:
+) -> list[spec.Span]:
     """When each called change began, the words of later ones a line lower."""
     first, last = min(times), max(times)
     thin, middle = _THINNEST * (last - first), first + (last - first) / 2
     return [
-        Span(
+        spec.Span(
             low=min(change.began_after, change.began_by - thin), high=change.began_by,
             colour="purple", opacity=0.25, name="change began", label_line=line,
             label=change.words if with_words else "",
@@ -139,11 +128,11 @@ def changes(
     ]  # fmt: skip
 
 
-def time_axis(times: Sequence[datetime]) -> Axis:
+def time_axis(times: Sequence[datetime]) -> spec.Axis:
     """All tests with a little room, at least a day either side."""
     first, last = min(times), max(times)
     margin = max(_MARGIN * (last - first), _LEAST_MARGIN)
-    return Axis(label=TIME, scale="date", range=(first - margin, last + margin))
+    return spec.Axis(label=TIME, scale="date", range=(first - margin, last + margin))
 
 
 def inner(values: FloatArray) -> FloatArray:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap
-from matplotlib.figure import Figure
 
 from shm.report import formatting
 from shm.report.figures import style
@@ -16,6 +14,10 @@ from shm.report.figures.specification import Member
 from shm.report.trial_scores import RICHNESS, find, judged, large, value
 from shm.values import Bin, CaseScore, MarkName, Richness, Score, TrialScore
 from shm.values.diagnosis import parted
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 def points(
@@ -117,7 +119,6 @@ DETECTION = Member(
 
 _NOTHING, _TWO, _UNKNOWN = "nothing", "two effects", "not in the catalogue"
 _NO_GAP, _PAIR, _UNEXPLAINED, _FAILED = "no gap", "a pair", "unexplained", "failed"
-_SHADES = LinearSegmentedColormap.from_list("share", ["#ffffff00", style.BLUE])
 _DARK = 0.55  # layout: of the darkest; beyond, letters are white
 
 
@@ -143,16 +144,18 @@ def _confusion(score: TrialScore) -> tuple[list[str], list[str], Counter[tuple[s
 
 
 def _draw_confusion(score: TrialScore) -> Figure | None:
+    # What draws is loaded where something is drawn.
+    from matplotlib.colors import LinearSegmentedColormap
+
     rows, columns, counts = _confusion(score)
     if not rows:
         return None
+    shades = LinearSegmentedColormap.from_list("share", ["#ffffff00", style.BLUE])
     table = np.array([[counts[row, column] for column in columns] for row in rows], dtype=float)
     share = table / table.sum(axis=1, keepdims=True)
-    figure = style.new_figure(0.23 * len(rows) + 2.3)
-    axes = figure.subplots()
-    style.dress(axes, "said", "planted")
+    figure, axes = style.one_panel("said", "planted", 0.23 * len(rows) + 2.3)
     axes.grid(False)
-    axes.imshow(share, cmap=_SHADES, vmin=0, vmax=1, aspect="auto")
+    axes.imshow(share, cmap=shades, vmin=0, vmax=1, aspect="auto")
     for row, column in np.argwhere(table > 0):
         dark = share[row, column] > _DARK
         axes.text(
@@ -225,9 +228,7 @@ def _draw_left_out(score: TrialScore) -> Figure | None:
     rows = _left_out(score)
     if not rows:
         return None
-    figure = style.new_figure(0.36 * len(rows) + 1.1)
-    axes = figure.subplots()
-    style.dress(axes, "share of the cases", "")
+    figure, axes = style.one_panel("share of the cases", "", 0.36 * len(rows) + 1.1)
     done = [0.0] * len(rows)
     for name, colour in _OUTCOMES.items():
         shares = [counts[name] / counts.total() for _, counts in rows]

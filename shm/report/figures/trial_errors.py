@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from shm.report.figures import style
 from shm.report.figures.specification import Member
@@ -14,14 +13,16 @@ from shm.report.figures.trial_answers import name_richness, of_richness, points
 from shm.report.trial_scores import find, judged, value
 from shm.values import CaseScore, MarkName, PlantedKind, Richness, TrialScore, Way
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 def _draw_reliability(score: TrialScore) -> Figure | None:
     bins = score.reliability
     if not bins:
         return None
-    figure = style.new_figure(3.6)
-    axes = figure.subplots()
-    style.dress(axes, "probability of what leads", "share that is right")
+    figure, axes = style.one_panel("probability of what leads", "share that is right", 3.6)
     axes.plot([0, 1], [0, 1], color=style.QUIET, linewidth=1.0, linestyle=":", label="just right")
     points(
         axes, [each.mean for each in bins], [each.score for each in bins], style.BLUE,
@@ -81,9 +82,7 @@ def _draw_log_score(score: TrialScore) -> Figure | None:
     found = of_richness(score, "log score")
     if not found:
         return None
-    figure = style.new_figure(2.8)
-    axes = figure.subplots()
-    style.dress(axes, "", "log score")
+    figure, axes = style.one_panel("", "log score", 2.8)
     points(axes, range(len(found)), [each for _, each in found], style.BLUE, "this trial")
     before = [_prototype(score, richness) for richness, _ in found]
     there = [(x, bound) for x, bound in enumerate(before) if math.isfinite(bound)]
@@ -153,9 +152,7 @@ def _draw_tension_errors(score: TrialScore) -> Figure | None:
     cases = _shown(score)
     if not cases:
         return None
-    figure = style.new_figure(4.2)
-    axes = figure.subplots()
-    style.dress(axes, "error of the tension before (%)", "after (%)")
+    figure, axes = style.one_panel("error of the tension before (%)", "after (%)", 4.2)
     for kind, (name, colour, marker) in _KINDS.items():
         own = np.array([_errors(case) for case in cases if case.kind == kind])
         if len(own):
@@ -287,9 +284,7 @@ def _draw_held_out(score: TrialScore) -> Figure | None:
     found = {way: ratios for way in _COLOURS if (ratios := _ratios(score, way))}
     if not found:
         return None
-    figure = style.new_figure(2.9)
-    axes = figure.subplots()
-    style.dress(axes, "held-out error, after over before", "share of cases below")
+    figure, axes = style.one_panel("held-out error, after over before", "share of cases below", 2.9)
     for way, ratios in found.items():
         axes.ecdf(ratios, color=_COLOURS[way], linewidth=1.5, label=f"{way} ({len(ratios)} cases)")
     axes.axvline(1.0, color=style.QUIET, linestyle=":", linewidth=1.0)

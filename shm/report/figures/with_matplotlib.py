@@ -14,25 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import MaxNLocator, NullFormatter, NullLocator, ScalarFormatter
 
+from shm.report.figures import specification as spec
 from shm.report.figures import style
-from shm.report.figures.specification import (
-    Axis,
-    Band,
-    Bars,
-    Dash,
-    Heat,
-    Line,
-    Mark,
-    Panel,
-    Place,
-    Points,
-    Rule,
-    Span,
-    Specification,
-)
 
 # Layout: points of dash and gap.
-_DASHES: dict[Dash, Any] = {
+_DASHES: dict[spec.Dash, Any] = {
     "solid": "-",
     "dash": "--",
     "dot": ":",
@@ -45,7 +31,7 @@ _SYMBOLS = {
 }  # fmt: skip
 
 
-def draw(figure: Specification) -> Figure:
+def draw(figure: spec.Specification) -> Figure:
     """The figure in the width of a page."""
     made = style.new_figure(figure.height_inches)
     places = list(_placed(made, figure))
@@ -64,7 +50,7 @@ def draw(figure: Specification) -> Figure:
     return made
 
 
-def _placed(made: Figure, figure: Specification) -> Iterable[tuple[Axes, Panel]]:
+def _placed(made: Figure, figure: spec.Specification) -> Iterable[tuple[Axes, spec.Panel]]:
     """The axes of each panel; those over one horizontal axis share it."""
     height, rows = figure.height_inches, figure.rows
     if figure.is_grid:
@@ -106,7 +92,7 @@ def _beside(grid: GridSpec, number: int, row: Any) -> list[Any]:
     return [parts[0, column] for column in range(len(row))]
 
 
-def _panel(axes: Axes, panel: Panel, figure: Specification) -> None:
+def _panel(axes: Axes, panel: spec.Panel, figure: spec.Specification) -> None:
     if panel.words:
         axes.set_axis_off()
         axes.text(
@@ -132,7 +118,7 @@ def _panel(axes: Axes, panel: Panel, figure: Specification) -> None:
         style.legend_above(axes, columns=2)
 
 
-def _scale(axes: Axes, letter: str, wanted: Axis) -> None:
+def _scale(axes: Axes, letter: str, wanted: spec.Axis) -> None:
     axis = axes.xaxis if letter == "x" else axes.yaxis
     if wanted.scale == "log":
         (axes.set_xscale if letter == "x" else axes.set_yscale)("log")
@@ -158,20 +144,20 @@ def _scale(axes: Axes, letter: str, wanted: Axis) -> None:
             axes.tick_params("y", length=0)
 
 
-def _look(axes: Axes, mark: Mark) -> dict[str, Any]:
+def _look(axes: Axes, mark: spec.Mark) -> dict[str, Any]:
     shares = {"transform": axes.get_xaxis_transform()} if mark.in_shares else {}
     colour = style.PALETTE[mark.colour]
     return {"color": colour, "alpha": mark.opacity, "label": mark.name or None, **shares}
 
 
-def _line(axes: Axes, mark: Line) -> None:
+def _line(axes: Axes, mark: spec.Line) -> None:
     axes.plot(
         mark.x, mark.y, linewidth=mark.width, linestyle=_DASHES[mark.dash],
         marker="." if mark.dots else "", markersize=3.5, **_look(axes, mark),
     )  # fmt: skip
 
 
-def _points(axes: Axes, mark: Points) -> None:
+def _points(axes: Axes, mark: spec.Points) -> None:
     look = {
         **_look(axes, mark), "marker": _SYMBOLS[mark.symbol], "markersize": mark.size,
         "markerfacecolor": None if mark.filled else "none", "linestyle": "none",
@@ -199,11 +185,11 @@ def _points(axes: Axes, mark: Points) -> None:
         )  # fmt: skip
 
 
-def _band(axes: Axes, mark: Band) -> None:
+def _band(axes: Axes, mark: spec.Band) -> None:
     axes.fill_between(mark.x, mark.low, mark.high, linewidth=0, **_look(axes, mark))
 
 
-def _bars(axes: Axes, mark: Bars) -> None:
+def _bars(axes: Axes, mark: spec.Bars) -> None:
     look = {**_look(axes, mark), "linewidth": 0}
     if mark.lying:
         bars = axes.barh(mark.x, mark.y, height=mark.width, left=mark.base, **look)
@@ -213,7 +199,7 @@ def _bars(axes: Axes, mark: Bars) -> None:
         axes.bar_label(bars, mark.labels, padding=5, fontsize=style.TINY + 0.5, color=style.INK)
 
 
-def _heat(axes: Axes, mark: Heat) -> None:
+def _heat(axes: Axes, mark: spec.Heat) -> None:
     code = style.PALETTE[mark.colour]
     shades = LinearSegmentedColormap.from_list(mark.colour, [(1, 1, 1, 0), to_rgba(code)])
     axes.pcolormesh(
@@ -221,7 +207,7 @@ def _heat(axes: Axes, mark: Heat) -> None:
     )
 
 
-def _rule(axes: Axes, mark: Rule) -> None:
+def _rule(axes: Axes, mark: spec.Rule) -> None:
     draw_it = axes.axvline if mark.axis == "x" else axes.axhline
     look = {**_look(axes, mark), "linewidth": mark.width, "linestyle": _DASHES[mark.dash]}
     draw_it(mark.at, **look)  # type: ignore[arg-type]
@@ -233,7 +219,7 @@ def _rule(axes: Axes, mark: Rule) -> None:
         )  # fmt: skip
 
 
-def _span(axes: Axes, mark: Span) -> None:
+def _span(axes: Axes, mark: spec.Span) -> None:
     draw_it = axes.axvspan if mark.axis == "x" else axes.axhspan
     draw_it(mark.low, mark.high, linewidth=0, **_look(axes, mark))  # type: ignore[arg-type]
     if mark.label:
@@ -247,16 +233,16 @@ def _span(axes: Axes, mark: Span) -> None:
         )  # fmt: skip
 
 
-def _place(value: Place) -> float:
+def _place(value: spec.Place) -> float:
     return float(date2num(value)) if isinstance(value, datetime) else value  # type: ignore[no-untyped-call]
 
 
-_DRAWN: dict[type[Mark], Any] = {
-    Line: _line,
-    Points: _points,
-    Band: _band,
-    Bars: _bars,
-    Heat: _heat,
-    Rule: _rule,
-    Span: _span,
+_DRAWN: dict[type[spec.Mark], Any] = {
+    spec.Line: _line,
+    spec.Points: _points,
+    spec.Band: _band,
+    spec.Bars: _bars,
+    spec.Heat: _heat,
+    spec.Rule: _rule,
+    spec.Span: _span,
 }

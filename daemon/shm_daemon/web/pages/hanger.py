@@ -17,8 +17,7 @@ from shm.report.diagnosis_report import answers, evidence
 from shm.report.hanger_report import facts, gap_part
 from shm.report.hanger_summary import details
 from shm.report.paper import Table
-from shm.report.shifts import temperature_table
-from shm.report.states import called_words
+from shm.report.states import called_words, temperature_table
 from shm.store import EventKind, Workspace
 from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Reader

@@ -10,13 +10,12 @@ from fastapi.responses import HTMLResponse
 
 from shm.errors import NothingThere
 from shm.report import formatting, modal_test_report
-from shm.report.figures.modal_test_response import point_name
-from shm.report.figures.modal_test_spectra import shown_points
+from shm.report.figures.modal_test_response import point_name, shown_points
 from shm.report.figures.style import VERDICT_STYLES
 from shm.report.formatting import Interval
 from shm.report.modal_test_report import name
 from shm.report.paper import Table, filled
-from shm.report.quality_table import headline, overall
+from shm.report.shared_tables import headline, overall
 from shm.values import ResponsePoint
 from shm.values.rounding import force_unit
 from shm_daemon.web.access import Reader

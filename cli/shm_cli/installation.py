@@ -1,4 +1,4 @@
-"""`shm notices`: what an installation brings along, under which licence each package stands."""
+"""`shm settings` and `shm notices`: what an installation holds: settings, other packages."""
 
 from __future__ import annotations
 
@@ -9,7 +9,65 @@ from importlib import metadata
 
 import rich_click as click
 
-from shm_cli.common import json_option, show, show_table, table
+from shm.settings import TABLE, Setting
+from shm_cli import flags
+from shm_cli.common import markdown, show, show_rows
+
+_HEADS = ("setting", "default", "unit", "range", "meaning")
+
+
+@click.command("settings")
+@flags.json
+def settings_command() -> None:
+    """Every setting: its default, its range, what it means.
+
+    A value comes from the flag, else the environment (`workers` from SHM_WORKERS), else
+    `[settings]` of `bridge.toml`, else the default.
+
+    \b
+    Example: shm settings
+    """
+    if flags.wants_json():
+        show({"settings": [_document(row) for row in TABLE]})
+    else:
+        show_rows("", _HEADS, [(row.name, *_cells(row)) for row in TABLE])
+
+
+def settings_page() -> str:
+    """The manual's page of settings in Markdown, from the one table of settings."""
+    head = (
+        "# Settings\n\n"
+        "A value comes from the flag, else the environment (`workers` from `SHM_WORKERS`), else "
+        "`[settings]` of `bridge.toml`, else the default. `shm settings` says the same.\n\n"
+    )
+    return head + markdown(_HEADS, [(f"`{row.name}`", *_cells(row)) for row in TABLE]) + "\n"
+
+
+def _cells(row: Setting) -> tuple[str, ...]:
+    return str(row.default), row.unit, _range(row), row.help
+
+
+def _range(row: Setting) -> str:
+    bounds = (
+        ", ".join(row.choices),
+        "" if row.low is None else f"from {row.low:g}",
+        "" if row.high is None else f"to {row.high:g}",
+    )
+    return " ".join(text for text in bounds if text)
+
+
+def _document(row: Setting) -> dict[str, object]:
+    return {
+        "setting": row.name,
+        "default": row.default,
+        "unit": row.unit,
+        "choices": list(row.choices),
+        "from": row.low,
+        "to": row.high,
+        "environment": row.environment_variable,
+        "meaning": row.help,
+    }
+
 
 _REQUIREMENT = re.compile(r"([\w.-]+)\s*(?:\[([^\]]*)\])?[^;]*;?(.*)")
 _ONLY_FOR = re.compile(r"""extra\s*==\s*['"]([\w.-]+)['"]""")
@@ -26,9 +84,9 @@ class Notice:
     extra: str
 
 
-@click.command()
-@json_option
-def command(as_json: bool) -> None:
+@click.command("notices")
+@flags.json
+def notices_command() -> None:
     """Other people's packages that work here, with the licence that each declares.
 
     Those of an extra, such as `web`, are listed where they are installed. The texts of the licences
@@ -38,13 +96,11 @@ def command(as_json: bool) -> None:
     Example: shm notices
     """
     found = notices()
-    if as_json:
+    if flags.wants_json():
         show({"packages": [asdict(each) for each in found]})
-        return
-    shown = table("", "package", "version", "licence", "extra")
-    for each in found:
-        shown.add_row(each.package, each.version, each.licence, each.extra)
-    show_table(shown)
+    else:
+        heads = ("package", "version", "licence", "extra")
+        show_rows("", heads, [(e.package, e.version, e.licence, e.extra) for e in found])
 
 
 def notices() -> Sequence[Notice]:

@@ -1,4 +1,4 @@
-"""`shm note`: what people saw or did at a hanger or at the bridge."""
+"""`shm note` and `shm audit`: what people saw and did, and what they changed."""
 
 from __future__ import annotations
 
@@ -10,20 +10,12 @@ import rich_click as click
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.values.notes import NoteKind
-from shm_cli.common import (
-    hanger_option,
-    json_option,
-    opened_store,
-    show,
-    show_table,
-    table,
-    who_option,
-)
-from shm_cli.parameter_types import Time, Words
+from shm_cli import flags
+from shm_cli.common import answer, opened_store, show_rows
 
 
 @click.group()
-def command() -> None:
+def note() -> None:
     """Notes, inspections and repairs of a hanger or of the bridge.
 
     \b
@@ -31,26 +23,25 @@ def command() -> None:
     """
 
 
-@command.command()
-@click.argument("text", type=Words())
-@hanger_option()
+@note.command()
+@click.argument("text", type=flags.Words())
+@flags.hanger()
 @click.option("--bridge", "whole", is_flag=True, help="Of the whole bridge.")
 @click.option(
     "--kind",
     type=click.Choice([each.value for each in NoteKind]),
     default=NoteKind.NOTE.value,
-    show_default=True,
     help="What it was.",
 )
-@click.option("--at", type=Time(), show_default="now", help="When it was seen or done.")
+@click.option("--at", type=flags.Time(), show_default="now", help="When it was seen or done.")
 @click.option(
     "--photo",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=flags.FILE,
     metavar="FILE",
     help="A JPEG or PNG of 5 MB at most; the picture alone is kept.",
 )
-@who_option
-@json_option
+@flags.who
+@flags.json
 @click.pass_context
 def add(
     ctx: click.Context,
@@ -61,7 +52,6 @@ def add(
     at: datetime | None,
     photo: Path | None,
     who: str,
-    as_json: bool,
 ) -> None:
     """Write a note, for good: a later one corrects it.
 
@@ -76,17 +66,14 @@ def add(
             workspace.bridge.tested(hanger_id)
         image = photo.read_bytes() if photo else b""
         made = store.notes.add(hanger_id, at or now, NoteKind(kind), text, who, now, image)
-    if as_json:
-        show(vars(made))
-        return
-    click.echo(f"Note {made.id} of {made.of} is kept.")
+    answer(vars(made), f"Note {made.id} of {made.of} is kept.")
 
 
-@command.command("list")
-@hanger_option()
-@json_option
+@note.command("list")
+@flags.hanger()
+@flags.json
 @click.pass_context
-def list_notes(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None:
+def list_notes(ctx: click.Context, hanger_id: int | None) -> None:
     """All notes, or those of a hanger and of the bridge; what was seen or done last comes first.
 
     \b
@@ -96,14 +83,35 @@ def list_notes(ctx: click.Context, hanger_id: int | None, as_json: bool) -> None
         if hanger_id is not None:
             workspace.bridge.tested(hanger_id)
         found = store.notes.list_all(hanger_id)
-    if as_json:
-        show({"notes": [vars(each) for each in found]})
+    if flags.wants_json() or not found:
+        answer({"notes": [vars(each) for each in found]}, "No note was written.")
         return
-    if not found:
-        click.echo("No note was written.")
+    rows = [
+        (
+            f"{each.at:%Y-%m-%d}", each.kind, each.of, each.who, "yes" if each.has_photo else "",
+            each.text,
+        )
+        for each in found
+    ]  # fmt: skip
+    show_rows("notes", ("date", "kind", "of", "by", "photo", "text"), rows)
+
+
+@click.command()
+@click.option("--limit", type=click.IntRange(min=1), help="So many of the newest.")
+@flags.json
+@click.pass_context
+def audit(ctx: click.Context, limit: int | None) -> None:
+    """Who changed what, when and how: the newest first.
+
+    What shm does by itself is not listed, nor what is edited in bridge.toml.
+
+    \b
+    Example: shm audit --limit 20
+    """
+    with opened_store(ctx) as (_, store):
+        rows = store.audit.list_rows(limit)
+    if flags.wants_json() or not rows:
+        answer({"changes": [vars(each) for each in rows]}, "Nothing was changed.")
         return
-    made = table("notes", "date", "kind", "of", "by", "photo", "text")
-    for each in found:
-        has_photo = "yes" if each.has_photo else ""
-        made.add_row(f"{each.at:%Y-%m-%d}", each.kind, each.of, each.who, has_photo, each.text)
-    show_table(made)
+    cells = [(f"{each.at:%Y-%m-%d %H:%M}", *list(vars(each).values())[2:]) for each in rows]
+    show_rows("changes", ("time", "who", "by", "action", "of", "detail"), cells)

@@ -1,0 +1,163 @@
+"""The options that verbs share, and what options take: a text that is not empty, a file to write.
+
+Whether a file can be written is checked before the work, not after it.
+"""
+
+from __future__ import annotations
+
+import getpass
+import os
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Any, TypeVar
+
+import rich_click as click
+
+from shm.documents import parse_time
+from shm.errors import BadInput
+from shm.inference import METHODS
+from shm.models import PRIORS
+from shm_cli import completion
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+FOLDER = click.Path(file_okay=False, path_type=Path)
+
+
+class Words(click.ParamType[str]):
+    """A text with something in it."""
+
+    name = "text"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The text without blanks around it; refuses an empty one."""
+        if not value.strip():
+            self.fail("it is empty. Say it in a few words.", param, ctx)
+        return value.strip()
+
+
+class Time(click.ParamType[datetime]):
+    """An ISO 8601 time; one without zone is taken as UTC."""
+
+    name = "time"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> datetime:
+        try:
+            return parse_time(str(value))
+        except (ValueError, OverflowError):
+            raise BadInput(
+                f"{value} is not an ISO 8601 time.", remedy="Write 2026-05-01T10:00:00Z."
+            ) from None
+
+
+class NewFile(click.Path):
+    """A path at which a file can be written, new or in the place of one."""
+
+    def __init__(self) -> None:
+        super().__init__(dir_okay=False, writable=True, path_type=Path)
+
+    def convert(
+        self, value: Any, parameter: click.Parameter | None, context: click.Context | None
+    ) -> Any:
+        path = Path(os.fsdecode(super().convert(value, parameter, context)))
+        folder = path.absolute().parent
+        if not folder.is_dir():
+            raise BadInput(f"{folder} is no folder.", remedy="Make it first, or name another.")
+        if not os.access(folder, os.W_OK):
+            raise BadInput(f"nothing can be written into {folder}.", remedy="Name another.")
+        return path
+
+
+_JSON = "shm_cli.json"
+
+
+def _note_json(ctx: click.Context, _: click.Parameter, is_asked: bool) -> None:
+    ctx.meta[_JSON] = is_asked
+
+
+json = click.option(
+    "--json", "as_json", is_flag=True, expose_value=False, callback=_note_json,
+    help="One JSON document on stdout.",
+)  # fmt: skip
+
+
+def wants_json() -> bool:
+    """Whether the command that runs was given --json."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(_JSON))
+
+
+why = click.option("--why", type=Words(), required=True, help="For the record.")
+who = click.option(
+    "--who",
+    callback=lambda *given: given[-1] or getpass.getuser(),
+    show_default="the user's name",
+    help="For the record.",
+)
+figures = click.option(
+    "--figures", type=FOLDER, metavar="DIR", help="Write each figure as a PNG here."
+)
+seed = click.option("--seed", type=click.IntRange(min=0), default=1, help="Random seed.")
+# Judgement: below 100 no 90 % interval has five draws beyond each end; a million fill the memory.
+samples = click.option(
+    "--samples",
+    type=click.IntRange(100, 1_000_000),
+    default=1000,
+    help="Posterior samples.",
+)
+repeat = click.option(
+    "--repeat",
+    type=click.IntRange(min=1),
+    default=1,
+    help="How often the data set counts (N_D of the thesis).",
+)
+method = click.option(
+    "--method",
+    type=click.Choice(METHODS),
+    default=METHODS[0],
+    help="How the sampler works; `textbook` is for fidelity, its evidence is biased.",
+)
+
+priors = click.option(
+    "--priors",
+    type=click.Choice(PRIORS),
+    default=PRIORS[0],
+    help="What is possible before the test: by the hanger's description, or by the thesis.",
+)
+
+log_file = click.option(
+    "--log-file",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write the log there, not on stderr; it is put aside as it grows (log_files of them).",
+)
+
+
+def tls(function: F) -> F:
+    """`--certificate PEM --key PEM` of whatever serves the web interface."""
+    texts = {"key": "The key of the certificate.", "certificate": "Serve HTTPS with this."}
+    for name, text in texts.items():
+        function = click.option(f"--{name}", type=FILE, metavar="PEM", help=text)(function)
+    return function
+
+
+def hanger(required: bool = False) -> Callable[[F], F]:
+    """`--hanger N`: a hanger of the workspace, or one of several in --hanger-file."""
+    return click.option(
+        "--hanger",
+        "hanger_id",
+        type=int,
+        required=required,
+        metavar="N",
+        shell_complete=completion.hangers,
+        help="Hanger number.",
+    )
+
+
+hanger_file = click.option(
+    "--hanger-file", type=FILE, metavar="H.toml", help="A [[hanger]] table, instead of a workspace."
+)
