@@ -178,7 +178,7 @@ class Bridge:
     streams: tuple[Stream, ...] = ()
     letterhead: Letterhead = NO_LETTERHEAD
     other_bridges: tuple[OtherBridge, ...] = ()
-    measurement_hours: Mapping[str, float] = field(default_factory=lambda: MEASUREMENT_HOURS)
+    measurement_hours: Mapping[str, float] = field(default_factory=lambda: dict(MEASUREMENT_HOURS))
     as_in_file: Bridge | None = None
     single_sign_on: SingleSignOn | None = None
 
@@ -340,7 +340,7 @@ def _hours(document: Mapping[str, Any], path: Path) -> Mapping[str, float]:
     """What measurements cost, the usual where the table does not say."""
     table = _table(document, "measurement_hours", path)
     if table is None:
-        return MEASUREMENT_HOURS
+        return dict(MEASUREMENT_HOURS)
     keys = {re.sub(r"\W", "_", kind): kind for kind in MEASUREMENT_HOURS}
     table.refuse_unknown(keys)
     own = {kind: table.positive(key, "hours") for key, kind in keys.items() if key in table}
