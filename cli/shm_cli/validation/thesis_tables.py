@@ -15,6 +15,7 @@ from shm_cli import thesis
 from shm_cli.validation import selection
 
 Tell = Callable[[str, float], None]
+# As in the thesis, chapter 5: data and N_D.
 _PRINTING, _REPEATS = "table 1.1", (10,)
 
 
