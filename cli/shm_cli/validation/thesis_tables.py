@@ -15,8 +15,8 @@ from shm_cli import thesis
 from shm_cli.validation import selection
 
 Tell = Callable[[str, float], None]
-_PRINTING = "table 1.1"
-_REPEATS = (10,)  # as the thesis counts it: see docs/trials/validation.md
+# As in the thesis, chapter 5: data and N_D.
+_PRINTING, _REPEATS = "table 1.1", (10,)
 
 
 @dataclass(frozen=True, eq=False)
