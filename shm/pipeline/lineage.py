@@ -25,7 +25,7 @@ from shm.models import Model, build, competing_names
 from shm.pipeline.ending import SHM
 from shm.read import Limits
 from shm.settings import TABLE, Settings
-from shm.store import Baseline, Lineage, Stage, Store, StoredRecording, StoredTest, Workspace
+from shm.store import Baseline, Lineage, Stage, Store, StoredRecording, StoredTest, Workspace, files
 from shm.values import Hanger, Posterior
 
 _IDENTIFY_SETTINGS = (
@@ -131,18 +131,12 @@ def reason_document(
     error: BaseException, recording: StoredRecording, time: datetime
 ) -> dict[str, Any]:
     """Why a file is refused: which file, line and channel, what is wrong, what to do."""
-    reason: dict[str, Any] = {
-        "schema": "shm.reason/1",
-        "file": recording.file.file_name,
-        "line": None,
-        "channel": None,
-        "message": f"internal error: {error!r}.",
-        "remedy": "Report this with the log, then drop the file again.",
-        "time": time,
-        "sha256": recording.file.sha256,
-    }
+    message = f"internal error: {error!r}."
+    remedy = "Report this with the log, then drop the file again."
     if isinstance(error, ShmError):
-        reason |= {"message": error.message, "remedy": error.remedy}
+        message, remedy = error.message, error.remedy
+    name, sha256 = recording.file.file_name, recording.file.sha256
+    reason = files.reason_document(name, sha256, message, remedy, time)
     if isinstance(error, BadInput):
         file = Path(error.file).name or recording.file.file_name
         reason |= {"file": file, "line": error.line, "channel": error.channel or None}

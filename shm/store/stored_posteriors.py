@@ -178,10 +178,11 @@ class Posteriors(Trends):
         with decoding(diagnoses, row, hanger):
             document = loads(row.document)
         try:
-            return _diagnosis(row, diagnosis_of(document))
+            found = diagnosis_of(document)
         except (KeyError, TypeError, ValueError):
             log.warning("the diagnosis of hanger %d is of a former version: make it again", hanger)
             return None
+        return StoredDiagnosis(row.id, row.hanger, found, row.diagnosed_at, lineage_from(row))
 
     def adopt(
         self,
@@ -316,13 +317,3 @@ def _adoption(row: Row[Any]) -> StoredAdoption:
             undone_why=row.undone_why or "",
             undone_who=row.undone_who or "",
         )
-
-
-def _diagnosis(row: Row[Any], diagnosis: Diagnosis) -> StoredDiagnosis:
-    return StoredDiagnosis(
-        id=row.id,
-        hanger=row.hanger,
-        diagnosis=diagnosis,
-        diagnosed_at=row.diagnosed_at,
-        lineage=Lineage(row.input_sha256, row.settings_sha256, row.version),
-    )
