@@ -28,16 +28,10 @@ from shm.settings import TABLE, Settings
 from shm.store import Baseline, Lineage, Stage, Store, StoredRecording, StoredTest, Workspace, files
 from shm.values import Hanger, Posterior
 
-_IDENTIFY_SETTINGS = (
-    "band_low_hz",
-    "band_high_hz",
-    "identifier",
-    "cross_check",
-    "estimator",
-    "reference_force_n",
-    "frequency_allowance",
-    "mains_hz",
-)
+IDENTIFY_SETTINGS = (
+    "band_low_hz", "band_high_hz", "identifier", "cross_check", "estimator", "reference_force_n",
+    "frequency_allowance", "mains_hz",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +65,7 @@ def competing(hanger: Hanger, settings: Settings, selected: Mapping[int, str]) -
 
 def identify_settings(settings: Settings) -> dict[str, Any]:
     """The settings that decide what an identification gives, by name."""
-    return {name: getattr(settings, name) for name in _IDENTIFY_SETTINGS}
+    return {name: getattr(settings, name) for name in IDENTIFY_SETTINGS}
 
 
 def read_limits(settings: Settings) -> Limits:
@@ -143,7 +137,6 @@ def reason_document(
     return reason
 
 
-IDENTIFY_SETTINGS = tuple(identify_settings(Settings()))
 _ALL = (*IDENTIFY_SETTINGS, "models", "samples", "seed", "baseline_tests", "false_call_years")
 _LIBRARIES = ("numpy", "scipy", "emcee")
 

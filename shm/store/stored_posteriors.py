@@ -123,7 +123,7 @@ class Posteriors(Trends):
         """The posteriors of a hanger in its selected class, by time."""
         query = _shown(hanger)
         return tuple(
-            _stored_posterior(row)
+            StoredPosterior(row.id, posterior_of_row(row), row.time, lineage_from(row))
             for row in self.rows(query.order_by(posteriors.c.time, posteriors.c.id))
         )
 
@@ -276,10 +276,6 @@ def _of_test(hanger: int, name: str) -> sa.Select[Any]:
     joined = posterior_tests.join(tests)
     query = sa.select(posterior_tests.c.posterior_id).select_from(joined)
     return query.where(tests.c.hanger == hanger, tests.c.name == name, in_force(tests))
-
-
-def _stored_posterior(row: Row[Any]) -> StoredPosterior:
-    return StoredPosterior(row.id, posterior_of_row(row), row.time, lineage_from(row))
 
 
 def _refuse_late(connection: Connection, adoption: Adoption, before: StoredSelection) -> None:
