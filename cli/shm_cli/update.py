@@ -15,7 +15,6 @@ from shm.inference import Progress, UpdateOptions, select, update
 from shm.models import DESCRIPTION, Model, build
 from shm.modes_document import load_modes
 from shm.pipeline.lineage import Taught
-from shm.pipeline.steps import calibration
 from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior
 from shm.values.rounding import force_unit
 from shm.values.stated_tension import averaged_now, stated
@@ -85,6 +84,8 @@ def calibrated(
             remedy="Check the reading (in N), the orders and the description.",
         )
     own = tests[0].hanger in (None, hanger.id)
+    from shm.pipeline.steps import calibration  # it opens what identifies: not before
+
     return replace(options, calibration=calibration(Taught(posterior, own), hanger))
 
 
