@@ -32,7 +32,6 @@ from shm.models import (
 )
 from shm.modes_document import load_modes
 from shm.pipeline.lineage import Taught
-from shm.pipeline.steps import calibration
 from shm.settings import load_settings
 from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior, Selection, Summary
 from shm.values.rounding import force_unit
@@ -102,6 +101,8 @@ def calibrated(
             remedy="Check the reading (in N), the orders and the description.",
         )
     own = tests[0].hanger in (None, hanger.id)
+    from shm.pipeline.steps import calibration  # it opens what identifies: not before
+
     return replace(options, calibration=calibration(Taught(posterior, own), hanger))
 
 

@@ -11,11 +11,5 @@ from shm.monitor.tracking import read_window
 from shm.monitor.windows import cut
 
 __all__ = [
-    "as_modal_test",
-    "cut",
-    "offsets",
-    "pooled",
-    "read_window",
-    "sees_nothing",
-    "sensor_faults",
-]
+    "as_modal_test", "cut", "offsets", "pooled", "read_window", "sees_nothing", "sensor_faults",
+]  # fmt: skip

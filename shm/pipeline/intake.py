@@ -32,6 +32,7 @@ from shm.store.archive import (
     refuse_oversize,
     safe_name,
 )
+from shm.store.files import reason_document
 
 
 class Sharing:
@@ -169,16 +170,7 @@ def _set_aside(
     path: Path, name: str, error: TooLarge, workspace: Workspace, store: Store, at: datetime
 ) -> None:
     """Lays what is too large in the quarantine, unread: nobody knows its checksum."""
-    reason = {
-        "schema": "shm.reason/1",
-        "file": name,
-        "line": None,
-        "channel": None,
-        "message": error.message,
-        "remedy": error.remedy,
-        "time": at,
-        "sha256": None,
-    }
+    reason = reason_document(name, None, error.message, error.remedy, at)
     lies = workspace.quarantine.move(path, name, reason, sidecar_path(path))
     said = {event.message for event in store.recordings.list_events("refused", file_name=name)}
     if lies != path or error.message not in said:  # what stays is met at each start

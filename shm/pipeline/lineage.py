@@ -25,19 +25,13 @@ from shm.models import Model, build, competing_names
 from shm.pipeline.ending import SHM
 from shm.read import Limits
 from shm.settings import TABLE, Settings
-from shm.store import Baseline, Lineage, Stage, Store, StoredRecording, StoredTest, Workspace
+from shm.store import Baseline, Lineage, Stage, Store, StoredRecording, StoredTest, Workspace, files
 from shm.values import Hanger, Posterior
 
-_IDENTIFY_SETTINGS = (
-    "band_low_hz",
-    "band_high_hz",
-    "identifier",
-    "cross_check",
-    "estimator",
-    "reference_force_n",
-    "frequency_allowance",
-    "mains_hz",
-)
+IDENTIFY_SETTINGS = (
+    "band_low_hz", "band_high_hz", "identifier", "cross_check", "estimator", "reference_force_n",
+    "frequency_allowance", "mains_hz",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +65,7 @@ def competing(hanger: Hanger, settings: Settings, selected: Mapping[int, str]) -
 
 def identify_settings(settings: Settings) -> dict[str, Any]:
     """The settings that decide what an identification gives, by name."""
-    return {name: getattr(settings, name) for name in _IDENTIFY_SETTINGS}
+    return {name: getattr(settings, name) for name in IDENTIFY_SETTINGS}
 
 
 def read_limits(settings: Settings) -> Limits:
@@ -131,25 +125,18 @@ def reason_document(
     error: BaseException, recording: StoredRecording, time: datetime
 ) -> dict[str, Any]:
     """Why a file is refused: which file, line and channel, what is wrong, what to do."""
-    reason: dict[str, Any] = {
-        "schema": "shm.reason/1",
-        "file": recording.file.file_name,
-        "line": None,
-        "channel": None,
-        "message": f"internal error: {error!r}.",
-        "remedy": "Report this with the log, then drop the file again.",
-        "time": time,
-        "sha256": recording.file.sha256,
-    }
+    message = f"internal error: {error!r}."
+    remedy = "Report this with the log, then drop the file again."
     if isinstance(error, ShmError):
-        reason |= {"message": error.message, "remedy": error.remedy}
+        message, remedy = error.message, error.remedy
+    name, sha256 = recording.file.file_name, recording.file.sha256
+    reason = files.reason_document(name, sha256, message, remedy, time)
     if isinstance(error, BadInput):
         file = Path(error.file).name or recording.file.file_name
         reason |= {"file": file, "line": error.line, "channel": error.channel or None}
     return reason
 
 
-IDENTIFY_SETTINGS = tuple(identify_settings(Settings()))
 _ALL = (*IDENTIFY_SETTINGS, "models", "samples", "seed", "baseline_tests", "false_call_years")
 _LIBRARIES = ("numpy", "scipy", "emcee")
 

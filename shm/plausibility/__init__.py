@@ -14,16 +14,9 @@ from shm.plausibility.copies import fingerprint_of
 from shm.values import Doubt
 
 __all__ = [
-    "CHECKS",
-    "FIRST_DAY",
-    "Candidate",
-    "Check",
-    "doubts_about",
-    "fingerprint_of",
-    "implied_shift",
-    "notice_of",
-    "refuse_impossible",
-]
+    "CHECKS", "FIRST_DAY", "Candidate", "Check", "doubts_about", "fingerprint_of", "implied_shift",
+    "notice_of", "refuse_impossible",
+]  # fmt: skip
 
 CHECKS: tuple[Check, ...] = (
     clock.before_the_bridge,

@@ -24,31 +24,11 @@ from shm.store.columns import Document
 from shm.store.tables import metadata
 
 NUMBERED = (
-    "recordings",
-    "holds",
-    "tests",
-    "posteriors",
-    "selections",
-    "baselines",
-    "drifts",
-    "watches",
-    "alerts",
-    "acknowledgements",
-    "deliveries",
-    "diagnoses",
-    "adoptions",
-    "events",
-    "steps",
-    "archive_copies",
-    "tokens",
-    "resolutions",
-    "silences",
-    "users",
-    "sessions",
-    "audit",
-    "changed_settings",
-    "notes",
-)
+    "recordings", "holds", "tests", "posteriors", "selections", "baselines", "drifts", "watches",
+    "alerts", "acknowledgements", "deliveries", "diagnoses", "adoptions", "events", "steps",
+    "archive_copies", "tokens", "resolutions", "silences", "users", "sessions", "audit",
+    "changed_settings", "notes",
+)  # fmt: skip
 """Tables of which no row is ever taken out, but for damaged ones of `drifts` and `watches` (see
 `forget`). The order is that of the bits: new ones come last."""
 

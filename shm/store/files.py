@@ -98,6 +98,22 @@ def end_recording(
     write_step(connection, recording_id, Stage.REFUSED, at)
 
 
+def reason_document(
+    file_name: str, sha256: str | None, message: str, remedy: str, at: datetime
+) -> dict[str, Any]:
+    """Why a file is held or refused, no `line` and no `channel` of it being at fault."""
+    return {
+        "schema": "shm.reason/1",
+        "file": file_name,
+        "line": None,
+        "channel": None,
+        "message": message,
+        "remedy": remedy,
+        "time": at,
+        "sha256": sha256,
+    }
+
+
 def end_tests(
     connection: Connection, recording_id: int, test_ids: Collection[int], at: datetime
 ) -> None:

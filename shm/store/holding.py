@@ -17,7 +17,7 @@ from shm.store.audit import note
 from shm.store.blobs import pack, test_from_document, unpack
 from shm.store.checksums import decoding, loads
 from shm.store.database import insert
-from shm.store.files import in_force, write_event, write_step
+from shm.store.files import in_force, reason_document, write_event, write_step
 from shm.store.list_rows import Decision, HeldTest, Hold
 from shm.store.outbox import raise_alert, resolve
 from shm.store.rows import Stage, StoredAlert
@@ -126,16 +126,7 @@ def _mark(
 
 def reason_of(recording: Row[Any], message: str, at: datetime, remedy: str = "") -> dict[str, Any]:
     """Why a recording is held, or counts no more."""
-    return {
-        "schema": "shm.reason/1",
-        "file": recording.file_name,
-        "line": None,
-        "channel": None,
-        "message": message,
-        "remedy": remedy,
-        "time": at,
-        "sha256": recording.sha256,
-    }
+    return reason_document(recording.file_name, recording.sha256, message, remedy, at)
 
 
 def open_holds(connection: Connection, hanger: int | None = None) -> tuple[Hold, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import fields
 from datetime import datetime, timedelta
 from functools import lru_cache
 from typing import Any
@@ -153,17 +154,7 @@ def resolution_of(row: Row[Any]) -> Resolution | None:
     return Resolution(row.id, row.end_who, row.end_why, row.end_at)
 
 
-_OWED = (
-    "id",
-    "hook",
-    "news",
-    "state",
-    "attempts",
-    "next_attempt_at",
-    "last_error",
-    "ended_at",
-    "message_id",
-)
+_OWED = tuple(field.name for field in fields(Delivery) if field.name != "stored")
 _outbox = stored_alerts.add_columns(
     *(deliveries.c[name].label(f"owed_{name}") for name in _OWED)
 ).join(deliveries, deliveries.c.alert_id == alerts.c.id)

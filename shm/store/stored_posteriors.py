@@ -123,7 +123,7 @@ class Posteriors(Trends):
         """The posteriors of a hanger in its selected class, by time."""
         query = _shown(hanger)
         return tuple(
-            _stored_posterior(row)
+            StoredPosterior(row.id, posterior_of_row(row), row.time, lineage_from(row))
             for row in self.rows(query.order_by(posteriors.c.time, posteriors.c.id))
         )
 
@@ -178,10 +178,11 @@ class Posteriors(Trends):
         with decoding(diagnoses, row, hanger):
             document = loads(row.document)
         try:
-            return _diagnosis(row, diagnosis_of(document))
+            found = diagnosis_of(document)
         except (KeyError, TypeError, ValueError):
             log.warning("the diagnosis of hanger %d is of a former version: make it again", hanger)
             return None
+        return StoredDiagnosis(row.id, row.hanger, found, row.diagnosed_at, lineage_from(row))
 
     def adopt(
         self,
@@ -277,10 +278,6 @@ def _of_test(hanger: int, name: str) -> sa.Select[Any]:
     return query.where(tests.c.hanger == hanger, tests.c.name == name, in_force(tests))
 
 
-def _stored_posterior(row: Row[Any]) -> StoredPosterior:
-    return StoredPosterior(row.id, posterior_of_row(row), row.time, lineage_from(row))
-
-
 def _refuse_late(connection: Connection, adoption: Adoption, before: StoredSelection) -> None:
     now = connection.execute(selection_in_force(adoption.hanger)).one_or_none()
     if now is None or now.id != before.id:
@@ -316,13 +313,3 @@ def _adoption(row: Row[Any]) -> StoredAdoption:
             undone_why=row.undone_why or "",
             undone_who=row.undone_who or "",
         )
-
-
-def _diagnosis(row: Row[Any], diagnosis: Diagnosis) -> StoredDiagnosis:
-    return StoredDiagnosis(
-        id=row.id,
-        hanger=row.hanger,
-        diagnosis=diagnosis,
-        diagnosed_at=row.diagnosed_at,
-        lineage=Lineage(row.input_sha256, row.settings_sha256, row.version),
-    )

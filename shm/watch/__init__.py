@@ -14,20 +14,10 @@ if TYPE_CHECKING:
     from shm.watch.watching import DatedTest, Newest, Watched, watch_hanger, watch_newest
 
 __all__ = [
-    "DatedTest",
-    "Newest",
-    "WatchOptions",
-    "Watched",
-    "WatchedFrequencies",
-    "end_stiffness",
-    "gap_percent",
-    "has_grown",
-    "joined",
-    "watch_frequencies",
-    "watch_gap",
-    "watch_hanger",
+    "DatedTest", "Newest", "WatchOptions", "Watched", "WatchedFrequencies", "end_stiffness",
+    "gap_percent", "has_grown", "joined", "watch_frequencies", "watch_gap", "watch_hanger",
     "watch_newest",
-]
+]  # fmt: skip
 
 if not TYPE_CHECKING:
     # The engine is large: who only words what it found, as `shm status` does, does without.

@@ -31,17 +31,9 @@ from shm.watch.neighbours.pattern_types import (
 )
 
 __all__ = [
-    "BridgePattern",
-    "Explanation",
-    "HangerRow",
-    "HangerShift",
-    "NeighbourOptions",
-    "NotCompared",
-    "SumKept",
-    "Suspect",
-    "bridge_pattern",
-    "shifts_of",
-]
+    "BridgePattern", "Explanation", "HangerRow", "HangerShift", "NeighbourOptions", "NotCompared",
+    "SumKept", "Suspect", "bridge_pattern", "shifts_of",
+]  # fmt: skip
 
 FEWEST = 3  # of two, either may be the one that moved
 _REACH = 2  # places: what hangers further off take up is below 5 % of a loss
