@@ -45,3 +45,11 @@ def test_an_unknown_standard_deviation_becomes_a_tenth_of_the_bandwidth() -> Non
     shape = np.array([1.0, 1.0])
     unknown = FoundMode(10.0, np.nan, 0.002, np.nan, shape, np.full(2, np.nan))
     assert blurred(unknown).frequency_sd_hz == pytest.approx(0.004)
+
+
+@pytest.mark.parametrize("share", [0.12, 0.17, 0.83, 0.88])
+def test_both_planes_are_judged_alike(share: float) -> None:
+    """15 % of the energy in the weaker plane, whichever that is."""
+    transverse, longitudinal = float(np.sqrt(share)), float(np.sqrt(1 - share))
+    _, planes = with_both_planes([mode(10.0, transverse, longitudinal)], ["transverse"], BIAXIAL)
+    assert (len(planes) == 2) == (0.15 < share < 0.85)

@@ -107,7 +107,7 @@ class Window:
             options,
             band_low_hz=max(self.low_hz - more, options.band_low_hz),
             band_high_hz=min(self.high_hz + more, options.band_high_hz),
-            max_order=min(options.max_order or _ORDERS_IN_WINDOW, _MAX_ORDER),
+            max_order=min(options.max_order or _ORDERS_IN_WINDOW, _ORDERS_IN_WINDOW),
             max_frequency_sd=strict * options.max_frequency_sd,
             max_frequency_spread=strict * options.max_frequency_spread,
         )

@@ -193,7 +193,7 @@ def _stands_for_both(
     alone = not any(
         is_close(mode.frequency_hz, other.frequency_hz) for other in modes if other is not mode
     )
-    return alone and SHARE_OF_BOTH <= share <= 1 - LEAST_SHARE
+    return alone and SHARE_OF_BOTH <= share <= 1 - SHARE_OF_BOTH
 
 
 def moves_in_one_plane(mode: FoundMode, points: Sequence[ResponsePoint], turned_rad: float) -> bool:
@@ -201,7 +201,7 @@ def moves_in_one_plane(mode: FoundMode, points: Sequence[ResponsePoint], turned_
     if set(PLANES) - {point.plane for point in points}:
         return False
     share = transverse_share(mode.shape, points, turned_rad)
-    return not SHARE_OF_BOTH <= share <= 1 - LEAST_SHARE
+    return not SHARE_OF_BOTH <= share <= 1 - SHARE_OF_BOTH
 
 
 def blurred(mode: FoundMode) -> FoundMode:
