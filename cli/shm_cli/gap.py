@@ -12,7 +12,7 @@ import rich_click as click
 from shm.errors import NothingThere, UsageError
 from shm.gap import GapOptions, diagnose_bridge
 from shm.gap import diagnose as diagnosed
-from shm.gap.kin import LEAST
+from shm.gap.shared_causes import LEAST
 from shm.models.effects import EFFECTS
 from shm.pipeline import utc_now
 from shm.pipeline.lineage import diagnosis_lineage

@@ -204,7 +204,7 @@ def update(
     repeat: int = 1,
     method: str = METHODS[0],
     priors: str = DESCRIPTION,
-    progress: Progress = updating.silent,
+    progress: Progress = silent,
 ) -> Posterior:
     """The posterior of tension and end stiffness of one model class, given all modes of `tests`.
 
@@ -242,7 +242,7 @@ def select(
     repeat: int = 1,
     method: str = METHODS[0],
     priors: str = DESCRIPTION,
-    progress: Progress = updating.silent,
+    progress: Progress = silent,
 ) -> Selection:
     """Model classes compared by their evidence, the most probable first.
 

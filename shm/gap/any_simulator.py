@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.gap.calibration import CALIBRATION
+from shm.gap.attribution import SAME_BELOW, grouped
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.groups import SAME_BELOW, grouped
 from shm.gap.model_probabilities import (
+    CALIBRATION,
     SINGLE,
     UNKNOWN,
     ScoredHypothesis,
@@ -24,13 +24,14 @@ from shm.gap.model_probabilities import (
     probabilities,
 )
 from shm.gap.search import SUPPORTED
-from shm.gap.simulator_fit import fitted, refitted
-from shm.gap.simulator_misfit import (
+from shm.gap.simulator_fit import (
     at_bounds,
     errors_of,
+    fitted,
     in_sds,
     moments,
     p_value,
+    refitted,
     rms,
     slips,
     without_copies,

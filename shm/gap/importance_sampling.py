@@ -27,13 +27,11 @@ from shm.gap.contract import Fit
 from shm.gap.coordinates import Branch, Straight
 from shm.gap.detectability import LONGEST_STEP
 from shm.gap.fit import fitted
-from shm.gap.objective import Landscape
-from shm.gap.optimiser import NEVER
+from shm.gap.optimiser import NEVER, Landscape
 from shm.gap.problem import GapProblem
 from shm.gap.proposal_distribution import Points, Proposal
 from shm.inference.coordinates import log_normal
-from shm.inference.mixture import Pool
-from shm.inference.tmcmc import effective, normalised, systematic
+from shm.inference.mixture import Pool, effective, normalised, systematic
 from shm.values import ENOUGH_EFFECTIVE, BoolArray, FloatArray, IntArray
 
 # Technical, effective draws against time: a first look and refits of a few hundred points, ten to

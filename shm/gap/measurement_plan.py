@@ -18,13 +18,6 @@ import scipy
 
 from shm.gap.attribution import WITHIN_REACH, Attribution, Explanation
 from shm.gap.contract import Design, Fit, Hypothesis
-from shm.gap.discrepancy import (
-    FREQUENCY_SIZES,
-    LARGEST_FREQUENCY,
-    LARGEST_SHAPE,
-    SMOOTH_ORDERS,
-    sizes_of,
-)
 from shm.gap.experiment_design import Proposal, lift_off, proposals, together
 from shm.gap.model_probabilities import log_prior
 from shm.gap.next_measurement import (
@@ -35,6 +28,13 @@ from shm.gap.next_measurement import (
     foreseen,
     new_sensors,
     same_modes,
+)
+from shm.gap.noise import (
+    FREQUENCY_SIZES,
+    LARGEST_FREQUENCY,
+    LARGEST_SHAPE,
+    SMOOTH_ORDERS,
+    sizes_of,
 )
 from shm.gap.problem import GapProblem
 from shm.inference.priors import UNKNOWN_READING_SD

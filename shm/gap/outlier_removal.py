@@ -1,17 +1,17 @@
 """The attribution of a gap with gross errors set aside, and what is told of these.
 
-Modes whose orders look wrong: a slip of whoever numbered them, which no effect imitates.
+So are modes whose orders look wrong: a slip of whoever numbered them, which no effect imitates.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
-from shm.gap.alone import acts_alone, with_what_acts
 from shm.gap.attribution import Attribution, answered, attributed, more_thorough
 from shm.gap.contract import Fit, GapOptions, Progress, silent
 from shm.gap.fit import baseline_fit, with_remainder
@@ -19,6 +19,7 @@ from shm.gap.outliers import (
     SURE,
     GrossError,
     LeftOut,
+    acts_alone,
     at,
     gross_errors,
     log_gross,
@@ -86,7 +87,7 @@ def cleared(
     done = replace(found, attribution=last, otherwise=otherwise, misnumbered=wrong)
     # No gap stands only as far as what was set aside was a slip and no part that acts alone.
     slips = np.prod([1 - _alone(done, each, last.baseline) for each in done.aside])
-    return replace(done, attribution=with_what_acts(last, 1 - float(slips)))
+    return replace(done, attribution=last.with_unknown(1 - float(slips)))
 
 
 def _alone(found: Cleared, error: GrossError, fit: Fit) -> float:
@@ -286,3 +287,51 @@ def _tension(problem: GapProblem, rng: np.random.Generator) -> str:
     fit = baseline_fit(problem, rng)
     tension_n = float(problem.tension_n(fit.hypothesis, fit.z[None])[0])
     return f", at {tension_n / 1e3:.0f} kN"
+
+
+def set_aside(outliers: Sequence[Outlier], otherwise: str = "") -> tuple[str, ...]:
+    """Of frequencies that were done without; `otherwise` would cause them, were they right."""
+    told = tuple(
+        f"{_measured(each)}, is set aside as a gross error (probability {_probability(each)}): "
+        f"{_expected(each)}. A wrong mode, a tone or a slip; look at the recording again."
+        f"{_acts_alone(each)}"
+        for each in outliers
+    )
+    if not told or not otherwise:
+        return told
+    right = "it prove right" if len(told) == 1 else "they prove right"
+    return (*told, f"Should {right}, {otherwise} is the likeliest cause: repeat the test.")
+
+
+def doubtful(outliers: Sequence[Outlier]) -> tuple[str, ...]:
+    """Of frequencies that may be gross errors, but were kept."""
+    return tuple(
+        f"{_measured(each)}, may be a gross error (probability {_probability(each)}): "
+        f"{_expected(each)}. It is kept, and the answer may lean on it; look at the recording "
+        f"again."
+        for each in outliers
+    )
+
+
+def _acts_alone(outlier: Outlier) -> str:
+    if not outlier.acts_alone:
+        return ""
+    return (
+        f" Or a part that only this mode's swing reaches, such as a guide with play or a crack "
+        f"that opens ({outlier.acts_alone:.2f}): test again with softer and with harder hits."
+    )
+
+
+def _measured(outlier: Outlier) -> str:
+    mode = f"{outlier.plane.capitalize()} {outlier.order} of test {outlier.test}"
+    return f"{mode}, {outlier.measured_hz:g} Hz"
+
+
+def _expected(outlier: Outlier) -> str:
+    sd_hz = outlier.expected_sd_hz
+    digits = max(0, 1 - math.floor(math.log10(sd_hz))) if sd_hz > 0 else 3
+    return f"the other data expect {outlier.expected_hz:.{digits}f} +- {sd_hz:.{digits}f} Hz"
+
+
+def _probability(outlier: Outlier) -> str:
+    return f"{outlier.probability:.2f}" if outlier.probability < 0.995 else "over 0.99"

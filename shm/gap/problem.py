@@ -14,9 +14,8 @@ import numpy as np
 
 from shm.gap.contract import Design, Fit, Hypothesis, Observations
 from shm.gap.coordinates import DEVIATIONS, Coordinates, Pair, Straight, cut
-from shm.gap.discrepancy import flexible_nodes
 from shm.gap.likelihood import Likelihood
-from shm.gap.noise import nodes
+from shm.gap.noise import flexible_nodes, nodes
 from shm.gap.repeated_errors import (
     STRETCHES,
     Repeated,
@@ -35,8 +34,6 @@ Effects = tuple[tuple[str, Variant], ...]
 
 # Technical: an eighth of the prior's standard deviation apart, over 93 % of the prior.
 _TENSIONS = tuple(float(each) for each in np.linspace(-2.5, 1.5, 33))
-
-
 _AT_REST = Conditions(amplitude=0.0)
 
 

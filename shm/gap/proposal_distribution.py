@@ -11,8 +11,7 @@ import scipy
 from shm.gap.contract import Peak
 from shm.gap.coordinates import Branch, Straight
 from shm.inference.coordinates import log_normal
-from shm.inference.mixture import Normal, TMixture
-from shm.inference.tmcmc import effective, normalised, systematic
+from shm.inference.mixture import Normal, TMixture, effective, normalised, systematic
 from shm.values import FloatArray, IntArray
 
 # Technical, all of them: importance weights correct whatever is drawn from, so they cost effective

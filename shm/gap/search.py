@@ -10,8 +10,10 @@ import scipy
 
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress
 from shm.gap.detectability import Scan
-from shm.gap.fit import STARTS, baseline_fit, fitted, with_remainder
-from shm.gap.hypotheses import (
+from shm.gap.fit import (
+    STARTS,
+    baseline_fit,
+    fitted,
     hopeful,
     hypotheses,
     invisible,
@@ -19,13 +21,14 @@ from shm.gap.hypotheses import (
     screened,
     tried_by_screening,
     varied,
+    with_remainder,
 )
 from shm.gap.importance_sampling import sampled
 from shm.gap.law_error import by_its_laws, mixed, otherwise
 from shm.gap.model_probabilities import Family, ScoredHypothesis, families, log_prior
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import predictions, predictive_p_value
-from shm.inference.tmcmc import normalised
+from shm.inference.mixture import normalised
 from shm.values import FloatArray
 
 # Judgement, time against the chance to miss a cause. Sampled is what Laplace's method puts within

@@ -9,7 +9,8 @@ from shm.resources import when_asked
 
 if TYPE_CHECKING:
     from shm.inference.ensemble import refresh
-    from shm.inference.updating import BiasedEvidenceWarning, class_probabilities, select, update
+    from shm.inference.tmcmc import BiasedEvidenceWarning
+    from shm.inference.updating import class_probabilities, select, update
 
 __all__ = [
     "METHODS",
@@ -31,7 +32,7 @@ if not TYPE_CHECKING:
         __name__,
         {
             "refresh": "shm.inference.ensemble",
-            "BiasedEvidenceWarning": "shm.inference.updating",
+            "BiasedEvidenceWarning": "shm.inference.tmcmc",
             **dict.fromkeys(("class_probabilities", "select", "update"), "shm.inference.updating"),
         },
     )

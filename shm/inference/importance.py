@@ -24,10 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.inference.mixture import Pool, TMixture
+from shm.inference.mixture import Pool, TMixture, effective, normalised, systematic
 from shm.inference.problem import Points, Problem
 from shm.inference.search import Anchors, carried
-from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import FloatArray
 
 # Technical: parts and shares of proposals; weights correct for them. As they are, log evidences of

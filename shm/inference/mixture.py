@@ -13,7 +13,7 @@ from typing import Generic, Protocol, Self, TypeVar
 import numpy as np
 import scipy
 
-from shm.values import FloatArray
+from shm.values import FloatArray, IntArray
 
 # Technical: proposals with heavier tails than a posterior, and somewhat wider, keep weights
 # bounded; still heavier or wider ones waste draws (2 or 8 degrees: the same evidence within 0.02).
@@ -212,3 +212,20 @@ class Pool(Generic[P, B]):
         """Log of how many draws per volume (n,) the proposals, each of so many, put there."""
         parts = [np.log(draws) + self._log_density(each, batch) for each, draws in proposals]
         return np.asarray(scipy.special.logsumexp(parts, axis=0))
+
+
+def normalised(log_weights: FloatArray) -> FloatArray:
+    """Weights (n,) that add to 1."""
+    weights = np.exp(log_weights - log_weights.max())
+    return np.asarray(weights / weights.sum())
+
+
+def effective(weights: FloatArray) -> float:
+    """Kish's effective number of draws with weights (n,) that add to 1."""
+    return float(1 / np.sum(weights**2))
+
+
+def systematic(weights: FloatArray, n: int, rng: np.random.Generator) -> IntArray:
+    """Indices (n,) drawn with `weights` by systematic resampling."""
+    positions = (np.arange(n) + rng.random()) / n
+    return np.searchsorted(np.cumsum(weights), positions).clip(0, len(weights) - 1).astype(int)
