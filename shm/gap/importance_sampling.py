@@ -31,8 +31,8 @@ from shm.gap.optimiser import NEVER, Landscape
 from shm.gap.problem import GapProblem
 from shm.gap.proposal_distribution import Points, Proposal
 from shm.inference.coordinates import log_normal
-from shm.inference.mixture import Pool, effective, normalised, systematic
-from shm.values import ENOUGH_EFFECTIVE, BoolArray, FloatArray, IntArray
+from shm.inference.mixture import Pool, Rows, effective, normalised, systematic
+from shm.values import ENOUGH_EFFECTIVE, FloatArray, IntArray
 
 # Technical, effective draws against time: a first look and refits of a few hundred points, ten to
 # twenty rounds at the most. Where they do not suffice, the answer says how many were effective.
@@ -53,14 +53,11 @@ _UNSEEN, _MUCH_BETTER = 1.25, 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Draws:
+class _Draws(Rows):
     """Draws with their linear parameters settled."""
 
     points: Points
     settled: Settled
-
-    def joined(self, other: _Draws) -> _Draws:
-        return _Draws(self.points.joined(other.points), self.settled.joined(other.settled))
 
 
 _Pool: TypeAlias = Pool[Proposal, _Draws]
@@ -172,7 +169,7 @@ _STEPS, _SETTLED_GAIN = 3, 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class Settled(Rows):
     """Points z (n, d) with their linear parameters at the best that the others allow.
 
     `log_marginal` (n,) is the log likelihood with the linear ones integrated out over their
@@ -182,18 +179,6 @@ class Settled:
     z: FloatArray
     log_marginal: FloatArray
     covariance: FloatArray
-
-    def take(self, rows: IntArray) -> Settled:
-        """Some of the points, by index."""
-        return Settled(self.z[rows], self.log_marginal[rows], self.covariance[rows])
-
-    def joined(self, other: Settled) -> Settled:
-        """Both sets of points."""
-        return Settled(
-            np.concatenate([self.z, other.z]),
-            np.concatenate([self.log_marginal, other.log_marginal]),
-            np.concatenate([self.covariance, other.covariance]),
-        )
 
 
 class Conditional:
@@ -228,7 +213,9 @@ class Conditional:
             there = self._view(tried)
             better = there.log_here > now.log_here[moving]
             z[moving[better]] = tried[better]
-            now = now.replaced(moving[better], there, better)
+            chosen = np.arange(len(z))
+            chosen[moving[better]] = len(z) + np.flatnonzero(better)
+            now = now.joined(there).take(chosen)
             now.gain[moving[~better]] = 0.0
         z[:, self._linear] += now.step
         return Settled(z, now.log_marginal, self._covariance[now.node])
@@ -264,7 +251,7 @@ class Conditional:
 
 
 @dataclass(frozen=True, eq=False)
-class _View:
+class _View(Rows):
     """Seen from points: the log marginal, the gain of a full step, the step, the likeliest node."""
 
     log_marginal: FloatArray
@@ -276,12 +263,3 @@ class _View:
     def log_here(self) -> FloatArray:
         """Log posterior of the linear parameters where they are, but for a constant."""
         return self.log_marginal - self.gain
-
-    def replaced(self, rows: IntArray, other: _View, chosen: BoolArray) -> _View:
-        """This view with `rows` taken from the `chosen` points of another."""
-        fields = []
-        for name in ("log_marginal", "gain", "step", "node"):
-            values = getattr(self, name).copy()
-            values[rows] = getattr(other, name)[chosen]
-            fields.append(values)
-        return _View(*fields)

@@ -18,6 +18,7 @@ from shm.gap.coordinates import Branch
 from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
 from shm.inference.coordinates import log_normal
+from shm.inference.mixture import Rows
 from shm.values import BoolArray, FloatArray
 
 _DIFFERENCE = 1e-4  # technical: forward differences err by half of it times the curvature
@@ -27,7 +28,7 @@ the two change places. Nothing can be followed over them."""
 
 
 @dataclass(frozen=True, eq=False)
-class Views:
+class Views(Rows):
     """The data seen from `m` points w (m, d): `residual` (m, data), measured less predicted.
 
     `slopes` (m, data, d) are the prediction's derivatives by w; `log_posterior` (m,) is the log of
@@ -38,19 +39,6 @@ class Views:
     residual: FloatArray
     slopes: FloatArray
     log_posterior: FloatArray
-
-    def where(self, chosen: BoolArray, other: Views) -> Views:
-        """These views where `chosen` (m,), elsewhere `other`."""
-        return Views(
-            np.where(chosen[:, None], self.w, other.w),
-            np.where(chosen[:, None], self.residual, other.residual),
-            np.where(chosen[:, None, None], self.slopes, other.slopes),
-            np.where(chosen, self.log_posterior, other.log_posterior),
-        )
-
-    def take(self, rows: BoolArray) -> Views:
-        """The views of some rows."""
-        return Views(self.w[rows], self.residual[rows], self.slopes[rows], self.log_posterior[rows])
 
 
 class Landscape:
@@ -138,7 +126,7 @@ class Optimum:
 
 
 @dataclass(frozen=True, eq=False)
-class _Downhill:
+class _Downhill(Rows):
     """Gradients (m, d) of the log posterior and its curvatures (m, d, d).
 
     `profile` (m,) is the log posterior with the linear parameters where they would go best.
@@ -147,17 +135,6 @@ class _Downhill:
     gradient: FloatArray
     curvature: FloatArray
     profile: FloatArray
-
-    def where(self, chosen: BoolArray, other: _Downhill) -> _Downhill:
-        """These where `chosen` (m,), elsewhere `other`."""
-        return _Downhill(
-            np.where(chosen[:, None], self.gradient, other.gradient),
-            np.where(chosen[:, None, None], self.curvature, other.curvature),
-            np.where(chosen, self.profile, other.profile),
-        )
-
-    def take(self, rows: BoolArray) -> _Downhill:
-        return _Downhill(self.gradient[rows], self.curvature[rows], self.profile[rows])
 
     def step(self, damping: FloatArray) -> FloatArray:
         """Damped steps (m, d)."""
@@ -175,18 +152,13 @@ class _Downhill:
 
 
 @dataclass(frozen=True, eq=False)
-class _Walkers:
+class _Walkers(Rows):
     """Points on their way, each on a branch of `signs` (m, d), with their damping (m,)."""
 
     views: Views
     downhill: _Downhill
     signs: FloatArray
     damping: FloatArray
-
-    def take(self, rows: BoolArray) -> _Walkers:
-        return _Walkers(
-            self.views.take(rows), self.downhill.take(rows), self.signs[rows], self.damping[rows]
-        )
 
 
 def optima(landscape: Landscape, starts: FloatArray) -> list[Optimum]:

@@ -15,9 +15,9 @@ import scipy
 from shm.gap.contract import Design, Fit, Hypothesis
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import identification_sd
+from shm.inference.mixture import Rows
 from shm.models.effects import EFFECTS, Effect, Parameter, parameters_of
 from shm.values import (
-    BoolArray,
     FloatArray,
     GapPlace,
     IntArray,
@@ -113,7 +113,7 @@ class Misfit:
 
 
 @dataclass(frozen=True, eq=False)
-class Change:
+class Change(Rows):
     """What a cause does at n places: `per_size` (n, distinct).
 
     `deviation` (n, distinct) is that of the data, as in Misfit, from what is expected without it.
@@ -242,7 +242,7 @@ def _size(problem: GapProblem, hypothesis: Hypothesis) -> Parameter:
 
 
 @dataclass(frozen=True, eq=False)
-class _State:
+class _State(Rows):
     """Sizes (n,) of a cause and the parameters z (n, p) of the misfit with them, what they leave
     (n,), and the change about them."""
 
@@ -250,20 +250,6 @@ class _State:
     z: FloatArray
     left: FloatArray
     change: Change
-
-    def better_of(self, other: _State) -> tuple[_State, BoolArray]:
-        """Place by place the state that leaves less, and where it is `other`."""
-        better = other.left < self.left
-        rows = better[:, None]
-        change = Change(
-            np.where(rows, other.change.deviation, self.change.deviation),
-            np.where(rows, other.change.per_size, self.change.per_size),
-            self.change.largest,
-        )
-        size, left = (
-            np.where(better, getattr(other, name), getattr(self, name)) for name in ("size", "left")
-        )
-        return _State(size, np.where(rows, other.z, self.z), left, change), better
 
 
 def tried(
@@ -286,7 +272,8 @@ def tried(
         except np.linalg.LinAlgError:
             # So stiff that rounding leaves the model no modes: no step down.
             moved = replace(state, left=np.full(len(size), np.inf))
-        state, better = state.better_of(moved)
+        better = moved.left < state.left
+        state = moved.where(better, state)
         length = np.where(better, 1.0, _SHORTER * length)
     return state.change
 

@@ -11,7 +11,7 @@ import scipy
 from shm.gap.contract import Peak
 from shm.gap.coordinates import Branch, Straight
 from shm.inference.coordinates import log_normal
-from shm.inference.mixture import Normal, TMixture, effective, normalised, systematic
+from shm.inference.mixture import Normal, Rows, TMixture, effective, normalised, systematic
 from shm.values import FloatArray, IntArray
 
 # Technical, all of them: importance weights correct whatever is drawn from, so they cost effective
@@ -32,7 +32,7 @@ what it borrows from the whole are much wider. The wide ones stay, for what is n
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class Points(Rows):
     """Points w (n, p), each on the branch of index `branch` (n,), straightened to y (n, p).
 
     `log_volume` (n,) is the log of |dy/dw|.
@@ -42,15 +42,6 @@ class Points:
     w: FloatArray
     y: FloatArray
     log_volume: FloatArray
-
-    def joined(self, other: Points) -> Points:
-        """Both sets of points."""
-        return Points(
-            np.append(self.branch, other.branch),
-            np.vstack([self.w, other.w]),
-            np.vstack([self.y, other.y]),
-            np.append(self.log_volume, other.log_volume),
-        )
 
 
 class Proposal:

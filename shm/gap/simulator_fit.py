@@ -17,7 +17,7 @@ from shm.gap.contract import Fit, Hypothesis, NoiseNode
 from shm.gap.likelihood import Likelihood
 from shm.gap.simulator_problem import Prior, Reading, SimulatorProblem
 from shm.inference.coordinates import log_normal
-from shm.inference.mixture import Normal, Pool, TMixture, effective, normalised, systematic
+from shm.inference.mixture import Normal, Pool, Rows, TMixture, effective, normalised, systematic
 from shm.values import FloatArray, IntArray
 
 # Technical: effective draws against calls of the simulator. Weights correct whatever is drawn from.
@@ -143,11 +143,8 @@ def _climbed(target: _Target, z: FloatArray) -> _Summit:
 
 
 @dataclass(frozen=True, eq=False)
-class _Points:
+class _Points(Rows):
     z: FloatArray
-
-    def joined(self, other: _Points, /) -> _Points:
-        return _Points(np.vstack([self.z, other.z]))
 
 
 def _log_density(proposal: TMixture, batch: _Points) -> FloatArray:

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.inference.mixture import Pool, TMixture, effective, normalised, systematic
+from shm.inference.mixture import Pool, Rows, TMixture, effective, normalised, systematic
 from shm.inference.problem import Points, Problem
 from shm.inference.search import Anchors, carried
 from shm.values import FloatArray
@@ -216,15 +216,11 @@ def _to_fit(weighted: Weighted) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class _Kept:
+class _Kept(Rows):
     """Draws inside of the prior, and the log density (n,) of what all proposals share there."""
 
     points: Points
     log_common: FloatArray
-
-    def joined(self, other: _Kept) -> _Kept:
-        log_common = np.append(self.log_common, other.log_common)
-        return _Kept(self.points.joined(other.points), log_common)
 
 
 class _Sampler:

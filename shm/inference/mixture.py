@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Generic, Protocol, Self, TypeVar
+from dataclasses import dataclass
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 import scipy
 
-from shm.values import FloatArray, IntArray
+from shm.values import BoolArray, FloatArray, IntArray
 
 # Technical: proposals with heavier tails than a posterior, and somewhat wider, keep weights
 # bounded; still heavier or wider ones waste draws (2 or 8 degrees: the same evidence within 0.02).
@@ -157,14 +158,44 @@ def _fitted(z: FloatArray, owned: FloatArray, pulled: FloatArray, former: Normal
     return Normal(mean, (1 - kept) * own + kept * former.covariance)
 
 
-class Batch(Protocol):
-    """What is known of some draws."""
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What is known of n points: arrays, or other rows, with one row for each.
 
-    def joined(self, other: Self, /) -> Self:
-        """These draws and then the others."""
+    A field that is a number is that of all points.
+    """
+
+    def take(self, rows: BoolArray | IntArray) -> Self:
+        """Some of the points, by index or choice."""
+        return self._mapped(lambda own: own.take(rows) if isinstance(own, Rows) else own[rows])
+
+    def joined(self, other: Self) -> Self:
+        """These points and then the others."""
+        return self._mapped(
+            lambda own, its: (
+                own.joined(its) if isinstance(own, Rows) else np.concatenate([own, its])
+            ),
+            other,
+        )
+
+    def where(self, chosen: BoolArray, other: Self) -> Self:
+        """These points where `chosen` (n,), elsewhere the `other` ones."""
+
+        def either(own: Any, its: Any) -> Any:
+            if isinstance(own, Rows):
+                return own.where(chosen, its)
+            return np.where(chosen.reshape(-1, *[1] * (np.ndim(own) - 1)), own, its)
+
+        return self._mapped(either, other)
+
+    def _mapped(self, act: Callable[..., Any], *others: Self) -> Self:
+        columns = zip(*(vars(each).values() for each in (self, *others)), strict=True)
+        return type(self)(
+            *(first if np.isscalar(first) else act(first, *rest) for first, *rest in columns)
+        )
 
 
-B = TypeVar("B", bound=Batch)
+B = TypeVar("B", bound=Rows)
 
 
 class Pool(Generic[P, B]):

@@ -22,18 +22,18 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
 from shm.inference.importance import Weighted
-from shm.inference.mixture import Normal, TMixture, normalised, systematic
+from shm.inference.mixture import Normal, Rows, TMixture, normalised, systematic
 from shm.inference.other_answers import Outcome
 from shm.inference.problem import Points, Problem
 from shm.inference.search import Anchors, WarmStart
 from shm.values import (
     BoolArray,
     FloatArray,
-    IntArray,
 )
 
 # Technical: longer strides than the textbook's 1, since the last step corrects what they leave.
@@ -146,7 +146,7 @@ class Mover:
         proposed = self._problem.log_posterior(proposal, self._floor)
         accepted = np.log(rng.random(len(density))) < proposed - density + log_ratio
         density = np.where(accepted, proposed, density)
-        return points.replaced(accepted, proposal), density, float(accepted.mean())
+        return proposal.where(accepted, points), density, float(accepted.mean())
 
     def _crank_nicolson(
         self, points: Points, rng: np.random.Generator
@@ -176,15 +176,12 @@ _TEXTBOOK_VARIATION = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Particles:
+class _Particles(Rows):
     """`theta` (n, d + 1) with sigma last, `predicted` (n, measurements), log likelihood (n,)."""
 
     theta: FloatArray
     predicted: FloatArray
     log_likelihood: FloatArray
-
-    def take(self, index: IntArray) -> _Particles:
-        return _Particles(self.theta[index], self.predicted[index], self.log_likelihood[index])
 
 
 class BiasedEvidenceWarning(UserWarning):
@@ -258,7 +255,7 @@ def _moved(
         visited.append(chains)
         lengths = lengths - 1
         chains, lengths = chains.take(np.flatnonzero(lengths)), lengths[lengths > 0]
-    return _joined(visited)
+    return reduce(_Particles.joined, visited)
 
 
 def _stepped(
@@ -275,16 +272,7 @@ def _stepped(
     proposed = _run(problem, np.where(inside[:, None], theta, chains.theta))
     gain = power * (proposed.log_likelihood - chains.log_likelihood)
     accepted = inside & (np.log(rng.random(len(theta))) < gain)
-    both = _joined([chains, proposed])
-    return both.take(np.arange(len(theta)) + len(theta) * accepted)
-
-
-def _joined(parts: list[_Particles]) -> _Particles:
-    return _Particles(
-        np.vstack([part.theta for part in parts]),
-        np.vstack([part.predicted for part in parts]),
-        np.concatenate([part.log_likelihood for part in parts]),
-    )
+    return proposed.where(accepted, chains)
 
 
 def _outcome(
