@@ -15,10 +15,10 @@ from shm.bridge.hanger import hanger_of
 from shm.errors import BadInput, UsageError
 from shm.gap import GapOptions, Progress
 from shm.gap import diagnose as diagnosed
-from shm.gap.contract import silent
 from shm.identify import Identification, IdentifyOptions
 from shm.identify.identification import identify as identified
 from shm.inference import METHODS, UpdateOptions, updating
+from shm.inference.options import silent
 from shm.models import DESCRIPTION, build, competing_names
 from shm.read import read as read_file
 from shm.read import registry

@@ -13,7 +13,7 @@ from itertools import combinations, product
 import numpy as np
 import scipy
 
-from shm.gap.contract import Fit, GapOptions, NoiseNode, Progress, silent
+from shm.gap.contract import Fit, GapOptions
 from shm.gap.coordinates import Branch
 from shm.gap.damping import with_damping
 from shm.gap.law_error import without_minor_cause
@@ -29,6 +29,7 @@ from shm.gap.optimiser import Landscape
 from shm.gap.problem import GapProblem
 from shm.gap.search import SUPPORTED, Search
 from shm.inference.mixture import normalised
+from shm.inference.options import Progress, silent
 from shm.values import Leads, leads
 
 WITHIN_REACH = 7.0
@@ -373,10 +374,7 @@ def expected_log_bayes_factor(one: Fit, other: Fit) -> float:
 
 def _when_true(true: Fit, rival: Fit) -> float:
     """Half of min over z of |predicted - rival(z)|^2 + |z|^2 - |z of the rival's fit|^2."""
-    errors = Likelihood([NoiseNode(rival.noise, 0.0, rival.model_error)])
+    errors = Likelihood.of(rival.noise, rival.model_error)
     apart = true.predicted - rival.predicted
-    products = errors.gram(np.column_stack([rival.slopes, apart])[None])[0, 0]
-    inner, outer, square = products[:-1, :-1], products[:-1, -1], products[-1, -1]
-    pull = outer - rival.z
-    curvature = inner + np.eye(len(rival.z))
-    return float(max(0.0, square - pull @ np.linalg.solve(curvature, pull)) / 2)
+    _, _, square, followed = errors.linear(rival.slopes, apart, rival.z)
+    return max(0.0, square - followed) / 2

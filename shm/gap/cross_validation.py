@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from shm.errors import UsageError
-from shm.gap.contract import Design, Fit, NoiseNode
+from shm.gap.contract import Design, Fit
 from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
 from shm.models.effects import Conditions
@@ -202,7 +202,7 @@ class _Part:
             rows,
             problem.observations.value[rows],
             fit.slopes[rows],
-            Likelihood([NoiseNode(fit.noise.part(frequency, shape), 0.0, fit.model_error)]),
+            Likelihood.of(fit.noise.part(frequency, shape), fit.model_error),
         )
 
     def weighed(self, data: FloatArray) -> FloatArray:

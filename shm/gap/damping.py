@@ -43,23 +43,20 @@ _LEAST_RATIO = 1.2  # of levels, as `shm.models.effects` asks
 def with_damping(observations: Observations, kinds: Sequence[Family]) -> tuple[Family, ...]:
     """Families with what damping says of each, the likeliest first."""
     rising = log_rising(observations)
-    told = [(kind, _odds(rising, kind.best.hypothesis)) for kind in kinds]
     found = [
         replace(kind, log_evidence=kind.log_evidence + odds, log_mimic=kind.log_mimic + odds)
-        for kind, odds in told
+        for kind in kinds
+        for odds in [log_odds(rising, kind.best.hypothesis)]
     ]
     return tuple(sorted(found, key=lambda each: -(each.log_evidence + each.log_prior)))
 
 
-def log_odds(observations: Observations, hypothesis: Hypothesis) -> float:
+def log_odds(rising: float, hypothesis: Hypothesis) -> float:
     """What damping adds to the log evidence of a hypothesis, against damping that does not rise.
 
-    Of something unknown no one knows whether it takes energy: both are as likely.
+    `rising` is its log Bayes factor. Of something unknown no one knows whether it takes energy:
+    both are as likely.
     """
-    return _odds(log_rising(observations), hypothesis)
-
-
-def _odds(rising: float, hypothesis: Hypothesis) -> float:
     rises = any(EFFECTS[name].dissipates for name in hypothesis.names)
     if not (rises or hypothesis.flexible):
         return 0.0
@@ -72,7 +69,7 @@ def log_rising(observations: Observations) -> float:
     design, damping = observations.design, observations.damping
     known = np.flatnonzero(np.isfinite(damping).all(axis=1))
     test = design.frequency_test[known]
-    level = np.array([each.amplitude for each in design.conditions])[test]
+    level = design.amplitude[known]
     if not len(known) or level.max() <= _LEAST_RATIO * level.min():
         return 0.0
     value, sd = damping[known].T

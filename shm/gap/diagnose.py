@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.gap.attribution import Attribution, Explanation, answered, possible
-from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress, silent
+from shm.gap.contract import Fit, GapOptions, Hypothesis
 from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
 from shm.gap.damping import acting
 from shm.gap.data_checks import Usable, tension_of_any_ends_n, usable
@@ -20,6 +20,7 @@ from shm.gap.places import places
 from shm.gap.problem import GapProblem
 from shm.gap.remainder import remainder_of
 from shm.gap.residuals import compatibility, residuals, sensor_remarks, trends
+from shm.inference.options import Progress, silent
 from shm.models import check_baseline
 from shm.models.as_made import TENSION_RATIO
 from shm.models.effects import check_effect_priors

@@ -18,13 +18,14 @@ import numpy as np
 import scipy
 
 from shm.errors import BadInput, UsageError
-from shm.gap.contract import Fit, Hypothesis, Peak, Progress
+from shm.gap.contract import Fit, Hypothesis, Peak
 from shm.gap.coordinates import is_place
 from shm.gap.detectability import HOPELESS_SHARE, Scan, marginal, scan, superposed, truncate
 from shm.gap.likelihood import Likelihood
 from shm.gap.model_probabilities import ScoredHypothesis
 from shm.gap.optimiser import Landscape, Optimum, optima
 from shm.gap.problem import GapProblem
+from shm.inference.options import Progress
 from shm.models.effects import EFFECTS
 from shm.values import FloatArray
 

@@ -31,7 +31,7 @@ from shm.gap.optimiser import NEVER, Landscape
 from shm.gap.problem import GapProblem
 from shm.gap.proposal_distribution import Points, Proposal
 from shm.inference.coordinates import log_normal
-from shm.inference.mixture import Pool, Rows, effective, normalised, systematic
+from shm.inference.mixture import Pool, Rows, normalised, systematic
 from shm.values import ENOUGH_EFFECTIVE, FloatArray, IntArray
 
 # Technical, effective draws against time: a first look and refits of a few hundred points, ten to
@@ -78,14 +78,14 @@ def sampled(
     if settled.log_marginal[best] > sampler.log_marginal_of_fit + _MUCH_BETTER:
         fit = fitted(problem, fit.hypothesis, rng, np.stack([settled.z[best], fit.z]))
     rows = systematic(normalised(final.log_weights), draws, rng)
-    share = 1 / _effective(final) - 1 / final.draws
+    share = 1 / final.effective - 1 / final.draws
     return replace(
         fit,
         draws=rng.permutation(sampler.scattered(settled.take(rows), rng)),
-        log_evidence=float(scipy.special.logsumexp(final.log_weights) - np.log(final.draws)),
+        log_evidence=final.log_evidence,
         log_evidence_sd=float(_UNSEEN * np.sqrt(max(share, 0.0))),
         method="sampled",
-        effective=_effective(final),
+        effective=final.effective,
     )
 
 
@@ -119,15 +119,15 @@ class _Sampler:
         pool, final = _empty(), _empty()
         to_fit = _TO_FIT * max(len(self._other), 1)
         while pool.draws + final.draws < most:
-            if pool.draws and _effective(pool) >= to_fit:
+            if pool.draws and pool.effective >= to_fit:
                 self._draw(final, proposal, _FINAL, rng)
-                if _effective(final) >= ENOUGH_EFFECTIVE:
+                if final.effective >= ENOUGH_EFFECTIVE:
                     return final
-                if _effective(final) >= _HOPEFUL * final.draws:
+                if final.effective >= _HOPEFUL * final.draws:
                     continue
                 pool.absorb(final)
                 final = _empty()
-                if _effective(pool) >= _INSTEAD * ENOUGH_EFFECTIVE:
+                if pool.effective >= _INSTEAD * ENOUGH_EFFECTIVE:
                     break
             else:
                 self._draw(pool, proposal, _TRIAL if pool.draws else _FIRST, rng)
@@ -156,11 +156,6 @@ class _Sampler:
 
 def _empty() -> _Pool:
     return Pool(lambda proposal, draws: proposal.log_density(draws.points))
-
-
-def _effective(pool: _Pool) -> float:
-    """Kish's effective number of draws."""
-    return effective(normalised(pool.log_weights))
 
 
 # Technical: what is nearly linear settles in a few steps, the last of them, of a gain below 0.2 in

@@ -154,13 +154,11 @@ def _off(
 
 def _linear(problem: GapProblem, fit: Fit, errors: Covariance, slopes: FloatArray) -> _Linear:
     """About a fit's most probable point; `slopes` (data, d + k), the first d its own."""
-    likelihood = Likelihood([NoiseNode(errors, 0.0, fit.model_error)])
+    likelihood = Likelihood.of(errors, fit.model_error)
     z = np.concatenate([fit.z, np.zeros(slopes.shape[1] - len(fit.z))])
     residual = problem.observations.value - fit.predicted
-    gram = likelihood.gram(np.column_stack([slopes, residual])[None])[0, 0]
-    inner, pull = gram[:-1, :-1] + np.eye(len(z)), gram[:-1, -1] - z
-    step = np.linalg.solve(inner, pull)
-    misfit = gram[-1, -1] + z @ z - pull @ step
+    inner, step, square, followed = likelihood.linear(slopes, residual, z)
+    misfit = square + z @ z - followed
     log = likelihood.log_height[0] - np.linalg.slogdet(inner)[1] / 2 - misfit / 2
     return _Linear(errors, float(log), step, inner)
 
@@ -198,7 +196,7 @@ def _fitted_anew(
         frequency=likeliest.errors.frequency + others[:count] @ others[:count].T,
         shape_loads=np.column_stack([likeliest.errors.shape_loads, others[count:]]),
     )
-    likelihood = Likelihood([NoiseNode(errors, 0.0, fit.model_error)])
+    likelihood = Likelihood.of(errors, fit.model_error)
     starts = np.array([fit.z, fit.z + likeliest.step[:own]])
     moved = fitted(problem, fit.hypothesis, rng, starts, likelihood)
     return replace(moved, log_evidence=fit.log_evidence, method=fit.method, peaks=fit.peaks)
@@ -340,7 +338,6 @@ def _added(problem: GapProblem, baseline: Fit, fit: Fit, index: int) -> float:
 def _beyond(shift: FloatArray, baseline: Fit, errors: NoiseNode) -> float:
     """The square of a shift (data,), in standard deviations, beyond what the baseline's parameters
     can follow."""
-    columns = np.column_stack([baseline.slopes, shift])[None]
-    products = Likelihood([errors]).gram(columns)[0, 0]
-    inner, outer = products[:-1, :-1] + np.eye(len(baseline.z)), products[:-1, -1]
-    return float(products[-1, -1] - outer @ np.linalg.solve(inner, outer))
+    likelihood, middle = Likelihood([errors]), np.zeros(len(baseline.z))
+    _, _, square, followed = likelihood.linear(baseline.slopes, shift, middle)
+    return square - followed

@@ -13,6 +13,7 @@ import scipy
 
 from shm.gap.contract import Design, Fit
 from shm.gap.experiment_design import Proposal, proposals, sensors_wanted, with_sensors
+from shm.gap.noise import same_mode
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import identification_sd
 from shm.values import NAN, FloatArray, NextMeasurement
@@ -179,7 +180,7 @@ class Errors:
 
     def between(self, one: Design, other: Design, *, same: bool) -> FloatArray:
         """The covariance (F of one, F of the other) by what repeats; of the `same` tests or not."""
-        found = self.repeated**2 * same_modes(one, other)
+        found = self.repeated**2 * same_mode(one, other)
         return found if self.remainder is None else found + self.remainder.between(one, other, same)
 
 
@@ -287,12 +288,6 @@ def _given_the_old(
     if errors.sensors is not None:
         noise[new : design.size, new : design.size] += errors.sensors @ errors.sensors.T
     return Foresight(design, mean, spread @ spread.T + noise)
-
-
-def same_modes(one: Design, other: Design) -> FloatArray:
-    """(F of one, F of the other): 1 where two frequencies are of one plane and order."""
-    planes = one.frequency_plane[:, None] == other.frequency_plane
-    return np.asarray(planes & (one.frequency_order[:, None] == other.frequency_order), dtype=float)
 
 
 def _agreement(design: Design, predicted: FloatArray, reference: FloatArray) -> FloatArray:

@@ -138,18 +138,12 @@ def drawn_together(observations: Observations) -> FloatArray:
     scatter much more (James and Stein's shrinkage). Components of a shape keep their proportions.
     """
     design = observations.design
-    count, mode = design.frequencies, _modes(design)
+    count, mode = design.frequencies, design.mode
     frequency, shape = observations.sd[:count], observations.sd[count:]
     of = np.unique(design.shape_mode, return_inverse=True)[1]
     size = np.sqrt(np.bincount(of, shape**2) / np.maximum(np.bincount(of), 1))
     factor = _drawn(mode[np.unique(design.shape_mode)], size) / size
     return np.concatenate([_drawn(mode, frequency), shape * factor[of]])
-
-
-def _modes(design: Design) -> IntArray:
-    """A number (F,) for each plane and order."""
-    orders = int(design.frequency_order.max()) + 1
-    return np.asarray(design.frequency_plane * orders + design.frequency_order)
 
 
 def _drawn(group: IntArray, sd: FloatArray) -> FloatArray:
@@ -167,10 +161,11 @@ def _drawn(group: IntArray, sd: FloatArray) -> FloatArray:
     return drawn
 
 
-def same_mode(design: Design) -> FloatArray:
-    """(F, F): 1 where two frequencies are of one plane and order, 0 elsewhere."""
-    mode = np.stack([design.frequency_plane, design.frequency_order])
-    return np.asarray((mode[:, :, None] == mode[:, None, :]).all(axis=0), dtype=float)
+def same_mode(one: Design, other: Design | None = None) -> FloatArray:
+    """(F of one, F of the other or of itself): 1 where both are of one plane and order, else 0."""
+    planes = np.equal.outer(one.frequency_plane, (other or one).frequency_plane)
+    orders = np.equal.outer(one.frequency_order, (other or one).frequency_order)
+    return np.asarray(planes & orders, dtype=float)
 
 
 def _unknown_sds(known: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -208,19 +203,9 @@ def _between_tests(observations: Observations) -> tuple[float, float]:
     """The scatter of shapes about their means over tests, in stated sds, and its freedom."""
     design = observations.design
     mode = design.shape_mode
-    masses = [each.added_mass for each in design.conditions]
-    mass = np.array([masses.index(each) for each in masses])[design.frequency_test[mode]]
-    keys = np.stack(
-        [
-            mass,
-            design.frequency_plane[mode],
-            design.frequency_order[mode],
-            design.shape_place,
-            design.shape_component,
-        ]
-    )
     # What is turned at will scatters by more than its own standard deviations say.
-    keys = np.vstack([keys, np.where(turned_modes(observations), np.arange(len(mode)), -1)])
+    turned = np.where(turned_modes(observations), np.arange(len(mode)), -1)
+    keys = np.vstack([design.kinds[:, design.frequencies :], turned])
     kind = np.unique(keys, axis=1, return_inverse=True)[1].ravel()
     value, sd = observations.value[design.frequencies :], observations.sd[design.frequencies :]
     count = np.bincount(kind)
@@ -369,14 +354,14 @@ def _over_orders(design: Design) -> list[FloatArray]:
     return [*patterns, alike_in_planes(design)] if several else patterns
 
 
-def smooth_over_orders(design: Design) -> FloatArray:
+def smooth_over_orders(one: Design, other: Design | None = None) -> FloatArray:
     """Correlations (F, F) that fall with the difference of the orders, in each plane."""
-    plane = design.frequency_plane
-    return np.asarray((plane[:, None] == plane) * alike_in_planes(design))
+    planes = np.equal.outer(one.frequency_plane, (other or one).frequency_plane)
+    return np.asarray(planes * alike_in_planes(one, other))
 
 
-def alike_in_planes(design: Design) -> FloatArray:
+def alike_in_planes(one: Design, other: Design | None = None) -> FloatArray:
     """Correlations (F, F) that fall with the difference of the orders, whatever the planes."""
-    order = design.frequency_order
-    apart = (order[:, None] - order) / SMOOTH_ORDERS
+    orders = np.subtract.outer(one.frequency_order, (other or one).frequency_order)
+    apart = orders / SMOOTH_ORDERS
     return np.asarray(np.exp(-(apart**2) / 2))

@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from shm.gap.attribution import Attribution, answered, attributed, more_thorough
-from shm.gap.contract import Fit, GapOptions, Progress, silent
+from shm.gap.contract import Fit, GapOptions
 from shm.gap.fit import baseline_fit, with_remainder
 from shm.gap.outliers import (
     SURE,
@@ -27,6 +27,7 @@ from shm.gap.outliers import (
     without_shape,
 )
 from shm.gap.problem import GapProblem
+from shm.inference.options import Progress, silent
 from shm.values import NAN, PLANES, IntArray, Outlier, Residual, effect_label
 
 _ROUNDS = 2  # judgement: one error may hide another

@@ -119,11 +119,8 @@ def gross_errors(
 def _open(problem: GapProblem, rows: IntArray, gone: IntArray) -> BoolArray:
     """Which of `rows` are of a test and of a mode that no gross error was found in yet."""
     design = problem.design
-    mode = np.stack([design.frequency_plane, design.frequency_order])
-    same_mode = (mode[:, rows, None] == mode[:, None, gone]).all(axis=0).any(axis=1)
-    return np.asarray(
-        ~np.isin(design.frequency_test[rows], design.frequency_test[gone]) & ~same_mode
-    )
+    test, mode = design.frequency_test, design.mode
+    return np.asarray(~np.isin(test[rows], test[gone]) & ~np.isin(mode[rows], mode[gone]))
 
 
 def _suspect(
@@ -364,9 +361,7 @@ def acts_alone(design: Design, kept: Design, row: int, deviation: float) -> floa
     """
     if abs(deviation) > _LARGEST or _right_elsewhere(design, kept, row):
         return 0.0
-    modes = len(
-        {*zip(design.frequency_plane.tolist(), design.frequency_order.tolist(), strict=True)}
-    )
+    modes = len(np.unique(design.mode))
     slip = GROSS_ERROR / np.log(WIDE_TO / WIDE_FROM)
     acts = UNKNOWN / NO_GAP * _SHARE / modes / np.log(_LARGEST / WIDE_FROM)
     return float(acts / (acts + slip))
@@ -376,8 +371,4 @@ def _right_elsewhere(design: Design, kept: Design, row: int) -> bool:
     same = (kept.frequency_plane == design.frequency_plane[row]) & (
         kept.frequency_order == design.frequency_order[row]
     )
-    return bool((_levels(kept)[same] * _SAME_LEVEL >= _levels(design)[row]).any())
-
-
-def _levels(design: Design) -> FloatArray:
-    return np.array([each.amplitude for each in design.conditions])[design.frequency_test]
+    return bool((kept.amplitude[same] * _SAME_LEVEL >= design.amplitude[row]).any())

@@ -146,20 +146,7 @@ class Change(Rows):
 
 def _distinct(design: Design, predicted: FloatArray) -> tuple[IntArray, IntArray]:
     """One row of each kind of datum, and of which kind each datum (data,) is."""
-    masses = [each.added_mass for each in design.conditions]
-    mass = np.array([masses.index(each) for each in masses])[design.frequency_test]
-    mode = np.concatenate([np.arange(design.frequencies), design.shape_mode])
-    none = np.full(design.frequencies, -1)
-    keys = np.stack(
-        [
-            mass[mode],
-            design.frequency_plane[mode],
-            design.frequency_order[mode],
-            np.concatenate([none, design.shape_place]),
-            np.concatenate([none, design.shape_component]),
-            predicted.round(10),
-        ]
-    )
+    keys = np.vstack([design.kinds, predicted.round(10)])
     _, rows, kind = np.unique(keys, axis=1, return_index=True, return_inverse=True)
     return rows, kind.ravel()
 

@@ -104,12 +104,11 @@ def order_law(kind: OverOrders, order: FloatArray, place: float) -> FloatArray:
 
 
 def _over_tests(design: Design) -> Iterator[tuple[OverTests, float, FloatArray]]:
-    test = design.frequency_test
-    yield "all tests", NAN, np.ones(len(test))
-    warmth = np.array([each.temperature_shift_k for each in design.conditions])[test]
+    yield "all tests", NAN, np.ones(design.frequencies)
+    warmth = design.temperature_shift_k
     if np.ptp(warmth) > 1.0:  # kelvin, as `shm.models.effects` asks of the catalogue's own
         yield "temperature", NAN, warmth
-    level = np.array([each.amplitude for each in design.conditions])[test]
+    level = design.amplitude
     levels = np.unique(level)
     if levels[-1] <= _SAME_LEVEL * levels[0]:
         return

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.gap.contract import Covariance, Design, Fit, Hypothesis, NoiseNode, Observations
+from shm.gap.contract import Covariance, Design, Fit, Hypothesis, Observations
 from shm.gap.cross_validation import HeldOut
 from shm.gap.likelihood import Likelihood, ShapeErrors
 from shm.gap.noise import SD_LOWER
@@ -94,7 +94,7 @@ def left_over(fit: Fit, sd: FloatArray) -> FloatArray:
     A fit weighs the data by all errors that it allows for. Supports that give and a section that
     varies keep its parameters from following the data as far as `sd` alone would let them.
     """
-    noise = Likelihood([NoiseNode(fit.noise, 0.0, fit.model_error)]).weighed(fit.slopes)
+    noise = Likelihood.of(fit.noise, fit.model_error).weighed(fit.slopes)
     weighed = np.concatenate([noise.frequency[0], noise.shape[0]])
     information = np.eye(fit.slopes.shape[1]) + fit.slopes.T @ weighed
     followed = fit.slopes @ np.linalg.solve(information, weighed.T)
@@ -140,10 +140,9 @@ def _conditions(design: Design) -> Iterator[tuple[str, FloatArray, IntArray]]:
     """Each condition's name, its value at each frequency and the groups it is compared within."""
     test, plane, order = design.frequency_test, design.frequency_plane, design.frequency_order
     mode = 2 * order + plane
-    each = design.conditions
-    masses = [0.0 if c.added_mass is None else c.added_mass.mass_kg for c in each]
-    yield "temperature", np.array([c.temperature_shift_k for c in each])[test], mode
-    yield "amplitude", np.array([c.amplitude for c in each])[test], mode
+    masses = [c.added_mass.mass_kg if c.added_mass else 0.0 for c in design.conditions]
+    yield "temperature", design.temperature_shift_k, mode
+    yield "amplitude", design.amplitude, mode
     yield "added mass", np.array(masses)[test], mode
     yield "order", order.astype(float), 2 * test + plane
     yield "plane", plane.astype(float), order
@@ -232,8 +231,7 @@ def _freedom(design: Design) -> int:
 
 def _means(design: Design) -> FloatArray:
     """Rows (m, F) that average each mode over the tests in which it was measured."""
-    mode = design.frequency_plane * (design.frequency_order.max() + 1) + design.frequency_order
-    rows = (mode == np.unique(mode)[:, None]).astype(float)
+    rows = (design.mode == np.unique(design.mode)[:, None]).astype(float)
     return np.asarray(rows / rows.sum(axis=1, keepdims=True))
 
 

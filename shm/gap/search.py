@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress
+from shm.gap.contract import Fit, GapOptions, Hypothesis
 from shm.gap.detectability import Scan
 from shm.gap.fit import (
     STARTS,
@@ -29,6 +29,7 @@ from shm.gap.model_probabilities import Family, ScoredHypothesis, families, log_
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import predictions, predictive_p_value
 from shm.inference.mixture import normalised
+from shm.inference.options import Progress
 from shm.values import FloatArray
 
 # Judgement, time against the chance to miss a cause. Sampled is what Laplace's method puts within

@@ -17,7 +17,16 @@ from shm.gap.contract import Fit, Hypothesis, NoiseNode
 from shm.gap.likelihood import Likelihood
 from shm.gap.simulator_problem import Prior, Reading, SimulatorProblem
 from shm.inference.coordinates import log_normal
-from shm.inference.mixture import Normal, Pool, Rows, TMixture, effective, normalised, systematic
+from shm.inference.mixture import (
+    Normal,
+    Pool,
+    Rows,
+    TMixture,
+    effective,
+    normalised,
+    systematic,
+    tempered,
+)
 from shm.values import FloatArray, IntArray
 
 # Technical: effective draws against calls of the simulator. Weights correct whatever is drawn from.
@@ -91,7 +100,7 @@ def fitted(
         hypothesis, best.z, best.covariance, problem.value - residual, slopes, node.covariance, 0.0,
         draws=pool.batch.z[systematic(weights, _KEPT, rng)],
         log_fit=float(target.likelihood.log(residual[None])[0]),
-        log_evidence=float(scipy.special.logsumexp(pool.log_weights) - np.log(pool.draws)),
+        log_evidence=pool.log_evidence,
         log_evidence_sd=float(np.sqrt(max(1 / count - 1 / pool.draws, 0.0))),
         method="sampled", effective=count,
     )  # fmt: skip
@@ -167,20 +176,12 @@ def _sampled(
         log_target = target.log(z)
         log_target = np.where(np.isnan(log_target), -np.inf, log_target)
         pool.add(proposal, _ROUND, _Points(z), log_target)
-        if effective(normalised(pool.log_weights)) > _ENOUGH:
+        if pool.effective > _ENOUGH:
             break
-        weights = _tempered(pool.log_weights, _TO_FIT * z.shape[1])
+        fewest = _TO_FIT * z.shape[1]
+        weights = tempered(pool.log_weights, fewest, _COOLING, _LEAST_POWER)
         proposal = proposal.refitted(pool.batch.z, weights).mixed(first, _FROM_FIRST)
     return pool
-
-
-def _tempered(log_weights: FloatArray, fewest: float) -> FloatArray:
-    """Weights raised to a power below 1 where too few draws carry them to be fitted to."""
-    power, weights = 1.0, normalised(log_weights)
-    while effective(weights) < fewest and power > _LEAST_POWER:
-        power *= _COOLING
-        weights = normalised(power * log_weights)
-    return weights
 
 
 # Judgement, in a prior's standard deviations: nearer to a bound than a hundredth of the range; so

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.inference.mixture import Pool, Rows, TMixture, effective, normalised, systematic
+from shm.inference.mixture import Pool, Rows, TMixture, effective, normalised, systematic, tempered
 from shm.inference.problem import Points, Problem
 from shm.inference.search import Anchors, carried
 from shm.values import FloatArray
@@ -164,7 +164,9 @@ def _adapted(
     for _ in range(_MOST_TRIALS):
         sampler.draw(trial, core, _TRIAL, rng)
         weighted = _weighted(trial)
-        core = core.refitted(weighted.points.z, _to_fit(weighted))
+        z = weighted.points.z
+        fewest = min(_FEWEST_TO_FIT * z.shape[1], len(z) / 2)
+        core = core.refitted(z, tempered(weighted.log_weights, fewest))
         if weighted.effective_sample_size >= _ENOUGH_TO_FIT * enough:
             break
     return core
@@ -202,17 +204,6 @@ def _fill(
 
 def _suffices(weighted: Weighted, enough: float) -> bool:
     return weighted.effective_sample_size >= enough and weighted.log_evidence_sd <= _ENOUGH_ERROR
-
-
-def _to_fit(weighted: Weighted) -> FloatArray:
-    """Weights to fit to, raised to a power below 1 where too few draws carry them."""
-    fewest = min(_FEWEST_TO_FIT * weighted.points.z.shape[1], len(weighted.log_weights) / 2)
-    power = 1.0
-    weights = normalised(weighted.log_weights)
-    while effective(weights) < fewest:
-        power *= 0.8
-        weights = normalised(power * weighted.log_weights)
-    return weights
 
 
 @dataclass(frozen=True, eq=False)

@@ -222,6 +222,16 @@ class Pool(Generic[P, B]):
         """Of the draws in `batch` (n,); the mean over all `draws` is the target's integral."""
         return np.asarray(self._log_target - self._log_drawn + np.log(self.draws))
 
+    @property
+    def effective(self) -> float:
+        """Kish's effective number of draws."""
+        return effective(normalised(self.log_weights))
+
+    @property
+    def log_evidence(self) -> float:
+        """Log of the target's integral."""
+        return float(scipy.special.logsumexp(self.log_weights) - np.log(self.draws))
+
     def add(self, proposal: P, draws: int, batch: B, log_target: FloatArray) -> None:
         """Those kept of so many draws of a proposal, where the target's log density is known."""
         self._append([(proposal, draws)], batch, log_target)
@@ -254,6 +264,18 @@ def normalised(log_weights: FloatArray) -> FloatArray:
 def effective(weights: FloatArray) -> float:
     """Kish's effective number of draws with weights (n,) that add to 1."""
     return float(1 / np.sum(weights**2))
+
+
+def tempered(
+    log_weights: FloatArray, fewest: float, cooling: float = 0.8, least: float = 0.0
+) -> FloatArray:
+    """Weights to fit to: where fewer draws than `fewest` carry them raised to a power below 1, in
+    steps of `cooling` down to the `least`."""
+    power, weights = 1.0, normalised(log_weights)
+    while effective(weights) < fewest and power > least:
+        power *= cooling
+        weights = normalised(power * log_weights)
+    return weights
 
 
 def systematic(weights: FloatArray, n: int, rng: np.random.Generator) -> IntArray:
