@@ -20,12 +20,11 @@ import scipy
 from shm.errors import BadInput, UsageError
 from shm.gap.contract import Fit, Hypothesis, Peak
 from shm.gap.coordinates import is_place
-from shm.gap.detectability import HOPELESS_SHARE, Scan, marginal, scan, superposed, truncate
+from shm.gap.detectability import Scan, marginal, scan
 from shm.gap.likelihood import Likelihood
 from shm.gap.model_probabilities import ScoredHypothesis
 from shm.gap.optimiser import Landscape, Optimum, optima
 from shm.gap.problem import GapProblem
-from shm.inference.options import Progress
 from shm.models.effects import EFFECTS
 from shm.values import FloatArray
 
@@ -35,10 +34,6 @@ IN_BASELINE = {
     "solid2": ("rotational_end_flexibility",),
 }
 """Effects that a baseline class has as parameters of its own."""
-# Judgement: what a scan puts 150 times (a coarse one 1100 times) behind is not fitted. A smaller
-# reach loses causes, a larger one costs a fit each.
-HOPELESS, HOPELESS_IF_COARSE = 5.0, 7.0
-NOTHING_SEEN = 1.0
 
 
 def hypotheses(problem: GapProblem, without: tuple[str, ...] = ()) -> tuple[Hypothesis, ...]:
@@ -70,33 +65,6 @@ def invisible(problem: GapProblem) -> dict[str, str]:
     return {name: reason for name, reason in reasons.items() if reason}
 
 
-def screened(
-    problem: GapProblem, baseline: Fit, singles: Sequence[Hypothesis], progress: Progress
-) -> dict[Hypothesis, Scan]:
-    """The single effects that these data can show, scanned, their priors cut to visible sizes."""
-    scans: dict[Hypothesis, Scan] = {}
-    for count, hypothesis in enumerate(singles):
-        progress(f"screening {hypothesis.name}", count / len(singles))
-        found = scan(problem, baseline, hypothesis)
-        if found.smallest < NOTHING_SEEN:
-            truncate(problem, found)
-            scans[hypothesis] = found
-    return scans
-
-
-def paired(
-    problem: GapProblem, leader: Fit, scans: Mapping[Hypothesis, Scan]
-) -> dict[Hypothesis, Scan]:
-    """The leader with every other effect: what each does alone is added to the leader's fit."""
-    first = leader.hypothesis
-    pairs = {
-        Hypothesis((*first.effects, *single.effects)): found
-        for single, found in scans.items()
-        if single.name != first.name
-    }
-    return {pair: superposed(problem, leader, found, pair) for pair, found in pairs.items()}
-
-
 def tried_by_screening(
     problem: GapProblem, before: Fit, scans: Mapping[Hypothesis, Scan]
 ) -> tuple[ScoredHypothesis, ...]:
@@ -113,28 +81,6 @@ def tried_by_screening(
         for hypothesis, found in scans.items()
     ]
     return tuple(sorted(tried, key=lambda each: -each.log_evidence))
-
-
-def hopeful(
-    tried: Sequence[ScoredHypothesis],
-    priors: Sequence[float],
-    coarse: Sequence[bool],
-    rival: float,
-    gap: float,
-    most: int,
-) -> tuple[ScoredHypothesis, ...]:
-    """Those that may come near the likeliest, the best first, at most `most`.
-
-    `priors` are the logarithms of theirs, `rival` the log of prior times evidence of the best so
-    far. A scan of several parameters is `coarse` and may be farther off. The larger the gap (what
-    the best gains in log evidence), the more a scan, which takes it as linear, may be wrong.
-    """
-    weighed = [each.log_evidence + prior for each, prior in zip(tried, priors, strict=True)]
-    order = np.argsort(-np.array(weighed), kind="stable")[:most]
-    best = max([rival, *weighed])
-    own = np.where(coarse, HOPELESS_IF_COARSE, HOPELESS)
-    reach = np.maximum(own, HOPELESS_SHARE * gap)
-    return tuple(tried[i] for i in order if weighed[i] > best - reach[i])
 
 
 def varied(
