@@ -144,24 +144,11 @@ class SimulatorDiagnosis:
 
     def to_records(self) -> list[dict[str, object]]:
         """One row for each answer, as `pandas.DataFrame` takes them."""
-        rows: list[dict[str, object]] = [
-            {"answer": e.name, "probability": e.probability, "gap_left_sds": e.gap_left}
-            for e in self.causes
-        ]
-        nan = float("nan")
-        return [
-            *rows,
-            {
-                "answer": "no gap",
-                "probability": self.no_gap_probability,
-                "gap_left_sds": self.shrinkage.before,
-            },
-            {
-                "answer": "unexplained",
-                "probability": self.unexplained_probability,
-                "gap_left_sds": nan,
-            },
-        ]
+        rows: list[tuple[object, ...]] = [(e.name, e.probability, e.gap_left) for e in self.causes]
+        rows.append(("no gap", self.no_gap_probability, self.shrinkage.before))
+        rows.append(("unexplained", self.unexplained_probability, float("nan")))
+        names = ("answer", "probability", "gap_left_sds")
+        return [dict(zip(names, row, strict=True)) for row in rows]
 
     def _verdict(self) -> str:
         gap = self.shrinkage

@@ -8,7 +8,7 @@ matrix.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -105,14 +105,23 @@ class Observations:
             return np.full((self.design.frequencies, 2), np.nan)
         return self.known_damping
 
-    def part(self, design: Design, data: IntArray) -> Observations:
-        """Those of another design, which are `data` of these."""
-        turned = None if self.turned is None else self.turned[data]
-        kept = data[: design.frequencies]
-        rounding = None if self.rounding is None else self.rounding[kept]
-        return Observations(
-            design, self.value[data], self.sd[data], turned, self.damping[kept], rounding
+    def part(self, frequencies: IntArray, shapes: IntArray) -> Observations:
+        """Some frequencies and some components of their shapes, by index in their order."""
+        design = self.design
+        part = replace(
+            design,
+            frequency_test=design.frequency_test[frequencies],
+            frequency_plane=design.frequency_plane[frequencies],
+            frequency_order=design.frequency_order[frequencies],
+            shape_mode=np.searchsorted(frequencies, design.shape_mode[shapes]),
+            shape_place=design.shape_place[shapes],
+            shape_component=design.shape_component[shapes],
         )
+        data = np.concatenate([frequencies, design.frequencies + shapes])
+        turned = None if self.turned is None else self.turned[data]
+        rounding = None if self.rounding is None else self.rounding[frequencies]
+        damping = self.damping[frequencies]
+        return Observations(part, self.value[data], self.sd[data], turned, damping, rounding)
 
 
 @dataclass(frozen=True, eq=False)

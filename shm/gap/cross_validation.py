@@ -79,17 +79,15 @@ def check_hold_out(problem: GapProblem, hold_out: tuple[str, ...]) -> None:
         _named(problem.observations.design, hold_out)
 
 
-def shrinkage(
-    problem: GapProblem, before: Fit, after: Fit | None, held: HeldOut | None
-) -> Shrinkage:
+def shrinkage(problem: GapProblem, before: Fit, after: Fit | None, held: HeldOut) -> Shrinkage:
     """Root mean squares in percent; NaN for what there is not."""
     frequencies = problem.observations.design.frequencies
     value = problem.observations.value[:frequencies]
     return Shrinkage(
         _rms_percent(value - before.predicted[:frequencies]),
         NAN if after is None else _rms_percent(value - after.predicted[:frequencies]),
-        NAN if held is None else _rms_percent(held.before),
-        NAN if held is None else _rms_percent(held.after),
+        _rms_percent(held.before),
+        _rms_percent(held.after),
     )
 
 

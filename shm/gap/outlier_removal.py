@@ -24,7 +24,6 @@ from shm.gap.outliers import (
     gross_errors,
     log_gross,
     log_ordinary,
-    without_shape,
 )
 from shm.gap.problem import GapProblem
 from shm.inference.options import Progress, silent
@@ -56,7 +55,7 @@ class Cleared:
         """A frequency seen from the other data that are kept, to which `fit` was fitted."""
         rows = np.union1d(self.rows, [error.row])
         index = int(np.searchsorted(rows, error.row))
-        return at(without_shape(self.whole.part(rows), index), fit, index)
+        return at(self.whole.part(rows).without_shape(index), fit, index)
 
 
 def cleared(

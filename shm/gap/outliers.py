@@ -18,7 +18,7 @@ right. It is none where another test, hit as hard, shows the mode where it belon
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -160,7 +160,7 @@ def _judged(
     The mode's shape is in neither: of a wrong mode it is wrong as well.
     """
     rest = problem.part(np.delete(np.arange(problem.design.frequencies), row))
-    whole = without_shape(problem, row)
+    whole = problem.without_shape(row)
     base, base_of_whole = (fitted(each, Hypothesis(), rng) for each in (rest, whole))
     gross, ordinary, kept = [], [], []
     for each in _contenders(problem, candidates, row):
@@ -325,25 +325,6 @@ def at(problem: GapProblem, fit: Fit, row: int) -> LeftOut:
     views = landscape.views(w, branch.signs[None])
     predicted = problem.observations.value - views.residual[0]
     return left_out(problem, fit.hypothesis, w[0], predicted, views.slopes[0], np.array([row]))
-
-
-def without_shape(problem: GapProblem, row: int) -> GapProblem:
-    """The same problem without the shape of the mode `row`; itself where it has none."""
-    observations, design = problem.observations, problem.design
-    kept = np.flatnonzero(design.shape_mode != row)
-    if len(kept) == len(design.shape_mode):
-        return problem
-    data = np.concatenate([np.arange(design.frequencies), design.frequencies + kept])
-    shapeless = replace(
-        design,
-        shape_mode=design.shape_mode[kept],
-        shape_place=design.shape_place[kept],
-        shape_component=design.shape_component[kept],
-    )
-    part = observations.part(shapeless, data)
-    made = GapProblem(problem.hanger, problem.baseline, part)
-    made.smallest = problem.smallest
-    return made
 
 
 _SHARE = 3 / 48

@@ -197,10 +197,21 @@ class GapProblem:
 
         `rows` are theirs, as indices or as a choice (F,). Priors are those of the whole.
         """
-        part = GapProblem(self.hanger, self.baseline, _part(self.observations, rows))
-        part.smallest = self.smallest
-        part._composed = self._composed
-        return part
+        kept = np.arange(self.design.frequencies)[rows]
+        shapes = np.flatnonzero(np.isin(self.design.shape_mode, kept))
+        return self._with(self.observations.part(kept, shapes))
+
+    def without_shape(self, row: int) -> GapProblem:
+        """The same problem without the shape of the mode `row`; itself where it has none."""
+        kept = np.flatnonzero(self.design.shape_mode != row)
+        if len(kept) == len(self.design.shape_mode):
+            return self
+        return self._with(self.observations.part(np.arange(self.design.frequencies), kept))
+
+    def _with(self, part: Observations) -> GapProblem:
+        problem = GapProblem(self.hanger, self.baseline, part)
+        problem.smallest, problem._composed = self.smallest, self._composed
+        return problem
 
     @property
     def design(self) -> Design:
@@ -245,24 +256,6 @@ class GapProblem:
         answers = composed.modes_of_tests(theta, conditions, orders, shapes)
         self.evaluations += len(theta) * len({id(modes) for modes in answers})
         return zip(tests, answers, strict=True)
-
-
-def _part(observations: Observations, rows: BoolArray | IntArray) -> Observations:
-    """The observations of some frequencies and of their shapes."""
-    design = observations.design
-    kept = np.arange(design.frequencies)[rows]
-    shapes = np.flatnonzero(np.isin(design.shape_mode, kept))
-    data = np.concatenate([kept, design.frequencies + shapes])
-    part = replace(
-        design,
-        frequency_test=design.frequency_test[kept],
-        frequency_plane=design.frequency_plane[kept],
-        frequency_order=design.frequency_order[kept],
-        shape_mode=np.searchsorted(kept, design.shape_mode[shapes]),
-        shape_place=design.shape_place[shapes],
-        shape_component=design.shape_component[shapes],
-    )
-    return observations.part(part, data)
 
 
 _STEP_SD = 0.01  # technical: of a reading's standard deviation; frequencies are linear over it

@@ -43,7 +43,7 @@ DRAWS = 100  # technical: a mean p-value to a tenth of its spread over draws
 
 
 def residuals(
-    problem: GapProblem, before: Fit, after: Fit | None, held_out: HeldOut | None
+    problem: GapProblem, before: Fit, after: Fit | None, held_out: HeldOut
 ) -> tuple[Residual, ...]:
     """The residual of each frequency from the baseline's fit `before`, in the data's order.
 
@@ -68,7 +68,8 @@ def residuals(
             z,
             misfit / misfit.sum() if misfit.sum() > 0 else np.full(frequencies, NAN),
             _percent(problem.observations, after),
-            *_held_out_percent(frequencies, held_out),
+            held_out.before_percent,
+            held_out.after_percent,
         ]
     )
     named = zip(design.frequency_plane, design.frequency_order, design.frequency_test, strict=True)
@@ -107,12 +108,6 @@ def _percent(observations: Observations, fit: Fit | None) -> FloatArray:
     if fit is None:
         return np.full(frequencies, NAN)
     return 100 * np.expm1((observations.value - fit.predicted)[:frequencies])
-
-
-def _held_out_percent(frequencies: int, held_out: HeldOut | None) -> tuple[FloatArray, FloatArray]:
-    if held_out is None:
-        return np.full(frequencies, NAN), np.full(frequencies, NAN)
-    return held_out.before_percent, held_out.after_percent
 
 
 def trends(problem: GapProblem, before: Fit) -> tuple[Trend, ...]:
