@@ -119,10 +119,7 @@ class Attribution:
 
 
 def attributed(
-    problem: GapProblem,
-    options: GapOptions,
-    rng: np.random.Generator,
-    progress: Progress = silent,
+    problem: GapProblem, options: GapOptions, rng: np.random.Generator, progress: Progress = silent
 ) -> Attribution:
     """The causes of the gap between the baseline and the measurements, with probabilities.
 

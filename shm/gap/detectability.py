@@ -279,11 +279,7 @@ def _shift(
 
 
 def _bent(
-    problem: GapProblem,
-    before: Fit,
-    hypothesis: Hypothesis,
-    share: FloatArray,
-    shift: FloatArray,
+    problem: GapProblem, before: Fit, hypothesis: Hypothesis, share: FloatArray, shift: FloatArray
 ) -> FloatArray:
     """The shifts (g, data) with the curvature on the way to where the bar's deviations follow.
 

@@ -151,11 +151,7 @@ def _following(
 
 
 def _on_the_way(
-    found: Usable,
-    clear: Cleared,
-    aside: Sequence[Outlier],
-    doubted: Sequence[Outlier],
-    best: Fit,
+    found: Usable, clear: Cleared, aside: Sequence[Outlier], doubted: Sequence[Outlier], best: Fit
 ) -> tuple[str, ...]:
     """What was found on the way to data that can be used and hold no gross errors, and what the
     measurement errs by."""

@@ -22,20 +22,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 import scipy
 
-from shm.gap.contract import (
-    Covariance,
-    Design,
-    Fit,
-    Hypothesis,
-    NoiseNode,
-)
+from shm.gap.contract import Covariance, Design, Fit, Hypothesis, NoiseNode
 from shm.gap.fit import fitted, scattered
 from shm.gap.likelihood import Likelihood
-from shm.gap.model_probabilities import (
-    CALIBRATION,
-    Family,
-    Share,
-)
+from shm.gap.model_probabilities import CALIBRATION, Family, Share
 from shm.gap.noise import alike_in_planes, same_mode, smooth_over_orders
 from shm.gap.problem import GapProblem
 from shm.inference.mixture import normalised

@@ -20,14 +20,7 @@ from shm.gap.attribution import WITHIN_REACH, Attribution, Explanation
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.experiment_design import Proposal, lift_off, proposals, together
 from shm.gap.model_probabilities import log_prior
-from shm.gap.next_measurement import (
-    NO_GAP,
-    Errors,
-    Foresight,
-    Remainder,
-    foreseen,
-    new_sensors,
-)
+from shm.gap.next_measurement import NO_GAP, Errors, Foresight, Remainder, foreseen, new_sensors
 from shm.gap.noise import (
     FREQUENCY_SIZES,
     LARGEST_FREQUENCY,
@@ -69,9 +62,7 @@ class PlannedMeasurement:
 
 
 def planned(
-    race: Race,
-    hours: Mapping[str, float] = MEASUREMENT_HOURS,
-    budget_hours: float = np.inf,
+    race: Race, hours: Mapping[str, float] = MEASUREMENT_HOURS, budget_hours: float = np.inf
 ) -> tuple[PlannedMeasurement, ...]:
     """The next measurements, that which promises most for its hours first, within a budget.
 

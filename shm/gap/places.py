@@ -17,11 +17,7 @@ from shm.gap.problem import GapProblem
 from shm.gap.residuals import identification_sd
 from shm.inference.mixture import Rows
 from shm.models.effects import EFFECTS, Effect, Parameter, parameters_of
-from shm.values import (
-    FloatArray,
-    GapPlace,
-    IntArray,
-)
+from shm.values import FloatArray, GapPlace, IntArray
 
 # Judgement: where no standard deviation is stated, the one that is estimated may be four times too
 # large (1 / 4.5^2 = 0.05), and data may rightly fit so well.
@@ -278,11 +274,7 @@ def _without(problem: GapProblem, before: Fit, misfit: Misfit, cause: LocalCause
 
 
 def _at(
-    problem: GapProblem,
-    misfit: Misfit,
-    cause: LocalCause,
-    z: FloatArray,
-    size: FloatArray,
+    problem: GapProblem, misfit: Misfit, cause: LocalCause, z: FloatArray, size: FloatArray
 ) -> _State:
     here, further = (
         cause.predicted(problem, z[:, : misfit.own], each)[:, misfit.rows] + misfit.repeated(z)

@@ -27,16 +27,7 @@ from shm.gap.likelihood import Likelihood, ShapeErrors
 from shm.gap.noise import SD_LOWER
 from shm.gap.problem import GapProblem
 from shm.gap.repeated_errors import SensorError
-from shm.values import (
-    NAN,
-    PLANES,
-    Compatibility,
-    FloatArray,
-    IntArray,
-    Residual,
-    Scatter,
-    Trend,
-)
+from shm.values import NAN, PLANES, Compatibility, FloatArray, IntArray, Residual, Scatter, Trend
 
 _LEAST_LEFT = 1e-9  # technical: of a datum that the fit follows altogether
 DRAWS = 100  # technical: a mean p-value to a tenth of its spread over draws

@@ -63,11 +63,7 @@ class Search:
     """Goes through the hypotheses; what it tries grows from step to step."""
 
     def __init__(
-        self,
-        problem: GapProblem,
-        options: GapOptions,
-        rng: np.random.Generator,
-        progress: Progress,
+        self, problem: GapProblem, options: GapOptions, rng: np.random.Generator, progress: Progress
     ):
         self.problem, self.options, self.rng, self.progress = problem, options, rng, progress
         progress("baseline", 0.0)

@@ -91,11 +91,7 @@ def _refuse_stranger(model: Model, known: Posterior) -> None:
 
 
 def _found(
-    problem: Problem,
-    known: Posterior,
-    samples: int,
-    rng: np.random.Generator,
-    progress: Progress,
+    problem: Problem, known: Posterior, samples: int, rng: np.random.Generator, progress: Progress
 ) -> tuple[str, Weighted | None]:
     """The first way whose draws can be trusted, and these; None where none can."""
     anchors = search(problem, rng)

@@ -79,10 +79,7 @@ class FieldLikelihood:
     repeat = 1
 
     def __init__(
-        self,
-        tests: Sequence[ModalTest],
-        model: Model,
-        reading: tuple[float, float] | None = None,
+        self, tests: Sequence[ModalTest], model: Model, reading: tuple[float, float] | None = None
     ):
         self.tests = tuple(tests)
         self.modes: list[Mode] = [mode for test in tests for mode in test.regular_modes]

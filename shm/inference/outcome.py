@@ -14,12 +14,7 @@ from shm.inference.field import FieldLikelihood
 from shm.inference.importance import Weighted
 from shm.inference.mixture import Normal
 from shm.inference.options import UpdateOptions
-from shm.inference.other_answers import (
-    Outcome,
-    climbed,
-    fitted,
-    other_answers,
-)
+from shm.inference.other_answers import Outcome, climbed, fitted, other_answers
 from shm.inference.problem import DIFFERENCE, Problem
 from shm.inference.tmcmc import Mover
 from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency

@@ -31,10 +31,7 @@ from shm.inference.mixture import Normal, Rows, TMixture, normalised, systematic
 from shm.inference.other_answers import Outcome
 from shm.inference.problem import Points, Problem
 from shm.inference.search import Anchors, WarmStart
-from shm.values import (
-    BoolArray,
-    FloatArray,
-)
+from shm.values import BoolArray, FloatArray
 
 # Technical: longer strides than the textbook's 1, since the last step corrects what they leave.
 _TARGET_VARIATION = 2.0
@@ -259,11 +256,7 @@ def _moved(
 
 
 def _stepped(
-    problem: Problem,
-    chains: _Particles,
-    factor: FloatArray,
-    power: float,
-    rng: np.random.Generator,
+    problem: Problem, chains: _Particles, factor: FloatArray, power: float, rng: np.random.Generator
 ) -> _Particles:
     """One random-walk Metropolis step of all chains; what leaves the prior is rejected."""
     lower, upper = _box(problem)

@@ -19,13 +19,7 @@ from shm.inference.problem import Problem
 from shm.inference.search import WarmStart, search, warm_start_from
 from shm.inference.tmcmc import sample, textbook
 from shm.models import THESIS, AsMade, Model
-from shm.values import (
-    ENOUGH_EFFECTIVE,
-    NAN,
-    ModalTest,
-    Posterior,
-    Selection,
-)
+from shm.values import ENOUGH_EFFECTIVE, NAN, ModalTest, Posterior, Selection
 
 # Technical: few particles do, since the last step weighs (`shm.inference.tmcmc`); 200 are
 # twenty or more for each parameter.
