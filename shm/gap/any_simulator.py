@@ -221,14 +221,10 @@ class _Answers:
         return self.chances.get(hypothesis, 0.0)
 
 
-def _single(name: str) -> Hypothesis:
-    return Hypothesis(((name, _EVERYWHERE),))
-
-
 def _answers(problem: SimulatorProblem, rng: np.random.Generator) -> _Answers:
     names = [each.name for each in problem.simulator.effects]
     alone = fitted(problem, Hypothesis(), rng)
-    singles = [fitted(problem, _single(name), rng, alone.z) for name in names]
+    singles = [fitted(problem, Hypothesis(((name, _EVERYWHERE),)), rng, alone.z) for name in names]
     plain = _by_evidence([*singles, *_pairs(problem, alone, _by_evidence(singles), rng)])
     fits = [alone, *plain, fitted(problem, Hypothesis(flexible=True), rng, alone.z)]
     for each in plain[:_FLEXIBLE]:

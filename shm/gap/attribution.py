@@ -197,18 +197,15 @@ def _explanations(
             variants=kind.tried,
             probability=chance,
             log_bayes_factor=kind.log_evidence - none.log_evidence,
-            log_fit=_gain(kind, none),
+            # At least what the evidence gains, else a better fit was not found.
+            log_fit=max(
+                kind.best.log_fit - none.best.log_fit, kind.log_evidence - none.log_evidence
+            ),
         )
         for kind, chance in zip(kinds, chances, strict=True)
         if kind.effects and not kind.flexible
     ]
     return tuple(sorted(found, key=lambda each: -each.probability))
-
-
-def _gain(kind: Family, none: Family) -> float:
-    """What the best fit gains: at least what the evidence does, else a better fit was not found."""
-    gain = kind.best.log_fit - none.best.log_fit
-    return max(gain, kind.log_evidence - none.log_evidence)
 
 
 def _fit(kinds: Sequence[Family]) -> Fit:
@@ -288,19 +285,15 @@ def possible(attribution: Attribution) -> list[tuple[float, Fit]]:
         (attribution.no_gap_probability, attribution.baseline),
         (attribution.unexplained_probability, attribution.unexplained),
     ]
-    for each in attribution.explanations:
-        fits += _anywhere(each)
+    for cause in attribution.explanations:
+        found = [(each.log_evidence, each.posterior) for each in cause.variants]
+        fitted = [(evidence, fit) for evidence, fit in found if fit is not None]
+        if fitted:
+            share = normalised(np.array([evidence for evidence, _ in fitted]))
+            fits += [
+                (cause.probability * s, fit) for s, (_, fit) in zip(share, fitted, strict=True)
+            ]
     return fits
-
-
-def _anywhere(cause: Explanation) -> list[tuple[float, Fit]]:
-    """The fits of a cause wherever it may act, with their shares of its probability."""
-    found = [(each.log_evidence, each.posterior) for each in cause.variants]
-    fitted = [(evidence, fit) for evidence, fit in found if fit is not None]
-    if not fitted:
-        return []
-    share = normalised(np.array([evidence for evidence, _ in fitted]))
-    return [(cause.probability * s, fit) for s, (_, fit) in zip(share, fitted, strict=True)]
 
 
 SAME_BELOW = 3.0

@@ -166,17 +166,15 @@ def _seen_from_the_other_end(landscape: Landscape, found: list[Optimum]) -> list
     z = best.branch.z(best.w[None])[0]
     parameters = landscape.problem.coordinates(landscape.hypothesis).parameters
     places = [k for k, parameter in enumerate(parameters) if is_place(parameter)]
-    mirrored = [_mirrored(z, some) for n in (1, 2) for some in combinations(places, n)]
+    mirrored = [
+        np.where(np.isin(np.arange(len(z)), some), -z, z)
+        for n in (1, 2)
+        for some in combinations(places, n)
+    ]
     others = optima(landscape, np.array(mirrored)) if mirrored else []
     if not others:
         return found
     return optima(landscape, np.array([e.branch.z(e.w[None])[0] for e in (*found, *others)]))
-
-
-def _mirrored(z: FloatArray, places: Sequence[int]) -> FloatArray:
-    other = z.copy()
-    other[list(places)] *= -1
-    return other
 
 
 def _fit(landscape: Landscape, found: list[Optimum], rng: np.random.Generator) -> Fit:

@@ -57,7 +57,9 @@ def ranked(problem: GapProblem, fits: Sequence[Fit]) -> tuple[NextMeasurement, .
         pair = (contenders[0], fit)
         pairs = zip(general, foresights[0], seen, strict=True)
         promises = [(each, _expected(*both)) for each, *both in pairs]
-        promises += [_promise(problem, pair, each, errors) for each in new_sensors(problem, pair)]
+        for each in new_sensors(problem, pair):
+            both = (foreseen(problem, own, each.design, errors) for own in pair)
+            promises.append((each, _expected(*both)))
         found += [_named(pair, promise) for promise in _worth_it(promises)]
     found.sort(key=lambda measurement: -measurement.expected_log_bayes_factor)
     distinct: dict[str, NextMeasurement] = {}
@@ -75,13 +77,6 @@ def _contenders(fits: Sequence[Fit]) -> list[Fit]:
     best = max((fit.log_evidence for fit in distinct.values()), default=0.0)
     racing = [f for f in distinct.values() if f.log_evidence > best - _OUT_OF_THE_RACE]
     return racing[:_CONTENDERS]
-
-
-def _promise(
-    problem: GapProblem, pair: tuple[Fit, Fit], proposal: Proposal, errors: Errors
-) -> _Promise:
-    one, other = (foreseen(problem, fit, proposal.design, errors) for fit in pair)
-    return proposal, _expected(one, other)
 
 
 def _expected(one: Foresight, other: Foresight) -> float:

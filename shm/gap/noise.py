@@ -268,7 +268,15 @@ def flexible_nodes(
     kinds = _kinds(observations)
     log_share = -np.log(len(kinds))
     return tuple(
-        _with_remainder(node, frequency, shape, log_share - np.log(len(kind)))
+        NoiseNode(
+            replace(
+                node.covariance,
+                frequency=node.covariance.frequency + frequency,
+                shape=node.covariance.shape + shape,
+            ),
+            float(node.log_weight + (log_share - np.log(len(kind)))),
+            node.model_error,
+        )
         for node in plain
         for kind in kinds
         for frequency, shape in kind
@@ -288,14 +296,6 @@ def _kinds(observations: Observations) -> list[list[tuple[FloatArray, FloatArray
         in_both.append((size**2 * pattern, shape))
     kinds = [in_frequencies, [(none[0], shape) for shape in shapes], in_both]
     return [kind for kind in kinds if kind]
-
-
-def _with_remainder(
-    node: NoiseNode, frequency: FloatArray, shape: FloatArray, log_share: np.float64
-) -> NoiseNode:
-    own = node.covariance
-    covariance = replace(own, frequency=own.frequency + frequency, shape=own.shape + shape)
-    return NoiseNode(covariance, float(node.log_weight + log_share), node.model_error)
 
 
 def _thinned(plain: tuple[NoiseNode, ...]) -> tuple[NoiseNode, ...]:

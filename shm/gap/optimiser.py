@@ -324,10 +324,8 @@ def _positive(curvature: FloatArray, safe: FloatArray) -> FloatArray:
 def _distinct(found: list[Optimum]) -> list[Optimum]:
     kept: list[Optimum] = []
     for each in sorted(found, key=lambda optimum: -optimum.log_evidence):
-        if not any(_alike(each, other) for other in kept):
+        if not any(
+            _near(each.w, o.w, o.curvature, each.branch.signs, o.branch.signs) for o in kept
+        ):
             kept.append(each)
     return kept
-
-
-def _alike(one: Optimum, other: Optimum) -> bool:
-    return _near(one.w, other.w, other.curvature, one.branch.signs, other.branch.signs)

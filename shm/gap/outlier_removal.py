@@ -57,6 +57,11 @@ class Cleared:
         index = int(np.searchsorted(rows, error.row))
         return at(self.whole.part(rows).without_shape(index), fit, index)
 
+    def expected(self, error: GrossError, fit: Fit) -> tuple[float, float]:
+        """By how much its logarithm lies above what is expected so, and the standard deviation."""
+        deviation, sd = self.seen(error, fit).expected
+        return float(deviation[0]), float(sd[0])
+
 
 def cleared(
     whole: GapProblem, options: GapOptions, rng: np.random.Generator, progress: Progress = silent
@@ -91,8 +96,8 @@ def cleared(
 
 
 def _alone(found: Cleared, error: GrossError, fit: Fit) -> float:
-    deviation, _ = found.seen(error, fit).expected
-    return acts_alone(found.whole.design, found.problem.design, error.row, float(deviation[0]))
+    deviation, _ = found.expected(error, fit)
+    return acts_alone(found.whole.design, found.problem.design, error.row, deviation)
 
 
 def _led_before(first: Attribution, last: Attribution) -> str:
@@ -120,8 +125,7 @@ def outliers(found: Cleared, errors: Sequence[GrossError], fit: Fit) -> tuple[Ou
 
 def _outlier(found: Cleared, error: GrossError, fit: Fit) -> Outlier:
     design, observations = found.whole.design, found.whole.observations
-    seen = found.seen(error, fit)
-    deviation, sd = (float(each[0]) for each in seen.expected)
+    deviation, sd = found.expected(error, fit)
     measured_hz = float(np.exp(observations.value[error.row]))
     expected_hz = measured_hz * float(np.exp(-deviation))
     own = float(np.nan_to_num(observations.sd[error.row]))
@@ -151,24 +155,11 @@ def with_outliers(
 
 def _residual(found: Cleared, error: GrossError, before: Fit, after: Fit | None) -> Residual:
     (told,) = outliers(found, [error], before)
-    seen = found.seen(error, before)
-    deviation, sd = (float(each[0]) for each in seen.expected)
-    return Residual(
-        told.plane,
-        told.order,
-        told.test,
-        told.measured_hz,
-        told.expected_hz,
-        100 * float(np.expm1(deviation)),
-        deviation / sd,
-        0.0,
-        after_percent=NAN if after is None else _percent(found, error, after),
-    )
-
-
-def _percent(found: Cleared, error: GrossError, fit: Fit) -> float:
-    deviation, _ = found.seen(error, fit).expected
-    return 100 * float(np.expm1(deviation[0]))
+    deviation, sd = found.expected(error, before)
+    left = NAN if after is None else found.expected(error, after)[0]
+    percent, after_percent = (100 * float(np.expm1(each)) for each in (deviation, left))
+    own = told.plane, told.order, told.test, told.measured_hz, told.expected_hz
+    return Residual(*own, percent, deviation / sd, 0.0, after_percent)
 
 
 FAR_BETTER = 10.0

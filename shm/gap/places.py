@@ -169,9 +169,6 @@ class LocalCause:
     small: float
     largest: float
 
-    def at(self, places_m: FloatArray) -> LocalCause:
-        return replace(self, places_m=places_m)
-
     def predicted(self, problem: GapProblem, baseline: FloatArray, size: FloatArray) -> FloatArray:
         """The data (n, data) with sizes (n,), and the baseline's parameters at z (n, d)."""
         theta = problem.theta(Hypothesis(), baseline)
@@ -323,7 +320,9 @@ def _place(problem: GapProblem, before: Fit, misfit: Misfit, cause: LocalCause) 
     half_waves = int(problem.observations.design.frequency_order.max())
     x_m = np.linspace(0, length_m, max(_PLACES_A_HALF_WAVE * half_waves + 1, _FEWEST_PLACES))
     fine_m = (np.arange(_FINE) + 0.5) * length_m / _FINE
-    change = tried(problem, before, misfit, cause.at(x_m), _PASSES).between(x_m, fine_m)
+    change = tried(problem, before, misfit, replace(cause, places_m=x_m), _PASSES).between(
+        x_m, fine_m
+    )
     found = _judged(misfit, change.left(misfit))
     if found is None:
         return None

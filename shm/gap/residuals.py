@@ -46,19 +46,23 @@ def residuals(
     """
     design = problem.observations.design
     frequencies = design.frequencies
-    deviation = (problem.observations.value - before.predicted)[:frequencies]
+    value = problem.observations.value[:frequencies]
+    deviation = value - before.predicted[:frequencies]
+    left_after = (
+        np.full(frequencies, NAN) if after is None else value - after.predicted[:frequencies]
+    )
     sd = identification_sd(problem, before if after is None else after)
     left = np.maximum(np.diag(left_over(before, sd)), _LEAST_LEFT * sd[:frequencies] ** 2)
     z = deviation / np.sqrt(left)
     misfit = (deviation / sd[:frequencies]) ** 2
     columns = np.column_stack(
         [
-            np.exp(problem.observations.value[:frequencies]),
+            np.exp(value),
             np.exp(before.predicted[:frequencies]),
             100 * np.expm1(deviation),
             z,
             misfit / misfit.sum() if misfit.sum() > 0 else np.full(frequencies, NAN),
-            _percent(problem.observations, after),
+            100 * np.expm1(left_after),
             held_out.before_percent,
             held_out.after_percent,
         ]
@@ -92,13 +96,6 @@ def left_over(fit: Fit, sd: FloatArray) -> FloatArray:
     followed = fit.slopes @ np.linalg.solve(information, weighed.T)
     kept = (np.eye(len(sd)) - followed)[: len(fit.noise.frequency)]
     return np.asarray((kept * sd**2) @ kept.T)
-
-
-def _percent(observations: Observations, fit: Fit | None) -> FloatArray:
-    frequencies = observations.design.frequencies
-    if fit is None:
-        return np.full(frequencies, NAN)
-    return 100 * np.expm1((observations.value - fit.predicted)[:frequencies])
 
 
 def trends(problem: GapProblem, before: Fit) -> tuple[Trend, ...]:

@@ -64,10 +64,6 @@ def _round(each: Patient) -> Hashable | None:
     return None if None in days else frozenset(days)
 
 
-def _length(each: Patient) -> Hashable:
-    return math.floor(math.log(each.hanger.length_m) / math.log(_CLASSES) * 2)
-
-
 _LIKENESSES: dict[str, Callable[[Patient], Hashable | None]] = {
     "hangers of one delivery": lambda each: each.hanger.family or None,
     "hangers of one section": lambda each: (
@@ -82,7 +78,9 @@ _LIKENESSES: dict[str, Callable[[Patient], Hashable | None]] = {
         each.hanger.fittings_m,
     ),
     "hangers tested on the same days": _round,
-    "hangers of about one length": _length,
+    "hangers of about one length": lambda each: math.floor(
+        math.log(each.hanger.length_m) / math.log(_CLASSES) * 2
+    ),
 }
 # Technical: shares of a family, with prior 1 each; a twentieth is finer than 20 hangers can tell.
 _SHARES = (np.arange(10) + 0.5) / 10
@@ -121,7 +119,8 @@ class Own:
 
     @property
     def log_evidence(self) -> float:
-        return _log_mean(self.log.sum(axis=0))
+        log = self.log.sum(axis=0)
+        return float(scipy.special.logsumexp(log) - np.log(len(log)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,7 +281,3 @@ def unknown(patients: Sequence[Patient], family: Kin, own: Own) -> Shared:
 
 def _log(value: FloatArray) -> FloatArray:
     return np.asarray(np.log(np.maximum(value, _TINY)))
-
-
-def _log_mean(log: FloatArray) -> float:
-    return float(scipy.special.logsumexp(log) - np.log(len(log)))
