@@ -8,9 +8,8 @@ from shm.inference.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, Sigm
 from shm.resources import when_asked
 
 if TYPE_CHECKING:
-    from shm.inference.ensemble import refresh
     from shm.inference.tmcmc import BiasedEvidenceWarning
-    from shm.inference.updating import class_probabilities, select, update
+    from shm.inference.updating import class_probabilities, refresh, select, update
 
 __all__ = [
     "METHODS",
@@ -31,8 +30,9 @@ if not TYPE_CHECKING:
     __getattr__ = when_asked(
         __name__,
         {
-            "refresh": "shm.inference.ensemble",
             "BiasedEvidenceWarning": "shm.inference.tmcmc",
-            **dict.fromkeys(("class_probabilities", "select", "update"), "shm.inference.updating"),
+            **dict.fromkeys(
+                ("class_probabilities", "refresh", "select", "update"), "shm.inference.updating"
+            ),
         },
     )
