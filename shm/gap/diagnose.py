@@ -77,15 +77,14 @@ def examined(
     rng = np.random.default_rng(options.seed)
     clear = cleared(whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done))
     problem = clear.problem
-    no_gap = clear.attribution.no_gap_probability
-    share, dynamic = acting(no_gap, found.tests, whole.observations)
-    attribution = clear.attribution.with_unknown(share)
+    first = clear.attribution
+    share, dynamic = acting(first.no_gap_probability, found.tests, whole.observations)
+    attribution = first.with_unknown(share)
     progress("shrinkage", _ATTRIBUTION)
     answer, before = answered(attribution), attribution.baseline
     after = attribution.leading.best.fit if attribution.leading else None
     aside, doubted = (outliers(clear, e, answer[0][1]) for e in (clear.aside, clear.doubted))
     held = held_out(problem, before, after, options.hold_out, rng)
-    following = _following(problem, attribution, progress)
     compatible = compatibility(problem, _fits(attribution))
     any_ends_n = tension_of_any_ends_n(found.tests, hanger, options.seed)
     after_n = _tension(problem, possible(attribution), rng, any_ends_n)
@@ -108,7 +107,7 @@ def examined(
         shrinkage=shrinkage(problem, before, after, held),
         tension_before_n=before_n,
         tension_after_n=after_n,
-        next_measurements=following,
+        next_measurements=_following(problem, attribution, progress),
         remarks=(
             *_of_another(found.tests, hanger),
             *_states(problem, before, after, (before_n, after_n)),

@@ -284,7 +284,7 @@ def _at(
 
 
 # By five points a half wave a spline follows its square, as local causes act, to 2 % (5/384 h^4 / 2
-# with h = 2 pi / 5); 31 lie nearer together than a corroded stretch is long (`places._EXTENT`).
+# with h = 2 pi / 5); 31 lie nearer together than a corroded stretch is long (`_EXTENT`).
 _PLACES_A_HALF_WAVE, _FEWEST_PLACES = 5, 31
 # Judgement: to first order and once more at the size found; an end goes through decades.
 _PASSES, _PASSES_OF_AN_END = 2, 16

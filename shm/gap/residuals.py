@@ -258,21 +258,24 @@ def _told(problem: GapProblem, error: SensorError, mean: float, sd: float) -> st
     kind, place, component = error
     usual: Scatter = problem.hanger.scatter
     at = f"the sensor at {problem.design.places_m[place]:.2f} m"
+    factor = {
+        "gain": 100 * usual.sensor_gain,
+        "place": 100 * usual.sensor_place_m,
+        "turn": float(np.degrees(usual.sensor_turn)),
+        "cross": 100 * usual.sensor_cross_mean,
+    }[kind]
+    off, own = factor * mean, factor * sd
     match kind:
         case "gain":
-            percent, own = 100 * usual.sensor_gain * mean, 100 * usual.sensor_gain * sd
             much = "much" if mean > 0 else "little"
-            return f"{at} reads {abs(percent):.1f} +- {own:.1f} % too {much} {PLANES[component]}"
+            return f"{at} reads {abs(off):.1f} +- {own:.1f} % too {much} {PLANES[component]}"
         case "place":
-            off, own = 100 * usual.sensor_place_m * mean, 100 * usual.sensor_place_m * sd
             end = "arch" if mean > 0 else "deck"
             return f"{at} sits {abs(off):.1f} +- {own:.1f} cm nearer to the {end} end"
         case "turn":
-            turned, own = np.degrees(usual.sensor_turn) * mean, np.degrees(usual.sensor_turn) * sd
-            return f"{at} is turned by {turned:.1f} +- {own:.1f} degrees"
+            return f"{at} is turned by {off:.1f} +- {own:.1f} degrees"
         case "cross":
-            percent, own = 100 * usual.sensor_cross_mean * mean, 100 * usual.sensor_cross_mean * sd
-            return f"{at} reads {percent:.1f} +- {own:.1f} % of each axis in the other"
+            return f"{at} reads {off:.1f} +- {own:.1f} % of each axis in the other"
 
 
 # As far as frequencies of sound hangers of others were off in all tests alike (`shm.gap.noise`):

@@ -91,7 +91,7 @@ def assembled(
         misfit_percent=_misfit_percent(problem, outcome.predicted),
         log_occam=log_occam,
     )
-    return replace(posterior, **vars(other_answers(problem, outcome, tests)))
+    return replace(posterior, **other_answers(problem, outcome, tests))
 
 
 def _draws(
