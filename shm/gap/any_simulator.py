@@ -182,10 +182,9 @@ def diagnose_simulator(
     problem = SimulatorProblem(simulator, kept)
     rng = np.random.default_rng(seed)
     answers = _answers(problem, rng)
-    fits = {e.hypothesis: e.fit for e in answers.scored if e.fit is not None}
-    alone = fits[Hypothesis()]
+    fits, alone = answers.fits, answers.fits[Hypothesis()]
     causes = sorted(
-        (_cause(problem, h, answers, fits[h], alone) for h in fits if h.effects and not h.flexible),
+        (_cause(answers, h) for h in fits if h.effects and not h.flexible),
         key=lambda each: -each.probability,
     )
     no_gap = answers.of(Hypothesis())
@@ -203,8 +202,8 @@ def diagnose_simulator(
             for reading, gap in zip(problem.readings, in_sds(problem, alone), strict=True)
         ),
         parameters_before=moments(problem, alone, problem.simulator.parameters),
-        parameters_after=_averaged(problem, answers, fits),
-        next_readings=_planned(problem, fits, answers, candidates),
+        parameters_after=_averaged(answers),
+        next_readings=_planned(answers, candidates),
         remarks=(*repeated, *at_bounds(problem, fits[first]), *slips(problem, alone, fits[first])),
     )
 
@@ -213,7 +212,8 @@ def diagnose_simulator(
 class _Answers:
     """What was tried, the probability of each, and of something unknown that passes for one."""
 
-    scored: tuple[ScoredHypothesis, ...]
+    problem: SimulatorProblem
+    fits: Mapping[Hypothesis, Fit]
     chances: Mapping[Hypothesis, float]
     unknown: float
 
@@ -229,12 +229,12 @@ def _answers(problem: SimulatorProblem, rng: np.random.Generator) -> _Answers:
     fits = [alone, *plain, fitted(problem, Hypothesis(flexible=True), rng, alone.z)]
     for each in plain[:_FLEXIBLE]:
         fits.append(fitted(problem, replace(each.hypothesis, flexible=True), rng, each.z))
-    scored = tuple(ScoredHypothesis.fitted(fit, len(alone.z)) for fit in fits)
+    scored = [ScoredHypothesis.fitted(fit, len(alone.z)) for fit in fits]
     tried = families(scored, dict.fromkeys(names, 1))
     best = next(each.best.fit for each in tried if not each.flexible)
     chances, unknown = probabilities(tried, p_value(problem, best or alone))
     of = {each.best.hypothesis: float(p) for each, p in zip(tried, chances, strict=True)}
-    return _Answers(scored, of, float(unknown))
+    return _Answers(problem, {fit.hypothesis: fit for fit in fits}, of, float(unknown))
 
 
 def _by_evidence(fits: Sequence[Fit]) -> list[Fit]:
@@ -268,18 +268,13 @@ def _pairs(
     ]
 
 
-def _cause(
-    problem: SimulatorProblem, hypothesis: Hypothesis, answers: _Answers, fit: Fit, alone: Fit
-) -> SimulatorCause:
+def _cause(answers: _Answers, hypothesis: Hypothesis) -> SimulatorCause:
+    problem, fit, alone = answers.problem, answers.fits[hypothesis], answers.fits[Hypothesis()]
     left, before = rms(in_sds(problem, fit)), rms(in_sds(problem, alone))
     beside = answers.of(replace(hypothesis, flexible=True))
     off = beside * (1 - _MIMICS) if left < LAW_OFF * before else 0.0
-    return SimulatorCause(
-        hypothesis.name,
-        answers.of(hypothesis) + off,
-        left,
-        moments(problem, fit, problem.own_priors(hypothesis)),
-    )
+    size = moments(problem, fit, problem.own_priors(hypothesis))
+    return SimulatorCause(hypothesis.name, answers.of(hypothesis) + off, left, size)
 
 
 def _groups(
@@ -319,15 +314,14 @@ def _held_out(problem: SimulatorProblem, fit: Fit) -> FloatArray:
     return left
 
 
-def _averaged(
-    problem: SimulatorProblem, answers: _Answers, fits: Mapping[Hypothesis, Fit]
-) -> dict[str, tuple[float, float]]:
+def _averaged(answers: _Answers) -> dict[str, tuple[float, float]]:
     """Over all answers by their probabilities (Hoeting et al. 1999)."""
     weight = dict(answers.chances)
     free = Hypothesis(flexible=True)
     weight[free] = weight.get(free, 0.0) + answers.unknown
+    problem = answers.problem
     own = problem.simulator.parameters
-    found = {h: moments(problem, fits[h], own) for h in weight if weight[h] > _OF_NOTE}
+    found = {h: moments(problem, answers.fits[h], own) for h in weight if weight[h] > _OF_NOTE}
     whole = sum(weight[h] for h in found)
     weight = {h: weight[h] / whole for h in found}
     averaged = {}
@@ -338,13 +332,9 @@ def _averaged(
     return averaged
 
 
-def _planned(
-    problem: SimulatorProblem,
-    fits: Mapping[Hypothesis, Fit],
-    answers: _Answers,
-    candidates: Sequence[Condition],
-) -> tuple[NextReading, ...]:
+def _planned(answers: _Answers, candidates: Sequence[Condition]) -> tuple[NextReading, ...]:
     """What tells the two likeliest answers apart, the most telling first."""
+    problem, fits = answers.problem, answers.fits
     plain = sorted((h for h in fits if not h.flexible), key=lambda h: -answers.of(h))[:2]
     if not candidates or len(plain) < 2:
         return ()

@@ -30,7 +30,7 @@ from shm.gap.noise import alike_in_planes, same_mode, smooth_over_orders
 from shm.gap.problem import GapProblem
 from shm.inference.mixture import normalised
 from shm.models.effects import EFFECTS
-from shm.values import FloatArray, IntArray
+from shm.values import FloatArray
 
 SHOWN = 3.0
 """Log odds against an exact law from which on the data show that it is off."""
@@ -263,21 +263,10 @@ def _by_levels(problem: GapProblem, fit: Fit) -> FloatArray:
 
 def _on_the_whole(design: Design, shift: FloatArray) -> FloatArray:
     """Root mean squares of a shift (data,) over each test and plane, and over each shape."""
-    count = design.frequencies
     planes = 1 + int(design.frequency_plane.max())
-    return np.concatenate(
-        [
-            _root_mean_square(
-                design.frequency_test * planes + design.frequency_plane, shift[:count]
-            ),
-            _root_mean_square(design.shape_mode, shift[count:]),
-        ]
-    )
-
-
-def _root_mean_square(group: IntArray, values: FloatArray) -> FloatArray:
-    """Of the values (n,) of each group, given to each of its members."""
-    mean = np.bincount(group, values**2) / np.maximum(np.bincount(group), 1)
+    own = design.frequency_test * planes + design.frequency_plane
+    group = np.concatenate([own, own.max() + 1 + design.shape_mode])
+    mean = np.bincount(group, shift**2) / np.maximum(np.bincount(group), 1)
     return np.asarray(np.sqrt(mean)[group])
 
 

@@ -1,12 +1,9 @@
-"""What a hypothesis predicts of a hanger's tests.
-
-What the error of a tension that was read leaves in the frequencies of its test.
-"""
+"""What a hypothesis predicts of a hanger's tests, and what errors that repeat do to these."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -34,6 +31,7 @@ Effects = tuple[tuple[str, Variant], ...]
 
 # Technical: an eighth of the prior's standard deviation apart, over 93 % of the prior.
 _TENSIONS = tuple(float(each) for each in np.linspace(-2.5, 1.5, 33))
+_STEP_SD = 0.01  # technical: of a reading's standard deviation; frequencies are linear over it
 _AT_REST = Conditions(amplitude=0.0)
 
 
@@ -144,8 +142,22 @@ class GapProblem:
         return Repeated(self.section_of(self.design), self.readings_of(self.design), shapes, errors)
 
     def readings_of(self, design: Design) -> FloatArray:
-        """What errors of tensions read do to the frequencies of a design: loads (F, tests)."""
-        return reading_loads(design, lambda of: self._predicted_near(of)[: of.frequencies])
+        """What one standard deviation of each tension read does to the frequencies of a design:
+        loads (F, tests with a reading).
+
+        All modes of a test move together, those of other tests do not.
+        """
+        names = np.array([each.test for each in design.conditions])
+        read = list(dict.fromkeys(c.test for c in design.conditions if c.tension_shift_sd_n > 0))
+        if not read:
+            return np.zeros((design.frequencies, 0))
+        moved = tuple(
+            replace(each, tension_shift_n=each.tension_shift_n + _STEP_SD * each.tension_shift_sd_n)
+            for each in design.conditions
+        )
+        there = self._predicted_near(replace(design, conditions=moved))
+        change = (there - self._predicted_near(design))[: design.frequencies] / _STEP_SD
+        return np.where(names[design.frequency_test, None] == read, change[:, None], 0.0)
 
     def section_of(self, design: Design) -> FloatArray:
         """What the section along the bar, the sensors' mass and the supports' give do to the
@@ -256,29 +268,3 @@ class GapProblem:
         answers = composed.modes_of_tests(theta, conditions, orders, shapes)
         self.evaluations += len(theta) * len({id(modes) for modes in answers})
         return zip(tests, answers, strict=True)
-
-
-_STEP_SD = 0.01  # technical: of a reading's standard deviation; frequencies are linear over it
-
-Predict = Callable[[Design], FloatArray]
-"""The logarithms of the frequencies (F,) that the baseline predicts of a design."""
-
-
-def reading_loads(design: Design, predict: Predict) -> FloatArray:
-    """Loads (F, tests with a reading): what one standard deviation of each reading does.
-
-    All modes of a test move together, those of other tests do not.
-    """
-    names = np.array([each.test for each in design.conditions])
-    read = list(dict.fromkeys(c.test for c in design.conditions if c.tension_shift_sd_n > 0))
-    if not read:
-        return np.zeros((design.frequencies, 0))
-    moved = replace(
-        design,
-        conditions=tuple(
-            replace(each, tension_shift_n=each.tension_shift_n + _STEP_SD * each.tension_shift_sd_n)
-            for each in design.conditions
-        ),
-    )
-    change = (predict(moved) - predict(design)) / _STEP_SD
-    return np.where(names[design.frequency_test, None] == read, change[:, None], 0.0)

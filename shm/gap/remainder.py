@@ -88,19 +88,15 @@ def _over_orders(design: Design, hanger: Hanger) -> Iterator[tuple[OverOrders, f
 
 def order_law(kind: OverOrders, order: FloatArray, place: float) -> FloatArray:
     """What a term of coefficient 1 does to modes of `order`; `place` is a share of the length."""
-    match kind:
-        case "even":
-            return np.ones_like(order)
-        case "order":
-            return order
-        case "order squared":
-            return np.asarray(order**2)
-        case "alternating":
-            return np.where(order % 2 == 1, 1.0, -1.0)
-        case "lowest orders":
-            return np.asarray(order**-2)
-        case "local":
-            return np.asarray(np.sin(order * np.pi * place) ** 2)
+    laws: dict[OverOrders, FloatArray] = {
+        "even": np.ones_like(order),
+        "order": order,
+        "order squared": order**2,
+        "alternating": np.where(order % 2 == 1, 1.0, -1.0),
+        "lowest orders": order**-2,
+        "local": np.sin(order * np.pi * place) ** 2,
+    }
+    return laws[kind]
 
 
 def _over_tests(design: Design) -> Iterator[tuple[OverTests, float, FloatArray]]:

@@ -40,12 +40,7 @@ class Likelihood:
     """
 
     def __init__(self, tests: Sequence[ModalTest], repeat: int = 1):
-        modes: list[Mode] = [mode for test in tests for mode in test.regular_modes]
-        if not modes:
-            raise BadInput(
-                "no measured frequency to update with.", remedy="Give a test with modes."
-            )
-        self.modes = modes
+        self.modes = modes = measured(tests)
         self.tests = tuple(tests)
         self.repeat = repeat
         self.frequency_hz: FloatArray = np.array([mode.frequency_hz for mode in modes])
@@ -177,6 +172,14 @@ class GroupedLikelihood(Likelihood):
     def _mean(self, sigmas: Sequence[FloatArray]) -> FloatArray:
         weights = [len(own) for own in self._groups]
         return np.asarray(np.sqrt(np.average(np.square(sigmas), axis=0, weights=weights)))
+
+
+def measured(tests: Sequence[ModalTest]) -> list[Mode]:
+    """The modes that count; raises BadInput where there are none."""
+    modes = [mode for test in tests for mode in test.regular_modes]
+    if not modes:
+        raise BadInput("no measured frequency to update with.", remedy="Give a test with modes.")
+    return modes
 
 
 def conditions_of(tests: Sequence[ModalTest], model: Model) -> list[Conditions]:

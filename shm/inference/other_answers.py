@@ -69,9 +69,7 @@ class _Best:
     fit: float
 
 
-def other_answers(
-    problem: Problem, outcome: Outcome, tests: Sequence[ModalTest]
-) -> dict[str, Any]:
+def other_answers(problem: Problem, outcome: Outcome, tests: Sequence[ModalTest]) -> dict[str, Any]:
     """Fields of a `Posterior` that its own draws do not show, of a bar as made.
 
     The description is off by the norm of the mean deviates, as far as frequencies see it.
