@@ -17,8 +17,8 @@ from shm.errors import NothingThere, UsageError
 from shm.gap import GapOptions, diagnose_bridge
 from shm.gap import diagnose as diagnosed
 from shm.gap.diagnose import examined
-from shm.gap.kin import LEAST
 from shm.gap.measurement_plan import PlannedMeasurement, Race, nothing_planned, planned
+from shm.gap.shared_causes import LEAST
 from shm.models.effects import EFFECTS
 from shm.pipeline import utc_now
 from shm.pipeline.lineage import diagnosis_lineage

@@ -23,10 +23,10 @@ from shm.errors import BadInput, UsageError
 from shm.gap import GapOptions, Progress
 from shm.gap import diagnose as diagnosed
 from shm.gap.any_simulator import diagnose_simulator
-from shm.gap.contract import silent
 from shm.identify import Identification, IdentifyOptions
 from shm.identify.identification import identify as identified
 from shm.inference import METHODS, UpdateOptions, updating
+from shm.inference.options import silent
 from shm.models import DESCRIPTION, build, competing_names
 from shm.read import read as read_file
 from shm.read import registry
@@ -227,7 +227,7 @@ def update(
     repeat: int = 1,
     method: str = METHODS[0],
     priors: str = DESCRIPTION,
-    progress: Progress = updating.silent,
+    progress: Progress = silent,
 ) -> Posterior:
     """The posterior of tension and end stiffness of one model class, given all modes of `tests`.
 
@@ -265,7 +265,7 @@ def select(
     repeat: int = 1,
     method: str = METHODS[0],
     priors: str = DESCRIPTION,
-    progress: Progress = updating.silent,
+    progress: Progress = silent,
 ) -> Selection:
     """Model classes compared by their evidence, the most probable first.
 

@@ -16,7 +16,7 @@ import traceback
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -53,31 +53,11 @@ UNEXPECTED = "unexpected "
 
 
 @dataclass(frozen=True)
-class RefusedTest:
-    """A test of which no mode can be trusted, and why."""
-
-    test: str
-    why: str
-
-
-@dataclass(frozen=True)
-class Identified:
-    """The tests of a case's recordings, and those that could not be used."""
-
-    tests: tuple[ModalTest, ...]
-    refused: tuple[RefusedTest, ...]
-
-    def document(self) -> dict[str, Any]:
-        """The modal-tests document, with what was refused."""
-        return {**modes_document(self.tests), "refused": [asdict(each) for each in self.refused]}
-
-
-@dataclass(frozen=True)
 class Solved:
-    """The answer to a case, and the tests identified for it where they were recordings."""
+    """The answer to a case, and the document of the tests identified where it has recordings."""
 
     answer: Answer
-    identified: Identified | None = None
+    identified: dict[str, Any] | None = None
 
 
 def solved(directory: Path, left_out: Sequence[str] = (), known: Path | None = None) -> Solved:
@@ -104,18 +84,19 @@ def _options(directory: Path, without: tuple[str, ...]) -> GapOptions:
 
 def _tests(
     directory: Path, hanger: Hanger, known: Path | None
-) -> tuple[tuple[ModalTest, ...], Identified | None]:
+) -> tuple[tuple[ModalTest, ...], dict[str, Any] | None]:
     modes = directory / MODES_FILE
     if modes.exists():
         return load_modes(modes), None
     if known is not None and known.exists():
         return load_modes(known), None
-    identified = identify_tests(directory, hanger)
-    return identified.tests, identified
+    return identify_tests(directory, hanger)
 
 
-def identify_tests(directory: Path, hanger: Hanger) -> Identified:
-    """The modal tests of recordings: t1_1.npz and t1_2.npz are one test, and so on.
+def identify_tests(directory: Path, hanger: Hanger) -> tuple[tuple[ModalTest, ...], dict[str, Any]]:
+    """The modal tests of recordings, and their document, with what was refused.
+
+    t1_1.npz and t1_2.npz are one test, and so on.
 
     Raises BadInput where no test has a mode that can be trusted.
     """
@@ -127,13 +108,13 @@ def identify_tests(directory: Path, hanger: Hanger) -> Identified:
         try:
             tests.append(_identified(paths, name, hanger))
         except BadInput as error:
-            refused.append(RefusedTest(name, str(error)))
+            refused.append({"test": name, "why": str(error)})
     if not tests:
         raise BadInput(
-            "; ".join(f"{each.test}: {each.why}" for each in refused) or "there is no test.",
+            "; ".join(f"{each['test']}: {each['why']}" for each in refused) or "there is no test.",
             file=directory,
         )
-    return Identified(tuple(tests), tuple(refused))
+    return tuple(tests), {**modes_document(tests), "refused": refused}
 
 
 def _identified(paths: Sequence[Path], name: str, hanger: Hanger) -> ModalTest:
@@ -228,8 +209,7 @@ def _solve_missing(
 
 def _write(found: Solved, trial: Trial, which: Round) -> None:
     if found.identified is not None:
-        text = dump(found.identified.document()) + "\n"
-        replace_text(trial.identified(found.answer.case), text)
+        replace_text(trial.identified(found.answer.case), dump(found.identified) + "\n")
     write_answer(found.answer, trial.answers(which))
 
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.gap.calibration import CALIBRATION
+from shm.gap.attribution import SAME_BELOW, grouped
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.groups import SAME_BELOW, grouped
 from shm.gap.model_probabilities import (
+    CALIBRATION,
     SINGLE,
     UNKNOWN,
     ScoredHypothesis,
@@ -24,13 +24,14 @@ from shm.gap.model_probabilities import (
     probabilities,
 )
 from shm.gap.search import SUPPORTED
-from shm.gap.simulator_fit import fitted, refitted
-from shm.gap.simulator_misfit import (
+from shm.gap.simulator_fit import (
     at_bounds,
     errors_of,
+    fitted,
     in_sds,
     moments,
     p_value,
+    refitted,
     rms,
     slips,
     without_copies,
@@ -143,24 +144,11 @@ class SimulatorDiagnosis:
 
     def to_records(self) -> list[dict[str, object]]:
         """One row for each answer, as `pandas.DataFrame` takes them."""
-        rows: list[dict[str, object]] = [
-            {"answer": e.name, "probability": e.probability, "gap_left_sds": e.gap_left}
-            for e in self.causes
-        ]
-        nan = float("nan")
-        return [
-            *rows,
-            {
-                "answer": "no gap",
-                "probability": self.no_gap_probability,
-                "gap_left_sds": self.shrinkage.before,
-            },
-            {
-                "answer": "unexplained",
-                "probability": self.unexplained_probability,
-                "gap_left_sds": nan,
-            },
-        ]
+        rows: list[tuple[object, ...]] = [(e.name, e.probability, e.gap_left) for e in self.causes]
+        rows.append(("no gap", self.no_gap_probability, self.shrinkage.before))
+        rows.append(("unexplained", self.unexplained_probability, float("nan")))
+        names = ("answer", "probability", "gap_left_sds")
+        return [dict(zip(names, row, strict=True)) for row in rows]
 
     def _verdict(self) -> str:
         gap = self.shrinkage
@@ -194,10 +182,9 @@ def diagnose_simulator(
     problem = SimulatorProblem(simulator, kept)
     rng = np.random.default_rng(seed)
     answers = _answers(problem, rng)
-    fits = {e.hypothesis: e.fit for e in answers.scored if e.fit is not None}
-    alone = fits[Hypothesis()]
+    fits, alone = answers.fits, answers.fits[Hypothesis()]
     causes = sorted(
-        (_cause(problem, h, answers, fits[h], alone) for h in fits if h.effects and not h.flexible),
+        (_cause(answers, h) for h in fits if h.effects and not h.flexible),
         key=lambda each: -each.probability,
     )
     no_gap = answers.of(Hypothesis())
@@ -215,8 +202,8 @@ def diagnose_simulator(
             for reading, gap in zip(problem.readings, in_sds(problem, alone), strict=True)
         ),
         parameters_before=moments(problem, alone, problem.simulator.parameters),
-        parameters_after=_averaged(problem, answers, fits),
-        next_readings=_planned(problem, fits, answers, candidates),
+        parameters_after=_averaged(answers),
+        next_readings=_planned(answers, candidates),
         remarks=(*repeated, *at_bounds(problem, fits[first]), *slips(problem, alone, fits[first])),
     )
 
@@ -225,7 +212,8 @@ def diagnose_simulator(
 class _Answers:
     """What was tried, the probability of each, and of something unknown that passes for one."""
 
-    scored: tuple[ScoredHypothesis, ...]
+    problem: SimulatorProblem
+    fits: Mapping[Hypothesis, Fit]
     chances: Mapping[Hypothesis, float]
     unknown: float
 
@@ -233,24 +221,20 @@ class _Answers:
         return self.chances.get(hypothesis, 0.0)
 
 
-def _single(name: str) -> Hypothesis:
-    return Hypothesis(((name, _EVERYWHERE),))
-
-
 def _answers(problem: SimulatorProblem, rng: np.random.Generator) -> _Answers:
     names = [each.name for each in problem.simulator.effects]
     alone = fitted(problem, Hypothesis(), rng)
-    singles = [fitted(problem, _single(name), rng, alone.z) for name in names]
+    singles = [fitted(problem, Hypothesis(((name, _EVERYWHERE),)), rng, alone.z) for name in names]
     plain = _by_evidence([*singles, *_pairs(problem, alone, _by_evidence(singles), rng)])
     fits = [alone, *plain, fitted(problem, Hypothesis(flexible=True), rng, alone.z)]
     for each in plain[:_FLEXIBLE]:
         fits.append(fitted(problem, replace(each.hypothesis, flexible=True), rng, each.z))
-    scored = tuple(ScoredHypothesis.fitted(fit, len(alone.z)) for fit in fits)
+    scored = [ScoredHypothesis.fitted(fit, len(alone.z)) for fit in fits]
     tried = families(scored, dict.fromkeys(names, 1))
     best = next(each.best.fit for each in tried if not each.flexible)
     chances, unknown = probabilities(tried, p_value(problem, best or alone))
     of = {each.best.hypothesis: float(p) for each, p in zip(tried, chances, strict=True)}
-    return _Answers(scored, of, float(unknown))
+    return _Answers(problem, {fit.hypothesis: fit for fit in fits}, of, float(unknown))
 
 
 def _by_evidence(fits: Sequence[Fit]) -> list[Fit]:
@@ -284,18 +268,13 @@ def _pairs(
     ]
 
 
-def _cause(
-    problem: SimulatorProblem, hypothesis: Hypothesis, answers: _Answers, fit: Fit, alone: Fit
-) -> SimulatorCause:
+def _cause(answers: _Answers, hypothesis: Hypothesis) -> SimulatorCause:
+    problem, fit, alone = answers.problem, answers.fits[hypothesis], answers.fits[Hypothesis()]
     left, before = rms(in_sds(problem, fit)), rms(in_sds(problem, alone))
     beside = answers.of(replace(hypothesis, flexible=True))
     off = beside * (1 - _MIMICS) if left < LAW_OFF * before else 0.0
-    return SimulatorCause(
-        hypothesis.name,
-        answers.of(hypothesis) + off,
-        left,
-        moments(problem, fit, problem.own_priors(hypothesis)),
-    )
+    size = moments(problem, fit, problem.own_priors(hypothesis))
+    return SimulatorCause(hypothesis.name, answers.of(hypothesis) + off, left, size)
 
 
 def _groups(
@@ -335,15 +314,14 @@ def _held_out(problem: SimulatorProblem, fit: Fit) -> FloatArray:
     return left
 
 
-def _averaged(
-    problem: SimulatorProblem, answers: _Answers, fits: Mapping[Hypothesis, Fit]
-) -> dict[str, tuple[float, float]]:
+def _averaged(answers: _Answers) -> dict[str, tuple[float, float]]:
     """Over all answers by their probabilities (Hoeting et al. 1999)."""
     weight = dict(answers.chances)
     free = Hypothesis(flexible=True)
     weight[free] = weight.get(free, 0.0) + answers.unknown
+    problem = answers.problem
     own = problem.simulator.parameters
-    found = {h: moments(problem, fits[h], own) for h in weight if weight[h] > _OF_NOTE}
+    found = {h: moments(problem, answers.fits[h], own) for h in weight if weight[h] > _OF_NOTE}
     whole = sum(weight[h] for h in found)
     weight = {h: weight[h] / whole for h in found}
     averaged = {}
@@ -354,13 +332,9 @@ def _averaged(
     return averaged
 
 
-def _planned(
-    problem: SimulatorProblem,
-    fits: Mapping[Hypothesis, Fit],
-    answers: _Answers,
-    candidates: Sequence[Condition],
-) -> tuple[NextReading, ...]:
+def _planned(answers: _Answers, candidates: Sequence[Condition]) -> tuple[NextReading, ...]:
     """What tells the two likeliest answers apart, the most telling first."""
+    problem, fits = answers.problem, answers.fits
     plain = sorted((h for h in fits if not h.flexible), key=lambda h: -answers.of(h))[:2]
     if not candidates or len(plain) < 2:
         return ()

@@ -1,24 +1,22 @@
 """Which effect causes the gap: evidence for no gap, each effect, pairs, and something unknown; what
 is claimed of it, and what stays possible.
 
-Faint second causes beside a large effect may be no more than its own law's error: a real effect
-does not follow the catalogue to the letter, and the larger it is, the better the data show by how
-much. What is left then often looks like a small effect of another kind. Where the second cause of a
-pair moves the data by little against the first, it counts for the most part as the law of the
-first.
+Where these data support several causes and cannot tell them apart, what is claimed is their group.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations, product
 
 import numpy as np
+import scipy
 
-from shm.gap.calibration import CALIBRATION
-from shm.gap.contract import Fit, GapOptions, Hypothesis, NoiseNode, Progress, silent
+from shm.gap.contract import Fit, GapOptions
+from shm.gap.coordinates import Branch
 from shm.gap.damping import with_damping
-from shm.gap.groups import SAME_BELOW, faces, grouped
+from shm.gap.law_error import without_minor_cause
 from shm.gap.likelihood import Likelihood
 from shm.gap.model_probabilities import (
     Family,
@@ -27,11 +25,12 @@ from shm.gap.model_probabilities import (
     probabilities,
     undetected_share,
 )
+from shm.gap.optimiser import Landscape
 from shm.gap.problem import GapProblem
 from shm.gap.search import SUPPORTED, Search
-from shm.inference.tmcmc import normalised
-from shm.models.effects import EFFECTS
-from shm.values import FloatArray, Leads, leads
+from shm.inference.mixture import normalised
+from shm.inference.options import Progress, silent
+from shm.values import Leads, leads
 
 WITHIN_REACH = 7.0
 """Judgement: at log odds of a thousand to one a cause has no chance beside the best one."""
@@ -109,12 +108,18 @@ class Attribution:
         members = [each for each in self.explanations if each.group == explanation.group]
         return sum(each.probability for each in members)
 
+    def with_unknown(self, probability: float) -> Attribution:
+        """No gap stands only as far as nothing acts of this `probability` beyond what was tried."""
+        moved = probability * self.no_gap_probability
+        return replace(
+            self,
+            no_gap_probability=self.no_gap_probability - moved,
+            unexplained_probability=self.unexplained_probability + moved,
+        )
+
 
 def attributed(
-    problem: GapProblem,
-    options: GapOptions,
-    rng: np.random.Generator,
-    progress: Progress = silent,
+    problem: GapProblem, options: GapOptions, rng: np.random.Generator, progress: Progress = silent
 ) -> Attribution:
     """The causes of the gap between the baseline and the measurements, with probabilities.
 
@@ -192,18 +197,15 @@ def _explanations(
             variants=kind.tried,
             probability=chance,
             log_bayes_factor=kind.log_evidence - none.log_evidence,
-            log_fit=_gain(kind, none),
+            # At least what the evidence gains, else a better fit was not found.
+            log_fit=max(
+                kind.best.log_fit - none.best.log_fit, kind.log_evidence - none.log_evidence
+            ),
         )
         for kind, chance in zip(kinds, chances, strict=True)
         if kind.effects and not kind.flexible
     ]
     return tuple(sorted(found, key=lambda each: -each.probability))
-
-
-def _gain(kind: Family, none: Family) -> float:
-    """What the best fit gains: at least what the evidence does, else a better fit was not found."""
-    gain = kind.best.log_fit - none.best.log_fit
-    return max(gain, kind.log_evidence - none.log_evidence)
 
 
 def _fit(kinds: Sequence[Family]) -> Fit:
@@ -254,59 +256,6 @@ def _idle(pair: Explanation, alone: Mapping[str, float]) -> bool:
     return any(single > pair.log_bayes_factor - SUPPORTED for single in singles)
 
 
-def without_minor_cause(
-    problem: GapProblem, baseline: Fit, kinds: Sequence[Family], chances: FloatArray
-) -> FloatArray:
-    """The probabilities (families,) with those of pairs given to the one effect that they lean on.
-
-    To an effect that was not worth a fit nothing is given: its law is not nearly right.
-    """
-    moved, odds = chances.copy(), CALIBRATION.minor_law_odds
-    plain = [i for i, kind in enumerate(kinds) if not kind.flexible]
-    alone = {kinds[i].name: i for i in plain if kinds[i].effects == 1 and kinds[i].best.fit}
-    for i in plain:
-        larger, part = second_cause(problem, baseline, kinds[i].best.fit)
-        if larger in alone and part <= CALIBRATION.minor_below:
-            share = chances[i] * odds / (1 + odds)
-            moved[i] -= share
-            moved[alone[larger]] += share
-    return moved
-
-
-def second_cause(problem: GapProblem, baseline: Fit, fit: Fit | None) -> tuple[str, float]:
-    """The name of the larger effect of a pair, and how far the other moves the data against it.
-
-    A fault of the law is the same in all tests: what differs from test to test is a cause, and as
-    large as the first (1); so is what is no pair, of name "".
-    """
-    if fit is None or len(fit.hypothesis.effects) != 2:
-        return "", 1.0
-    moves = [_added(problem, baseline, fit, index) for index in (0, 1)]
-    large = int(np.argmax(moves))
-    (name, _), (second, variant) = fit.hypothesis.effects[large], fit.hypothesis.effects[1 - large]
-    differs = bool(EFFECTS[second].follows or variant.test)
-    return name, 1.0 if differs else moves[1 - large] / max(moves[large], np.finfo(float).tiny)
-
-
-def _added(problem: GapProblem, baseline: Fit, fit: Fit, index: int) -> float:
-    """By how many standard deviations one effect of a pair moves the data beside the other one.
-
-    Beyond what the baseline's own parameters can follow.
-    """
-    shift = fit.predicted - problem.predicted_with(fit, [1 - index])
-    least = min(problem.likelihood(Hypothesis()).nodes, key=lambda node: node.model_error)
-    return float(np.sqrt(max(_beyond(shift, baseline, least), 0.0)))
-
-
-def _beyond(shift: FloatArray, baseline: Fit, errors: NoiseNode) -> float:
-    """The square of a shift (data,), in standard deviations, beyond what the baseline's parameters
-    can follow."""
-    columns = np.column_stack([baseline.slopes, shift])[None]
-    products = Likelihood([errors]).gram(columns)[0, 0]
-    inner, outer = products[:-1, :-1] + np.eye(len(baseline.z)), products[:-1, -1]
-    return float(products[-1, -1] - outer @ np.linalg.solve(inner, outer))
-
-
 def answered(attribution: Attribution) -> list[tuple[float, Fit]]:
     """The fits, with their probabilities, of what the diagnosis claims.
 
@@ -336,16 +285,86 @@ def possible(attribution: Attribution) -> list[tuple[float, Fit]]:
         (attribution.no_gap_probability, attribution.baseline),
         (attribution.unexplained_probability, attribution.unexplained),
     ]
-    for each in attribution.explanations:
-        fits += _anywhere(each)
+    for cause in attribution.explanations:
+        found = [(each.log_evidence, each.posterior) for each in cause.variants]
+        fitted = [(evidence, fit) for evidence, fit in found if fit is not None]
+        if fitted:
+            share = normalised(np.array([evidence for evidence, _ in fitted]))
+            fits += [
+                (cause.probability * s, fit) for s, (_, fit) in zip(share, fitted, strict=True)
+            ]
     return fits
 
 
-def _anywhere(cause: Explanation) -> list[tuple[float, Fit]]:
-    """The fits of a cause wherever it may act, with their shares of its probability."""
-    found = [(each.log_evidence, each.posterior) for each in cause.variants]
-    fitted = [(evidence, fit) for evidence, fit in found if fit is not None]
-    if not fitted:
-        return []
-    share = normalised(np.array([evidence for evidence, _ in fitted]))
-    return [(cause.probability * s, fit) for s, (_, fit) in zip(share, fitted, strict=True)]
+SAME_BELOW = 3.0
+"""Log Bayes factor, expected or found, under which two causes count as not separable: evidence of
+less than twenty to one is not strong (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
+"""
+NOTABLE_WITHIN = 1.6
+"""A peak with less than a fifth of the best one's evidence does not speak for its cause."""
+
+
+def faces(problem: GapProblem, fit: Fit) -> tuple[Fit, ...]:
+    """A fit as seen from each of its notable peaks, its best point first.
+
+    A mass that may sit in the middle or at an end looks like a stiff end from one of them only.
+    """
+    best = max((peak.log_evidence for peak in fit.peaks), default=0.0)
+    notable = [peak for peak in fit.peaks if peak.log_evidence > best - NOTABLE_WITHIN]
+    if len(notable) < 2:
+        return (fit,)
+    landscape = Landscape(problem, fit.hypothesis)
+    views = landscape.views(np.array([p.w for p in notable]), np.array([p.signs for p in notable]))
+    branches = [Branch(peak.signs) for peak in notable]
+    others = [
+        replace(
+            fit,
+            z=branch.z(w[None])[0],
+            predicted=problem.observations.value - residual,
+            slopes=slopes / branch.stretch(w),
+        )
+        for branch, w, residual, slopes in zip(
+            branches, views.w, views.residual, views.slopes, strict=True
+        )
+    ]
+    return (fit, *others)
+
+
+def grouped(
+    causes: Sequence[Sequence[Fit]], near: Sequence[bool] | None = None
+) -> tuple[tuple[int, ...], ...]:
+    """Indices of `causes` that cannot be told apart, each group of two and more, in their order.
+
+    A cause has one or several faces; one alike is enough. Those that are `near` the best by the
+    evidence found are one group, whatever better data would say. Groups are connected: a cause that
+    is like two others joins them.
+    """
+    close = np.array(near if near is not None else [False] * len(causes), dtype=bool)
+    links = np.eye(len(causes)) + np.outer(close, close)
+    for i, j in combinations(range(len(causes)), 2):
+        if links[i, j]:
+            continue
+        pairs = product(causes[i], causes[j])
+        links[i, j] = any(expected_log_bayes_factor(*pair) < SAME_BELOW for pair in pairs)
+    count, label = scipy.sparse.csgraph.connected_components(
+        scipy.sparse.csr_array(links), directed=False
+    )
+    members = [tuple(int(i) for i in np.flatnonzero(label == k)) for k in range(count)]
+    return tuple(sorted(group for group in members if len(group) > 1))
+
+
+def expected_log_bayes_factor(one: Fit, other: Fit) -> float:
+    """What data like these tell two fitted causes apart, in the direction that tells less.
+
+    If one is true, the other comes as near to its prediction as its parameters allow (linearised);
+    half of the squared distance that is left is the log Bayes factor to expect.
+    """
+    return min(_when_true(one, other), _when_true(other, one))
+
+
+def _when_true(true: Fit, rival: Fit) -> float:
+    """Half of min over z of |predicted - rival(z)|^2 + |z|^2 - |z of the rival's fit|^2."""
+    errors = Likelihood.of(rival.noise, rival.model_error)
+    apart = true.predicted - rival.predicted
+    _, _, square, followed = errors.linear(rival.slopes, apart, rival.z)
+    return max(0.0, square - followed) / 2

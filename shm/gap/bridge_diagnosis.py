@@ -16,16 +16,15 @@ import numpy as np
 import scipy
 
 from shm.errors import UsageError
-from shm.gap.calibration import CALIBRATION
-from shm.gap.contract import GapOptions, Progress, silent
+from shm.gap.attribution import SAME_BELOW
+from shm.gap.contract import GapOptions
 from shm.gap.coordinates import scale_free
 from shm.gap.diagnose import examined, tension_estimate
-from shm.gap.groups import SAME_BELOW
-from shm.gap.kin import LEAST, kin
-from shm.gap.model_probabilities import SINGLE, UNKNOWN
-from shm.gap.shared_causes import SCATTERS, Own, Shared, Sizes, shared, sizes, unknown
+from shm.gap.model_probabilities import CALIBRATION, SINGLE, UNKNOWN
+from shm.gap.shared_causes import LEAST, SCATTERS, Own, Shared, Sizes, kin, shared, sizes, unknown
 from shm.gap.shared_evidence import Patient, Place, Reach, patient
-from shm.inference.tmcmc import systematic
+from shm.inference.mixture import systematic
+from shm.inference.options import Progress, silent
 from shm.values import (
     BridgeDiagnosis,
     EffectEstimate,

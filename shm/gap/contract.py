@@ -8,8 +8,7 @@ matrix.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -51,6 +50,36 @@ class Design:
         """How many data: F + S."""
         return self.frequencies + len(self.shape_mode)
 
+    @property
+    def mode(self) -> IntArray:
+        """A number (F,) for each plane and order."""
+        orders = self.frequency_order.max() + 1
+        return np.asarray(self.frequency_plane * orders + self.frequency_order)
+
+    @property
+    def amplitude(self) -> FloatArray:
+        """At which each frequency (F,) was measured."""
+        return np.array([each.amplitude for each in self.conditions])[self.frequency_test]
+
+    @property
+    def temperature_shift_k(self) -> FloatArray:
+        """At which each frequency (F,) was measured."""
+        return np.array([each.temperature_shift_k for each in self.conditions])[self.frequency_test]
+
+    @property
+    def kinds(self) -> IntArray:
+        """What each datum is (5, F + S): known mass, plane, order, place and axis; -1 for none."""
+        masses = [each.added_mass for each in self.conditions]
+        mass = np.array([masses.index(each) for each in masses])[self.frequency_test]
+        mode = np.concatenate([np.arange(self.frequencies), self.shape_mode])
+        none = np.full(self.frequencies, -1)
+        place, axis = (
+            np.concatenate([none, each]) for each in (self.shape_place, self.shape_component)
+        )
+        return np.stack(
+            [mass[mode], self.frequency_plane[mode], self.frequency_order[mode], place, axis]
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Observations:
@@ -76,14 +105,23 @@ class Observations:
             return np.full((self.design.frequencies, 2), np.nan)
         return self.known_damping
 
-    def part(self, design: Design, data: IntArray) -> Observations:
-        """Those of another design, which are `data` of these."""
-        turned = None if self.turned is None else self.turned[data]
-        kept = data[: design.frequencies]
-        rounding = None if self.rounding is None else self.rounding[kept]
-        return Observations(
-            design, self.value[data], self.sd[data], turned, self.damping[kept], rounding
+    def part(self, frequencies: IntArray, shapes: IntArray) -> Observations:
+        """Some frequencies and some components of their shapes, by index in their order."""
+        design = self.design
+        part = replace(
+            design,
+            frequency_test=design.frequency_test[frequencies],
+            frequency_plane=design.frequency_plane[frequencies],
+            frequency_order=design.frequency_order[frequencies],
+            shape_mode=np.searchsorted(frequencies, design.shape_mode[shapes]),
+            shape_place=design.shape_place[shapes],
+            shape_component=design.shape_component[shapes],
         )
+        data = np.concatenate([frequencies, design.frequencies + shapes])
+        turned = None if self.turned is None else self.turned[data]
+        rounding = None if self.rounding is None else self.rounding[frequencies]
+        damping = self.damping[frequencies]
+        return Observations(part, self.value[data], self.sd[data], turned, damping, rounding)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,11 +137,6 @@ class Covariance:
     frequency: FloatArray
     shape: FloatArray
     shape_loads: FloatArray
-
-    @property
-    def shape_variance(self) -> FloatArray:
-        """The whole variance (S,) of each component."""
-        return np.asarray(self.shape + (self.shape_loads**2).sum(axis=1))
 
     def part(self, frequencies: IntArray, components: IntArray) -> Covariance:
         """Of some frequencies and some components of shapes, by index."""
@@ -190,13 +223,6 @@ class Fit:
     method: Method
     peaks: tuple[Peak, ...] = ()
     effective: float = float("nan")
-
-
-Progress = Callable[[str, float], None]
-
-
-def silent(label: str, fraction: float) -> None:
-    """No progress is shown."""
 
 
 @dataclass(frozen=True)

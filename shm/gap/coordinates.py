@@ -214,11 +214,8 @@ class Pair:
         """The w of a spring that gives so much."""
         stiffness = self.own + np.log(1 / give - 1) / np.log(10)
         share = (stiffness - self.lower) / (self.upper - self.lower)
-        return np.asarray(
-            scipy.special.ndtri(
-                share.clip(scipy.special.ndtr(-_FARTHEST), scipy.special.ndtr(_FARTHEST))
-            )
-        )
+        ends = scipy.special.ndtr([-_FARTHEST, _FARTHEST])
+        return np.asarray(scipy.special.ndtri(share.clip(*ends)))
 
 
 class Straight:

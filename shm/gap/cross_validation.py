@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from shm.errors import UsageError
-from shm.gap.contract import Design, Fit, NoiseNode
+from shm.gap.contract import Design, Fit
 from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
 from shm.models.effects import Conditions
@@ -79,17 +79,15 @@ def check_hold_out(problem: GapProblem, hold_out: tuple[str, ...]) -> None:
         _named(problem.observations.design, hold_out)
 
 
-def shrinkage(
-    problem: GapProblem, before: Fit, after: Fit | None, held: HeldOut | None
-) -> Shrinkage:
+def shrinkage(problem: GapProblem, before: Fit, after: Fit | None, held: HeldOut) -> Shrinkage:
     """Root mean squares in percent; NaN for what there is not."""
     frequencies = problem.observations.design.frequencies
     value = problem.observations.value[:frequencies]
     return Shrinkage(
         _rms_percent(value - before.predicted[:frequencies]),
         NAN if after is None else _rms_percent(value - after.predicted[:frequencies]),
-        NAN if held is None else _rms_percent(held.before),
-        NAN if held is None else _rms_percent(held.after),
+        _rms_percent(held.before),
+        _rms_percent(held.after),
     )
 
 
@@ -202,7 +200,7 @@ class _Part:
             rows,
             problem.observations.value[rows],
             fit.slopes[rows],
-            Likelihood([NoiseNode(fit.noise.part(frequency, shape), 0.0, fit.model_error)]),
+            Likelihood.of(fit.noise.part(frequency, shape), fit.model_error),
         )
 
     def weighed(self, data: FloatArray) -> FloatArray:

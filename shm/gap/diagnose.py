@@ -1,11 +1,4 @@
-"""The whole diagnosis of one hanger: where, which effect, how far, what to measure next.
-
-Where along the hanger a local cause would have to sit, from the pattern over modes and shapes.
-
-One local change is tried at many places; its size and the baseline's parameters follow by least
-squares, to first order and then once more at the size found (Cawley and Adams 1979 compare patterns
-in the same way).
-"""
+"""The whole diagnosis of one hanger: where, which effect, how far, what to measure next."""
 
 from __future__ import annotations
 
@@ -14,23 +7,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.gap.alone import with_dynamics
 from shm.gap.attribution import Attribution, Explanation, answered, possible
-from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress, silent
+from shm.gap.contract import Fit, GapOptions, Hypothesis
 from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
-from shm.gap.data_checks import Usable, doubtful, set_aside, usable
-from shm.gap.falsification import compatibility
-from shm.gap.few_frequencies import tension_of_any_ends_n
+from shm.gap.damping import acting
+from shm.gap.data_checks import Usable, tension_of_any_ends_n, usable
 from shm.gap.law_error import mixed
-from shm.gap.misfit import Misfit
 from shm.gap.next_measurement import ranked
 from shm.gap.observations import observed
-from shm.gap.outlier_removal import Cleared, cleared, outliers, with_outliers
-from shm.gap.places import LocalCause, flexible_ends, local_causes, tried
+from shm.gap.outlier_removal import Cleared, cleared, doubtful, outliers, set_aside, with_outliers
+from shm.gap.places import places
 from shm.gap.problem import GapProblem
 from shm.gap.remainder import remainder_of
-from shm.gap.residuals import residuals, trends
-from shm.gap.sensor_errors import sensor_remarks
+from shm.gap.residuals import compatibility, residuals, sensor_remarks, trends
+from shm.inference.options import Progress, silent
 from shm.models import check_baseline
 from shm.models.as_made import TENSION_RATIO
 from shm.models.effects import check_effect_priors
@@ -39,11 +29,11 @@ from shm.values import (
     ENOUGH_EFFECTIVE,
     MOST_MISFIT_PERCENT,
     NAN,
+    NO_GAP,
     Cause,
     Diagnosis,
     EffectEstimate,
     FloatArray,
-    GapPlace,
     Hanger,
     ModalTest,
     NextMeasurement,
@@ -87,14 +77,15 @@ def examined(
     rng = np.random.default_rng(options.seed)
     clear = cleared(whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done))
     problem = clear.problem
-    attribution, dynamic = with_dynamics(clear.attribution, found.tests, whole.observations)
+    first = clear.attribution
+    share, dynamic = acting(first.no_gap_probability, found.tests, whole.observations)
+    attribution = first.with_unknown(share)
     progress("shrinkage", _ATTRIBUTION)
     answer, before = answered(attribution), attribution.baseline
     after = attribution.leading.best.fit if attribution.leading else None
     aside, doubted = (outliers(clear, e, answer[0][1]) for e in (clear.aside, clear.doubted))
     held = held_out(problem, before, after, options.hold_out, rng)
-    following = _following(problem, attribution, progress)
-    compatible = compatibility(problem, attribution)
+    compatible = compatibility(problem, _fits(attribution))
     any_ends_n = tension_of_any_ends_n(found.tests, hanger, options.seed)
     after_n = _tension(problem, possible(attribution), rng, any_ends_n)
     before_n = _tension(problem, [(1.0, before)], rng)
@@ -116,7 +107,7 @@ def examined(
         shrinkage=shrinkage(problem, before, after, held),
         tension_before_n=before_n,
         tension_after_n=after_n,
-        next_measurements=following,
+        next_measurements=_following(problem, attribution, progress),
         remarks=(
             *_of_another(found.tests, hanger),
             *_states(problem, before, after, (before_n, after_n)),
@@ -159,11 +150,7 @@ def _following(
 
 
 def _on_the_way(
-    found: Usable,
-    clear: Cleared,
-    aside: Sequence[Outlier],
-    doubted: Sequence[Outlier],
-    best: Fit,
+    found: Usable, clear: Cleared, aside: Sequence[Outlier], doubted: Sequence[Outlier], best: Fit
 ) -> tuple[str, ...]:
     """What was found on the way to data that can be used and hold no gross errors, and what the
     measurement errs by."""
@@ -243,6 +230,15 @@ def _estimates(problem: GapProblem, fit: Fit) -> tuple[EffectEstimate, ...]:
     )
 
 
+def _fits(attribution: Attribution) -> dict[str, list[Fit]]:
+    """Of no gap and of every cause that was fitted in full, at each of its places."""
+    found = {
+        each.effect: [variant.fit for variant in each.variants if variant.fit is not None]
+        for each in attribution.explanations
+    }
+    return {NO_GAP: [attribution.baseline], **{name: fits for name, fits in found.items() if fits}}
+
+
 def _contenders(attribution: Attribution) -> list[Fit]:
     """The fits that further measurements should tell apart, the likeliest first."""
     weighed = [(attribution.no_gap_probability, attribution.baseline)]
@@ -286,81 +282,3 @@ def _summary(samples: FloatArray) -> tuple[float, float, float, float]:
     """Mean, standard deviation, 5 and 95 % quantiles."""
     low, high = np.quantile(samples, [0.05, 0.95])
     return float(samples.mean()), float(samples.std(ddof=1)), float(low), float(high)
-
-
-# By five points a half wave a spline follows its square, as local causes act, to 2 % (5/384 h^4 / 2
-# with h = 2 pi / 5); 31 lie nearer together than a corroded stretch is long (`places._EXTENT`).
-_PLACES_A_HALF_WAVE, _FEWEST_PLACES = 5, 31
-# Judgement: to first order and once more at the size found; an end goes through decades.
-_PASSES, _PASSES_OF_AN_END = 2, 16
-# Technical: as many stretches as a page shows, eight points in each.
-_BINS = 180
-_FINE = 8 * _BINS
-_LEAST_GAIN = 6.0  # of chi-square, for a size and a place: 95 % of chance alone
-_FEWEST = 4  # tension and stiffness take two frequencies, a size and its place two more
-_OUTSIDE = 0.05  # on either side of a 90 % interval
-
-
-def places(problem: GapProblem, before: Fit) -> tuple[GapPlace, ...]:
-    """For each kind of local cause where it would have to sit; that which explains most first.
-
-    Kinds are `point mass`, `lateral spring`, `section loss` and `flexible end`, whose profile
-    holds the two ends with their probabilities. Kinds that explain no more than noise would are
-    absent, as all are where there are fewer than `_FEWEST` frequencies. A profile is the likelihood
-    of the likeliest size at each place, scaled to a density (means over 180 stretches).
-    What a kind leaves unexplained counts as noise, so that a kind that does not fit does not claim
-    to know its place. Where two places explain the data alike, as x and L - x do of a hanger with
-    like ends whose shapes were not measured, the profile has both and the interval spans both.
-    """
-    if problem.design.frequencies < _FEWEST:
-        return ()
-    misfit = Misfit.of(problem, before)
-    found = [_place(problem, before, misfit, cause) for cause in local_causes(problem)]
-    found.append(_end(problem, before, misfit))
-    return tuple(sorted((each for each in found if each), key=lambda place: -place.share))
-
-
-def _place(problem: GapProblem, before: Fit, misfit: Misfit, cause: LocalCause) -> GapPlace | None:
-    length_m = problem.hanger.length_m
-    half_waves = int(problem.observations.design.frequency_order.max())
-    x_m = np.linspace(0, length_m, max(_PLACES_A_HALF_WAVE * half_waves + 1, _FEWEST_PLACES))
-    fine_m = (np.arange(_FINE) + 0.5) * length_m / _FINE
-    change = tried(problem, before, misfit, cause.at(x_m), _PASSES).between(x_m, fine_m)
-    found = _judged(misfit, change.left(misfit))
-    if found is None:
-        return None
-    probability, share = found
-    low_m, high_m = np.interp([_OUTSIDE, 1 - _OUTSIDE], probability.cumsum(), fine_m)
-    density = probability.reshape(_BINS, -1).sum(axis=1) * _BINS / length_m
-    middles_m = fine_m.reshape(_BINS, -1).mean(axis=1)
-    profile = tuple(zip(middles_m.tolist(), density.tolist(), strict=True))
-    likeliest_m = float(fine_m[probability.argmax()])
-    return GapPlace(cause.kind, likeliest_m, float(low_m), float(high_m), share, profile)
-
-
-def _end(problem: GapProblem, before: Fit, misfit: Misfit) -> GapPlace | None:
-    """The end that would have to turn."""
-    ends = flexible_ends(problem)
-    if not ends:
-        return None
-    changes = [tried(problem, before, misfit, end, _PASSES_OF_AN_END) for end in ends]
-    found = _judged(misfit, np.concatenate([change.left(misfit) for change in changes]))
-    if found is None:
-        return None
-    probability, share = found
-    x_m = np.concatenate([end.places_m for end in ends])
-    possible = x_m[probability >= 2 * _OUTSIDE]
-    profile = tuple(zip(x_m.tolist(), probability.tolist(), strict=True))
-    likeliest_m = float(x_m[probability.argmax()])
-    low_m, high_m = float(possible.min()), float(possible.max())
-    return GapPlace(ends[0].kind, likeliest_m, low_m, high_m, share, profile)
-
-
-def _judged(misfit: Misfit, left: FloatArray) -> tuple[FloatArray, float] | None:
-    """Probabilities (n,) of places that leave a chi-square `left` (n,), and the share that the
-    best of them explains; None where noise alone would explain as much."""
-    log_likelihood = misfit.log_likelihood(left)
-    if 2 * log_likelihood.max() < _LEAST_GAIN:
-        return None
-    probability = np.exp(log_likelihood - log_likelihood.max())
-    return probability / probability.sum(), 1 - float(left.min()) / misfit.total

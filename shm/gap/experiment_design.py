@@ -57,9 +57,7 @@ def proposals(design: Design, hanger: Hanger) -> tuple[Proposal, ...]:
         Proposal("repeat", "the same test once more", like_the_present(design)),
         *_other_plane(design),
         *_more_modes(design),
-        *_other_temperatures(design),
-        *_other_levels(design),
-        *_known_masses(design, hanger),
+        *_other_conditions(design, hanger),
     ]
     done = measured_already(design)
     return tuple(proposal for proposal in every if proposal.kind not in done)
@@ -156,37 +154,23 @@ def _more_modes(design: Design) -> Iterator[Proposal]:
     yield Proposal("more modes", f"{_orders(orders)}{where}", _test(design, modes, none))
 
 
-def _other_temperatures(design: Design) -> Iterator[Proposal]:
-    for shift_k, word in ((-_WARMER_K, "colder"), (_WARMER_K, "warmer")):
-        yield Proposal(
-            "temperature",
-            f"a test on a day {_WARMER_K:g} K {word}",
-            like_the_present(design, replace(_usual(design), temperature_shift_k=shift_k)),
-        )
-
-
-def _other_levels(design: Design) -> Iterator[Proposal]:
+def _other_conditions(design: Design, hanger: Hanger) -> Iterator[Proposal]:
+    """A colder and a warmer day, softer and harder hits, known masses."""
     usual = _usual(design)
+    for shift_k, word in ((-_WARMER_K, "colder"), (_WARMER_K, "warmer")):
+        day = like_the_present(design, replace(usual, temperature_shift_k=shift_k))
+        yield Proposal("temperature", f"a test on a day {_WARMER_K:g} K {word}", day)
     for factor, word in zip(_LEVELS, ("softer", "harder"), strict=True):
-        yield Proposal(
-            "level",
-            f"a {word} hit, {factor:g} times the usual level",
-            like_the_present(design, replace(usual, amplitude=factor * usual.amplitude)),
-        )
-
-
-def _known_masses(design: Design, hanger: Hanger) -> Iterator[Proposal]:
-    own_kg = hanger.mass_per_length_kg_m * hanger.length_m
-    wanted_kg = _MASS_SHARE * own_kg
+        hit = like_the_present(design, replace(usual, amplitude=factor * usual.amplitude))
+        yield Proposal("level", f"a {word} hit, {factor:g} times the usual level", hit)
+    wanted_kg = _MASS_SHARE * (hanger.mass_per_length_kg_m * hanger.length_m)
     step_kg = min(_MASS_STEP_KG, float(10.0 ** np.floor(np.log10(wanted_kg))))
     mass_kg = step_kg * round(wanted_kg / step_kg)
     for share in _MASS_PLACES:
         mass = AddedMass(mass_kg, round(share * hanger.length_m, 1))
-        yield Proposal(
-            "known mass",
-            f"known mass of {mass.mass_kg:g} kg at {mass.x_m:g} m",
-            like_the_present(design, replace(_usual(design), added_mass=mass)),
-        )
+        loaded = like_the_present(design, replace(usual, added_mass=mass))
+        what = f"known mass of {mass.mass_kg:g} kg at {mass.x_m:g} m"
+        yield Proposal("known mass", what, loaded)
 
 
 def _test(

@@ -1,27 +1,100 @@
-"""A hypothesis fitted to the observations, with its evidence by Laplace's method.
+"""Hypotheses that these data could show: which are worth a full fit, and the fit, with its evidence
+by Laplace's method.
 
-Laplace's method (Tierney and Kadane 1986) puts a normal distribution on each of the most probable
-points; the evidence is the sum of their integrals. Mirror images count as what they are: two.
+Each single effect, at each place where it may act, is first tried linearised, on top of a fit
+without it. Laplace's method (Tierney and Kadane 1986) puts a normal distribution on each of the
+most probable points; the evidence is the sum of their integrals. Mirror images count as what they
+are: two.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import scipy
 
-from shm.errors import BadInput
+from shm.errors import BadInput, UsageError
 from shm.gap.contract import Fit, Hypothesis, Peak
 from shm.gap.coordinates import is_place
-from shm.gap.detectability import scan
+from shm.gap.detectability import Scan, marginal, scan
 from shm.gap.likelihood import Likelihood
-from shm.gap.objective import Landscape
-from shm.gap.optimiser import Optimum, optima
+from shm.gap.model_probabilities import ScoredHypothesis
+from shm.gap.optimiser import Landscape, Optimum, optima
 from shm.gap.problem import GapProblem
+from shm.models.effects import EFFECTS
 from shm.values import FloatArray
+
+IN_BASELINE = {
+    "beam2": ("rotational_end_flexibility",),
+    "solid1": ("rotational_end_flexibility", "translational_end_flexibility"),
+    "solid2": ("rotational_end_flexibility",),
+}
+"""Effects that a baseline class has as parameters of its own."""
+
+
+def hypotheses(problem: GapProblem, without: tuple[str, ...] = ()) -> tuple[Hypothesis, ...]:
+    """Baseline + one effect, for every variant, in the order of the catalogue.
+
+    Left out are the effects `without`, those that the baseline has itself and those that these
+    data cannot show. Raises UsageError for a name that is not in the catalogue.
+    """
+    unknown = sorted(set(without) - set(EFFECTS))
+    if unknown:
+        raise UsageError(
+            f"No effect is called {', '.join(unknown)}. The catalogue has {', '.join(EFFECTS)}."
+        )
+    survey = problem.observations.design.survey
+    return tuple(
+        Hypothesis(((name, variant),))
+        for name, effect in EFFECTS.items()
+        if name not in without and name not in invisible(problem)
+        for variant in effect.variants(problem.hanger, survey)
+    )
+
+
+def invisible(problem: GapProblem) -> dict[str, str]:
+    """The effects that cannot be told from the baseline, and why in a sentence each."""
+    survey = problem.observations.design.survey
+    reasons = {name: each.invisible(problem.hanger, survey) for name, each in EFFECTS.items()}
+    for name in IN_BASELINE.get(problem.baseline, ()):
+        reasons[name] = f"The baseline {problem.baseline} has it as parameters of its own."
+    return {name: reason for name, reason in reasons.items() if reason}
+
+
+def tried_by_screening(
+    problem: GapProblem, before: Fit, scans: Mapping[Hypothesis, Scan]
+) -> tuple[ScoredHypothesis, ...]:
+    """What scans on top of a fit say, the best first, as gains on it to stand beside fits."""
+    nothing = marginal(problem, Hypothesis(), before, np.zeros((1, len(before.predicted))))
+    best = ScoredHypothesis.fitted(before, len(before.z))
+    level = float(nothing.log_likelihood[0])
+    tried = [
+        ScoredHypothesis(
+            hypothesis,
+            before.log_evidence + found.log_evidence - level,
+            best.log_fit + float(found.marginal.log_peak.max()) - level,
+        )
+        for hypothesis, found in scans.items()
+    ]
+    return tuple(sorted(tried, key=lambda each: -each.log_evidence))
+
+
+def varied(
+    tried: Sequence[ScoredHypothesis], alike: int, most: int
+) -> tuple[ScoredHypothesis, ...]:
+    """The best by their evidence, at most `most`, and no more than `alike` of one family."""
+    before: Counter[str] = Counter()
+    kept = []
+    for each in sorted(tried, key=lambda each: -each.log_evidence):
+        before[each.hypothesis.name] += 1
+        if before[each.hypothesis.name] <= alike:
+            kept.append(each)
+    return tuple(kept[:most])
+
 
 _DRAWS = 256  # technical: a mean to 6 % of its sd, as the likeliest fits are sampled afterwards
 # Judgement: each start costs a descent. From 3 points of a scan; and over 93 % of the prior of the
@@ -93,17 +166,15 @@ def _seen_from_the_other_end(landscape: Landscape, found: list[Optimum]) -> list
     z = best.branch.z(best.w[None])[0]
     parameters = landscape.problem.coordinates(landscape.hypothesis).parameters
     places = [k for k, parameter in enumerate(parameters) if is_place(parameter)]
-    mirrored = [_mirrored(z, some) for n in (1, 2) for some in combinations(places, n)]
+    mirrored = [
+        np.where(np.isin(np.arange(len(z)), some), -z, z)
+        for n in (1, 2)
+        for some in combinations(places, n)
+    ]
     others = optima(landscape, np.array(mirrored)) if mirrored else []
     if not others:
         return found
     return optima(landscape, np.array([e.branch.z(e.w[None])[0] for e in (*found, *others)]))
-
-
-def _mirrored(z: FloatArray, places: Sequence[int]) -> FloatArray:
-    other = z.copy()
-    other[list(places)] *= -1
-    return other
 
 
 def _fit(landscape: Landscape, found: list[Optimum], rng: np.random.Generator) -> Fit:

@@ -27,14 +27,12 @@ from shm.gap.contract import Fit
 from shm.gap.coordinates import Branch, Straight
 from shm.gap.detectability import LONGEST_STEP
 from shm.gap.fit import fitted
-from shm.gap.objective import Landscape
-from shm.gap.optimiser import NEVER
+from shm.gap.optimiser import NEVER, Landscape
 from shm.gap.problem import GapProblem
 from shm.gap.proposal_distribution import Points, Proposal
 from shm.inference.coordinates import log_normal
-from shm.inference.mixture import Pool
-from shm.inference.tmcmc import effective, normalised, systematic
-from shm.values import ENOUGH_EFFECTIVE, BoolArray, FloatArray, IntArray
+from shm.inference.mixture import Pool, Rows, normalised, systematic
+from shm.values import ENOUGH_EFFECTIVE, FloatArray, IntArray
 
 # Technical, effective draws against time: a first look and refits of a few hundred points, ten to
 # twenty rounds at the most. Where they do not suffice, the answer says how many were effective.
@@ -55,14 +53,11 @@ _UNSEEN, _MUCH_BETTER = 1.25, 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Draws:
+class _Draws(Rows):
     """Draws with their linear parameters settled."""
 
     points: Points
     settled: Settled
-
-    def joined(self, other: _Draws) -> _Draws:
-        return _Draws(self.points.joined(other.points), self.settled.joined(other.settled))
 
 
 _Pool: TypeAlias = Pool[Proposal, _Draws]
@@ -83,14 +78,14 @@ def sampled(
     if settled.log_marginal[best] > sampler.log_marginal_of_fit + _MUCH_BETTER:
         fit = fitted(problem, fit.hypothesis, rng, np.stack([settled.z[best], fit.z]))
     rows = systematic(normalised(final.log_weights), draws, rng)
-    share = 1 / _effective(final) - 1 / final.draws
+    share = 1 / final.effective - 1 / final.draws
     return replace(
         fit,
         draws=rng.permutation(sampler.scattered(settled.take(rows), rng)),
-        log_evidence=float(scipy.special.logsumexp(final.log_weights) - np.log(final.draws)),
+        log_evidence=final.log_evidence,
         log_evidence_sd=float(_UNSEEN * np.sqrt(max(share, 0.0))),
         method="sampled",
-        effective=_effective(final),
+        effective=final.effective,
     )
 
 
@@ -124,15 +119,15 @@ class _Sampler:
         pool, final = _empty(), _empty()
         to_fit = _TO_FIT * max(len(self._other), 1)
         while pool.draws + final.draws < most:
-            if pool.draws and _effective(pool) >= to_fit:
+            if pool.draws and pool.effective >= to_fit:
                 self._draw(final, proposal, _FINAL, rng)
-                if _effective(final) >= ENOUGH_EFFECTIVE:
+                if final.effective >= ENOUGH_EFFECTIVE:
                     return final
-                if _effective(final) >= _HOPEFUL * final.draws:
+                if final.effective >= _HOPEFUL * final.draws:
                     continue
                 pool.absorb(final)
                 final = _empty()
-                if _effective(pool) >= _INSTEAD * ENOUGH_EFFECTIVE:
+                if pool.effective >= _INSTEAD * ENOUGH_EFFECTIVE:
                     break
             else:
                 self._draw(pool, proposal, _TRIAL if pool.draws else _FIRST, rng)
@@ -163,18 +158,13 @@ def _empty() -> _Pool:
     return Pool(lambda proposal, draws: proposal.log_density(draws.points))
 
 
-def _effective(pool: _Pool) -> float:
-    """Kish's effective number of draws."""
-    return effective(normalised(pool.log_weights))
-
-
 # Technical: what is nearly linear settles in a few steps, the last of them, of a gain below 0.2 in
 # log likelihood, without another look.
 _STEPS, _SETTLED_GAIN = 3, 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class Settled(Rows):
     """Points z (n, d) with their linear parameters at the best that the others allow.
 
     `log_marginal` (n,) is the log likelihood with the linear ones integrated out over their
@@ -184,18 +174,6 @@ class Settled:
     z: FloatArray
     log_marginal: FloatArray
     covariance: FloatArray
-
-    def take(self, rows: IntArray) -> Settled:
-        """Some of the points, by index."""
-        return Settled(self.z[rows], self.log_marginal[rows], self.covariance[rows])
-
-    def joined(self, other: Settled) -> Settled:
-        """Both sets of points."""
-        return Settled(
-            np.concatenate([self.z, other.z]),
-            np.concatenate([self.log_marginal, other.log_marginal]),
-            np.concatenate([self.covariance, other.covariance]),
-        )
 
 
 class Conditional:
@@ -230,7 +208,9 @@ class Conditional:
             there = self._view(tried)
             better = there.log_here > now.log_here[moving]
             z[moving[better]] = tried[better]
-            now = now.replaced(moving[better], there, better)
+            chosen = np.arange(len(z))
+            chosen[moving[better]] = len(z) + np.flatnonzero(better)
+            now = now.joined(there).take(chosen)
             now.gain[moving[~better]] = 0.0
         z[:, self._linear] += now.step
         return Settled(z, now.log_marginal, self._covariance[now.node])
@@ -266,7 +246,7 @@ class Conditional:
 
 
 @dataclass(frozen=True, eq=False)
-class _View:
+class _View(Rows):
     """Seen from points: the log marginal, the gain of a full step, the step, the likeliest node."""
 
     log_marginal: FloatArray
@@ -278,12 +258,3 @@ class _View:
     def log_here(self) -> FloatArray:
         """Log posterior of the linear parameters where they are, but for a constant."""
         return self.log_marginal - self.gain
-
-    def replaced(self, rows: IntArray, other: _View, chosen: BoolArray) -> _View:
-        """This view with `rows` taken from the `chosen` points of another."""
-        fields = []
-        for name in ("log_marginal", "gain", "step", "node"):
-            values = getattr(self, name).copy()
-            values[rows] = getattr(other, name)[chosen]
-            fields.append(values)
-        return _View(*fields)

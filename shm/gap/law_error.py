@@ -8,7 +8,9 @@ what the effect does beyond what the baseline can follow, the same in all tests 
 it does to that very mode or, where a law shifts its action from mode to mode, to the modes of a
 test and plane on the whole. The fraction is unknown.
 
-How far the laws of a hypothesis' effects may be off, and how likely that is.
+So what is left beside a large effect often looks like a small one of another kind. Where the second
+cause of a pair moves the data by little against the first, it counts for the most part as the law
+of the first.
 """
 
 from __future__ import annotations
@@ -20,16 +22,15 @@ from typing import Literal, NamedTuple
 import numpy as np
 import scipy
 
-from shm.gap.calibration import CALIBRATION, Share
 from shm.gap.contract import Covariance, Design, Fit, Hypothesis, NoiseNode
-from shm.gap.discrepancy import alike_in_planes, smooth_over_orders
 from shm.gap.fit import fitted, scattered
 from shm.gap.likelihood import Likelihood
-from shm.gap.noise import same_mode
+from shm.gap.model_probabilities import CALIBRATION, Family, Share
+from shm.gap.noise import alike_in_planes, same_mode, smooth_over_orders
 from shm.gap.problem import GapProblem
-from shm.inference.tmcmc import normalised
+from shm.inference.mixture import normalised
 from shm.models.effects import EFFECTS
-from shm.values import FloatArray, IntArray
+from shm.values import FloatArray
 
 SHOWN = 3.0
 """Log odds against an exact law from which on the data show that it is off."""
@@ -143,13 +144,11 @@ def _off(
 
 def _linear(problem: GapProblem, fit: Fit, errors: Covariance, slopes: FloatArray) -> _Linear:
     """About a fit's most probable point; `slopes` (data, d + k), the first d its own."""
-    likelihood = Likelihood([NoiseNode(errors, 0.0, fit.model_error)])
+    likelihood = Likelihood.of(errors, fit.model_error)
     z = np.concatenate([fit.z, np.zeros(slopes.shape[1] - len(fit.z))])
     residual = problem.observations.value - fit.predicted
-    gram = likelihood.gram(np.column_stack([slopes, residual])[None])[0, 0]
-    inner, pull = gram[:-1, :-1] + np.eye(len(z)), gram[:-1, -1] - z
-    step = np.linalg.solve(inner, pull)
-    misfit = gram[-1, -1] + z @ z - pull @ step
+    inner, step, square, followed = likelihood.linear(slopes, residual, z)
+    misfit = square + z @ z - followed
     log = likelihood.log_height[0] - np.linalg.slogdet(inner)[1] / 2 - misfit / 2
     return _Linear(errors, float(log), step, inner)
 
@@ -187,7 +186,7 @@ def _fitted_anew(
         frequency=likeliest.errors.frequency + others[:count] @ others[:count].T,
         shape_loads=np.column_stack([likeliest.errors.shape_loads, others[count:]]),
     )
-    likelihood = Likelihood([NoiseNode(errors, 0.0, fit.model_error)])
+    likelihood = Likelihood.of(errors, fit.model_error)
     starts = np.array([fit.z, fit.z + likeliest.step[:own]])
     moved = fitted(problem, fit.hypothesis, rng, starts, likelihood)
     return replace(moved, log_evidence=fit.log_evidence, method=fit.method, peaks=fit.peaks)
@@ -264,19 +263,60 @@ def _by_levels(problem: GapProblem, fit: Fit) -> FloatArray:
 
 def _on_the_whole(design: Design, shift: FloatArray) -> FloatArray:
     """Root mean squares of a shift (data,) over each test and plane, and over each shape."""
-    count = design.frequencies
     planes = 1 + int(design.frequency_plane.max())
-    return np.concatenate(
-        [
-            _root_mean_square(
-                design.frequency_test * planes + design.frequency_plane, shift[:count]
-            ),
-            _root_mean_square(design.shape_mode, shift[count:]),
-        ]
-    )
-
-
-def _root_mean_square(group: IntArray, values: FloatArray) -> FloatArray:
-    """Of the values (n,) of each group, given to each of its members."""
-    mean = np.bincount(group, values**2) / np.maximum(np.bincount(group), 1)
+    own = design.frequency_test * planes + design.frequency_plane
+    group = np.concatenate([own, own.max() + 1 + design.shape_mode])
+    mean = np.bincount(group, shift**2) / np.maximum(np.bincount(group), 1)
     return np.asarray(np.sqrt(mean)[group])
+
+
+def without_minor_cause(
+    problem: GapProblem, baseline: Fit, kinds: Sequence[Family], chances: FloatArray
+) -> FloatArray:
+    """The probabilities (families,) with those of pairs given to the one effect that they lean on.
+
+    To an effect that was not worth a fit nothing is given: its law is not nearly right.
+    """
+    moved, odds = chances.copy(), CALIBRATION.minor_law_odds
+    plain = [i for i, kind in enumerate(kinds) if not kind.flexible]
+    alone = {kinds[i].name: i for i in plain if kinds[i].effects == 1 and kinds[i].best.fit}
+    for i in plain:
+        larger, part = second_cause(problem, baseline, kinds[i].best.fit)
+        if larger in alone and part <= CALIBRATION.minor_below:
+            share = chances[i] * odds / (1 + odds)
+            moved[i] -= share
+            moved[alone[larger]] += share
+    return moved
+
+
+def second_cause(problem: GapProblem, baseline: Fit, fit: Fit | None) -> tuple[str, float]:
+    """The name of the larger effect of a pair, and how far the other moves the data against it.
+
+    A fault of the law is the same in all tests: what differs from test to test is a cause, and as
+    large as the first (1); so is what is no pair, of name "".
+    """
+    if fit is None or len(fit.hypothesis.effects) != 2:
+        return "", 1.0
+    moves = [_added(problem, baseline, fit, index) for index in (0, 1)]
+    large = int(np.argmax(moves))
+    (name, _), (second, variant) = fit.hypothesis.effects[large], fit.hypothesis.effects[1 - large]
+    differs = bool(EFFECTS[second].follows or variant.test)
+    return name, 1.0 if differs else moves[1 - large] / max(moves[large], np.finfo(float).tiny)
+
+
+def _added(problem: GapProblem, baseline: Fit, fit: Fit, index: int) -> float:
+    """By how many standard deviations one effect of a pair moves the data beside the other one.
+
+    Beyond what the baseline's own parameters can follow.
+    """
+    shift = fit.predicted - problem.predicted_with(fit, [1 - index])
+    least = min(problem.likelihood(Hypothesis()).nodes, key=lambda node: node.model_error)
+    return float(np.sqrt(max(_beyond(shift, baseline, least), 0.0)))
+
+
+def _beyond(shift: FloatArray, baseline: Fit, errors: NoiseNode) -> float:
+    """The square of a shift (data,), in standard deviations, beyond what the baseline's parameters
+    can follow."""
+    likelihood, middle = Likelihood([errors]), np.zeros(len(baseline.z))
+    _, _, square, followed = likelihood.linear(baseline.slopes, shift, middle)
+    return square - followed

@@ -110,6 +110,11 @@ class Likelihood:
         data = self.frequencies + self._shape.precision.shape[1]
         self.log_height: FloatArray = self.log_weight - volume - data * np.log(2 * np.pi) / 2
 
+    @classmethod
+    def of(cls, errors: Covariance, model_error: float) -> Likelihood:
+        """That of errors of known size."""
+        return cls([NoiseNode(errors, 0.0, model_error)])
+
     def by_node(self, residual: FloatArray) -> FloatArray:
         """Log likelihood and log weight of each node, (n, nodes); -inf where it is not finite."""
         finite = np.asarray(np.isfinite(residual).all(axis=1))
@@ -125,6 +130,19 @@ class Likelihood:
         frequency = self._frequency_gram(columns[:, : self.frequencies])[:, self._frequency_of]
         shape = self._shape.gram(columns[:, self.frequencies :])[:, self._shape_of]
         return np.asarray(frequency + shape)
+
+    def linear(
+        self, slopes: FloatArray, residual: FloatArray, z: FloatArray
+    ) -> tuple[FloatArray, FloatArray, float, float]:
+        """About a point z (d,) with its residual (data,), of errors of known size.
+
+        The curvature (d, d), the best step (d,), the square of the residual and what of it the
+        parameters, with standard normal priors, follow in that step.
+        """
+        gram = self.gram(np.column_stack([slopes, residual])[None])[0, 0]
+        inner, pull = gram[:-1, :-1] + np.eye(len(z)), gram[:-1, -1] - z
+        step = np.linalg.solve(inner, pull)
+        return inner, step, float(gram[-1, -1]), float(pull @ step)
 
     def weighed(self, columns: FloatArray) -> Weighed:
         """C^-1 X of columns X (data, c), to take products with many residuals."""

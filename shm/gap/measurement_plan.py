@@ -17,24 +17,18 @@ import numpy as np
 import scipy
 
 from shm.gap.attribution import WITHIN_REACH, Attribution, Explanation
-from shm.gap.contract import Design, Fit, Hypothesis
-from shm.gap.discrepancy import (
+from shm.gap.contract import Fit, Hypothesis
+from shm.gap.experiment_design import Proposal, lift_off, proposals, together
+from shm.gap.model_probabilities import log_prior
+from shm.gap.next_measurement import NO_GAP, Errors, Foresight, Remainder, foreseen, new_sensors
+from shm.gap.noise import (
     FREQUENCY_SIZES,
     LARGEST_FREQUENCY,
     LARGEST_SHAPE,
-    SMOOTH_ORDERS,
+    alike_in_planes,
+    same_mode,
     sizes_of,
-)
-from shm.gap.experiment_design import Proposal, lift_off, proposals, together
-from shm.gap.model_probabilities import log_prior
-from shm.gap.next_measurement import (
-    NO_GAP,
-    Errors,
-    Foresight,
-    Remainder,
-    foreseen,
-    new_sensors,
-    same_modes,
+    smooth_over_orders,
 )
 from shm.gap.problem import GapProblem
 from shm.inference.priors import UNKNOWN_READING_SD
@@ -68,9 +62,7 @@ class PlannedMeasurement:
 
 
 def planned(
-    race: Race,
-    hours: Mapping[str, float] = MEASUREMENT_HOURS,
-    budget_hours: float = np.inf,
+    race: Race, hours: Mapping[str, float] = MEASUREMENT_HOURS, budget_hours: float = np.inf
 ) -> tuple[PlannedMeasurement, ...]:
     """The next measurements, that which promises most for its hours first, within a budget.
 
@@ -238,11 +230,6 @@ def holds(other: str, one: str) -> bool:
     return set(parted(one)) <= set(parted(other))
 
 
-def chance_of(cause: str, among: Mapping[str, float]) -> float:
-    """The probability of all explanations that name a cause."""
-    return sum(chance for name, chance in among.items() if holds(name, cause))
-
-
 def _log_density(contender: Contender, rows: IntArray, data: FloatArray) -> FloatArray:
     """Log density (ways, draws) of data (ways, draws, rows), but for a constant."""
     found = []
@@ -324,14 +311,4 @@ def _unknown_ways(problem: GapProblem, fit: Fit, usual: Errors) -> list[tuple[fl
     return [(float(np.exp(log - ways[0][0])), own) for log, own in ways[:_WAYS]]
 
 
-def _smooth(one: Design, other: Design) -> FloatArray:
-    same_plane = one.frequency_plane[:, None] == other.frequency_plane
-    return np.asarray(_alike(one, other) * same_plane)
-
-
-def _alike(one: Design, other: Design) -> FloatArray:
-    apart = (one.frequency_order[:, None] - other.frequency_order) / SMOOTH_ORDERS
-    return np.asarray(np.exp(-(apart**2) / 2))
-
-
-_PATTERNS = (same_modes, _smooth, _alike)
+_PATTERNS = (same_mode, smooth_over_orders, alike_in_planes)

@@ -10,24 +10,115 @@ places (Scott and Berger, Ann. Stat. 38, 2010); its evidence is the mean over th
 p-value) is what the evidence does not hold: whether even the likeliest explanation fits
 (`probabilities`). What a hypothesis is in truth, P(cause | h), trials have taught
 (`calibration.toml`): a pair with a minor second cause is for the most part one cause with an error
-of its law (`without_minor_cause` in `shm.gap.attribution`), and a free remainder sometimes a cause
+of its law (`without_minor_cause` in `shm.gap.law_error`), and a free remainder sometimes a cause
 that was not found (`undetected_share`); every other h is what its name says.
+
+That file, which `tests/benchmarks/gap_calibration.py` writes, says too how often effects imitate
+what is not in the catalogue and how far their laws are off.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import tomllib
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 from functools import cache
 from itertools import combinations
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
 
-from shm.gap.calibration import CALIBRATION
+from shm.errors import BadInput
 from shm.gap.contract import Fit, Hypothesis, Method
 from shm.values import FloatArray
 
+FILE = Path(__file__).with_name("calibration.toml")
+
+
+class Share(NamedTuple):
+    """Prior probabilities: that an effect's own law is off by so much, and that something unknown
+    is that passes for it."""
+
+    own: float
+    unknown: float
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """The trial that taught the values, and how many answers spoke for them."""
+
+    trial: str
+    seeds: str
+    cases: str
+    answers: str
+    date: date
+    command: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The values, each explained in the file.
+
+    `mimics_one` and `mimics_two` are shares of what is not in the catalogue; `in_mimicking_pairs`
+    and `with_turned_sensors` count the pairs in which each effect led falsely. `exact`, `of_a_mode`
+    and `on_the_whole` (by fraction) add to 1, and so does `where_rough`.
+    """
+
+    provenance: Provenance
+    mimics_one: float
+    mimics_two: float
+    in_mimicking_pairs: Mapping[str, int]
+    with_turned_sensors: Mapping[str, int]
+    undetected_share: float
+    minor_below: float
+    minor_law_odds: float
+    exact: Share
+    of_a_mode: Mapping[float, Share]
+    on_the_whole: Mapping[float, Share]
+    rough: float
+    where_rough: Mapping[float, float]
+
+    @property
+    def mimicking_pairs(self) -> int:
+        """All pairs that led falsely."""
+        return sum(self.in_mimicking_pairs.values()) // 2 + sum(self.with_turned_sensors.values())
+
+
+def read_calibration(file: Path = FILE) -> Calibration:
+    """The values of a file; raises BadInput where it lacks one."""
+    try:
+        return _values(tomllib.loads(file.read_text(encoding="utf-8")))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BadInput(
+            f"not a whole calibration ({error!r}).",
+            file=file,
+            remedy="Write it anew with tests/benchmarks/gap_calibration.py.",
+        ) from error
+
+
+def _values(told: dict[str, Any]) -> Calibration:
+    mimic, law, rough = told["mimic"], told["law"], told["rough_law"]
+    return Calibration(
+        provenance=Provenance(**told["provenance"]),
+        mimics_one=mimic["one_effect"],
+        mimics_two=mimic["two_effects"],
+        in_mimicking_pairs=mimic["in_pairs"],
+        with_turned_sensors=mimic["with_turned_sensors"],
+        undetected_share=told["undetected"]["share"],
+        minor_below=told["minor"]["below"],
+        minor_law_odds=float(told["minor"]["law_odds"]),
+        exact=Share(**law["exact"]),
+        of_a_mode={each.pop("fraction"): Share(**each) for each in law["of_a_mode"]},
+        on_the_whole={each.pop("fraction"): Share(**each) for each in law["on_the_whole"]},
+        rough=rough["probability"],
+        where_rough={each["fraction"]: each["share"] for each in rough["of_a_mode"]},
+    )
+
+
+CALIBRATION = read_calibration()
 # Before any data, judgement: who asks for a diagnosis mostly has a gap, and one cause is commoner
 # than two. Blind trials plant the same mix; where it is another, odds are off by the ratio.
 NO_GAP = 0.25

@@ -13,6 +13,7 @@ import scipy
 
 from shm.gap.contract import Design, Fit
 from shm.gap.experiment_design import Proposal, proposals, sensors_wanted, with_sensors
+from shm.gap.noise import same_mode
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import identification_sd
 from shm.values import NAN, FloatArray, NextMeasurement
@@ -56,7 +57,9 @@ def ranked(problem: GapProblem, fits: Sequence[Fit]) -> tuple[NextMeasurement, .
         pair = (contenders[0], fit)
         pairs = zip(general, foresights[0], seen, strict=True)
         promises = [(each, _expected(*both)) for each, *both in pairs]
-        promises += [_promise(problem, pair, each, errors) for each in new_sensors(problem, pair)]
+        for each in new_sensors(problem, pair):
+            both = (foreseen(problem, own, each.design, errors) for own in pair)
+            promises.append((each, _expected(*both)))
         found += [_named(pair, promise) for promise in _worth_it(promises)]
     found.sort(key=lambda measurement: -measurement.expected_log_bayes_factor)
     distinct: dict[str, NextMeasurement] = {}
@@ -74,13 +77,6 @@ def _contenders(fits: Sequence[Fit]) -> list[Fit]:
     best = max((fit.log_evidence for fit in distinct.values()), default=0.0)
     racing = [f for f in distinct.values() if f.log_evidence > best - _OUT_OF_THE_RACE]
     return racing[:_CONTENDERS]
-
-
-def _promise(
-    problem: GapProblem, pair: tuple[Fit, Fit], proposal: Proposal, errors: Errors
-) -> _Promise:
-    one, other = (foreseen(problem, fit, proposal.design, errors) for fit in pair)
-    return proposal, _expected(one, other)
 
 
 def _expected(one: Foresight, other: Foresight) -> float:
@@ -179,7 +175,7 @@ class Errors:
 
     def between(self, one: Design, other: Design, *, same: bool) -> FloatArray:
         """The covariance (F of one, F of the other) by what repeats; of the `same` tests or not."""
-        found = self.repeated**2 * same_modes(one, other)
+        found = self.repeated**2 * same_mode(one, other)
         return found if self.remainder is None else found + self.remainder.between(one, other, same)
 
 
@@ -287,12 +283,6 @@ def _given_the_old(
     if errors.sensors is not None:
         noise[new : design.size, new : design.size] += errors.sensors @ errors.sensors.T
     return Foresight(design, mean, spread @ spread.T + noise)
-
-
-def same_modes(one: Design, other: Design) -> FloatArray:
-    """(F of one, F of the other): 1 where two frequencies are of one plane and order."""
-    planes = one.frequency_plane[:, None] == other.frequency_plane
-    return np.asarray(planes & (one.frequency_order[:, None] == other.frequency_order), dtype=float)
 
 
 def _agreement(design: Design, predicted: FloatArray, reference: FloatArray) -> FloatArray:

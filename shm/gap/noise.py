@@ -1,4 +1,5 @@
-"""The unknown errors of the data: a few possibilities, each a covariance with a prior weight.
+"""The unknown errors of the data, and the discrepancy that stands for what is not in the catalogue:
+a few possibilities, each a covariance with a prior weight.
 
 The frequencies err by their identification, by a small model error that belongs to a mode and so
 repeats in every test, and by what repeats in any case (`shm.gap.repeated_errors`): cov = factor^2
@@ -7,24 +8,31 @@ but for peaks of both planes that overlap in a test: R correlates those by an un
 frequency of small amplitude with the same one at that of the hit. sigma is as likely half-normal of
 2e-5, as the general model agrees with independent finite elements, as it is log-uniform from there
 to 3e-3: sound hangers of others had errors of up to 5e-4 that repeat in every test, and whoever
-takes none of it for scatter finds a cause in each. Stated standard
-deviations rest on a few hits and are themselves uncertain: those of one mode in several tests are
-drawn together as far as they differ by chance, and `factor`, what is left and common to all, has a
-log-normal prior of 20 %. That of the shapes is taken from their own scatter between tests. Where no
-standard deviations are given there is instead one unknown standard deviation for all, log-uniform,
-beside what rounding adds (`shm.gap.rounding`); where some are, both. Unknowns are integrated by the
-trapezoidal rule over their logarithm.
+takes none of it for scatter finds a cause in each. Stated standard deviations rest on a few hits
+and are themselves uncertain: those of one mode in several tests are drawn together as far as they
+differ by chance, and `factor`, what is left and common to all, has a log-normal prior of 20 %. That
+of the shapes is taken from their own scatter between tests. Where no standard deviations are given
+there is instead one unknown standard deviation for all, log-uniform, beside what rounding adds
+(`shm.gap.observations`); where some are, both. Unknowns are integrated by the trapezoidal rule over
+their logarithm.
+
+The discrepancy is a remainder of the data that is free to take many forms. That of the frequencies
+is a Gaussian process over their fractional deviations (Kennedy and O'Hagan, J. R. Stat. Soc. B 63,
+2001): alike in all tests, by test, or growing with temperature or level, and over the orders
+independent, smooth, or the same for all. One of the shapes is an extra variance of every component.
+Sizes are log-uniform, so that a remainder pays for its freedom.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from shm.gap.contract import Covariance, Design, NoiseNode, Observations
+from shm.gap.observations import rounding_covariance
 from shm.gap.repeated_errors import Repeated, turned_modes
-from shm.gap.rounding import rounding_covariance
 from shm.values import FloatArray, IntArray
 
 # As the general model and other finite elements differ at most (docs/gap.md, what is compared).
@@ -130,18 +138,12 @@ def drawn_together(observations: Observations) -> FloatArray:
     scatter much more (James and Stein's shrinkage). Components of a shape keep their proportions.
     """
     design = observations.design
-    count, mode = design.frequencies, _modes(design)
+    count, mode = design.frequencies, design.mode
     frequency, shape = observations.sd[:count], observations.sd[count:]
     of = np.unique(design.shape_mode, return_inverse=True)[1]
     size = np.sqrt(np.bincount(of, shape**2) / np.maximum(np.bincount(of), 1))
     factor = _drawn(mode[np.unique(design.shape_mode)], size) / size
     return np.concatenate([_drawn(mode, frequency), shape * factor[of]])
-
-
-def _modes(design: Design) -> IntArray:
-    """A number (F,) for each plane and order."""
-    orders = int(design.frequency_order.max()) + 1
-    return np.asarray(design.frequency_plane * orders + design.frequency_order)
 
 
 def _drawn(group: IntArray, sd: FloatArray) -> FloatArray:
@@ -159,10 +161,11 @@ def _drawn(group: IntArray, sd: FloatArray) -> FloatArray:
     return drawn
 
 
-def same_mode(design: Design) -> FloatArray:
-    """(F, F): 1 where two frequencies are of one plane and order, 0 elsewhere."""
-    mode = np.stack([design.frequency_plane, design.frequency_order])
-    return np.asarray((mode[:, :, None] == mode[:, None, :]).all(axis=0), dtype=float)
+def same_mode(one: Design, other: Design | None = None) -> FloatArray:
+    """(F of one, F of the other or of itself): 1 where both are of one plane and order, else 0."""
+    planes = np.equal.outer(one.frequency_plane, (other or one).frequency_plane)
+    orders = np.equal.outer(one.frequency_order, (other or one).frequency_order)
+    return np.asarray(planes & orders, dtype=float)
 
 
 def _unknown_sds(known: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -200,19 +203,9 @@ def _between_tests(observations: Observations) -> tuple[float, float]:
     """The scatter of shapes about their means over tests, in stated sds, and its freedom."""
     design = observations.design
     mode = design.shape_mode
-    masses = [each.added_mass for each in design.conditions]
-    mass = np.array([masses.index(each) for each in masses])[design.frequency_test[mode]]
-    keys = np.stack(
-        [
-            mass,
-            design.frequency_plane[mode],
-            design.frequency_order[mode],
-            design.shape_place,
-            design.shape_component,
-        ]
-    )
     # What is turned at will scatters by more than its own standard deviations say.
-    keys = np.vstack([keys, np.where(turned_modes(observations), np.arange(len(mode)), -1)])
+    turned = np.where(turned_modes(observations), np.arange(len(mode)), -1)
+    keys = np.vstack([design.kinds[:, design.frequencies :], turned])
     kind = np.unique(keys, axis=1, return_inverse=True)[1].ravel()
     value, sd = observations.value[design.frequencies :], observations.sd[design.frequencies :]
     count = np.bincount(kind)
@@ -249,3 +242,126 @@ def _trapezoidal(density: FloatArray, below: float = 0.0) -> FloatArray:
     weights[[0, -1]] /= 2
     weights[0] += below
     return np.asarray(weights / weights.sum())
+
+
+# Judgement: no cause of the catalogue moves frequencies by more than a tenth without being seen by
+# eye, nor unit shapes by more than a third. Twice as large, over log-uniform sizes from 1e-4, costs
+# a remainder ln(7.6 / 6.9) = 0.1 of log evidence.
+LARGEST_FREQUENCY, LARGEST_SHAPE = 0.1, 0.3
+SMALLEST_SDS = 1.0  # a smaller one drowns in the errors
+# Judgement: a factor of 4 between sizes, and of the plain possibilities one of each third; time
+# goes with their product, and a mean over finer ones is hardly another.
+FREQUENCY_SIZES, SHAPE_SIZES, PLAIN_NODES = 6, 4, 3
+# Judgement: causes act on neighbouring modes alike (a spring, a mass near an end), not on far ones.
+SMOOTH_ORDERS = 2.0
+SD_UNKNOWN = 1e-3  # judgement, of what states none: a hammer test of fair quality
+
+
+def flexible_nodes(
+    observations: Observations, repeated: Repeated | None = None
+) -> tuple[NoiseNode, ...]:
+    """The unknown errors together with a remainder, in place of the unknown errors alone.
+
+    Their weights add to 1. A remainder of the frequencies, of the shapes and of both are as likely.
+    """
+    plain = _thinned(nodes(observations, repeated))
+    kinds = _kinds(observations)
+    log_share = -np.log(len(kinds))
+    return tuple(
+        NoiseNode(
+            replace(
+                node.covariance,
+                frequency=node.covariance.frequency + frequency,
+                shape=node.covariance.shape + shape,
+            ),
+            float(node.log_weight + (log_share - np.log(len(kind)))),
+            node.model_error,
+        )
+        for node in plain
+        for kind in kinds
+        for frequency, shape in kind
+    )
+
+
+def _kinds(observations: Observations) -> list[list[tuple[FloatArray, FloatArray]]]:
+    """For each kind of remainder the variances that it may add to frequencies and shapes."""
+    design = observations.design
+    sizes = sizes_of(observations.sd[: design.frequencies], LARGEST_FREQUENCY, FREQUENCY_SIZES)
+    shapes = _shape_remainders(observations)
+    none = np.zeros((design.frequencies, design.frequencies)), np.zeros(len(design.shape_mode))
+    in_frequencies, in_both = [], []
+    for pattern in _patterns(design):
+        in_frequencies += [(size**2 * pattern, none[1]) for size in sizes]
+    for pattern, size, shape in product(_over_orders(design), sizes, shapes):
+        in_both.append((size**2 * pattern, shape))
+    kinds = [in_frequencies, [(none[0], shape) for shape in shapes], in_both]
+    return [kind for kind in kinds if kind]
+
+
+def _thinned(plain: tuple[NoiseNode, ...]) -> tuple[NoiseNode, ...]:
+    """A few of the unknown errors, since the remainder itself covers what lies between them."""
+    if len(plain) <= PLAIN_NODES:
+        return plain
+    weight = np.exp([node.log_weight for node in plain])
+    reached = np.cumsum(weight) / weight.sum()
+    middles = (np.arange(PLAIN_NODES) + 0.5) / PLAIN_NODES
+    kept, counts = np.unique(np.searchsorted(reached, middles), return_counts=True)
+    return tuple(
+        NoiseNode(plain[i].covariance, float(np.log(count / PLAIN_NODES)), plain[i].model_error)
+        for i, count in zip(kept, counts, strict=True)
+    )
+
+
+def _shape_remainders(observations: Observations) -> list[FloatArray]:
+    sd = observations.sd[observations.design.frequencies :]
+    if sd.size == 0:
+        return []
+    return [
+        np.asarray(size**2 * np.ones_like(sd)) for size in sizes_of(sd, LARGEST_SHAPE, SHAPE_SIZES)
+    ]
+
+
+def sizes_of(sd: FloatArray, largest: float, count: int) -> FloatArray:
+    """Sizes that a remainder may have, from what drowns in the errors."""
+    known = sd[np.isfinite(sd)]
+    typical = float(np.median(known)) if known.size else SD_UNKNOWN
+    return np.geomspace(min(SMALLEST_SDS * typical, largest / 2), largest, count)
+
+
+def _patterns(design: Design) -> list[FloatArray]:
+    """Correlations (F, F): alike in all tests, by test, and growing with what the tests vary."""
+    test = design.frequency_test
+    orders = _over_orders(design)
+    patterns = list(orders)
+    if len(np.unique(test)) > 1:
+        same_test = (test[:, None] == test).astype(float)
+        patterns += [same_test * orders[0], same_test * orders[-1]]
+    for condition in (
+        np.array([each.temperature_shift_k for each in design.conditions]),
+        np.array([each.amplitude for each in design.conditions]) ** 2,
+    ):
+        spread = condition - condition.mean()
+        if np.ptp(condition[np.unique(test)]) > 0:
+            grown = (spread / np.abs(spread).max())[test]
+            patterns.append(np.outer(grown, grown) * orders[-1])
+    return patterns
+
+
+def _over_orders(design: Design) -> list[FloatArray]:
+    """Correlations (F, F) between modes: none, smooth over the order in one plane or in both."""
+    patterns = [same_mode(design), smooth_over_orders(design)]
+    several = np.ptp(design.frequency_plane) > 0
+    return [*patterns, alike_in_planes(design)] if several else patterns
+
+
+def smooth_over_orders(one: Design, other: Design | None = None) -> FloatArray:
+    """Correlations (F, F) that fall with the difference of the orders, in each plane."""
+    planes = np.equal.outer(one.frequency_plane, (other or one).frequency_plane)
+    return np.asarray(planes * alike_in_planes(one, other))
+
+
+def alike_in_planes(one: Design, other: Design | None = None) -> FloatArray:
+    """Correlations (F, F) that fall with the difference of the orders, whatever the planes."""
+    orders = np.subtract.outer(one.frequency_order, (other or one).frequency_order)
+    apart = orders / SMOOTH_ORDERS
+    return np.asarray(np.exp(-(apart**2) / 2))

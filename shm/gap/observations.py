@@ -7,12 +7,14 @@ component spread over the certain ones.
 Where a test says how its frequencies depend on amplitude, it counts as two: its frequencies of
 small amplitude at amplitude 0, and at that of its hits those that change, each by its own slope.
 
-How much of a shape's standard deviations is that of its direction about the hanger's axis.
-
 Where two planes' frequencies are all but equal, noise turns both shapes at will: every component
 errs by the same angle times the other component at its place, so that the larger of a place's two
 standard deviations grows with the shape, sd^2 = own^2 + (turn size)^2. Components err independently
 by `own` alone.
+
+Frequencies that state no standard deviation may have been rounded. A step is the same number of Hz
+for all modes, so that low ones are much less exact than high ones.
+Frequencies rounded to one number, as of both planes, err alike: they are one datum and not two.
 """
 
 from __future__ import annotations
@@ -26,7 +28,6 @@ import scipy
 
 from shm.errors import BadInput
 from shm.gap.contract import Design, Observations
-from shm.gap.rounding import rounding_sds
 from shm.inference.priors import reading_sd_n
 from shm.models.effects import Conditions, Survey
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
@@ -50,10 +51,10 @@ class _Component:
 def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
     """All usable data of `tests`; shapes without standard deviations are not usable.
 
-    Raises BadInput where there are no frequencies, a frequency or a sensor's place that cannot be,
-    or one mode twice in a test.
+    They are as `shm.gap.data_checks` leaves them. Raises BadInput for a frequency or an order that
+    cannot be.
     """
-    _refuse_nonsense(tests, hanger)
+    _refuse_nonsense(tests)
     tests = [level for test in tests for level in _by_level(test)]
     modes = [(t, mode) for t, test in enumerate(tests) for mode in test.modes]
     frequency = np.array([mode.frequency_hz for _, mode in modes])
@@ -211,37 +212,17 @@ def weighted_length(value: FloatArray, sd: FloatArray) -> float:
     return float(np.sqrt(weight @ value**2 / weight.mean()))
 
 
-def _refuse_nonsense(tests: Sequence[ModalTest], hanger: Hanger) -> None:
-    for test in tests:
-        for mode in test.modes:
-            _refuse_mode(test, mode, hanger)
-        named = [(mode.plane, mode.order) for mode in test.modes]
-        twice = next((each for each in named if named.count(each) > 1), None)
-        if twice is not None:
+def _refuse_nonsense(tests: Sequence[ModalTest]) -> None:
+    for of, mode in ((test, mode) for test in tests for mode in test.modes):
+        where = f"test {of.id}, {mode.plane} mode {mode.order}"
+        if not (np.isfinite(mode.frequency_hz) and mode.frequency_hz > 0):
             raise BadInput(
-                f"test {test.id} holds the {twice[0]} mode {twice[1]} twice.",
-                remedy="Give each mode of a plane its own order, counted from 1.",
+                f"{where}: {mode.frequency_hz} Hz is no frequency.", remedy="Leave it out."
             )
-    if not any(test.modes for test in tests):
-        raise BadInput(
-            "no test holds a frequency: there is nothing to diagnose.",
-            remedy="Identify modes, or give tests that have some.",
-        )
-
-
-def _refuse_mode(test: ModalTest, mode: Mode, hanger: Hanger) -> None:
-    where = f"test {test.id}, {mode.plane} mode {mode.order}"
-    if not (np.isfinite(mode.frequency_hz) and mode.frequency_hz > 0):
-        raise BadInput(f"{where}: {mode.frequency_hz} Hz is no frequency.", remedy="Leave it out.")
-    if mode.order < 1:
-        raise BadInput(f"{where}: orders count from 1.", remedy="Number the modes of each plane.")
-    outside = [p.x_m for p in mode.shape if not 0 <= p.x_m <= hanger.length_m]
-    if outside:
-        raise BadInput(
-            f"{where}: a sensor at {outside[0]:g} m is not on this hanger, which is "
-            f"{hanger.length_m:g} m long.",
-            remedy="Give places in metres from the deck end.",
-        )
+        if mode.order < 1:
+            raise BadInput(
+                f"{where}: orders count from 1.", remedy="Number the modes of each plane."
+            )
 
 
 def _merged(places_m: Sequence[float]) -> tuple[float, ...]:
@@ -285,3 +266,63 @@ def told_apart(sd: FloatArray, size: FloatArray, least: float) -> tuple[FloatArr
     if turn * np.max(size**2) <= max(own, least**2):
         return sd, 0.0
     return np.full_like(sd, np.sqrt(max(own, least**2))), float(np.sqrt(turn))
+
+
+# Six digits are more than anybody rounds to; a number of full precision is a multiple, to so much
+# of it, by chance of one in 500.
+_FINEST_HZ, _TO = 1e-6, 1e-3
+_COARSEST_HZ = 1.0  # judgement: what is coarser was not rounded; a step is a part of this
+_FEWEST_TO_ROUND = 3  # distinct ones: chance makes the step of three twice as coarse in 1 of 8
+
+
+def step_hz(test: ModalTest) -> float:
+    """What all frequencies of a test without a standard deviation are multiples of; 0 for none."""
+    finest = {mode.frequency_hz / _FINEST_HZ for mode in test.modes if _is_bare(mode)}
+    if len(finest) < _FEWEST_TO_ROUND or any(abs(each - round(each)) > _TO for each in finest):
+        return 0.0
+    return _FINEST_HZ * math.gcd(*map(round, finest), round(_COARSEST_HZ / _FINEST_HZ))
+
+
+def rounding_sds(tests: Sequence[ModalTest]) -> FloatArray:
+    """Of the logarithm of each frequency (F,) in the tests' order: step / sqrt(12) over it."""
+    return np.array(
+        [
+            step / math.sqrt(12) / mode.frequency_hz if _is_bare(mode) else 0.0
+            for test in tests
+            for step in [step_hz(test)]
+            for mode in test.modes
+        ]
+    )
+
+
+def rounding_covariance(observations: Observations) -> FloatArray:
+    """Covariance (F, F) that rounding adds.
+
+    The mean of k equal numbers errs as one of them does, and what was equal before rounding to
+    within a step apart may differ by as much as two that were rounded independently.
+    """
+    count = observations.design.frequencies
+    if observations.rounding is None:
+        return np.zeros((count, count))
+    value, sd = observations.value[:count], observations.rounding
+    equal = np.equal.outer(value, value)
+    shared = equal * (1 - 1 / equal.sum(axis=1))
+    return np.asarray(np.outer(sd, sd) * (np.eye(count) + shared))
+
+
+def told_of_rounding(tests: Sequence[ModalTest]) -> str:
+    """The coarsest rounding, in words."""
+    steps = [(step_hz(test), test) for test in tests]
+    step, test = max(steps, key=lambda pair: pair[0])
+    if not step:
+        return ""
+    lowest = min(mode.frequency_hz for mode in test.modes if _is_bare(mode))
+    return (
+        f"The frequencies of test {test.id} are rounded to {step:g} Hz: errors of "
+        f"{100 * step / math.sqrt(12) / lowest:.2g} % of the lowest are expected from that alone. "
+        "Give them with more digits."
+    )
+
+
+def _is_bare(mode: Mode) -> bool:
+    return not mode.frequency_sd_hz > 0

@@ -1,6 +1,7 @@
-"""From several starts to the most probable points, all in one batch.
+"""The posterior density of a hypothesis and, from several starts, its most probable points.
 
-Damped Gauss-Newton steps (Levenberg 1944, Marquardt 1963). The unknown size of the errors is
+All are climbed to in one batch, by slopes from differences and by
+damped Gauss-Newton steps (Levenberg 1944, Marquardt 1963). The unknown size of the errors is
 averaged over its probabilities at each point, which is expectation maximisation (Dempster et al.
 1977): the gradient is exact, and no step is too bold while the misfit is large.
 """
@@ -12,10 +13,73 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from shm.gap.contract import Hypothesis
 from shm.gap.coordinates import Branch
-from shm.gap.objective import Landscape, Views
+from shm.gap.likelihood import Likelihood
+from shm.gap.problem import GapProblem
 from shm.inference.coordinates import log_normal
+from shm.inference.mixture import Rows
 from shm.values import BoolArray, FloatArray
+
+_DIFFERENCE = 1e-4  # technical: forward differences err by half of it times the curvature
+_STEEPEST = 1e3
+"""Slopes beyond this are cliffs: where a support's own mode crosses one of the bar, the names of
+the two change places. Nothing can be followed over them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Views(Rows):
+    """The data seen from `m` points w (m, d): `residual` (m, data), measured less predicted.
+
+    `slopes` (m, data, d) are the prediction's derivatives by w; `log_posterior` (m,) is the log of
+    likelihood times prior density by w.
+    """
+
+    w: FloatArray
+    residual: FloatArray
+    slopes: FloatArray
+    log_posterior: FloatArray
+
+
+class Landscape:
+    """The posterior of a hypothesis, by the problem's own likelihood or by another one."""
+
+    def __init__(
+        self, problem: GapProblem, hypothesis: Hypothesis, likelihood: Likelihood | None = None
+    ):
+        self.problem = problem
+        self.hypothesis = hypothesis
+        self.likelihood = likelihood or problem.likelihood(hypothesis)
+        self.coordinates = problem.coordinates(hypothesis)
+        self._value = problem.observations.value
+
+    def residual(self, z: FloatArray) -> FloatArray:
+        """Measured less predicted (n, data) at z (n, d)."""
+        with np.errstate(all="ignore"):
+            return np.asarray(self._value - self.problem.predict(self.hypothesis, z))
+
+    def log_posterior(self, z: FloatArray) -> FloatArray:
+        """Log of likelihood times prior density by z (n, d), (n,)."""
+        return self.likelihood.log(self.residual(z)) + log_normal(z)
+
+    def views(self, w: FloatArray, signs: FloatArray, known: FloatArray | None = None) -> Views:
+        """From points w (m, d), each on the branch of `signs` (m, d), all in one batch.
+
+        `known` (m, data, d) are slopes of near points, of which those by the nearly linear
+        parameters are taken over.
+        """
+        m, d = w.shape
+        moved = np.arange(d) if known is None else self.coordinates.other
+        shifted = w + _DIFFERENCE * np.concatenate([np.zeros((1, 1, d)), np.eye(d)[moved, None]])
+        branch = Branch(np.tile(signs, (len(shifted), 1)))
+        residual = self.residual(branch.z(shifted.reshape(-1, d))).reshape(len(shifted), m, -1)
+        slopes = np.empty((m, residual.shape[2], d)) if known is None else known.copy()
+        slopes[:, :, moved] = np.moveaxis(residual[0] - residual[1:], 0, -1) / _DIFFERENCE
+        likelihood = self.likelihood.log(residual[0])
+        likelihood = np.where(np.isfinite(slopes).all(axis=(1, 2)), likelihood, -np.inf)
+        slopes[np.abs(slopes) > _STEEPEST] = 0.0
+        return Views(w, residual[0], slopes, likelihood + log_normal(w))
+
 
 # Judgement, as Marquardt's method mostly goes to the same optima: steps of at most one standard
 # deviation of the prior, whose damping falls fast and rises faster; after so many of them a point
@@ -62,7 +126,7 @@ class Optimum:
 
 
 @dataclass(frozen=True, eq=False)
-class _Downhill:
+class _Downhill(Rows):
     """Gradients (m, d) of the log posterior and its curvatures (m, d, d).
 
     `profile` (m,) is the log posterior with the linear parameters where they would go best.
@@ -71,17 +135,6 @@ class _Downhill:
     gradient: FloatArray
     curvature: FloatArray
     profile: FloatArray
-
-    def where(self, chosen: BoolArray, other: _Downhill) -> _Downhill:
-        """These where `chosen` (m,), elsewhere `other`."""
-        return _Downhill(
-            np.where(chosen[:, None], self.gradient, other.gradient),
-            np.where(chosen[:, None, None], self.curvature, other.curvature),
-            np.where(chosen, self.profile, other.profile),
-        )
-
-    def take(self, rows: BoolArray) -> _Downhill:
-        return _Downhill(self.gradient[rows], self.curvature[rows], self.profile[rows])
 
     def step(self, damping: FloatArray) -> FloatArray:
         """Damped steps (m, d)."""
@@ -99,18 +152,13 @@ class _Downhill:
 
 
 @dataclass(frozen=True, eq=False)
-class _Walkers:
+class _Walkers(Rows):
     """Points on their way, each on a branch of `signs` (m, d), with their damping (m,)."""
 
     views: Views
     downhill: _Downhill
     signs: FloatArray
     damping: FloatArray
-
-    def take(self, rows: BoolArray) -> _Walkers:
-        return _Walkers(
-            self.views.take(rows), self.downhill.take(rows), self.signs[rows], self.damping[rows]
-        )
 
 
 def optima(landscape: Landscape, starts: FloatArray) -> list[Optimum]:
@@ -276,10 +324,8 @@ def _positive(curvature: FloatArray, safe: FloatArray) -> FloatArray:
 def _distinct(found: list[Optimum]) -> list[Optimum]:
     kept: list[Optimum] = []
     for each in sorted(found, key=lambda optimum: -optimum.log_evidence):
-        if not any(_alike(each, other) for other in kept):
+        if not any(
+            _near(each.w, o.w, o.curvature, each.branch.signs, o.branch.signs) for o in kept
+        ):
             kept.append(each)
     return kept
-
-
-def _alike(one: Optimum, other: Optimum) -> bool:
-    return _near(one.w, other.w, other.curvature, one.branch.signs, other.branch.signs)

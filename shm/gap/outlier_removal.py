@@ -1,31 +1,32 @@
 """The attribution of a gap with gross errors set aside, and what is told of these.
 
-Modes whose orders look wrong: a slip of whoever numbered them, which no effect imitates.
+So are modes whose orders look wrong: a slip of whoever numbered them, which no effect imitates.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
-from shm.gap.alone import acts_alone, with_what_acts
 from shm.gap.attribution import Attribution, answered, attributed, more_thorough
-from shm.gap.contract import Fit, GapOptions, Progress, silent
+from shm.gap.contract import Fit, GapOptions
 from shm.gap.fit import baseline_fit, with_remainder
 from shm.gap.outliers import (
     SURE,
     GrossError,
     LeftOut,
+    acts_alone,
     at,
     gross_errors,
     log_gross,
     log_ordinary,
-    without_shape,
 )
 from shm.gap.problem import GapProblem
+from shm.inference.options import Progress, silent
 from shm.values import NAN, PLANES, IntArray, Outlier, Residual, effect_label
 
 _ROUNDS = 2  # judgement: one error may hide another
@@ -54,7 +55,12 @@ class Cleared:
         """A frequency seen from the other data that are kept, to which `fit` was fitted."""
         rows = np.union1d(self.rows, [error.row])
         index = int(np.searchsorted(rows, error.row))
-        return at(without_shape(self.whole.part(rows), index), fit, index)
+        return at(self.whole.part(rows).without_shape(index), fit, index)
+
+    def expected(self, error: GrossError, fit: Fit) -> tuple[float, float]:
+        """By how much its logarithm lies above what is expected so, and the standard deviation."""
+        deviation, sd = self.seen(error, fit).expected
+        return float(deviation[0]), float(sd[0])
 
 
 def cleared(
@@ -86,12 +92,12 @@ def cleared(
     done = replace(found, attribution=last, otherwise=otherwise, misnumbered=wrong)
     # No gap stands only as far as what was set aside was a slip and no part that acts alone.
     slips = np.prod([1 - _alone(done, each, last.baseline) for each in done.aside])
-    return replace(done, attribution=with_what_acts(last, 1 - float(slips)))
+    return replace(done, attribution=last.with_unknown(1 - float(slips)))
 
 
 def _alone(found: Cleared, error: GrossError, fit: Fit) -> float:
-    deviation, _ = found.seen(error, fit).expected
-    return acts_alone(found.whole.design, found.problem.design, error.row, float(deviation[0]))
+    deviation, _ = found.expected(error, fit)
+    return acts_alone(found.whole.design, found.problem.design, error.row, deviation)
 
 
 def _led_before(first: Attribution, last: Attribution) -> str:
@@ -119,8 +125,7 @@ def outliers(found: Cleared, errors: Sequence[GrossError], fit: Fit) -> tuple[Ou
 
 def _outlier(found: Cleared, error: GrossError, fit: Fit) -> Outlier:
     design, observations = found.whole.design, found.whole.observations
-    seen = found.seen(error, fit)
-    deviation, sd = (float(each[0]) for each in seen.expected)
+    deviation, sd = found.expected(error, fit)
     measured_hz = float(np.exp(observations.value[error.row]))
     expected_hz = measured_hz * float(np.exp(-deviation))
     own = float(np.nan_to_num(observations.sd[error.row]))
@@ -150,24 +155,11 @@ def with_outliers(
 
 def _residual(found: Cleared, error: GrossError, before: Fit, after: Fit | None) -> Residual:
     (told,) = outliers(found, [error], before)
-    seen = found.seen(error, before)
-    deviation, sd = (float(each[0]) for each in seen.expected)
-    return Residual(
-        told.plane,
-        told.order,
-        told.test,
-        told.measured_hz,
-        told.expected_hz,
-        100 * float(np.expm1(deviation)),
-        deviation / sd,
-        0.0,
-        after_percent=NAN if after is None else _percent(found, error, after),
-    )
-
-
-def _percent(found: Cleared, error: GrossError, fit: Fit) -> float:
-    deviation, _ = found.seen(error, fit).expected
-    return 100 * float(np.expm1(deviation[0]))
+    deviation, sd = found.expected(error, before)
+    left = NAN if after is None else found.expected(error, after)[0]
+    percent, after_percent = (100 * float(np.expm1(each)) for each in (deviation, left))
+    own = told.plane, told.order, told.test, told.measured_hz, told.expected_hz
+    return Residual(*own, percent, deviation / sd, 0.0, after_percent)
 
 
 FAR_BETTER = 10.0
@@ -286,3 +278,51 @@ def _tension(problem: GapProblem, rng: np.random.Generator) -> str:
     fit = baseline_fit(problem, rng)
     tension_n = float(problem.tension_n(fit.hypothesis, fit.z[None])[0])
     return f", at {tension_n / 1e3:.0f} kN"
+
+
+def set_aside(outliers: Sequence[Outlier], otherwise: str = "") -> tuple[str, ...]:
+    """Of frequencies that were done without; `otherwise` would cause them, were they right."""
+    told = tuple(
+        f"{_measured(each)}, is set aside as a gross error (probability {_probability(each)}): "
+        f"{_expected(each)}. A wrong mode, a tone or a slip; look at the recording again."
+        f"{_acts_alone(each)}"
+        for each in outliers
+    )
+    if not told or not otherwise:
+        return told
+    right = "it prove right" if len(told) == 1 else "they prove right"
+    return (*told, f"Should {right}, {otherwise} is the likeliest cause: repeat the test.")
+
+
+def doubtful(outliers: Sequence[Outlier]) -> tuple[str, ...]:
+    """Of frequencies that may be gross errors, but were kept."""
+    return tuple(
+        f"{_measured(each)}, may be a gross error (probability {_probability(each)}): "
+        f"{_expected(each)}. It is kept, and the answer may lean on it; look at the recording "
+        f"again."
+        for each in outliers
+    )
+
+
+def _acts_alone(outlier: Outlier) -> str:
+    if not outlier.acts_alone:
+        return ""
+    return (
+        f" Or a part that only this mode's swing reaches, such as a guide with play or a crack "
+        f"that opens ({outlier.acts_alone:.2f}): test again with softer and with harder hits."
+    )
+
+
+def _measured(outlier: Outlier) -> str:
+    mode = f"{outlier.plane.capitalize()} {outlier.order} of test {outlier.test}"
+    return f"{mode}, {outlier.measured_hz:g} Hz"
+
+
+def _expected(outlier: Outlier) -> str:
+    sd_hz = outlier.expected_sd_hz
+    digits = max(0, 1 - math.floor(math.log10(sd_hz))) if sd_hz > 0 else 3
+    return f"the other data expect {outlier.expected_hz:.{digits}f} +- {sd_hz:.{digits}f} Hz"
+
+
+def _probability(outlier: Outlier) -> str:
+    return f"{outlier.probability:.2f}" if outlier.probability < 0.995 else "over 0.99"

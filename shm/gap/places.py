@@ -1,5 +1,8 @@
-"""Local causes of a gap: one effect of the catalogue at places along the hanger, its likeliest size
-at each, and what it does.
+"""Where along the hanger a local cause would have to sit, from the pattern over modes and shapes.
+
+One local change is tried at many places; its size and the baseline's parameters follow by least
+squares, to first order and then once more at the size found (Cawley and Adams 1979 compare patterns
+in the same way).
 """
 
 from __future__ import annotations
@@ -7,12 +10,142 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
-from shm.gap.contract import Fit, Hypothesis
-from shm.gap.misfit import Change, Misfit
+from shm.gap.contract import Design, Fit, Hypothesis
 from shm.gap.problem import GapProblem
+from shm.gap.residuals import identification_sd
+from shm.inference.mixture import Rows
 from shm.models.effects import EFFECTS, Effect, Parameter, parameters_of
-from shm.values import BoolArray, FloatArray
+from shm.values import FloatArray, GapPlace, IntArray
+
+# Judgement: where no standard deviation is stated, the one that is estimated may be four times too
+# large (1 / 4.5^2 = 0.05), and data may rightly fit so well.
+_LEAST_SCALE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Misfit:
+    """The baseline's misfit, with its free parameters and errors together as one covariance.
+
+    Data that the baseline and a local cause cannot but predict alike, as those of a mode in tests
+    at several temperatures, are taken together: `rows` (distinct,) are one of each kind, `value`
+    and `sd` their weighted means, and the chi-square of their `scatter` about these is left over in
+    any case. `deviation` (distinct,) is that of the values from the middle of the prior, to first
+    order; `slopes` (distinct, p) are those of the baseline's d parameters and then, as further
+    parameters z, of the errors that repeat; `weighted` is the same over `sd`, `inner` (p, p) the
+    covariance of all p. `own` is d. `data` counts all data; `least_scale` is the
+    least chi-square of a datum that is taken for noise.
+    """
+
+    rows: IntArray
+    value: FloatArray
+    sd: FloatArray
+    deviation: FloatArray
+    slopes: FloatArray
+    weighted: FloatArray
+    inner: FloatArray
+    own: int
+    scatter: float
+    data: int
+    least_scale: float
+
+    @classmethod
+    def of(cls, problem: GapProblem, before: Fit) -> Misfit:
+        observations = problem.observations
+        rows, kind = _distinct(observations.design, before.predicted)
+        precision = identification_sd(problem, before) ** -2
+        sd = np.asarray(np.bincount(kind, precision) ** -0.5)
+        value = np.bincount(kind, precision * observations.value) * sd**2
+        slopes = np.column_stack([before.slopes, problem.repeated.loads])[rows]
+        weighted = slopes / sd[:, None]
+        return cls(
+            rows=rows,
+            value=value,
+            sd=sd,
+            deviation=value - before.predicted[rows] + before.slopes[rows] @ before.z,
+            slopes=slopes,
+            weighted=weighted,
+            inner=np.asarray(np.linalg.inv(np.eye(slopes.shape[1]) + weighted.T @ weighted)),
+            own=len(before.z),
+            scatter=float(precision @ (observations.value - value[kind]) ** 2),
+            data=len(kind),
+            least_scale=1.0 if np.isfinite(observations.sd).any() else _LEAST_SCALE,
+        )
+
+    def products(self, one: FloatArray, other: FloatArray) -> FloatArray:
+        """Products (n,) of rows (n, distinct) by the inverse covariance (Woodbury's identity)."""
+        one, other = one / self.sd, other / self.sd
+        left, right = one @ self.weighted, other @ self.weighted
+        products = np.einsum("ij,ij->i", one, other)
+        return np.asarray(products - np.einsum("ij,ij->i", left @ self.inner, right))
+
+    def parameters(self, deviation: FloatArray) -> FloatArray:
+        """The likeliest parameters z (n, p) for deviations (n, distinct)."""
+        return np.asarray((deviation / self.sd) @ self.weighted @ self.inner)
+
+    @property
+    def total(self) -> float:
+        """The chi-square of the baseline."""
+        deviation = self.deviation[None]
+        return float(self.products(deviation, deviation)[0]) + self.scatter
+
+    def repeated(self, z: FloatArray) -> FloatArray:
+        """What errors that repeat add to predictions (n, distinct) at parameters z (n, p)."""
+        return np.asarray(z[:, self.own :] @ self.slopes[:, self.own :].T)
+
+    def at(self, predicted: FloatArray, z: FloatArray) -> FloatArray:
+        """The chi-square (n,) of predictions (n, distinct) at parameters z (n, p)."""
+        error = (self.value - predicted) / self.sd
+        return np.asarray((error**2).sum(axis=1) + (z**2).sum(axis=1)) + self.scatter
+
+    def log_likelihood(self, chi_square: FloatArray) -> FloatArray:
+        """Of causes that leave `chi_square` (n,), relative to none at all.
+
+        What the best of them leaves counts as noise.
+        """
+        rest = chi_square.min() / max(self.data - 2, 1)
+        return np.asarray((self.total - chi_square) / (2 * max(rest, self.least_scale)))
+
+
+@dataclass(frozen=True, eq=False)
+class Change(Rows):
+    """What a cause does at n places: `per_size` (n, distinct).
+
+    `deviation` (n, distinct) is that of the data, as in Misfit, from what is expected without it.
+    """
+
+    deviation: FloatArray
+    per_size: FloatArray
+    largest: float
+
+    def sizes(self, misfit: Misfit) -> FloatArray:
+        """The likeliest sizes (n,), from 0 to the largest, the baseline's parameters free."""
+        square = misfit.products(self.per_size, self.per_size)
+        along = misfit.products(self.per_size, self.deviation)
+        with np.errstate(over="ignore"):  # a cause that does nothing has no size
+            sizes = along / np.maximum(square, np.finfo(float).tiny)
+        return np.clip(sizes, 0.0, self.largest)
+
+    def left(self, misfit: Misfit) -> FloatArray:
+        """The chi-square (n,) that the likeliest sizes leave."""
+        rest = self.deviation - self.sizes(misfit)[:, None] * self.per_size
+        return misfit.products(rest, rest) + misfit.scatter
+
+    def between(self, x_m: FloatArray, fine_m: FloatArray) -> Change:
+        """The same at places between those tried, `x_m` (n,)."""
+        deviation, per_size = scipy.interpolate.CubicSpline(
+            x_m, [self.deviation, self.per_size], axis=1
+        )(fine_m)
+        return Change(deviation, per_size, self.largest)
+
+
+def _distinct(design: Design, predicted: FloatArray) -> tuple[IntArray, IntArray]:
+    """One row of each kind of datum, and of which kind each datum (data,) is."""
+    keys = np.vstack([design.kinds, predicted.round(10)])
+    _, rows, kind = np.unique(keys, axis=1, return_index=True, return_inverse=True)
+    return rows, kind.ravel()
+
 
 _SMALL_SHARE = 0.25  # of a size's range, in which effects are linear still and well above rounding
 _EXTENT = 0.05  # judgement: of the length, a corroded stretch: shorter than half a wave of any mode
@@ -35,9 +168,6 @@ class LocalCause:
     places_m: FloatArray
     small: float
     largest: float
-
-    def at(self, places_m: FloatArray) -> LocalCause:
-        return replace(self, places_m=places_m)
 
     def predicted(self, problem: GapProblem, baseline: FloatArray, size: FloatArray) -> FloatArray:
         """The data (n, data) with sizes (n,), and the baseline's parameters at z (n, d)."""
@@ -92,7 +222,7 @@ def _size(problem: GapProblem, hypothesis: Hypothesis) -> Parameter:
 
 
 @dataclass(frozen=True, eq=False)
-class _State:
+class _State(Rows):
     """Sizes (n,) of a cause and the parameters z (n, p) of the misfit with them, what they leave
     (n,), and the change about them."""
 
@@ -100,20 +230,6 @@ class _State:
     z: FloatArray
     left: FloatArray
     change: Change
-
-    def better_of(self, other: _State) -> tuple[_State, BoolArray]:
-        """Place by place the state that leaves less, and where it is `other`."""
-        better = other.left < self.left
-        rows = better[:, None]
-        change = Change(
-            np.where(rows, other.change.deviation, self.change.deviation),
-            np.where(rows, other.change.per_size, self.change.per_size),
-            self.change.largest,
-        )
-        size, left = (
-            np.where(better, getattr(other, name), getattr(self, name)) for name in ("size", "left")
-        )
-        return _State(size, np.where(rows, other.z, self.z), left, change), better
 
 
 def tried(
@@ -136,7 +252,8 @@ def tried(
         except np.linalg.LinAlgError:
             # So stiff that rounding leaves the model no modes: no step down.
             moved = replace(state, left=np.full(len(size), np.inf))
-        state, better = state.better_of(moved)
+        better = moved.left < state.left
+        state = moved.where(better, state)
         length = np.where(better, 1.0, _SHORTER * length)
     return state.change
 
@@ -154,11 +271,7 @@ def _without(problem: GapProblem, before: Fit, misfit: Misfit, cause: LocalCause
 
 
 def _at(
-    problem: GapProblem,
-    misfit: Misfit,
-    cause: LocalCause,
-    z: FloatArray,
-    size: FloatArray,
+    problem: GapProblem, misfit: Misfit, cause: LocalCause, z: FloatArray, size: FloatArray
 ) -> _State:
     here, further = (
         cause.predicted(problem, z[:, : misfit.own], each)[:, misfit.rows] + misfit.repeated(z)
@@ -168,3 +281,83 @@ def _at(
     expected = z @ misfit.slopes.T + size[:, None] * per_size
     change = Change(misfit.value - here + expected, per_size, cause.largest)
     return _State(size, z, misfit.at(here, z), change)
+
+
+# By five points a half wave a spline follows its square, as local causes act, to 2 % (5/384 h^4 / 2
+# with h = 2 pi / 5); 31 lie nearer together than a corroded stretch is long (`_EXTENT`).
+_PLACES_A_HALF_WAVE, _FEWEST_PLACES = 5, 31
+# Judgement: to first order and once more at the size found; an end goes through decades.
+_PASSES, _PASSES_OF_AN_END = 2, 16
+# Technical: as many stretches as a page shows, eight points in each.
+_BINS = 180
+_FINE = 8 * _BINS
+_LEAST_GAIN = 6.0  # of chi-square, for a size and a place: 95 % of chance alone
+_FEWEST = 4  # tension and stiffness take two frequencies, a size and its place two more
+_OUTSIDE = 0.05  # on either side of a 90 % interval
+
+
+def places(problem: GapProblem, before: Fit) -> tuple[GapPlace, ...]:
+    """For each kind of local cause where it would have to sit; that which explains most first.
+
+    Kinds are `point mass`, `lateral spring`, `section loss` and `flexible end`, whose profile
+    holds the two ends with their probabilities. Kinds that explain no more than noise would are
+    absent, as all are where there are fewer than `_FEWEST` frequencies. A profile is the likelihood
+    of the likeliest size at each place, scaled to a density (means over 180 stretches).
+    What a kind leaves unexplained counts as noise, so that a kind that does not fit does not claim
+    to know its place. Where two places explain the data alike, as x and L - x do of a hanger with
+    like ends whose shapes were not measured, the profile has both and the interval spans both.
+    """
+    if problem.design.frequencies < _FEWEST:
+        return ()
+    misfit = Misfit.of(problem, before)
+    found = [_place(problem, before, misfit, cause) for cause in local_causes(problem)]
+    found.append(_end(problem, before, misfit))
+    return tuple(sorted((each for each in found if each), key=lambda place: -place.share))
+
+
+def _place(problem: GapProblem, before: Fit, misfit: Misfit, cause: LocalCause) -> GapPlace | None:
+    length_m = problem.hanger.length_m
+    half_waves = int(problem.observations.design.frequency_order.max())
+    x_m = np.linspace(0, length_m, max(_PLACES_A_HALF_WAVE * half_waves + 1, _FEWEST_PLACES))
+    fine_m = (np.arange(_FINE) + 0.5) * length_m / _FINE
+    change = tried(problem, before, misfit, replace(cause, places_m=x_m), _PASSES).between(
+        x_m, fine_m
+    )
+    found = _judged(misfit, change.left(misfit))
+    if found is None:
+        return None
+    probability, share = found
+    low_m, high_m = np.interp([_OUTSIDE, 1 - _OUTSIDE], probability.cumsum(), fine_m)
+    density = probability.reshape(_BINS, -1).sum(axis=1) * _BINS / length_m
+    middles_m = fine_m.reshape(_BINS, -1).mean(axis=1)
+    profile = tuple(zip(middles_m.tolist(), density.tolist(), strict=True))
+    likeliest_m = float(fine_m[probability.argmax()])
+    return GapPlace(cause.kind, likeliest_m, float(low_m), float(high_m), share, profile)
+
+
+def _end(problem: GapProblem, before: Fit, misfit: Misfit) -> GapPlace | None:
+    """The end that would have to turn."""
+    ends = flexible_ends(problem)
+    if not ends:
+        return None
+    changes = [tried(problem, before, misfit, end, _PASSES_OF_AN_END) for end in ends]
+    found = _judged(misfit, np.concatenate([change.left(misfit) for change in changes]))
+    if found is None:
+        return None
+    probability, share = found
+    x_m = np.concatenate([end.places_m for end in ends])
+    possible = x_m[probability >= 2 * _OUTSIDE]
+    profile = tuple(zip(x_m.tolist(), probability.tolist(), strict=True))
+    likeliest_m = float(x_m[probability.argmax()])
+    low_m, high_m = float(possible.min()), float(possible.max())
+    return GapPlace(ends[0].kind, likeliest_m, low_m, high_m, share, profile)
+
+
+def _judged(misfit: Misfit, left: FloatArray) -> tuple[FloatArray, float] | None:
+    """Probabilities (n,) of places that leave a chi-square `left` (n,), and the share that the
+    best of them explains; None where noise alone would explain as much."""
+    log_likelihood = misfit.log_likelihood(left)
+    if 2 * log_likelihood.max() < _LEAST_GAIN:
+        return None
+    probability = np.exp(log_likelihood - log_likelihood.max())
+    return probability / probability.sum(), 1 - float(left.min()) / misfit.total

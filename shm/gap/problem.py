@@ -1,12 +1,9 @@
-"""What a hypothesis predicts of a hanger's tests.
-
-What the error of a tension that was read leaves in the frequencies of its test.
-"""
+"""What a hypothesis predicts of a hanger's tests, and what errors that repeat do to these."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -14,9 +11,8 @@ import numpy as np
 
 from shm.gap.contract import Design, Fit, Hypothesis, Observations
 from shm.gap.coordinates import DEVIATIONS, Coordinates, Pair, Straight, cut
-from shm.gap.discrepancy import flexible_nodes
 from shm.gap.likelihood import Likelihood
-from shm.gap.noise import nodes
+from shm.gap.noise import flexible_nodes, nodes
 from shm.gap.repeated_errors import (
     STRETCHES,
     Repeated,
@@ -35,8 +31,7 @@ Effects = tuple[tuple[str, Variant], ...]
 
 # Technical: an eighth of the prior's standard deviation apart, over 93 % of the prior.
 _TENSIONS = tuple(float(each) for each in np.linspace(-2.5, 1.5, 33))
-
-
+_STEP_SD = 0.01  # technical: of a reading's standard deviation; frequencies are linear over it
 _AT_REST = Conditions(amplitude=0.0)
 
 
@@ -147,8 +142,22 @@ class GapProblem:
         return Repeated(self.section_of(self.design), self.readings_of(self.design), shapes, errors)
 
     def readings_of(self, design: Design) -> FloatArray:
-        """What errors of tensions read do to the frequencies of a design: loads (F, tests)."""
-        return reading_loads(design, lambda of: self._predicted_near(of)[: of.frequencies])
+        """What one standard deviation of each tension read does to the frequencies of a design:
+        loads (F, tests with a reading).
+
+        All modes of a test move together, those of other tests do not.
+        """
+        names = np.array([each.test for each in design.conditions])
+        read = list(dict.fromkeys(c.test for c in design.conditions if c.tension_shift_sd_n > 0))
+        if not read:
+            return np.zeros((design.frequencies, 0))
+        moved = tuple(
+            replace(each, tension_shift_n=each.tension_shift_n + _STEP_SD * each.tension_shift_sd_n)
+            for each in design.conditions
+        )
+        there = self._predicted_near(replace(design, conditions=moved))
+        change = (there - self._predicted_near(design))[: design.frequencies] / _STEP_SD
+        return np.where(names[design.frequency_test, None] == read, change[:, None], 0.0)
 
     def section_of(self, design: Design) -> FloatArray:
         """What the section along the bar, the sensors' mass and the supports' give do to the
@@ -200,10 +209,21 @@ class GapProblem:
 
         `rows` are theirs, as indices or as a choice (F,). Priors are those of the whole.
         """
-        part = GapProblem(self.hanger, self.baseline, _part(self.observations, rows))
-        part.smallest = self.smallest
-        part._composed = self._composed
-        return part
+        kept = np.arange(self.design.frequencies)[rows]
+        shapes = np.flatnonzero(np.isin(self.design.shape_mode, kept))
+        return self._with(self.observations.part(kept, shapes))
+
+    def without_shape(self, row: int) -> GapProblem:
+        """The same problem without the shape of the mode `row`; itself where it has none."""
+        kept = np.flatnonzero(self.design.shape_mode != row)
+        if len(kept) == len(self.design.shape_mode):
+            return self
+        return self._with(self.observations.part(np.arange(self.design.frequencies), kept))
+
+    def _with(self, part: Observations) -> GapProblem:
+        problem = GapProblem(self.hanger, self.baseline, part)
+        problem.smallest, problem._composed = self.smallest, self._composed
+        return problem
 
     @property
     def design(self) -> Design:
@@ -248,47 +268,3 @@ class GapProblem:
         answers = composed.modes_of_tests(theta, conditions, orders, shapes)
         self.evaluations += len(theta) * len({id(modes) for modes in answers})
         return zip(tests, answers, strict=True)
-
-
-def _part(observations: Observations, rows: BoolArray | IntArray) -> Observations:
-    """The observations of some frequencies and of their shapes."""
-    design = observations.design
-    kept = np.arange(design.frequencies)[rows]
-    shapes = np.flatnonzero(np.isin(design.shape_mode, kept))
-    data = np.concatenate([kept, design.frequencies + shapes])
-    part = replace(
-        design,
-        frequency_test=design.frequency_test[kept],
-        frequency_plane=design.frequency_plane[kept],
-        frequency_order=design.frequency_order[kept],
-        shape_mode=np.searchsorted(kept, design.shape_mode[shapes]),
-        shape_place=design.shape_place[shapes],
-        shape_component=design.shape_component[shapes],
-    )
-    return observations.part(part, data)
-
-
-_STEP_SD = 0.01  # technical: of a reading's standard deviation; frequencies are linear over it
-
-Predict = Callable[[Design], FloatArray]
-"""The logarithms of the frequencies (F,) that the baseline predicts of a design."""
-
-
-def reading_loads(design: Design, predict: Predict) -> FloatArray:
-    """Loads (F, tests with a reading): what one standard deviation of each reading does.
-
-    All modes of a test move together, those of other tests do not.
-    """
-    names = np.array([each.test for each in design.conditions])
-    read = list(dict.fromkeys(c.test for c in design.conditions if c.tension_shift_sd_n > 0))
-    if not read:
-        return np.zeros((design.frequencies, 0))
-    moved = replace(
-        design,
-        conditions=tuple(
-            replace(each, tension_shift_n=each.tension_shift_n + _STEP_SD * each.tension_shift_sd_n)
-            for each in design.conditions
-        ),
-    )
-    change = (predict(moved) - predict(design)) / _STEP_SD
-    return np.where(names[design.frequency_test, None] == read, change[:, None], 0.0)

@@ -11,8 +11,15 @@ import scipy
 from shm.gap.contract import Peak
 from shm.gap.coordinates import Branch, Straight
 from shm.inference.coordinates import log_normal
-from shm.inference.mixture import Normal, TMixture
-from shm.inference.tmcmc import effective, normalised, systematic
+from shm.inference.mixture import (
+    Normal,
+    Rows,
+    TMixture,
+    effective,
+    normalised,
+    systematic,
+    tempered,
+)
 from shm.values import FloatArray, IntArray
 
 # Technical, all of them: importance weights correct whatever is drawn from, so they cost effective
@@ -33,7 +40,7 @@ what it borrows from the whole are much wider. The wide ones stay, for what is n
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class Points(Rows):
     """Points w (n, p), each on the branch of index `branch` (n,), straightened to y (n, p).
 
     `log_volume` (n,) is the log of |dy/dw|.
@@ -43,15 +50,6 @@ class Points:
     w: FloatArray
     y: FloatArray
     log_volume: FloatArray
-
-    def joined(self, other: Points) -> Points:
-        """Both sets of points."""
-        return Points(
-            np.append(self.branch, other.branch),
-            np.vstack([self.w, other.w]),
-            np.vstack([self.y, other.y]),
-            np.append(self.log_volume, other.log_volume),
-        )
 
 
 class Proposal:
@@ -127,12 +125,13 @@ class Proposal:
         self, points: Points, log_weight: FloatArray, rng: np.random.Generator
     ) -> Proposal:
         """Moved towards weighted points: where these are many, new parts on their clusters."""
-        tempered = _tempered(log_weight, _FEWEST_TO_FIT * self._dimension)
+        fewest = min(_FEWEST_TO_FIT * self._dimension, len(log_weight) / 2)
+        weights = tempered(log_weight, fewest)
         shares, mixtures = [], []
         for k, mixture in enumerate(self._core):
             rows = np.flatnonzero(points.branch == k)
             shares.append(float(np.exp(_total(log_weight[rows]) - _total(log_weight))))
-            mixtures.append(_refitted(mixture, points.y[rows], tempered[rows], rng))
+            mixtures.append(_refitted(mixture, points.y[rows], weights[rows], rng))
         return Proposal(np.array(shares), mixtures, self._dimension, self._straight, self._first)
 
 
@@ -193,13 +192,3 @@ def _moved(part: Normal, w: FloatArray, owned: FloatArray) -> Normal:
     own = (share[:, None] * (w - mean)).T @ (w - mean)
     centre = (1 - kept) * mean + kept * part.mean
     return Normal(centre, _INFLATION * ((1 - kept) * own + kept * part.covariance))
-
-
-def _tempered(log_weight: FloatArray, fewest: float) -> FloatArray:
-    """Weights to fit to, raised to a power below 1 where too few points carry them."""
-    power, weights = 1.0, normalised(log_weight)
-    fewest = min(fewest, len(weights) / 2)
-    while effective(weights) < fewest:
-        power *= 0.8
-        weights = normalised(power * log_weight)
-    return weights

@@ -12,18 +12,109 @@ is held out shrinks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise, product
 
 import numpy as np
 import scipy
 
 from shm.gap.attribution import Attribution
-from shm.gap.contract import Fit, Hypothesis
-from shm.gap.law_terms import Term, terms_of
+from shm.gap.contract import Design, Fit, Hypothesis
 from shm.gap.noise import same_mode
 from shm.gap.problem import GapProblem
-from shm.values import NAN, Compatibility, FloatArray, Remainder
+from shm.values import NAN, PLANES, Compatibility, FloatArray, Hanger, LawTerm, Plane, Remainder
+from shm.values.diagnosis import OverOrders, OverTests
+
+# Judgement: a tenth of the length is as near as six to eight orders tell places apart; beyond the
+# middle frequencies repeat themselves.
+_PLACES = (0.1, 0.2, 0.3, 0.4, 0.5)
+_ALIKE = 0.98  # of correlation: terms that no data here tell apart, of which the plainest stays
+_SAME_LEVEL = 1.2  # hits within 20 % of each other are of one level (`shm.models.effects`)
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """What a term does to each frequency, `values` (F,), for a coefficient of 1."""
+
+    over_orders: OverOrders
+    over_tests: OverTests
+    planes: tuple[Plane, ...]
+    values: FloatArray
+    x_m: float = NAN
+    threshold: float = NAN
+
+    def found(self, coefficient: float, sd: float, log_bayes_factor: float) -> LawTerm:
+        reach = 100 * float(max(np.ptp(self.values), np.abs(self.values).max()))
+        return LawTerm(
+            self.over_orders, self.over_tests, self.planes, reach * coefficient, reach * sd,
+            log_bayes_factor, self.x_m, self.threshold, coefficient,
+        )  # fmt: skip
+
+
+def terms_of(design: Design, hanger: Hanger) -> tuple[Term, ...]:
+    """Every term that these data could show, plain ones first, none twice under two names."""
+    kept: list[Term] = []
+    columns = np.zeros((design.frequencies, 0))
+    for term in _all(design, hanger):
+        size = float(np.linalg.norm(term.values))
+        if size == 0:
+            continue
+        unit = term.values / size
+        if not np.any(np.abs(columns.T @ unit) > _ALIKE):
+            kept.append(term)
+            columns = np.column_stack([columns, unit])
+    return tuple(kept)
+
+
+def _all(design: Design, hanger: Hanger) -> Iterator[Term]:
+    plane = design.frequency_plane
+    planes = [PLANES[k] for k in np.unique(plane)]
+    choices = [tuple(planes), *((each,) for each in planes)] if len(planes) > 1 else [tuple(planes)]
+    tests = list(_over_tests(design))
+    orders = list(_over_orders(design, hanger))
+    for (kind, threshold, grown), (shape, x_m, over), chosen in product(tests, orders, choices):
+        inside = np.isin(plane, [PLANES.index(each) for each in chosen])
+        yield Term(shape, kind, chosen, grown * over * inside, x_m, threshold)
+
+
+def _over_orders(design: Design, hanger: Hanger) -> Iterator[tuple[OverOrders, float, FloatArray]]:
+    order = design.frequency_order.astype(float)
+    for kind in ("even", "order", "order squared", "alternating", "lowest orders"):
+        yield kind, NAN, order_law(kind, order, NAN)
+    for share in _PLACES:
+        yield "local", share * hanger.length_m, order_law("local", order, share)
+
+
+def order_law(kind: OverOrders, order: FloatArray, place: float) -> FloatArray:
+    """What a term of coefficient 1 does to modes of `order`; `place` is a share of the length."""
+    laws: dict[OverOrders, FloatArray] = {
+        "even": np.ones_like(order),
+        "order": order,
+        "order squared": order**2,
+        "alternating": np.where(order % 2 == 1, 1.0, -1.0),
+        "lowest orders": order**-2,
+        "local": np.sin(order * np.pi * place) ** 2,
+    }
+    return laws[kind]
+
+
+def _over_tests(design: Design) -> Iterator[tuple[OverTests, float, FloatArray]]:
+    yield "all tests", NAN, np.ones(design.frequencies)
+    warmth = design.temperature_shift_k
+    if np.ptp(warmth) > 1.0:  # kelvin, as `shm.models.effects` asks of the catalogue's own
+        yield "temperature", NAN, warmth
+    level = design.amplitude
+    levels = np.unique(level)
+    if levels[-1] <= _SAME_LEVEL * levels[0]:
+        return
+    yield "level", NAN, level
+    yield "level squared", NAN, np.asarray(level**2)
+    for low, high in pairwise(levels):
+        if high > _SAME_LEVEL * low:
+            middle = float((low + high) / 2)
+            yield "above a level", middle, (level > middle).astype(float)
+
 
 DESCRIBED_FROM = 0.3
 """Judgement: something unknown that is less likely than this is not worth a law."""

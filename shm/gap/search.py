@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import scipy
 
-from shm.gap.contract import Fit, GapOptions, Hypothesis, Progress
-from shm.gap.detectability import Scan
-from shm.gap.fit import STARTS, baseline_fit, fitted, with_remainder
-from shm.gap.hypotheses import (
-    hopeful,
+from shm.gap.contract import Fit, GapOptions, Hypothesis
+from shm.gap.detectability import HOPELESS_SHARE, Scan, scan, superposed, truncate
+from shm.gap.fit import (
+    STARTS,
+    baseline_fit,
+    fitted,
     hypotheses,
     invisible,
-    paired,
-    screened,
     tried_by_screening,
     varied,
+    with_remainder,
 )
 from shm.gap.importance_sampling import sampled
 from shm.gap.law_error import by_its_laws, mixed, otherwise
 from shm.gap.model_probabilities import Family, ScoredHypothesis, families, log_prior
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import predictions, predictive_p_value
-from shm.inference.tmcmc import normalised
+from shm.inference.mixture import normalised
+from shm.inference.options import Progress
 from shm.values import FloatArray
 
 # Judgement, time against the chance to miss a cause. Sampled is what Laplace's method puts within
@@ -50,6 +52,10 @@ SUPPORTED = 2.0
 # Judgement: of a large effect the error of its law may cost a fifth of what it explains, hundreds
 # in a gap of many standard deviations; less reach would judge a cause by the letter of its law.
 LAWS_WITHIN, LAWS_WITHIN_SHARE = 500.0, 0.2
+# Judgement: what a scan puts 150 times (a coarse one 1100 times) behind is not fitted. A smaller
+# reach loses causes, a larger one costs a fit each.
+HOPELESS, HOPELESS_IF_COARSE = 5.0, 7.0
+NOTHING_SEEN = 1.0
 DROWNED = "Even at its largest it would drown in the errors of these data."
 
 
@@ -57,11 +63,7 @@ class Search:
     """Goes through the hypotheses; what it tries grows from step to step."""
 
     def __init__(
-        self,
-        problem: GapProblem,
-        options: GapOptions,
-        rng: np.random.Generator,
-        progress: Progress,
+        self, problem: GapProblem, options: GapOptions, rng: np.random.Generator, progress: Progress
     ):
         self.problem, self.options, self.rng, self.progress = problem, options, rng, progress
         progress("baseline", 0.0)
@@ -74,13 +76,13 @@ class Search:
 
     def singles(self) -> list[ScoredHypothesis]:
         """No gap and every single effect, those that stand a chance fitted."""
-        self.scans = screened(
-            self.problem,
-            self.baseline,
-            self.hypotheses,
-            lambda label, fraction: self._tell(label, 0.4 * fraction),
-        )
-        self.variants = _counts(tuple(self.scans))
+        for count, hypothesis in enumerate(self.hypotheses):
+            self._tell(f"screening {hypothesis.name}", 0.4 * count / len(self.hypotheses))
+            found = scan(self.problem, self.baseline, hypothesis)
+            if found.smallest < NOTHING_SEEN:
+                truncate(self.problem, found)
+                self.scans[hypothesis] = found
+        self.variants = dict(Counter(each.name for each in self.scans))
         rival = self.baseline.log_evidence + log_prior(Hypothesis(), self.variants)
         rough = tried_by_screening(self.problem, self.baseline, self.scans)
         nothing = self.baseline.log_evidence
@@ -169,7 +171,12 @@ class Search:
         scans: dict[Hypothesis, Scan] = {}
         rough: list[ScoredHypothesis] = []
         for fit in fits:
-            found = _new(paired(self.problem, fit, self.scans), {*known, *scans})
+            found, own = {}, fit.hypothesis
+            for single, alone in self.scans.items():
+                pair = Hypothesis((*own.effects, *single.effects))
+                either_way = {pair, Hypothesis(pair.effects[::-1])}
+                if single.name != own.name and not either_way & {*known, *scans}:
+                    found[pair] = superposed(self.problem, fit, alone, pair)
             rough += tried_by_screening(self.problem, fit, found)
             scans |= found
         return scans, rough
@@ -195,10 +202,8 @@ class Search:
         chosen = sorted(near, key=lambda h: -weight[h])[:most]
         if bent and Hypothesis() not in chosen:
             chosen.append(Hypothesis())
-        if not bent:
-            thorough = set(chosen)
-        else:
-            thorough = {h for h in chosen if weight[h] > first - THOROUGH_WITHIN or not h.effects}
+        near = [h for h in chosen if weight[h] > first - THOROUGH_WITHIN or not h.effects]
+        thorough = near if bent else chosen
         return [
             self._sampled(each, each.hypothesis in thorough) if each.hypothesis in chosen else each
             for each in tried
@@ -232,14 +237,12 @@ class Search:
 
     def leaders(self, tried: Sequence[ScoredHypothesis], most: int = LEADERS) -> list[Family]:
         """The likeliest families of one effect."""
-        return self._singles(tried)[:most]
+        singles = [f for f in families(tried, self.variants) if f.effects == 1 and not f.flexible]
+        return singles[:most]
 
     def _leading_fits(self, tried: Sequence[ScoredHypothesis], most: int) -> list[Fit]:
         leaders = (family.best.fit for family in self.leaders(tried, most))
         return [fit for fit in leaders if fit is not None]
-
-    def _singles(self, tried: Sequence[ScoredHypothesis]) -> list[Family]:
-        return [f for f in families(tried, self.variants) if f.effects == 1 and not f.flexible]
 
     def _hopeful(
         self,
@@ -249,13 +252,22 @@ class Search:
         rival: float,
         most: int,
     ) -> tuple[ScoredHypothesis, ...]:
-        """What stands a chance; `without` is the log evidence without what was scanned."""
+        """What may come near the likeliest, the best first, at most `most`.
+
+        `without` is the log evidence without what was scanned, `rival` the log of prior times
+        evidence of the best so far. A scan of several parameters is coarse and may be farther off.
+        The larger the gap (what the best gains in log evidence), the more a scan, which takes it as
+        linear, may be wrong.
+        """
         if not rough:
             return ()
-        priors = [log_prior(each.hypothesis, self.variants) for each in rough]
+        weighed = [e.log_evidence + log_prior(e.hypothesis, self.variants) for e in rough]
         coarse = [scans[each.hypothesis].share.shape[1] > 1 for each in rough]
         gap = max(each.log_evidence for each in rough) - without
-        return hopeful(rough, priors, coarse, rival, gap, most)
+        reach = np.where(coarse, HOPELESS_IF_COARSE, HOPELESS)
+        least = max([rival, *weighed]) - np.maximum(reach, HOPELESS_SHARE * gap)
+        order = np.argsort(-np.array(weighed), kind="stable")[:most]
+        return tuple(rough[i] for i in order if weighed[i] > least[i])
 
     def _fitted(
         self,
@@ -339,17 +351,3 @@ class Search:
             found = sampled(self.problem, fit, self.rng, self.options.draws, thorough)
             known = self._samples[tried.hypothesis] = fit, found, thorough
         return self._tried(known[1])
-
-
-def _counts(singles: Sequence[Hypothesis]) -> dict[str, int]:
-    names = [each.name for each in singles]
-    return {name: names.count(name) for name in names}
-
-
-def _new(pairs: Mapping[Hypothesis, Scan], known: Set[Hypothesis]) -> dict[Hypothesis, Scan]:
-    """Pairs that are not known, in whichever order of their effects."""
-    return {
-        pair: found
-        for pair, found in pairs.items()
-        if pair not in known and Hypothesis(pair.effects[::-1]) not in known
-    }

@@ -16,13 +16,12 @@ import numpy as np
 from shm.gap.attribution import Attribution, Explanation, possible
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.coordinates import scale_free
-from shm.gap.detectability import Scan
+from shm.gap.detectability import Scan, marginal
 from shm.gap.law_error import mixed
-from shm.gap.marginal import marginal
 from shm.gap.model_probabilities import NO_GAP, PAIR, SINGLE, UNKNOWN, ScoredHypothesis
 from shm.gap.problem import GapProblem
 from shm.gap.search import Search
-from shm.inference.tmcmc import normalised, systematic
+from shm.inference.mixture import normalised, systematic
 from shm.models.effects import Parameter, Variant, parameters_of
 from shm.values import Diagnosis, FloatArray, Hanger, ModalTest
 

@@ -1,13 +1,13 @@
-"""A hypothesis of a user's simulator fitted: Newton steps from several starts, then sampled.
+"""A hypothesis of a user's simulator fitted, and what a fit leaves of the readings.
 
-The evidence comes from importance sampling about the peaks (t distributions refitted to their own
-draws, with a share of the prior so that no weight is unbounded; Cappe et al. 2008, Hesterberg
-1995): Laplace's method only says where to draw.
+Newton steps lead to the peaks from several starts. The evidence comes from importance sampling
+about the peaks (t distributions refitted to their own draws, with a share of the prior so that no
+weight is unbounded; Cappe et al. 2008, Hesterberg 1995): Laplace's method only says where to draw.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +15,18 @@ import scipy
 
 from shm.gap.contract import Fit, Hypothesis, NoiseNode
 from shm.gap.likelihood import Likelihood
-from shm.gap.simulator_problem import SimulatorProblem
+from shm.gap.simulator_problem import Prior, Reading, SimulatorProblem
 from shm.inference.coordinates import log_normal
-from shm.inference.mixture import Normal, Pool, TMixture
-from shm.inference.tmcmc import effective, normalised, systematic
+from shm.inference.mixture import (
+    Normal,
+    Pool,
+    Rows,
+    TMixture,
+    effective,
+    normalised,
+    systematic,
+    tempered,
+)
 from shm.values import FloatArray, IntArray
 
 # Technical: effective draws against calls of the simulator. Weights correct whatever is drawn from.
@@ -92,7 +100,7 @@ def fitted(
         hypothesis, best.z, best.covariance, problem.value - residual, slopes, node.covariance, 0.0,
         draws=pool.batch.z[systematic(weights, _KEPT, rng)],
         log_fit=float(target.likelihood.log(residual[None])[0]),
-        log_evidence=float(scipy.special.logsumexp(pool.log_weights) - np.log(pool.draws)),
+        log_evidence=pool.log_evidence,
         log_evidence_sd=float(np.sqrt(max(1 / count - 1 / pool.draws, 0.0))),
         method="sampled", effective=count,
     )  # fmt: skip
@@ -144,11 +152,8 @@ def _climbed(target: _Target, z: FloatArray) -> _Summit:
 
 
 @dataclass(frozen=True, eq=False)
-class _Points:
+class _Points(Rows):
     z: FloatArray
-
-    def joined(self, other: _Points, /) -> _Points:
-        return _Points(np.vstack([self.z, other.z]))
 
 
 def _log_density(proposal: TMixture, batch: _Points) -> FloatArray:
@@ -171,17 +176,120 @@ def _sampled(
         log_target = target.log(z)
         log_target = np.where(np.isnan(log_target), -np.inf, log_target)
         pool.add(proposal, _ROUND, _Points(z), log_target)
-        if effective(normalised(pool.log_weights)) > _ENOUGH:
+        if pool.effective > _ENOUGH:
             break
-        weights = _tempered(pool.log_weights, _TO_FIT * z.shape[1])
+        fewest = _TO_FIT * z.shape[1]
+        weights = tempered(pool.log_weights, fewest, _COOLING, _LEAST_POWER)
         proposal = proposal.refitted(pool.batch.z, weights).mixed(first, _FROM_FIRST)
     return pool
 
 
-def _tempered(log_weights: FloatArray, fewest: float) -> FloatArray:
-    """Weights raised to a power below 1 where too few draws carry them to be fitted to."""
-    power, weights = 1.0, normalised(log_weights)
-    while effective(weights) < fewest and power > _LEAST_POWER:
-        power *= _COOLING
-        weights = normalised(power * log_weights)
-    return weights
+# Judgement, in a prior's standard deviations: nearer to a bound than a hundredth of the range; so
+# far out that one in 150 000 lies beyond.
+_AT_BOUND, _FAR_OUT = 2.33, 4.5
+_FEWEST_EFFECTIVE = 20  # judgement: fewer draws tell a spread to no better than a sixth
+# Judgement: what does not fit, but for one of its three worst readings, holds a slip.
+_BAD, _GOOD, _SUSPECTS = 0.01, 0.05, 3
+
+
+def without_copies(readings: Sequence[Reading]) -> tuple[tuple[Reading, ...], tuple[str, ...]]:
+    """The readings, those alike to the last digit once, and a remark on them."""
+    kept = {
+        (tuple(sorted(e.condition.items())), e.observable, e.value, repr(e.sd)): e for e in readings
+    }
+    copies = len(readings) - len(kept)
+    if not copies:
+        return tuple(readings), ()
+    return tuple(kept.values()), (
+        f"{copies} of {len(readings)} readings repeat another one to the last digit and count once:"
+        " a copy, or a step of the instrument that hides its scatter, adds nothing.",
+    )
+
+
+def errors_of(problem: SimulatorProblem, fit: Fit) -> FloatArray:
+    """Stated deviations, and for unstated ones those that the fit found."""
+    found = np.sqrt(np.diag(fit.noise.frequency))
+    return np.where(np.isfinite(problem.sd), problem.sd, found)
+
+
+def in_sds(problem: SimulatorProblem, fit: Fit) -> FloatArray:
+    """What a fit leaves of each reading (data,)."""
+    return np.asarray((problem.value - fit.predicted) / errors_of(problem, fit))
+
+
+def rms(values: FloatArray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def p_value(problem: SimulatorProblem, fit: Fit, residual: FloatArray | None = None) -> float:
+    """Of the misfit at the best point, averaged over the unknown size of the errors.
+
+    A `residual` (data,) may be another than the fit's, NaN for readings that do not count.
+    """
+    away = problem.value - fit.predicted if residual is None else residual
+    freedom = max(1, int(np.isfinite(away).sum()) - len(fit.z))
+    nodes = problem.nodes()
+    weight = np.exp([each.log_weight for each in nodes])
+    squares = [float(np.nansum(away**2 / np.diag(n.covariance.frequency))) for n in nodes]
+    return float(weight @ scipy.special.chdtrc(freedom, squares) / weight.sum())
+
+
+def moments(
+    problem: SimulatorProblem, fit: Fit, names: Mapping[str, object]
+) -> dict[str, tuple[float, float]]:
+    """Mean and standard deviation of parameters; NaN for a deviation that draws do not show."""
+    found = {}
+    for j, (name, prior) in enumerate(problem.priors(fit.hypothesis).items()):
+        if name in names:
+            value = prior.value(fit.draws[:, j])
+            shown = fit.effective >= _FEWEST_EFFECTIVE and not _at_bound(prior, fit.draws[:, j])
+            found[name] = float(value.mean()), float(value.std()) if shown else float("nan")
+    return found
+
+
+def _at_bound(prior: Prior, z: FloatArray) -> bool:
+    return prior.spread in ("uniform", "logarithmic") and bool(abs(z.mean()) > _AT_BOUND)
+
+
+def at_bounds(problem: SimulatorProblem, fit: Fit) -> tuple[str, ...]:
+    """A remark on each parameter that lies at the bound of its prior, or far out of it."""
+    said = []
+    for j, (name, prior) in enumerate(problem.priors(fit.hypothesis).items()):
+        z = fit.draws[:, j]
+        bound = _at_bound(prior, z)
+        if bound or abs(z.mean()) > _FAR_OUT:
+            where = "at its bound" if bound else "far out of its prior"
+            said.append(
+                f"{name} lies {where}, {float(prior.value(z).mean()):.4g}: widen its prior if it "
+                "may lie there."
+            )
+    return tuple(said)
+
+
+def slips(problem: SimulatorProblem, *fits: Fit) -> tuple[str, ...]:
+    """A remark on the reading with which alone the last of these does not fit, if any does not."""
+    return tuple(said for fit in fits if (said := _slip(problem, fit)))[-1:]
+
+
+def _slip(problem: SimulatorProblem, fit: Fit) -> str:
+    """On the reading without which a bad fit is a good one; empty where there is none."""
+    if len(problem.value) < len(fit.z) + 3 or p_value(problem, fit) > _BAD:
+        return ""
+    best, said = _GOOD, ""
+    for row in np.argsort(-np.abs(in_sds(problem, fit)))[:_SUSPECTS]:
+        z = refitted(problem, fit, np.arange(len(problem.value)) != row)
+        away = problem.value - problem.predicted(fit.hypothesis, z[None])[0]
+        off = abs(away[row]) / errors_of(problem, fit)[row]
+        away[row] = np.nan
+        if (p := p_value(problem, fit, away)) > best:
+            best, said = p, _on_slip(problem.readings[row], off, fit.hypothesis.name)
+    return said
+
+
+def _on_slip(reading: Reading, off: float, effect: str) -> str:
+    return (
+        f"{reading.observable} = {reading.value:.6g} at {dict(reading.condition)} lies "
+        f"{off:.0f} sds from what all other readings say with {effect or 'the simulator alone'}: "
+        "look whether it is a slip, and diagnose again without it."
+    )

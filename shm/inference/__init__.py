@@ -8,9 +8,9 @@ from shm.inference.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, Upda
 from shm.resources import when_asked
 
 if TYPE_CHECKING:
-    from shm.inference.ensemble import refresh
     from shm.inference.likelihood import sigma_by_group
-    from shm.inference.updating import BiasedEvidenceWarning, class_probabilities, select, update
+    from shm.inference.tmcmc import BiasedEvidenceWarning
+    from shm.inference.updating import class_probabilities, refresh, select, update
 
 __all__ = [
     "METHODS",
@@ -31,9 +31,10 @@ if not TYPE_CHECKING:
     __getattr__ = when_asked(
         __name__,
         {
-            "refresh": "shm.inference.ensemble",
             "sigma_by_group": "shm.inference.likelihood",
-            "BiasedEvidenceWarning": "shm.inference.updating",
-            **dict.fromkeys(("class_probabilities", "select", "update"), "shm.inference.updating"),
+            "BiasedEvidenceWarning": "shm.inference.tmcmc",
+            **dict.fromkeys(
+                ("class_probabilities", "refresh", "select", "update"), "shm.inference.updating"
+            ),
         },
     )

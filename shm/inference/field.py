@@ -26,8 +26,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
-from shm.errors import BadInput
-from shm.inference.likelihood import conditions_of, predicted_hz
+from shm.inference.likelihood import conditions_of, measured, predicted_hz
 from shm.inference.systematic_errors import errors_of_bar, felt_by, loads_of_ends, mean_of_ends
 from shm.models import Model
 from shm.models.as_made import TENSION
@@ -79,17 +78,10 @@ class FieldLikelihood:
     repeat = 1
 
     def __init__(
-        self,
-        tests: Sequence[ModalTest],
-        model: Model,
-        reading: tuple[float, float] | None = None,
+        self, tests: Sequence[ModalTest], model: Model, reading: tuple[float, float] | None = None
     ):
         self.tests = tuple(tests)
-        self.modes: list[Mode] = [mode for test in tests for mode in test.regular_modes]
-        if not self.modes:
-            raise BadInput(
-                "no measured frequency to update with.", remedy="Give a test with modes."
-            )
+        self.modes = measured(tests)
         conditions = conditions_of(tests, model)
         keys = [(m.plane, m.order, c) for m, c in zip(self.modes, conditions, strict=True)]
         distinct = list(dict.fromkeys(keys))

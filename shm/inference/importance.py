@@ -24,10 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.inference.mixture import Pool, TMixture
+from shm.inference.mixture import Pool, Rows, TMixture, effective, normalised, systematic, tempered
 from shm.inference.problem import Points, Problem
 from shm.inference.search import Anchors, carried
-from shm.inference.tmcmc import effective, normalised, systematic
 from shm.values import FloatArray
 
 # Technical: parts and shares of proposals; weights correct for them. As they are, log evidences of
@@ -131,15 +130,13 @@ def weigh(
     through them too, lest the population have missed one that matters. Where too few of the final
     draws are effective, they become trials, and others are drawn.
     """
-    sampler = _Sampler(problem, _tails(wider, rng))
+    sampler = _Sampler(problem, _tails(wider, rng), enough, rng)
     core = _first(problem, population, anchors, rng)
     trial = sampler.pool()
     for _ in range(_ATTEMPTS):
-        core = _adapted(sampler, trial, core, enough, rng)
-        share = _weighted(trial).effective_sample_size / trial.draws
-        final = sampler.pool()
-        _fill(sampler, final, core, share, enough, rng)
-        if _weighted(final).effective_sample_size >= _POOR * enough:
+        core = sampler.adapted(trial, core)
+        final = sampler.final(core, trial.effective / trial.draws)
+        if final.effective >= _POOR * enough:
             break
         trial.absorb(final)
     return _weighted(final)
@@ -154,23 +151,6 @@ def _first(
     return found.joined(anchors.normals(0.0), _FROM_ANCHORS)
 
 
-def _adapted(
-    sampler: _Sampler,
-    trial: Pool[TMixture, _Kept],
-    core: TMixture,
-    enough: float,
-    rng: np.random.Generator,
-) -> TMixture:
-    """The mixture refitted to all trial draws, batch by batch."""
-    for _ in range(_MOST_TRIALS):
-        sampler.draw(trial, core, _TRIAL, rng)
-        weighted = _weighted(trial)
-        core = core.refitted(weighted.points.z, _to_fit(weighted))
-        if weighted.effective_sample_size >= _ENOUGH_TO_FIT * enough:
-            break
-    return core
-
-
 def _tails(stages: Sequence[FloatArray], rng: np.random.Generator) -> TMixture | None:
     """A mixture for the earlier stages, the later the more; None where there are none."""
     tails = None
@@ -180,52 +160,12 @@ def _tails(stages: Sequence[FloatArray], rng: np.random.Generator) -> TMixture |
     return tails
 
 
-def _fill(
-    sampler: _Sampler,
-    final: Pool[TMixture, _Kept],
-    core: TMixture,
-    share: float,
-    enough: float,
-    rng: np.random.Generator,
-) -> None:
-    """Draws from one mixture, of which a `share` is expected to be effective.
-
-    Their number is set beforehand: to stop as soon as the weights look even would prefer samples
-    that have missed a large one.
-    """
-    needed = max(enough, 1 / _AIMED_ERROR**2) / share
-    sampler.draw(final, core, int(np.clip(needed, _FEWEST, _MOST)), rng)
-    for _ in range(_MOST_EXTENSIONS):
-        if _suffices(_weighted(final), enough):
-            break
-        sampler.draw(final, core, _EXTENSION, rng)
-
-
-def _suffices(weighted: Weighted, enough: float) -> bool:
-    return weighted.effective_sample_size >= enough and weighted.log_evidence_sd <= _ENOUGH_ERROR
-
-
-def _to_fit(weighted: Weighted) -> FloatArray:
-    """Weights to fit to, raised to a power below 1 where too few draws carry them."""
-    fewest = min(_FEWEST_TO_FIT * weighted.points.z.shape[1], len(weighted.log_weights) / 2)
-    power = 1.0
-    weights = normalised(weighted.log_weights)
-    while effective(weights) < fewest:
-        power *= 0.8
-        weights = normalised(power * weighted.log_weights)
-    return weights
-
-
 @dataclass(frozen=True, eq=False)
-class _Kept:
+class _Kept(Rows):
     """Draws inside of the prior, and the log density (n,) of what all proposals share there."""
 
     points: Points
     log_common: FloatArray
-
-    def joined(self, other: _Kept) -> _Kept:
-        log_common = np.append(self.log_common, other.log_common)
-        return _Kept(self.points.joined(other.points), log_common)
 
 
 class _Sampler:
@@ -233,22 +173,50 @@ class _Sampler:
     and the `tails`, whose density at a draw is found once.
     """
 
-    def __init__(self, problem: Problem, tails: TMixture | None):
-        self._problem, self._tails = problem, tails
+    def __init__(
+        self, problem: Problem, tails: TMixture | None, enough: float, rng: np.random.Generator
+    ):
+        self._problem, self._tails, self._enough, self._rng = problem, tails, enough, rng
         self._of_core = np.log1p(-_FROM_PRIOR) + np.log1p(-_FROM_TAILS if tails else 0.0)
 
     def pool(self) -> Pool[TMixture, _Kept]:
         """An empty one."""
         return Pool(self._log_density)
 
-    def draw(
-        self, pool: Pool[TMixture, _Kept], core: TMixture, draws: int, rng: np.random.Generator
-    ) -> None:
+    def adapted(self, trial: Pool[TMixture, _Kept], core: TMixture) -> TMixture:
+        """The mixture refitted to all trial draws, batch by batch."""
+        for _ in range(_MOST_TRIALS):
+            self._draw(trial, core, _TRIAL)
+            z = trial.batch.points.z
+            fewest = min(_FEWEST_TO_FIT * z.shape[1], len(z) / 2)
+            core = core.refitted(z, tempered(trial.log_weights, fewest))
+            if trial.effective >= _ENOUGH_TO_FIT * self._enough:
+                break
+        return core
+
+    def final(self, core: TMixture, share: float) -> Pool[TMixture, _Kept]:
+        """Draws from one mixture, of which a `share` is expected to be effective.
+
+        Their number is set beforehand: to stop as soon as the weights look even would prefer
+        samples that have missed a large one.
+        """
+        final = self.pool()
+        needed = max(self._enough, 1 / _AIMED_ERROR**2) / share
+        self._draw(final, core, int(np.clip(needed, _FEWEST, _MOST)))
+        for _ in range(_MOST_EXTENSIONS):
+            found = _weighted(final)
+            if final.effective >= self._enough and found.log_evidence_sd <= _ENOUGH_ERROR:
+                break
+            self._draw(final, core, _EXTENSION)
+        return final
+
+    def _draw(self, pool: Pool[TMixture, _Kept], core: TMixture, draws: int) -> None:
         """One more batch into the pool; draws outside of the prior are counted, not evaluated."""
-        n = rng.binomial(draws, _FROM_PRIOR)
+        n = self._rng.binomial(draws, _FROM_PRIOR)
         mixture = core.mixed(self._tails, _FROM_TAILS) if self._tails else core
         coordinates = self._problem.coordinates
-        z = np.vstack([coordinates.draw_prior(n, rng), mixture.draw(draws - n, rng)])
+        drawn = coordinates.draw_prior(n, self._rng), mixture.draw(draws - n, self._rng)
+        z = np.vstack(drawn)
         log_prior = coordinates.log_prior(z)
         inside = np.isfinite(log_prior)
         z, log_prior = z[inside], log_prior[inside]

@@ -41,12 +41,7 @@ class Likelihood:
     """
 
     def __init__(self, tests: Sequence[ModalTest], repeat: int = 1):
-        modes: list[Mode] = [mode for test in tests for mode in test.regular_modes]
-        if not modes:
-            raise BadInput(
-                "no measured frequency to update with.", remedy="Give a test with modes."
-            )
-        self.modes = modes
+        self.modes = modes = measured(tests)
         self.tests = tuple(tests)
         self.repeat = repeat
         self.frequency_hz: FloatArray = np.array([mode.frequency_hz for mode in modes])
@@ -194,6 +189,14 @@ def sigma_by_group(
         likelihood.predict(model, theta), np.random.default_rng(options.seed)
     )
     return {name: Summary.of(values) for name, values in drawn.items()}
+
+
+def measured(tests: Sequence[ModalTest]) -> list[Mode]:
+    """The modes that count; raises BadInput where there are none."""
+    modes = [mode for test in tests for mode in test.regular_modes]
+    if not modes:
+        raise BadInput("no measured frequency to update with.", remedy="Give a test with modes.")
+    return modes
 
 
 def conditions_of(tests: Sequence[ModalTest], model: Model) -> list[Conditions]:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Generic, Protocol, Self, TypeVar
+from dataclasses import dataclass
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 import scipy
 
-from shm.values import FloatArray
+from shm.values import BoolArray, FloatArray, IntArray
 
 # Technical: proposals with heavier tails than a posterior, and somewhat wider, keep weights
 # bounded; still heavier or wider ones waste draws (2 or 8 degrees: the same evidence within 0.02).
@@ -157,14 +158,44 @@ def _fitted(z: FloatArray, owned: FloatArray, pulled: FloatArray, former: Normal
     return Normal(mean, (1 - kept) * own + kept * former.covariance)
 
 
-class Batch(Protocol):
-    """What is known of some draws."""
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What is known of n points: arrays, or other rows, with one row for each.
 
-    def joined(self, other: Self, /) -> Self:
-        """These draws and then the others."""
+    A field that is a number is that of all points.
+    """
+
+    def take(self, rows: BoolArray | IntArray) -> Self:
+        """Some of the points, by index or choice."""
+        return self._mapped(lambda own: own.take(rows) if isinstance(own, Rows) else own[rows])
+
+    def joined(self, other: Self) -> Self:
+        """These points and then the others."""
+        return self._mapped(
+            lambda own, its: (
+                own.joined(its) if isinstance(own, Rows) else np.concatenate([own, its])
+            ),
+            other,
+        )
+
+    def where(self, chosen: BoolArray, other: Self) -> Self:
+        """These points where `chosen` (n,), elsewhere the `other` ones."""
+
+        def either(own: Any, its: Any) -> Any:
+            if isinstance(own, Rows):
+                return own.where(chosen, its)
+            return np.where(chosen.reshape(-1, *[1] * (np.ndim(own) - 1)), own, its)
+
+        return self._mapped(either, other)
+
+    def _mapped(self, act: Callable[..., Any], *others: Self) -> Self:
+        columns = zip(*(vars(each).values() for each in (self, *others)), strict=True)
+        return type(self)(
+            *(first if np.isscalar(first) else act(first, *rest) for first, *rest in columns)
+        )
 
 
-B = TypeVar("B", bound=Batch)
+B = TypeVar("B", bound=Rows)
 
 
 class Pool(Generic[P, B]):
@@ -191,6 +222,16 @@ class Pool(Generic[P, B]):
         """Of the draws in `batch` (n,); the mean over all `draws` is the target's integral."""
         return np.asarray(self._log_target - self._log_drawn + np.log(self.draws))
 
+    @property
+    def effective(self) -> float:
+        """Kish's effective number of draws."""
+        return effective(normalised(self.log_weights))
+
+    @property
+    def log_evidence(self) -> float:
+        """Log of the target's integral."""
+        return float(scipy.special.logsumexp(self.log_weights) - np.log(self.draws))
+
     def add(self, proposal: P, draws: int, batch: B, log_target: FloatArray) -> None:
         """Those kept of so many draws of a proposal, where the target's log density is known."""
         self._append([(proposal, draws)], batch, log_target)
@@ -212,3 +253,32 @@ class Pool(Generic[P, B]):
         """Log of how many draws per volume (n,) the proposals, each of so many, put there."""
         parts = [np.log(draws) + self._log_density(each, batch) for each, draws in proposals]
         return np.asarray(scipy.special.logsumexp(parts, axis=0))
+
+
+def normalised(log_weights: FloatArray) -> FloatArray:
+    """Weights (n,) that add to 1."""
+    weights = np.exp(log_weights - log_weights.max())
+    return np.asarray(weights / weights.sum())
+
+
+def effective(weights: FloatArray) -> float:
+    """Kish's effective number of draws with weights (n,) that add to 1."""
+    return float(1 / np.sum(weights**2))
+
+
+def tempered(
+    log_weights: FloatArray, fewest: float, cooling: float = 0.8, least: float = 0.0
+) -> FloatArray:
+    """Weights to fit to: where fewer draws than `fewest` carry them raised to a power below 1, in
+    steps of `cooling` down to the `least`."""
+    power, weights = 1.0, normalised(log_weights)
+    while effective(weights) < fewest and power > least:
+        power *= cooling
+        weights = normalised(power * log_weights)
+    return weights
+
+
+def systematic(weights: FloatArray, n: int, rng: np.random.Generator) -> IntArray:
+    """Indices (n,) drawn with `weights` by systematic resampling."""
+    positions = (np.arange(n) + rng.random()) / n
+    return np.searchsorted(np.cumsum(weights), positions).clip(0, len(weights) - 1).astype(int)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import scipy
@@ -62,15 +62,6 @@ class Outcome:
     method: str
 
 
-@dataclass(frozen=True)
-class OtherAnswers:
-    """Fields of a `Posterior` that its own draws do not show; NaN where there is nothing."""
-
-    tension_of_other_ends_n: float = NAN
-    tension_of_other_orders_n: float = NAN
-    description_off_sd: float = NAN
-
-
 @dataclass(frozen=True, eq=False)
 class _Best:
     """The draw that fits best: its place (d,), its sigma, and its log likelihood less half of the
@@ -81,28 +72,28 @@ class _Best:
     fit: float
 
 
-def other_answers(problem: Problem, outcome: Outcome, tests: Sequence[ModalTest]) -> OtherAnswers:
-    """Of a bar as made; nothing of one with the priors of the thesis.
+def other_answers(problem: Problem, outcome: Outcome, tests: Sequence[ModalTest]) -> dict[str, Any]:
+    """Fields of a `Posterior` that its own draws do not show, of a bar as made.
 
     The description is off as far as frequencies see it.
     """
     coordinates = problem.coordinates
     if not isinstance(coordinates, DescribedCoordinates):
-        return OtherAnswers()
+        return {}
     places = coordinates.places(outcome.samples[:, :-1])
     _, seen = coordinates.smooth(places)
-    off_sd = _description_off_sd(seen)
+    off_sd = {"description_off_sd": _description_off_sd(seen)}
     if not coordinates.felt_springs:
-        return OtherAnswers(description_off_sd=off_sd)
+        return off_sd
     fit = problem.likelihood.marginal(outcome.predicted) - 0.5 * (seen**2).sum(axis=1)
     at = int(fit.argmax())
     best = _Best(places[at], float(outcome.samples[at, -1]), float(fit[at]))
-    ratio = outcome.samples[:, 0]
-    return OtherAnswers(
-        _tension_of_other_ends_n(problem, coordinates, best, ratio),
-        _tension_of_other_orders_n(problem, coordinates, best, ratio, tests),
-        off_sd,
-    )
+    of = problem, coordinates, best, outcome.samples[:, 0]
+    return {
+        **off_sd,
+        "tension_of_other_ends_n": _tension_of_other_ends_n(*of),
+        "tension_of_other_orders_n": _tension_of_other_orders_n(*of, tests),
+    }
 
 
 def _description_off_sd(seen: FloatArray) -> float:

@@ -14,12 +14,7 @@ from shm.inference.field import FieldLikelihood
 from shm.inference.importance import Weighted
 from shm.inference.mixture import Normal
 from shm.inference.options import UpdateOptions
-from shm.inference.other_answers import (
-    Outcome,
-    climbed,
-    fitted,
-    other_answers,
-)
+from shm.inference.other_answers import Outcome, climbed, fitted, other_answers
 from shm.inference.problem import DIFFERENCE, Problem
 from shm.inference.tmcmc import Mover
 from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency
@@ -67,7 +62,7 @@ def assembled(
     likelihood = problem.likelihood
     log_likelihood = likelihood.joint(outcome.predicted, samples[:, -1])
     most_probable = _most_probable(problem, samples, log_likelihood)
-    log_occam = outcome.log_evidence - _highest(problem, outcome.predicted)
+    log_occam = outcome.log_evidence - float(likelihood.marginal(outcome.predicted).max())
     if isinstance(likelihood, FieldLikelihood):
         # What is kept can be computed again from the posterior alone.
         likelihood.settle(model, most_probable[:-1])
@@ -96,7 +91,7 @@ def assembled(
         misfit_percent=_misfit_percent(problem, outcome.predicted),
         log_occam=log_occam,
     )
-    return replace(posterior, **vars(other_answers(problem, outcome, tests)))
+    return replace(posterior, **other_answers(problem, outcome, tests))
 
 
 def _draws(
@@ -114,18 +109,9 @@ def _draws(
 def _most_probable(problem: Problem, samples: FloatArray, log_likelihood: FloatArray) -> FloatArray:
     """The MAP estimate with sigma (parameters + 1,), climbed to from the likeliest sample."""
     coordinates = problem.coordinates
-    if isinstance(coordinates, DescribedCoordinates):
-        return _highest_described(problem, coordinates, samples, log_likelihood)
-    return _highest_in_box(problem, samples[int(log_likelihood.argmax())])
-
-
-def _highest_described(
-    problem: Problem,
-    coordinates: DescribedCoordinates,
-    samples: FloatArray,
-    log_likelihood: FloatArray,
-) -> FloatArray:
-    """Of flat and normal priors: the squares of the deviates seen belong to the fit."""
+    if not isinstance(coordinates, DescribedCoordinates):
+        return _highest_in_box(problem, samples[int(log_likelihood.argmax())])
+    # Of flat and normal priors: the squares of the deviates seen belong to the fit.
     z = coordinates.places(samples[:, :-1])
     _, seen = coordinates.smooth(z)
     at = int((log_likelihood - 0.5 * (seen**2).sum(axis=1)).argmax())
@@ -179,11 +165,6 @@ def _misfit_percent(problem: Problem, predicted: FloatArray) -> float:
     count = getattr(problem.likelihood, "frequencies", predicted.shape[1])
     off = problem.likelihood.misfit(predicted.mean(axis=0)[None])[0, :count]
     return float(100 * np.sqrt(np.mean(off**2)))
-
-
-def _highest(problem: Problem, predicted: FloatArray) -> float:
-    """The largest log likelihood among the draws, noise integrated out."""
-    return float(problem.likelihood.marginal(predicted).max())
 
 
 def _highest_in_box(problem: Problem, best: FloatArray) -> FloatArray:

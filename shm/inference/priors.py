@@ -13,15 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.models.as_made import (
-    BENDING,
-    DENSITY,
-    LENGTH,
-    MODULUS,
-    RESTRAINT,
-    SECTION,
-    AsMade,
-)
+from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, RESTRAINT, SECTION, AsMade
 from shm.values import FloatArray, Hanger, IntArray, ModalTest
 
 DEVIATIONS = (SECTION, DENSITY, MODULUS)

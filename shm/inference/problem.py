@@ -12,12 +12,13 @@ from shm.inference.coordinates import Coordinates
 from shm.inference.described import DescribedCoordinates
 from shm.inference.field import FieldLikelihood
 from shm.inference.likelihood import GroupedLikelihood, Likelihood
+from shm.inference.mixture import Rows
 from shm.inference.modal_groups import ONE
 from shm.inference.options import Progress
 from shm.inference.priors import Calibration, reading_of
 from shm.models import THESIS, AsMade, Model
 from shm.models.as_made import TENSION
-from shm.values import BoolArray, FloatArray, IntArray, ModalTest
+from shm.values import FloatArray, ModalTest
 
 DIFFERENCE = 1e-4
 """Forward difference in z, whose prior has a standard deviation of 1. It steers searches and
@@ -25,26 +26,11 @@ proposals, which weights correct, and is as exact as a first-order repeatability
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class Points(Rows):
     """Points `z` (n, d) with what they predict, `predicted` (n, measurements)."""
 
     z: FloatArray
     predicted: FloatArray
-
-    def take(self, index: IntArray) -> Points:
-        """The chosen points."""
-        return Points(self.z[index], self.predicted[index])
-
-    def joined(self, other: Points) -> Points:
-        """These points and then the others."""
-        return Points(np.vstack([self.z, other.z]), np.vstack([self.predicted, other.predicted]))
-
-    def replaced(self, where: BoolArray, by: Points) -> Points:
-        """These points with those `where` (n,) is true taken from `by`."""
-        column = where[:, None]
-        return Points(
-            np.where(column, by.z, self.z), np.where(column, by.predicted, self.predicted)
-        )
 
 
 class Problem:

@@ -222,17 +222,11 @@ def _shared_places(problem: Problem, posterior: Posterior) -> tuple[IntArray, Fl
         if posterior.priors != DESCRIPTION:
             return np.empty(0, dtype=int), np.empty((0, 0))
         return coordinates.shared(posterior.names, posterior.samples)
-    columns = _shared(problem, posterior)
+    # What ends can exchange is not shared.
+    known = set(posterior.names) - {name for swap in problem.model.swaps for name in swap}
+    columns = np.array([i for i, n in enumerate(problem.prior.names) if n in known], dtype=int)
     lower, upper = problem.prior.lower[columns], problem.prior.upper[columns]
     names = [problem.prior.names[i] for i in columns]
     samples = np.array([posterior.parameter(name) for name in names])
     samples = samples.reshape(len(names), len(posterior.samples)).T
     return columns, quantile((samples - lower) / (upper - lower))
-
-
-def _shared(problem: Problem, posterior: Posterior) -> IntArray:
-    """Columns of the problem's parameters that the posterior has too and no swap moves."""
-    moved = {name for swap in problem.model.swaps for name in swap}
-    names = problem.prior.names
-    both = [i for i, name in enumerate(names) if name in posterior.names and name not in moved]
-    return np.array(both, dtype=int)

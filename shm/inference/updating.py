@@ -1,184 +1,36 @@
-"""Posterior of one model class, and the choice among several, given modal tests.
+"""Posterior of one model class, from scratch or from a known one, and the choice among several.
 
-TMCMC as Ching and Chen (2007, J. Eng. Mech. 133(7), 816-832) and the thesis (4.3) have it.
+A known posterior, of earlier tests, only says where to look. Prior, likelihood and answer are those
+of `update`: the draws of the known posterior are carried to the new data by least squares, a t
+mixture fitted to them is the proposal of the same adaptive importance sampling, and the weights
+correct whatever the old draws had wrong. Shares of the prior and of the anchors of a fresh search
+are in the proposal, lest the known posterior have lost a mode or the hanger have changed.
 
-The likelihood is raised to a power b that goes from 0 to 1, each step as far as a coefficient of
-variation of the weights of 1 allows; the model error sigma is a sampled parameter; a particle that
-is resampled k times makes a chain of k random-walk Metropolis steps, whose covariance is 0.2^2
-times that of the weighted population; the evidence is the product of the mean weights.
-
-It is here for fidelity. On hangers its evidence is wrong, for sigma collapses at some power: a
-phase transition that the population does not follow.
+Where the weights are not to be trusted, the affine-invariant ensemble sampler emcee (Foreman-Mackey
+et al. 2013), started from the weighted draws, makes the population anew and it is weighed again.
+Where they are still not, `update` starts from scratch. The posterior's `method` says which it was.
 """
 
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from shm.errors import UsageError
-from shm.inference.importance import Weighted, weigh
-from shm.inference.mixture import Normal
+from shm.inference.importance import FARTHEST, Weighted, weigh
+from shm.inference.mixture import normalised
 from shm.inference.options import TEXTBOOK, Progress, UpdateOptions, silent
-from shm.inference.other_answers import Outcome, reading_off_sd
+from shm.inference.other_answers import reading_off_sd
 from shm.inference.outcome import assembled, posterior_of
 from shm.inference.priors import DECADES, reading_of
-from shm.inference.problem import Points, Problem
-from shm.inference.search import WarmStart, search, warm_start_from
-from shm.inference.tmcmc import normalised, sample
+from shm.inference.problem import Problem
+from shm.inference.search import Anchors, WarmStart, carried, search, warm_start_from
+from shm.inference.tmcmc import sample, textbook
 from shm.models import THESIS, AsMade, Model
-from shm.values import (
-    ENOUGH_EFFECTIVE,
-    NAN,
-    BoolArray,
-    FloatArray,
-    IntArray,
-    ModalTest,
-    Posterior,
-    Selection,
-)
-
-# Ching and Chen (2007), thesis 4.3: scale of the random walk, variation of a stage's weights.
-_SCALE = 0.2
-_TARGET_VARIATION = 1.0
-
-
-class BiasedEvidenceWarning(UserWarning):
-    """The method's evidence is known to be biased on hangers."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Particles:
-    """`theta` (n, d + 1) with sigma last, `predicted` (n, measurements), log likelihood (n,)."""
-
-    theta: FloatArray
-    predicted: FloatArray
-    log_likelihood: FloatArray
-
-    def take(self, index: IntArray) -> _Particles:
-        return _Particles(self.theta[index], self.predicted[index], self.log_likelihood[index])
-
-
-def textbook(problem: Problem, particles: int, rng: np.random.Generator) -> Outcome:
-    """The posterior's draws and evidence by the textbook; warns with BiasedEvidenceWarning."""
-    warnings.warn(
-        "textbook TMCMC: a bias of -1 to -7 in log evidence was measured on hangers; use the "
-        "default method for evidences and model selection.",
-        BiasedEvidenceWarning,
-        stacklevel=3,
-    )
-    lower, upper = _box(problem)
-    population = _run(problem, lower + (upper - lower) * rng.random((particles, len(lower))))
-    power, log_evidence, variance = 0.0, 0.0, 0.0
-    while power < 1:
-        step = _power_step(population.log_likelihood, 1 - power)
-        log_weights = step * population.log_likelihood
-        weights = normalised(log_weights)
-        power = power + step if step < 1 - power else 1.0
-        log_evidence += float(np.logaddexp.reduce(log_weights) - np.log(particles))
-        variance += float((weights * particles).var() / particles)
-        population = _moved(problem, population, weights, power, rng)
-    return _outcome(population, log_evidence, np.sqrt(variance), rng)
-
-
-def _box(problem: Problem) -> tuple[FloatArray, FloatArray]:
-    """The uniform prior's bounds (d + 1,), sigma last."""
-    return np.append(problem.prior.lower, 0.0), np.append(problem.prior.upper, 1.0)
-
-
-def _run(problem: Problem, theta: FloatArray) -> _Particles:
-    predicted = problem.run(theta[:, :-1])
-    return _Particles(theta, predicted, problem.likelihood.joint(predicted, theta[:, -1]))
-
-
-def _power_step(log_likelihood: FloatArray, most: float) -> float:
-    """The largest step of the power whose weights keep the target variation."""
-
-    def too_far(step: float) -> bool:
-        weights = normalised(step * log_likelihood)
-        return bool(weights.std() > _TARGET_VARIATION * weights.mean())
-
-    if not too_far(most):
-        return most
-    low, high = 0.0, most
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (low, middle) if too_far(middle) else (middle, high)
-    return high
-
-
-def _moved(
-    problem: Problem,
-    population: _Particles,
-    weights: FloatArray,
-    power: float,
-    rng: np.random.Generator,
-) -> _Particles:
-    """The next population: each chosen particle leads a chain as long as it was chosen often."""
-    covariance = np.cov(population.theta.T, aweights=weights)
-    walk = Normal(np.zeros(len(covariance)), _SCALE**2 * covariance)
-    factor = np.asarray(walk.factor, dtype=float)
-    lengths = rng.multinomial(len(weights), weights)
-    chains, visited = population.take(np.flatnonzero(lengths)), []
-    lengths = lengths[lengths > 0]
-    while len(lengths):
-        chains = _stepped(problem, chains, factor, power, rng)
-        visited.append(chains)
-        lengths = lengths - 1
-        chains, lengths = chains.take(np.flatnonzero(lengths)), lengths[lengths > 0]
-    return _joined(visited)
-
-
-def _stepped(
-    problem: Problem,
-    chains: _Particles,
-    factor: FloatArray,
-    power: float,
-    rng: np.random.Generator,
-) -> _Particles:
-    """One random-walk Metropolis step of all chains; what leaves the prior is rejected."""
-    lower, upper = _box(problem)
-    theta = chains.theta + rng.standard_normal(chains.theta.shape) @ factor.T
-    inside: BoolArray = np.all((theta > lower) & (theta < upper), axis=1)
-    proposed = _run(problem, np.where(inside[:, None], theta, chains.theta))
-    gain = power * (proposed.log_likelihood - chains.log_likelihood)
-    accepted = inside & (np.log(rng.random(len(theta))) < gain)
-    both = _joined([chains, proposed])
-    return both.take(np.arange(len(theta)) + len(theta) * accepted)
-
-
-def _joined(parts: list[_Particles]) -> _Particles:
-    return _Particles(
-        np.vstack([part.theta for part in parts]),
-        np.vstack([part.predicted for part in parts]),
-        np.concatenate([part.log_likelihood for part in parts]),
-    )
-
-
-def _outcome(
-    population: _Particles, log_evidence: float, log_evidence_sd: float, rng: np.random.Generator
-) -> Outcome:
-    """The last population in random order; the distinct particles count as effective."""
-    n = len(population.theta)
-    population = population.take(rng.permutation(n))
-    equal = Weighted(Points(population.theta, population.predicted), np.zeros(n), n)
-    distinct = float(len(np.unique(population.theta, axis=0)))
-    return Outcome(
-        population.theta,
-        population.predicted,
-        log_evidence,
-        log_evidence_sd,
-        distinct,
-        equal.r_hat,
-        "textbook",
-    )
-
-
-__all__ = ["Progress", "UpdateOptions", "infer", "posterior_of", "select", "silent", "update"]
+from shm.values import ENOUGH_EFFECTIVE, NAN, FloatArray, ModalTest, Posterior, Selection
 
 # Technical: few particles do, since the last step weighs (`shm.inference.tmcmc`); 200 are
 # twenty or more for each parameter.
@@ -361,3 +213,182 @@ def _log_prior(model: Model, tests: Sequence[ModalTest]) -> float:
     if len(planes) > 1 and model.hanger.plate is None:
         shares += [one**2, one]
     return float(np.log(np.mean(shares)))
+
+
+RE_WEIGHTED = "re-weighted"
+ENSEMBLE = "ensemble"
+
+# Technical: the population that the first mixture is fitted to, some 150 points: those known are
+# near and take few steps, those of the prior more; noise a little larger than the model error keeps
+# a proposal wider than the posterior. Held against updates from scratch in
+# tests/benchmarks/updating_from_known.py, as is the ensemble: 40 steps from draws that are weighed.
+_KNOWN, _FRESH, _FROM_EACH_ANCHOR = 80, 80, 20
+_KNOWN_STEPS, _FRESH_STEPS, _WIDE_STEPS = 5, 9, 1
+_NOISE, _WIDE_NOISE = 1.5, 6.0
+_WALKERS, _STEPS, _THINNED = 300, 40, 5
+
+# Judgement: where a re-weighting is trusted, or worth an ensemble; below, the update is begun from
+# scratch, which costs time alone (docs/inference.md, Sampler).
+_FEWEST = 0.25
+_HOPELESS = 0.05
+_LEAST_SPREAD = 0.7
+
+_WORST_TAIL = 0.7  # Vehtari et al. 2024, see `tail_index`
+
+
+def refresh(
+    tests: Sequence[ModalTest],
+    model: Model,
+    known: Posterior,
+    options: UpdateOptions | None = None,
+    progress: Progress = silent,
+) -> Posterior:
+    """The posterior of `model` given `tests` alone, found from a `known` one of the same class.
+
+    The same posterior as that of `update`, within Monte Carlo error, for less work; the
+    same seed, tests and known posterior give the same draws. `options.method` counts where it
+    comes to a start from scratch. Raises UsageError where the known posterior is of another class,
+    BadInput as `update` does.
+    """
+    options = options or UpdateOptions()
+    _refuse_stranger(model, known)
+    if reading_of(tests) is not None:  # rare, and to be held against what frequencies alone say
+        return update(tests, model, options, progress)
+    problem = Problem.of(tests, model, options.repeat, progress, options.calibration)
+    started = time.perf_counter()
+    rng = np.random.default_rng(options.seed)
+    progress(model.name, 0.0)
+    method, weighted = _found(problem, known, options.samples, rng, progress)
+    if weighted is None:
+        fresh = update(tests, model, options, progress)
+        spent, seconds = problem.evaluations, time.perf_counter() - started
+        return replace(fresh, evaluations=fresh.evaluations + spent, seconds=seconds)
+    progress(model.name, 1.0)
+    return posterior_of(problem, weighted, tests, options, rng, started, method)
+
+
+def _refuse_stranger(model: Model, known: Posterior) -> None:
+    if known.model != model.name or known.names[:-1] != model.parameter_names:
+        raise UsageError(
+            f"a known posterior of model class {known.model} says nothing about {model.name}.",
+            remedy="Give one of the same class, or use `update`.",
+        )
+
+
+def _found(
+    problem: Problem, known: Posterior, samples: int, rng: np.random.Generator, progress: Progress
+) -> tuple[str, Weighted | None]:
+    """The first way whose draws can be trusted, and these; None where none can."""
+    anchors = search(problem, rng)
+    progress(problem.model.name, 0.2)
+    population, wide = _population(problem, known, anchors, rng)
+    weighted = weigh(problem, population, anchors, ENOUGH * samples, rng, [wide])
+    if trusted(weighted, samples):
+        return RE_WEIGHTED, weighted
+    # An ensemble that starts from next to nothing costs more than it saves.
+    if weighted.effective_sample_size < _HOPELESS * samples:
+        return RE_WEIGHTED, None
+    progress(problem.model.name, 0.5)
+    chain = _ensemble(problem, weighted, population, rng)
+    weighted = weigh(problem, chain, anchors, ENOUGH * samples, rng, [wide])
+    agrees = trusted(weighted, samples) and _as_wide(weighted, chain, samples, rng)
+    return ENSEMBLE, weighted if agrees else None
+
+
+def _population(
+    problem: Problem, known: Posterior, anchors: Anchors, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Points (n, d) about where the new posterior is, and wider ones.
+
+    Draws of the known posterior and of the prior, both carried to the new data, and some around
+    each anchor. The known draws would not do alone: a valley that the old data closed and the new
+    ones open has none of them.
+    """
+    noise = _NOISE * float(anchors.sigma[0])
+    known_z = _places(problem, known)
+    chosen = known_z[rng.permutation(len(known_z))[:_KNOWN]]
+    fresh = problem.coordinates.draw_prior(_FRESH, rng)
+    near = [normal.draw_t(_FROM_EACH_ANCHOR, rng) for normal in anchors.normals(0.0)]
+    population = np.vstack(
+        [
+            carried(problem, chosen, noise, rng, _KNOWN_STEPS),
+            carried(problem, fresh, noise, rng, _FRESH_STEPS),
+            problem.coordinates.fold(np.vstack(near)),
+        ]
+    )
+    density = problem.log_posterior(problem.evaluate(population))
+    population = population[density > density.max() - FARTHEST]
+    wide = carried(problem, population, _WIDE_NOISE / _NOISE * noise, rng, _WIDE_STEPS)
+    return population, wide
+
+
+def _places(problem: Problem, known: Posterior) -> FloatArray:
+    """The known draws as points (n, d), folded."""
+    return problem.coordinates.places(known.samples[:, :-1])
+
+
+def trusted(weighted: Weighted, samples: int) -> bool:
+    """Whether the effective draws are enough for `samples`, and the weights' tail light enough."""
+    if weighted.effective_sample_size < _FEWEST * samples:
+        return False
+    return tail_index(weighted.log_weights) <= _WORST_TAIL
+
+
+def _as_wide(weighted: Weighted, chain: FloatArray, samples: int, rng: np.random.Generator) -> bool:
+    """Whether the weighted draws spread in each direction as the ensemble's points (n, d) do."""
+    spread = weighted.resampled(samples, rng).z.std(axis=0) / chain.std(axis=0)
+    return bool(spread.min() > _LEAST_SPREAD)
+
+
+def tail_index(log_weights: FloatArray) -> float:
+    """Shape k of the generalised Pareto distribution of the largest weights (n,).
+
+    Above 0.7 the mean of the weights converges too slowly to be used (Vehtari, Simpson, Gelman,
+    Yao and Gabry 2024, J. Mach. Learn. Res. 25(72)). The fit is that of Zhang and Stephens (2009),
+    drawn to 0.5 as Vehtari et al. do.
+    """
+    weights = np.sort(np.exp(log_weights - log_weights.max()))
+    tail = int(min(len(weights) / 5, 3 * np.sqrt(len(weights))))
+    excess = weights[-tail:] - weights[-tail - 1]
+    tries = np.arange(1, 31 + int(np.sqrt(tail)))
+    quartile = excess[int(tail / 4 + 0.5) - 1]
+    theta = 1 / excess[-1] + (1 - np.sqrt(tries[-1] / (tries - 0.5))) / (3 * quartile)
+    shape = np.log1p(-theta[:, None] * excess).mean(axis=1)
+    log_likelihood = tail * (np.log(-theta / shape) - shape - 1)
+    share = np.exp(log_likelihood - log_likelihood.max())
+    best = (theta * share).sum() / share.sum()
+    k = np.log1p(-best * excess).mean()
+    return float((tail * k + 5) / (tail + 10))
+
+
+def _ensemble(
+    problem: Problem, weighted: Weighted, population: FloatArray, rng: np.random.Generator
+) -> FloatArray:
+    """Points (n, d) of the posterior by emcee, started from the best draws and the population."""
+    # Its moves load all of scipy.stats, and most posteriors need none of them.
+    from emcee import EnsembleSampler
+    from emcee.moves import DEMove, KDEMove
+
+    lots = weighted.log_weights + rng.gumbel(size=len(weighted.log_weights))
+    drawn = weighted.points.z[np.argsort(-lots)[: _WALKERS - _WALKERS // 2]]
+    chosen = rng.permutation(len(population))[: _WALKERS // 2]
+    start = np.vstack([drawn, population[chosen]])
+    start = start[: len(start) // 2 * 2]
+
+    def log_posterior(z: FloatArray) -> FloatArray:
+        found = problem.coordinates.log_prior(z)
+        inside = np.isfinite(found)
+        points = problem.evaluate(z[inside])
+        found[inside] += problem.likelihood.marginal(points.predicted)
+        return found
+
+    sampler = EnsembleSampler(
+        len(start),
+        problem.dimension,
+        log_posterior,
+        moves=[(DEMove(), 0.8), (KDEMove(), 0.2)],
+        vectorize=True,
+    )
+    sampler.random_state = np.random.RandomState(rng.integers(2**32)).get_state()
+    sampler.run_mcmc(start, _STEPS, skip_initial_state_check=True)
+    return np.asarray(sampler.get_chain(discard=_STEPS // 3, thin=_THINNED, flat=True))

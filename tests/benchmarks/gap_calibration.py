@@ -36,12 +36,11 @@ from shm.blind.scoring.marks import LARGE
 from shm.blind.solving import identify_tests
 from shm.bridge import load_hanger
 from shm.errors import ShmError
-from shm.gap.attribution import Attribution, second_cause
-from shm.gap.calibration import CALIBRATION, FILE, Calibration, Provenance, Share
+from shm.gap.attribution import Attribution
 from shm.gap.contract import Fit, GapOptions
 from shm.gap.data_checks import usable
-from shm.gap.law_error import allowances, by_its_laws
-from shm.gap.model_probabilities import log_prior
+from shm.gap.law_error import allowances, by_its_laws, second_cause
+from shm.gap.model_probabilities import CALIBRATION, FILE, Calibration, Provenance, Share, log_prior
 from shm.gap.observations import observed
 from shm.gap.outlier_removal import Cleared, cleared
 from shm.gap.problem import GapProblem
@@ -263,7 +262,7 @@ def text(told: Calibration) -> str:
     rough = "\n".join(
         f"    {{ fraction = {f:g}, share = {share:.4g} }}," for f, share in told.where_rough.items()
     )
-    return f"""# What trials on simulated hangers taught the gap diagnosis; `shm/gap/calibration.py` reads it.
+    return f"""# What trials on simulated hangers taught the gap diagnosis; `shm/gap/model_probabilities.py` reads it.
 # `python tests/benchmarks/gap_calibration.py` runs the trial and writes this file anew.
 
 [provenance]

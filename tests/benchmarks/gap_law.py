@@ -29,9 +29,9 @@ sys.path.insert(0, str(ROOT))
 
 import tests.worlds.finite_elements as world  # noqa: E402
 from shm.gap import GapOptions, diagnose  # noqa: E402
-from shm.gap.attribution import _beyond  # noqa: E402
 from shm.gap.contract import Hypothesis  # noqa: E402
 from shm.gap.fit import baseline_fit  # noqa: E402
+from shm.gap.law_error import _beyond  # noqa: E402
 from shm.gap.observations import observed  # noqa: E402
 from shm.gap.problem import GapProblem  # noqa: E402
 from shm.values import FloatArray, Hanger, LawTerm, ModalTest  # noqa: E402

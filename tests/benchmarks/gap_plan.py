@@ -16,6 +16,7 @@ import argparse
 import json
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -32,8 +33,8 @@ from shm.gap.measurement_plan import (  # noqa: E402
     ENOUGH,
     Race,
     _offered,
-    chance_of,
     chances,
+    holds,
     log_odds_of,
     planned,
 )
@@ -123,6 +124,11 @@ class Known:
         scatter = replace(self.hanger.scatter, tension=UNKNOWN_READING_SD)
         weighed = replace(self.hanger, nominal_tension_n=read_n, scatter=scatter)
         return replace(self, hanger=weighed, tests=tests)
+
+
+def chance_of(cause: str, among: Mapping[str, float]) -> float:
+    """The probability of all explanations that name a cause."""
+    return sum(chance for name, chance in among.items() if holds(name, cause))
 
 
 def plan_of(design: Design, before: tuple[ModalTest, ...]) -> OneTest:

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from shm.gap.attribution import Attribution, Explanation, attributed, hardly_behind, more_thorough
-from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import GapOptions, Hypothesis
-from shm.gap.model_probabilities import ScoredHypothesis
+from shm.gap.model_probabilities import CALIBRATION, ScoredHypothesis
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign

@@ -11,9 +11,9 @@ import pytest
 
 from shm.blind.making import make_trial
 from shm.errors import BadInput
-from shm.gap.calibration import CALIBRATION, FILE, Calibration, Provenance, read_calibration
 from shm.gap.contract import Hypothesis
 from shm.gap.fit import baseline_fit, fitted
+from shm.gap.model_probabilities import CALIBRATION, FILE, Calibration, Provenance, read_calibration
 from shm.models.effects import EFFECTS, Variant
 from tests.benchmarks.gap_calibration import (
     Lesson,

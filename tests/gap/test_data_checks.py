@@ -167,12 +167,20 @@ def test_shapes_without_standard_deviation_are_said() -> None:
     assert remark.startswith("1 of 2 points of mode shapes have no standard deviation")
 
 
+def _with_sensor(x_m: float) -> ModalTest:
+    test = _test()
+    shaped = replace(test.modes[0], shape=(ShapePoint(x_m, 1.0),))
+    return replace(test, modes=(shaped, *test.modes[1:]))
+
+
 @pytest.mark.parametrize(
     ("tests", "said"),
     [
         ([_test("t1"), _test("t1")], "test id t1 is given 2 times"),
         ([replace(_test(), hanger=4)], "is of hanger 4, not of 3"),
         ([replace(_test(), added_mass=AddedMass(25.0, 13.0))], "added mass at 13 m is beyond"),
+        ([_with_sensor(13.0)], "a sensor of transverse 1 at 13 m is beyond"),
+        ([_with_sensor(-0.01)], "a sensor of transverse 1 at -0.01 m is beyond"),
         ([replace(_test(), modes=())], "no test holds a mode"),
     ],
 )

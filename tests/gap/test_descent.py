@@ -18,8 +18,7 @@ from shm.gap.coordinates import Branch, Coordinates
 from shm.gap.fit import fitted
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import nodes
-from shm.gap.objective import Landscape
-from shm.gap.optimiser import Optimum, optima
+from shm.gap.optimiser import Landscape, Optimum, optima
 from shm.models.effects import Parameter
 from shm.values import FloatArray, Scatter
 from tests.gap import linear_toy as toy

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.gap.discrepancy import flexible_nodes
-from shm.gap.noise import nodes
+from shm.gap.noise import flexible_nodes, nodes
 from tests.gap import linear_toy as toy
 
 SEEDS = pytest.mark.parametrize(

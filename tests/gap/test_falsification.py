@@ -7,10 +7,10 @@ import pytest
 from scipy.stats import norm
 
 from shm.gap.contract import Hypothesis
-from shm.gap.falsification import Bounds, error_bounds
 from shm.gap.fit import baseline_fit
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
+from shm.gap.residuals import Bounds, error_bounds
 from tests.helpers.gap_campaigns import campaign
 from tests.helpers.hangers import HANGER_3
 

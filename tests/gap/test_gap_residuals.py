@@ -27,6 +27,11 @@ def toy(gap, conditions=None, modes=MODES, noise=0.0, seed=1):
     )
 
 
+def nothing(problem):
+    """Of which nothing is held out."""
+    return HeldOut(*np.empty((2, 0, problem.design.frequencies)))
+
+
 def warmer(design):
     return (
         2e-4 * np.array([c.temperature_shift_k for c in design.conditions])[design.frequency_test]
@@ -35,7 +40,7 @@ def warmer(design):
 
 def test_shares_of_the_misfit_add_to_one_and_go_with_the_squares():
     problem = toy(lambda design: 0.01 * (design.frequency_order == 4))
-    found = residuals(problem, problem.fit(), None, None)
+    found = residuals(problem, problem.fit(), None, nothing(problem))
     share = np.array([each.share for each in found])
     percent = np.array([each.residual_percent for each in found])
     assert share.sum() == pytest.approx(1)
@@ -45,7 +50,7 @@ def test_shares_of_the_misfit_add_to_one_and_go_with_the_squares():
 
 def test_a_residual_is_measured_over_predicted_less_one_in_the_order_of_the_data():
     problem = toy(lambda design: 0.01 * (design.frequency_order == 4))
-    first = residuals(problem, problem.fit(), None, None)[3]
+    first = residuals(problem, problem.fit(), None, nothing(problem))[3]
     assert (first.test, first.plane, first.order) == ("t1", "transverse", 4)
     expected = 100 * (first.measured_hz / first.predicted_hz - 1)
     assert first.residual_percent == pytest.approx(expected)
@@ -56,7 +61,7 @@ def test_z_is_that_of_a_datum_against_the_prediction_from_all_others():
     """z = (y - mean of the others) / sqrt(sd^2 + var of that mean) where one mean is free."""
     problem = toy(lambda design: 0.01 * (design.frequency_order == 1), modes=[(0, 1), (0, 2)])
     value = problem.observations.value
-    found = residuals(problem, problem.fit(), None, None)
+    found = residuals(problem, problem.fit(), None, nothing(problem))
     for i, each in enumerate(found):
         others = np.delete(value, i)
         apart = (value[i] - others.mean()) / np.sqrt(SD**2 + SD**2 / len(others))
@@ -67,14 +72,16 @@ def test_the_z_of_pure_noise_is_standard_normal():
     squares = []
     for seed in range(40):
         problem = toy(lambda design: np.zeros(design.size), noise=SD, seed=seed)
-        squares += [each.z**2 for each in residuals(problem, problem.fit(), None, None)]
+        squares += [each.z**2 for each in residuals(problem, problem.fit(), None, nothing(problem))]
     assert np.mean(squares) == pytest.approx(1, abs=0.1)
 
 
 def test_a_model_error_that_swallows_the_gap_does_not_hide_it():
     problem = toy(lambda design: 0.01 * (design.frequency_order == 4))
     fits = problem.fit(), problem.fit(model_error=0.01)
-    plain, swallowed = (max(r.z for r in residuals(problem, fit, None, None)) for fit in fits)
+    plain, swallowed = (
+        max(r.z for r in residuals(problem, fit, None, nothing(problem))) for fit in fits
+    )
     assert swallowed > 0.9 * plain > 7
 
 

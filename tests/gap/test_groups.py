@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.gap.groups import expected_log_bayes_factor, grouped
+from shm.gap.attribution import expected_log_bayes_factor, grouped
 from tests.gap import linear_toy as toy
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shm.errors import UsageError
-from shm.gap.hypotheses import hypotheses, invisible
+from shm.gap.fit import hypotheses, invisible
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS

@@ -6,8 +6,7 @@ from itertools import combinations
 
 import pytest
 
-from shm.gap.calibration import CALIBRATION
-from shm.gap.model_probabilities import EVEN, imitation
+from shm.gap.model_probabilities import CALIBRATION, EVEN, imitation
 from shm.models.effects import EFFECTS
 
 

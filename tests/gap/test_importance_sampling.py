@@ -18,7 +18,7 @@ from shm.gap.importance_sampling import sampled
 from shm.gap.noise import nodes
 from shm.gap.problem import GapProblem
 from shm.gap.proposal_distribution import Proposal
-from shm.inference.tmcmc import normalised
+from shm.inference.mixture import normalised
 from shm.models.effects import Variant
 from shm.values import ENOUGH_EFFECTIVE, FloatArray
 from tests.helpers.gap_campaigns import campaign, problem_of

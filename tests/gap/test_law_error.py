@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.law_error import ByLaws, by_its_laws
+from shm.gap.model_probabilities import CALIBRATION
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import predictions, predictive_p_value

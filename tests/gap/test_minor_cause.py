@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.attribution import without_minor_cause
-from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
-from shm.gap.model_probabilities import ScoredHypothesis, families
+from shm.gap.law_error import without_minor_cause
+from shm.gap.model_probabilities import CALIBRATION, ScoredHypothesis, families
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import Variant

@@ -11,10 +11,17 @@ import pytest
 from scipy import stats
 
 from shm.gap import GapOptions, diagnose, outliers
-from shm.gap.alone import acts_alone
 from shm.gap.fit import baseline_fit
 from shm.gap.observations import observed
-from shm.gap.outliers import FREEDOM, GROSS_ERROR, SURE, left_out, log_gross, log_ordinary
+from shm.gap.outliers import (
+    FREEDOM,
+    GROSS_ERROR,
+    SURE,
+    acts_alone,
+    left_out,
+    log_gross,
+    log_ordinary,
+)
 from shm.gap.problem import GapProblem
 from shm.report.diagnosis_wording import Answer, answer
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, Reality, campaign

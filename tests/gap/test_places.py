@@ -8,8 +8,8 @@ import pytest
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.diagnose import places
 from shm.gap.fit import fitted
-from shm.gap.misfit import Change, Misfit
 from shm.gap.observations import observed
+from shm.gap.places import Change, Misfit
 from shm.gap.problem import GapProblem
 from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
 from tests.helpers.hangers import HANGER_3

@@ -8,9 +8,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from shm.gap.law_terms import terms_of
 from shm.gap.noise import same_mode
-from shm.gap.remainder import Left, like_tension, with_law
+from shm.gap.remainder import Left, like_tension, terms_of, with_law
 from shm.models.effects import Conditions
 from shm.values import NAN, PLANES, FloatArray, Remainder
 from tests.helpers.hangers import HANGER_3

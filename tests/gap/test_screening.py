@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shm.gap.contract import Hypothesis
-from shm.gap.hypotheses import varied
+from shm.gap.fit import varied
 from shm.gap.model_probabilities import ScoredHypothesis
 from shm.models.effects import Variant
 

@@ -10,9 +10,10 @@ import pytest
 from scipy.special import logsumexp
 
 from shm.gap import search as searching
-from shm.gap.contract import GapOptions, Hypothesis, silent
+from shm.gap.contract import GapOptions, Hypothesis
 from shm.gap.model_probabilities import ScoredHypothesis, log_prior
 from shm.gap.search import Search
+from shm.inference.options import silent
 from shm.models.effects import EFFECTS, Variant
 from tests.helpers.gap_campaigns import campaign, problem_of
 

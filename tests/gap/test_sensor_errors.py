@@ -10,7 +10,7 @@ import pytest
 from shm.gap.fit import baseline_fit
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
-from shm.gap.sensor_errors import sensor_remarks
+from shm.gap.residuals import sensor_remarks
 from shm.simulate import CampaignPlan, HangerState, campaign
 from shm.values import Hanger, ModalTest, Scatter
 from tests.helpers.hangers import HANGER_3

@@ -9,7 +9,6 @@ import pytest
 
 from shm.gap.noise import nodes
 from shm.gap.observations import observed, told_apart
-from shm.gap.outliers import without_shape
 from shm.gap.problem import GapProblem
 from shm.gap.repeated_errors import turn_loads
 from shm.simulate import CampaignPlan, HangerState, campaign
@@ -91,7 +90,7 @@ def test_without_the_shape_of_one_mode_the_others_may_still_be_turned(test: Moda
     first, *rest = (_may_be_turned(mode, 0.3) for mode in test.modes)
     turned = replace(test, modes=(first, *rest))
     whole = GapProblem(HANGER_3, "beam1", observed([turned], HANGER_3))
-    without = without_shape(whole, 0).observations
+    without = whole.without_shape(0).observations
     others = whole.observations.design.shape_mode != 0
     _, _, *of_others = turn_loads(whole.observations)[others].T
     # A sum over fewer components rounds otherwise; what is no load of a mode is 0 in both.

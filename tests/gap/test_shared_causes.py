@@ -14,8 +14,7 @@ from shm.documents import dump
 from shm.errors import UsageError
 from shm.gap import GapOptions, diagnose_bridge
 from shm.gap.bridge_diagnosis import jointly
-from shm.gap.kin import kin
-from shm.gap.shared_causes import two_at_least
+from shm.gap.shared_causes import kin, two_at_least
 from shm.gap.shared_evidence import Evidence, Faint, Patient, Place, Reach
 from shm.models.effects import EFFECTS, Variant
 from shm.report.as_text import as_text

@@ -9,8 +9,7 @@ import pytest
 from scipy import stats
 from scipy.special import logsumexp
 
-from shm.inference.mixture import Pool
-from shm.inference.tmcmc import effective, normalised
+from shm.inference.mixture import Pool, effective, normalised
 from shm.values import FloatArray
 
 

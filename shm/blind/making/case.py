@@ -250,10 +250,7 @@ PLANS: dict[Richness, CampaignPlan] = {
 _SIZES, _SIZES_OF_A_PAIR = (1.0, 1000.0), (8.0, 100.0)
 """Up to what real hangers show: a few percent of frequencies that are known to 1e-4."""
 _ABOUT = 1.1  # judgement: a size is drawn log-uniform over decades, so a tenth more is that size
-_WEAK = (
-    0.02,
-    0.2,
-)  # judgement: the weak end of a range without its edge, which no interval holds
+_WEAK = (0.02, 0.2)  # judgement: the weak end of a range without its edge, which no interval holds
 _OF_SENSORS = ("sensor_mass", "sensor_misalignment", "skewed_principal_axes")
 """Not planted without shapes: then nobody knows where the sensors sit or what they see across."""
 _OF_LEVELS = ("geometric_hardening", "joint_softening")

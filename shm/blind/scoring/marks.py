@@ -69,7 +69,11 @@ def _marks(question: Question, cases: Sequence[CaseScore], rng: np.random.Genera
     overall = _mark(question, _estimate(question, mine, rng).score, question.overall)
     by_richness = [_of_richness(question, mine, each, rng) for each in get_args(Richness)]
     by_way = _by_way(question, mine, rng) if question.better else []
-    by_effect = _by_effect(question, mine, rng) if _is_by_effect(question) else []
+    by_effect = (
+        _by_effect(question, mine, rng)
+        if question.name in BY_EFFECT and question.above == LARGE
+        else []
+    )
     return [overall, *by_richness, *by_way, *by_effect]
 
 
@@ -105,10 +109,6 @@ def _by_way(question: Question, cases: Sequence[CaseScore], rng: np.random.Gener
         replace(_mark(question, recordings.score, Bounds()), way="recordings"),
         replace(lost, way="recordings less modes"),
     ]
-
-
-def _is_by_effect(question: Question) -> bool:
-    return question.name in BY_EFFECT and question.above == LARGE
 
 
 def _by_effect(
