@@ -24,24 +24,22 @@ from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.middleware import Pages
 from shm_daemon.web.other_bridges import OtherBridges
 from shm_daemon.web.pages import (
-    accounts,
     alerts,
-    audit,
     baseline,
     bridge,
     bridges,
     comparison,
     downloads,
     hanger,
-    health,
-    held,
     notes,
     one_test,
+    operation,
     sensors,
     settings,
-    single_sign_on,
+    signing_in,
     static,
     upload,
+    users,
 )
 from shm_daemon.web.site import Site
 
@@ -53,14 +51,13 @@ _PARTS = (
     hangers,
     alerts,
     metrics,
-    accounts,
-    single_sign_on,
+    signing_in,
+    users,
     static,
     bridge,
     bridges,
     comparison,
-    health,
-    held,
+    operation,
     sensors,
     tests,
     one_test,
@@ -69,7 +66,6 @@ _PARTS = (
     baseline,
     downloads,
     notes,
-    audit,
     settings,
 )
 """What answers, asked in this order."""
@@ -94,7 +90,7 @@ def load_pages(site: Site) -> Pages:
     app.state.site = site
     app.state.background_worker = BackgroundWorker()
     app.state.ordered_baselines = baseline.Ordered()
-    app.state.sign_ons = single_sign_on.SignOns()
+    app.state.sign_ons = signing_in.SignOns()
     app.state.other_bridges = OtherBridges()
     app.state.exposition = Exposition(watching_site)
     handle_faults(app)

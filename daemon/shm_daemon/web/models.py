@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol, TypeVar
 
+from fastapi import Path, Query
 from pydantic import AfterValidator, BaseModel, Field
 
 
@@ -22,7 +24,26 @@ MOST_ROWS = 1000
 LARGEST_NUMBER = 2**31 - 1
 """Of the store's integers: PostgreSQL refuses larger ones."""
 
+Row = Annotated[int, Path(ge=0, le=LARGEST_NUMBER)]
+"""The number of a row of the store, in an address."""
+Before = Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)]
+"""The number of the row to go on after."""
 Written = Annotated[str, Field(max_length=MOST_WRITTEN), AfterValidator(_written)]
+
+
+class Numbered(Protocol):
+    """A row by whose number one can go on."""
+
+    @property
+    def id(self) -> int: ...
+
+
+Listed = TypeVar("Listed", bound=Numbered)
+
+
+def paged(rows: Sequence[Listed], most: int) -> tuple[Sequence[Listed], int | None]:
+    """The first `most` of rows, of which one more was asked for; and `before` of the next page."""
+    return rows[:most], rows[most - 1].id if len(rows) > most else None
 
 
 class Uploaded(BaseModel):
