@@ -18,7 +18,7 @@ from shm_daemon.web import hanger_numbers, hangers, metrics, recordings, tests
 from shm_daemon.web.access import Reader
 from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.bridge_view import glance
-from shm_daemon.web.faults import handle_faults
+from shm_daemon.web.faults import answers, handle_faults
 from shm_daemon.web.frame import prepare_templates
 from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.middleware import Pages
@@ -50,7 +50,6 @@ _PARTS = (
     upload,
     hangers,
     alerts,
-    metrics,
     signing_in,
     users,
     static,
@@ -94,8 +93,9 @@ def load_pages(site: Site) -> Pages:
     app.state.other_bridges = OtherBridges()
     app.state.exposition = Exposition(watching_site)
     handle_faults(app)
+    app.include_router(metrics.router)
     for part in _PARTS:
-        app.include_router(part.router)
+        app.include_router(part.router, responses=answers(400, 401, 403, 503))
     app.include_router(_described)
 
     def close() -> None:

@@ -93,10 +93,6 @@ class Compared:
     why_not: str = ""
 
     @property
-    def size_bytes(self) -> int:
-        return 2000 * len(self.pattern.rows) if self.pattern else 100
-
-    @property
     def sentence(self) -> str:
         if self.pattern is None:
             return f"Over the bridge nothing can be compared: {self.why_not}"

@@ -194,7 +194,7 @@ router = APIRouter(prefix="/api/hangers/{hanger_id}", tags=["hangers"])
 @router.get(
     "/trend",
     response_model=HangerTrend,
-    responses=answers(400, 401, 403, 404, 422, 503),
+    responses=answers(404, 422),
     summary="Tension and end stiffness over time",
 )
 def trend(
@@ -227,7 +227,7 @@ def trend(
 @router.get(
     "/tests",
     response_model=HangerTests,
-    responses=answers(400, 401, 403, 404, 422, 503),
+    responses=answers(404, 422),
     summary="The tests of a hanger",
 )
 def some_tests(
@@ -253,7 +253,7 @@ def some_tests(
 @router.get(
     "/figures/{name}",
     response_model=FigureDocument,
-    responses=answers(400, 401, 403, 404, 422, 503),
+    responses=answers(404, 422),
     summary="A figure of the hanger's page",
 )
 def figure(

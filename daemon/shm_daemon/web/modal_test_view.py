@@ -246,22 +246,6 @@ class WorkedOut:
     conditions: Table
     figures: Mapping[str, bytes]
 
-    @property
-    def size_bytes(self) -> int:
-        found, documents = self.sheet.identification, self.figures.values()
-        arrays: list[np.ndarray[Any, Any]] = [
-            found.poles.order,
-            found.poles.frequency_hz,
-            found.poles.damping_ratio,
-        ]
-        if found.fit is not None:
-            arrays.append(found.fit)
-        if found.frequency_response is not None:
-            arrays.append(found.frequency_response.accelerance)
-        if self.spectrum is not None:
-            arrays.append(self.spectrum.values)
-        return sum(array.nbytes for array in arrays) + sum(map(len, documents))
-
 
 @dataclass(frozen=True)
 class ModalTestOrder:

@@ -90,7 +90,7 @@ def described_by(
     "",
     status_code=202,
     response_model=Uploaded,
-    responses=answers(400, 401, 403, 408, 413, 415, 422, 503),
+    responses=answers(408, 413, 415, 422),
     openapi_extra=PLAIN_BODY,
     summary="Upload a recording",
 )
@@ -137,7 +137,7 @@ async def upload(
 @_of_uploads.get(
     "/{key}",
     response_model=RecordingStatus,
-    responses=answers(400, 401, 403, 404, 422, 503),
+    responses=answers(404, 422),
     summary="How far a recording has come",
 )
 def status(
@@ -154,7 +154,7 @@ def status(
 @_of_uploads.get(
     "",
     response_model=Recordings,
-    responses=answers(400, 401, 403, 422, 503),
+    responses=answers(422),
     summary="The recording of a checksum",
 )
 def recordings(
@@ -327,7 +327,7 @@ class _Body:
     "/{name}/chunks",
     status_code=202,
     response_model=AcknowledgedChunk,
-    responses=answers(400, 401, 403, 408, 409, 413, 415, 422, 503),
+    responses=answers(408, 409, 413, 415, 422),
     openapi_extra=PLAIN_BODY,
     summary="Send a chunk of a stream",
 )

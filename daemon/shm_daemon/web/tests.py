@@ -245,7 +245,7 @@ class PlotlyFigure(BaseModel):
 
 
 # Statuses as RFC 9110 defines them.
-_FAULTS = answers(400, 401, 403, 404, 422, 503)
+_FAULTS = answers(404, 422)
 _LATER: dict[int | str, dict[str, Any]] = {
     202: {"model": Waiting, "description": "It is being worked out; `Retry-After` says how long."}
 }

@@ -140,7 +140,7 @@ def _stream_of(alert: AlertRow, site: Site) -> str | None:
 @router.get(
     "/api/alerts",
     response_model=Alerts,
-    responses=answers(400, 401, 403, 422, 503),
+    responses=answers(422),
     summary="Alerts that were raised",
 )
 def alerts(
@@ -177,7 +177,7 @@ def alerts(
 @router.post(
     "/api/alerts/{alert_id}/acknowledgement",
     response_model=AlertState,
-    responses=answers(400, 401, 403, 404, 409, 422, 503),
+    responses=answers(404, 409, 422),
     summary="Take note of an alert",
 )
 def acknowledge(

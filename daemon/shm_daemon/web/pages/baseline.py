@@ -36,7 +36,6 @@ class Told:
 
     warning: str
     sentences: tuple[str, ...]
-    size_bytes: int = 1000
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ def compare_page(
 @router.get(
     "/api/compare/figure",
     response_model=FigureDocument,
-    responses=answers(400, 401, 403, 404, 422, 503),
+    responses=answers(404, 422),
     summary="Hangers on one time axis",
 )
 def compare_figure(

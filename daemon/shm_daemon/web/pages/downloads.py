@@ -39,17 +39,6 @@ _COLUMNS = (
 
 
 @dataclass(frozen=True)
-class ReportFile:
-    """A report as it is sent."""
-
-    content: bytes
-
-    @property
-    def size_bytes(self) -> int:
-        return len(self.content)
-
-
-@dataclass(frozen=True)
 class ReportOrder:
     """A report to be made in a process of its own: of which hanger, in which minute."""
 
@@ -58,17 +47,17 @@ class ReportOrder:
     form: Literal["pdf", "html"]
     minute: int
 
-    def make(self) -> ReportFile:
+    def make(self) -> bytes:
         workspace = Workspace.open(self.folder)
         with workspace.store() as store:
             paper = hanger_paper(hanger_report(workspace, store, self.hanger, utc_now()))
         if self.form == "pdf":
             from shm.report.as_pdf import as_pdf
 
-            return ReportFile(as_pdf(paper))
+            return as_pdf(paper)
         from shm.report.as_html import as_html
 
-        return ReportFile(as_html(paper).encode())
+        return as_html(paper).encode()
 
 
 @router.get("/hangers/{hanger_id}/report.{form}")
@@ -80,7 +69,7 @@ def report(
     minute = int(time.time() // _FRESH_S)
     order = ReportOrder(site.workspace.folder, hanger_id, form, minute)
     made = _awaited(background_worker_of(request), order)
-    return _file(made.content, f"hanger{hanger_id}.{form}", _TYPES[form])
+    return _file(made, f"hanger{hanger_id}.{form}", _TYPES[form])
 
 
 @router.get("/hangers/{hanger_id}/results.csv")
@@ -102,7 +91,7 @@ def _refuse_untested(store: Store, hanger: Hanger) -> None:
         )
 
 
-def _awaited(worker: BackgroundWorker[ReportFile], order: ReportOrder) -> ReportFile:
+def _awaited(worker: BackgroundWorker[bytes], order: ReportOrder) -> bytes:
     ends_at = time.monotonic() + _LONGEST_S
     while (made := worker.wanted(order)) is None:
         if time.monotonic() > ends_at:

@@ -28,7 +28,6 @@ from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
-from shm_daemon.web.faults import answers
 from shm_daemon.web.forms import Form, reason_in, time_in
 from shm_daemon.web.frame import page
 from shm_daemon.web.hangers import quarantined
@@ -60,25 +59,14 @@ _OTHER_STAGE = "at a stage that this version of shm does not know"
 
 
 @dataclass(frozen=True)
-class Examined:
-    """What the checks found."""
-
-    findings: tuple[Finding, ...]
-
-    @property
-    def size_bytes(self) -> int:
-        return sum(len(each.found) + len(each.remedy) + 200 for each in self.findings)
-
-
-@dataclass(frozen=True)
 class Examine:
     """An order to look at everything, good for some minutes: a large store takes seconds."""
 
     folder: Path
     minutes: int
 
-    def make(self) -> Examined:
-        return Examined(examine(self.folder, utc_now()))
+    def make(self) -> tuple[Finding, ...]:
+        return examine(self.folder, utc_now())
 
 
 @router.get("/operation", include_in_schema=False)
@@ -129,12 +117,7 @@ def examination_fragment(request: Request, site: AtSite, _: Reader) -> Response:
     return page(request, "examination.html.j2", examination=found)
 
 
-@router.get(
-    "/api/operation",
-    response_model=Operation,
-    responses=answers(400, 401, 403, 503),
-    summary="Whether the work flows",
-)
+@router.get("/api/operation", response_model=Operation, summary="Whether the work flows")
 def operation(site: AtSite, _: Reader) -> Any:
     """Daemon, queue, quarantine, disk and versions."""
     return _operation(site)
@@ -143,7 +126,7 @@ def operation(site: AtSite, _: Reader) -> Any:
 @router.get(
     "/api/operation/examination",
     response_model=Examination,
-    responses={202: {"model": Underway}, **answers(400, 401, 403, 503)},
+    responses={202: {"model": Underway}},
     summary="All checks of `shm doctor`",
 )
 def examination(request: Request, site: AtSite, _: Reader) -> Any:
@@ -258,10 +241,10 @@ def _examination(request: Request, site: Site) -> Table | None:
 def _examined(request: Request, site: Site) -> tuple[Finding, ...] | None:
     order = Examine(site.workspace.folder, int(utc_now().timestamp() // _FRESH_S))
     try:
-        found = background_worker_of(request).wanted(order)
+        found: tuple[Finding, ...] | None = background_worker_of(request).wanted(order)
     except ShmError as error:
         return (Finding("examination", Level.UNKNOWN, error.message, error.remedy),)
-    return None if found is None else found.findings
+    return found
 
 
 def _underway() -> JSONResponse:

@@ -91,7 +91,7 @@ def stream_page(
     )
 
 
-@router.get("/api/streams", responses=answers(400, 401, 403, 503), summary="Permanent sensors")
+@router.get("/api/streams", summary="Permanent sensors")
 def streams(site: AtSite, _: Reader) -> Any:
     """Each stream: whether it is live, its lag, what it lost, what its last window said."""
     return JSONResponse(plain({"streams": [_document(each, site) for each in _states(site)]}))
@@ -100,7 +100,7 @@ def streams(site: AtSite, _: Reader) -> Any:
 @router.get(
     "/api/streams/{name}/figure",
     response_model=FigureDocument,
-    responses=answers(400, 401, 403, 404, 422, 503),
+    responses=answers(404, 422),
     summary="What a stream has shown",
 )
 def stream_figure(site: AtSite, _: Reader, name: Name, days: Days = 7.0) -> JSONResponse:

@@ -101,7 +101,7 @@ class ImportLook(BaseModel):
 @_of_imports.post(
     "",
     response_model=ImportLook,
-    responses=answers(400, 401, 403, 408, 409, 413, 415, 422, 503),
+    responses=answers(408, 409, 413, 415, 422),
     openapi_extra=PLAIN_BODY,
     summary="Import the first file of a logger",
 )
