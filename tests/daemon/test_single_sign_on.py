@@ -21,7 +21,7 @@ from shm.pipeline import utc_now
 from shm.store import Workspace
 from shm.store.people import Role
 from shm_daemon.doctor import examine
-from shm_daemon.doctor.checks import Level
+from shm_daemon.doctor_checks import Level
 from shm_daemon.web.access import COOKIE
 from shm_daemon.web.address import Address
 from shm_daemon.web.pages import signing_in

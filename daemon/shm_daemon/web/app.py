@@ -14,12 +14,11 @@ from fastapi.responses import JSONResponse
 import shm
 from shm.errors import ShmError
 from shm.pipeline import utc_now
-from shm_daemon.web import hanger_numbers, hangers, metrics, recordings, tests
+from shm_daemon.web import frame, hanger_numbers, hangers, metrics, recordings, tests
 from shm_daemon.web.access import Reader
 from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.bridge_view import glance
 from shm_daemon.web.faults import answers, handle_faults
-from shm_daemon.web.frame import prepare_templates
 from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.middleware import Pages
 from shm_daemon.web.other_bridges import OtherBridges
@@ -27,9 +26,7 @@ from shm_daemon.web.pages import (
     alerts,
     baseline,
     bridge,
-    bridges,
     comparison,
-    downloads,
     hanger,
     notes,
     one_test,
@@ -37,7 +34,6 @@ from shm_daemon.web.pages import (
     sensors,
     settings,
     signing_in,
-    static,
     upload,
     users,
 )
@@ -52,9 +48,8 @@ _PARTS = (
     alerts,
     signing_in,
     users,
-    static,
+    frame,
     bridge,
-    bridges,
     comparison,
     operation,
     sensors,
@@ -63,7 +58,6 @@ _PARTS = (
     hanger_numbers,
     hanger,
     baseline,
-    downloads,
     notes,
     settings,
 )
@@ -118,7 +112,7 @@ log = logging.getLogger(__name__)
 
 def warm_up(app: FastAPI) -> None:
     """Takes about a second; requests are answered meanwhile."""
-    prepare_templates()
+    frame.prepare_templates()
     try:
         glance(app.state.site, utc_now())
     except ShmError as error:  # whoever asks is told too

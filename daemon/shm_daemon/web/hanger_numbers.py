@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Query, Request
+from fastapi import APIRouter, Path, Query
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 
@@ -17,31 +17,24 @@ from shm.documents import averaged_document
 from shm.errors import NothingThere
 from shm.report import formatting
 from shm.report.formatting import Interval
-from shm.report.states import QuantityOverTime, StatesOverTime, called_words
+from shm.report.states import StatesOverTime, called_words
 from shm.store import StoredWatch, TestRow
 from shm.store import TrendPoint as StoredPoint
 from shm.values.rounding import ForceUnit
-from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.access import Reader
 from shm_daemon.web.address import test_page
-from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
+from shm_daemon.web.background_work import RETRY_AFTER
 from shm_daemon.web.faults import answers
-from shm_daemon.web.hanger_figures import FIGURES
-from shm_daemon.web.hanger_figures.over_time import tension_unit
-from shm_daemon.web.hanger_view import HangerView
-from shm_daemon.web.hangers import Number, described
-from shm_daemon.web.models import LARGEST_NUMBER, MOST_ROWS, AveragedTension
-from shm_daemon.web.plotting import answer, plain
-from shm_daemon.web.site import Site
-
-
-class Numbers(BaseModel):
-    """Posterior samples in numbers; `q05` and `q95` bound 90 % of them."""
-
-    mean: float
-    sd: float
-    q05: float
-    q50: float
-    q95: float
+from shm_daemon.web.hanger_figures import FIGURES, tension_unit
+from shm_daemon.web.hanger_view import HangerView, View
+from shm_daemon.web.models import (
+    LARGEST_NUMBER,
+    MOST_ROWS,
+    AveragedTension,
+    Posterior,
+    paged,
+    plain,
+)
 
 
 class TrendPoint(BaseModel):
@@ -51,9 +44,9 @@ class TrendPoint(BaseModel):
     time: datetime
     temperature_c: float | None
     model: str
-    tension_n: Numbers = Field(description="By the class in force alone.")
+    tension_n: Posterior = Field(description="By the class in force alone.")
     averaged: AveragedTension = Field(description="What figures and tables show.")
-    stiffness: dict[str, Numbers]
+    stiffness: dict[str, Posterior]
 
 
 class TrendEvent(BaseModel):
@@ -109,7 +102,7 @@ class TestState(BaseModel):
     stage: str
     temperature_c: float | None
     model: str | None
-    tension_n: Numbers | None = Field(description="By the class in force alone.")
+    tension_n: Posterior | None = Field(description="By the class in force alone.")
     averaged: AveragedTension | None = Field(description="What tables show.")
     page: str = Field(description="The address of its page.")
 
@@ -198,20 +191,17 @@ router = APIRouter(prefix="/api/hangers/{hanger_id}", tags=["hangers"])
     summary="Tension and end stiffness over time",
 )
 def trend(
-    request: Request,
-    site: AtSite,
     _: Reader,
-    hanger_id: Number,
+    view: View,
     since: Annotated[datetime | None, Query(description="ISO 8601; all tests without it.")] = None,
 ) -> Any:
     """Every test with its posterior in numbers, the oldest first, events and states over time."""
-    view = _view(request, site, hanger_id)
     points = view.trend if since is None else view.store.posteriors.trend(view.hanger, since)
-    events = view.store.alerts.list_hanger_events(hanger_id, since)
+    events = view.store.alerts.list_hanger_events(view.hanger.id, since)
     return JSONResponse(
         plain(
             {
-                "hanger": hanger_id,
+                "hanger": view.hanger.id,
                 "points": [_point(point) for point in points],
                 "events": [
                     {"at": e.at, "kind": e.kind.value, "who": e.who, "why": e.why} for e in events
@@ -231,10 +221,8 @@ def trend(
     summary="The tests of a hanger",
 )
 def some_tests(
-    request: Request,
-    site: AtSite,
     _: Reader,
-    hanger_id: Number,
+    view: View,
     limit: Annotated[int, Query(ge=1, le=MOST_ROWS)] = 50,
     before: Annotated[
         int | None,
@@ -242,12 +230,8 @@ def some_tests(
     ] = None,
 ) -> Any:
     """The newest first; those before a test where `before` names its number."""
-    rows = lines_before(_view(request, site, hanger_id), limit + 1, before)
-    return {
-        "hanger": hanger_id,
-        "tests": [_test(line) for line in rows[:limit]],
-        "next_before": rows[limit - 1].id if len(rows) > limit else None,
-    }
+    shown, older = paged(lines_before(view, limit + 1, before), limit)
+    return {"hanger": view.hanger.id, "tests": list(map(_test, shown)), "next_before": older}
 
 
 @router.get(
@@ -257,28 +241,20 @@ def some_tests(
     summary="A figure of the hanger's page",
 )
 def figure(
-    request: Request,
-    site: AtSite,
     _: Reader,
-    hanger_id: Number,
+    view: View,
     name: Annotated[str, Path(max_length=40, description="`trend`, `stiffness`, ...")],
 ) -> JSONResponse:
     """A plotly document with its caption; with `Retry-After` where it is not whole yet."""
-    view = _view(request, site, hanger_id)
     found = next((each for each in FIGURES if each.name == name and each.is_there(view)), None)
     if found is None:
         raise NothingThere(
-            f"hanger {hanger_id} has no figure {name}.",
+            f"hanger {view.hanger.id} has no figure {name}.",
             remedy=f"Figures: {', '.join(e.name for e in FIGURES if e.is_there(view)) or 'none'}.",
         )
-    made = answer(found.document(view))
+    made = JSONResponse(found.document(view))
     made.headers.update(_headers(view) if found.shows_states else {})
     return made
-
-
-def _view(request: Request, site: Site, hanger_id: int) -> HangerView:
-    hanger = described(site.workspace, hanger_id)
-    return HangerView(site.workspace, site.store, hanger, background_worker_of(request))
 
 
 def _headers(view: HangerView) -> dict[str, str]:
@@ -308,19 +284,17 @@ def _change(call: StoredWatch) -> dict[str, Any]:
 
 
 def _states(states: StatesOverTime) -> list[dict[str, Any]]:
-    return [_state(states, quantity) for quantity in states.quantities]
-
-
-def _state(states: StatesOverTime, quantity: QuantityOverTime) -> dict[str, Any]:
-    band = quantity.filtered
-    return {
-        "quantity": quantity.name,
-        "reference_temperature_c": states.reference_temperature_c,
-        "times": list(states.times),
-        "q05": band.low,
-        "q50": band.middle,
-        "q95": band.high,
-    }
+    return [
+        {
+            "quantity": quantity.name,
+            "reference_temperature_c": states.reference_temperature_c,
+            "times": list(states.times),
+            "q05": quantity.filtered.low,
+            "q50": quantity.filtered.middle,
+            "q95": quantity.filtered.high,
+        }
+        for quantity in states.quantities
+    ]
 
 
 def _test(line: TestLine) -> dict[str, Any]:

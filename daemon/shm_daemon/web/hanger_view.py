@@ -6,7 +6,9 @@ import logging
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from fastapi import Depends, Request
 
 from shm.errors import ShmError
 from shm.pipeline import utc_now
@@ -24,7 +26,9 @@ from shm.store import (
 )
 from shm.values import Hanger
 from shm.values.notes import Note
-from shm_daemon.web.background_work import BackgroundWorker
+from shm_daemon.web.access import AtSite
+from shm_daemon.web.background_work import BackgroundWorker, background_worker_of
+from shm_daemon.web.hangers import Number, described
 
 log = logging.getLogger(__name__)
 
@@ -125,3 +129,12 @@ class HangerView:
             tests=tuple(each.id for each in self.store.watch.list_watched(stored)),
             false_call_years=self.workspace.settings.false_call_years,
         )
+
+
+def view_of(request: Request, site: AtSite, hanger_id: Number) -> HangerView:
+    """The hanger that is asked for; raises NothingThere."""
+    hanger = described(site.workspace, hanger_id)
+    return HangerView(site.workspace, site.store, hanger, background_worker_of(request))
+
+
+View = Annotated[HangerView, Depends(view_of)]

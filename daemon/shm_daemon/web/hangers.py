@@ -18,8 +18,7 @@ from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
-from shm_daemon.web.models import LARGEST_NUMBER, Hangers, HangerState, Status
-from shm_daemon.web.plotting import plain
+from shm_daemon.web.models import LARGEST_NUMBER, Hangers, HangerState, Status, plain
 from shm_daemon.web.site import Site
 
 router = APIRouter(prefix="/api", tags=["state"])

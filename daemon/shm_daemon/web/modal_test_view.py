@@ -72,8 +72,7 @@ class TestFigure:
         found = self.member.draw(shown)
         if not isinstance(found, Specification):
             return None
-        words = {"caption": self.member.caption(shown), "alt": self.member.alt(shown)}
-        return {**with_plotly.document(found), **words}
+        return with_plotly.with_words(found, self.member.caption(shown), self.member.alt(shown))
 
 
 # Judgement: a figure of one panel fits a laptop's screen with its caption, one of several fills it.

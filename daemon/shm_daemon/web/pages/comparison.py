@@ -29,7 +29,6 @@ from shm_daemon.web.frame import page
 from shm_daemon.web.hanger_numbers import FigureDocument
 from shm_daemon.web.hangers import described
 from shm_daemon.web.models import LARGEST_NUMBER
-from shm_daemon.web.plotting import answer
 from shm_daemon.web.site import Site
 
 router = APIRouter(tags=["hangers"])
@@ -87,8 +86,7 @@ def compare_figure(
             "none of these hangers was tested since a baseline of its own.",
             remedy="Choose others, or an earlier day.",
         )
-    words = {"caption": caption(courses), "alt": alt(courses)}
-    return answer({**with_plotly.document(specify(courses)), **words})
+    return JSONResponse(with_plotly.with_words(specify(courses), caption(courses), alt(courses)))
 
 
 def _chosen(site: Site, numbers: Sequence[int]) -> list[Hanger]:

@@ -32,7 +32,7 @@ from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
 from shm_daemon.web.hanger_numbers import FigureDocument
-from shm_daemon.web.plotting import answer, plain
+from shm_daemon.web.models import plain
 from shm_daemon.web.site import Site
 
 router = APIRouter(tags=["streams"])
@@ -113,8 +113,7 @@ def stream_figure(site: AtSite, _: Reader, name: Name, days: Days = 7.0) -> JSON
             f"stream {name} has shown nothing in the last {days:g} days.",
             remedy="See `shm stream` for when it was heard last.",
         )
-    words = {"caption": caption(course), "alt": alt(course)}
-    return answer({**with_plotly.document(specify(course)), **words})
+    return JSONResponse(with_plotly.with_words(specify(course), caption(course), alt(course)))
 
 
 def _states(site: Site) -> tuple[StreamCondition, ...]:

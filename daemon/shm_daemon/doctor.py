@@ -1,10 +1,7 @@
 """All checks of a workspace, whatever is broken: what cannot be looked at is told, never raised.
 
-Whether alerts reach people: hooks, and what is owed to them.
-
-Versions, and whether what the settings call for is there. Needs no store.
-
-The workspace as files: folders, permissions, room on the disks. Needs no store.
+Here are those that need no store: versions, what the settings call for, hooks and whoever else is
+asked, folders, permissions, disks. Those of the store are in `doctor_checks`.
 """
 
 from __future__ import annotations
@@ -36,17 +33,14 @@ from shm.store import Workspace
 from shm.store.rows import Delivery, DeliveryState, Silence
 from shm.store.stored_alerts import silenced_until
 from shm.store.workspace import FOLDERS
-from shm_daemon.doctor.check_description import (
-    check_changed_settings,
-    check_single_sign_on,
-    check_streams,
-)
-from shm_daemon.doctor.checks import (
+from shm_daemon.doctor_checks import (
     WAITS_LONG,
     Check,
     Examined,
     Finding,
+    Level,
     check_backup,
+    check_changed_settings,
     check_clock,
     check_daemon,
     check_hangers,
@@ -55,6 +49,7 @@ from shm_daemon.doctor.checks import (
     check_raw_files,
     check_spool,
     check_store,
+    check_streams,
     check_under_way,
     fault,
     ok,
@@ -65,6 +60,8 @@ from shm_daemon.doctor.checks import (
 from shm_daemon.heartbeat import NEARLY_FULL, told
 from shm_daemon.hooks import HookFailed, HookNotifier
 from shm_daemon.web.other_bridges import ask_all
+
+__all__ = ["Finding", "Level", "examine"]
 
 _REMEMBERED = timedelta(days=30)  # judgement: a month, within which an operator looks here
 
@@ -81,6 +78,23 @@ def check_hooks(workspace: Workspace) -> Iterator[Finding]:
             yield from _secrecy(workspace, f"hook {hook.name}", _secret_file(hook))
     finally:
         notifier.close()
+
+
+def check_single_sign_on(workspace: Workspace) -> Iterator[Finding]:
+    """Asks the provider what it says of itself; raises ShmError where that or our secret is off.
+
+    Nothing where none is described, or its extra is missing, which `check_extras` says.
+    """
+    described = workspace.bridge.single_sign_on
+    if described is None or find_spec("authlib") is None:
+        return
+    from shm_daemon.openid import Provider  # an extra
+
+    Provider(described).discover()
+    yield ok("single sign-on", f"{described.host} answers")
+    if described.client_secret_file.stat().st_mode & 0o044:
+        name = described.client_secret_file.name
+        yield warning("single sign-on", f"others can read {name}", f"chmod 600 {name}")
 
 
 def check_other_bridges(workspace: Workspace) -> Iterator[Finding]:
