@@ -5,9 +5,9 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
@@ -61,13 +61,13 @@ def run(
     """
     wakeup = wakeup or Wakeup()
     patience = Patience(wakeup, standby)
-    with stopped_by_signals(wakeup), last_words():
+    with stopped_by_signals(wakeup), ExitStack() as ending:
+        ending.callback(tell_systemd, "STOPPING=1", "STATUS=ending")
         while not wakeup.stopped:
             try:
                 with workspace.lock(patience) as lock, ExitStack() as stack:
                     begin = partial(_begin, stack, workspace, lock, wakeup, clock, make_executor)
-                    daemon = begin(notifier, once)
-                    if daemon.serve(once):
+                    if begin(notifier, once).serve(once):
                         return
             except StoreError as error:
                 waiting_helps = error.retry_after_s is not None
@@ -77,15 +77,6 @@ def run(
                     if waiting_helps and wakeup.stopped:  # meanwhile: that is no failure
                         return
                     raise
-
-
-@contextmanager
-def last_words() -> Iterator[None]:
-    """Tells systemd at the end of the context that the service is ending."""
-    try:
-        yield
-    finally:
-        tell_systemd("STOPPING=1", "STATUS=ending")
 
 
 class Patience:

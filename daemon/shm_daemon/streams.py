@@ -38,7 +38,7 @@ from shm.store.archive import checksum, refuse_oversize
 from shm.store.ring import Kept, ring_of
 from shm.values import Channel, FloatArray, Recording
 from shm.values.stream import Chunk, Stream, StreamEvent
-from shm_daemon.spool import STREAMS, FileStabilityTracker, scan
+from shm_daemon.spool import STREAMS, FileStabilityTracker, lay_out, scan
 
 log = logging.getLogger(__name__)
 
@@ -115,14 +115,16 @@ class RollingFiles:
         except BadInput as error:
             if not isinstance(error, DoubledChunk):  # which is noted
                 note_refused(self._store, name, error, now)
-            _lay_out(workspace, path, error, now)
+            lay_out(workspace, path, path.name, error, now, checksum(path))
         else:
             path.unlink()
             sidecar_path(path).unlink(missing_ok=True)
 
 
 def _chunks(workspace: Workspace, stream: Stream, path: Path) -> Iterator[Chunk]:
-    _describe(path)
+    common, own = path.with_name("stream.toml"), sidecar_path(path)
+    if common.is_file() and not own.exists():  # what all files of a folder do not say stands there
+        shutil.copyfile(common, own)
     recording, *others = read_test(path, read_limits(workspace.settings))
     if others or not isinstance(recording, Recording):
         raise _refusal("holds no samples, or those of several records", path)
@@ -134,13 +136,6 @@ def _chunks(workspace: Workspace, stream: Stream, path: Path) -> Iterator[Chunk]
         at = start + timedelta(seconds=first / rate)
         part = values[:, first:last].astype(np.float32)
         yield Chunk(stream.name, number, at, rate, names, part, weather)
-
-
-def _describe(path: Path) -> None:
-    """What all files of a folder do not say stands once in its `stream.toml`."""
-    common, own = path.with_name("stream.toml"), sidecar_path(path)
-    if common.is_file() and not own.exists():
-        shutil.copyfile(common, own)
 
 
 def _channels(recording: Recording, stream: Stream, path: Path) -> list[Channel]:
@@ -183,21 +178,6 @@ def _refusal(what: str, path: Path) -> BadInput:
         file=path,
         remedy="See docs/permanent_sensors.md; a name may give the time: h3_20260501_101000.csv.",
     )
-
-
-def _lay_out(workspace: Workspace, path: Path, error: BadInput, now: datetime) -> None:
-    """Moves a refused file into the quarantine, with the reason."""
-    reason = {
-        "schema": "shm.reason/1",
-        "file": path.name,
-        "line": error.line,
-        "channel": error.channel or None,
-        "message": error.message,
-        "remedy": error.remedy,
-        "time": now,
-        "sha256": checksum(path),
-    }
-    workspace.quarantine.move(path, path.name, reason, sidecar_path(path))
 
 
 _LOOK_S = 2.0  # technical: chunks are sealed within seconds, of ten minutes

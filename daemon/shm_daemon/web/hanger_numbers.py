@@ -31,6 +31,7 @@ from shm_daemon.web.models import (
     LARGEST_NUMBER,
     MOST_ROWS,
     AveragedTension,
+    FigureDocument,
     Posterior,
     paged,
     plain,
@@ -113,15 +114,6 @@ class HangerTests(BaseModel):
     hanger: int
     tests: list[TestState]
     next_before: int | None = Field(description="To go on with; null at the oldest test.")
-
-
-class FigureDocument(BaseModel):
-    """A figure as plotly draws it, with its words."""
-
-    data: list[dict[str, Any]]
-    layout: dict[str, Any]
-    caption: str
-    alt: str = Field(description="What a blind reader needs.")
 
 
 @dataclass(frozen=True)

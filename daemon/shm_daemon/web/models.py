@@ -308,6 +308,15 @@ class Examination(BaseModel):
     findings: list[Finding]
 
 
+class FigureDocument(BaseModel):
+    """A figure as plotly draws it, with its words."""
+
+    data: list[dict[str, Any]]
+    layout: dict[str, Any]
+    caption: str
+    alt: str = Field(description="What a blind reader needs.")
+
+
 class Underway(BaseModel):
     """It is being worked out: ask again after `Retry-After` seconds."""
 

@@ -31,8 +31,7 @@ from shm_daemon.web import with_plotly
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
-from shm_daemon.web.hanger_numbers import FigureDocument
-from shm_daemon.web.models import plain
+from shm_daemon.web.models import FigureDocument, plain
 from shm_daemon.web.site import Site
 
 router = APIRouter(tags=["streams"])
