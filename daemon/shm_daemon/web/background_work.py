@@ -198,9 +198,8 @@ class BackgroundWorker(Generic[Made]):
 
 def background_worker_of(request: Request) -> BackgroundWorker[Any]:
     """The background worker of the app, for all that is ordered there."""
-    background_worker = request.app.state.background_worker
-    assert isinstance(background_worker, BackgroundWorker)
-    return background_worker
+    found: BackgroundWorker[Any] = request.app.state.background_worker
+    return found
 
 
 def _packed(order: Order) -> bytes:

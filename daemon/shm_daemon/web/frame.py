@@ -96,9 +96,10 @@ def for_a_person(request: Request) -> bool:
     return "text/html" in accepted and not path.startswith("/api/")
 
 
+@cache
 def asset(name: str) -> str:
     """The address of a file of `static/`; it changes with the file, so that it may be kept."""
-    return f"/static/{name}?v={_checksum(name)}"
+    return f"/static/{name}?v={hashlib.sha256((STATIC / name).read_bytes()).hexdigest()[:12]}"
 
 
 @cache
@@ -108,11 +109,6 @@ def plotly_address() -> str:
         return f"/static/plotly.js?v={version_of('plotly')}"
     except PackageNotFoundError:
         return "/static/plotly.js"
-
-
-@cache
-def _checksum(name: str) -> str:
-    return hashlib.sha256((STATIC / name).read_bytes()).hexdigest()[:12]
 
 
 @cache

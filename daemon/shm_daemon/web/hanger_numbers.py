@@ -173,15 +173,11 @@ def lines_before(view: HangerView, limit: int, before: int | None = None) -> lis
     return [TestLine(row, points.get(row.id), unit) for row in rows]
 
 
-router = APIRouter(prefix="/api/hangers/{hanger_id}", tags=["hangers"])
+# Statuses as RFC 9110 defines them.
+router = APIRouter(prefix="/api/hangers/{hanger_id}", tags=["hangers"], responses=answers(404, 422))
 
 
-@router.get(
-    "/trend",
-    response_model=HangerTrend,
-    responses=answers(404, 422),
-    summary="Tension and end stiffness over time",
-)
+@router.get("/trend", response_model=HangerTrend, summary="Tension and end stiffness over time")
 def trend(
     _: Reader,
     view: View,
@@ -206,12 +202,7 @@ def trend(
     )
 
 
-@router.get(
-    "/tests",
-    response_model=HangerTests,
-    responses=answers(404, 422),
-    summary="The tests of a hanger",
-)
+@router.get("/tests", response_model=HangerTests, summary="The tests of a hanger")
 def some_tests(
     _: Reader,
     view: View,
@@ -227,10 +218,7 @@ def some_tests(
 
 
 @router.get(
-    "/figures/{name}",
-    response_model=FigureDocument,
-    responses=answers(404, 422),
-    summary="A figure of the hanger's page",
+    "/figures/{name}", response_model=FigureDocument, summary="A figure of the hanger's page"
 )
 def figure(
     _: Reader,

@@ -85,8 +85,7 @@ def _states(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
             "latest_test_at": tests[hanger.id].time if hanger.id in tests else None,
             "nominal_tension_n": hanger.nominal_tension_n,
             "baseline_set_at": set_at.get(hanger.id),
-            "shifts": _shifts(known.watches.get(hanger.id)),
-            "creep_per_year": _creep(known.watches.get(hanger.id)),
+            **_watched(known.watches.get(hanger.id)),
             "open_alerts": known.open_alerts.get(hanger.id, 0),
             **_tension(known.latest.get(hanger.id)),
         }
@@ -102,16 +101,13 @@ def _tension(latest: TrendPoint | None) -> dict[str, Any]:
     return {"model": latest.model, "tension_n": summary, "averaged": averaged}
 
 
-def _shifts(latest: StoredWatch | None) -> list[dict[str, Any]]:
-    """Those of the latest test that was compared with the baseline in force."""
+def _watched(latest: StoredWatch | None) -> dict[str, Any]:
+    """Of the latest test that was compared with the baseline in force."""
     drifts = latest.watched.told if latest else ()
-    return [{key: _known(getattr(drift, key)) for key in _SHIFT} for drift in drifts]
-
-
-def _creep(latest: StoredWatch | None) -> dict[str, float] | None:
     creep = latest.watched.creep_per_year if latest else None
-    return {"mean": creep.mean, "sd": creep.sd} if creep and creep.is_known else None
-
-
-def _known(value: Any) -> Any:
-    return None if value != value else value  # NaN is what is not known
+    return {
+        "shifts": plain([{key: getattr(drift, key) for key in _SHIFT} for drift in drifts]),
+        "creep_per_year": {"mean": creep.mean, "sd": creep.sd}
+        if creep and creep.is_known
+        else None,
+    }

@@ -25,8 +25,8 @@ from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import name_in
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
-from shm_daemon.web.hangers import Number
-from shm_daemon.web.modal_test_view import AT_WORK, FIGURES, TestView, as_bytes
+from shm_daemon.web.hangers import Number, described
+from shm_daemon.web.modal_test_view import AT_WORK, FIGURES, TestView
 from shm_daemon.web.models import FigureDocument, Underway
 
 _AT_ONCE_S = 0.05  # what would be rounded to 0.0 s
@@ -215,13 +215,14 @@ class Hits(BaseModel):
     dropped: list[DroppedState]
 
 
-_FAULTS = answers(404, 422)
+# Status as RFC 9110 defines it.
 _LATER: dict[int | str, dict[str, Any]] = {
     202: {"model": Underway, "description": "It is being worked out; `Retry-After` says how long."}
 }
 _OF_TEST = "/hangers/{hanger_id}/tests/{test:path}"
 
-router = APIRouter(prefix="/api", tags=["state"])
+# Statuses as RFC 9110 defines them.
+router = APIRouter(prefix="/api", tags=["state"], responses=answers(404, 422))
 # Technical: a file name of 255 bytes has 765 characters when encoded; no test has more responses.
 Name = Annotated[str, Path(max_length=1000, description="The test's name, percent-encoded.")]
 MOST_RESPONSES = 100_000
@@ -235,8 +236,10 @@ Point = Annotated[
 
 def view_of(request: Request, site: AtSite, hanger_id: Number, test: Name) -> TestView:
     """The test that is asked for; raises NothingThere."""
-    background_worker = background_worker_of(request)
-    return TestView.of(site.workspace, site.store, background_worker, hanger_id, name_in(test))
+    store = site.store
+    stored = store.tests.named(described(site.workspace, hanger_id).id, name_in(test))
+    recording = store.recordings.get(stored.recording_id)
+    return TestView(site.workspace, store, background_worker_of(request), stored, recording)
 
 
 View = Annotated[TestView, Depends(view_of)]
@@ -245,7 +248,7 @@ View = Annotated[TestView, Depends(view_of)]
 @router.get(
     _OF_TEST + "/figures/{figure}",
     response_model=FigureDocument,
-    responses={**_LATER, **_FAULTS},
+    responses=_LATER,
     summary="One figure of a test",
 )
 def figure(
@@ -261,13 +264,13 @@ def figure(
     if found.document is None:
         return waiting()
     headers = RETRY_AFTER if found.provisional else None
-    return Response(as_bytes(found.document), headers=headers, media_type="application/json")
+    return Response(found.document, headers=headers, media_type="application/json")
 
 
 @router.get(
     _OF_TEST + "/hits",
     response_model=Hits,
-    responses={**_LATER, **_FAULTS},
+    responses=_LATER,
     summary="The hits of a test, and why one was dropped",
 )
 def hits(_: Reader, view: View) -> Any:
@@ -279,12 +282,7 @@ def hits(_: Reader, view: View) -> Any:
     return {"hits": list(map(asdict, found.hits)), "dropped": list(map(asdict, found.dropped))}
 
 
-@router.get(
-    _OF_TEST,
-    response_model=TestState,
-    responses=_FAULTS,
-    summary="One test as it is stored",
-)
+@router.get(_OF_TEST, response_model=TestState, summary="One test as it is stored")
 def test(_: Reader, view: View) -> Any:
     """Modes, quality, what was set aside, and where all that comes from."""
     sheet, stored, file = view.as_stored, view.stored, view.recording.file

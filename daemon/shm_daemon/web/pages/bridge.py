@@ -16,7 +16,6 @@ from pydantic import BaseModel, Field
 from shm.pipeline import utc_now
 from shm.report import formatting
 from shm.report.contents import hangers_unit
-from shm.report.formatting import Interval
 from shm.values.messages import TODAY, WEEK, Lead, Urgency
 from shm.values.rounding import ForceUnit, rounded_percent
 from shm_daemon.heartbeat import told
@@ -51,12 +50,8 @@ from shm_daemon.web.site import Site, held_documents
 
 router = APIRouter(tags=["state"])
 
-_WHEN = {
-    "none": "",
-    "next_test": "next test",
-    "week": WEEK,
-    "today": TODAY,
-}  # of an action, in words
+_WHEN = {"none": "", "next_test": "next test", "week": WEEK, "today": TODAY}
+"""Of an action, in words."""
 _COMPARING = "The hangers are being compared …"
 
 
@@ -150,13 +145,18 @@ def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
     """A hanger's row of the table."""
     line, hanger = each.line, each.hanger
     tension, latest = line.tension_n, line.latest
+    shift = shift_words(each) if latest and each.shift is None else ""
+    if each.shift is not None:
+        shift = rounded_percent(each.shift.mean, each.shift.width / 2, "+").removesuffix(" %")
+    if tension:
+        words = formatting.with_half(tension, unit).removesuffix(f" {unit.name}")
     return {
         "id": hanger.id,
         "name": formatting.hanger_name(hanger.id, hanger.name),
         "status": line.status,
-        "tension": _in(unit, tension) if tension else "no test yet",
+        "tension": words if tension else "no test yet",
         "nominal": formatting.mean(line.of_nominal) if line.of_nominal else "",
-        "shift": _shift(each),
+        "shift": shift,
         "message": line.message,
         "when": _WHEN[line.message.urgency],
         "open_alerts": line.open_alerts,
@@ -166,16 +166,6 @@ def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
         "is_quiet": each.is_quiet,
         "tests": each.tests,
     }
-
-
-def _in(unit: ForceUnit, tension: Interval) -> str:
-    return formatting.with_half(tension, unit).removesuffix(f" {unit.name}")
-
-
-def _shift(each: HangerGlance) -> str:
-    if each.shift is None:
-        return shift_words(each) if each.line.latest else ""
-    return rounded_percent(each.shift.mean, each.shift.width / 2, "+").removesuffix(" %")
 
 
 def _glance_document(each: HangerGlance) -> dict[str, Any]:
@@ -190,8 +180,8 @@ def _glance_document(each: HangerGlance) -> dict[str, Any]:
         "latest_test": line.test or None,
         "latest_test_at": line.latest,
         "model": line.model or None,
-        "tension_n": _interval(line.tension_n),
-        "shift": _interval(each.shift),
+        "tension_n": line.tension_n and asdict(line.tension_n),
+        "shift": each.shift and asdict(each.shift),
         "called": line.called,
         "open_alerts": line.open_alerts,
         "warnings": list(line.warnings),
@@ -200,10 +190,6 @@ def _glance_document(each: HangerGlance) -> dict[str, Any]:
 
 def _underway() -> JSONResponse:
     return JSONResponse({"message": _COMPARING}, 202, RETRY_AFTER)
-
-
-def _interval(interval: Interval | None) -> dict[str, float] | None:
-    return asdict(interval) if interval else None
 
 
 class BridgeInList(BaseModel):
@@ -255,8 +241,7 @@ def summary(site: AtSite, _: Reader) -> Summary:
 
 
 def _bridges(request: Request, site: Site) -> tuple[BridgeRow, ...]:
-    asked = request.app.state.other_bridges
-    assert isinstance(asked, OtherBridges)
+    asked: OtherBridges = request.app.state.other_bridges
     bridge = site.workspace.bridge
     others = asked.rows(bridge.other_bridges, site.workspace.folder)
     return worst_first((*own_row(site, utc_now()), *others))

@@ -51,8 +51,10 @@ def compare_page(
     every, day = site.workspace.bridge.hangers, _day(since)
     chosen = _chosen(site, hanger) if hanger else []
     rows = hanger_lines(site.workspace, site.store, utc_now(), chosen)
-    if not chosen:
-        rows = _likely(rows)
+    if not chosen:  # the hanger that is worst off, between its neighbours
+        first = next((i for i, each in enumerate(rows) if each.message.urgency == "today"), 0)
+        start = max(0, min(first - 1, len(rows) - 3))
+        rows = rows[start : start + 3]
         chosen = [each.hanger for each in rows]
     asked = [("hanger", each.id) for each in chosen] + ([("since", day)] if day else [])
     return page(
@@ -97,13 +99,6 @@ def _chosen(site: Site, numbers: Sequence[int]) -> list[Hanger]:
         )
     wanted = {described(site.workspace, each).id for each in numbers}
     return [each for each in site.workspace.bridge.hangers if each.id in wanted]
-
-
-def _likely(lines: tuple[HangerLine, ...]) -> tuple[HangerLine, ...]:
-    """Where nobody has chosen: the hanger that is worst off, between its neighbours."""
-    first = next((i for i, each in enumerate(lines) if each.message.urgency == "today"), 0)
-    start = max(0, min(first - 1, len(lines) - 3))
-    return lines[start : start + 3]
 
 
 def _is_there(rows: Sequence[HangerLine], since: Day | None) -> bool:

@@ -123,6 +123,9 @@ def all_tests(request: Request, _: Reader, view: View, before: Before = None) ->
 def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
     said = message(report)
     assert said.status is not None  # a hanger with a test has one
+    tables = [make(report) for make in _TABLES]
+    if view.states is not None:
+        tables.insert(2, temperature_table(view.states))
     return {
         "status_word": said.status.value,
         "style": said.status.name.lower(),
@@ -134,7 +137,7 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
             part: [_chart(view, e) for e in FIGURES if e.part == part and e.is_there(view)]
             for part in ("trends", "model", "gap")
         },
-        "tables": _tables(view, report),
+        "tables": [table for table in tables if table.rows],
         "alerts": hanger_tables.alerts(report),
         "events": _events(view),
         "gap": gap_part(report),
@@ -147,13 +150,6 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
 def _chart(view: HangerView, figure: HangerFigure) -> Chart:
     address = f"/api/hangers/{view.hanger.id}/figures/{figure.name}"
     return Chart(figure.title, address, figure.caption(view), figure.height_px, figure.is_wide)
-
-
-def _tables(view: HangerView, report: HangerReport) -> list[Table]:
-    made = [make(report) for make in _TABLES]
-    if view.states is not None:
-        made.insert(2, temperature_table(view.states))
-    return [table for table in made if table.rows]
 
 
 def _events(view: HangerView) -> Table:
@@ -252,12 +248,9 @@ def _row(point: TrendPoint) -> tuple[str, ...]:
     numbers = (known.mean, known.q05, known.q95, point.averaged.repeatability_sd_n)
     when = f"{point.taken_at:%Y-%m-%dT%H:%M:%SZ}" if point.taken_at else ""
     temperature = _cell(point.temperature_c)
-    return (_inert(point.test), when, temperature, point.model, *map(_cell, numbers))
-
-
-def _inert(name: str) -> str:
-    """No formula for a spreadsheet: a test is named by whoever uploads its file."""
-    return f"'{name}" if name.startswith(("=", "+", "-", "@")) else name
+    # No formula for a spreadsheet: a test is named by whoever uploads its file.
+    inert = f"'{point.test}" if point.test.startswith(("=", "+", "-", "@")) else point.test
+    return (inert, when, temperature, point.model, *map(_cell, numbers))
 
 
 def _cell(value: float) -> str:

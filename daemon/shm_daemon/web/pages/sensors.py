@@ -83,7 +83,7 @@ def stream_page(
         "stream.html.j2",
         stream=stream,
         row=_row(state),
-        facts=[*_facts(state), *_beside_hammer(against_hammer(site.store, stream))],
+        facts=_facts(state, against_hammer(site.store, stream)),
         events=_events(state.events),
         address=f"/api/streams/{name}/figure?days={days:g}",
         days=days,
@@ -139,7 +139,7 @@ def _row(state: StreamCondition) -> Row:
     return Row(state.stream.name, state.stream.hanger, state.state, _STYLES[state.state], cells)
 
 
-def _facts(state: StreamCondition) -> list[tuple[str, str, str]]:
+def _facts(state: StreamCondition, hammer: AmbientBias) -> list[tuple[str, str, str]]:
     stream, window = state.stream, state.window
     behind = told(state.behind) if state.behind is not None else "unknown"
     found = [
@@ -157,14 +157,10 @@ def _facts(state: StreamCondition) -> list[tuple[str, str, str]]:
         )
         found.append(("Last window", f"{window.window.kind}, {len(window.modes)} modes",
                       window.why or how))  # fmt: skip
+    if hammer.is_known:
+        bias = rounded_percent(hammer.common, NINETY_PERCENT * hammer.common_sd, "+")
+        found.append(("Against hammer tests", bias, hammer.text()))
     return found
-
-
-def _beside_hammer(found: AmbientBias) -> list[tuple[str, str, str]]:
-    if not found.is_known:
-        return []
-    half = NINETY_PERCENT * found.common_sd
-    return [("Against hammer tests", rounded_percent(found.common, half, "+"), found.text())]
 
 
 def _events(events: tuple[StreamEvent, ...]) -> Table:
