@@ -102,10 +102,7 @@ class JournalFormatter(logging.Formatter):
 def _to_file(file: Path, settings: Settings) -> logging.Handler:
     try:
         return RotatingFileHandler(
-            file,
-            maxBytes=settings.log_file_bytes,
-            backupCount=settings.log_files,
-            encoding="utf-8",
+            file, maxBytes=settings.log_file_bytes, backupCount=settings.log_files, encoding="utf-8"
         )
     except OSError as error:
         raise UsageError(

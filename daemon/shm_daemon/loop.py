@@ -11,14 +11,7 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
-from shm.errors import (
-    SchemaOutdated,
-    ShmError,
-    StoreBusy,
-    StoreDamaged,
-    StoreError,
-    TooLarge,
-)
+from shm.errors import SchemaOutdated, ShmError, StoreBusy, StoreDamaged, StoreError, TooLarge
 from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
 from shm.pipeline.streaming import Streaming
 from shm.settings import Settings

@@ -32,14 +32,7 @@ from shm.read import sidecar_path
 from shm.read.profiles import Described, sidecar_text
 from shm.read.sidecar import SIDECAR_SUFFIX
 from shm.store import Workspace
-from shm.store.archive import (
-    MODES_SUFFIX,
-    checksum,
-    refuse_oversize,
-    safe_name,
-    suffix_of,
-    sync,
-)
+from shm.store.archive import MODES_SUFFIX, checksum, refuse_oversize, safe_name, suffix_of, sync
 
 STREAMS = "streams"
 """The folder of the spool with the rolling files of permanent sensors."""

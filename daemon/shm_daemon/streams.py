@@ -192,10 +192,7 @@ class StreamKeeper:
     """One turn after the other, in a thread or by whoever calls `turn`."""
 
     def __init__(
-        self,
-        workspace: Workspace,
-        clock: Callable[[], datetime],
-        sealed: Sealed = lambda _: None,
+        self, workspace: Workspace, clock: Callable[[], datetime], sealed: Sealed = lambda _: None
     ):
         self._workspace, self._clock, self._sealed = workspace, clock, sealed
         self._store: Store | None = None

@@ -14,7 +14,7 @@ from fastapi.responses import JSONResponse
 import shm
 from shm.errors import ShmError
 from shm.pipeline import utc_now
-from shm_daemon.web import frame, hanger_numbers, hangers, metrics, recordings, tests
+from shm_daemon.web import frame, hangers, metrics, recordings, tests
 from shm_daemon.web.access import Reader
 from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.bridge_view import glance
@@ -55,7 +55,6 @@ _PARTS = (
     sensors,
     tests,
     one_test,
-    hanger_numbers,
     hanger,
     baseline,
     notes,

@@ -161,10 +161,7 @@ def static_file(request: Request, name: str) -> Response:
 def _answer(request: Request, name: str, is_of_version: bool) -> Response:
     packs = "gzip" in request.headers.get("accept-encoding", "")
     content, packed = _content(name), b""
-    headers = {
-        "Cache-Control": _KEPT if is_of_version else _ASKED_AGAIN,
-        "Vary": "Accept-Encoding",
-    }
+    headers = {"Cache-Control": _KEPT if is_of_version else _ASKED_AGAIN, "Vary": "Accept-Encoding"}
     if packs and len(content) > _WORTH_PACKING_BYTES:
         packed, headers["Content-Encoding"] = _packed(name), "gzip"
     return Response(packed or content, headers=headers, media_type=_KINDS[Path(name).suffix])

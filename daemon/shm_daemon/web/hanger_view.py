@@ -28,7 +28,8 @@ from shm.values import Hanger
 from shm.values.notes import Note
 from shm_daemon.web.access import AtSite
 from shm_daemon.web.background_work import BackgroundWorker, background_worker_of
-from shm_daemon.web.hangers import Number, described
+from shm_daemon.web.models import HangerNumber
+from shm_daemon.web.site import described
 
 log = logging.getLogger(__name__)
 
@@ -131,7 +132,7 @@ class HangerView:
         )
 
 
-def view_of(request: Request, site: AtSite, hanger_id: Number) -> HangerView:
+def view_of(request: Request, site: AtSite, hanger_id: HangerNumber) -> HangerView:
     """The hanger that is asked for; raises NothingThere."""
     hanger = described(site.workspace, hanger_id)
     return HangerView(site.workspace, site.store, hanger, background_worker_of(request))

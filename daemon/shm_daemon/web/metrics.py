@@ -35,11 +35,10 @@ from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
-from shm_daemon.web.hangers import quarantined
 from shm_daemon.web.health import health_document
 from shm_daemon.web.middleware import HEALTH, METRICS
 from shm_daemon.web.models import Health
-from shm_daemon.web.site import Site
+from shm_daemon.web.site import Site, quarantined
 
 _LATELY = timedelta(hours=1)
 _QUANTILES = (0.5, 0.95, 1.0)  # the usual, the slow and the slowest

@@ -31,6 +31,9 @@ Row = Annotated[int, Path(ge=0, le=LARGEST_NUMBER)]
 """The number of a row of the store, in an address."""
 Before = Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)]
 """The number of the row to go on after."""
+HangerNumber = Annotated[
+    int, Path(ge=0, le=LARGEST_NUMBER, description="The number of the hanger.")
+]
 Written = Annotated[str, Field(max_length=MOST_WRITTEN), AfterValidator(_written)]
 
 

@@ -148,10 +148,7 @@ def status(
 
 
 @_of_uploads.get(
-    "",
-    response_model=Recordings,
-    responses=answers(422),
-    summary="The recording of a checksum",
+    "", response_model=Recordings, responses=answers(422), summary="The recording of a checksum"
 )
 def recordings(
     site: AtSite, _: Reader, sha256: Annotated[str, Query(pattern="^[0-9a-fA-F]{64}$")]

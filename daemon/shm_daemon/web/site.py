@@ -13,9 +13,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from shm.errors import NothingThere, ShmError, StoreError
+from shm.errors import BadInput, NothingThere, ShmError, StoreError
 from shm.store import Store, Workspace
 from shm.store.people import same_name
+from shm.values import Hanger
 from shm_daemon.web.address import Address, network_of
 
 MOST_WRONG, WITHIN_S = 10, 60.0
@@ -172,3 +173,16 @@ def held_documents(site: Site, hanger: int | None = None) -> list[dict[str, Any]
         }
         for hold in site.store.recordings.list_holds(hanger)
     ]
+
+
+def described(workspace: Workspace, hanger_id: int) -> Hanger:
+    """A hanger of the bridge; raises NothingThere."""
+    try:
+        return workspace.bridge.hanger(hanger_id)
+    except BadInput as error:
+        raise NothingThere(error.message, remedy=error.remedy) from error
+
+
+def quarantined(workspace: Workspace) -> int:
+    """How many refused files lie in the quarantine."""
+    return sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json"))

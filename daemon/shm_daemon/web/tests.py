@@ -25,9 +25,9 @@ from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import name_in
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
-from shm_daemon.web.hangers import Number, described
 from shm_daemon.web.modal_test_view import AT_WORK, FIGURES, TestView
-from shm_daemon.web.models import FigureDocument, Underway
+from shm_daemon.web.models import FigureDocument, HangerNumber, Underway
+from shm_daemon.web.site import described
 
 _AT_ONCE_S = 0.05  # what would be rounded to 0.0 s
 
@@ -234,7 +234,7 @@ Point = Annotated[
 ]
 
 
-def view_of(request: Request, site: AtSite, hanger_id: Number, test: Name) -> TestView:
+def view_of(request: Request, site: AtSite, hanger_id: HangerNumber, test: Name) -> TestView:
     """The test that is asked for; raises NothingThere."""
     store = site.store
     stored = store.tests.named(described(site.workspace, hanger_id).id, name_in(test))

@@ -138,10 +138,7 @@ def _stream_of(alert: AlertRow, site: Site) -> str | None:
 
 
 @router.get(
-    "/api/alerts",
-    response_model=Alerts,
-    responses=answers(422),
-    summary="Alerts that were raised",
+    "/api/alerts", response_model=Alerts, responses=answers(422), summary="Alerts that were raised"
 )
 def alerts(
     site: AtSite,
@@ -180,12 +177,7 @@ def alerts(
     responses=answers(404, 409, 422),
     summary="Take note of an alert",
 )
-def acknowledge(
-    site: AtSite,
-    writer: Writer,
-    alert_id: Row,
-    told: Acknowledge,
-) -> Any:
+def acknowledge(site: AtSite, writer: Writer, alert_id: Row, told: Acknowledge) -> Any:
     """Notes on the record that somebody has seen an alert, or with `resolved` to its end."""
     named = told.who is not None and not writer.is_person  # who signed in has a name
     who = f"{told.who} (token {writer.name})" if named else writer.name

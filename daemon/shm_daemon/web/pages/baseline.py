@@ -22,7 +22,8 @@ from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.forms import Form, reason_in, time_in
 from shm_daemon.web.frame import page
-from shm_daemon.web.hangers import Number, described
+from shm_daemon.web.models import HangerNumber
+from shm_daemon.web.site import described
 
 router = APIRouter(prefix="/hangers/{hanger_id}/baseline", include_in_schema=False)
 
@@ -63,7 +64,7 @@ Ordered = OrderedDict[str, SetBaseline | Told | ShmError]
 
 @router.get("")
 def baseline_page(
-    request: Request, site: AtSite, _: Engineer, hanger_id: Number, order: str = ""
+    request: Request, site: AtSite, _: Engineer, hanger_id: HangerNumber, order: str = ""
 ) -> HTMLResponse:
     """What the hanger is compared with, and the form for another; what comes of an order."""
     one = described(site.workspace, hanger_id)
@@ -81,7 +82,7 @@ def baseline_page(
 
 @router.post("")
 def order_baseline(
-    request: Request, site: AtSite, engineer: Engineer, hanger_id: Number, told: Form
+    request: Request, site: AtSite, engineer: Engineer, hanger_id: HangerNumber, told: Form
 ) -> Response:
     """Has it made beside the interface."""
     one = described(site.workspace, hanger_id)
@@ -102,7 +103,7 @@ def order_baseline(
 
 
 @router.get("/outcome")
-def outcome(request: Request, _: Engineer, hanger_id: Number, order: str) -> Response:
+def outcome(request: Request, _: Engineer, hanger_id: HangerNumber, order: str) -> Response:
     """What came of an order, without the frame; 202 while it is being made."""
     ordered: Ordered = request.app.state.ordered_baselines
     found = ordered.get(order)

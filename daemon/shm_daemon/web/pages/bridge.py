@@ -224,9 +224,7 @@ def bridges_page(request: Request, site: AtSite, _: Reader) -> Response:
 
 
 @router.get(
-    "/api/bridges",
-    response_model=Bridges,
-    summary="This bridge and the others that it knows",
+    "/api/bridges", response_model=Bridges, summary="This bridge and the others that it knows"
 )
 def bridges(request: Request, site: AtSite, _: Reader) -> Any:
     """As `shm bridges --json` has them; what others said is at most some seconds old."""

@@ -26,9 +26,8 @@ from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.bridge_view import HangerGlance
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
-from shm_daemon.web.hangers import described
 from shm_daemon.web.models import LARGEST_NUMBER, FigureDocument
-from shm_daemon.web.site import Site
+from shm_daemon.web.site import Site, described
 
 router = APIRouter(tags=["hangers"])
 

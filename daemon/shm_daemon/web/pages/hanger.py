@@ -35,11 +35,10 @@ from shm_daemon.web.background_work import RETRY_AFTER, BackgroundWorker, backgr
 from shm_daemon.web.faults import Refused
 from shm_daemon.web.frame import page
 from shm_daemon.web.hanger_figures import FIGURES, HangerFigure
-from shm_daemon.web.hanger_numbers import headings, lines_before
 from shm_daemon.web.hanger_view import HangerView, View
-from shm_daemon.web.hangers import Number, described
-from shm_daemon.web.models import Before, paged
-from shm_daemon.web.site import held_documents
+from shm_daemon.web.hangers import headings, lines_before
+from shm_daemon.web.models import Before, HangerNumber, paged
+from shm_daemon.web.site import described, held_documents
 
 router = APIRouter(include_in_schema=False)
 
@@ -200,7 +199,7 @@ class ReportOrder:
 
 @router.get("/hangers/{hanger_id}/report.{form}")
 def report(
-    request: Request, site: AtSite, _: Reader, hanger_id: Number, form: Literal["pdf", "html"]
+    request: Request, site: AtSite, _: Reader, hanger_id: HangerNumber, form: Literal["pdf", "html"]
 ) -> Response:
     """What `shm report` writes; 503 with `Retry-After` where many others wait."""
     _refuse_untested(site.store, described(site.workspace, hanger_id))
@@ -211,7 +210,7 @@ def report(
 
 
 @router.get("/hangers/{hanger_id}/results.csv")
-def results(site: AtSite, _: Reader, hanger_id: Number) -> Response:
+def results(site: AtSite, _: Reader, hanger_id: HangerNumber) -> Response:
     """Every test with its tension averaged over the model classes, in N, the oldest first."""
     hanger = described(site.workspace, hanger_id)
     _refuse_untested(site.store, hanger)

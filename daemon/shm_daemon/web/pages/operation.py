@@ -30,10 +30,9 @@ from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.forms import Form, reason_in, time_in
 from shm_daemon.web.frame import page
-from shm_daemon.web.hangers import quarantined
 from shm_daemon.web.health import troubles
 from shm_daemon.web.models import Before, Examination, Operation, Row, Underway
-from shm_daemon.web.site import Site, held_documents
+from shm_daemon.web.site import Site, held_documents, quarantined
 
 router = APIRouter(tags=["operation"])
 

@@ -13,12 +13,7 @@ from fastapi.responses import JSONResponse
 from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.stream_course import stream_course
-from shm.pipeline.stream_state import (
-    StreamCondition,
-    against_hammer,
-    stream_states,
-    tension_words,
-)
+from shm.pipeline.stream_state import StreamCondition, against_hammer, stream_states, tension_words
 from shm.report import formatting
 from shm.report.figures.stream_course import alt, caption, specify
 from shm.report.paper import Table

@@ -63,12 +63,7 @@ class _Row:
 
 
 @router.get("/settings")
-def settings_page(
-    request: Request,
-    site: AtSite,
-    _: Engineer,
-    hanger: Before = None,
-) -> Response:
+def settings_page(request: Request, site: AtSite, _: Engineer, hanger: Before = None) -> Response:
     """The bridge's settings and hooks, and the thresholds and limits of one hanger."""
     return _page(request, site, hanger)
 
