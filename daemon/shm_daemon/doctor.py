@@ -16,7 +16,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import datetime, timedelta
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -243,7 +243,7 @@ _SHOWN = ("numpy", "scipy", "sqlalchemy")
 
 def check_versions() -> Iterator[Finding]:
     """What results depend on."""
-    libraries = ", ".join(f"{name} {_version(name)}" for name in _SHOWN)
+    libraries = ", ".join(f"{name} {version(name)}" for name in _SHOWN)
     yield ok(
         "versions",
         f"shm {__version__}, Python {platform.python_version()}, {libraries}, "
@@ -293,13 +293,6 @@ def check_confinement() -> Iterator[Finding]:
         )
     if not missing:
         yield ok("confinement", "files are read within limits, Landlock and a list of system calls")
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def check_folders(folder: Path) -> Iterator[Finding]:

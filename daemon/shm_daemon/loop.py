@@ -25,6 +25,7 @@ from shm_daemon.mqtt import messages
 from shm_daemon.spool import FileStabilityTracker, scan
 from shm_daemon.streams import StreamKeeper, streams_kept
 from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
+from shm_daemon.web.site import modified_ns
 
 # Technical: how soon it looks again, against the work of looking; hints come in bursts.
 _RECEIVING_S = 1.0
@@ -154,7 +155,7 @@ class Daemon:
         self._tracker = FileStabilityTracker(settings.spool_stable_seconds, time.monotonic)
         self._longest_wait_s = longest_wait_s()
         self._scan_at = 0.0
-        self._described_at = _modified_ns(flow.workspace), flow.workspace.newest_change
+        self._described_at = modified_ns(flow.workspace), flow.workspace.newest_change
         self._once, self._failure = False, ""
         folders = flow.workspace.spool, flow.workspace.archive.folder
         self._devices = {folder: _device(folder) for folder in folders}
@@ -291,7 +292,7 @@ class Daemon:
     def _heed_description(self) -> None:
         """Takes a changed `bridge.toml` or setting over; a wrong one leaves the last in force."""
         workspace = self._flow.workspace
-        described = _modified_ns(workspace), self._flow.store.settings.newest()
+        described = modified_ns(workspace), self._flow.store.settings.newest()
         if described == self._described_at:
             return
         self._described_at = described
@@ -310,10 +311,3 @@ def _device(folder: Path) -> int | None:
         return folder.stat().st_dev
     except OSError:
         return None
-
-
-def _modified_ns(workspace: Workspace) -> int:
-    try:
-        return Path(workspace.bridge.source).stat().st_mtime_ns
-    except OSError:
-        return 0

@@ -195,7 +195,9 @@ class Listener:
 
     def _work(self) -> None:
         while not self._ended.is_set():
-            message = self._next()
+            message = None
+            with suppress(queue.Empty):
+                message = self._queue.get(timeout=_LOOK_S if self._pending else None)
             try:
                 if message is not None:
                     self._take(message)
@@ -209,12 +211,6 @@ class Listener:
         if self._store is not None:
             self._store.close()
 
-    def _next(self) -> _Message | None:
-        try:
-            return self._queue.get(timeout=_LOOK_S if self._pending else None)
-        except queue.Empty:
-            return None
-
     def _try_later(self, message: _Message | None, error: Exception) -> None:
         log.warning("a message waits: %s", error)
         if message is not None:
@@ -227,7 +223,12 @@ class Listener:
             return
         level, _, given = message.topic.removeprefix(f"{self._topic}/").partition("/")
         if level == _STREAM and given:
-            self._take_chunk(message, given)
+            # One that cannot be used is noted and logged, and acknowledged too: the broker would
+            # send it again for ever.
+            with suppress(BadInput):
+                workspace, _ = self._description.now()
+                take_chunks(workspace, self._opened(), given, [message.payload], utc_now())
+            self._acknowledge(message)
             return
         with incoming(self._workspace.spool, len(message.payload)) as file:
             file.write(message.payload)
@@ -251,14 +252,6 @@ class Listener:
             hanger = int(level) if re.fullmatch(r"\d{1,9}", level) else level
             landed = file.land(name, {"hanger": hanger})
             self._pending.append((replace(message, payload=b""), landed))
-
-    def _take_chunk(self, message: _Message, stream: str) -> None:
-        """One that cannot be used is acknowledged too: the broker would send it again for ever."""
-        with suppress(BadInput):  # which is noted and logged
-            take_chunks(
-                self._description.now()[0], self._opened(), stream, [message.payload], utc_now()
-            )
-        self._acknowledge(message)
 
     def _acknowledge_received(self) -> None:
         """Acknowledges what has left the spool for the store."""

@@ -132,17 +132,17 @@ def glance(site: Site, now: datetime) -> BridgeGlance:
 def compared(request: Request, site: Site) -> Compared | None:
     """What moved over the bridge; None while it is being worked out."""
     order = tuple(hanger.id for hanger in site.workspace.bridge.hangers)
-    wanted = Comparison(tuple(map(_comparable, hanger_shifts(site.store, order))), order)
+    # One NaN, which equals itself, where a change of temperature is not known.
+    shifts = tuple(
+        shift if math.isfinite(shift.temperature_change_k)
+        else replace(shift, temperature_change_k=NAN)
+        for shift in hanger_shifts(site.store, order)
+    )  # fmt: skip
+    wanted = Comparison(shifts, order)
     if len(order) <= QUICKLY_COMPARED:
         return wanted.make()
     found: Compared | None = background_worker_of(request).wanted(wanted)
     return found
-
-
-def _comparable(shift: HangerShift) -> HangerShift:
-    """With the one NaN that equals itself where the change of temperature is not known."""
-    known = math.isfinite(shift.temperature_change_k)
-    return shift if known else replace(shift, temperature_change_k=NAN)
 
 
 CLASSES = (
@@ -256,28 +256,24 @@ def triangles(kind: str, x: float, base: float, hollow: bool = False) -> tuple[T
 
 
 def _mark(glance: HangerGlance, x: float, top: float, number: bool) -> HangerMark:
-    kind, shift = kind_of(glance), glance.shift
+    kind, shift, line = kind_of(glance), glance.shift, glance.line
     hollow = shift is not None and shift.low < 0 < shift.high
+    words = [formatting.hanger_name(glance.hanger.id, glance.hanger.name), shift_words(glance)]
+    if line.latest:
+        words.append(f"last test {line.latest:%Y-%m-%d}")
+    if line.open_alerts:
+        words.append(formatting.counted(line.open_alerts, "open alert"))
     return HangerMark(
         id=glance.hanger.id,
         x=round(x, 1),
         top=round(top, 1),
         kind=kind,
-        words=_words(glance),
+        words=", ".join(words),
         triangles=triangles(kind, x, top - 8, hollow),
         number=number,
-        open_alerts=glance.line.open_alerts,
+        open_alerts=line.open_alerts,
         is_quiet=glance.is_quiet,
     )
-
-
-def _words(glance: HangerGlance) -> str:
-    parts = [formatting.hanger_name(glance.hanger.id, glance.hanger.name), shift_words(glance)]
-    if glance.line.latest:
-        parts.append(f"last test {glance.line.latest:%Y-%m-%d}")
-    if glance.line.open_alerts:
-        parts.append(formatting.counted(glance.line.open_alerts, "open alert"))
-    return ", ".join(parts)
 
 
 def _numbered(hangers: Sequence[HangerGlance], places: Sequence[float]) -> set[int]:

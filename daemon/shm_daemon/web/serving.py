@@ -220,7 +220,8 @@ def web_beside(
     refuse_uninstalled()
     refuse_unguarded(workspace, address)
     context_of(certificate, key)
-    log_file = log_beside(log_file) if log_file else None
+    if log_file:  # daemon.web.log by daemon.log
+        log_file = log_file.with_name(f"{log_file.stem}.web{log_file.suffix}")
     keeper = _Keeper(_command(workspace.folder, address, certificate, key, log_file))
     thread = threading.Thread(target=keeper.keep, name="web", daemon=True)
     thread.start()
@@ -229,11 +230,6 @@ def web_beside(
     finally:
         keeper.stop()
         thread.join()  # it ends the process itself where that does not end in time
-
-
-def log_beside(file: Path) -> Path:
-    """Where the web interface writes its log beside a daemon's: daemon.web.log by daemon.log."""
-    return file.with_name(f"{file.stem}.web{file.suffix}")
 
 
 class _Keeper:

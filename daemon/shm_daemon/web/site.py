@@ -80,7 +80,7 @@ class Description:
     """The workspace as `bridge.toml` describes it. May be used from many threads."""
 
     def __init__(self, workspace: Workspace):
-        self._workspace, self._described_at = workspace, _modified_ns(workspace)
+        self._workspace, self._described_at = workspace, modified_ns(workspace)
         self._fault: ShmError | None = None
         self._lock = threading.Lock()
 
@@ -92,7 +92,7 @@ class Description:
     def now(self) -> tuple[Workspace, ShmError | None]:
         """As it is described now or, where that has a fault, as it last was; and the fault."""
         with self._lock:
-            modified = _modified_ns(self._workspace)
+            modified = modified_ns(self._workspace)
             if modified != self._described_at:
                 self._described_at = modified
                 try:
@@ -154,7 +154,8 @@ class Site:
                 self._store = None
 
 
-def _modified_ns(workspace: Workspace) -> int:
+def modified_ns(workspace: Workspace) -> int:
+    """When `bridge.toml` was last written; 0 where it cannot be looked at."""
     try:
         return Path(workspace.bridge.source).stat().st_mtime_ns
     except OSError:

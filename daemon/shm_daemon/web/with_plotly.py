@@ -13,19 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from shm.report.figures.specification import (
-    Axis,
-    Band,
-    Bars,
-    Heat,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    Span,
-    Specification,
-)
+from shm.report.figures import specification as spec
 from shm.report.figures.style import PALETTE
 from shm.values import FloatArray
 from shm_daemon.web.models import plain
@@ -48,12 +36,12 @@ _SYMBOLS = {
 }  # fmt: skip
 
 
-def document(figure: Specification) -> dict[str, Any]:
+def document(figure: spec.Specification) -> dict[str, Any]:
     """The plotly document `{"data", "layout"}`: lists and texts only, null for what is unknown."""
     return _Drawing(figure).document()
 
 
-def with_words(figure: Specification, caption: str, alt: str) -> dict[str, Any]:
+def with_words(figure: spec.Specification, caption: str, alt: str) -> dict[str, Any]:
     """Its document with what is seen and with what a blind reader needs."""
     return {**document(figure), "caption": caption, "alt": alt}
 
@@ -61,7 +49,7 @@ def with_words(figure: Specification, caption: str, alt: str) -> dict[str, Any]:
 class _Drawing:
     """Gathers the traces and the layout of one figure, panel by panel."""
 
-    def __init__(self, figure: Specification) -> None:
+    def __init__(self, figure: spec.Specification) -> None:
         self.figure = figure
         self.traces: list[dict[str, Any]] = []
         self.layout: dict[str, Any] = {
@@ -109,14 +97,18 @@ class _Drawing:
             self.layout["margin"] = {"t": _ABOVE_PX}
         return {"data": self.traces, "layout": plain(self.layout)}
 
-    def _widths(self, row: Sequence[Panel]) -> list[list[float]]:
+    def _widths(self, row: Sequence[spec.Panel]) -> list[list[float]]:
         if not self.figure.is_grid:
             return _shares([panel.width for panel in row], [_GAP_BESIDE] * (len(row) - 1))
         columns = max(len(each) for each in self.figure.rows)
         return _shares([1.0] * columns, [_GAP_GRID] * (columns - 1))[: len(row)]
 
     def _place(
-        self, panel: Panel, axes: tuple[str, str], domains: tuple[list[float], ...], column: int
+        self,
+        panel: spec.Panel,
+        axes: tuple[str, str],
+        domains: tuple[list[float], ...],
+        column: int,
     ) -> None:
         """The vertical axis of a panel, its title and its words."""
         (x, y), (width, domain) = axes, domains
@@ -162,14 +154,14 @@ class _Drawing:
             }  # fmt: skip
         return key.replace("yaxis", "y")
 
-    def _draw(self, mark: Mark, panel: Panel, x: str, y: str) -> None:
-        if isinstance(mark, Rule) and mark.hover:
+    def _draw(self, mark: spec.Mark, panel: spec.Panel, x: str, y: str) -> None:
+        if isinstance(mark, spec.Rule) and mark.hover:
             shown = [x for each in panel.marks if hasattr(each, "x") for x in each.x]
-            mark = Line(
+            mark = spec.Line(
                 x=[min(shown), max(shown)], y=[mark.at] * 2, width=mark.width, dash=mark.dash,
                 colour=mark.colour, opacity=mark.opacity, name=mark.name, hover=mark.hover,
             )  # fmt: skip
-        if isinstance(mark, Rule | Span):
+        if isinstance(mark, spec.Rule | spec.Span):
             self._shape(mark, x, y)
             return
         axes = {"xaxis": x, "yaxis": self._overlay(y) if mark.in_shares else y}
@@ -177,7 +169,7 @@ class _Drawing:
         for trace in _TRACES[type(mark)](mark, colour):
             self.traces.append({**axes, **_told(mark), **self._legend(mark, trace), **trace})
 
-    def _legend(self, mark: Mark, trace: dict[str, Any]) -> dict[str, Any]:
+    def _legend(self, mark: spec.Mark, trace: dict[str, Any]) -> dict[str, Any]:
         if not mark.name:
             return {"showlegend": False}
         is_first = mark.name not in self.named and trace.get("showlegend", True)
@@ -186,8 +178,8 @@ class _Drawing:
         name = escaped(mark.name)
         return {"name": name, "legendgroup": name, "showlegend": is_first}
 
-    def _shape(self, mark: Rule | Span, x: str, y: str) -> None:
-        low, high = (mark.at, mark.at) if isinstance(mark, Rule) else (mark.low, mark.high)
+    def _shape(self, mark: spec.Rule | spec.Span, x: str, y: str) -> None:
+        low, high = (mark.at, mark.at) if isinstance(mark, spec.Rule) else (mark.low, mark.high)
         along, other = (x, y) if mark.axis == "x" else (y, x)
         letter, opposite = mark.axis, "y" if mark.axis == "x" else "x"
         shape: dict[str, Any] = {
@@ -195,7 +187,7 @@ class _Drawing:
             f"{letter}1": _one(high), f"{opposite}0": 0, f"{opposite}1": 1, "layer": "below",
         }  # fmt: skip
         colour = colour_of(mark.colour)
-        if isinstance(mark, Rule):
+        if isinstance(mark, spec.Rule):
             line = {"color": colour, "width": _PX_A_POINT * mark.width, "dash": mark.dash}
             shape |= {"type": "line", "line": line, "opacity": mark.opacity}
             place = {"textposition": "start", "yanchor": "top"}
@@ -204,7 +196,7 @@ class _Drawing:
             shape["line"] = {"width": 0}
             place = {"textposition": f"top {mark.label_side}"}
         if mark.label:
-            lower = 0 if isinstance(mark, Rule) else mark.label_line
+            lower = 0 if isinstance(mark, spec.Rule) else mark.label_line
             shape["label"] = {
                 "text": "<br>" * lower + escaped(mark.label),
                 "font": {"color": colour, "size": 11},
@@ -217,7 +209,7 @@ class _Drawing:
         self.layout["shapes"].append(shape)
 
 
-def _heights(figure: Specification) -> list[list[float]]:
+def _heights(figure: spec.Specification) -> list[list[float]]:
     """From the uppermost row to the lowest: where each begins and ends."""
     rows = figure.rows
     if figure.is_grid:
@@ -231,7 +223,7 @@ def _heights(figure: Specification) -> list[list[float]]:
     return [[max(0.0, 1 - high), 1 - low] for low, high in found]
 
 
-def _begins_left(row: Sequence[Panel]) -> bool:
+def _begins_left(row: Sequence[spec.Panel]) -> bool:
     """Whether a title stands where the legend begins."""
     return any(panel.title and panel.title_side == "left" for panel in row)
 
@@ -250,7 +242,7 @@ def _key(axis: str) -> str:
     return f"{axis[0]}axis{axis[1:]}"
 
 
-def _axis_of(axis: Axis) -> dict[str, Any]:
+def _axis_of(axis: spec.Axis) -> dict[str, Any]:
     found: dict[str, Any] = {"title": {"text": axis.label.replace("\n", "<br>")}}
     if axis.scale != "linear":
         found["type"] = axis.scale
@@ -270,7 +262,7 @@ def _axis_of(axis: Axis) -> dict[str, Any]:
     return found
 
 
-def _told(mark: Mark) -> dict[str, Any]:
+def _told(mark: spec.Mark) -> dict[str, Any]:
     if not mark.hover and not len(mark.texts):
         return {"hoverinfo": "skip"}
     told = {"hovertemplate": (mark.hover or "%{text}") + "<extra></extra>"}
@@ -279,7 +271,7 @@ def _told(mark: Mark) -> dict[str, Any]:
     return told
 
 
-def _line(mark: Line, colour: str) -> list[dict[str, Any]]:
+def _line(mark: spec.Line, colour: str) -> list[dict[str, Any]]:
     line = {"color": colour, "width": _PX_A_POINT * mark.width, "dash": mark.dash}
     return [
         {
@@ -289,7 +281,7 @@ def _line(mark: Line, colour: str) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _points(mark: Points, colour: str) -> list[dict[str, Any]]:
+def _points(mark: spec.Points, colour: str) -> list[dict[str, Any]]:
     symbol = _SYMBOLS[mark.symbol]
     is_open = not mark.filled or symbol in ("x-thin", "line-ns")
     trace: dict[str, Any] = {
@@ -320,7 +312,7 @@ def _points(mark: Points, colour: str) -> list[dict[str, Any]]:
     return [trace]
 
 
-def _band(mark: Band, colour: str) -> list[dict[str, Any]]:
+def _band(mark: spec.Band, colour: str) -> list[dict[str, Any]]:
     edge = {"type": "scatter", "mode": "lines", "x": numbers(mark.x), "line": {"width": 0}}
     fill = {"fill": "tonexty", "fillcolor": colour_of(mark.colour, mark.opacity)}
     return [
@@ -329,7 +321,7 @@ def _band(mark: Band, colour: str) -> list[dict[str, Any]]:
     ]
 
 
-def _bars(mark: Bars, colour: str) -> list[dict[str, Any]]:
+def _bars(mark: spec.Bars, colour: str) -> list[dict[str, Any]]:
     x, y = numbers(mark.x), numbers(mark.y)
     return [
         {
@@ -342,15 +334,15 @@ def _bars(mark: Bars, colour: str) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _heat(mark: Heat, colour: str) -> list[dict[str, Any]]:
+def _heat(mark: spec.Heat, colour: str) -> list[dict[str, Any]]:
     z = [numbers(row) for row in np.asarray(mark.z, float)]
     shades = [[0, colour_of(mark.colour, 0.0)], [1, colour]]
     place = {"x": numbers(mark.x), "y": numbers(mark.y), "z": z}
     return [{"type": "heatmap", **place, "colorscale": shades, "showscale": False}]
 
 
-_TRACES: dict[type[Mark], Any] = {
-    Line: _line, Points: _points, Band: _band, Bars: _bars, Heat: _heat
+_TRACES: dict[type[spec.Mark], Any] = {
+    spec.Line: _line, spec.Points: _points, spec.Band: _band, spec.Bars: _bars, spec.Heat: _heat
 }  # fmt: skip
 
 
