@@ -25,7 +25,7 @@ from shm.report.contents import HangerLine
 from shm.report.formatting import Interval
 from shm.report.hanger_status import BridgeMessage, Status, bridge_message
 from shm.values import NAN, Hanger
-from shm.values.rounding import rounded_percent
+from shm.values.rounding import ForceUnit, rounded_percent
 from shm.watch.neighbours import BridgePattern, HangerShift, bridge_pattern
 from shm_daemon.web.background_work import background_worker_of
 from shm_daemon.web.site import Site
@@ -65,6 +65,15 @@ class HangerGlance:
         if line.tension_n is None or line.baseline_tension_n is None or self.is_baseline:
             return None
         return line.tension_n.since(line.baseline_tension_n)
+
+    def cells(self, unit: ForceUnit) -> tuple[str, str, str]:
+        """As tables have it: tension, percent of nominal, shift in percent; empty where unknown."""
+        line, shift, tension = self.line, self.shift, "no test yet"
+        if line.tension_n:
+            tension = formatting.with_half(line.tension_n, unit).removesuffix(f" {unit.name}")
+        nominal = formatting.mean(line.of_nominal) if line.of_nominal else ""
+        percent = rounded_percent(shift.mean, shift.width / 2, "+") if shift else ""
+        return tension, nominal, percent.removesuffix(" %")
 
 
 @dataclass(frozen=True)

@@ -117,9 +117,8 @@ def _queue(site: Site) -> Iterator[Metric]:
 
 
 def _recordings(site: Site) -> Iterator[Metric]:
-    yield _labelled(
-        "shm_recordings", "Recordings at a stage.", "stage", site.store.recordings.stage_counts()
-    )
+    counts = site.store.recordings.stage_counts()
+    yield _labelled("shm_recordings", "Recordings at a stage.", "stage", counts)
 
 
 def _alerts(site: Site) -> Iterator[Metric]:
@@ -128,9 +127,8 @@ def _alerts(site: Site) -> Iterator[Metric]:
 
 
 def _deliveries(site: Site) -> Iterator[Metric]:
-    yield _labelled(
-        "shm_deliveries", "Alerts to hooks.", "state", site.store.alerts.delivery_counts()
-    )
+    counts = site.store.alerts.delivery_counts()
+    yield _labelled("shm_deliveries", "Alerts to hooks.", "state", counts)
 
 
 def _stages(site: Site) -> Iterator[Metric]:

@@ -17,7 +17,7 @@ from shm.pipeline import utc_now
 from shm.report import formatting
 from shm.report.contents import hangers_unit
 from shm.values.messages import TODAY, WEEK, Lead, Urgency
-from shm.values.rounding import ForceUnit, rounded_percent
+from shm.values.rounding import ForceUnit
 from shm_daemon.heartbeat import told
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import SUMMARY, test_page
@@ -144,19 +144,14 @@ def _facts(bridge: BridgeGlance, now: datetime) -> list[tuple[str, str, str]]:
 def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
     """A hanger's row of the table."""
     line, hanger = each.line, each.hanger
-    tension, latest = line.tension_n, line.latest
-    shift = shift_words(each) if latest and each.shift is None else ""
-    if each.shift is not None:
-        shift = rounded_percent(each.shift.mean, each.shift.width / 2, "+").removesuffix(" %")
-    if tension:
-        words = formatting.with_half(tension, unit).removesuffix(f" {unit.name}")
+    latest, (tension, nominal, shift) = line.latest, each.cells(unit)
     return {
         "id": hanger.id,
         "name": formatting.hanger_name(hanger.id, hanger.name),
         "status": line.status,
-        "tension": words if tension else "no test yet",
-        "nominal": formatting.mean(line.of_nominal) if line.of_nominal else "",
-        "shift": shift,
+        "tension": tension,
+        "nominal": nominal,
+        "shift": shift or (shift_words(each) if latest else ""),
         "message": line.message,
         "when": _WHEN[line.message.urgency],
         "open_alerts": line.open_alerts,

@@ -20,7 +20,6 @@ from shm.report.figures.compared_hangers import MOST, Course, alt, caption, spec
 from shm.report.formatting import Interval
 from shm.report.paper import Table
 from shm.values import Hanger
-from shm.values.rounding import rounded_percent
 from shm_daemon.web import with_plotly
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.bridge_view import HangerGlance
@@ -152,18 +151,10 @@ def _table(lines: Sequence[HangerLine]) -> Table:
             (
                 formatting.hanger_name(line.hanger.id, line.hanger.name),
                 line.status.value if line.status else "",
-                formatting.with_half(line.tension_n, unit).removesuffix(f" {unit.name}")
-                if line.tension_n else "no test yet",
-                formatting.mean(line.of_nominal) if line.of_nominal else "",
-                _shift(line),
+                *HangerGlance(line).cells(unit),
                 f"{line.hanger.length_m:g} m",
                 f"{line.latest:%Y-%m-%d}" if line.latest else "",
             )
             for line in lines
         ),
     )  # fmt: skip
-
-
-def _shift(line: HangerLine) -> str:
-    shift = HangerGlance(line).shift
-    return rounded_percent(shift.mean, shift.width / 2, "+").removesuffix(" %") if shift else ""
