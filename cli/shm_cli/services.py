@@ -59,7 +59,7 @@ def daemon(
     """
     from shm_daemon.logs import begin_logging
     from shm_daemon.web.address import Address
-    from shm_daemon.web.web_process import web_beside
+    from shm_daemon.web.serving import web_beside
 
     tls = {"--certificate": certificate, "--key": key}
     if not with_web and any(tls.values()):

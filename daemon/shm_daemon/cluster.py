@@ -108,15 +108,14 @@ def _connect(scheduler: str) -> Client:
 
 
 def _refuse_unlike(worker: str, its: object, expected: Mapping[str, str]) -> None:
-    if not isinstance(its, Mapping):
-        raise _unlike(worker, f"cannot run shm: {its!r}")
-    for name, version in expected.items():
-        if its.get(name) != version:
-            raise _unlike(worker, f"has {name} {its.get(name)}, the daemon {version}")
-
-
-def _unlike(worker: str, how: str) -> ShmError:
-    return ShmError(
+    if isinstance(its, Mapping):
+        unlike = [name for name, version in expected.items() if its.get(name) != version]
+        if not unlike:
+            return
+        how = f"has {unlike[0]} {its.get(unlike[0])}, the daemon {expected[unlike[0]]}"
+    else:
+        how = f"cannot run shm: {its!r}"
+    raise ShmError(
         f"the worker {worker} {how}.",
         remedy="Install the same there, set OMP_NUM_THREADS=1, and begin it again.",
         retry_after_s=AGAIN_S,
@@ -133,14 +132,7 @@ def _pass_on(there: Future[T], *, here: Future[T], scheduler: str) -> None:
     elif isinstance(error, KilledWorker):
         here.set_exception(BrokenExecutor(str(error)))
     elif isinstance(error, _LOST):
-        here.set_exception(_lost(scheduler))
+        lost = f"a step was lost with the connection to {scheduler}."
+        here.set_exception(ShmError(lost, remedy="It is tried again.", retry_after_s=AGAIN_S))
     else:
         here.set_exception(error)
-
-
-def _lost(scheduler: str) -> ShmError:
-    return ShmError(
-        f"a step was lost with the connection to {scheduler}.",
-        remedy="It is tried again.",
-        retry_after_s=AGAIN_S,
-    )

@@ -213,26 +213,22 @@ def _work(pipe: Connection, prepare: Callable[[], object] | None) -> None:
             except BaseException as error:  # noqa: BLE001 - whatever it is, it is the answer
                 error.add_note(traceback.format_exc())
                 answer = None, error
-            _answer(pipe, answer)
+            try:
+                pipe.send(answer)
+            except ConnectionError:
+                raise
+            except Exception as error:  # noqa: BLE001 - what cannot be pickled raises anything
+                unsent = f"an answer cannot be sent: {error!r}; {answer[1]!r}"
+                pipe.send((None, RuntimeError(unsent)))
             del step, answer
-
-
-def _answer(pipe: Connection, answer: tuple[Any, BaseException | None]) -> None:
-    try:
-        pipe.send(answer)
-    except ConnectionError:
-        raise
-    except Exception as error:  # noqa: BLE001 - what cannot be pickled raises anything
-        pipe.send((None, RuntimeError(f"an answer cannot be sent: {error!r}; {answer[1]!r}")))
 
 
 def _bound_memory() -> None:
     """A step that grows without end gets a MemoryError before the machine has no memory left."""
     most = int(_MOST_OF_MEMORY * memory_of_machine())
-    if most:
-        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-        if hard == resource.RLIM_INFINITY or hard > most:
-            resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    if most and (hard == resource.RLIM_INFINITY or hard > most):
+        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
 
 
 def process_pool(workers: int) -> ProcessPoolExecutor:

@@ -30,7 +30,16 @@ def begin_logging(settings: Settings, file: Path | None = None) -> None:
 
     Raises UsageError where that file cannot be written.
     """
-    handler = _to_file(file, settings) if file is not None else logging.StreamHandler(sys.stderr)
+    handler: logging.Handler = logging.StreamHandler(sys.stderr)
+    if file is not None:
+        most, kept = settings.log_file_bytes, settings.log_files
+        try:
+            handler = RotatingFileHandler(file, maxBytes=most, backupCount=kept, encoding="utf-8")
+        except OSError as error:
+            raise UsageError(
+                f"the log file {file} cannot be written: {error.strerror}.",
+                remedy="Name another one with --log-file.",
+            ) from error
     journal = file is None and tells_the_journal()
     handler.setFormatter(formatter(settings.log_format, journal))
     level = logging.getLevelNamesMapping()[settings.log_level.upper()]
@@ -97,18 +106,3 @@ class JournalFormatter(logging.Formatter):
         number = next(numbers, "<7>")
         lines = self._inner.format(record).splitlines() or [""]
         return "\n".join(number + line for line in lines)
-
-
-def _to_file(file: Path, settings: Settings) -> logging.Handler:
-    try:
-        return RotatingFileHandler(
-            file,
-            maxBytes=settings.log_file_bytes,
-            backupCount=settings.log_files,
-            encoding="utf-8",
-        )
-    except OSError as error:
-        raise UsageError(
-            f"the log file {file} cannot be written: {error.strerror}.",
-            remedy="Name another one with --log-file.",
-        ) from error

@@ -5,20 +5,13 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
-from shm.errors import (
-    SchemaOutdated,
-    ShmError,
-    StoreBusy,
-    StoreDamaged,
-    StoreError,
-    TooLarge,
-)
+from shm.errors import SchemaOutdated, ShmError, StoreBusy, StoreDamaged, StoreError, TooLarge
 from shm.pipeline import Clock, Flow, Notifier, Sharing, utc_now
 from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
@@ -32,6 +25,7 @@ from shm_daemon.mqtt import messages
 from shm_daemon.spool import FileStabilityTracker, scan
 from shm_daemon.streams import StreamKeeper, streams_kept
 from shm_daemon.wakeup import SPOOL, Wakeup, rung_by_changes, stopped_by_signals
+from shm_daemon.web.site import modified_ns
 
 # Technical: how soon it looks again, against the work of looking; hints come in bursts.
 _RECEIVING_S = 1.0
@@ -61,13 +55,13 @@ def run(
     """
     wakeup = wakeup or Wakeup()
     patience = Patience(wakeup, standby)
-    with stopped_by_signals(wakeup), last_words():
+    with stopped_by_signals(wakeup), ExitStack() as ending:
+        ending.callback(tell_systemd, "STOPPING=1", "STATUS=ending")
         while not wakeup.stopped:
             try:
                 with workspace.lock(patience) as lock, ExitStack() as stack:
                     begin = partial(_begin, stack, workspace, lock, wakeup, clock, make_executor)
-                    daemon = begin(notifier, once)
-                    if daemon.serve(once):
+                    if begin(notifier, once).serve(once):
                         return
             except StoreError as error:
                 waiting_helps = error.retry_after_s is not None
@@ -77,15 +71,6 @@ def run(
                     if waiting_helps and wakeup.stopped:  # meanwhile: that is no failure
                         return
                     raise
-
-
-@contextmanager
-def last_words() -> Iterator[None]:
-    """Tells systemd at the end of the context that the service is ending."""
-    try:
-        yield
-    finally:
-        tell_systemd("STOPPING=1", "STATUS=ending")
 
 
 class Patience:
@@ -170,7 +155,7 @@ class Daemon:
         self._tracker = FileStabilityTracker(settings.spool_stable_seconds, time.monotonic)
         self._longest_wait_s = longest_wait_s()
         self._scan_at = 0.0
-        self._described_at = _modified_ns(flow.workspace), flow.workspace.newest_change
+        self._described_at = modified_ns(flow.workspace), flow.workspace.newest_change
         self._once, self._failure = False, ""
         folders = flow.workspace.spool, flow.workspace.archive.folder
         self._devices = {folder: _device(folder) for folder in folders}
@@ -307,7 +292,7 @@ class Daemon:
     def _heed_description(self) -> None:
         """Takes a changed `bridge.toml` or setting over; a wrong one leaves the last in force."""
         workspace = self._flow.workspace
-        described = _modified_ns(workspace), self._flow.store.settings.newest()
+        described = modified_ns(workspace), self._flow.store.settings.newest()
         if described == self._described_at:
             return
         self._described_at = described
@@ -326,10 +311,3 @@ def _device(folder: Path) -> int | None:
         return folder.stat().st_dev
     except OSError:
         return None
-
-
-def _modified_ns(workspace: Workspace) -> int:
-    try:
-        return Path(workspace.bridge.source).stat().st_mtime_ns
-    except OSError:
-        return 0

@@ -22,10 +22,10 @@ from urllib.parse import unquote, urlsplit
 
 from shm.errors import BadInput, ShmError, TooLarge, needing
 from shm.pipeline import utc_now
-from shm.read import FORMATS, sidecar_path
+from shm.read import FORMATS
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX, refuse_oversize
-from shm_daemon.spool import Incoming, Landed, incoming, landing_name
+from shm_daemon.spool import Landed, incoming, landing_name, lay_out
 from shm_daemon.streams import take_chunks
 from shm_daemon.web.site import Description
 
@@ -195,7 +195,9 @@ class Listener:
 
     def _work(self) -> None:
         while not self._ended.is_set():
-            message = self._next()
+            message = None
+            with suppress(queue.Empty):
+                message = self._queue.get(timeout=_LOOK_S if self._pending else None)
             try:
                 if message is not None:
                     self._take(message)
@@ -209,12 +211,6 @@ class Listener:
         if self._store is not None:
             self._store.close()
 
-    def _next(self) -> _Message | None:
-        try:
-            return self._queue.get(timeout=_LOOK_S if self._pending else None)
-        except queue.Empty:
-            return None
-
     def _try_later(self, message: _Message | None, error: Exception) -> None:
         log.warning("a message waits: %s", error)
         if message is not None:
@@ -227,52 +223,35 @@ class Listener:
             return
         level, _, given = message.topic.removeprefix(f"{self._topic}/").partition("/")
         if level == _STREAM and given:
-            self._take_chunk(message, given)
+            # One that cannot be used is noted and logged, and acknowledged too: the broker would
+            # send it again for ever.
+            with suppress(BadInput):
+                workspace, _ = self._description.now()
+                take_chunks(workspace, self._opened(), given, [message.payload], utc_now())
+            self._acknowledge(message)
             return
         with incoming(self._workspace.spool, len(message.payload)) as file:
             file.write(message.payload)
-            name = _name(given, level, message.payload, file.sha256)
+            try:
+                name = landing_name(given)
+            except BadInput:
+                suffix = _suffix(message.payload[:_HEAD_BYTES])
+                name = landing_name(f"hanger-{level}-{file.sha256[:8]}{suffix}")
             if message.again and self._is_received(file.sha256):
                 self._acknowledge(message)
                 return
             try:
-                self._refuse_oversize(file)
+                for setting in ("max_file_bytes", "mqtt_max_bytes"):
+                    most = getattr(self._workspace.settings, setting)
+                    refuse_oversize(file.size_bytes, most, setting=setting)
             except TooLarge as error:  # the broker would send it again for ever
-                self._lay_out(file, name, error)
+                lay_out(self._workspace, file.whole(), name, error, utc_now(), file.sha256)
+                log.warning("%s is refused: %s %s", name, error.message, error.remedy)
                 self._acknowledge(message)
                 return
             hanger = int(level) if re.fullmatch(r"\d{1,9}", level) else level
             landed = file.land(name, {"hanger": hanger})
             self._pending.append((replace(message, payload=b""), landed))
-
-    def _take_chunk(self, message: _Message, stream: str) -> None:
-        """One that cannot be used is acknowledged too: the broker would send it again for ever."""
-        with suppress(BadInput):  # which is noted and logged
-            take_chunks(
-                self._description.now()[0], self._opened(), stream, [message.payload], utc_now()
-            )
-        self._acknowledge(message)
-
-    def _refuse_oversize(self, file: Incoming) -> None:
-        settings = self._workspace.settings
-        for setting in ("max_file_bytes", "mqtt_max_bytes"):
-            refuse_oversize(file.size_bytes, getattr(settings, setting), setting=setting)
-
-    def _lay_out(self, file: Incoming, name: str, error: TooLarge) -> None:
-        """Moves a message that is too large into the quarantine, with the reason."""
-        reason = {
-            "schema": "shm.reason/1",
-            "file": name,
-            "line": None,
-            "channel": None,
-            "message": error.message,
-            "remedy": error.remedy,
-            "time": utc_now(),
-            "sha256": file.sha256,
-        }
-        path = file.whole()
-        self._workspace.quarantine.move(path, name, reason, sidecar_path(path))
-        log.warning("%s is refused: %s %s", name, error.message, error.remedy)
 
     def _acknowledge_received(self) -> None:
         """Acknowledges what has left the spool for the store."""
@@ -297,15 +276,8 @@ class Listener:
         return self._store
 
 
-def _name(given: str, level: str, payload: bytes, sha256: str) -> str:
-    """The name that the topic gives, or one made of what the file looks like."""
-    try:
-        return landing_name(given)
-    except BadInput:
-        return landing_name(f"hanger-{level}-{sha256[:8]}{_suffix(payload[:_HEAD_BYTES])}")
-
-
 def _suffix(head: bytes) -> str:
+    """Of a file without a name, by what it looks like."""
     if head.lstrip().startswith(b"{"):
         return MODES_SUFFIX
     return next((kind.suffixes[0] for kind in FORMATS if kind.recognises(head)), "")

@@ -118,9 +118,10 @@ class Provider:
         except OAuthError as error:
             raise self._refused(error) from error
         except JoseError as error:
+            is_of_time = isinstance(error, ClaimError) and error.claim in ("exp", "nbf", "iat")
             raise ShmError(
                 f"{host} has sent proof that does not hold: {error.description or error.error}.",
-                remedy=_CLOCK if _is_of_time(error) else f"Begin again. {_DESCRIBE}",
+                remedy=_CLOCK if is_of_time else f"Begin again. {_DESCRIBE}",
             ) from error
         except requests.ConnectionError as error:
             raise _passing(f"{host} cannot be reached: {reason_of(error)}.", _OTHERWISE) from error
@@ -223,7 +224,3 @@ def _name_in(claims: Mapping[str, Any], described: SingleSignOn) -> str:
 
 def _passing(message: str, remedy: str) -> ShmError:
     return ShmError(message, remedy=remedy, retry_after_s=60.0)
-
-
-def _is_of_time(error: JoseError) -> bool:
-    return isinstance(error, ClaimError) and error.claim in ("exp", "nbf", "iat")

@@ -22,13 +22,15 @@ import stat
 import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path, PurePosixPath
 
 from shm.errors import BadInput
 from shm.read import sidecar_path
 from shm.read.sidecar import SIDECAR_SUFFIX, Described, sidecar_text
+from shm.store import Workspace
 from shm.store.archive import (
     MODES_SUFFIX,
     checksum,
@@ -315,31 +317,40 @@ class Incoming:
         return False
 
 
-@contextmanager
-def incoming(spool: Path, max_bytes: int) -> Iterator[Incoming]:
+def incoming(spool: Path, max_bytes: int) -> closing[Incoming]:
     """A file under way that leaves nothing behind where it does not land."""
-    file = Incoming(spool, max_bytes)
-    try:
-        yield file
-    finally:
-        file.close()
+    return closing(Incoming(spool, max_bytes))
+
+
+def lay_out(
+    workspace: Workspace, path: Path, name: str, error: BadInput, at: datetime, sha256: str
+) -> None:
+    """Moves a refused file and its sidecar into the quarantine, with the reason."""
+    reason = {
+        "schema": "shm.reason/1",
+        "file": name,
+        "line": error.line,
+        "channel": error.channel or None,
+        "message": error.message,
+        "remedy": error.remedy,
+        "time": at,
+        "sha256": sha256,
+    }
+    workspace.quarantine.move(path, name, reason, sidecar_path(path))
 
 
 def _places(spool: Path, name: str, sha256: str) -> Iterator[Path]:
     """The name itself, then with a piece of the checksum, then with pieces of chance."""
-    suffix = MODES_SUFFIX if name.lower().endswith(MODES_SUFFIX) else _suffixes_of(name)
-    stem = name[: len(name) - len(suffix)]
+    size = len(last := suffix_of(name))
+    if name.lower().endswith(MODES_SUFFIX):
+        size = len(MODES_SUFFIX)
+    elif last == ".gz":  # the ending before it as well
+        size += len(suffix_of(name[:-size]))
+    stem, suffix = name[: len(name) - size], name[len(name) - size :]
     yield spool / name
     yield spool / f"{stem}-{sha256[:8]}{suffix}"
     while True:
         yield spool / f"{stem}-{uuid.uuid4().hex[:12]}{suffix}"
-
-
-def _suffixes_of(name: str) -> str:
-    """The ending with that before `.gz`."""
-    last = suffix_of(name)
-    before = suffix_of(name[: len(name) - len(last)]) if last == ".gz" else ""
-    return name[len(name) - len(before + last) :] if last else ""
 
 
 def _named(source: Path, target: Path) -> bool:

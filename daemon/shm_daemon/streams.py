@@ -38,7 +38,7 @@ from shm.store.archive import checksum, refuse_oversize
 from shm.store.ring import Kept, ring_of
 from shm.values import Channel, FloatArray, Recording
 from shm.values.stream import Chunk, Stream, StreamEvent
-from shm_daemon.spool import STREAMS, FileStabilityTracker, scan
+from shm_daemon.spool import STREAMS, FileStabilityTracker, lay_out, scan
 
 log = logging.getLogger(__name__)
 
@@ -115,14 +115,16 @@ class RollingFiles:
         except BadInput as error:
             if not isinstance(error, DoubledChunk):  # which is noted
                 note_refused(self._store, name, error, now)
-            _lay_out(workspace, path, error, now)
+            lay_out(workspace, path, path.name, error, now, checksum(path))
         else:
             path.unlink()
             sidecar_path(path).unlink(missing_ok=True)
 
 
 def _chunks(workspace: Workspace, stream: Stream, path: Path) -> Iterator[Chunk]:
-    _describe(path)
+    common, own = path.with_name("stream.toml"), sidecar_path(path)
+    if common.is_file() and not own.exists():  # what all files of a folder do not say stands there
+        shutil.copyfile(common, own)
     recording, *others = read_test(path, read_limits(workspace.settings))
     if others or not isinstance(recording, Recording):
         raise _refusal("holds no samples, or those of several records", path)
@@ -134,13 +136,6 @@ def _chunks(workspace: Workspace, stream: Stream, path: Path) -> Iterator[Chunk]
         at = start + timedelta(seconds=first / rate)
         part = values[:, first:last].astype(np.float32)
         yield Chunk(stream.name, number, at, rate, names, part, weather)
-
-
-def _describe(path: Path) -> None:
-    """What all files of a folder do not say stands once in its `stream.toml`."""
-    common, own = path.with_name("stream.toml"), sidecar_path(path)
-    if common.is_file() and not own.exists():
-        shutil.copyfile(common, own)
 
 
 def _channels(recording: Recording, stream: Stream, path: Path) -> list[Channel]:
@@ -185,21 +180,6 @@ def _refusal(what: str, path: Path) -> BadInput:
     )
 
 
-def _lay_out(workspace: Workspace, path: Path, error: BadInput, now: datetime) -> None:
-    """Moves a refused file into the quarantine, with the reason."""
-    reason = {
-        "schema": "shm.reason/1",
-        "file": path.name,
-        "line": error.line,
-        "channel": error.channel or None,
-        "message": error.message,
-        "remedy": error.remedy,
-        "time": now,
-        "sha256": checksum(path),
-    }
-    workspace.quarantine.move(path, path.name, reason, sidecar_path(path))
-
-
 _LOOK_S = 2.0  # technical: chunks are sealed within seconds, of ten minutes
 _SWEEP_S = 3600.0  # technical: a thirtieth of a day of samples is no matter
 _RETRY_S = 60.0  # technical: a full disk is not mended sooner
@@ -212,10 +192,7 @@ class StreamKeeper:
     """One turn after the other, in a thread or by whoever calls `turn`."""
 
     def __init__(
-        self,
-        workspace: Workspace,
-        clock: Callable[[], datetime],
-        sealed: Sealed = lambda _: None,
+        self, workspace: Workspace, clock: Callable[[], datetime], sealed: Sealed = lambda _: None
     ):
         self._workspace, self._clock, self._sealed = workspace, clock, sealed
         self._store: Store | None = None

@@ -18,7 +18,8 @@ from shm.pipeline.intake import receive
 from shm.read import sandbox
 from shm.store import Archive, DeliveryState, Stage, Workspace
 from shm_cli.main import run
-from shm_daemon.doctor import Finding, Level, checks, examine
+from shm_daemon import doctor_checks as checks
+from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import HEARTBEAT, beat, turn_failed
 from tests.helpers.nouns import NOW
 from tests.helpers.outboxes import entered, make_baseline, raise_alerts
@@ -421,7 +422,7 @@ def test_an_extra_that_the_settings_call_for_must_be_installed(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert only(workspace, "extras").level is Level.OK
-    monkeypatch.setattr("shm_daemon.doctor.examining.find_spec", lambda name: None)
+    monkeypatch.setattr("shm_daemon.doctor.find_spec", lambda name: None)
     monkeypatch.setenv("SHM_MQTT_URL", "mqtts://broker:8883")
     finding = only(workspace, "extras")
     assert (finding.level, finding.remedy) == (Level.FAULT, "pip install 'shm[mqtt]'")

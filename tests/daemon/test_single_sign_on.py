@@ -21,10 +21,10 @@ from shm.pipeline import utc_now
 from shm.store import Workspace
 from shm.store.people import Role
 from shm_daemon.doctor import examine
-from shm_daemon.doctor.checks import Level
+from shm_daemon.doctor_checks import Level
 from shm_daemon.web.access import COOKIE
 from shm_daemon.web.address import Address
-from shm_daemon.web.pages import single_sign_on
+from shm_daemon.web.pages import signing_in
 from tests.helpers import openid_providers
 from tests.helpers.openid_providers import CLIENT, SECRET, Provider
 from tests.helpers.web_servers import Served, served
@@ -180,7 +180,7 @@ def test_a_sign_in_is_of_use_once_in_its_own_browser_and_soon(
     assert "Begin it again" in replayed.text
     browser.cookies.clear()
     late = go(browser, scene)
-    monkeypatch.setattr(single_sign_on, "utc_now", lambda: utc_now() + timedelta(minutes=11))
+    monkeypatch.setattr(signing_in, "utc_now", lambda: utc_now() + timedelta(minutes=11))
     assert come(browser, late).status_code == 403
 
 

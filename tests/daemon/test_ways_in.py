@@ -21,7 +21,7 @@ from shm.errors import UsageError
 from shm.modes_document import modes_document
 from shm.store import Stage, Workspace
 from shm_daemon.web.address import Address
-from shm_daemon.web.web_process import web_beside
+from shm_daemon.web.serving import web_beside
 from tests.helpers.brokers import a_broker
 from tests.helpers.daemons import ROOT, quick_daemons, until_serving
 from tests.helpers.workspaces import make_workspace, modelled_test
@@ -31,7 +31,7 @@ import sys, time
 from pathlib import Path
 from shm.store import Workspace
 from shm_daemon.web.address import Address
-from shm_daemon.web.web_process import web_beside
+from shm_daemon.web.serving import web_beside
 with web_beside(Workspace.open(sys.argv[1]), Address(port=int(sys.argv[2])), Path(sys.argv[3])):
     time.sleep(300)
 """

@@ -24,7 +24,7 @@ _LET_GO = threading.Event()
 @dataclass(frozen=True)
 class Text:
     said: str
-    size_bytes: int = 1
+    padding: bytes = b""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Order:
 
     word: str
     how: str = "at once"
-    size_bytes: int = 1
+    size_bytes: int = 0
 
     def make(self) -> Text:
         _MADE.append(self.word)
@@ -48,7 +48,7 @@ class Order:
         if self.how == "dies once" and not Path(self.word).exists():
             Path(self.word).touch()
             os._exit(3)
-        return Text(self.word, self.size_bytes)
+        return Text(self.word, bytes(self.size_bytes))
 
 
 def a_process(workers: int) -> ProcessPoolExecutor:

@@ -20,8 +20,7 @@ from shm.store import Workspace
 from shm.values import TENSION, Drift, Hanger
 from shm_daemon.web import bridge_view
 from shm_daemon.web.address import Address
-from shm_daemon.web.bridge_view import HangerGlance
-from shm_daemon.web.pages.bridge import CLASSES, elevation, kind_of, shift_words
+from shm_daemon.web.bridge_view import CLASSES, HangerGlance, elevation, kind_of, shift_words
 from shm_daemon.web.site import Description, Site
 from tests.helpers.nouns import a_message
 from tests.helpers.taken_in import ingest_quickly

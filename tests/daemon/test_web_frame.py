@@ -17,10 +17,11 @@ import pytest
 
 from shm.store import Workspace
 from shm_daemon.heartbeat import HEARTBEAT, beat, patience_s
-from shm_daemon.web import plotting
 from shm_daemon.web.address import Address
 from shm_daemon.web.frame import NAVIGATION
 from shm_daemon.web.middleware import PROTECTION
+from shm_daemon.web.models import plain
+from shm_daemon.web.with_plotly import colour_of
 from tests.helpers.web_servers import Served, served
 from tests.helpers.workspaces import make_workspace
 
@@ -148,14 +149,14 @@ def test_a_figure_is_what_json_can_say() -> None:
         "x": [datetime(2026, 5, 1, tzinfo=UTC), np.datetime64("2026-05-02")],
         "y": np.array([1.0, np.nan]),
         "customdata": np.array([["a", math.inf]], dtype=object),
-        "line": {"color": plotting.colour("blue"), "width": np.float64(2)},
+        "line": {"color": colour_of("blue"), "width": np.float64(2)},
     }
-    document = json.loads(json.dumps(plotting.plain(trace), allow_nan=False))
+    document = json.loads(json.dumps(plain(trace), allow_nan=False))
     assert document["y"] == [1.0, None]
     assert document["x"][0] == "2026-05-01T00:00:00+00:00"
     assert document["customdata"] == [["a", None]]
 
 
 def test_a_colour_may_be_seen_through() -> None:
-    assert plotting.colour("blue") == "#0072b2"
-    assert plotting.colour("blue", 0.25) == "rgba(0,114,178,0.25)"
+    assert colour_of("blue") == "#0072b2"
+    assert colour_of("blue", 0.25) == "rgba(0,114,178,0.25)"

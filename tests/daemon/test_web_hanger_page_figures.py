@@ -18,11 +18,12 @@ from shm.store import BaselineGlance, EventKind, HangerEvent, TrendPoint
 from shm.values import NAN, Averaged, FloatArray, Summary
 from shm.values.notes import Note, NoteKind
 from shm.watch.state import Band
-from shm_daemon.web.hanger_figures.over_time import STIFFNESS, TEMPERATURE, TREND
+from shm_daemon.web.hanger_figures import FIGURES
 from shm_daemon.web.hanger_view import HangerView
 from tests.helpers.workspaces import START
 from tests.report.diagnoses import HANGER
 
+TREND, STIFFNESS, TEMPERATURE = FIGURES[:3]
 BLUNDER = 700
 
 

@@ -15,20 +15,13 @@ from shm.bridge import AppriseHook
 from shm.bridge.hooks import apprise_scheme
 from shm.values import Alert
 from shm_daemon.hooks.command import Processes
-from shm_daemon.hooks.contract import HookFailed, Surroundings, one_line
+from shm_daemon.hooks.contract import HookFailed, one_line
 
 _SENDER = Path(__file__).with_name("apprise_sender.py")
-_TITLE = "shm: hanger {0.hanger}"
-_GROUP_TITLE = "shm: {} hangers"
-_TEST_TITLE = "shm: test of a hook"
 
 
-class AppriseDeliverer:
+class AppriseDeliverer(Processes):
     """Sends each alert to all addresses of the hook; it is delivered when each of them took it."""
-
-    def __init__(self, surroundings: Surroundings):
-        self._folder = surroundings.folder
-        self._processes = Processes(surroundings)
 
     def __call__(self, hook: AppriseHook, alert: Alert) -> str:
         """Sends the alert; raises HookFailed naming the services that did not take it."""
@@ -36,15 +29,12 @@ class AppriseDeliverer:
         # By standard input, as arguments are seen by everyone on the machine. -P: this folder
         # holds a module of the library's name.
         command = [sys.executable, "-P", str(_SENDER)]
-        self._processes.run(command, _told(alert, addresses), {})
+        self.run(command, _told(alert, addresses), {})
         return f"taken by {', '.join(schemes)}"
 
     def ready(self, hook: AppriseHook) -> str:
         """The services; raises HookFailed where one or the library is missing."""
         return ", ".join(self._where(hook)[1])
-
-    def close(self) -> None:
-        self._processes.close()
 
     def _where(self, hook: AppriseHook) -> tuple[tuple[str, ...], list[str]]:
         """The addresses and their schemes, the only part that may be told."""
@@ -58,7 +48,7 @@ class AppriseDeliverer:
 
     def _addresses(self, hook: AppriseHook) -> tuple[str, ...]:
         try:
-            text = (self._folder / hook.address_file).read_text(encoding="utf-8")
+            text = (self.folder / hook.address_file).read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "not a text"
             raise HookFailed(
@@ -81,11 +71,13 @@ def _allowed(address: str) -> str:
 
 def _told(alert: Alert, addresses: Sequence[str]) -> bytes:
     test, resolved = "test" in alert.kinds, "resolved" in alert.kinds
-    title = _GROUP_TITLE.format(len(alert.alerts)) if alert.alerts else _TITLE.format(alert)
+    title = f"shm: {len(alert.alerts)} hangers" if alert.alerts else f"shm: hanger {alert.hanger}"
     body = f"{alert.message}\n\nTest {alert.test} of {alert.time:%Y-%m-%d %H:%M} UTC."
     told = {
         "addresses": list(addresses),
-        "title": one_line(_TEST_TITLE if test else f"{title}{': resolved' if resolved else ''}"),
+        "title": one_line(
+            "shm: test of a hook" if test else f"{title}{': resolved' if resolved else ''}"
+        ),
         "body": f"{alert.message if test else body}\nKey: {alert.key}",
         "type": "info" if test else "success" if resolved else "warning",
     }

@@ -21,31 +21,11 @@ from shm_daemon.hooks.contract import SHOWN_CHARACTERS, HookFailed, Surroundings
 _PASSED_ON = ("PATH", "HOME", "LANG")
 
 
-class CommandDeliverer:
-    """Runs the command for each alert; an exit code of 0 says that it is delivered."""
-
-    def __init__(self, surroundings: Surroundings):
-        self._processes = Processes(surroundings)
-
-    def __call__(self, hook: CommandHook, alert: Alert) -> str:
-        """Runs the command; raises HookFailed with what it wrote."""
-        told = dump(alert_document(alert)).encode()
-        answer = self._processes.run(hook.command, told, {"SHM_ALERT_KEY": alert.key})
-        return f"exit code 0: {answer}" if answer else "exit code 0"
-
-    def ready(self, hook: CommandHook) -> str:
-        """The program; raises HookFailed where it is not there or cannot be run."""
-        return self._processes.find(hook.command[0])
-
-    def close(self) -> None:
-        self._processes.close()
-
-
 class Processes:
     """Runs programs in the workspace's folder, each in a process group of its own."""
 
     def __init__(self, surroundings: Surroundings):
-        self._folder, self._timeout_s = surroundings.folder, surroundings.timeout_s
+        self.folder, self._timeout_s = surroundings.folder, surroundings.timeout_s
         given = surroundings.environment
         self._environment = {name: given[name] for name in _PASSED_ON if name in given}
         self._running: set[int] = set()
@@ -76,17 +56,6 @@ class Processes:
                 )
             return _tail(answer)
 
-    def find(self, program: str) -> str:
-        """Where a program is that `run` would begin; raises HookFailed."""
-        beside = self._folder / program if "/" in program else program
-        found = shutil.which(beside, path=self._environment.get("PATH"))
-        if found is None:
-            raise HookFailed(
-                f"{program} is not there, or cannot be run.",
-                remedy="Check its path, and that it may be executed.",
-            )
-        return str(found)
-
     def close(self) -> None:
         """Ends running programs; what they were to deliver is delivered again."""
         with self._lock:
@@ -110,7 +79,7 @@ class Processes:
                     stdin=subprocess.PIPE,
                     stdout=answer,
                     stderr=errors,
-                    cwd=self._folder,
+                    cwd=self.folder,
                     env={**self._environment, **variables},
                     start_new_session=True,
                 )
@@ -128,6 +97,28 @@ class Processes:
         process.wait()
         if process.stdin is not None:
             process.stdin.close()
+
+
+class CommandDeliverer(Processes):
+    """Runs the command for each alert; an exit code of 0 says that it is delivered."""
+
+    def __call__(self, hook: CommandHook, alert: Alert) -> str:
+        """Runs the command; raises HookFailed with what it wrote."""
+        told = dump(alert_document(alert)).encode()
+        answer = self.run(hook.command, told, {"SHM_ALERT_KEY": alert.key})
+        return f"exit code 0: {answer}" if answer else "exit code 0"
+
+    def ready(self, hook: CommandHook) -> str:
+        """The program; raises HookFailed where it is not there or cannot be run."""
+        program = hook.command[0]
+        beside = self.folder / program if "/" in program else program
+        found = shutil.which(beside, path=self._environment.get("PATH"))
+        if found is None:
+            raise HookFailed(
+                f"{program} is not there, or cannot be run.",
+                remedy="Check its path, and that it may be executed.",
+            )
+        return str(found)
 
 
 def _kill(group: int) -> None:

@@ -127,21 +127,18 @@ def _judged(response: requests.Response) -> str:
     status = response.status_code
     if 200 <= status < 300:
         return f"{status} {one_line(response.reason or '')}".strip()
-    answer = f"answered {status}: {_words(response)}"
+    try:  # the beginning of its own words; its answer counts even where they break off
+        words = next(response.iter_content(SHOWN_CHARACTERS), b"").decode(errors="replace")
+    except (requests.RequestException, OSError):
+        words = ""
+    answer = (
+        f"answered {status}: {one_line(words) or one_line(response.reason or '') or 'no message'}"
+    )
     if 300 <= status < 400:
         raise HookFailed(answer, remedy="Write the address that it sends to; it is not followed.")
     if 400 <= status < 500 and status not in _WORTH_ANOTHER_TRY:
         raise DeliveryRefused(answer, remedy="Correct its address or its secret.")
     raise HookFailed(answer, remedy=_LOOK)
-
-
-def _words(response: requests.Response) -> str:
-    """The beginning of the server's own words; its answer counts even where they break off."""
-    try:
-        words = next(response.iter_content(SHOWN_CHARACTERS), b"").decode(errors="replace")
-    except (requests.RequestException, OSError):
-        words = ""
-    return one_line(words) or one_line(response.reason or "") or "no message"
 
 
 def unchanged(request: requests.PreparedRequest) -> requests.PreparedRequest:

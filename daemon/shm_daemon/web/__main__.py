@@ -23,7 +23,13 @@ from shm_daemon.web.serving import leaving, serve
 def main(arguments: Sequence[str]) -> int:
     """Serves one workspace; the exit code."""
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s")
-    wanted = _parser().parse_args(arguments)
+    parser = argparse.ArgumentParser("shm_daemon.web", description="Begin it with `shm web`.")
+    parser.add_argument("workspace", type=Path)
+    parser.add_argument("host")
+    parser.add_argument("port", type=int)
+    for option in ("--certificate", "--key", "--log-file"):
+        parser.add_argument(option, type=Path)
+    wanted = parser.parse_args(arguments)
     try:
         workspace = Workspace.open(wanted.workspace)
         begin_logging(workspace.settings, wanted.log_file)
@@ -33,30 +39,6 @@ def main(arguments: Sequence[str]) -> int:
         logging.getLogger("shm").error("%s", error)
         return error.exit_code
     return 0
-
-
-def command(
-    workspace: Path,
-    address: Address,
-    certificate: Path | None = None,
-    key: Path | None = None,
-    log_file: Path | None = None,
-) -> list[str]:
-    """The words that begin it in a process of its own."""
-    options = {"--certificate": certificate, "--key": key, "--log-file": log_file}
-    given = [str(word) for option in options.items() if option[1] is not None for word in option]
-    place = [str(workspace), address.host, str(address.port)]
-    return [sys.executable, "-m", "shm_daemon.web", *place, *given]
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser("shm_daemon.web", description="Begin it with `shm web`.")
-    parser.add_argument("workspace", type=Path)
-    parser.add_argument("host")
-    parser.add_argument("port", type=int)
-    for option in ("--certificate", "--key", "--log-file"):
-        parser.add_argument(option, type=Path)
-    return parser
 
 
 def _end_with_input() -> None:

@@ -76,7 +76,9 @@ def reading(request: Request, site: AtSite, credentials: Credentials) -> Visitor
     if credentials is not None:
         found = _visitor(request, site, credentials.credentials, Role.READER)
     elif _is_at_home(request, site):
-        found = _at_home(site, request.cookies.get(COOKIE))
+        # Here reading needs no token: a cookie that is out of date takes nothing away.
+        secret = request.cookies.get(COOKIE)
+        found = (_found(site, secret) if secret else None) or Visitor("")
     else:
         found = _signed_in(request, site, "Reading needs a user or a token here.", Role.READER)
     request.state.visitor = found
@@ -216,11 +218,6 @@ def _visitor(request: Request, site: Site, secret: str, needed: Role) -> Visitor
         f"The token {found.name} may not write.",
         "Make one that may: `shm token create NAME --scope write`.",
     )
-
-
-def _at_home(site: Site, secret: str | None) -> Visitor:
-    """Here reading needs no token: a cookie that is out of date takes nothing away."""
-    return (_found(site, secret) if secret else None) or Visitor("")
 
 
 def _signed_in(request: Request, site: Site, otherwise: str, needed: Role) -> Visitor:

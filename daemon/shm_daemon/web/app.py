@@ -14,34 +14,28 @@ from fastapi.responses import JSONResponse
 import shm
 from shm.errors import ShmError
 from shm.pipeline import utc_now
-from shm_daemon.web import hanger_numbers, hangers, metrics, recordings, tests
+from shm_daemon.web import frame, hangers, metrics, recordings, tests
 from shm_daemon.web.access import Reader
 from shm_daemon.web.background_work import BackgroundWorker
 from shm_daemon.web.bridge_view import glance
-from shm_daemon.web.faults import handle_faults
-from shm_daemon.web.frame import prepare_templates
+from shm_daemon.web.faults import answers, handle_faults
 from shm_daemon.web.metrics import Exposition
 from shm_daemon.web.middleware import Pages
 from shm_daemon.web.other_bridges import OtherBridges
 from shm_daemon.web.pages import (
-    accounts,
     alerts,
-    audit,
     baseline,
     bridge,
-    bridges,
     comparison,
-    downloads,
     hanger,
-    health,
-    held,
     notes,
     one_test,
+    operation,
     sensors,
     settings,
-    single_sign_on,
-    static,
+    signing_in,
     upload,
+    users,
 )
 from shm_daemon.web.site import Site
 
@@ -52,24 +46,18 @@ _PARTS = (
     upload,
     hangers,
     alerts,
-    metrics,
-    accounts,
-    single_sign_on,
-    static,
+    signing_in,
+    users,
+    frame,
     bridge,
-    bridges,
     comparison,
-    health,
-    held,
+    operation,
     sensors,
     tests,
     one_test,
-    hanger_numbers,
     hanger,
     baseline,
-    downloads,
     notes,
-    audit,
     settings,
 )
 """What answers, asked in this order."""
@@ -94,12 +82,13 @@ def load_pages(site: Site) -> Pages:
     app.state.site = site
     app.state.background_worker = BackgroundWorker()
     app.state.ordered_baselines = baseline.Ordered()
-    app.state.sign_ons = single_sign_on.SignOns()
+    app.state.sign_ons = signing_in.SignOns()
     app.state.other_bridges = OtherBridges()
     app.state.exposition = Exposition(watching_site)
     handle_faults(app)
+    app.include_router(metrics.router)
     for part in _PARTS:
-        app.include_router(part.router)
+        app.include_router(part.router, responses=answers(400, 401, 403, 503))
     app.include_router(_described)
 
     def close() -> None:
@@ -122,7 +111,7 @@ log = logging.getLogger(__name__)
 
 def warm_up(app: FastAPI) -> None:
     """Takes about a second; requests are answered meanwhile."""
-    prepare_templates()
+    frame.prepare_templates()
     try:
         glance(app.state.site, utc_now())
     except ShmError as error:  # whoever asks is told too

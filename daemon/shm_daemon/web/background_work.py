@@ -8,13 +8,13 @@ memory, within a limit.
 from __future__ import annotations
 
 import logging
+import pickle
 import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
 from fastapi import Request
@@ -42,23 +42,10 @@ class Order(Protocol):
 
     def __hash__(self) -> int: ...
 
-    def make(self) -> Sized: ...
+    def make(self) -> object: ...
 
 
-class Sized(Protocol):
-    """A result that knows about how much memory it takes."""
-
-    @property
-    def size_bytes(self) -> int: ...
-
-
-Made = TypeVar("Made", bound=Sized)
-
-
-@dataclass(frozen=True)
-class _Failure:
-    error: ShmError
-    at_s: float
+Made = TypeVar("Made")
 
 
 class BackgroundWorker(Generic[Made]):
@@ -70,8 +57,8 @@ class BackgroundWorker(Generic[Made]):
         pool: Callable[[int], ProcessPoolExecutor] = process_pool,
     ):
         self._longest_s, self._pool = longest_s, pool
-        self._kept: OrderedDict[Order, Made] = OrderedDict()
-        self._failures: dict[Order, _Failure] = {}
+        self._kept: OrderedDict[Order, tuple[Made, int]] = OrderedDict()
+        self._failures: dict[Order, tuple[ShmError, float]] = {}
         self._waiting: OrderedDict[Order, None] = OrderedDict()
         self._lost: Order | None = None
         self._changed = threading.Condition()
@@ -81,9 +68,10 @@ class BackgroundWorker(Generic[Made]):
     def kept(self, order: Order) -> Made | None:
         """What was made of an order already; begins nothing."""
         with self._changed:
-            if order in self._kept:
-                self._kept.move_to_end(order)
-            return self._kept.get(order)
+            if order not in self._kept:
+                return None
+            self._kept.move_to_end(order)
+            return self._kept[order][0]
 
     def wanted(self, order: Order) -> Made | None:
         """What was made of an order; None while it is being worked on, or while many others wait.
@@ -94,12 +82,15 @@ class BackgroundWorker(Generic[Made]):
             found = self.kept(order)
             if found is not None:
                 return found
-            failure = self._failures.get(order)
-            if failure and time.monotonic() - failure.at_s < _FAILURE_LASTS_S:
-                raise failure.error.with_traceback(None)
+            error, failed_at_s = self._failures.get(order, (None, 0.0))
+            if error and time.monotonic() - failed_at_s < _FAILURE_LASTS_S:
+                raise error.with_traceback(None)
             if len(self._waiting) < _MOST_WAITING and not self._closed:
                 self._waiting[order] = None
-                self._begin()
+                if self._thread is None:
+                    self._thread = threading.Thread(target=self._work, name="workshop", daemon=True)
+                    self._thread.start()
+                self._changed.notify_all()
             return None
 
     def close(self) -> None:
@@ -110,12 +101,6 @@ class BackgroundWorker(Generic[Made]):
             self._changed.notify_all()
         if thread is not None:
             thread.join()
-
-    def _begin(self) -> None:
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._work, name="workshop", daemon=True)
-            self._thread.start()
-        self._changed.notify_all()
 
     def _work(self) -> None:
         while self._shift():
@@ -148,11 +133,15 @@ class BackgroundWorker(Generic[Made]):
     def _made(self, pool: ProcessPoolExecutor, order: Order) -> bool:
         """Has an order made and notes what came of it; whether the process can be used further."""
         try:
-            future: Future[Made] = pool.submit(order.make)  # type: ignore[arg-type]
+            future = pool.submit(_packed, order)
             self._await(future)
-            made = future.result(timeout=0)
+            packed = future.result(timeout=0)
         except TimeoutError:
-            self._failed(order, _too_long(self._longest_s))
+            remedy = (
+                "Have it written at leisure with `shm report`; see the log of the web interface."
+            )
+            said = f"it took more than {self._longest_s:g} s and was given up."
+            self._failed(order, ShmError(said, remedy=remedy))
             return False
         except BrokenProcessPool:
             self._tried_again(order)
@@ -161,25 +150,27 @@ class BackgroundWorker(Generic[Made]):
             self._failed(order, error)
         except Exception:
             log.exception("working out %r failed", order)
-            self._failed(order, _unexpected())
+            remedy = "The log of the web interface says more."
+            self._failed(order, ShmError("an internal error.", remedy=remedy))
         else:
-            self._keep(order, made)
+            self._keep(order, packed)
         return True
 
-    def _await(self, future: Future[Made]) -> None:
+    def _await(self, future: Future[bytes]) -> None:
         deadline = time.monotonic() + self._longest_s
         while not self._closed and time.monotonic() < deadline:
             if wait([future], timeout=_LOOK_S).done:
                 return
 
-    def _keep(self, order: Order, made: Made) -> None:
+    def _keep(self, order: Order, packed: bytes) -> None:
+        made: Made = pickle.loads(packed)  # noqa: S301 - our own process has made it
         with self._changed:
             self._waiting.pop(order, None)
             self._failures.pop(order, None)
-            self._kept[order] = made
-            while sum(each.size_bytes for each in self._kept.values()) > _MOST_KEPT_BYTES:
-                if len(self._kept) == 1:
-                    break
+            self._kept[order] = made, len(packed)
+            while len(self._kept) > 1 and (
+                sum(size_bytes for _, size_bytes in self._kept.values()) > _MOST_KEPT_BYTES
+            ):
                 self._kept.popitem(last=False)
 
     def _tried_again(self, order: Order) -> None:
@@ -192,7 +183,8 @@ class BackgroundWorker(Generic[Made]):
             self._lost = order
             return
         self._lost = None
-        self._failed(order, _died())
+        remedy = "It may lack memory: see the log, and try again in a minute."
+        self._failed(order, ShmError("the process that worked on it died.", remedy=remedy))
 
     def _failed(self, order: Order, error: ShmError) -> None:
         now = time.monotonic()
@@ -200,30 +192,16 @@ class BackgroundWorker(Generic[Made]):
             if self._closed:  # that is why it was not made
                 return
             self._waiting.pop(order, None)
-            fresh = {o: f for o, f in self._failures.items() if now - f.at_s < _FAILURE_LASTS_S}
-            self._failures = {**fresh, order: _Failure(error, now)}
+            fresh = {o: f for o, f in self._failures.items() if now - f[1] < _FAILURE_LASTS_S}
+            self._failures = {**fresh, order: (error, now)}
 
 
 def background_worker_of(request: Request) -> BackgroundWorker[Any]:
     """The background worker of the app, for all that is ordered there."""
-    background_worker = request.app.state.background_worker
-    assert isinstance(background_worker, BackgroundWorker)
-    return background_worker
+    found: BackgroundWorker[Any] = request.app.state.background_worker
+    return found
 
 
-def _too_long(longest_s: float) -> ShmError:
-    return ShmError(
-        f"it took more than {longest_s:g} s and was given up.",
-        remedy="Have it written at leisure with `shm report`; see the log of the web interface.",
-    )
-
-
-def _died() -> ShmError:
-    return ShmError(
-        "the process that worked on it died.",
-        remedy="It may lack memory: see the log, and try again in a minute.",
-    )
-
-
-def _unexpected() -> ShmError:
-    return ShmError("an internal error.", remedy="The log of the web interface says more.")
+def _packed(order: Order) -> bytes:
+    """What is made of an order, as it comes from the other process: its length is its size here."""
+    return pickle.dumps(order.make())

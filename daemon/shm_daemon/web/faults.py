@@ -116,9 +116,8 @@ def _invalid(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     where = " ".join(str(part) for part in first["loc"])
-    return _told(
-        request, 422, f"{where}: {first['msg']}.", "See /openapi.json for what is expected."
-    )
+    remedy = "See /openapi.json for what is expected."
+    return _told(request, 422, f"{where}: {first['msg']}.", remedy)
 
 
 def _known(request: Request, error: Exception) -> Response:

@@ -1,20 +1,26 @@
-"""The frame around every page: its templates, its navigation, and what went wrong as a page."""
+"""The frame around every page: its templates, its navigation, what went wrong as a page; the style
+sheets and scripts, which tell nothing of the bridge: anybody may have them.
+
+Plotly's script is that of the installed package: nothing is fetched from elsewhere.
+"""
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 from functools import cache
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as version_of
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from fastapi import Request
+from fastapi import APIRouter, Request, Response
 from fastapi.responses import HTMLResponse
 from jinja2 import ChoiceLoader, Environment, PackageLoader, PrefixLoader
 
 import shm
-from shm.errors import ShmError
+from shm.errors import NothingThere, ShmError
 from shm.report import formatting
 from shm.report.as_html import ENVIRONMENT as OF_REPORTS
 from shm.report.as_html import environment
@@ -22,8 +28,15 @@ from shm.report.figures.style import PALETTE
 from shm_daemon.web.health import notices
 from shm_daemon.web.site import Site
 
+router = APIRouter(include_in_schema=False)
+
 STATIC = Path(__file__).with_name("static")
 """Our style sheets and scripts."""
+_KINDS = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+_KEPT = "public, max-age=31536000, immutable"
+_ASKED_AGAIN = "no-cache"
+_WORTH_PACKING_BYTES = 1000  # technical: less goes into one packet (1,460 bytes) anyhow
+
 
 NAVIGATION = (
     ("/", "Bridge"),
@@ -83,9 +96,10 @@ def for_a_person(request: Request) -> bool:
     return "text/html" in accepted and not path.startswith("/api/")
 
 
+@cache
 def asset(name: str) -> str:
     """The address of a file of `static/`; it changes with the file, so that it may be kept."""
-    return f"/static/{name}?v={_checksum(name)}"
+    return f"/static/{name}?v={hashlib.sha256((STATIC / name).read_bytes()).hexdigest()[:12]}"
 
 
 @cache
@@ -95,11 +109,6 @@ def plotly_address() -> str:
         return f"/static/plotly.js?v={version_of('plotly')}"
     except PackageNotFoundError:
         return "/static/plotly.js"
-
-
-@cache
-def _checksum(name: str) -> str:
-    return hashlib.sha256((STATIC / name).read_bytes()).hexdigest()[:12]
 
 
 @cache
@@ -132,3 +141,45 @@ def _address(request: Request) -> str:
     """Where a person wanted to go."""
     query = f"?{request.url.query}" if request.url.query else ""
     return request.url.path + query if request.method == "GET" else "/"
+
+
+@router.get("/static/plotly.js")
+def plotly(request: Request) -> Response:
+    """The script that draws figures, under an address that changes with its version."""
+    return _answer(request, "plotly.js", request.query_params.get("v") == version_of("plotly"))
+
+
+@router.get("/static/{name}")
+def static_file(request: Request, name: str) -> Response:
+    """A file of ours."""
+    if name != "report.css" and name not in {path.name for path in STATIC.iterdir()}:
+        raise NothingThere(f"There is no {name}.")
+    is_of_version = name != "report.css" and asset(name).endswith(f"?{request.url.query}")
+    return _answer(request, name, is_of_version)
+
+
+def _answer(request: Request, name: str, is_of_version: bool) -> Response:
+    packs = "gzip" in request.headers.get("accept-encoding", "")
+    content, packed = _content(name), b""
+    headers = {"Cache-Control": _KEPT if is_of_version else _ASKED_AGAIN, "Vary": "Accept-Encoding"}
+    if packs and len(content) > _WORTH_PACKING_BYTES:
+        packed, headers["Content-Encoding"] = _packed(name), "gzip"
+    return Response(packed or content, headers=headers, media_type=_KINDS[Path(name).suffix])
+
+
+@cache
+def _packed(name: str) -> bytes:
+    return gzip.compress(_content(name), 6, mtime=0)
+
+
+@cache
+def _content(name: str) -> bytes:
+    if name == "plotly.js":
+        found = find_spec("plotly")  # importing the package takes seconds
+        if found is None or found.origin is None:
+            raise NothingThere("plotly is not installed.", remedy="pip install 'shm[web]'")
+        return (Path(found.origin).parent / "package_data" / "plotly.min.js").read_bytes()
+    if name == "report.css":
+        assert OF_REPORTS.loader is not None
+        return OF_REPORTS.loader.get_source(OF_REPORTS, name)[0].encode()
+    return (STATIC / name).read_bytes()

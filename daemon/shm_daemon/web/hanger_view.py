@@ -6,7 +6,9 @@ import logging
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from fastapi import Depends, Request
 
 from shm.errors import ShmError
 from shm.pipeline import utc_now
@@ -24,22 +26,12 @@ from shm.store import (
 )
 from shm.values import Hanger
 from shm.values.notes import Note
-from shm_daemon.web.background_work import BackgroundWorker
-
-_BYTES_A_TEST = 1_000  # technical: some ten quantities of a dozen numbers; it bounds a cache
+from shm_daemon.web.access import AtSite
+from shm_daemon.web.background_work import BackgroundWorker, background_worker_of
+from shm_daemon.web.models import HangerNumber
+from shm_daemon.web.site import described
 
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, eq=False)
-class WorkedOutStates:
-    """The states over time of a hanger, worked out aside."""
-
-    states: StatesOverTime
-
-    @property
-    def size_bytes(self) -> int:
-        return _BYTES_A_TEST * (1 + len(self.states.times))
 
 
 @dataclass(frozen=True)
@@ -56,12 +48,12 @@ class StatesOrder:
     tests: tuple[int, ...]
     false_call_years: float
 
-    def make(self) -> WorkedOutStates:
+    def make(self) -> StatesOverTime:
         """Runs in a process of its own: the workspace is opened anew."""
         workspace = Workspace.open(self.folder)
         with workspace.store() as store:
             baseline = store.watch.baseline(self.hanger.id, self.model)
-            return WorkedOutStates(hanger_states(workspace, store, self.hanger, baseline))
+            return hanger_states(workspace, store, self.hanger, baseline)
 
 
 class HangerView:
@@ -121,11 +113,11 @@ class HangerView:
         if self.baseline is None:
             return NOTHING_WATCHED
         try:
-            made = self._background_worker.wanted(self._order(self.baseline))
+            made: StatesOverTime | None = self._background_worker.wanted(self._order(self.baseline))
         except ShmError as error:
             log.warning("states over time of hanger %d: %s", self.hanger.id, error)
             return NOTHING_WATCHED
-        return None if made is None else made.states
+        return made
 
     def _order(self, baseline: BaselineGlance) -> StatesOrder:
         stored = self.store.watch.baseline(self.hanger.id, baseline.model)
@@ -138,3 +130,12 @@ class HangerView:
             tests=tuple(each.id for each in self.store.watch.list_watched(stored)),
             false_call_years=self.workspace.settings.false_call_years,
         )
+
+
+def view_of(request: Request, site: AtSite, hanger_id: HangerNumber) -> HangerView:
+    """The hanger that is asked for; raises NothingThere."""
+    hanger = described(site.workspace, hanger_id)
+    return HangerView(site.workspace, site.store, hanger, background_worker_of(request))
+
+
+View = Annotated[HangerView, Depends(view_of)]

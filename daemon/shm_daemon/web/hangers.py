@@ -1,38 +1,198 @@
-"""What is known of the hangers, in numbers."""
+"""What is known of the hangers, in numbers: the state of all; of one its trend, its tests, the
+documents of its figures. The lines of the table of tests are in the words of the report.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from datetime import datetime
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path
+from fastapi import APIRouter, Path, Query
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, Field
 
 from shm.documents import averaged_document
-from shm.errors import BadInput, NothingThere
+from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import HangersNow
-from shm.store import DeliveryState, StoredWatch, TrendPoint, Workspace
+from shm.report import formatting
+from shm.report.formatting import Interval
+from shm.report.states import StatesOverTime, called_words
+from shm.store import DeliveryState, StoredWatch, TestRow
+from shm.store import TrendPoint as StoredPoint
 from shm.values import Hanger
+from shm.values.rounding import ForceUnit
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.address import test_page
+from shm_daemon.web.background_work import RETRY_AFTER
 from shm_daemon.web.faults import answers
-from shm_daemon.web.models import LARGEST_NUMBER, Hangers, HangerState, Status
-from shm_daemon.web.plotting import plain
-from shm_daemon.web.site import Site
+from shm_daemon.web.hanger_figures import FIGURES, tension_unit
+from shm_daemon.web.hanger_view import HangerView, View
+from shm_daemon.web.models import (
+    LARGEST_NUMBER,
+    MOST_ROWS,
+    AveragedTension,
+    FigureDocument,
+    HangerNumber,
+    Hangers,
+    HangerState,
+    Posterior,
+    Status,
+    paged,
+    plain,
+)
+from shm_daemon.web.site import Site, described, quarantined
 
-router = APIRouter(prefix="/api", tags=["state"])
-Number = Annotated[int, Path(ge=0, le=LARGEST_NUMBER, description="The number of the hanger.")]
+
+class TrendPoint(BaseModel):
+    """One test; stiffness is log10 of N m/rad, by `transverse_end_stiffness` and the like."""
+
+    test: str
+    time: datetime
+    temperature_c: float | None
+    model: str
+    tension_n: Posterior = Field(description="By the class in force alone.")
+    averaged: AveragedTension = Field(description="What figures and tables show.")
+    stiffness: dict[str, Posterior]
+
+
+class TrendEvent(BaseModel):
+    """What happened to the hanger beside its tests."""
+
+    at: datetime
+    kind: str = Field(description="baseline, adopted, adoption undone, alert, acknowledged")
+    who: str
+    why: str
+
+
+class CalledChange(BaseModel):
+    """A change that was called, and when it began with 90 % probability."""
+
+    called_by: str = Field(description="The test after which it was called.")
+    began_after: datetime
+    began_by: datetime
+    words: str
+
+
+class StateOverTime(BaseModel):
+    """What all tests up to each say of one quantity: tension in N, stiffness log10 of its unit.
+
+    It holds at the reference temperature: the swing with the temperature is taken out.
+    """
+
+    quantity: str
+    reference_temperature_c: float | None
+    times: list[datetime]
+    q05: list[float | None]
+    q50: list[float | None]
+    q95: list[float | None]
+
+
+class HangerTrend(BaseModel):
+    """A hanger over time; `states` are null while they are worked out: ask again."""
+
+    hanger: int
+    points: list[TrendPoint]
+    events: list[TrendEvent]
+    changes: list[CalledChange]
+    states: list[StateOverTime] | None
+
+
+class TestState(BaseModel):
+    """One test; what updating finds is null before it has been through it."""
+
+    __test__ = False  # no test, though named so
+
+    id: int
+    test: str
+    time: datetime
+    stage: str
+    temperature_c: float | None
+    model: str | None
+    tension_n: Posterior | None = Field(description="By the class in force alone.")
+    averaged: AveragedTension | None = Field(description="What tables show.")
+    page: str = Field(description="The address of its page.")
+
+
+class HangerTests(BaseModel):
+    """Tests of a hanger, the newest first."""
+
+    hanger: int
+    tests: list[TestState]
+    next_before: int | None = Field(description="To go on with; null at the oldest test.")
+
+
+@dataclass(frozen=True)
+class TestLine:
+    """One test, its tension in `unit`; `point` is None before it has been through updating."""
+
+    __test__ = False  # no test, though named so
+
+    row: TestRow
+    point: StoredPoint | None
+    unit: ForceUnit
+
+    @property
+    def id(self) -> int:
+        return self.row.id
+
+    @property
+    def name(self) -> str:
+        return self.row.name
+
+    @property
+    def address(self) -> str:
+        return test_page(self.row.hanger, self.row.name)
+
+    @property
+    def time(self) -> str:
+        """Its own or, where it tells none, that of its receipt."""
+        received = self.point is not None and self.point.taken_at is None
+        return formatting.moment(self.row.time) + (" (received)" if received else "")
+
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """Temperature, model, tension and its interval."""
+        if self.point is None:
+            return ("", f"on its way: {self.row.stage.value}", "", "")
+        tension = Interval.of_averaged(self.point.averaged).in_unit(self.unit)
+        known = math.isfinite(self.point.temperature_c)
+        return (
+            formatting.temperature(self.point.temperature_c) if known else "not recorded",
+            formatting.model_class(self.point.model),
+            formatting.mean(tension),
+            formatting.span(tension),
+        )
+
+
+def headings(view: HangerView) -> tuple[str, ...]:
+    """Of the table of the lines."""
+    unit = tension_unit(view.trend)
+    return ("test", "time", "temperature", "model", *formatting.tension_headings(unit))
+
+
+def lines_before(view: HangerView, limit: int, before: int | None = None) -> list[TestLine]:
+    """So many tests, the newest first; `before` is the number of the test to go on after."""
+    points = {point.test_id: point for point in view.trend}
+    rows = view.store.tests.list_rows(view.hanger.id, limit, before)
+    unit = tension_unit(view.trend)
+    return [TestLine(row, points.get(row.id), unit) for row in rows]
+
+
+_of_all = APIRouter(prefix="/api", tags=["state"])
+# Statuses as RFC 9110 defines them.
+_of_one = APIRouter(
+    prefix="/api/hangers/{hanger_id}", tags=["hangers"], responses=answers(404, 422)
+)
 _SHIFT = ("quantity", "shift_mean", "shift_sd", "threshold", "probability")
 
 
-@router.get(
-    "/status",
-    response_model=Status,
-    responses=answers(400, 401, 403, 503),
-    summary="What is held and what waits",
-)
+@_of_all.get("/status", response_model=Status, summary="What is held and what waits")
 def status(site: AtSite, _: Reader) -> Any:
     """Counts of recordings, files, alerts and deliveries."""
     workspace, store = site.workspace, site.store
@@ -47,42 +207,24 @@ def status(site: AtSite, _: Reader) -> Any:
     }
 
 
-@router.get(
-    "/hangers",
-    response_model=Hangers,
-    responses=answers(400, 401, 403, 503),
-    summary="The state of all hangers",
-)
+@_of_all.get("/hangers", response_model=Hangers, summary="The state of all hangers")
 def hangers(site: AtSite, _: Reader) -> Any:
     """Tension with its interval, shifts and open alerts of each hanger."""
-    return {"hangers": _states(site, site.workspace.bridge.hangers)}
+    return {"hangers": _now(site, site.workspace.bridge.hangers)}
 
 
-@router.get(
+@_of_all.get(
     "/hangers/{hanger_id}",
     response_model=HangerState,
-    responses=answers(400, 401, 403, 404, 422, 503),
+    responses=answers(404, 422),
     summary="The state of one hanger",
 )
-def hanger(site: AtSite, _: Reader, hanger_id: Number) -> Any:
+def hanger(site: AtSite, _: Reader, hanger_id: HangerNumber) -> Any:
     """Tension with its interval, shifts and open alerts of one hanger."""
-    return _states(site, [described(site.workspace, hanger_id)])[0]
+    return _now(site, [described(site.workspace, hanger_id)])[0]
 
 
-def described(workspace: Workspace, hanger_id: int) -> Hanger:
-    """A hanger of the bridge; raises NothingThere."""
-    try:
-        return workspace.bridge.hanger(hanger_id)
-    except BadInput as error:
-        raise NothingThere(error.message, remedy=error.remedy) from error
-
-
-def quarantined(workspace: Workspace) -> int:
-    """How many refused files lie in the quarantine."""
-    return sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json"))
-
-
-def _states(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
+def _now(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
     """Of many hangers in as many questions as of one."""
     store = site.store
     known = HangersNow.of(site.workspace, store, hangers, utc_now())
@@ -96,8 +238,7 @@ def _states(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
             "latest_test_at": tests[hanger.id].time if hanger.id in tests else None,
             "nominal_tension_n": hanger.nominal_tension_n,
             "baseline_set_at": set_at.get(hanger.id),
-            "shifts": _shifts(known.watches.get(hanger.id)),
-            "creep_per_year": _creep(known.watches.get(hanger.id)),
+            **_watched(known.watches.get(hanger.id)),
             "open_alerts": known.open_alerts.get(hanger.id, 0),
             **_tension(known.latest.get(hanger.id)),
         }
@@ -105,7 +246,7 @@ def _states(site: Site, hangers: Sequence[Hanger]) -> list[dict[str, Any]]:
     ]
 
 
-def _tension(latest: TrendPoint | None) -> dict[str, Any]:
+def _tension(latest: StoredPoint | None) -> dict[str, Any]:
     if latest is None:
         return {"model": None, "tension_n": None, "averaged": None}
     summary = {**asdict(latest.tension_n), "map": latest.most_probable_tension_n}
@@ -113,16 +254,133 @@ def _tension(latest: TrendPoint | None) -> dict[str, Any]:
     return {"model": latest.model, "tension_n": summary, "averaged": averaged}
 
 
-def _shifts(latest: StoredWatch | None) -> list[dict[str, Any]]:
-    """Those of the latest test that was compared with the baseline in force."""
+def _watched(latest: StoredWatch | None) -> dict[str, Any]:
+    """Of the latest test that was compared with the baseline in force."""
     drifts = latest.watched.told if latest else ()
-    return [{key: _known(getattr(drift, key)) for key in _SHIFT} for drift in drifts]
-
-
-def _creep(latest: StoredWatch | None) -> dict[str, float] | None:
     creep = latest.watched.creep_per_year if latest else None
-    return {"mean": creep.mean, "sd": creep.sd} if creep and creep.is_known else None
+    return {
+        "shifts": plain([{key: getattr(drift, key) for key in _SHIFT} for drift in drifts]),
+        "creep_per_year": {"mean": creep.mean, "sd": creep.sd}
+        if creep and creep.is_known
+        else None,
+    }
 
 
-def _known(value: Any) -> Any:
-    return None if value != value else value  # NaN is what is not known
+@_of_one.get("/trend", response_model=HangerTrend, summary="Tension and end stiffness over time")
+def trend(
+    _: Reader,
+    view: View,
+    since: Annotated[datetime | None, Query(description="ISO 8601; all tests without it.")] = None,
+) -> Any:
+    """Every test with its posterior in numbers, the oldest first, events and states over time."""
+    points = view.trend if since is None else view.store.posteriors.trend(view.hanger, since)
+    events = view.store.alerts.list_hanger_events(view.hanger.id, since)
+    return JSONResponse(
+        plain(
+            {
+                "hanger": view.hanger.id,
+                "points": [_point(point) for point in points],
+                "events": [
+                    {"at": e.at, "kind": e.kind.value, "who": e.who, "why": e.why} for e in events
+                ],
+                "changes": [_change(call) for call in view.calls],
+                "states": None if view.states is None else _states(view.states),
+            }
+        ),
+        headers=_headers(view),
+    )
+
+
+@_of_one.get("/tests", response_model=HangerTests, summary="The tests of a hanger")
+def some_tests(
+    _: Reader,
+    view: View,
+    limit: Annotated[int, Query(ge=1, le=MOST_ROWS)] = 50,
+    before: Annotated[
+        int | None,
+        Query(ge=0, le=LARGEST_NUMBER, description="`next_before` of the answer before."),
+    ] = None,
+) -> Any:
+    """The newest first; those before a test where `before` names its number."""
+    shown, older = paged(lines_before(view, limit + 1, before), limit)
+    return {"hanger": view.hanger.id, "tests": list(map(_test, shown)), "next_before": older}
+
+
+@_of_one.get(
+    "/figures/{name}", response_model=FigureDocument, summary="A figure of the hanger's page"
+)
+def figure(
+    _: Reader,
+    view: View,
+    name: Annotated[str, Path(max_length=40, description="`trend`, `stiffness`, ...")],
+) -> JSONResponse:
+    """A plotly document with its caption; with `Retry-After` where it is not whole yet."""
+    found = next((each for each in FIGURES if each.name == name and each.is_there(view)), None)
+    if found is None:
+        raise NothingThere(
+            f"hanger {view.hanger.id} has no figure {name}.",
+            remedy=f"Figures: {', '.join(e.name for e in FIGURES if e.is_there(view)) or 'none'}.",
+        )
+    made = JSONResponse(found.document(view))
+    made.headers.update(_headers(view) if found.shows_states else {})
+    return made
+
+
+def _headers(view: HangerView) -> dict[str, str]:
+    return RETRY_AFTER if view.states is None else {}
+
+
+def _point(point: StoredPoint) -> dict[str, Any]:
+    return {
+        "test": point.test,
+        "time": point.time,
+        "temperature_c": point.temperature_c,
+        "model": point.model,
+        "tension_n": vars(point.tension_n),
+        "averaged": averaged_document(point.averaged),
+        "stiffness": {name: vars(numbers) for name, numbers in point.stiffness.items()},
+    }
+
+
+def _change(call: StoredWatch) -> dict[str, Any]:
+    change = call.watched.change
+    return {
+        "called_by": call.watched.test,
+        "began_after": change.began_after,
+        "began_by": change.began_by,
+        "words": called_words(change),
+    }
+
+
+def _states(states: StatesOverTime) -> list[dict[str, Any]]:
+    return [
+        {
+            "quantity": quantity.name,
+            "reference_temperature_c": states.reference_temperature_c,
+            "times": list(states.times),
+            "q05": quantity.filtered.low,
+            "q50": quantity.filtered.middle,
+            "q95": quantity.filtered.high,
+        }
+        for quantity in states.quantities
+    ]
+
+
+def _test(line: TestLine) -> dict[str, Any]:
+    point = line.point
+    return {
+        "id": line.id,
+        "test": line.name,
+        "time": line.row.time,
+        "stage": line.row.stage.value,
+        "temperature_c": plain(point.temperature_c) if point else None,
+        "model": point.model if point else None,
+        "tension_n": vars(point.tension_n) if point else None,
+        "averaged": plain(averaged_document(point.averaged)) if point else None,
+        "page": line.address,
+    }
+
+
+router = APIRouter()
+router.include_router(_of_all)
+router.include_router(_of_one)

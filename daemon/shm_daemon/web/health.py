@@ -45,12 +45,12 @@ def troubles(site: Site) -> list[str]:
 
 def limits(site: Site) -> list[str]:
     """Why work goes on otherwise than it is described; empty where all is well."""
-    return _found(site, _description, _strangers)
+    return _found(site, _of_description, _of_strangers)
 
 
 def attention(site: Site) -> list[str]:
     """What a person should look at though nothing fails."""
-    return _found(site, _held, _never_taken, _streams)
+    return _found(site, _held, _never_taken, _of_streams)
 
 
 def notices(site: Site) -> list[Lead]:
@@ -75,8 +75,9 @@ def _of_daemon(site: Site) -> list[Lead]:
     silence = _silence(site)
     if not silence:
         return []
-    action = "Until it runs again (`shm daemon`), recordings wait and no alert is raised."
-    return [Lead(silence, action)]
+    return [
+        Lead(silence, "Until it runs again (`shm daemon`), recordings wait and no alert is raised.")
+    ]
 
 
 def _of_description(site: Site) -> list[Lead]:
@@ -97,10 +98,10 @@ def _of_strangers(site: Site) -> list[Lead]:
     missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.watched})
     if not missing:
         return []
-    named = _named(missing)
     return [
         Lead(
-            f"bridge.toml: hanger {named} is not described, though tests of it are stored.",
+            f"bridge.toml: hanger {_named(missing)} is not described, though tests of it are "
+            "stored.",
             f"Add its table `[[hanger]]` with `id = {missing[0]}` to bridge.toml.",
         )
     ]
@@ -129,17 +130,17 @@ def _of_streams(site: Site) -> Sequence[Lead]:
         return []  # told as a trouble
 
 
-def _found(site: Site, *checks: Callable[[Site], list[str]]) -> list[str]:
-    return [reason for check in checks for reason in _looked_at(site, check)]
-
-
-def _looked_at(site: Site, check: Callable[[Site], list[str]]) -> list[str]:
+def _found(site: Site, *checks: Callable[[Site], Sequence[str | Lead]]) -> list[str]:
     """Whatever befalls one check, the others answer, and so does `/health`."""
-    try:
-        return check(site)
-    except Exception:
-        log.exception("a check of /health failed")
-        return [f"The check of the {check.__name__.strip('_')} failed; the log says more."]
+    found = []
+    for check in checks:
+        try:
+            found += [each if isinstance(each, str) else each.state for each in check(site)]
+        except Exception:
+            log.exception("a check of /health failed")
+            name = check.__name__.removeprefix("_of").strip("_")
+            found.append(f"The check of the {name} failed; the log says more.")
+    return found
 
 
 def _store(site: Site) -> list[str]:
@@ -195,7 +196,13 @@ def _held(site: Site) -> list[str]:
     for hold in holds:
         of_hangers.setdefault(hold.hanger, []).append(hold.recording_id)
     return [
-        f"hanger {hanger}: {_recordings(ids)} held until a person decides."
+        f"hanger {hanger}: "
+        + (
+            f"recording {ids[0]} is"
+            if len(ids) == 1
+            else f"{len(ids)} recordings ({_named(ids)}) are"
+        )
+        + " held until a person decides."
         for hanger, ids in sorted(of_hangers.items())
     ]
 
@@ -205,22 +212,5 @@ def _never_taken(site: Site) -> list[str]:
     return [f"{count} of the spool will never be taken: see `shm doctor`."] if count else []
 
 
-def _streams(site: Site) -> list[str]:
-    return [lead.state for lead in _of_streams(site)]
-
-
-def _recordings(ids: Sequence[int]) -> str:
-    few = f"recording {ids[0]} is"
-    return few if len(ids) == 1 else f"{len(ids)} recordings ({_named(ids)}) are"
-
-
 def _named(ids: Sequence[int]) -> str:
     return ", ".join(map(str, ids[:_NAMED])) + (" and others" if ids[_NAMED:] else "")
-
-
-def _description(site: Site) -> list[str]:
-    return [notice.state for notice in _of_description(site)]
-
-
-def _strangers(site: Site) -> list[str]:
-    return [notice.state for notice in _of_strangers(site)]

@@ -15,6 +15,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from datetime import timedelta
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,19 +28,17 @@ from prometheus_client.registry import Collector
 
 from shm.pipeline import utc_now
 from shm.pipeline.stream_state import StreamCondition, stream_states
+from shm.store import Workspace
 from shm.store.list_rows import ON_THE_WAY
 from shm.store.ring import ring_of
 from shm_daemon.heartbeat import seconds_since_beat
 from shm_daemon.spool import scan
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
-from shm_daemon.web.hangers import quarantined
 from shm_daemon.web.health import health_document
 from shm_daemon.web.middleware import HEALTH, METRICS
 from shm_daemon.web.models import Health
-from shm_daemon.web.site import Site
-
-__all__ = ["CONTENT_TYPE", "Exposition"]
+from shm_daemon.web.site import Site, quarantined
 
 _LATELY = timedelta(hours=1)
 _QUANTILES = (0.5, 0.95, 1.0)  # the usual, the slow and the slowest
@@ -47,7 +46,7 @@ _QUANTILES = (0.5, 0.95, 1.0)  # the usual, the slow and the slowest
 log = logging.getLogger(__name__)
 
 
-class Exposition:
+class Exposition(Collector):
     """The page for Prometheus, and how often each part of it has failed since the beginning."""
 
     def __init__(self, site: Site):
@@ -58,12 +57,15 @@ class Exposition:
     def page(self) -> bytes:
         """In a registry of its own, as text of Prometheus."""
         registry = CollectorRegistry(auto_describe=False)
-        registry.register(_Measured(self._metrics))
+        registry.register(self)
         return generate_latest(registry)
 
-    def _metrics(self) -> Iterator[Metric]:
-        for name, part in _PARTS.items():
-            yield from self._made(name, part)
+    def describe(self) -> list[Metric]:
+        return []  # or registering would measure once more
+
+    def collect(self) -> Iterator[Metric]:
+        for name, gauge in _PARTS.items():
+            yield from self._made(name, partial(_of_workspace, *gauge))
         up = self._made("store", _usable)
         yield from up or [_store_up(is_up=False)]
         if up:  # else each part would wait in vain for a server that is away
@@ -89,37 +91,12 @@ class Exposition:
         return made
 
 
-class _Measured(Collector):
-    def __init__(self, metrics: Callable[[], Iterator[Metric]]):
-        self._metrics = metrics
-
-    def describe(self) -> list[Metric]:
-        return []  # or registering would measure once more
-
-    def collect(self) -> Iterator[Metric]:
-        return self._metrics()
-
-
-def _spool(site: Site) -> Iterator[Metric]:
-    files = len(scan(site.workspace.spool))
-    yield _gauge("shm_spool_files", "Files in the spool.", files)
-
-
-def _quarantine(site: Site) -> Iterator[Metric]:
-    text = "Refused files in the quarantine."
-    yield _gauge("shm_quarantined_files", text, quarantined(site.workspace))
-
-
-def _disk(site: Site) -> Iterator[Metric]:
-    free = shutil.disk_usage(site.workspace.folder).free
-    yield _gauge("shm_disk_free_bytes", "Room on the disk of the workspace.", free)
-
-
-def _daemon(site: Site) -> Iterator[Metric]:
-    ago = seconds_since_beat(site.workspace)
-    if ago is not None:
-        text = "How long ago the daemon's loop last went round."
-        yield _gauge("shm_daemon_seen_seconds", text, ago)
+def _of_workspace(
+    name: str, text: str, value: Callable[[Workspace], float | None], site: Site
+) -> Iterator[Metric]:
+    found = value(site.workspace)
+    if found is not None:
+        yield GaugeMetricFamily(name, text, found)
 
 
 def _usable(site: Site) -> Iterator[Metric]:
@@ -131,18 +108,17 @@ def _queue(site: Site) -> Iterator[Metric]:
     looks, counts = scan(site.workspace.spool), site.store.recordings.stage_counts()
     waiting = len(looks) + sum(counts[stage] for stage in ON_THE_WAY)
     text = "Files in the spool and recordings that are not through."
-    yield _gauge("shm_queue_length", text, waiting)
+    yield GaugeMetricFamily("shm_queue_length", text, waiting)
     changed_s = [time.time() - look.modified_ns / 1e9 for look in looks.values()]
     oldest = site.store.recordings.oldest_waiting()
     stored_s = [(utc_now() - oldest).total_seconds()] if oldest else []
     text = "How long the oldest of the queue has waited; 0 where it is empty."
-    yield _gauge("shm_queue_oldest_seconds", text, max([0.0, *changed_s, *stored_s]))
+    yield GaugeMetricFamily("shm_queue_oldest_seconds", text, max([0.0, *changed_s, *stored_s]))
 
 
 def _recordings(site: Site) -> Iterator[Metric]:
-    yield _labelled(
-        "shm_recordings", "Recordings at a stage.", "stage", site.store.recordings.stage_counts()
-    )
+    counts = site.store.recordings.stage_counts()
+    yield _labelled("shm_recordings", "Recordings at a stage.", "stage", counts)
 
 
 def _alerts(site: Site) -> Iterator[Metric]:
@@ -151,9 +127,8 @@ def _alerts(site: Site) -> Iterator[Metric]:
 
 
 def _deliveries(site: Site) -> Iterator[Metric]:
-    yield _labelled(
-        "shm_deliveries", "Alerts to hooks.", "state", site.store.alerts.delivery_counts()
-    )
+    counts = site.store.alerts.delivery_counts()
+    yield _labelled("shm_deliveries", "Alerts to hooks.", "state", counts)
 
 
 def _stages(site: Site) -> Iterator[Metric]:
@@ -172,47 +147,42 @@ def _stages(site: Site) -> Iterator[Metric]:
 def _streams(site: Site) -> Iterator[Metric]:
     ring, now = ring_of(site.workspace), utc_now()
     states = stream_states(site.workspace, ring, site.store, now)
-    told: tuple[tuple[str, str, Callable[[StreamCondition], float]], ...] = (
-        ("lag_seconds", "How long ago the last sample of a stream was measured.", _lag_s),
-        ("behind_seconds", "How much of a stream has come and is not read yet.", _behind_s),
-        ("lost_share", "What did not come of the samples of the last day.", _lost),
-        ("apart_seconds", "Samples of the last day for a time that was there: kept apart.", _apart),
-        ("ring_bytes", "Room that the raw samples of a stream take.", _size),
-    )
+    told: tuple[tuple[str, str, Callable[[StreamCondition], float | timedelta | None]], ...] = (
+        ("lag_seconds", "How long ago the last sample of a stream was measured.",
+         lambda state: state.lag),
+        ("behind_seconds", "How much of a stream has come and is not read yet.",
+         lambda state: state.behind),
+        ("lost_share", "What did not come of the samples of the last day.",
+         lambda state: state.lost_share),
+        ("apart_seconds", "Samples of the last day for a time that was there: kept apart.",
+         lambda state: state.apart_s),
+        ("ring_bytes", "Room that the raw samples of a stream take.",
+         lambda state: state.ring_bytes),
+    )  # fmt: skip
     for name, text, value in told:
         family = GaugeMetricFamily(f"shm_stream_{name}", text, labels=["stream"])
         for state in states:
-            family.add_metric([state.stream.name], value(state))
+            found = value(state)
+            found = found.total_seconds() if isinstance(found, timedelta) else found
+            family.add_metric([state.stream.name], math.nan if found is None else found)
         yield family
 
 
-def _lag_s(state: StreamCondition) -> float:
-    return state.lag.total_seconds() if state.lag is not None else math.nan
-
-
-def _behind_s(state: StreamCondition) -> float:
-    return state.behind.total_seconds() if state.behind is not None else math.nan
-
-
-def _lost(state: StreamCondition) -> float:
-    return state.lost_share
-
-
-def _apart(state: StreamCondition) -> float:
-    return state.apart_s
-
-
-def _size(state: StreamCondition) -> float:
-    return float(state.ring_bytes)
-
-
 _Part = Callable[[Site], Iterator[Metric]]
-_PARTS: Mapping[str, _Part] = {
-    "spool": _spool,
-    "quarantine": _quarantine,
-    "disk": _disk,
-    "daemon": _daemon,
-}
+_PARTS: Mapping[str, tuple[str, str, Callable[[Workspace], float | None]]] = {
+    "spool": ("shm_spool_files", "Files in the spool.", lambda of: len(scan(of.spool))),
+    "quarantine": (
+        "shm_quarantined_files", "Refused files in the quarantine.", lambda of: quarantined(of)
+    ),
+    "disk": (
+        "shm_disk_free_bytes", "Room on the disk of the workspace.",
+        lambda of: shutil.disk_usage(of.folder).free,
+    ),
+    "daemon": (
+        "shm_daemon_seen_seconds", "How long ago the daemon's loop last went round.",
+        seconds_since_beat,
+    ),
+}  # fmt: skip
 _OF_STORE: Mapping[str, _Part] = {
     "queue": _queue,
     "recordings": _recordings,
@@ -224,11 +194,7 @@ _OF_STORE: Mapping[str, _Part] = {
 
 
 def _store_up(*, is_up: bool) -> Metric:
-    return _gauge("shm_store_up", "Whether the store can be used.", float(is_up))
-
-
-def _gauge(name: str, text: str, value: float) -> GaugeMetricFamily:
-    return GaugeMetricFamily(name, text, value)
+    return GaugeMetricFamily("shm_store_up", "Whether the store can be used.", float(is_up))
 
 
 def _labelled(name: str, text: str, label: str, values: Mapping[str, int]) -> GaugeMetricFamily:
@@ -272,6 +238,5 @@ def metrics(request: Request, _: Reader) -> Response:
     """Computed from store and spool at each scrape; `shm_store_up` is 0 where the store is out, and
     `shm_scrape_errors_total` counts what could not be told.
     """
-    exposition = request.app.state.exposition
-    assert isinstance(exposition, Exposition)
+    exposition: Exposition = request.app.state.exposition
     return Response(exposition.page(), headers={"Content-Type": CONTENT_TYPE})

@@ -34,7 +34,6 @@ from shm.store import Lineage, Store, StoredRecording, StoredTest, Workspace
 from shm.store.archive import MODES_SUFFIX
 from shm_daemon.web import with_plotly
 from shm_daemon.web.background_work import BackgroundWorker
-from shm_daemon.web.hangers import described
 
 _ROW_PX, _REST_PX = 118, 90
 """Of the mode shapes: a row of panels, and what is above and below them."""
@@ -69,8 +68,7 @@ class TestFigure:
         found = self.member.draw(shown)
         if not isinstance(found, Specification):
             return None
-        words = {"caption": self.member.caption(shown), "alt": self.member.alt(shown)}
-        return {**with_plotly.document(found), **words}
+        return with_plotly.with_words(found, self.member.caption(shown), self.member.alt(shown))
 
 
 # Judgement: a figure of one panel fits a laptop's screen with its caption, one of several fills it.
@@ -96,12 +94,12 @@ AT_WORK = "The raw file is being identified once more; this comes in some second
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure over HTTP: its document, None while it is worked out, and whether more will come.
+    """A figure over HTTP: its JSON, None while it is worked out, and whether more will come.
 
     `provisional` is what the store alone gives, while the rest is worked out.
     """
 
-    document: dict[str, Any] | bytes | None
+    document: bytes | None
     provisional: bool = False
 
 
@@ -116,21 +114,6 @@ class TestView:
     background_worker: BackgroundWorker[WorkedOut]
     stored: StoredTest
     recording: StoredRecording
-
-    @classmethod
-    def of(
-        cls,
-        workspace: Workspace,
-        store: Store,
-        background_worker: BackgroundWorker[Any],
-        hanger_id: int,
-        name: str,
-    ) -> TestView:
-        """Raises NothingThere for a hanger or a test that is none."""
-        stored = store.tests.named(described(workspace, hanger_id).id, name)
-        return cls(
-            workspace, store, background_worker, stored, store.recordings.get(stored.recording_id)
-        )
 
     @property
     def is_archived(self) -> bool:
@@ -154,7 +137,12 @@ class TestView:
 
     @cached_property
     def order(self) -> ModalTestOrder:
-        return order_of(self.workspace, self.recording, self.stored)
+        """What to work out of a test as it is stored and would be identified now."""
+        stored, workspace = self.stored, self.workspace
+        terms = identify_lineage(self.recording, stored.hanger, workspace)
+        return ModalTestOrder(
+            workspace.folder, stored.hanger, stored.test.id, stored.lineage, terms
+        )
 
     @cached_property
     def worked(self) -> WorkedOut | None:
@@ -168,7 +156,22 @@ class TestView:
 
     @cached_property
     def as_stored(self) -> ModalTestReport:
-        return stored_sheet(self.workspace, self.store, self.stored)
+        """What the store knows of a test: no records, hits, poles and fit."""
+        stored, settings = self.stored, self.workspace.settings
+        response = self.store.tests.frequency_response(stored)
+        found = Identification(
+            test=stored.test,
+            frequency_response=response,
+            hits=(),
+            dropped=(),
+            poles=_NO_POLES,
+            notes=stored.notes,
+            window_time_constant_s=math.nan,
+            quality=stored.quality,
+            set_aside=stored.set_aside,
+        )
+        band_hz = (settings.band_low_hz, settings.band_high_hz) if response is not None else None
+        return ModalTestReport(found, (), self.workspace.bridge.hanger(stored.hanger), band_hz)
 
     @property
     def summary(self) -> str:
@@ -203,26 +206,15 @@ class TestView:
     def figure(self, figure: TestFigure, point: int) -> Figure:
         """A figure at the response of index `point`; raises as `whole`, and NothingThere."""
         found = None if figure.source == "file" else figure.document(self.shown(point))
+        packed = json.dumps(found, allow_nan=False).encode() if found else None
         if self.worked:
-            return Figure(_there(self.worked.figures.get(figure.name) or found, figure))
-        if figure.source == "store" or (found is not None and self.missing):
-            return Figure(_there(found, figure))
-        if self.whole() is not None:  # made since we looked
-            return Figure(found, provisional=True)
-        return Figure(found, provisional=found is not None)
-
-
-def _there(found: dict[str, Any] | bytes | None, figure: TestFigure) -> dict[str, Any] | bytes:
-    if found is None:
-        raise NothingThere(f"{figure.title}: this test has nothing for it.")
-    return found
-
-
-def as_bytes(document: dict[str, Any] | bytes) -> bytes:
-    """A document as JSON."""
-    if isinstance(document, bytes):
-        return document
-    return json.dumps(document, allow_nan=False).encode()
+            packed = self.worked.figures.get(figure.name) or packed
+        elif figure.source != "store" and not (found and self.missing):
+            is_made = self.whole() is not None  # since we looked
+            return Figure(packed, provisional=is_made or found is not None)
+        if packed is None:
+            raise NothingThere(f"{figure.title}: this test has nothing for it.")
+        return Figure(packed)
 
 
 _NO_POLES = Poles(np.empty(0), np.empty(0), np.empty(0), np.empty(0, bool))
@@ -243,22 +235,6 @@ class WorkedOut:
     conditions: Table
     figures: Mapping[str, bytes]
 
-    @property
-    def size_bytes(self) -> int:
-        found, documents = self.sheet.identification, self.figures.values()
-        arrays: list[np.ndarray[Any, Any]] = [
-            found.poles.order,
-            found.poles.frequency_hz,
-            found.poles.damping_ratio,
-        ]
-        if found.fit is not None:
-            arrays.append(found.fit)
-        if found.frequency_response is not None:
-            arrays.append(found.frequency_response.accelerance)
-        if self.spectrum is not None:
-            arrays.append(self.spectrum.values)
-        return sum(array.nbytes for array in arrays) + sum(map(len, documents))
-
 
 @dataclass(frozen=True)
 class ModalTestOrder:
@@ -277,50 +253,20 @@ class ModalTestOrder:
         """
         workspace = Workspace.open(self.folder)
         with workspace.store() as store:
-            return worked_out(modal_test_report(workspace, store, self.hanger_id, self.name))
-
-
-def order_of(
-    workspace: Workspace, recording: StoredRecording, stored: StoredTest
-) -> ModalTestOrder:
-    """What to work out of a test as it is stored and would be identified now."""
-    terms = identify_lineage(recording, stored.hanger, workspace)
-    return ModalTestOrder(workspace.folder, stored.hanger, stored.test.id, stored.lineage, terms)
-
-
-def worked_out(sheet: ModalTestReport) -> WorkedOut:
-    """The sheet with all that needs its records made of them."""
-    whole = Shown.of(sheet, point=0)
-    documents = {figure.name: figure.document(whole) for figure in FROM_RECORDS}
-    return WorkedOut(
-        sheet=replace(sheet, records=()),
-        spectrum=whole.spectrum,
-        summary=summary(sheet),
-        hits=hits(sheet),
-        dropped=dropped(sheet),
-        # Where it comes from, the page says itself, with the steps.
-        conditions=conditions(replace(sheet, lineage={})),
-        figures={
-            name: json.dumps(document, allow_nan=False).encode()
-            for name, document in documents.items()
-            if document is not None
-        },
-    )
-
-
-def stored_sheet(workspace: Workspace, store: Store, stored: StoredTest) -> ModalTestReport:
-    """What the store knows of a test: no records, hits, poles and fit."""
-    response, settings = store.tests.frequency_response(stored), workspace.settings
-    found = Identification(
-        test=stored.test,
-        frequency_response=response,
-        hits=(),
-        dropped=(),
-        poles=_NO_POLES,
-        notes=stored.notes,
-        window_time_constant_s=math.nan,
-        quality=stored.quality,
-        set_aside=stored.set_aside,
-    )
-    band_hz = (settings.band_low_hz, settings.band_high_hz) if response is not None else None
-    return ModalTestReport(found, (), workspace.bridge.hanger(stored.hanger), band_hz)
+            sheet = modal_test_report(workspace, store, self.hanger_id, self.name)
+        whole = Shown.of(sheet, point=0)
+        documents = {figure.name: figure.document(whole) for figure in FROM_RECORDS}
+        return WorkedOut(
+            sheet=replace(sheet, records=()),
+            spectrum=whole.spectrum,
+            summary=summary(sheet),
+            hits=hits(sheet),
+            dropped=dropped(sheet),
+            # Where it comes from, the page says itself, with the steps.
+            conditions=conditions(replace(sheet, lineage={})),
+            figures={
+                name: json.dumps(document, allow_nan=False).encode()
+                for name, document in documents.items()
+                if document is not None
+            },
+        )

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from enum import Enum
+from typing import Annotated, Any, Literal, Protocol, TypeVar
 
+import numpy as np
+from fastapi import Path, Query
 from pydantic import AfterValidator, BaseModel, Field
 
 
@@ -22,7 +27,29 @@ MOST_ROWS = 1000
 LARGEST_NUMBER = 2**31 - 1
 """Of the store's integers: PostgreSQL refuses larger ones."""
 
+Row = Annotated[int, Path(ge=0, le=LARGEST_NUMBER)]
+"""The number of a row of the store, in an address."""
+Before = Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)]
+"""The number of the row to go on after."""
+HangerNumber = Annotated[
+    int, Path(ge=0, le=LARGEST_NUMBER, description="The number of the hanger.")
+]
 Written = Annotated[str, Field(max_length=MOST_WRITTEN), AfterValidator(_written)]
+
+
+class Numbered(Protocol):
+    """A row by whose number one can go on."""
+
+    @property
+    def id(self) -> int: ...
+
+
+Listed = TypeVar("Listed", bound=Numbered)
+
+
+def paged(rows: Sequence[Listed], most: int) -> tuple[Sequence[Listed], int | None]:
+    """The first `most` of rows, of which one more was asked for; and `before` of the next page."""
+    return rows[:most], rows[most - 1].id if len(rows) > most else None
 
 
 class Uploaded(BaseModel):
@@ -67,7 +94,7 @@ class Recordings(BaseModel):
     recordings: list[RecordingStatus]
 
 
-class Quantity(BaseModel):
+class Posterior(BaseModel):
     """A posterior in numbers; `q05` and `q95` bound 90 % of it."""
 
     mean: float
@@ -75,6 +102,11 @@ class Quantity(BaseModel):
     q05: float
     q50: float
     q95: float
+
+
+class Quantity(Posterior):
+    """A posterior in numbers, and where it is most probable."""
+
     map: float
 
 
@@ -88,20 +120,10 @@ class Shift(BaseModel):
     probability: float | None = Field(description="That the shift is beyond the threshold.")
 
 
-class Tension(BaseModel):
-    """A tension in N in numbers; `q05` and `q95` bound 90 % of it."""
-
-    mean: float
-    sd: float
-    q05: float
-    q50: float
-    q95: float
-
-
 class AveragedTension(BaseModel):
     """The tension over all model classes, each with its probability; its interval is absolute."""
 
-    tension_n: Tension
+    tension_n: Posterior
     repeatability_sd_n: float | None = Field(description="With which the same test repeats it.")
     probability_above_limit: float | None = Field(description="Null where no limit is set.")
     probability_slack: float | None = Field(description="Null where no limit is set.")
@@ -289,6 +311,15 @@ class Examination(BaseModel):
     findings: list[Finding]
 
 
+class FigureDocument(BaseModel):
+    """A figure as plotly draws it, with its words."""
+
+    data: list[dict[str, Any]]
+    layout: dict[str, Any]
+    caption: str
+    alt: str = Field(description="What a blind reader needs.")
+
+
 class Underway(BaseModel):
     """It is being worked out: ask again after `Retry-After` seconds."""
 
@@ -336,3 +367,30 @@ class Moved(BaseModel):
 
     sentence: str
     explanations: dict[str, float] = Field(description="The probability of each explanation.")
+
+
+def plain(value: Any) -> Any:
+    """What JSON can say: arrays as lists, times in ISO 8601, NaN and infinity as null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(each) for key, each in value.items()}
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind == "f" and not np.isfinite(value).all():
+            return np.where(np.isfinite(value), value, None).tolist()  # type: ignore[call-overload]
+        if value.dtype.kind == "M":
+            return value.astype(str).tolist()
+        return plain(value.tolist()) if value.dtype.kind == "O" else value.tolist()
+    if isinstance(value, str | bool) or value is None:
+        return value.value if isinstance(value, Enum) else value
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    return _single(value)
+
+
+def _single(value: Any) -> Any:
+    if isinstance(value, datetime):
+        return value.isoformat()
+    if isinstance(value, np.datetime64):
+        return str(value)
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

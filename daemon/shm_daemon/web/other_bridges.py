@@ -62,7 +62,11 @@ def ask(bridge: OtherBridge, folder: Path, lines: Lines, timeout_s: float = LONG
                 verify=verify,
                 auth=unchanged,
             ) as response:
-                body = _body(response)
+                body = bytearray()
+                for piece in response.iter_content(4096):
+                    body += piece
+                    if len(body) > _LARGEST_BYTES:
+                        raise _no_shm(f"more than {_LARGEST_BYTES // 1024} kB")
         except (requests.RequestException, OSError) as error:
             if not line.cut_off and not isinstance(error, requests.Timeout):
                 raise _failure(error) from None
@@ -99,15 +103,6 @@ def _certificate(bridge: OtherBridge, folder: Path) -> str | bool:
     return str(path)
 
 
-def _body(response: requests.Response) -> bytes:
-    body = bytearray()
-    for piece in response.iter_content(4096):
-        body += piece
-        if len(body) > _LARGEST_BYTES:
-            raise _no_shm(f"more than {_LARGEST_BYTES // 1024} kB")
-    return bytes(body)
-
-
 def _failure(error: Exception) -> NotTold:
     if isinstance(error, requests.exceptions.SSLError):
         return NotTold(
@@ -118,7 +113,7 @@ def _failure(error: Exception) -> NotTold:
     return NotTold(f"The connection failed ({reason_of(error)}).", remedy=_LOOK)
 
 
-def _judged(bridge: OtherBridge, status: int, body: bytes) -> Summary:
+def _judged(bridge: OtherBridge, status: int, body: bytes | bytearray) -> Summary:
     """The summary of an answer; raises NotTold."""
     try:
         found = json.loads(body)
@@ -126,7 +121,14 @@ def _judged(bridge: OtherBridge, status: int, body: bytes) -> Summary:
         found = None
     document = found if isinstance(found, dict) else {}
     if status == 200 and "version" in document:
-        return _read(document)
+        try:
+            return value_of(Summary, document)
+        except Misfit:
+            theirs = one_line(str(document["version"]))[:20]
+            raise NotTold(
+                f"Its shm {theirs} and this {shm.__version__} do not understand each other.",
+                remedy="Upgrade the older of the two.",
+            ) from None
     if 300 <= status < 400:
         remedy = "It is not followed: write the dashboard's own address into bridge.toml."
         raise NotTold("Its address sends elsewhere.", remedy=remedy)
@@ -141,17 +143,6 @@ def _judged(bridge: OtherBridge, status: int, body: bytes) -> Summary:
         raise NotTold("Its shm is older than this one.", remedy=f"Upgrade it to {shm.__version__}.")
     said, remedy = (one_line(str(document.get(key, ""))) for key in ("message", "remedy"))
     raise NotTold(f"It answers {status}: {said}", remedy=remedy or _LOOK)
-
-
-def _read(document: dict[str, object]) -> Summary:
-    try:
-        return value_of(Summary, document)
-    except Misfit:
-        theirs = one_line(str(document["version"]))[:20]
-        raise NotTold(
-            f"Its shm {theirs} and this {shm.__version__} do not understand each other.",
-            remedy="Upgrade the older of the two.",
-        ) from None
 
 
 def _no_shm(answered: str) -> NotTold:

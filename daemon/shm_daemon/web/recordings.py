@@ -8,7 +8,7 @@ import asyncio
 import re
 from collections.abc import Callable
 from datetime import datetime
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Path, Query, Request
 from pydantic import BaseModel, Field
@@ -75,14 +75,12 @@ def described_by(
         "added_mass_kg": added_mass_kg,
         "added_mass_at_m": added_mass_at_m,
         "sampling_rate_hz": sampling_rate_hz,
-        **{key: _listed(text) for key, text in (("unit", unit), ("plane", plane))},
-        **{
-            key: _numbers(key, text)
-            for key, text in (
-                ("x_m", x_m), ("calibration", calibration), ("full_scale", full_scale),
-            )
-        },
-    }  # fmt: skip
+        "unit": _listed(unit),
+        "plane": _listed(plane),
+        "x_m": _numbers("x_m", x_m),
+        "calibration": _numbers("calibration", calibration),
+        "full_scale": _numbers("full_scale", full_scale),
+    }
     return {key: value for key, value in values.items() if value is not None}
 
 
@@ -90,7 +88,7 @@ def described_by(
     "",
     status_code=202,
     response_model=Uploaded,
-    responses=answers(400, 401, 403, 408, 413, 415, 422, 503),
+    responses=answers(408, 413, 415, 422),
     openapi_extra=PLAIN_BODY,
     summary="Upload a recording",
 )
@@ -118,26 +116,24 @@ async def upload(
     workspace = site.workspace
     file = await run_in_threadpool(Incoming, workspace.spool, workspace.settings.max_file_bytes)
     try:
-        await receive_body(request, file, workspace.settings.max_file_bytes)
+        await receive_body(request, file.write, workspace.settings.max_file_bytes)
         landed = await run_in_threadpool(_land, file, name, described, x_content_sha256)
     finally:
         await run_in_threadpool(file.close)
     store = site.store.acting_as(writer.actor)
-    outcome = await run_in_threadpool(_outcome, store, landed)
-    status_url = f"{UPLOADS}/{landed.sha256}"
     return Uploaded(
         sha256=landed.sha256,
         size_bytes=landed.size_bytes,
         file_name=landed.path.name,
-        outcome=outcome,
-        status_url=status_url,
+        outcome=await run_in_threadpool(_outcome, store, landed),
+        status_url=f"{UPLOADS}/{landed.sha256}",
     )
 
 
 @_of_uploads.get(
     "/{key}",
     response_model=RecordingStatus,
-    responses=answers(400, 401, 403, 404, 422, 503),
+    responses=answers(404, 422),
     summary="How far a recording has come",
 )
 def status(
@@ -152,10 +148,7 @@ def status(
 
 
 @_of_uploads.get(
-    "",
-    response_model=Recordings,
-    responses=answers(400, 401, 403, 422, 503),
-    summary="The recording of a checksum",
+    "", response_model=Recordings, responses=answers(422), summary="The recording of a checksum"
 )
 def recordings(
     site: AtSite, _: Reader, sha256: Annotated[str, Query(pattern="^[0-9a-fA-F]{64}$")]
@@ -165,29 +158,23 @@ def recordings(
     return {"recordings": [_row(site.store, found)] if found else []}
 
 
-class Sink(Protocol):
-    """What a body is written to."""
-
-    def write(self, piece: bytes | bytearray) -> None:
-        """Raises TooLarge before more is kept than is taken."""
-
-
 async def receive_body(
     request: Request,
-    file: Sink,
+    write: Callable[[bytes | bytearray], object],
     max_bytes: int,
     refuse_large: Callable[[int, int], object] = refuse_oversize,
 ) -> None:
-    """Writes the body of a request to a file; refuses a form, and one that says it is too large,
-    before a byte of it is sent, where the sender waits for our word.
+    """Has the body of a request written, a piece at a time, beside the loop that serves the others;
+    `write` raises TooLarge before more is kept than is taken.
+
+    Refuses a form, and one that says it is too large, before a byte of it is sent, where the sender
+    waits for our word.
     """
-    _refuse_form(request)
+    if request.headers.get("content-type", "").strip().lower().startswith("multipart/"):
+        raise Refused(
+            415, "A form is not taken.", "Send the bytes of the file as the body: `curl -T FILE`."
+        )
     refuse_large(int(request.headers.get("content-length", 0)), max_bytes)
-    await _stream(request, file)
-
-
-async def _stream(request: Request, file: Sink) -> None:
-    """Writes what comes, a piece at a time, beside the loop that serves the others."""
     pieces, waiting = request.stream(), bytearray()
     try:
         while True:
@@ -197,21 +184,13 @@ async def _stream(request: Request, file: Sink) -> None:
                 break
             waiting += piece
             if len(waiting) >= _PIECE_BYTES:
-                await run_in_threadpool(file.write, waiting)
+                await run_in_threadpool(write, waiting)
                 waiting = bytearray()
     except TimeoutError:
         raise Refused(408, f"Nothing came for {_SILENCE_S:.0f} s.", "Send it again.") from None
     except ClientDisconnect:
         raise Refused(400, "The connection broke off.", "Send it again.") from None
-    await run_in_threadpool(file.write, waiting)
-
-
-def _refuse_form(request: Request) -> None:
-    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if kind.startswith("multipart/"):
-        raise Refused(
-            415, "A form is not taken.", "Send the bytes of the file as the body: `curl -T FILE`."
-        )
+    await run_in_threadpool(write, waiting)
 
 
 def _land(
@@ -312,22 +291,11 @@ class AcknowledgedChunk(BaseModel):
     is_new: bool = Field(description="False where the same chunk was there before.")
 
 
-class _Body:
-    """What comes, in memory: a chunk is small."""
-
-    def __init__(self) -> None:
-        self.content = bytearray()
-
-    def write(self, piece: bytes | bytearray) -> None:
-        refuse_long_chunk(len(self.content) + len(piece))
-        self.content += piece
-
-
 @_of_streams.post(
     "/{name}/chunks",
     status_code=202,
     response_model=AcknowledgedChunk,
-    responses=answers(400, 401, 403, 408, 409, 413, 415, 422, 503),
+    responses=answers(408, 409, 413, 415, 422),
     openapi_extra=PLAIN_BODY,
     summary="Send a chunk of a stream",
 )
@@ -343,11 +311,15 @@ async def chunks(
     Example: `curl --data-binary @chunk.json -H "Authorization: Bearer $TOKEN"
     http://127.0.0.1:8400/api/streams/h3/chunks`
     """
-    body = _Body()
-    await receive_body(request, body, LARGEST_BYTES, refuse_long_chunk)
-    content = [bytes(body.content)]
-    workspace, store = site.workspace, site.store
-    (kept,) = await run_in_threadpool(take_chunks, workspace, store, name, content, utc_now())
+    body = bytearray()  # in memory: a chunk is small
+
+    def write(piece: bytes | bytearray) -> None:
+        refuse_long_chunk(len(body) + len(piece))
+        body.extend(piece)
+
+    await receive_body(request, write, LARGEST_BYTES, refuse_long_chunk)
+    chunk, workspace, store = [bytes(body)], site.workspace, site.store
+    (kept,) = await run_in_threadpool(take_chunks, workspace, store, name, chunk, utc_now())
     return AcknowledgedChunk(**vars(kept))
 
 

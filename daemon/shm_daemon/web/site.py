@@ -13,9 +13,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from shm.errors import NothingThere, ShmError, StoreError
+from shm.errors import BadInput, NothingThere, ShmError, StoreError
 from shm.store import Store, Workspace
 from shm.store.people import same_name
+from shm.values import Hanger
 from shm_daemon.web.address import Address, network_of
 
 MOST_WRONG, WITHIN_S = 10, 60.0
@@ -79,7 +80,7 @@ class Description:
     """The workspace as `bridge.toml` describes it. May be used from many threads."""
 
     def __init__(self, workspace: Workspace):
-        self._workspace, self._described_at = workspace, _modified_ns(workspace)
+        self._workspace, self._described_at = workspace, modified_ns(workspace)
         self._fault: ShmError | None = None
         self._lock = threading.Lock()
 
@@ -91,7 +92,7 @@ class Description:
     def now(self) -> tuple[Workspace, ShmError | None]:
         """As it is described now or, where that has a fault, as it last was; and the fault."""
         with self._lock:
-            modified = _modified_ns(self._workspace)
+            modified = modified_ns(self._workspace)
             if modified != self._described_at:
                 self._described_at = modified
                 try:
@@ -153,7 +154,8 @@ class Site:
                 self._store = None
 
 
-def _modified_ns(workspace: Workspace) -> int:
+def modified_ns(workspace: Workspace) -> int:
+    """When `bridge.toml` was last written; 0 where it cannot be looked at."""
     try:
         return Path(workspace.bridge.source).stat().st_mtime_ns
     except OSError:
@@ -172,3 +174,16 @@ def held_documents(site: Site, hanger: int | None = None) -> list[dict[str, Any]
         }
         for hold in site.store.recordings.list_holds(hanger)
     ]
+
+
+def described(workspace: Workspace, hanger_id: int) -> Hanger:
+    """A hanger of the bridge; raises NothingThere."""
+    try:
+        return workspace.bridge.hanger(hanger_id)
+    except BadInput as error:
+        raise NothingThere(error.message, remedy=error.remedy) from error
+
+
+def quarantined(workspace: Workspace) -> int:
+    """How many refused files lie in the quarantine."""
+    return sum(1 for _ in workspace.quarantine.folder.glob("*.reason.json"))

@@ -20,13 +20,14 @@ from shm.errors import NothingThere
 from shm.report import formatting
 from shm.report.paper import Table
 from shm.report.shared_tables import overall
-from shm.store import FormerPosterior, FormerTest, Lineage, Step
+from shm.store import FormerPosterior, FormerTest, Step
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.address import name_in
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
 from shm_daemon.web.faults import answers
-from shm_daemon.web.hangers import Number
-from shm_daemon.web.modal_test_view import AT_WORK, FIGURES, TestView, as_bytes
+from shm_daemon.web.modal_test_view import AT_WORK, FIGURES, TestView
+from shm_daemon.web.models import FigureDocument, HangerNumber, Underway
+from shm_daemon.web.site import described
 
 _AT_ONCE_S = 0.05  # what would be rounded to 0.0 s
 
@@ -34,25 +35,21 @@ _AT_ONCE_S = 0.05  # what would be rounded to 0.0 s
 def origin(view: TestView) -> Table:
     """File, checksums and version; a checksum is written out, for it is there to be compared."""
     file, lineage = view.recording.file, view.stored.lineage
+    size, is_now = file.size_bytes, view.order.terms == lineage
+    anew = f"have changed since: `shm ingest --again {view.recording.id}` identifies it anew"
     facts = {
         "raw file": file.file_name,
         "its SHA-256": file.sha256,
-        "its size": _size(file.size_bytes),
+        "its size": f"{size / 1e6:.2f} MB" if size >= 1e5 else f"{size} bytes",
         "received": formatting.moment(view.recording.received_at),
         "in the archive": "yes" if view.is_archived else "no: taken out",
         "sidecar": "came with it" if file.sidecar_as else "none",
         "checksum of the input": lineage.input_sha256,
         "checksum of the settings": lineage.settings_sha256,
         "identified with": f"shm {lineage.version}",
-        "settings, description and version": _now(view),
+        "settings, description and version": "as they are now" if is_now else anew,
     }
     return Table("Raw file and lineage", ("what", "value"), tuple(facts.items()))
-
-
-def _now(view: TestView) -> str:
-    if view.order.terms == view.stored.lineage:
-        return "as they are now"
-    return f"have changed since: `shm ingest --again {view.recording.id}` identifies it anew"
 
 
 def steps_of(view: TestView) -> tuple[Step, ...]:
@@ -69,7 +66,7 @@ def steps(view: TestView) -> Table:
         (
             step.stage,
             "test" if step.test else "file",
-            _second(step.at),
+            f"{step.at:%Y-%m-%d %H:%M:%S} UTC",
             _after(step.at, then),
             f"shm {step.version}" if step.version else "not noted",
         )
@@ -84,56 +81,39 @@ def formers_of(view: TestView) -> tuple[FormerTest, ...]:
     return tuple(each for each in found if each.name == view.stored.test.id)
 
 
+def _replaced(view: TestView) -> list[tuple[str | None, datetime, FormerTest | FormerPosterior]]:
+    """What later runs have replaced: its model class (None of an identification), when it was made,
+    and itself.
+    """
+    found: list[tuple[str | None, datetime, FormerTest | FormerPosterior]] = []
+    for test in formers_of(view):
+        found.append((None, test.identified_at, test))
+        found += [(each.model, each.updated_at, each) for each in test.posteriors]
+    return [each for each in found if each[2].superseded_at]
+
+
 def superseded(view: TestView) -> Table:
     """Identifications and posteriors that later runs have replaced."""
-    rows: list[tuple[str, ...]] = []
-    for test in formers_of(view):
-        if test.superseded_at:
-            rows.append(
-                _former("identification", test.identified_at, test.superseded_at, test.lineage)
-            )
-        for each in test.posteriors:
-            if each.superseded_at:
-                what = f"posterior, {formatting.model_class(each.model)}"
-                rows.append(_former(what, each.updated_at, each.superseded_at, each.lineage))
-    return Table(
-        "Superseded results", ("what", "made", "superseded", "with", "settings"), tuple(rows)
+    rows = tuple(
+        (
+            f"posterior, {formatting.model_class(model)}" if model else "identification",
+            formatting.moment(made_at),
+            formatting.moment(former.superseded_at) if former.superseded_at else "",
+            f"shm {former.lineage.version}",
+            former.lineage.settings_sha256[:12],
+        )
+        for model, made_at, former in _replaced(view)
     )
-
-
-def _former(what: str, made: datetime, ended: datetime, lineage: Lineage) -> tuple[str, ...]:
-    return (
-        what,
-        formatting.moment(made),
-        formatting.moment(ended),
-        f"shm {lineage.version}",
-        lineage.settings_sha256[:12],
-    )
-
-
-def _second(at: datetime) -> str:
-    return f"{at:%Y-%m-%d %H:%M:%S} UTC"
+    return Table("Superseded results", ("what", "made", "superseded", "with", "settings"), rows)
 
 
 def _after(at: datetime, then: datetime | None) -> str:
     seconds = (at - then).total_seconds() if then else 0.0
     if seconds < _AT_ONCE_S:
         return "at once"
-    return (
-        f"{formatting.plain(seconds)} s"
-        if seconds < 3600
-        else f"{formatting.plain(seconds / 3600)} h"
-    )
-
-
-def _size(size_bytes: int) -> str:
-    return f"{size_bytes / 1e6:.2f} MB" if size_bytes >= 1e5 else f"{size_bytes} bytes"
-
-
-class Waiting(BaseModel):
-    """What was asked for is being worked out: ask again after `Retry-After` seconds."""
-
-    message: str
+    if seconds < 3600:
+        return f"{formatting.plain(seconds)} s"
+    return f"{formatting.plain(seconds / 3600)} h"
 
 
 class Check(BaseModel):
@@ -235,23 +215,14 @@ class Hits(BaseModel):
     dropped: list[DroppedState]
 
 
-class PlotlyFigure(BaseModel):
-    """A figure for plotly, with its words."""
-
-    data: list[dict[str, Any]]
-    layout: dict[str, Any]
-    caption: str
-    alt: str
-
-
-# Statuses as RFC 9110 defines them.
-_FAULTS = answers(400, 401, 403, 404, 422, 503)
+# Status as RFC 9110 defines it.
 _LATER: dict[int | str, dict[str, Any]] = {
-    202: {"model": Waiting, "description": "It is being worked out; `Retry-After` says how long."}
+    202: {"model": Underway, "description": "It is being worked out; `Retry-After` says how long."}
 }
 _OF_TEST = "/hangers/{hanger_id}/tests/{test:path}"
 
-router = APIRouter(prefix="/api", tags=["state"])
+# Statuses as RFC 9110 defines them.
+router = APIRouter(prefix="/api", tags=["state"], responses=answers(404, 422))
 # Technical: a file name of 255 bytes has 765 characters when encoded; no test has more responses.
 Name = Annotated[str, Path(max_length=1000, description="The test's name, percent-encoded.")]
 MOST_RESPONSES = 100_000
@@ -263,10 +234,12 @@ Point = Annotated[
 ]
 
 
-def view_of(request: Request, site: AtSite, hanger_id: Number, test: Name) -> TestView:
+def view_of(request: Request, site: AtSite, hanger_id: HangerNumber, test: Name) -> TestView:
     """The test that is asked for; raises NothingThere."""
-    background_worker = background_worker_of(request)
-    return TestView.of(site.workspace, site.store, background_worker, hanger_id, name_in(test))
+    store = site.store
+    stored = store.tests.named(described(site.workspace, hanger_id).id, name_in(test))
+    recording = store.recordings.get(stored.recording_id)
+    return TestView(site.workspace, store, background_worker_of(request), stored, recording)
 
 
 View = Annotated[TestView, Depends(view_of)]
@@ -274,8 +247,8 @@ View = Annotated[TestView, Depends(view_of)]
 
 @router.get(
     _OF_TEST + "/figures/{figure}",
-    response_model=PlotlyFigure,
-    responses={**_LATER, **_FAULTS},
+    response_model=FigureDocument,
+    responses=_LATER,
     summary="One figure of a test",
 )
 def figure(
@@ -291,13 +264,13 @@ def figure(
     if found.document is None:
         return waiting()
     headers = RETRY_AFTER if found.provisional else None
-    return Response(as_bytes(found.document), headers=headers, media_type="application/json")
+    return Response(found.document, headers=headers, media_type="application/json")
 
 
 @router.get(
     _OF_TEST + "/hits",
     response_model=Hits,
-    responses={**_LATER, **_FAULTS},
+    responses=_LATER,
     summary="The hits of a test, and why one was dropped",
 )
 def hits(_: Reader, view: View) -> Any:
@@ -309,15 +282,10 @@ def hits(_: Reader, view: View) -> Any:
     return {"hits": list(map(asdict, found.hits)), "dropped": list(map(asdict, found.dropped))}
 
 
-@router.get(
-    _OF_TEST,
-    response_model=TestState,
-    responses=_FAULTS,
-    summary="One test as it is stored",
-)
+@router.get(_OF_TEST, response_model=TestState, summary="One test as it is stored")
 def test(_: Reader, view: View) -> Any:
     """Modes, quality, what was set aside, and where all that comes from."""
-    sheet, stored = view.as_stored, view.stored
+    sheet, stored, file = view.as_stored, view.stored, view.recording.file
     before, after = view.store.tests.beside(stored)
     response = sheet.identification.frequency_response
     return {
@@ -331,10 +299,25 @@ def test(_: Reader, view: View) -> Any:
         "set_aside": [_known(asdict(each)) for each in stored.set_aside],
         "notes": list(stored.notes),
         "responses": [point.name for point in response.points] if response else [],
-        "file": _file(view),
+        "file": {
+            "file_name": file.file_name,
+            "sha256": file.sha256,
+            "size_bytes": file.size_bytes,
+            "received_at": view.recording.received_at,
+            "archived": view.is_archived,
+        },
         "lineage": stored.lineage.columns,
         "steps": [{"stage": s.stage, "at": s.at, "version": s.version} for s in steps_of(view)],
-        "superseded": _superseded(view),
+        "superseded": [
+            {
+                "what": "posterior" if model else "identification",
+                "model": model,
+                "made_at": made_at,
+                "superseded_at": former.superseded_at,
+                "lineage": former.lineage.columns,
+            }
+            for model, made_at, former in _replaced(view)
+        ],
         "previous": before,
         "next": after,
         "missing": view.missing,
@@ -345,34 +328,6 @@ def test(_: Reader, view: View) -> Any:
 def waiting() -> JSONResponse:
     """The answer while something is worked out."""
     return JSONResponse({"message": AT_WORK}, 202, RETRY_AFTER)
-
-
-def _file(view: TestView) -> dict[str, Any]:
-    file = view.recording.file
-    return {
-        "file_name": file.file_name,
-        "sha256": file.sha256,
-        "size_bytes": file.size_bytes,
-        "received_at": view.recording.received_at,
-        "archived": view.is_archived,
-    }
-
-
-def _superseded(view: TestView) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = []
-    for test in formers_of(view):
-        if test.superseded_at:
-            rows.append({"what": "identification", "model": None, "made_at": test.identified_at})
-            rows[-1] |= _ended(test)
-        for each in test.posteriors:
-            if each.superseded_at:
-                rows.append({"what": "posterior", "model": each.model, "made_at": each.updated_at})
-                rows[-1] |= _ended(each)
-    return rows
-
-
-def _ended(former: FormerTest | FormerPosterior) -> dict[str, Any]:
-    return {"superseded_at": former.superseded_at, "lineage": former.lineage.columns}
 
 
 def _known(row: dict[str, Any]) -> dict[str, Any]:

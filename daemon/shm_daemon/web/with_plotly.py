@@ -1,4 +1,7 @@
-"""Draws the specification of a figure for the screen: a plotly document, in plain dictionaries."""
+"""Draws the specification of a figure for the screen: a plotly document, in plain dictionaries.
+
+`static/charts.js` turns the colours for a dark screen.
+"""
 
 from __future__ import annotations
 
@@ -10,21 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from shm.report.figures.specification import (
-    Axis,
-    Band,
-    Bars,
-    Heat,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    Rule,
-    Span,
-    Specification,
-)
+from shm.report.figures import specification as spec
+from shm.report.figures.style import PALETTE
 from shm.values import FloatArray
-from shm_daemon.web import plotting
+from shm_daemon.web.models import plain
 
 _GAP, _GAP_NUMBERED, _GAP_BESIDE, _GAP_GRID = 0.045, 0.13, 0.08, 0.03
 """Between two panels, as shares of the figure: over one horizontal axis, over one each, side by
@@ -44,15 +36,20 @@ _SYMBOLS = {
 }  # fmt: skip
 
 
-def document(figure: Specification) -> dict[str, Any]:
+def document(figure: spec.Specification) -> dict[str, Any]:
     """The plotly document `{"data", "layout"}`: lists and texts only, null for what is unknown."""
     return _Drawing(figure).document()
+
+
+def with_words(figure: spec.Specification, caption: str, alt: str) -> dict[str, Any]:
+    """Its document with what is seen and with what a blind reader needs."""
+    return {**document(figure), "caption": caption, "alt": alt}
 
 
 class _Drawing:
     """Gathers the traces and the layout of one figure, panel by panel."""
 
-    def __init__(self, figure: Specification) -> None:
+    def __init__(self, figure: spec.Specification) -> None:
         self.figure = figure
         self.traces: list[dict[str, Any]] = []
         self.layout: dict[str, Any] = {
@@ -73,7 +70,7 @@ class _Drawing:
         for line, (row, domain) in enumerate(zip(self.figure.rows, upright, strict=True)):
             for column, (panel, width) in enumerate(zip(row, self._widths(row), strict=True)):
                 number += 1
-                x, y = _axis("x", across), _axis("y", number)
+                x, y = ("x" if across == 1 else f"x{across}", "y" if number == 1 else f"y{number}")
                 self._place(panel, (x, y), (width, domain), column)
                 if panel.x is not None:
                     self.layout[_key(x)] = {**_axis_of(panel.x), "anchor": y, "domain": width}
@@ -98,16 +95,20 @@ class _Drawing:
         elif not self.figure.is_grid and _begins_left(self.figure.rows[0]):
             self.layout["legend"] = {"y": 1, "yref": "container", "yanchor": "top"}
             self.layout["margin"] = {"t": _ABOVE_PX}
-        return {"data": self.traces, "layout": plotting.plain(self.layout)}
+        return {"data": self.traces, "layout": plain(self.layout)}
 
-    def _widths(self, row: Sequence[Panel]) -> list[list[float]]:
+    def _widths(self, row: Sequence[spec.Panel]) -> list[list[float]]:
         if not self.figure.is_grid:
             return _shares([panel.width for panel in row], [_GAP_BESIDE] * (len(row) - 1))
         columns = max(len(each) for each in self.figure.rows)
         return _shares([1.0] * columns, [_GAP_GRID] * (columns - 1))[: len(row)]
 
     def _place(
-        self, panel: Panel, axes: tuple[str, str], domains: tuple[list[float], ...], column: int
+        self,
+        panel: spec.Panel,
+        axes: tuple[str, str],
+        domains: tuple[list[float], ...],
+        column: int,
     ) -> None:
         """The vertical axis of a panel, its title and its words."""
         (x, y), (width, domain) = axes, domains
@@ -132,7 +133,7 @@ class _Drawing:
                 "text": escaped(panel.title), "xref": f"{x} domain", "yref": f"{y} domain",
                 "x": 1 if at_right else 0, "y": 1, "xanchor": panel.title_side,
                 "yanchor": "bottom", "showarrow": False,
-                "font": {"size": size, "color": plotting.colour(panel.title_colour)},
+                "font": {"size": size, "color": colour_of(panel.title_colour)},
             })  # fmt: skip
 
     def _quieten(self, x: str, y: str, is_first: bool, is_last: bool) -> None:
@@ -153,22 +154,22 @@ class _Drawing:
             }  # fmt: skip
         return key.replace("yaxis", "y")
 
-    def _draw(self, mark: Mark, panel: Panel, x: str, y: str) -> None:
-        if isinstance(mark, Rule) and mark.hover:
-            ends = _extent(panel)
-            mark = Line(
-                x=ends, y=[mark.at] * 2, width=mark.width, dash=mark.dash, colour=mark.colour,
-                opacity=mark.opacity, name=mark.name, hover=mark.hover,
+    def _draw(self, mark: spec.Mark, panel: spec.Panel, x: str, y: str) -> None:
+        if isinstance(mark, spec.Rule) and mark.hover:
+            shown = [x for each in panel.marks if hasattr(each, "x") for x in each.x]
+            mark = spec.Line(
+                x=[min(shown), max(shown)], y=[mark.at] * 2, width=mark.width, dash=mark.dash,
+                colour=mark.colour, opacity=mark.opacity, name=mark.name, hover=mark.hover,
             )  # fmt: skip
-        if isinstance(mark, Rule | Span):
+        if isinstance(mark, spec.Rule | spec.Span):
             self._shape(mark, x, y)
             return
         axes = {"xaxis": x, "yaxis": self._overlay(y) if mark.in_shares else y}
-        colour = plotting.colour(mark.colour)
+        colour = colour_of(mark.colour)
         for trace in _TRACES[type(mark)](mark, colour):
             self.traces.append({**axes, **_told(mark), **self._legend(mark, trace), **trace})
 
-    def _legend(self, mark: Mark, trace: dict[str, Any]) -> dict[str, Any]:
+    def _legend(self, mark: spec.Mark, trace: dict[str, Any]) -> dict[str, Any]:
         if not mark.name:
             return {"showlegend": False}
         is_first = mark.name not in self.named and trace.get("showlegend", True)
@@ -177,48 +178,38 @@ class _Drawing:
         name = escaped(mark.name)
         return {"name": name, "legendgroup": name, "showlegend": is_first}
 
-    def _shape(self, mark: Rule | Span, x: str, y: str) -> None:
-        low, high = (mark.at, mark.at) if isinstance(mark, Rule) else (mark.low, mark.high)
+    def _shape(self, mark: spec.Rule | spec.Span, x: str, y: str) -> None:
+        low, high = (mark.at, mark.at) if isinstance(mark, spec.Rule) else (mark.low, mark.high)
         along, other = (x, y) if mark.axis == "x" else (y, x)
-        letter = mark.axis
-        opposite = "y" if letter == "x" else "x"
+        letter, opposite = mark.axis, "y" if mark.axis == "x" else "x"
         shape: dict[str, Any] = {
             f"{letter}ref": along, f"{opposite}ref": f"{other} domain", f"{letter}0": _one(low),
             f"{letter}1": _one(high), f"{opposite}0": 0, f"{opposite}1": 1, "layer": "below",
         }  # fmt: skip
-        colour = plotting.colour(mark.colour)
-        if isinstance(mark, Rule):
+        colour = colour_of(mark.colour)
+        if isinstance(mark, spec.Rule):
             line = {"color": colour, "width": _PX_A_POINT * mark.width, "dash": mark.dash}
             shape |= {"type": "line", "line": line, "opacity": mark.opacity}
             place = {"textposition": "start", "yanchor": "top"}
         else:
-            shape |= {"type": "rect", "fillcolor": plotting.colour(mark.colour, mark.opacity)}
+            shape |= {"type": "rect", "fillcolor": colour_of(mark.colour, mark.opacity)}
             shape["line"] = {"width": 0}
             place = {"textposition": f"top {mark.label_side}"}
         if mark.label:
-            lower = 0 if isinstance(mark, Rule) else mark.label_line
+            lower = 0 if isinstance(mark, spec.Rule) else mark.label_line
             shape["label"] = {
                 "text": "<br>" * lower + escaped(mark.label),
                 "font": {"color": colour, "size": 11},
                 **place,
             }
         if mark.name:
-            self._legend_of_shape(mark, shape)
+            shape |= {"name": mark.name, "legendgroup": mark.name}
+            shape["showlegend"] = mark.name not in self.named
+            self.named.add(mark.name)
         self.layout["shapes"].append(shape)
 
-    def _legend_of_shape(self, mark: Mark, shape: dict[str, Any]) -> None:
-        shape |= {"name": mark.name, "legendgroup": mark.name}
-        shape["showlegend"] = mark.name not in self.named
-        self.named.add(mark.name)
 
-
-def _extent(panel: Panel) -> list[Any]:
-    """From the first place to the last of what a panel shows: a level reaches as far."""
-    found = [x for mark in panel.marks if hasattr(mark, "x") for x in mark.x]
-    return [min(found), max(found)]
-
-
-def _heights(figure: Specification) -> list[list[float]]:
+def _heights(figure: spec.Specification) -> list[list[float]]:
     """From the uppermost row to the lowest: where each begins and ends."""
     rows = figure.rows
     if figure.is_grid:
@@ -232,7 +223,7 @@ def _heights(figure: Specification) -> list[list[float]]:
     return [[max(0.0, 1 - high), 1 - low] for low, high in found]
 
 
-def _begins_left(row: Sequence[Panel]) -> bool:
+def _begins_left(row: Sequence[spec.Panel]) -> bool:
     """Whether a title stands where the legend begins."""
     return any(panel.title and panel.title_side == "left" for panel in row)
 
@@ -246,16 +237,12 @@ def _shares(sizes: Sequence[float], gaps: Sequence[float]) -> list[list[float]]:
     return found
 
 
-def _axis(letter: str, number: int) -> str:
-    return letter if number == 1 else f"{letter}{number}"
-
-
 def _key(axis: str) -> str:
     """`yaxis2` of `y2`: how the layout names what a trace names."""
     return f"{axis[0]}axis{axis[1:]}"
 
 
-def _axis_of(axis: Axis) -> dict[str, Any]:
+def _axis_of(axis: spec.Axis) -> dict[str, Any]:
     found: dict[str, Any] = {"title": {"text": axis.label.replace("\n", "<br>")}}
     if axis.scale != "linear":
         found["type"] = axis.scale
@@ -275,7 +262,7 @@ def _axis_of(axis: Axis) -> dict[str, Any]:
     return found
 
 
-def _told(mark: Mark) -> dict[str, Any]:
+def _told(mark: spec.Mark) -> dict[str, Any]:
     if not mark.hover and not len(mark.texts):
         return {"hoverinfo": "skip"}
     told = {"hovertemplate": (mark.hover or "%{text}") + "<extra></extra>"}
@@ -284,7 +271,7 @@ def _told(mark: Mark) -> dict[str, Any]:
     return told
 
 
-def _line(mark: Line, colour: str) -> list[dict[str, Any]]:
+def _line(mark: spec.Line, colour: str) -> list[dict[str, Any]]:
     line = {"color": colour, "width": _PX_A_POINT * mark.width, "dash": mark.dash}
     return [
         {
@@ -294,7 +281,7 @@ def _line(mark: Line, colour: str) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _points(mark: Points, colour: str) -> list[dict[str, Any]]:
+def _points(mark: spec.Points, colour: str) -> list[dict[str, Any]]:
     symbol = _SYMBOLS[mark.symbol]
     is_open = not mark.filled or symbol in ("x-thin", "line-ns")
     trace: dict[str, Any] = {
@@ -310,7 +297,7 @@ def _points(mark: Points, colour: str) -> list[dict[str, Any]]:
         trace["error_y"] = {
             "type": "data", "symmetric": False, "array": numbers(np.asarray(mark.high) - y),
             "arrayminus": numbers(y - np.asarray(mark.low)), "thickness": 1.5,
-            "width": 2 if mark.caps else 0, "color": plotting.colour(mark.colour, 0.8),
+            "width": 2 if mark.caps else 0, "color": colour_of(mark.colour, 0.8),
         }  # fmt: skip
     if not len(mark.labels):
         return [trace]
@@ -325,38 +312,47 @@ def _points(mark: Points, colour: str) -> list[dict[str, Any]]:
     return [trace]
 
 
-def _band(mark: Band, colour: str) -> list[dict[str, Any]]:
+def _band(mark: spec.Band, colour: str) -> list[dict[str, Any]]:
     edge = {"type": "scatter", "mode": "lines", "x": numbers(mark.x), "line": {"width": 0}}
-    fill = {"fill": "tonexty", "fillcolor": plotting.colour(mark.colour, mark.opacity)}
+    fill = {"fill": "tonexty", "fillcolor": colour_of(mark.colour, mark.opacity)}
     return [
         {**edge, "y": numbers(mark.low), "showlegend": False},
         {**edge, "y": numbers(mark.high), **fill},
     ]
 
 
-def _bars(mark: Bars, colour: str) -> list[dict[str, Any]]:
+def _bars(mark: spec.Bars, colour: str) -> list[dict[str, Any]]:
     x, y = numbers(mark.x), numbers(mark.y)
     return [
         {
             "type": "bar", "orientation": "h" if mark.lying else "v", "base": numbers(mark.base),
             "x": y if mark.lying else x, "y": x if mark.lying else y, "width": mark.width,
-            "marker": {"color": plotting.colour(mark.colour, mark.opacity), "line": {"width": 0}},
+            "marker": {"color": colour_of(mark.colour, mark.opacity), "line": {"width": 0}},
             "textposition": "auto" if len(mark.labels) else "none", "textangle": 0,
             "cliponaxis": False, **({"text": list(mark.labels)} if len(mark.labels) else {}),
         }
     ]  # fmt: skip
 
 
-def _heat(mark: Heat, colour: str) -> list[dict[str, Any]]:
+def _heat(mark: spec.Heat, colour: str) -> list[dict[str, Any]]:
     z = [numbers(row) for row in np.asarray(mark.z, float)]
-    shades = [[0, plotting.colour(mark.colour, 0.0)], [1, colour]]
+    shades = [[0, colour_of(mark.colour, 0.0)], [1, colour]]
     place = {"x": numbers(mark.x), "y": numbers(mark.y), "z": z}
     return [{"type": "heatmap", **place, "colorscale": shades, "showscale": False}]
 
 
-_TRACES: dict[type[Mark], Any] = {
-    Line: _line, Points: _points, Band: _band, Bars: _bars, Heat: _heat
+_TRACES: dict[type[spec.Mark], Any] = {
+    spec.Line: _line, spec.Points: _points, spec.Band: _band, spec.Bars: _bars, spec.Heat: _heat
 }  # fmt: skip
+
+
+def colour_of(name: str, opacity: float = 1.0) -> str:
+    """A colour of the palette (`blue`, `orange`, ..., `ink`), as plotly takes it."""
+    code = PALETTE[name]
+    if opacity >= 1:
+        return code
+    red, green, blue = (int(code[at : at + 2], 16) for at in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity:g})"
 
 
 def escaped(text: str) -> str:

@@ -11,9 +11,8 @@ from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import RedirectResponse
-from starlette.concurrency import run_in_threadpool
 
 from shm.bridge import Hook
 from shm.errors import BadInput
@@ -24,19 +23,27 @@ from shm.report.hanger_status import HangerMessage
 from shm.store import AlertRow, DeliveryRow, DeliveryState, News, Silence
 from shm.store.stored_alerts import said_of, silenced_until
 from shm.values.messages import Lead
-from shm_daemon.web.access import AtSite, Reader, Visitor, Writer
+from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import test_page
 from shm_daemon.web.faults import answers
-from shm_daemon.web.forms import form_of, reason_in, time_in
+from shm_daemon.web.forms import Form, reason_in, time_in
 from shm_daemon.web.frame import page
-from shm_daemon.web.models import LARGEST_NUMBER, MOST_ROWS, Acknowledge, Alerts, AlertState
+from shm_daemon.web.models import (
+    LARGEST_NUMBER,
+    MOST_ROWS,
+    Acknowledge,
+    Alerts,
+    AlertState,
+    Before,
+    Row,
+    paged,
+)
 from shm_daemon.web.site import Site
 
 router = APIRouter(tags=["alerts"])
 
 _SHOWN = 50  # technical: alerts on a page, which links to older ones
 _MARKS = {"delivered": "steady", "waiting": "watch", "given up": "alert", "not needed": "steady"}
-Number = Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)]
 
 
 @router.get("/alerts", include_in_schema=False)
@@ -44,9 +51,9 @@ def alerts_page(
     request: Request,
     site: AtSite,
     _: Reader,
-    hanger: Number = None,
-    open_before: Number = None,
-    noted_before: Number = None,
+    hanger: Before = None,
+    open_before: Before = None,
+    noted_before: Before = None,
 ) -> Response:
     """Alerts of all hangers or of one, the newest first.
 
@@ -84,9 +91,8 @@ def _some(
 ) -> tuple[list[dict[str, Any]], int | None]:
     """Alerts as the page shows them, and the number to go on after, if there are more."""
     rows = site.store.alerts.list_rows(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
-    shown = rows[:_SHOWN]
+    shown, older = paged(rows, _SHOWN)
     documents, now = alert_documents(shown, site), _messages(shown, site)
-    older = shown[-1].id if len(rows) > _SHOWN else None
     return [
         {
             **document,
@@ -132,15 +138,12 @@ def _stream_of(alert: AlertRow, site: Site) -> str | None:
 
 
 @router.get(
-    "/api/alerts",
-    response_model=Alerts,
-    responses=answers(400, 401, 403, 422, 503),
-    summary="Alerts that were raised",
+    "/api/alerts", response_model=Alerts, responses=answers(422), summary="Alerts that were raised"
 )
 def alerts(
     site: AtSite,
     _: Reader,
-    hanger: Number = None,
+    hanger: Before = None,
     open: Annotated[
         bool, Query(description="Only those that stand and that nobody has acknowledged.")
     ] = False,
@@ -164,24 +167,17 @@ def alerts(
         found = site.store.alerts.list_rows(hanger, is_open=is_open)[::-1]
         return {"alerts": alert_documents(found, site), "next_before": None}
     rows = site.store.alerts.list_rows(hanger, is_open=is_open, limit=limit + 1, before=before)
-    return {
-        "alerts": alert_documents(rows[:limit], site),
-        "next_before": rows[limit - 1].id if len(rows) > limit else None,
-    }
+    shown, older = paged(rows, limit)
+    return {"alerts": alert_documents(shown, site), "next_before": older}
 
 
 @router.post(
     "/api/alerts/{alert_id}/acknowledgement",
     response_model=AlertState,
-    responses=answers(400, 401, 403, 404, 409, 422, 503),
+    responses=answers(404, 409, 422),
     summary="Take note of an alert",
 )
-def acknowledge(
-    site: AtSite,
-    writer: Writer,
-    alert_id: Annotated[int, Path(ge=0, le=LARGEST_NUMBER)],
-    told: Acknowledge,
-) -> Any:
+def acknowledge(site: AtSite, writer: Writer, alert_id: Row, told: Acknowledge) -> Any:
     """Notes on the record that somebody has seen an alert, or with `resolved` to its end."""
     named = told.who is not None and not writer.is_person  # who signed in has a name
     who = f"{told.who} (token {writer.name})" if named else writer.name
@@ -230,41 +226,25 @@ def _delivery(row: DeliveryRow, hook: Hook | None, message: str, now: datetime) 
     return {**vars(row), **state}
 
 
-silence_router = APIRouter(prefix="/silences", include_in_schema=False)
-
-_ALL = "all"
-_SHOWN_AT = "/alerts#silences"
-
-
-@silence_router.post("")
-async def make(request: Request, site: AtSite, writer: Writer) -> Response:
+@router.post("/silences", include_in_schema=False)
+def silence(site: AtSite, writer: Writer, told: Form) -> Response:
     """Holds the messages of hooks back for a while."""
-    await run_in_threadpool(_make, site, writer, await form_of(request))
-    return RedirectResponse(_SHOWN_AT, 303)
-
-
-@silence_router.post("/{number}/end")
-def end(
-    site: AtSite, writer: Writer, number: Annotated[int, Path(ge=0, le=LARGEST_NUMBER)]
-) -> Response:
-    """Ends one before its time."""
-    store = site.store.acting_as(writer.actor)
-    store.silences.end(number, writer.actor.name, utc_now())
-    return RedirectResponse(_SHOWN_AT, 303)
-
-
-def _make(site: Site, writer: Visitor, told: dict[str, str]) -> None:
     now, number, why = utc_now(), told.get("hanger", ""), reason_in(told, "a silence")
     since, until = time_in(told, "from") or now, time_in(told, "until")
-    if until is None or not (number == _ALL or number.isdecimal()):
+    if until is None or not (number == "all" or number.isdecimal()):
         raise BadInput("a silence has hangers and an end.", remedy="Choose them in the form.")
-    hanger = None if number == _ALL else int(number)
+    hanger = None if number == "all" else int(number)
     if hanger is not None:
         site.workspace.bridge.tested(hanger)
     who = writer.actor
     site.store.acting_as(who).silences.make(
         hanger, (since, until), who.name, why, now, is_maintenance="maintenance" in told
     )
+    return RedirectResponse("/alerts#silences", 303)
 
 
-router.include_router(silence_router)
+@router.post("/silences/{number}/end", include_in_schema=False)
+def end_silence(site: AtSite, writer: Writer, number: Row) -> Response:
+    """Ends one before its time."""
+    site.store.acting_as(writer.actor).silences.end(number, writer.actor.name, utc_now())
+    return RedirectResponse("/alerts#silences", 303)

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
-from starlette.concurrency import run_in_threadpool
 
 from shm.errors import BadInput, NothingThere, ShmError
 from shm.pipeline import utc_now
@@ -21,9 +20,10 @@ from shm.store.audit import Actor
 from shm.watch.repair_check import EVENT_KINDS
 from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
-from shm_daemon.web.forms import form_of, reason_in, time_in
+from shm_daemon.web.forms import Form, reason_in, time_in
 from shm_daemon.web.frame import page
-from shm_daemon.web.hangers import Number, described
+from shm_daemon.web.models import HangerNumber
+from shm_daemon.web.site import described
 
 router = APIRouter(prefix="/hangers/{hanger_id}/baseline", include_in_schema=False)
 
@@ -37,7 +37,6 @@ class Told:
 
     warning: str
     sentences: tuple[str, ...]
-    size_bytes: int = 1000
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ Ordered = OrderedDict[str, SetBaseline | Told | ShmError]
 
 @router.get("")
 def baseline_page(
-    request: Request, site: AtSite, _: Engineer, hanger_id: Number, order: str = ""
+    request: Request, site: AtSite, _: Engineer, hanger_id: HangerNumber, order: str = ""
 ) -> HTMLResponse:
     """What the hanger is compared with, and the form for another; what comes of an order."""
     one = described(site.workspace, hanger_id)
@@ -82,11 +81,11 @@ def baseline_page(
 
 
 @router.post("")
-async def order_baseline(
-    request: Request, site: AtSite, engineer: Engineer, hanger_id: Number
+def order_baseline(
+    request: Request, site: AtSite, engineer: Engineer, hanger_id: HangerNumber, told: Form
 ) -> Response:
     """Has it made beside the interface."""
-    told, one = await form_of(request), described(site.workspace, hanger_id)
+    one = described(site.workspace, hanger_id)
     since, why, kind = time_in(told, "since"), reason_in(told, "a baseline"), told.get("kind", "")
     if since is None:
         raise BadInput("a baseline has a first day.", remedy="Choose it in the form.")
@@ -95,7 +94,7 @@ async def order_baseline(
     order = Order(since, why, engineer.actor.name, EVENT_KINDS[kind] if kind else None)
     wanted = SetBaseline(site.workspace.folder, one.id, order, engineer.actor, utc_now())
     word = secrets.token_urlsafe(9)
-    await run_in_threadpool(background_worker_of(request).wanted, wanted)
+    background_worker_of(request).wanted(wanted)
     ordered: Ordered = request.app.state.ordered_baselines
     ordered[word] = wanted
     while len(ordered) > _MOST_REMEMBERED:
@@ -104,7 +103,7 @@ async def order_baseline(
 
 
 @router.get("/outcome")
-def outcome(request: Request, _: Engineer, hanger_id: Number, order: str) -> Response:
+def outcome(request: Request, _: Engineer, hanger_id: HangerNumber, order: str) -> Response:
     """What came of an order, without the frame; 202 while it is being made."""
     ordered: Ordered = request.app.state.ordered_baselines
     found = ordered.get(order)

@@ -1,53 +1,57 @@
-"""The page of the bridge: its elevation, what moved over it, and all hangers in a table.
-
-The elevation of the bridge: where its deck, arch and hangers are drawn, and what marks them.
-
-A class of shift has a colour and, for whoever cannot tell colours, a number of triangles: down for
-lost, up for gained. Lengths are in drawing units; upwards is less y.
+"""The page of the bridge: its elevation, what moved over it, and all hangers in a table; and the
+page of all bridges: this one and those of `[[other_bridge]]`, the worst first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from datetime import datetime
-from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse
+from pydantic import BaseModel, Field
 
 from shm.pipeline import utc_now
 from shm.report import formatting
 from shm.report.contents import hangers_unit
-from shm.report.formatting import Interval
-from shm.values.messages import TODAY, WEEK
-from shm.values.rounding import ForceUnit, rounded_percent
+from shm.values.messages import TODAY, WEEK, Lead, Urgency
+from shm.values.rounding import ForceUnit
 from shm_daemon.heartbeat import told
 from shm_daemon.web.access import AtSite, Reader
-from shm_daemon.web.address import test_page
+from shm_daemon.web.address import SUMMARY, test_page
 from shm_daemon.web.background_work import RETRY_AFTER
+from shm_daemon.web.bridge_summary import (
+    BridgeRow,
+    Summary,
+    groups,
+    headline,
+    own_row,
+    row_document,
+    summary_of,
+    worst_first,
+)
 from shm_daemon.web.bridge_view import (
+    CLASSES,
     QUICKLY_COMPARED,
     BridgeGlance,
     HangerGlance,
     compared,
+    elevation,
     glance,
+    shift_words,
+    triangles,
 )
-from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import BridgeState, Moved, Underway
-from shm_daemon.web.site import held_documents
+from shm_daemon.web.other_bridges import OtherBridges
+from shm_daemon.web.site import Site, held_documents
 
 router = APIRouter(tags=["state"])
 
-_WHEN = {
-    "none": "",
-    "next_test": "next test",
-    "week": WEEK,
-    "today": TODAY,
-}  # of an action, in words
+_WHEN = {"none": "", "next_test": "next test", "week": WEEK, "today": TODAY}
+"""Of an action, in words."""
 _COMPARING = "The hangers are being compared …"
 
 
@@ -87,12 +91,7 @@ def moved_fragment(request: Request, site: AtSite, _: Reader) -> Response:
     return page(request, "moved.html.j2", moved=found.sentence)
 
 
-@router.get(
-    "/api/bridge",
-    response_model=BridgeState,
-    responses=answers(400, 401, 403, 503),
-    summary="The whole bridge at a glance",
-)
+@router.get("/api/bridge", response_model=BridgeState, summary="The whole bridge at a glance")
 def bridge(site: AtSite, _: Reader) -> Any:
     """Each hanger's tension, against its baseline too."""
     found = glance(site, utc_now())
@@ -106,7 +105,7 @@ def bridge(site: AtSite, _: Reader) -> Any:
 @router.get(
     "/api/bridge/moved",
     response_model=Moved,
-    responses={202: {"model": Underway}, **answers(400, 401, 403, 503)},
+    responses={202: {"model": Underway}},
     summary="What moved over the bridge",
 )
 def moved(request: Request, site: AtSite, _: Reader) -> Any:
@@ -145,14 +144,14 @@ def _facts(bridge: BridgeGlance, now: datetime) -> list[tuple[str, str, str]]:
 def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
     """A hanger's row of the table."""
     line, hanger = each.line, each.hanger
-    tension, latest = line.tension_n, line.latest
+    latest, (tension, nominal, shift) = line.latest, each.cells(unit)
     return {
         "id": hanger.id,
         "name": formatting.hanger_name(hanger.id, hanger.name),
         "status": line.status,
-        "tension": _in(unit, tension) if tension else "no test yet",
-        "nominal": formatting.mean(line.of_nominal) if line.of_nominal else "",
-        "shift": _shift(each),
+        "tension": tension,
+        "nominal": nominal,
+        "shift": shift or (shift_words(each) if latest else ""),
         "message": line.message,
         "when": _WHEN[line.message.urgency],
         "open_alerts": line.open_alerts,
@@ -162,16 +161,6 @@ def _row(each: HangerGlance, unit: ForceUnit, now: datetime) -> dict[str, Any]:
         "is_quiet": each.is_quiet,
         "tests": each.tests,
     }
-
-
-def _in(unit: ForceUnit, tension: Interval) -> str:
-    return formatting.with_half(tension, unit).removesuffix(f" {unit.name}")
-
-
-def _shift(each: HangerGlance) -> str:
-    if each.shift is None:
-        return shift_words(each) if each.line.latest else ""
-    return rounded_percent(each.shift.mean, each.shift.width / 2, "+").removesuffix(" %")
 
 
 def _glance_document(each: HangerGlance) -> dict[str, Any]:
@@ -186,8 +175,8 @@ def _glance_document(each: HangerGlance) -> dict[str, Any]:
         "latest_test": line.test or None,
         "latest_test_at": line.latest,
         "model": line.model or None,
-        "tension_n": _interval(line.tension_n),
-        "shift": _interval(each.shift),
+        "tension_n": line.tension_n and asdict(line.tension_n),
+        "shift": each.shift and asdict(each.shift),
         "called": line.called,
         "open_alerts": line.open_alerts,
         "warnings": list(line.warnings),
@@ -198,177 +187,74 @@ def _underway() -> JSONResponse:
     return JSONResponse({"message": _COMPARING}, 202, RETRY_AFTER)
 
 
-def _interval(interval: Interval | None) -> dict[str, float] | None:
-    return asdict(interval) if interval else None
+class BridgeInList(BaseModel):
+    """A bridge, and what it said of itself when it could be asked last."""
+
+    name: str
+    address: str
+    states: list[str] = Field(description="In a word or two; empty before the first test.")
+    urgency: Urgency = Field(description="`today` too where nobody watches it.")
+    trouble: Lead | None = Field(description="Why it cannot be asked now; null where it was.")
+    told_at: datetime | None
+    summary: Summary | None = Field(description="Null where it could never be asked.")
 
 
-CLASSES = (
-    ("lost3", "lost more than 6 %"),
-    ("lost2", "lost 3 to 6 %"),
-    ("lost1", "lost 1 to 3 %"),
-    ("same", "within 1 %"),
-    ("gained1", "gained 1 to 3 %"),
-    ("gained2", "gained 3 to 6 %"),
-    ("gained3", "gained more than 6 %"),
-    ("unknown", "not known: no test since a baseline"),
+class Bridges(BaseModel):
+    """This bridge and the others, the worst first."""
+
+    headline: str
+    bridges: list[BridgeInList]
+
+
+@router.get("/bridges", include_in_schema=False)
+def bridges_page(request: Request, site: AtSite, _: Reader) -> Response:
+    """How all bridges are, and the way to each."""
+    now, rows = utc_now(), _bridges(request, site)
+    return page(
+        request,
+        "bridges.html.j2",
+        groups=groups(rows),
+        rows=[(each, _words_of(each, now)) for each in rows],
+    )
+
+
+@router.get(
+    "/api/bridges", response_model=Bridges, summary="This bridge and the others that it knows"
 )
-"""The classes of shift from the baseline, each with its words."""
-# Judgement: 1 % is what one test tells by, and each class is about twice the one before.
-_LIMITS = (0.01, 0.03, 0.06)
-
-# Judgement: drawing units, of which a laptop's page has about 1100. Hangers are so far apart that
-# their numbers (every second, fifth ... where 30 units are too few) can be read.
-_MOST_STEP, _LEAST_STEP, _WIDEST = 34.0, 9.0, 1100.0
-_TALLEST, _TOP, _BELOW, _BESIDE = 220.0, 48.0, 60.0, 36.0
-_BETWEEN_NUMBERS = 30.0
-_TRIANGLE = 10.0
+def bridges(request: Request, site: AtSite, _: Reader) -> Any:
+    """As `shm bridges --json` has them; what others said is at most some seconds old."""
+    rows = _bridges(request, site)
+    return {"headline": headline(rows), "bridges": [row_document(each) for each in rows]}
 
 
-@dataclass(frozen=True)
-class Triangle:
-    """A mark over a hanger; hollow where the shift may as well be none."""
-
-    points: str
-    hollow: bool
+@router.get(SUMMARY, response_model=Summary, summary="This bridge in a line")
+def summary(site: AtSite, _: Reader) -> Summary:
+    """What its home page says first; it does not ask other bridges."""
+    return summary_of(site, utc_now())
 
 
-@dataclass(frozen=True)
-class HangerMark:
-    """A hanger as it is drawn, and what is said of it."""
-
-    id: int
-    x: float
-    top: float
-    kind: str
-    words: str
-    triangles: tuple[Triangle, ...]
-    number: bool
-    open_alerts: int
-    is_quiet: bool
+def _bridges(request: Request, site: Site) -> tuple[BridgeRow, ...]:
+    asked: OtherBridges = request.app.state.other_bridges
+    bridge = site.workspace.bridge
+    others = asked.rows(bridge.other_bridges, site.workspace.folder)
+    return worst_first((*own_row(site, utc_now()), *others))
 
 
-@dataclass(frozen=True)
-class Elevation:
-    """The drawing; `deck` is the deck's height, `step` a hanger's room, `bar` its width."""
-
-    width: float
-    height: float
-    deck: float
-    step: float
-    bar: float
-    arch: str
-    hangers: tuple[HangerMark, ...]
-
-
-def elevation(hangers: Sequence[HangerGlance]) -> Elevation:
-    """The hangers evenly spaced in their order, as long as they are, the arch over them."""
-    step = min(_MOST_STEP, max(_LEAST_STEP, (_WIDEST - 2 * _BESIDE) / (len(hangers) + 1)))
-    longest = max(each.hanger.length_m for each in hangers)
-    deck = _TOP + _TALLEST
-    tops = [deck - _TALLEST * each.hanger.length_m / longest for each in hangers]
-    places = [_BESIDE + step * (index + 1) for index in range(len(hangers))]
-    numbered = _numbered(hangers, places)
-    marks = tuple(
-        _mark(each, x, top, index in numbered)
-        for index, (each, x, top) in enumerate(zip(hangers, places, tops, strict=True))
+def _words_of(row: BridgeRow, now: datetime) -> str:
+    """What is told small below a bridge's words."""
+    found = row.summary
+    if found is None or row.told_at is None:
+        return ""
+    latest = f"last test {told(now - found.latest_test_at)} ago" if found.latest_test_at else ""
+    parts = (
+        found.bridge if found.bridge != row.name else "",
+        formatting.counted(found.hangers, "hanger"),
+        latest or "no test yet",
+        formatting.counted(found.open_alerts, "open alert")
+        if found.open_alerts
+        else "no open alert",
+        f"{formatting.counted(found.held, 'recording')} held until you decide"
+        if found.held
+        else "",
     )
-    width = 2 * _BESIDE + step * (len(hangers) + 1)
-    ends = [(_BESIDE, deck), *zip(places, tops, strict=True), (width - _BESIDE, deck)]
-    return Elevation(width, deck + _BELOW, deck, step, round(step / 4, 1), _curve(ends), marks)
-
-
-def kind_of(glance: HangerGlance) -> str:
-    """The class of a hanger's shift; a test that is of the baseline itself says nothing of one."""
-    shift = glance.shift
-    if shift is None:
-        return "unknown"
-    size = sum(abs(shift.mean) >= limit for limit in _LIMITS)
-    if size == 0:
-        return "same"
-    return f"{'lost' if shift.mean < 0 else 'gained'}{size}"
-
-
-def shift_words(glance: HangerGlance) -> str:
-    """The shift from the baseline as people say it."""
-    if glance.is_baseline:
-        return "is the baseline"
-    if glance.shift is None:
-        return "no baseline yet" if glance.line.tension_n else "no test yet"
-    shift = glance.shift
-    return f"{rounded_percent(shift.mean, shift.width / 2, '+')} since the baseline"
-
-
-def triangles(kind: str, x: float, base: float, hollow: bool = False) -> tuple[Triangle, ...]:
-    """As many as the class says, one over the other from `base` up."""
-    if kind in ("same", "unknown"):
-        return ()
-    count, down, half = int(kind[-1]), kind.startswith("lost"), _TRIANGLE / 2
-    found = []
-    for index in range(count):
-        low = base - index * (_TRIANGLE + 1)
-        flat, tip = (low - _TRIANGLE + 2, low) if down else (low, low - _TRIANGLE + 2)
-        points = f"{x - half:.1f},{flat:.1f} {x + half:.1f},{flat:.1f} {x:.1f},{tip:.1f}"
-        found.append(Triangle(points, hollow))
-    return tuple(found)
-
-
-def _mark(glance: HangerGlance, x: float, top: float, number: bool) -> HangerMark:
-    kind, shift = kind_of(glance), glance.shift
-    hollow = shift is not None and shift.low < 0 < shift.high
-    return HangerMark(
-        id=glance.hanger.id,
-        x=round(x, 1),
-        top=round(top, 1),
-        kind=kind,
-        words=_words(glance),
-        triangles=triangles(kind, x, top - 8, hollow),
-        number=number,
-        open_alerts=glance.line.open_alerts,
-        is_quiet=glance.is_quiet,
-    )
-
-
-def _words(glance: HangerGlance) -> str:
-    parts = [formatting.hanger_name(glance.hanger.id, glance.hanger.name), shift_words(glance)]
-    if glance.line.latest:
-        parts.append(f"last test {glance.line.latest:%Y-%m-%d}")
-    if glance.line.open_alerts:
-        parts.append(formatting.counted(glance.line.open_alerts, "open alert"))
-    return ", ".join(parts)
-
-
-def _numbered(hangers: Sequence[HangerGlance], places: Sequence[float]) -> set[int]:
-    """Which have room for their number: those with an alert, then those that moved, go before."""
-
-    def urgency(index: int) -> tuple[bool, float]:
-        glance = hangers[index]
-        moved = abs(glance.shift.mean) if glance.shift and kind_of(glance)[-1] in "23" else 0.0
-        return glance.line.open_alerts == 0, -moved
-
-    chosen: set[int] = set()
-    for index in sorted(range(len(hangers)), key=urgency):
-        if all(abs(places[index] - places[each]) >= _BETWEEN_NUMBERS for each in chosen):
-            chosen.add(index)
-    return chosen
-
-
-def _curve(points: Sequence[tuple[float, float]]) -> str:
-    """A path through all points, evenly spaced, round where they bend and with no hump that they
-    have not: a monotone cubic, as Bezier pieces.
-    """
-    slopes = _slopes([y for _, y in points])
-    path = f"M{points[0][0]:.1f} {points[0][1]:.1f}"
-    for (begin, end), (first, last) in zip(pairwise(points), pairwise(slopes), strict=True):
-        third = (end[0] - begin[0]) / 3
-        path += f"C{begin[0] + third:.1f} {begin[1] + first / 3:.1f}"
-        path += f" {end[0] - third:.1f} {end[1] - last / 3:.1f} {end[0]:.1f} {end[1]:.1f}"
-    return path
-
-
-def _slopes(heights: Sequence[float]) -> list[float]:
-    """The rise from point to point at each of three or more (Fritsch and Butland, 1984): flat at a
-    summit, and nowhere so steep as to overshoot.
-    """
-    rises = [after - before for before, after in pairwise(heights)]
-    inner = [2 * a * b / (a + b) if a * b > 0 else 0.0 for a, b in pairwise(rises)]
-    return [(3 * rises[0] - inner[0]) / 2, *inner, (3 * rises[-1] - inner[-1]) / 2]
+    return " · ".join(filter(None, parts))

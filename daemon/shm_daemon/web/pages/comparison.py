@@ -20,17 +20,13 @@ from shm.report.figures.compared_hangers import MOST, Course, alt, caption, spec
 from shm.report.formatting import Interval
 from shm.report.paper import Table
 from shm.values import Hanger
-from shm.values.rounding import rounded_percent
 from shm_daemon.web import with_plotly
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.bridge_view import HangerGlance
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
-from shm_daemon.web.hanger_numbers import FigureDocument
-from shm_daemon.web.hangers import described
-from shm_daemon.web.models import LARGEST_NUMBER
-from shm_daemon.web.plotting import answer
-from shm_daemon.web.site import Site
+from shm_daemon.web.models import LARGEST_NUMBER, FigureDocument
+from shm_daemon.web.site import Site, described
 
 router = APIRouter(tags=["hangers"])
 
@@ -53,8 +49,10 @@ def compare_page(
     every, day = site.workspace.bridge.hangers, _day(since)
     chosen = _chosen(site, hanger) if hanger else []
     rows = hanger_lines(site.workspace, site.store, utc_now(), chosen)
-    if not chosen:
-        rows = _likely(rows)
+    if not chosen:  # the hanger that is worst off, between its neighbours
+        first = next((i for i, each in enumerate(rows) if each.message.urgency == "today"), 0)
+        start = max(0, min(first - 1, len(rows) - 3))
+        rows = rows[start : start + 3]
         chosen = [each.hanger for each in rows]
     asked = [("hanger", each.id) for each in chosen] + ([("since", day)] if day else [])
     return page(
@@ -74,7 +72,7 @@ def compare_page(
 @router.get(
     "/api/compare/figure",
     response_model=FigureDocument,
-    responses=answers(400, 401, 403, 404, 422, 503),
+    responses=answers(404, 422),
     summary="Hangers on one time axis",
 )
 def compare_figure(
@@ -87,8 +85,7 @@ def compare_figure(
             "none of these hangers was tested since a baseline of its own.",
             remedy="Choose others, or an earlier day.",
         )
-    words = {"caption": caption(courses), "alt": alt(courses)}
-    return answer({**with_plotly.document(specify(courses)), **words})
+    return JSONResponse(with_plotly.with_words(specify(courses), caption(courses), alt(courses)))
 
 
 def _chosen(site: Site, numbers: Sequence[int]) -> list[Hanger]:
@@ -100,13 +97,6 @@ def _chosen(site: Site, numbers: Sequence[int]) -> list[Hanger]:
         )
     wanted = {described(site.workspace, each).id for each in numbers}
     return [each for each in site.workspace.bridge.hangers if each.id in wanted]
-
-
-def _likely(lines: tuple[HangerLine, ...]) -> tuple[HangerLine, ...]:
-    """Where nobody has chosen: the hanger that is worst off, between its neighbours."""
-    first = next((i for i, each in enumerate(lines) if each.message.urgency == "today"), 0)
-    start = max(0, min(first - 1, len(lines) - 3))
-    return lines[start : start + 3]
 
 
 def _is_there(rows: Sequence[HangerLine], since: Day | None) -> bool:
@@ -161,18 +151,10 @@ def _table(lines: Sequence[HangerLine]) -> Table:
             (
                 formatting.hanger_name(line.hanger.id, line.hanger.name),
                 line.status.value if line.status else "",
-                formatting.with_half(line.tension_n, unit).removesuffix(f" {unit.name}")
-                if line.tension_n else "no test yet",
-                formatting.mean(line.of_nominal) if line.of_nominal else "",
-                _shift(line),
+                *HangerGlance(line).cells(unit),
                 f"{line.hanger.length_m:g} m",
                 f"{line.latest:%Y-%m-%d}" if line.latest else "",
             )
             for line in lines
         ),
     )  # fmt: skip
-
-
-def _shift(line: HangerLine) -> str:
-    shift = HangerGlance(line).shift
-    return rounded_percent(shift.mean, shift.width / 2, "+").removesuffix(" %") if shift else ""

@@ -1,34 +1,43 @@
-"""The page of one hanger: how it stands, how it went, what the model misses, its tests."""
+"""The page of one hanger: how it stands, how it went, what the model misses, its tests; its report
+as a file, and its results as a table.
+"""
 
 from __future__ import annotations
 
+import csv
+import io
+import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Any, Literal
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Request, Response
 from fastapi.responses import HTMLResponse
 
+from shm.errors import NothingThere
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.reporting import hanger_report
 from shm.report import formatting, hanger_tables
 from shm.report.contents import HangerReport, message
 from shm.report.diagnosis_report import answers, evidence
-from shm.report.hanger_report import facts, gap_part
+from shm.report.hanger_report import facts, gap_part, hanger_paper
 from shm.report.hanger_summary import details
 from shm.report.paper import Table
 from shm.report.states import called_words, temperature_table
-from shm.store import EventKind, Workspace
+from shm.store import EventKind, Store, TrendPoint, Workspace
 from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Reader
-from shm_daemon.web.background_work import background_worker_of
+from shm_daemon.web.background_work import RETRY_AFTER, BackgroundWorker, background_worker_of
+from shm_daemon.web.faults import Refused
 from shm_daemon.web.frame import page
 from shm_daemon.web.hanger_figures import FIGURES, HangerFigure
-from shm_daemon.web.hanger_numbers import headings, lines_before
-from shm_daemon.web.hanger_view import HangerView
-from shm_daemon.web.hangers import Number, described
-from shm_daemon.web.models import LARGEST_NUMBER
-from shm_daemon.web.site import held_documents
+from shm_daemon.web.hanger_view import HangerView, View
+from shm_daemon.web.hangers import headings, lines_before
+from shm_daemon.web.models import Before, HangerNumber, paged
+from shm_daemon.web.site import described, held_documents
 
 router = APIRouter(include_in_schema=False)
 
@@ -49,6 +58,16 @@ _TABLES = (
     hanger_tables.models,
     hanger_tables.quality,
 )
+_TYPES = {"pdf": "application/pdf", "html": "text/html; charset=utf-8"}
+# Judgement: a report takes 5 to 15 s; a browser's user waits for a minute, hardly longer.
+_LONGEST_S = 60.0
+_LOOK_S = 0.2
+_FRESH_S = 60
+"""A report is kept for so long: acknowledgements and notes change it without a new test."""
+_COLUMNS = (
+    "test", "time_utc", "temperature_c", "model", "tension_n", "tension_q05_n", "tension_q95_n",
+    "repeatability_sd_n",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -63,11 +82,9 @@ class Chart:
 
 
 @router.get("/hangers/{hanger_id}")
-def hanger(request: Request, site: AtSite, _: Reader, hanger_id: Number) -> HTMLResponse:
+def hanger(request: Request, site: AtSite, _: Reader, view: View) -> HTMLResponse:
     """Everything known of a hanger; its figures are fetched as they come into view."""
-    one = described(site.workspace, hanger_id)
-    view = HangerView(site.workspace, site.store, one, background_worker_of(request))
-    rows = lines_before(view, _LATEST_TESTS + 1)
+    one, rows = view.hanger, lines_before(view, _LATEST_TESTS + 1)
     common: dict[str, Any] = {
         "name": formatting.hanger_name(one.id, one.name),
         "hanger": one,
@@ -85,32 +102,28 @@ def hanger(request: Request, site: AtSite, _: Reader, hanger_id: Number) -> HTML
 
 
 @router.get("/hangers/{hanger_id}/tests")
-def all_tests(
-    request: Request,
-    site: AtSite,
-    _: Reader,
-    hanger_id: Number,
-    before: Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)] = None,
-) -> HTMLResponse:
+def all_tests(request: Request, _: Reader, view: View, before: Before = None) -> HTMLResponse:
     """All tests of a hanger, the newest first, some a page."""
-    one = described(site.workspace, hanger_id)
-    view = HangerView(site.workspace, site.store, one, background_worker_of(request))
-    rows = lines_before(view, _TESTS_A_PAGE + 1, before)
+    one = view.hanger
+    tests, older = paged(lines_before(view, _TESTS_A_PAGE + 1, before), _TESTS_A_PAGE)
     return page(
         request,
         "hanger_tests.html.j2",
         name=formatting.hanger_name(one.id, one.name),
         hanger=one,
-        tests=rows[:_TESTS_A_PAGE],
+        tests=tests,
         test_headings=headings(view),
         is_first=before is None,
-        older=rows[_TESTS_A_PAGE - 1].id if len(rows) > _TESTS_A_PAGE else None,
+        older=older,
     )
 
 
 def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
     said = message(report)
     assert said.status is not None  # a hanger with a test has one
+    tables = [make(report) for make in _TABLES]
+    if view.states is not None:
+        tables.insert(2, temperature_table(view.states))
     return {
         "status_word": said.status.value,
         "style": said.status.name.lower(),
@@ -118,8 +131,11 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
         "details": details(report),
         "facts": facts(report),
         "is_called": report.is_called,
-        "charts": {part: _charts(view, part) for part in ("trends", "model", "gap")},
-        "tables": _tables(view, report),
+        "charts": {
+            part: [_chart(view, e) for e in FIGURES if e.part == part and e.is_there(view)]
+            for part in ("trends", "model", "gap")
+        },
+        "tables": [table for table in tables if table.rows],
         "alerts": hanger_tables.alerts(report),
         "events": _events(view),
         "gap": gap_part(report),
@@ -129,20 +145,9 @@ def _content(view: HangerView, report: HangerReport) -> dict[str, Any]:
     }
 
 
-def _charts(view: HangerView, part: str) -> list[Chart]:
-    return [_chart(view, each) for each in FIGURES if each.part == part and each.is_there(view)]
-
-
 def _chart(view: HangerView, figure: HangerFigure) -> Chart:
     address = f"/api/hangers/{view.hanger.id}/figures/{figure.name}"
     return Chart(figure.title, address, figure.caption(view), figure.height_px, figure.is_wide)
-
-
-def _tables(view: HangerView, report: HangerReport) -> list[Table]:
-    made = [make(report) for make in _TABLES]
-    if view.states is not None:
-        made.insert(2, temperature_table(view.states))
-    return [table for table in made if table.rows]
 
 
 def _events(view: HangerView) -> Table:
@@ -167,3 +172,85 @@ def _beside(workspace: Workspace, hanger: Hanger) -> list[tuple[str, Hanger]]:
     place = [each.id for each in order].index(hanger.id)
     before = [("previous", order[place - 1])] if place > 0 else []
     return before + [("next", each) for each in order[place + 1 : place + 2]]
+
+
+@dataclass(frozen=True)
+class ReportOrder:
+    """A report to be made in a process of its own: of which hanger, in which minute."""
+
+    folder: Path
+    hanger: int
+    form: Literal["pdf", "html"]
+    minute: int
+
+    def make(self) -> bytes:
+        workspace = Workspace.open(self.folder)
+        with workspace.store() as store:
+            paper = hanger_paper(hanger_report(workspace, store, self.hanger, utc_now()))
+        if self.form == "pdf":
+            from shm.report.as_pdf import as_pdf
+
+            return as_pdf(paper)
+        from shm.report.as_html import as_html
+
+        return as_html(paper).encode()
+
+
+@router.get("/hangers/{hanger_id}/report.{form}")
+def report(
+    request: Request, site: AtSite, _: Reader, hanger_id: HangerNumber, form: Literal["pdf", "html"]
+) -> Response:
+    """What `shm report` writes; 503 with `Retry-After` where many others wait."""
+    _refuse_untested(site.store, described(site.workspace, hanger_id))
+    minute = int(time.time() // _FRESH_S)
+    order = ReportOrder(site.workspace.folder, hanger_id, form, minute)
+    made = _awaited(background_worker_of(request), order)
+    return _file(made, f"hanger{hanger_id}.{form}", _TYPES[form])
+
+
+@router.get("/hangers/{hanger_id}/results.csv")
+def results(site: AtSite, _: Reader, hanger_id: HangerNumber) -> Response:
+    """Every test with its tension averaged over the model classes, in N, the oldest first."""
+    hanger = described(site.workspace, hanger_id)
+    _refuse_untested(site.store, hanger)
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(_COLUMNS)
+    writer.writerows(_row(point) for point in site.store.posteriors.trend(hanger))
+    return _file(text.getvalue().encode(), f"hanger{hanger_id}.csv", "text/csv; charset=utf-8")
+
+
+def _refuse_untested(store: Store, hanger: Hanger) -> None:
+    if not store.posteriors.latest_trends([hanger]):
+        raise NothingThere(
+            f"hanger {hanger.id} has no test to report.", remedy="Upload a recording of it."
+        )
+
+
+def _awaited(worker: BackgroundWorker[bytes], order: ReportOrder) -> bytes:
+    ends_at = time.monotonic() + _LONGEST_S
+    while (made := worker.wanted(order)) is None:
+        if time.monotonic() > ends_at:
+            raise Refused(503, "the report is not made yet.", "Ask again.", RETRY_AFTER)
+        time.sleep(_LOOK_S)
+    return made
+
+
+def _file(content: bytes, name: str, kind: str) -> Response:
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return Response(content, headers=headers, media_type=kind)
+
+
+def _row(point: TrendPoint) -> tuple[str, ...]:
+    known = point.averaged.tension_n
+    numbers = (known.mean, known.q05, known.q95, point.averaged.repeatability_sd_n)
+    when = f"{point.taken_at:%Y-%m-%dT%H:%M:%SZ}" if point.taken_at else ""
+    temperature = _cell(point.temperature_c)
+    # No formula for a spreadsheet: a test is named by whoever uploads its file.
+    inert = f"'{point.test}" if point.test.startswith(("=", "+", "-", "@")) else point.test
+    return (inert, when, temperature, point.model, *map(_cell, numbers))
+
+
+def _cell(value: float) -> str:
+    """Empty where it is not known."""
+    return f"{value:.6g}" if math.isfinite(value) else ""

@@ -16,7 +16,6 @@ from shm.report.formatting import Interval
 from shm.report.modal_test_report import name
 from shm.report.paper import Table, filled
 from shm.report.shared_tables import headline, overall
-from shm.values import ResponsePoint
 from shm.values.rounding import force_unit
 from shm_daemon.web.access import Reader
 from shm_daemon.web.address import test_json, test_page
@@ -37,14 +36,16 @@ def one_test(
     request: Request, _: Reader, view: View, response: Response = None, part: Part = "page"
 ) -> HTMLResponse:
     """The page; or, where `part` says so, its tables of hits, once they are worked out."""
-    return _hits(request, view) if part == "hits" else _page(request, view, response)
-
-
-def _page(request: Request, view: TestView, response: int | None) -> HTMLResponse:
-    sheet, hanger_id = view.sheet, view.stored.hanger
+    if part == "hits":  # without the frame: the page that asked puts them in their place
+        if view.whole() is None:
+            return HTMLResponse(f'<p class="note">{AT_WORK}</p>', 202, RETRY_AFTER)
+        return page(request, "test_hits.html.j2", hits=_hit_tables(view))
+    sheet, hanger_id, shown = view.sheet, view.stored.hanger, view.shown()
     before, after = view.store.tests.beside(view.stored)
-    points, verdict = _points(view), overall(view.stored.quality)
-    chosen = response if response is not None and response < len(points) else _telling(view)
+    points = shown.spectrum.points if shown.spectrum else ()
+    chosen = response if response is not None and response < len(points) else None
+    if chosen is None:  # that which shows the modes best
+        chosen = shown_points(shown.sheet, shown.spectrum, 1)[0] if shown.spectrum else 0
     address = test_page(hanger_id, view.stored.test.id)
     return page(
         request,
@@ -54,7 +55,7 @@ def _page(request: Request, view: TestView, response: int | None) -> HTMLRespons
         test=view.stored.test.id,
         recording=view.recording.id,
         verdict=headline(view.stored.quality),
-        style=VERDICT_STYLES[verdict],
+        style=VERDICT_STYLES[overall(view.stored.quality)],
         summary=view.summary,
         facts=_facts(view),
         missing=view.missing,
@@ -72,16 +73,9 @@ def _page(request: Request, view: TestView, response: int | None) -> HTMLRespons
         document=test_json(hanger_id, view.stored.test.id),
         hits=_hit_tables(view),
         at_work=AT_WORK,
-        details=filled(modal_test_report.notes(sheet), *_dropped(view), _conditions(view)),
+        details=_details(view),
         lineage=filled(origin(view), steps(view), superseded(view)),
     )
-
-
-def _hits(request: Request, view: TestView) -> HTMLResponse:
-    """Without the frame: the page that asked puts it in its place."""
-    if view.whole() is None:
-        return HTMLResponse(f'<p class="note">{AT_WORK}</p>', 202, RETRY_AFTER)
-    return page(request, "test_hits.html.j2", hits=_hit_tables(view))
 
 
 def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
@@ -90,27 +84,14 @@ def _hit_tables(view: TestView) -> tuple[Table, ...] | None:
     return filled(whole.hits) if whole else None
 
 
-def _dropped(view: TestView) -> tuple[Table, ...]:
-    """By itself where it was worked out; in the store it stands among the notes."""
-    return (view.worked.dropped,) if view.worked else ()
-
-
-def _conditions(view: TestView) -> Table:
+def _details(view: TestView) -> tuple[Table, ...]:
+    """What was dropped stands by itself where it was worked out; in the store, among the notes."""
+    notes = modal_test_report.notes(view.sheet)
     if view.worked:
-        return view.worked.conditions
+        return filled(notes, view.worked.dropped, view.worked.conditions)
     found = modal_test_report.conditions(view.as_stored)
-    return replace(found, rows=tuple(row for row in found.rows if row[0] not in _NOT_STORED))
-
-
-def _points(view: TestView) -> tuple[ResponsePoint, ...]:
-    curve = view.shown().spectrum
-    return curve.points if curve else ()
-
-
-def _telling(view: TestView) -> int:
-    """The response that shows the modes best."""
-    shown = view.shown()
-    return shown_points(shown.sheet, shown.spectrum, 1)[0] if shown.spectrum else 0
+    rows = tuple(row for row in found.rows if row[0] not in _NOT_STORED)
+    return filled(notes, replace(found, rows=rows))
 
 
 def _chart(view: TestView, figure: TestFigure, chosen: int) -> tuple[str, int]:

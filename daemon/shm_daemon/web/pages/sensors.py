@@ -31,8 +31,7 @@ from shm_daemon.web import with_plotly
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
-from shm_daemon.web.hanger_numbers import FigureDocument
-from shm_daemon.web.plotting import answer, plain
+from shm_daemon.web.models import FigureDocument, plain
 from shm_daemon.web.site import Site
 
 router = APIRouter(tags=["streams"])
@@ -84,14 +83,14 @@ def stream_page(
         "stream.html.j2",
         stream=stream,
         row=_row(state),
-        facts=[*_facts(state), *_beside_hammer(against_hammer(site.store, stream))],
+        facts=_facts(state, against_hammer(site.store, stream)),
         events=_events(state.events),
         address=f"/api/streams/{name}/figure?days={days:g}",
         days=days,
     )
 
 
-@router.get("/api/streams", responses=answers(400, 401, 403, 503), summary="Permanent sensors")
+@router.get("/api/streams", summary="Permanent sensors")
 def streams(site: AtSite, _: Reader) -> Any:
     """Each stream: whether it is live, its lag, what it lost, what its last window said."""
     return JSONResponse(plain({"streams": [_document(each, site) for each in _states(site)]}))
@@ -100,7 +99,7 @@ def streams(site: AtSite, _: Reader) -> Any:
 @router.get(
     "/api/streams/{name}/figure",
     response_model=FigureDocument,
-    responses=answers(400, 401, 403, 404, 422, 503),
+    responses=answers(404, 422),
     summary="What a stream has shown",
 )
 def stream_figure(site: AtSite, _: Reader, name: Name, days: Days = 7.0) -> JSONResponse:
@@ -113,8 +112,7 @@ def stream_figure(site: AtSite, _: Reader, name: Name, days: Days = 7.0) -> JSON
             f"stream {name} has shown nothing in the last {days:g} days.",
             remedy="See `shm stream` for when it was heard last.",
         )
-    words = {"caption": caption(course), "alt": alt(course)}
-    return answer({**with_plotly.document(specify(course)), **words})
+    return JSONResponse(with_plotly.with_words(specify(course), caption(course), alt(course)))
 
 
 def _states(site: Site) -> tuple[StreamCondition, ...]:
@@ -141,7 +139,7 @@ def _row(state: StreamCondition) -> Row:
     return Row(state.stream.name, state.stream.hanger, state.state, _STYLES[state.state], cells)
 
 
-def _facts(state: StreamCondition) -> list[tuple[str, str, str]]:
+def _facts(state: StreamCondition, hammer: AmbientBias) -> list[tuple[str, str, str]]:
     stream, window = state.stream, state.window
     behind = told(state.behind) if state.behind is not None else "unknown"
     found = [
@@ -159,14 +157,10 @@ def _facts(state: StreamCondition) -> list[tuple[str, str, str]]:
         )
         found.append(("Last window", f"{window.window.kind}, {len(window.modes)} modes",
                       window.why or how))  # fmt: skip
+    if hammer.is_known:
+        bias = rounded_percent(hammer.common, NINETY_PERCENT * hammer.common_sd, "+")
+        found.append(("Against hammer tests", bias, hammer.text()))
     return found
-
-
-def _beside_hammer(found: AmbientBias) -> list[tuple[str, str, str]]:
-    if not found.is_known:
-        return []
-    half = NINETY_PERCENT * found.common_sd
-    return [("Against hammer tests", rounded_percent(found.common, half, "+"), found.text())]
 
 
 def _events(events: tuple[StreamEvent, ...]) -> Table:

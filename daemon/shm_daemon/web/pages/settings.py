@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated
+from functools import partial
 
-from fastapi import APIRouter, Query, Request, Response
-from fastapi.responses import RedirectResponse
-from starlette.concurrency import run_in_threadpool
+from fastapi import APIRouter, Request, Response
 
 from shm.bridge import Bridge
 from shm.bridge.changes import HANGER_KEYS, HOOK_KEYS, SETTING_KEYS
 from shm.bridge.hooks import QUIET_HOURS, QuietHours
-from shm.errors import BadInput, UsageError
+from shm.errors import BadInput
 from shm.pipeline import utc_now
 from shm.pipeline.watching import differences
 from shm.report import formatting
@@ -24,9 +22,9 @@ from shm.store.audit import ChangedSetting, said
 from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.faults import Refused
-from shm_daemon.web.forms import form_of
+from shm_daemon.web.forms import Form, done_or_again
 from shm_daemon.web.frame import page
-from shm_daemon.web.models import LARGEST_NUMBER
+from shm_daemon.web.models import Before
 from shm_daemon.web.site import Site
 
 router = APIRouter(include_in_schema=False)
@@ -65,55 +63,46 @@ class _Row:
 
 
 @router.get("/settings")
-def settings_page(
-    request: Request,
-    site: AtSite,
-    _: Engineer,
-    hanger: Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)] = None,
-) -> Response:
+def settings_page(request: Request, site: AtSite, _: Engineer, hanger: Before = None) -> Response:
     """The bridge's settings and hooks, and the thresholds and limits of one hanger."""
     return _page(request, site, hanger)
 
 
 @router.post("/settings")
-async def change(request: Request, site: AtSite, engineer: Engineer) -> Response:
+def change(request: Request, site: AtSite, engineer: Engineer, told: Form) -> Response:
     """Sets one value, or gives it back to `bridge.toml`."""
-    told = await form_of(request)
-    key, hanger = told.get("key", ""), _hanger_of(told.get("key", ""))
-    try:
-        await run_in_threadpool(_change, site, engineer, key, told)
-    except (BadInput, UsageError) as error:
-        site.forget_description()  # somebody else's change, which it may not show yet
-        status = 409 if isinstance(error, UsageError) else 422
-        problem = f"{error.message} {error.remedy}"
-        return await run_in_threadpool(_page, request, site, hanger, problem, status)
-    address = "/settings" if hanger is None else f"/settings?hanger={hanger}#hanger"
-    return RedirectResponse(address, 303)
-
-
-def _change(site: Site, engineer: Engineer, key: str, told: dict[str, str]) -> None:
-    workspace, store = site.workspace, site.store.acting_as(engineer.actor)
+    key, hanger, workspace = told.get("key", ""), None, site.workspace
     rows = {row.key: row for row in _all_rows(workspace.bridge, workspace.settings)}
     if key not in rows:
         raise Refused(404, f"{key!r} is none of the settings of this page.", "See bridge.toml.")
-    value: float | str | None = None
-    if told.get("action") != "back":
-        value = _span(told) if key.endswith(QUIET_HOURS) else _number(told.get("value", ""))
-    based_on = told.get("based_on", "")
-    workspace.change_setting(
-        store,
-        key,
-        value,
-        utc_now(),
-        engineer.name,
-        based_on=int(based_on) if based_on.isdecimal() else 0,
-        in_file=rows[key].in_file,
-    )
-    site.forget_description()
+    address = "/settings"
+    if key.startswith("hanger."):
+        hanger = int(key.split(".")[1])
+        address = f"/settings?hanger={hanger}#hanger"
+
+    def change() -> None:
+        try:
+            workspace.change_setting(
+                site.store.acting_as(engineer.actor),
+                key,
+                _value(key, told),
+                utc_now(),
+                engineer.name,
+                based_on=int(told["based_on"]) if told.get("based_on", "").isdecimal() else 0,
+                in_file=rows[key].in_file,
+            )
+        finally:
+            site.forget_description()  # ours, or somebody else's change, which it may not show yet
+
+    return done_or_again(change, address, partial(_page, request, site, hanger))
 
 
-def _span(told: Mapping[str, str]) -> str:
-    """Empty where both times are; whether it is one, `bridge.toml`'s own check says."""
+def _value(key: str, told: Mapping[str, str]) -> float | str | None:
+    """None of what is given back; whether quiet hours are a span, `bridge.toml` itself checks."""
+    if told.get("action") == "back":
+        return None
+    if not key.endswith(QUIET_HOURS):
+        return _number(told.get("value", ""))
     begins, ends = told.get("begins", ""), told.get("ends", "")
     return f"{begins}-{ends}" if begins or ends else ""
 
@@ -214,9 +203,3 @@ def _row(
     label = before + _MEANINGS[name]
     label = label if before else label[0].upper() + label[1:]
     return _Row(key, label, name.rpartition(".")[2], in_file, in_force, changed.get(key))
-
-
-def _hanger_of(key: str) -> int | None:
-    kind, _, rest = key.partition(".")
-    number = rest.partition(".")[0]
-    return int(number) if kind == "hanger" and number.isdecimal() and len(number) < 10 else None

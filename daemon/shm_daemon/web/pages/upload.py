@@ -29,13 +29,13 @@ from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.address import IMPORTS
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
-from shm_daemon.web.models import LARGEST_NUMBER
+from shm_daemon.web.models import LARGEST_NUMBER, plain
 from shm_daemon.web.recordings import PLAIN_BODY, receive_body
 
-_of_page = APIRouter(include_in_schema=False)
+router = APIRouter(tags=["recordings"])
 
 
-@_of_page.get("/upload")
+@router.get("/upload", include_in_schema=False)
 def upload_page(request: Request, site: AtSite, _: Reader) -> Response:
     """Files go to `POST /api/recordings` one by one; `static/upload.js` follows each."""
     workspace = site.workspace
@@ -52,8 +52,6 @@ def upload_page(request: Request, site: AtSite, _: Reader) -> Response:
 
 
 _MOST_ANSWERS = 4000  # technical: of an address, 64 kB at most when each character is escaped
-
-_of_imports = APIRouter(prefix=IMPORTS, tags=["recordings"])
 
 
 class ImportedColumn(BaseModel):
@@ -98,10 +96,10 @@ class ImportLook(BaseModel):
     sha256: str | None
 
 
-@_of_imports.post(
-    "",
+@router.post(
+    IMPORTS,
     response_model=ImportLook,
-    responses=answers(400, 401, 403, 408, 409, 413, 415, 422, 503),
+    responses=answers(408, 409, 413, 415, 422),
     openapi_extra=PLAIN_BODY,
     summary="Import the first file of a logger",
 )
@@ -129,7 +127,7 @@ async def import_file(
     workspace = site.workspace
     file = await run_in_threadpool(Incoming, workspace.spool, workspace.settings.max_file_bytes)
     try:
-        await receive_body(request, file, workspace.settings.max_file_bytes)
+        await receive_body(request, file.write, workspace.settings.max_file_bytes)
         looked = await run_in_threadpool(_looked, file, landing_name(name), workspace, said)
         if looked.sha256 is not None:
             audit = site.store.acting_as(writer.actor).audit
@@ -154,16 +152,7 @@ def _looked(file: Incoming, name: str, workspace: Workspace, said: str | None) -
             keep_profile(found, workspace, each_time=answers.each_time)
             landed = file.land(name, found.described)
     document = import_document(found)
-    return ImportLook(**_plain(document), sha256=landed.sha256 if landed else None)
-
-
-def _plain(node: Any) -> Any:
-    """A document in which unknown numbers are null."""
-    if isinstance(node, dict):
-        return {key: _plain(value) for key, value in node.items()}
-    if isinstance(node, list):
-        return [_plain(value) for value in node]
-    return None if isinstance(node, float) and not math.isfinite(node) else node
+    return ImportLook(**plain(document), sha256=landed.sha256 if landed else None)
 
 
 def _answers(said: str, found: Import) -> Answers:
@@ -219,8 +208,3 @@ def _misread(what: str) -> BadInput:
         f"the answers cannot be read: {what}.",
         remedy='Send said={"hanger": 3, "columns": {"A1": {"plane": "transverse"}}}.',
     )
-
-
-router = APIRouter()
-router.include_router(_of_imports)
-router.include_router(_of_page)

@@ -1,4 +1,7 @@
-"""Signing in where a provider of OpenID Connect says who one is: there and back."""
+"""Signing in: a person gives name and password, or a token, or is named by a provider of OpenID
+Connect; the browser then keeps a secret where no script can read it. Signing out, and the page
+where a person changes the own password.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +12,28 @@ from collections import OrderedDict
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Depends, Request, Response
 from fastapi.responses import RedirectResponse
 
 from shm.bridge.description import SingleSignOn
-from shm.errors import NothingThere, ShmError, needing
+from shm.errors import NothingThere, ShmError, UsageError, needing
 from shm.pipeline import utc_now
-from shm_daemon.web.access import AtSite, unless_throttled
-from shm_daemon.web.frame import page
+from shm.store.people import SESSION, SIGNED_IN_FOR
+from shm_daemon.web.access import (
+    COOKIE,
+    AtSite,
+    Person,
+    change_own_password,
+    is_signed_in,
+    refuse_foreign,
+    session_of,
+    unless_throttled,
+    visitor_in_force,
+)
+from shm_daemon.web.faults import Refused
+from shm_daemon.web.forms import Form, FormOfAnybody, done_or_again
+from shm_daemon.web.frame import for_a_person, page
 from shm_daemon.web.middleware import is_https
-from shm_daemon.web.pages.accounts import ask, keep_signed_in, ours
 from shm_daemon.web.site import Site
 
 if TYPE_CHECKING:
@@ -26,6 +41,7 @@ if TYPE_CHECKING:
 
 router = APIRouter(include_in_schema=False)
 
+_KEPT_S = int(SIGNED_IN_FOR.total_seconds())
 _BACK = "/sign-in/back"
 _COOKIE, _ITS_PATH = "shm_sign_on", "/sign-in"
 _WITHIN = timedelta(minutes=10)  # judgement: to type a password and confirm on a telephone
@@ -35,6 +51,82 @@ _FORGOTTEN = (
 )
 
 log = logging.getLogger(__name__)
+
+
+@router.get("/sign-in")
+def sign_in_page(request: Request, site: AtSite, next: str = "/") -> Response:
+    """Asks for name and password, or for a token; who has signed in already goes on."""
+    if is_signed_in(request, site):
+        return RedirectResponse(_ours(next), 303)
+    return _ask(request, next)
+
+
+@router.post("/sign-in", dependencies=[Depends(refuse_foreign)])
+def sign_in(request: Request, site: AtSite, told: FormOfAnybody) -> Response:
+    """Gives the cookie to who signs in; removing the user or revoking the token ends it at once."""
+    wanted, secret = told.get("next", "/"), told.get("token", "").strip()
+    try:
+        if "name" in told:
+            secret = session_of(request, site, told["name"], told.get("password", ""))
+        else:
+            visitor_in_force(request, site, secret)
+    except Refused as refused:
+        if not for_a_person(request):
+            raise
+        return _ask(request, wanted, refused.status_code, refused.detail)
+    answer = RedirectResponse(_ours(wanted), 303)
+    _keep_signed_in(request, answer, secret)
+    return answer
+
+
+def _keep_signed_in(request: Request, answer: Response, secret: str) -> None:
+    """Has the browser keep the secret of a session."""
+    answer.set_cookie(COOKIE, secret, max_age=_KEPT_S, httponly=True, samesite="strict",
+                      secure=is_https(request.scope))  # fmt: skip
+
+
+@router.post("/sign-out", dependencies=[Depends(refuse_foreign)])
+def sign_out(request: Request, site: AtSite) -> Response:
+    """Ends the session and takes the cookie back."""
+    secret = request.cookies.get(COOKIE, "")
+    if secret.startswith(SESSION):
+        site.store.people.sign_out(secret, utc_now())
+    answer = RedirectResponse("/sign-in", 303)
+    answer.delete_cookie(COOKIE, httponly=True, samesite="strict", secure=is_https(request.scope))
+    return answer
+
+
+def _ask(request: Request, wanted: str, status: int = 200, message: str = "") -> Response:
+    """The page that asks who one is, with what went wrong."""
+    return page(request, "sign_in.html.j2", status=status, message=message, next=_ours(wanted))
+
+
+def _ours(wanted: str) -> str:
+    """An address of this site: nobody is sent elsewhere after signing in."""
+    plain = wanted.startswith("/") and wanted.isascii() and wanted.isprintable()
+    return wanted if plain and not wanted.startswith("//") and "\\" not in wanted else "/"
+
+
+@router.get("/password")
+def password_page(request: Request, _: Person, changed: bool = False) -> Response:
+    """Asks for the old password and, twice, for the new one."""
+    return page(request, "password.html.j2", message="", changed=changed)
+
+
+@router.post("/password")
+def change_password(request: Request, site: AtSite, person: Person, told: Form) -> Response:
+    """Changes it; other browsers of the person are signed out."""
+    password = told.get("password", "")
+
+    def change() -> None:
+        if password != told.get("again", ""):
+            raise UsageError("the new passwords differ.", remedy="Type the same one twice.")
+        change_own_password(request, site, person, told.get("old", ""), password)
+
+    def again(message: str, status: int) -> Response:
+        return page(request, "password.html.j2", status=status, message=message, changed=False)
+
+    return done_or_again(change, "/password?changed=true", again)
 
 
 class SignOns:
@@ -84,7 +176,7 @@ def begin(request: Request, site: AtSite, next: str = "/") -> Response:
         begun = signs.provider(site.workspace.bridge.single_sign_on).begin(back)
     except ShmError as error:
         return _told(request, next, error)
-    signs.note(begun, ours(next))
+    signs.note(begun, _ours(next))
     answer = RedirectResponse(begun.url, 303)
     # Lax: it must come back with a person whom a page of the provider sends.
     answer.set_cookie(_COOKIE, begun.state, max_age=int(_WITHIN.total_seconds()), path=_ITS_PATH,
@@ -131,7 +223,7 @@ def _signed_in(request: Request, site: Site, name: str, wanted: str) -> Response
         )
     # No redirect: a browser that came from elsewhere would not send the strict cookie along.
     answer = page(request, "signed_in.html.j2", name=name, next=wanted)
-    keep_signed_in(request, answer, secret)
+    _keep_signed_in(request, answer, secret)
     answer.delete_cookie(_COOKIE, path=_ITS_PATH)
     return answer
 
@@ -143,6 +235,6 @@ def _told(request: Request, wanted: str, error: ShmError) -> Response:
 
 
 def _refused(request: Request, wanted: str, status: int, said: str) -> Response:
-    answer = ask(request, wanted, status, said)
+    answer = _ask(request, wanted, status, said)
     answer.delete_cookie(_COOKIE, path=_ITS_PATH)
     return answer

@@ -1,37 +1,38 @@
-"""The page of operation: whether the work flows, what was refused, what `shm doctor` says."""
+"""The page of operation: whether the work flows, what was refused, what `shm doctor` says; and what
+is held until a person decides whether it counts.
+"""
 
 from __future__ import annotations
 
 import json
 import platform
 import shutil
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from datetime import datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Query, Request, Response
-from fastapi.responses import JSONResponse
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import JSONResponse, RedirectResponse
 
 import shm
 from shm.documents import parse_time
-from shm.errors import ShmError
+from shm.errors import BadInput, ShmError
 from shm.pipeline import utc_now
+from shm.plausibility import refuse_impossible
 from shm.report import formatting
 from shm.report.paper import Table
 from shm.store import ENDED, DeliveryState, Workspace
 from shm_daemon.doctor import Finding, Level, examine
 from shm_daemon.heartbeat import seconds_since_beat, told
 from shm_daemon.spool import scan
-from shm_daemon.web.access import AtSite, Reader
+from shm_daemon.web.access import AtSite, Reader, Writer
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of
-from shm_daemon.web.faults import answers
+from shm_daemon.web.forms import Form, reason_in, time_in
 from shm_daemon.web.frame import page
-from shm_daemon.web.hangers import quarantined
 from shm_daemon.web.health import troubles
-from shm_daemon.web.models import LARGEST_NUMBER, Examination, Operation, Underway
-from shm_daemon.web.site import Site, held_documents
+from shm_daemon.web.models import Before, Examination, Operation, Row, Underway
+from shm_daemon.web.site import Site, held_documents, quarantined
 
 router = APIRouter(tags=["operation"])
 
@@ -57,34 +58,18 @@ _OTHER_STAGE = "at a stage that this version of shm does not know"
 
 
 @dataclass(frozen=True)
-class Examined:
-    """What the checks found."""
-
-    findings: tuple[Finding, ...]
-
-    @property
-    def size_bytes(self) -> int:
-        return sum(len(each.found) + len(each.remedy) + 200 for each in self.findings)
-
-
-@dataclass(frozen=True)
 class Examine:
     """An order to look at everything, good for some minutes: a large store takes seconds."""
 
     folder: Path
     minutes: int
 
-    def make(self) -> Examined:
-        return Examined(examine(self.folder, utc_now()))
+    def make(self) -> tuple[Finding, ...]:
+        return examine(self.folder, utc_now())
 
 
 @router.get("/operation", include_in_schema=False)
-def operation_page(
-    request: Request,
-    site: AtSite,
-    _: Reader,
-    decided: Annotated[int | None, Query(ge=0, le=LARGEST_NUMBER)] = None,
-) -> Response:
+def operation_page(request: Request, site: AtSite, _: Reader, decided: Before = None) -> Response:
     """Everything an operator asks first, and the full examination as soon as it is there.
 
     `decided` is a recording that was held, of which its decision is told.
@@ -101,6 +86,27 @@ def operation_page(
     )
 
 
+@router.post("/held/{recording}", include_in_schema=False)
+def decide(site: AtSite, writer: Writer, recording: Row, told: Form) -> Response:
+    """Lets a recording count from now on, or takes it out; the daemon does what follows."""
+    who, why, now = writer.actor, reason_in(told, "a decision"), utc_now()
+    decisions = site.store.acting_as(who).recordings
+    match told.get("action"):
+        case "confirm":
+            time = time_in(told, "time")
+            refuse_impossible(time, site.workspace.bridge.built)
+            decisions.confirm(recording, who.name, why, now, time)
+        case "discard":
+            decisions.discard(recording, who.name, why, now)
+        case "withdraw":
+            decisions.withdraw(recording, who.name, why, now, told.get("test"))
+        case "reinstate":
+            decisions.reinstate(recording, who.name, why, now)
+        case _:
+            raise BadInput("this is none of the decisions.", remedy="Choose one in the form.")
+    return RedirectResponse(f"/operation?decided={recording}#held", 303)
+
+
 @router.get("/operation/examination", include_in_schema=False)
 def examination_fragment(request: Request, site: AtSite, _: Reader) -> Response:
     """The examination alone, for a page that is shown already."""
@@ -110,12 +116,7 @@ def examination_fragment(request: Request, site: AtSite, _: Reader) -> Response:
     return page(request, "examination.html.j2", examination=found)
 
 
-@router.get(
-    "/api/operation",
-    response_model=Operation,
-    responses=answers(400, 401, 403, 503),
-    summary="Whether the work flows",
-)
+@router.get("/api/operation", response_model=Operation, summary="Whether the work flows")
 def operation(site: AtSite, _: Reader) -> Any:
     """Daemon, queue, quarantine, disk and versions."""
     return _operation(site)
@@ -124,7 +125,7 @@ def operation(site: AtSite, _: Reader) -> Any:
 @router.get(
     "/api/operation/examination",
     response_model=Examination,
-    responses={202: {"model": Underway}, **answers(400, 401, 403, 503)},
+    responses={202: {"model": Underway}},
     summary="All checks of `shm doctor`",
 )
 def examination(request: Request, site: AtSite, _: Reader) -> Any:
@@ -189,17 +190,18 @@ def _facts(state: dict[str, Any]) -> list[tuple[str, str, str]]:
     seen_s, counts = state["daemon_seen_seconds_ago"], state["recordings"]
     ended = sum(counts[stage] for stage in ENDED)
     under_way = sum(counts.values()) - ended
-    owed = state["deliveries"]
+    owed, oldest = state["deliveries"], state["oldest_waiting_at"]
     return [
         (
             "Daemon",
             "active" if state["daemon"] else "none active",
-            f"last seen {_ago(seen_s)} ago" if seen_s is not None else "never seen here",
+            "never seen here" if seen_s is None
+            else f"last seen {told(timedelta(seconds=seen_s))} ago",
         ),
         (
             "Waiting",
             f"{state['spool']} in the spool, {under_way} stored",
-            _since(state["oldest_waiting_at"]),
+            f"the oldest since {formatting.moment(oldest)}" if oldest else "nothing stored waits",
         ),
         (
             "Deliveries",
@@ -215,34 +217,15 @@ def _facts(state: dict[str, Any]) -> list[tuple[str, str, str]]:
     ]  # fmt: skip
 
 
-def _ago(seconds: float) -> str:
-    return told(timedelta(seconds=seconds))
-
-
-def _since(oldest: datetime | None) -> str:
-    return f"the oldest since {formatting.moment(oldest)}" if oldest else "nothing stored waits"
-
-
 def _stages(counts: dict[str, int]) -> Table:
     rows = tuple((name, str(n), _STAGES.get(name, _OTHER_STAGE)) for name, n in counts.items())
     return Table("Recordings by stage", ("stage", "recordings", "what that means"), rows)
 
 
 def _examination(request: Request, site: Site) -> Table | None:
-    found = _examined(request, site)
-    return None if found is None else _findings(found)
-
-
-def _examined(request: Request, site: Site) -> tuple[Finding, ...] | None:
-    order = Examine(site.workspace.folder, int(utc_now().timestamp() // _FRESH_S))
-    try:
-        found = background_worker_of(request).wanted(order)
-    except ShmError as error:
-        return (Finding("examination", Level.UNKNOWN, error.message, error.remedy),)
-    return None if found is None else found.findings
-
-
-def _findings(findings: Sequence[Finding]) -> Table:
+    findings = _examined(request, site)
+    if findings is None:
+        return None
     order = list(Level)
     worst_first = sorted(findings, key=lambda each: order.index(each.level), reverse=True)
     return Table(
@@ -252,6 +235,15 @@ def _findings(findings: Sequence[Finding]) -> Table:
         marks=tuple(_MARKS[each.level] for each in worst_first),
         note="Made anew every five minutes at most; paths are those of the bridge's computer.",
     )
+
+
+def _examined(request: Request, site: Site) -> tuple[Finding, ...] | None:
+    order = Examine(site.workspace.folder, int(utc_now().timestamp() // _FRESH_S))
+    try:
+        found: tuple[Finding, ...] | None = background_worker_of(request).wanted(order)
+    except ShmError as error:
+        return (Finding("examination", Level.UNKNOWN, error.message, error.remedy),)
+    return found
 
 
 def _underway() -> JSONResponse:

@@ -1,5 +1,5 @@
 """What a check finds: whether the work flows (daemon, spool, what is under way, quarantine, raw
-files), and whether store, backups, clock and hangers are in order.
+files), and whether store, backups, clock, hangers, streams and settings are in order.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from shm.pipeline.lineage import discarded_of, redescribed
+from shm.pipeline.unheard import REMEDIES, heard
 from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files
@@ -184,10 +185,14 @@ def check_quarantine(examined: Examined) -> Iterator[Finding]:
         yield ok("quarantine", "empty")
         return
     first, last = (_age(path, examined.now) for path in (reasons[0], reasons[-1]))
+    try:
+        said = json.loads(reasons[-1].read_text(encoding="utf-8"))
+        why = f"{said['file']}: {said['message']}"
+    except (OSError, ValueError, KeyError, TypeError):
+        why = reasons[-1].name
     yield warning(
         "quarantine",
-        f"{counted(len(reasons), 'file')} since {told(first)}, the latest {told(last)} ago: "
-        f"{_why(reasons[-1])}",
+        f"{counted(len(reasons), 'file')} since {told(first)}, the latest {told(last)} ago: {why}",
         "Mend and drop them again, or `shm archive prune --quarantine-days 90`.",
     )
 
@@ -226,10 +231,8 @@ def check_raw_files(examined: Examined) -> Iterator[Finding]:
 
 def _without_baseline(examined: Examined) -> set[int]:
     """Hangers whose tests rightly wait until there are enough of them for a baseline."""
-    wanted, selected = (
-        examined.workspace.settings.baseline_tests,
-        examined.store.posteriors.selected_models(),
-    )
+    wanted = examined.workspace.settings.baseline_tests
+    selected = examined.store.posteriors.selected_models()
     latest = examined.store.tests.latest().items()
     return {id_ for id_, found in latest if id_ not in selected and found.tests < wanted}
 
@@ -241,14 +244,6 @@ def _age(path: Path, now: datetime) -> timedelta:
     except FileNotFoundError:
         return timedelta(0)
     return max(now - since, timedelta(0))
-
-
-def _why(reason: Path) -> str:
-    try:
-        said = json.loads(reason.read_text(encoding="utf-8"))
-        return f"{said['file']}: {said['message']}"
-    except (OSError, ValueError, KeyError, TypeError):
-        return reason.name
 
 
 def check_store(examined: Examined) -> Iterator[Finding]:
@@ -273,10 +268,8 @@ def check_store(examined: Examined) -> Iterator[Finding]:
 def check_backup(examined: Examined) -> Iterator[Finding]:
     """How old the last backup is, and how many raw files have no copy."""
     store, now = examined.store, examined.now
-    last, remedy = (
-        store.upkeep.last_backup(),
-        "`shm db backup FILE --archive DIR`, best every night.",
-    )
+    last = store.upkeep.last_backup()
+    remedy = "`shm db backup FILE --archive DIR`, best every night."
     if last is None:
         yield warning("backup", "never made here", remedy)
     else:
@@ -310,11 +303,8 @@ def check_clock(examined: Examined) -> Iterator[Finding]:
 def check_hangers(examined: Examined) -> Iterator[Finding]:
     """Which hangers have no test, none lately, or no baseline."""
     store, bridge = examined.store, examined.workspace.bridge
-    settings, latest, selected = (
-        examined.workspace.settings,
-        store.tests.latest(),
-        store.posteriors.selected_models(),
-    )
+    settings, latest = examined.workspace.settings, store.tests.latest()
+    selected = store.posteriors.selected_models()
     ids = [hanger.id for hanger in bridge.hangers]
     never = [str(each) for each in ids if each not in latest]
     before = examined.now - timedelta(days=settings.quiet_days)
@@ -361,6 +351,23 @@ def _outdated_baselines(examined: Examined) -> Iterator[Finding]:
         if hangers:
             anew = f"shm drift rebaseline --hanger {hangers[0]} --since DAY --why TEXT"
             yield warning("hangers", f"{found}: {some(hangers)}", f"Set a new baseline: `{anew}`.")
+
+
+def check_streams(examined: Examined) -> Iterator[Finding]:
+    """Nothing where `bridge.toml` describes no stream."""
+    found = heard(examined.workspace, examined.store, examined.now)
+    for state, remedy in REMEDIES.items():
+        names = [each.named for each in found if each.state == state]
+        if names:
+            yield warning("streams", f"{state}: {some(names)}", remedy)
+    if found and not any(each.state in REMEDIES for each in found):
+        yield ok("streams", f"{counted(len(found), 'stream')}, heard within the hour")
+
+
+def check_changed_settings(examined: Examined) -> Iterator[Finding]:
+    """Who reads `bridge.toml` must learn what holds instead of it."""
+    changed = examined.store.settings.list_current().values()
+    yield ok("settings", "; ".join(map(str, changed)) or "all as bridge.toml says")
 
 
 def _synchronised() -> bool | None:

@@ -1,10 +1,7 @@
 """All checks of a workspace, whatever is broken: what cannot be looked at is told, never raised.
 
-Whether alerts reach people: hooks, and what is owed to them.
-
-Versions, and whether what the settings call for is there. Needs no store.
-
-The workspace as files: folders, permissions, room on the disks. Needs no store.
+Here are those that need no store: versions, what the settings call for, hooks and whoever else is
+asked, folders, permissions, disks. Those of the store are in `doctor_checks`.
 """
 
 from __future__ import annotations
@@ -19,7 +16,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import datetime, timedelta
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -36,35 +33,13 @@ from shm.store import Workspace
 from shm.store.rows import Delivery, DeliveryState, Silence
 from shm.store.stored_alerts import silenced_until
 from shm.store.workspace import FOLDERS
-from shm_daemon.doctor.check_description import (
-    check_changed_settings,
-    check_single_sign_on,
-    check_streams,
-)
-from shm_daemon.doctor.checks import (
-    WAITS_LONG,
-    Check,
-    Examined,
-    Finding,
-    check_backup,
-    check_clock,
-    check_daemon,
-    check_hangers,
-    check_held,
-    check_quarantine,
-    check_raw_files,
-    check_spool,
-    check_store,
-    check_under_way,
-    fault,
-    ok,
-    some,
-    unknown,
-    warning,
-)
+from shm_daemon import doctor_checks as of_store
+from shm_daemon.doctor_checks import Finding, Level, fault, ok, some, unknown, warning
 from shm_daemon.heartbeat import NEARLY_FULL, told
 from shm_daemon.hooks import HookFailed, HookNotifier
 from shm_daemon.web.other_bridges import ask_all
+
+__all__ = ["Finding", "Level", "examine"]
 
 _REMEMBERED = timedelta(days=30)  # judgement: a month, within which an operator looks here
 
@@ -78,9 +53,28 @@ def check_hooks(workspace: Workspace) -> Iterator[Finding]:
     try:
         for hook in workspace.bridge.hooks:
             yield _ready(notifier, hook)
-            yield from _secrecy(workspace, f"hook {hook.name}", _secret_file(hook))
+            secret = hook.secret_file if isinstance(hook, WebhookHook) else ""
+            secret = hook.address_file if isinstance(hook, AppriseHook) else secret
+            yield from _secrecy(workspace, f"hook {hook.name}", secret)
     finally:
         notifier.close()
+
+
+def check_single_sign_on(workspace: Workspace) -> Iterator[Finding]:
+    """Asks the provider what it says of itself; raises ShmError where that or our secret is off.
+
+    Nothing where none is described, or its extra is missing, which `check_extras` says.
+    """
+    described = workspace.bridge.single_sign_on
+    if described is None or find_spec("authlib") is None:
+        return
+    from shm_daemon.openid import Provider  # an extra
+
+    Provider(described).discover()
+    yield ok("single sign-on", f"{described.host} answers")
+    if described.client_secret_file.stat().st_mode & 0o044:
+        name = described.client_secret_file.name
+        yield warning("single sign-on", f"others can read {name}", f"chmod 600 {name}")
 
 
 def check_other_bridges(workspace: Workspace) -> Iterator[Finding]:
@@ -104,7 +98,7 @@ def check_logo(workspace: Workspace) -> Iterator[Finding]:
         yield ok("logo", path.name)
 
 
-def check_deliveries(examined: Examined) -> Iterator[Finding]:
+def check_deliveries(examined: of_store.Examined) -> Iterator[Finding]:
     """Whether alerts wait for their hooks, or were given up."""
     store, now = examined.store, examined.now
     waiting = store.alerts.list_deliveries(DeliveryState.WAITING)
@@ -137,14 +131,14 @@ def _is_late(
     delivery: Delivery, silences: tuple[Silence, ...], bridge: Bridge, now: datetime
 ) -> bool:
     """Whether a delivery waits long, and nothing that people asked for keeps it."""
-    if any(quiet_until(delivery, bridge.hooks, at) for at in (now, now - WAITS_LONG)):
+    if any(quiet_until(delivery, bridge.hooks, at) for at in (now, now - of_store.WAITS_LONG)):
         return False
     if delivery.message_id is not None:
-        return now - delivery.next_attempt_at > WAITS_LONG
+        return now - delivery.next_attempt_at > of_store.WAITS_LONG
     if delivery.hook in bridge.escalation_s:
         return False
     is_silenced = silenced_until(silences, delivery.alert.hanger, now) is not None
-    return not is_silenced and now - delivery.stored.raised_at > WAITS_LONG
+    return not is_silenced and now - delivery.stored.raised_at > of_store.WAITS_LONG
 
 
 def _ready(notifier: HookNotifier, hook: Hook) -> Finding:
@@ -158,32 +152,26 @@ def _ready(notifier: HookNotifier, hook: Hook) -> Finding:
         return fault(check, error.message, error.remedy)
 
 
-def _secret_file(hook: Hook) -> str:
-    if isinstance(hook, WebhookHook):
-        return hook.secret_file
-    return hook.address_file if isinstance(hook, AppriseHook) else ""
-
-
 def _secrecy(workspace: Workspace, check: str, name: str) -> Iterator[Finding]:
     path = workspace.folder / name
     if name and path.exists() and path.stat().st_mode & (stat.S_IRGRP | stat.S_IROTH):
         yield warning(check, f"others can read {name}", f"chmod 600 {path}")
 
 
-_CHECKS: Sequence[tuple[str, Check]] = (
-    ("store", check_store),
-    ("daemon", check_daemon),
-    ("spool", check_spool),
-    ("recordings", check_under_way),
-    ("quarantine", check_quarantine),
-    ("held", check_held),
-    ("raw files", check_raw_files),
-    ("backup", check_backup),
-    ("clock", check_clock),
+_CHECKS: Sequence[tuple[str, of_store.Check]] = (
+    ("store", of_store.check_store),
+    ("daemon", of_store.check_daemon),
+    ("spool", of_store.check_spool),
+    ("recordings", of_store.check_under_way),
+    ("quarantine", of_store.check_quarantine),
+    ("held", of_store.check_held),
+    ("raw files", of_store.check_raw_files),
+    ("backup", of_store.check_backup),
+    ("clock", of_store.check_clock),
     ("deliveries", check_deliveries),
-    ("hangers", check_hangers),
-    ("streams", check_streams),
-    ("settings", check_changed_settings),
+    ("hangers", of_store.check_hangers),
+    ("streams", of_store.check_streams),
+    ("settings", of_store.check_changed_settings),
 )
 _REPORT = "This is a fault of shm; please report it."
 
@@ -221,7 +209,7 @@ def _of_store(workspace: Workspace, now: datetime) -> Iterator[Finding]:
         return
     with store:
         for name, check in _CHECKS:
-            yield from _found(name, partial(check, Examined(workspace, store, now)))
+            yield from _found(name, partial(check, of_store.Examined(workspace, store, now)))
 
 
 def _found(name: str, check: Callable[[], Iterable[Finding]]) -> list[Finding]:
@@ -255,7 +243,7 @@ _SHOWN = ("numpy", "scipy", "sqlalchemy")
 
 def check_versions() -> Iterator[Finding]:
     """What results depend on."""
-    libraries = ", ".join(f"{name} {_version(name)}" for name in _SHOWN)
+    libraries = ", ".join(f"{name} {version(name)}" for name in _SHOWN)
     yield ok(
         "versions",
         f"shm {__version__}, Python {platform.python_version()}, {libraries}, "
@@ -305,13 +293,6 @@ def check_confinement() -> Iterator[Finding]:
         )
     if not missing:
         yield ok("confinement", "files are read within limits, Landlock and a list of system calls")
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def check_folders(folder: Path) -> Iterator[Finding]:

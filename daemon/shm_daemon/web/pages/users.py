@@ -1,0 +1,76 @@
+"""Who may sign in, and as what; and what people changed: engineers let people in, change what they
+may and end them, and read the audit log.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+from fastapi import APIRouter, Request, Response
+
+from shm.errors import UsageError
+from shm.pipeline import utc_now
+from shm.report import formatting
+from shm.report.paper import Table
+from shm.store.people import Role
+from shm_daemon.web.access import AtSite, Engineer
+from shm_daemon.web.forms import Form, done_or_again
+from shm_daemon.web.frame import page
+from shm_daemon.web.models import Before, paged
+from shm_daemon.web.site import Site
+
+router = APIRouter(include_in_schema=False)
+
+_SHOWN = 100  # technical: changes on a page, which links to older ones
+
+
+@router.get("/users")
+def users_page(request: Request, site: AtSite, _: Engineer) -> Response:
+    """Who may sign in, and as what."""
+    return _page(request, site)
+
+
+@router.post("/users")
+def change_user(request: Request, site: AtSite, engineer: Engineer, told: Form) -> Response:
+    """Adds or removes a user, changes their role or sets a password."""
+    people, at = site.store.acting_as(engineer.actor).people, utc_now()
+    by_provider = site.workspace.bridge.single_sign_on is not None
+    name, password = told.get("name", ""), told.get("password", "")
+    role = next((each for each in Role if each == told.get("role", "")), None)
+
+    def change() -> None:
+        match told.get("action", ""), role:
+            case "add", Role():
+                people.add(name, role, None if by_provider and not password else password, at)
+            case "role", Role():
+                people.set_role(name, role, at)
+            case "password", _:
+                people.set_password(name, password, at)
+            case "remove", _:
+                people.remove(name, at)
+            case _:
+                raise UsageError("nothing was asked for.", remedy="Choose a button of this page.")
+
+    return done_or_again(change, "/users", partial(_page, request, site))
+
+
+def _page(request: Request, site: Site, message: str = "", status: int = 200) -> Response:
+    found = [each for each in site.store.people.list_all() if each.removed_at is None]
+    return page(
+        request, "users.html.j2", status=status, message=message, users=found, roles=list(Role)
+    )
+
+
+@router.get("/audit")
+def audit_page(request: Request, site: AtSite, _: Engineer, before: Before = None) -> Response:
+    """What people changed, by page, API or command line, the newest first."""
+    shown, older = paged(site.store.audit.list_rows(_SHOWN + 1, before), _SHOWN)
+    table = Table(
+        "Changes",
+        ("time", "who", "by", "action", "of", "detail"),
+        tuple(
+            (formatting.moment(each.at), each.who, each.via, each.action, each.subject, each.detail)
+            for each in shown
+        ),
+    )
+    return page(request, "audit.html.j2", table=table, older=older, is_first=before is None)
