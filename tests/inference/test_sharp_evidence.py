@@ -9,14 +9,14 @@ from shm.models import THESIS, build
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.sharp_oracle import ORACLE, Resolution, SharpEvidence, sharp_test
 
-COARSE = Resolution(step=0.6, change=10.0)
+COARSE = Resolution(step=0.5, change=10.0)
 
 
 @pytest.mark.trial
 @pytest.mark.parametrize("repeat", ORACLE)
 def test_a_coarser_quadrature_agrees_with_the_stored_oracle(repeat: int) -> None:
     coarse = SharpEvidence(repeat, COARSE).log_evidence()
-    assert coarse == pytest.approx(ORACLE[repeat], abs=0.02)
+    assert coarse == pytest.approx(ORACLE[repeat], abs=0.03)
 
 
 def test_the_cells_of_the_springs_are_fine_enough() -> None:
