@@ -1,14 +1,15 @@
 """The same likelihood through the field's samplers: cost, evidence, effective samples.
 
-Beam 2 on hanger 3, table 1.1 of the thesis counted once and ten times (N_D). Every sampler runs in
-an environment of its own, which this command makes from the pinned files beside the scripts in
-`peers/`, and calls the frequencies and the likelihood of this package. Run:
+Beam 2 on hanger 3 with the thesis's frequencies and with sharp ones, each counted once and ten
+times (N_D). Every sampler runs in an environment of its own, which this command makes from the
+pinned files beside the scripts in `peers/`, and calls the frequencies and the likelihood of this
+package. One run after the other: side by side they would lengthen each other's processor time. Run:
 
-    python tests/benchmarks/peers.py --seeds 5 --write-docs
+    python tests/benchmarks/peers.py --resume --write-docs
 
-Runs are kept in the folder; a later run of some of the samplers replaces theirs and the tables show
-all. Exits 1 where a bound fails: our evidence right, and every peer with a right evidence at least
-30 times as expensive.
+Each run is a line of `docs/trials/peers/runs.jsonl`, from which the tables are made. Exits 1 where
+a bound fails: our evidence right, and every peer with a right evidence at least 30 times as
+expensive.
 """
 
 from __future__ import annotations
@@ -23,13 +24,13 @@ import subprocess
 import sys
 import venv
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import Progress
+from rich.progress import track
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS = Path(__file__).resolve().parent / "peers"
@@ -38,6 +39,7 @@ sys.path[:0] = [str(SCRIPTS), str(ROOT)]
 from table import Case, failed_bounds, show, write_docs  # noqa: E402
 
 DOCS = ROOT / "docs" / "trials" / "peers.md"
+RUNS = DOCS.with_suffix("") / "runs.jsonl"
 OURS = "shm"
 OUR_SEEDS = 20
 ENVIRONMENTS = {
@@ -46,6 +48,7 @@ ENVIRONMENTS = {
     "dynesty_dynamic": "nested",
     "ultranest": "nested",
     "nautilus": "nested",
+    "pocomc": "pocomc",
     "pymc": "pymc",
     "uqpy": "uqpy",
     "blackjax": "blackjax",
@@ -63,13 +66,19 @@ class Job:
     seed: int
 
     @property
-    def name(self) -> str:
-        return f"{self.peer}-{self.case.repeat}-{self.case.sigma}-{self.seed}"
+    def head(self) -> dict[str, Any]:
+        """The keys by which its line is found."""
+        return {"peer": self.peer, **asdict(self.case), "seed": self.seed}
 
-    @property
-    def siblings(self) -> str:
-        """A pattern of the files of all seeds."""
-        return f"{self.peer}-{self.case.repeat}-{self.case.sigma}-*.json"
+    def done(self, rows: Iterable[dict[str, Any]], limit: int) -> bool:
+        """Whether these hold it: finished, or failed with as much time as now."""
+        own = [row for row in rows if row.items() >= self.head.items()]
+        return any("failure" not in row or row["limit"] >= limit for row in own)
+
+    def hopeless(self, rows: Iterable[dict[str, Any]], limit: int) -> bool:
+        """Whether another seed has failed with as much time."""
+        of_any_seed = {"peer": self.peer, **asdict(self.case)}.items()
+        return any(row.items() >= of_any_seed and row.get("limit", 0) >= limit for row in rows)
 
 
 def environment(name: str, folder: Path) -> Path:
@@ -95,18 +104,19 @@ def environment(name: str, folder: Path) -> Path:
 
 def run(job: Job, python: Path, limit: int) -> dict[str, Any]:
     """The line of JSON that a run prints, or why there is none, with the job's own keys."""
-    command = [str(python), str(SCRIPTS / f"run_{job.peer}.py"), "--repeat", str(job.case.repeat)]
-    command += ["--sigma", job.case.sigma, "--seed", str(job.seed), "--limit", str(limit)]
+    command = [str(python), str(SCRIPTS / f"run_{job.peer}.py"), "--problem", job.case.problem]
+    command += ["--repeat", str(job.case.repeat), "--sigma", job.case.sigma]
+    command += ["--seed", str(job.seed), "--limit", str(limit)]
     single = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     path = {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         command, env=os.environ | single | path, capture_output=True, text=True, check=False
     )
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
-    head = {"peer": job.peer, "repeat": job.case.repeat, "sigma": job.case.sigma, "seed": job.seed}
+    head = job.head | {"date": datetime.now(UTC).date().isoformat()}
     if done.returncode == 0 and lines:
         return head | json.loads(lines[-1])
-    return head | {"failure": _why(done, limit)}
+    return head | {"failure": _why(done, limit), "limit": limit}
 
 
 def _why(done: subprocess.CompletedProcess[str], limit: int) -> str:
@@ -119,16 +129,16 @@ def _why(done: subprocess.CompletedProcess[str], limit: int) -> str:
 def planned(peers: Sequence[str], cases: Iterable[Case], seeds: int) -> list[Job]:
     """All runs, the first seed of all first; ours has more seeds and integrates sigma out."""
     jobs = [
-        Job(peer, case, seed)
+        Job(peer, replace(case, sigma="integrated") if peer == OURS else case, seed)
         for seed in range(1, max(seeds, OUR_SEEDS) + 1)
         for case in cases
         for peer in peers
-        if (peer != OURS and seed <= seeds) or (peer == OURS and case.sigma == "integrated")
+        if seed <= (OUR_SEEDS if peer == OURS else seeds)
     ]
-    return jobs if seeds else []
+    return list(dict.fromkeys(jobs)) if seeds else []
 
 
-def prepared(peers: Sequence[str], folder: Path, console: Console) -> dict[str, Path]:
+def prepared(peers: Iterable[str], folder: Path, console: Console) -> dict[str, Path]:
     """The interpreters of the samplers whose environment can be made; says which cannot."""
     made: dict[str, Path] = {}
     for peer in peers:
@@ -140,32 +150,27 @@ def prepared(peers: Sequence[str], folder: Path, console: Console) -> dict[str, 
     return made
 
 
-def forget(jobs: Iterable[Job], folder: Path) -> None:
-    """Takes away what is kept of the samplers and cases that are to run."""
-    for pattern in {job.siblings for job in jobs}:
-        for path in folder.glob(pattern):
-            path.unlink()
+def kept(runs: Path) -> list[dict[str, Any]]:
+    """The lines of the file, none where there is no file."""
+    lines = runs.read_text(encoding="utf-8").splitlines() if runs.is_file() else []
+    return [json.loads(line) for line in lines]
 
 
-def run_all(
-    jobs: Sequence[Job], pythons: dict[str, Path], folder: Path, limit: int, workers: int
-) -> None:
-    """Runs the jobs and keeps each one's line as a file; a case that failed once is left there."""
+def keep(rows: Iterable[dict[str, Any]], runs: Path) -> None:
+    """Writes the file anew."""
+    runs.write_text("".join(f"{json.dumps(row)}\n" for row in rows), encoding="utf-8")
 
-    def attempt(job: Job) -> str:
-        if any("failure" in json.loads(path.read_text()) for path in folder.glob(job.siblings)):
-            return "left out, an earlier seed failed"
+
+def run_all(jobs: Sequence[Job], pythons: dict[str, Path], runs: Path, limit: int) -> None:
+    """Runs the jobs, one after the other; each one's line replaces what the file held of it."""
+    for job in track(jobs, "runs"):
+        if job.hopeless(kept(runs), limit):
+            print(f"{job.head}: left out, an earlier seed failed", flush=True)
+            continue
         row = run(job, pythons[job.peer], limit)
-        (folder / f"{job.name}.json").write_text(json.dumps(row))
-        return str(row.get("failure") or f"{row['cpu_seconds']:.1f} s")
-
-    with Progress() as progress, ThreadPoolExecutor(workers) as pool:
-        task = progress.add_task("runs", total=len(jobs))
-        under_way = {pool.submit(attempt, job): job for job in jobs}
-        for future in as_completed(under_way):
-            progress.update(
-                task, advance=1, description=f"{under_way[future].name}: {future.result()}"
-            )
+        others = [other for other in kept(runs) if not other.items() >= job.head.items()]
+        keep([*others, row], runs)
+        print(f"{job.head}: {row.get('failure') or row['cpu_seconds']}", flush=True)
 
 
 def main() -> int:
@@ -173,26 +178,30 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=5, help="0: only the tables, anew")
     parser.add_argument("--peers", default=",".join(ENVIRONMENTS))
+    parser.add_argument("--problem", default="thesis,sharp")
     parser.add_argument("--repeats", default="1,10", help="how often the data set counts")
-    parser.add_argument("--sigma", default="sampled,integrated")
-    parser.add_argument("--limit", type=int, default=900, help="processor time of a run in s")
-    parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--folder", type=Path, default=ROOT / "build" / "peers")
+    parser.add_argument("--sigma", default="sampled", help="of the others; ours integrates it out")
+    parser.add_argument("--limit", type=int, default=1800, help="processor time of a run in s")
+    parser.add_argument("--environments", type=Path, default=ROOT / "build" / "peers")
+    parser.add_argument("--runs", type=Path, default=RUNS, help="a line for each run")
     parser.add_argument("--resume", action="store_true", help="only the runs that are not kept yet")
     parser.add_argument("--write-docs", action="store_true")
     arguments = parser.parse_args()
-    console, results = Console(width=190), arguments.folder / "results"
-    results.mkdir(parents=True, exist_ok=True)
-    sigmas, repeats = arguments.sigma.split(","), map(int, arguments.repeats.split(","))
-    cases = [Case(repeat, sigma) for repeat in repeats for sigma in sigmas]
-    pythons = prepared(arguments.peers.split(","), arguments.folder, console)
-    jobs = planned(list(pythons), cases, arguments.seeds)
+    console = Console(width=190)
+    cases = [
+        Case(problem, int(repeat), sigma)
+        for problem in arguments.problem.split(",")
+        for repeat in arguments.repeats.split(",")
+        for sigma in arguments.sigma.split(",")
+    ]
+    jobs = planned(arguments.peers.split(","), cases, arguments.seeds)
     if arguments.resume:
-        jobs = [job for job in jobs if not (results / f"{job.name}.json").is_file()]
-    else:
-        forget(jobs, results)
-    run_all(jobs, pythons, results, arguments.limit, arguments.workers)
-    rows = [json.loads(path.read_text()) for path in sorted(results.glob("*.json"))]
+        rows = kept(arguments.runs)
+        jobs = [job for job in jobs if not job.done(rows, arguments.limit)]
+    pythons = prepared(dict.fromkeys(job.peer for job in jobs), arguments.environments, console)
+    jobs = [job for job in jobs if job.peer in pythons]
+    run_all(jobs, pythons, arguments.runs, arguments.limit)
+    rows = kept(arguments.runs)
     show(rows, console)
     if arguments.write_docs:
         write_docs(rows, DOCS)

@@ -113,11 +113,12 @@ def beam2_log_evidence(table: str, repeat: int, resolution: Resolution | None = 
         values |= {cell: integrand.log_density(*(_PEAK + step * cell)) for cell in border}
         least = max(values.values()) - _NEGLIGIBLE
         grown = [cell for cell in border if values[cell] > least]
-        border = {near for cell in grown for near in _neighbours(cell)} - values.keys()
+        border = {near for cell in grown for near in neighbours(cell)} - values.keys()
     return float(logsumexp(list(values.values())) + np.log(step / _WIDTH).sum())
 
 
-def _neighbours(cell: tuple[int, int]) -> list[tuple[int, int]]:
+def neighbours(cell: tuple[int, int]) -> list[tuple[int, int]]:
+    """The cell of a lattice and the eight around it."""
     return [(cell[0] + i, cell[1] + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
 
 

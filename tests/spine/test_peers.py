@@ -24,12 +24,17 @@ def loaded(path: Path) -> ModuleType:
 
 
 table = loaded(BENCHMARKS / "peers" / "table.py")
+command = loaded(BENCHMARKS / "peers.py")
+problem = loaded(BENCHMARKS / "peers" / "problem.py")
+
+FIVE = (0.0, 0.1, -0.1, 0.05, -0.05)
 
 
 def row(peer: str, seed: int, seconds: float, off: float) -> dict[str, Any]:
     sigma = "integrated" if peer == "shm" else "sampled"
-    head = {"peer": peer, "repeat": 1, "sigma": sigma, "seed": seed, "version": "1"}
-    evidence = {"log_evidence": table.EVIDENCE[1] + off, "log_evidence_sd": None}
+    head = {"peer": peer, "problem": "thesis", "repeat": 1, "sigma": sigma, "seed": seed}
+    exact = table.EVIDENCE["thesis", 1]
+    evidence = {"version": "1", "log_evidence": exact + off, "log_evidence_sd": None}
     cost = {"cpu_seconds": seconds, "evaluations": 1000, "effective_samples": 100.0}
     return head | evidence | cost | {"theta_f": 1.2, "theta_f_sd": 0.1}
 
@@ -38,19 +43,19 @@ def rows(peer: str, seconds: float, offs: tuple[float, ...]) -> list[dict[str, A
     return [row(peer, seed, seconds, off) for seed, off in enumerate(offs, start=1)]
 
 
-OURS = rows("shm", 1.0, (0.05, -0.05, 0.0))
+OURS = rows("shm", 1.0, FIVE)
 
 
 @pytest.mark.parametrize(
     ("offs", "verdict"),
     [
-        ((0.1, -0.1, 0.0), "right"),
-        ((-1.0, -1.1, -0.9), "wrong"),
-        ((-0.8, 0.8, 0.0), "wrong"),
-        ((0.0,), "one run"),
+        (FIVE, "right"),
+        ((-1.0, -1.1, -0.9, -1.0, -1.0), "wrong"),
+        ((-0.8, 0.8, 0.0, 0.0, 0.0), "wrong"),
+        ((0.0, 0.1, -0.1, 0.05), "open: 4 of 5 runs"),
     ],
 )
-def test_an_evidence_is_right_where_bias_and_spread_are_small(
+def test_an_evidence_is_right_after_five_runs_of_small_bias_and_spread(
     offs: tuple[float, ...], verdict: str
 ) -> None:
     (summary,) = table.summarised(rows("dynesty", 50.0, offs))
@@ -58,12 +63,12 @@ def test_an_evidence_is_right_where_bias_and_spread_are_small(
 
 
 def test_the_bounds_hold_where_a_right_peer_is_dear_and_a_cheap_one_wrong() -> None:
-    dear, cheap = rows("dynesty", 50.0, (0.0, 0.1)), rows("blackjax", 2.0, (-3.0, -2.9))
+    dear, cheap = rows("dynesty", 50.0, FIVE), rows("blackjax", 2.0, (-3.0, -2.9))
     assert table.failed_bounds([*OURS, *dear, *cheap]) == []
 
 
 def test_a_right_and_cheap_peer_breaks_a_bound() -> None:
-    (failed,) = table.failed_bounds([*OURS, *rows("dynesty", 20.0, (0.0, 0.1))])
+    (failed,) = table.failed_bounds([*OURS, *rows("dynesty", 20.0, FIVE)])
     assert "only 20 times ours" in failed
 
 
@@ -72,9 +77,14 @@ def test_our_wrong_evidence_breaks_a_bound() -> None:
     assert "bias +0.55" in failed
 
 
+FAILED = {"peer": "uqpy", "problem": "thesis", "repeat": 1, "sigma": "sampled", "seed": 1} | {
+    "failure": "no memory",
+    "limit": 900,
+}
+
+
 def test_a_failed_run_is_told_with_its_reason() -> None:
-    failed = {"peer": "uqpy", "repeat": 1, "sigma": "sampled", "seed": 1, "failure": "no memory"}
-    (line,) = table.failures([*OURS, failed])
+    (line,) = table.failures([*OURS, FAILED])
     assert "1 of 1 runs failed (no memory)" in line
 
 
@@ -86,13 +96,12 @@ def test_the_tables_stand_between_the_marks_and_the_text_stays(tmp_path: Path) -
     assert text.startswith("before\n<!-- peers -->")
     assert text.endswith("<!-- /peers -->\nafter\n")
     assert "**shm** 1 1 s, bias " in text
-    whole = (tmp_path / "peers" / "n_d_1.csv").read_text()
-    assert '**shm** 1,integrated,3,1,1,"1,000",' in whole
+    whole = (tmp_path / "peers" / "thesis_n_d_1.csv").read_text()
+    assert '**shm** 1,integrated,5,1,1,"1,000",' in whole
     assert "old" not in text
 
 
 def test_every_sampler_has_a_script_a_title_and_pinned_versions() -> None:
-    command = loaded(BENCHMARKS / "peers.py")
     assert command.ENVIRONMENTS.keys() == table.TITLES.keys()
     for peer, environment in command.ENVIRONMENTS.items():
         assert (BENCHMARKS / "peers" / f"run_{peer}.py").is_file()
@@ -102,11 +111,52 @@ def test_every_sampler_has_a_script_a_title_and_pinned_versions() -> None:
 
 
 def test_ours_is_planned_with_sigma_integrated_out_and_more_seeds() -> None:
-    command = loaded(BENCHMARKS / "peers.py")
-    cases = [command.Case(1, "sampled"), command.Case(1, "integrated")]
+    cases = [command.Case("sharp", 1, "sampled"), command.Case("sharp", 1, "integrated")]
     jobs = command.planned(["shm", "emcee"], cases, seeds=2)
-    assert {(job.case.sigma, job.seed) for job in jobs if job.peer == "shm"} == {
-        ("integrated", seed) for seed in range(1, command.OUR_SEEDS + 1)
-    }
+    ours = [(job.case.sigma, job.seed) for job in jobs if job.peer == "shm"]
+    assert ours == [("integrated", seed) for seed in range(1, command.OUR_SEEDS + 1)]
     assert sum(job.peer == "emcee" for job in jobs) == 4
     assert command.planned(["shm", "emcee"], cases, seeds=0) == []
+
+
+def test_a_run_is_done_when_it_finished_or_failed_with_as_much_time() -> None:
+    case = command.Case("thesis", 1, "sampled")
+    finished, failed = command.Job("dynesty", case, 2), command.Job("uqpy", case, 1)
+    kept = [*rows("dynesty", 50.0, FIVE), FAILED]
+    assert finished.done(kept, limit=900)
+    assert not command.Job("dynesty", case, 6).done(kept, limit=900)
+    assert not command.Job("dynesty", command.Case("sharp", 1, "sampled"), 2).done(kept, limit=900)
+    assert failed.done(kept, limit=900)
+    assert not failed.done(kept, limit=1800)
+
+
+def test_no_other_seed_is_tried_where_one_failed_with_as_much_time() -> None:
+    other = command.Job("uqpy", command.Case("thesis", 1, "sampled"), 2)
+    assert other.hopeless([FAILED], limit=900)
+    assert not other.hopeless([FAILED], limit=1800)
+    assert not other.hopeless(rows("uqpy", 50.0, (0.0,)), limit=900)
+
+
+def test_each_run_replaces_its_own_line_and_keeps_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs, case = tmp_path / "runs.jsonl", command.Case("thesis", 1, "sampled")
+    old = rows("dynesty", 50.0, (0.0, 0.1))
+    command.keep(old, runs)
+    new = row("dynesty", 1, 40.0, 0.2)
+    monkeypatch.setattr(command, "run", lambda job, python, limit: new)
+    command.run_all([command.Job("dynesty", case, 1)], {"dynesty": Path()}, runs, 900)
+    assert command.kept(runs) == [old[1], new]
+
+
+def test_the_kept_runs_are_of_the_problems_as_they_are() -> None:
+    kept = [row for row in command.kept(command.RUNS) if "failure" not in row]
+    cases = {(row["problem"], row["repeat"], row["sigma"]) for row in kept}
+    for case in cases:
+        now = problem.Target(*case).fingerprint()
+        found = {row["fingerprint"] for row in kept if row.items() >= dict_of(case).items()}
+        assert found == {now}, f"{case}: run it anew, the problem has changed"
+
+
+def dict_of(case: tuple[str, int, str]) -> dict[str, Any]:
+    return dict(zip(("problem", "repeat", "sigma"), case, strict=True))

@@ -12,11 +12,16 @@ from rich.console import Console
 from rich.table import Table
 
 from docs.filling import write_csv
+from tests.helpers import sharp_oracle
 from tests.helpers.evidence_oracle import ORACLE
 
-EVIDENCE = {repeat: ORACLE["1.1", "beam2", repeat] for repeat in (1, 10)}
-"""By quadrature; N_D: log evidence."""
+EVIDENCE = {
+    **{("thesis", repeat): ORACLE["1.1", "beam2", repeat] for repeat in (1, 10)},
+    **{("sharp", repeat): value for repeat, value in sharp_oracle.ORACLE.items()},
+}
+"""By quadrature; (problem, N_D): log evidence."""
 
+FEWEST_RUNS = 5
 LARGEST_BIAS = 0.2
 LARGEST_SPREAD = 0.3
 TIMES_FASTER = 30
@@ -27,6 +32,7 @@ TITLES = {
     "dynesty_dynamic": "dynesty, dynamic",
     "ultranest": "ultranest",
     "nautilus": "nautilus",
+    "pocomc": "pocoMC",
     "pymc": "PyMC `sample_smc`",
     "uqpy": "UQpy TMCMC",
     "blackjax": "blackjax tempered SMC",
@@ -41,10 +47,19 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Case:
-    """How often the data set counts, and whether sigma is sampled or integrated out."""
+    """Which data, how often they count, and whether sigma is sampled or integrated out."""
 
+    problem: str
     repeat: int
     sigma: str
+
+    @property
+    def data(self) -> tuple[str, int]:
+        """By what its evidence is known."""
+        return self.problem, self.repeat
+
+    def __str__(self) -> str:
+        return f"{self.problem}, N_D = {self.repeat}, sigma {self.sigma}"
 
 
 @dataclass(frozen=True)
@@ -68,8 +83,9 @@ class Summary:
 
     @property
     def right(self) -> bool:
-        """Whether the evidence is right: at least two runs, small bias, small spread."""
-        return abs(self.bias) <= LARGEST_BIAS and self.spread <= LARGEST_SPREAD
+        """Whether the evidence is right: enough runs, small bias, small spread."""
+        close = abs(self.bias) <= LARGEST_BIAS and self.spread <= LARGEST_SPREAD
+        return close and self.runs >= FEWEST_RUNS
 
     @property
     def verdict(self) -> str:
@@ -78,34 +94,38 @@ class Summary:
             return "-"
         if np.isnan(self.log_evidence):
             return "not given"
-        if np.isnan(self.spread):
-            return "one run"
+        if self.runs < FEWEST_RUNS:
+            return f"open: {self.runs} of {FEWEST_RUNS} runs"
         return "right" if self.right else "wrong"
 
 
 def summarised(rows: Sequence[dict[str, Any]]) -> list[Summary]:
     """One summary for each sampler and case, in the order of TITLES."""
-    groups: dict[tuple[str, int, str], list[dict[str, Any]]] = {}
+    groups: dict[tuple[str, Case], list[dict[str, Any]]] = {}
     for row in rows:
-        groups.setdefault((row["peer"], row["repeat"], row["sigma"]), []).append(row)
+        case = Case(row["problem"], row["repeat"], row["sigma"])
+        groups.setdefault((row["peer"], case), []).append(row)
     summaries = [_summary(*key, group) for key, group in groups.items()]
-    order = list(TITLES)
-    return sorted(summaries, key=lambda s: (s.case.repeat, order.index(s.peer), s.case.sigma))
+    cases, peers = list(EVIDENCE), list(TITLES)
+    return sorted(
+        summaries,
+        key=lambda s: (cases.index(s.case.data), peers.index(s.peer), s.case.sigma),
+    )
 
 
-def _summary(peer: str, repeat: int, sigma: str, rows: Sequence[dict[str, Any]]) -> Summary:
+def _summary(peer: str, case: Case, rows: Sequence[dict[str, Any]]) -> Summary:
     done = [row for row in rows if "failure" not in row]
     evidence, theta_f = _column(done, "log_evidence"), _column(done, "theta_f")
     return Summary(
         peer=peer,
-        case=Case(repeat, sigma),
+        case=case,
         version=done[0]["version"] if done else "",
         runs=len(done),
         failures=tuple(row["failure"] for row in rows if "failure" in row),
         cpu_seconds=_median(_column(done, "cpu_seconds")),
         evaluations=_median(_column(done, "evaluations")),
         log_evidence=_median(evidence),
-        bias=_median(evidence) - EVIDENCE[repeat],
+        bias=_median(evidence) - EVIDENCE[case.data],
         spread=_spread(evidence),
         claimed=_median(_column(done, "log_evidence_sd")),
         effective_samples=_median(_column(done, "effective_samples")),
@@ -154,25 +174,28 @@ def _number(value: float, form: str) -> str:
     return "-" if np.isnan(value) else format(value, form)
 
 
-def _our_seconds(summaries: Sequence[Summary], repeat: int) -> float:
-    found = [s.cpu_seconds for s in summaries if s.peer == OURS and s.case.repeat == repeat]
+def _our_seconds(summaries: Sequence[Summary], data: tuple[str, int]) -> float:
+    found = [s.cpu_seconds for s in summaries if s.peer == OURS and s.case.data == data]
     return found[0] if found else float("nan")
 
 
-def _tables(rows: Sequence[dict[str, Any]]) -> dict[int, list[list[str]]]:
+def _tables(rows: Sequence[dict[str, Any]]) -> dict[tuple[str, int], list[list[str]]]:
     summaries = summarised(rows)
     return {
-        repeat: [
-            _cells(s, _our_seconds(summaries, repeat)) for s in summaries if s.case.repeat == repeat
-        ]
-        for repeat in EVIDENCE
+        data: [_cells(s, _our_seconds(summaries, data)) for s in summaries if s.case.data == data]
+        for data in dict.fromkeys(s.case.data for s in summaries)
     }
 
 
+def _title(data: tuple[str, int]) -> str:
+    problem, repeat = data
+    return f"{problem.capitalize()}, N_D = {repeat}"
+
+
 def show(rows: Sequence[dict[str, Any]], console: Console) -> None:
-    """Prints a table for each N_D, and what failed."""
-    for repeat, lines in _tables(rows).items():
-        table = Table(*COLUMNS, title=f"N_D = {repeat}, log evidence {EVIDENCE[repeat]:.2f}")
+    """Prints a table for each problem and N_D, and what failed."""
+    for data, lines in _tables(rows).items():
+        table = Table(*COLUMNS, title=f"{_title(data)}, log evidence {EVIDENCE[data]:.2f}")
         for cells in lines:
             table.add_row(*cells)
         console.print(table)
@@ -183,7 +206,7 @@ def show(rows: Sequence[dict[str, Any]], console: Console) -> None:
 def failures(rows: Sequence[dict[str, Any]]) -> list[str]:
     """A sentence for each sampler and case with failed runs."""
     return [
-        f"{TITLES[s.peer]}, N_D = {s.case.repeat}, sigma {s.case.sigma}: {len(s.failures)} of "
+        f"{TITLES[s.peer]}, {s.case}: {len(s.failures)} of "
         f"{s.runs + len(s.failures)} runs failed ({'; '.join(sorted(set(s.failures)))})."
         for s in summarised(rows)
         if s.failures
@@ -196,31 +219,31 @@ def write_docs(rows: Sequence[dict[str, Any]], page: Path) -> None:
     before, rest = text.split("<!-- peers -->")
     after = rest.split("<!-- /peers -->")[1]
     parts = []
-    for repeat, lines in _tables(rows).items():
-        name = f"n_d_{repeat}.csv"
+    for data, lines in _tables(rows).items():
+        name = "{}_n_d_{}.csv".format(*data)
         write_csv(page.with_suffix("") / name, [COLUMNS, *lines])
-        parts.append(f"{_in_short(repeat, lines)} ([All figures]({page.stem}/{name}).)")
+        parts.append(f"{_in_short(data, lines)} ([All figures]({page.stem}/{name}).)")
     parts += [*failures(rows)]
     inside = "\n".join(f"- {part}" for part in parts)
     page.write_text(f"{before}<!-- peers -->\n{inside}\n<!-- /peers -->{after}", encoding="utf-8")
 
 
-def _in_short(repeat: int, lines: Sequence[Sequence[str]]) -> str:
+def _in_short(data: tuple[str, int], lines: Sequence[Sequence[str]]) -> str:
     """Of each sampler how long it took, how far its evidence is off, and the verdict."""
     told = []
     for cells in lines:
         row = dict(zip(COLUMNS, cells, strict=True))
         bias = "evidence" if row["bias"] == "-" else f"bias {row['bias']},"
         told.append(f"{row['sampler']} {row['processor time s']} s, {bias} {row['evidence is']}")
-    return f"**N_D = {repeat}**, log evidence {EVIDENCE[repeat]:.2f}: {'; '.join(told)}."
+    return f"**{_title(data)}**, log evidence {EVIDENCE[data]:.2f}: {'; '.join(told)}."
 
 
 def failed_bounds(rows: Sequence[dict[str, Any]]) -> list[str]:
     """Which bounds fail: our evidence, and our lead over each peer whose evidence is right."""
     summaries, failed = summarised(rows), []
     for summary in summaries:
-        ours = _our_seconds(summaries, summary.case.repeat)
-        where = f"{summary.peer}, N_D = {summary.case.repeat}, sigma {summary.case.sigma}"
+        ours = _our_seconds(summaries, summary.case.data)
+        where = f"{summary.peer}, {summary.case}"
         if summary.peer == OURS and not summary.right:
             failed.append(f"{where}: bias {summary.bias:+.2f}, spread {summary.spread:.2f}")
         elif summary.right and summary.peer != OURS:
