@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     from shm.values import Recording as Recording
     from shm.values import Selection as Selection
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 _STEPS_AND_PACKAGES = ("identify", "read", "simulate")
 _HOMES = {
