@@ -16,10 +16,10 @@ import numpy as np
 from shm.models.tensioned_beam import wave_numbers
 from shm.values import FloatArray
 
-NAME = "equal springs, fitted"
+NAME = "equal springs"
 SOURCE = "supposition of Ceballos and Prato 2008, J. Sound Vib. 317, 127; exact beam"
-ENDS = "equal springs"
-LEAVES_OUT = "unequal ends, what the description is off by, an interval"
+ENDS = "alike"
+LEAVES_OUT = "ends that differ"
 
 VALID_FROM_XI, WORST_ERROR = 3.0, 2e-4
 """On equal springs, of six orders, up to xi = 200, by `tests/models/test_equal_springs.py`."""

@@ -39,8 +39,9 @@ def test_a_beam_as_baseline_is_the_class_at_the_descriptions_length(name: str, h
 
 
 @pytest.mark.parametrize("name", few_of(["s1", "s2"], 1))
-def test_a_solid_baseline_has_the_frequencies_of_its_class(name: str) -> None:
-    composed, model = ComposedHanger(HANGER_3, name, [], PLACES), build(name, HANGER_3, THESIS)
+def test_a_solid_baseline_has_the_frequencies_of_its_class_as_it_hangs(name: str) -> None:
+    composed = ComposedHanger(HANGER_3, name, [], PLACES)
+    model = build(name, HANGER_3, THESIS).as_it_hangs()
     theta = np.array([[0.9, 0, 0, 0, 0], [1.2, 0, 0, 0, 0]])
     found = composed.modes(theta, PLAIN, 4)
     np.testing.assert_allclose(found.frequency_hz, model.frequencies_hz(theta[:, :1], 4), rtol=1e-9)

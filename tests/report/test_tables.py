@@ -133,6 +133,6 @@ def test_formulas_of_practice_stand_beside_ours(season: HangerReport) -> None:
     string_n = 4 * hanger.mass_per_length_kg_m * (first.frequency_hz * hanger.length_m) ** 2
     assert made.rows[0][:2] == ("taut string, mode 1", f"{season.tension_unit.of(string_n):.0f}")
     assert [row[0] for row in made.rows[-2:]] == [
-        "equal springs, fitted, all modes",
+        "equal springs, all modes",
         "ours, all modes of both planes",
     ]
