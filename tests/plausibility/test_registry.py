@@ -98,6 +98,13 @@ def test_who_may_discard_a_test_of_another_bar_is_told_that_the_hanger_may_be_da
     assert "damaged" not in notice_of(PLAIN, [copied], 12, [])
 
 
+@pytest.mark.parametrize(("share", "moved"), [(0.85, "has lost 1"), (1.15, "has gained 1")])
+def test_which_way_the_tension_would_have_gone_is_said(share: float, moved: str) -> None:
+    moved_test = replace(PLAIN, test=modelled_test("t", HANGER_3, 0, share))
+    doubt = Doubt("right hanger", "the modes fit hanger 4: right hanger?", "Drop it", "Why.")
+    assert f"hanger 3 {moved}" in notice_of(moved_test, [doubt], 12, [])
+
+
 @pytest.mark.parametrize("share", [0.8, 0.9, 0.95, 1.0, 1.1])
 def test_the_tension_that_the_modes_imply_is_that_of_the_beam(share: float) -> None:
     """Clamped ends, as described: f(T) of beam1 is the closed form; linear in ln T to 10 %."""

@@ -11,6 +11,7 @@ import pytest
 
 from shm.bridge import load_bridge
 from shm.errors import BadInput, StoreBusy, UsageError
+from shm.pipeline import utc_now
 from shm.resources import default_config
 from shm.settings import TABLE, load_settings
 from shm.store import Workspace
@@ -104,3 +105,13 @@ def test_the_templates_example_hook_is_a_valid_one(tmp_path: Path) -> None:
     (tmp_path / "bridge.toml").write_text("\n".join(hook))
     (found,) = load_bridge(tmp_path / "bridge.toml").hooks
     assert found.name == "mail"
+
+
+def test_a_setting_that_cannot_hold_is_refused_and_nothing_is_changed(tmp_path: Path) -> None:
+    workspace = Workspace.initialise(tmp_path / "bridge")
+    with workspace.store() as store:
+        with pytest.raises(BadInput, match="samples"):
+            workspace.change_setting(store, "settings.samples", 1.0, utc_now(), "anna")
+        assert store.settings.list_current() == {}
+        workspace.change_setting(store, "settings.samples", 4000.0, utc_now(), "anna")
+        assert list(store.settings.list_current()) == ["settings.samples"]
