@@ -151,11 +151,10 @@ class GroupedLikelihood(Likelihood):
     def __init__(self, tests: Sequence[ModalTest], repeat: int, sigma: str):
         super().__init__(tests, repeat)
         self.by_name = groups(self.modes, sigma)
-        self._groups = list(self.by_name.values())
-        self._parts = [Likelihood.part(self, own) for own in self._groups]
+        self._parts = [Likelihood.part(self, own) for own in self.by_name.values()]
 
     def marginal(self, predicted: FloatArray, floor: float = 0.0) -> FloatArray:
-        parts = zip(self._parts, self._groups, strict=True)
+        parts = zip(self._parts, self.by_name.values(), strict=True)
         terms = [part.marginal(predicted[:, own], floor) for part, own in parts]
         return np.asarray(np.sum(terms, axis=0))
 
@@ -171,11 +170,11 @@ class GroupedLikelihood(Likelihood):
         return {name: part.draw_sigma(predicted[:, own], rng) for part, (name, own) in parts}
 
     def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
-        parts = zip(self._parts, self._groups, strict=True)
+        parts = zip(self._parts, self.by_name.values(), strict=True)
         return self._mean([part.likeliest_sigma(predicted[:, own]) for part, own in parts])
 
     def _mean(self, sigmas: Sequence[FloatArray]) -> FloatArray:
-        weights = [len(own) for own in self._groups]
+        weights = [len(own) for own in self.by_name.values()]
         return np.asarray(np.sqrt(np.average(np.square(sigmas), axis=0, weights=weights)))
 
 

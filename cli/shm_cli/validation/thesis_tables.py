@@ -5,12 +5,12 @@ The data of 5.1 and 6.1 are table 1.1, counted ten times (docs/trials/validation
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from shm.modes_document import load_modes
-from shm.values import PLANES, Hanger
+from shm.values import PLANES, Hanger, Plane
 from shm_cli import thesis
 from shm_cli.validation import selection
 
@@ -35,17 +35,18 @@ def measured(hanger: Hanger, seed: int, tell: Tell) -> Shown:
         for printing, path in thesis.PRINTINGS.items()
     }
     document = [
-        {"plane": plane, "order": order, **{name: hz[plane, order] for name, hz in own}}
-        for own in [by_printing.items()]
-        for plane, order in _in_order(by_printing[_PRINTING])
+        {"plane": plane, "order": order}
+        | {name: hz[plane, order] for name, hz in by_printing.items()}
+        for plane, order in sorted(by_printing[_PRINTING], key=_place)
     ]
     heads = ("plane", "mode", *(f"{name} (Hz)" for name in by_printing))
     cells = [tuple(f"{value}" for value in row.values()) for row in document]
     return Shown(heads, cells, document)
 
 
-def _in_order(hz: dict[Any, float]) -> Iterator[tuple[Any, int]]:
-    return iter(sorted(hz, key=lambda each: (PLANES.index(each[0]), each[1])))
+def _place(mode: tuple[Plane, int]) -> tuple[int, int]:
+    plane, order = mode
+    return PLANES.index(plane), order
 
 
 def evidence(hanger: Hanger, seed: int, tell: Tell) -> Shown:
