@@ -43,7 +43,8 @@ ENOUGH = 0.5
 """Effective draws for each sample to keep; fewer repeat draws, more cost in proportion."""
 
 _AGAIN = (3, 9)
-"""Times as many particles in a second and a third attempt, where the draws were too few."""
+"""Times as many particles in a second and a third attempt, where the draws are too few or the tail
+of their weights is heavy."""
 
 
 def update(
@@ -111,19 +112,23 @@ def infer(
 ) -> Weighted:
     """Weighted draws of the posterior of any `problem`, enough for `samples` equal ones.
 
-    Where fewer than 200 are effective it goes on with more particles; `Posterior.caveats` says so
-    where that did not help.
+    Where fewer than 200 are effective, or their weights have a heavy tail, it goes on with more
+    particles; `Posterior.caveats` says so where too few remain.
     """
     near = warm_start_from(problem, warm_start)
     particles = max(samples // _SAMPLES_A_PARTICLE, _FEWEST_PARTICLES)
-    best = _weighted(problem, samples, particles, rng, progress, near)
+    attempts = [_weighted(problem, samples, particles, rng, progress, near)]
     for more in _AGAIN:
-        if best.effective_sample_size >= min(ENOUGH_EFFECTIVE, samples):
-            break
+        if _sound(attempts[-1], samples):
+            return attempts[-1]
         # Other anchors and slower stages; the posterior is the same.
-        again = _weighted(problem, samples, more * particles, rng, progress)
-        best = max(best, again, key=lambda each: each.effective_sample_size)
-    return best
+        attempts.append(_weighted(problem, samples, more * particles, rng, progress))
+    return max(attempts, key=lambda each: (_sound(each, samples), each.effective_sample_size))
+
+
+def _sound(weighted: Weighted, samples: int) -> bool:
+    enough = weighted.effective_sample_size >= min(ENOUGH_EFFECTIVE, samples)
+    return enough and weighted.light_tailed
 
 
 def _weighted(
@@ -233,8 +238,6 @@ _FEWEST = 0.25
 _HOPELESS = 0.05
 _LEAST_SPREAD = 0.7
 
-_WORST_TAIL = 0.7  # Vehtari et al. 2024, see `tail_index`
-
 
 def refresh(
     tests: Sequence[ModalTest],
@@ -329,36 +332,13 @@ def _places(problem: Problem, known: Posterior) -> FloatArray:
 
 def trusted(weighted: Weighted, samples: int) -> bool:
     """Whether the effective draws are enough for `samples`, and the weights' tail light enough."""
-    if weighted.effective_sample_size < _FEWEST * samples:
-        return False
-    return tail_index(weighted.log_weights) <= _WORST_TAIL
+    return weighted.effective_sample_size >= _FEWEST * samples and weighted.light_tailed
 
 
 def _as_wide(weighted: Weighted, chain: FloatArray, samples: int, rng: np.random.Generator) -> bool:
     """Whether the weighted draws spread in each direction as the ensemble's points (n, d) do."""
     spread = weighted.resampled(samples, rng).z.std(axis=0) / chain.std(axis=0)
     return bool(spread.min() > _LEAST_SPREAD)
-
-
-def tail_index(log_weights: FloatArray) -> float:
-    """Shape k of the generalised Pareto distribution of the largest weights (n,).
-
-    Above 0.7 the mean of the weights converges too slowly to be used (Vehtari, Simpson, Gelman,
-    Yao and Gabry 2024, J. Mach. Learn. Res. 25(72)). The fit is that of Zhang and Stephens (2009),
-    drawn to 0.5 as Vehtari et al. do.
-    """
-    weights = np.sort(np.exp(log_weights - log_weights.max()))
-    tail = int(min(len(weights) / 5, 3 * np.sqrt(len(weights))))
-    excess = weights[-tail:] - weights[-tail - 1]
-    tries = np.arange(1, 31 + int(np.sqrt(tail)))
-    quartile = excess[int(tail / 4 + 0.5) - 1]
-    theta = 1 / excess[-1] + (1 - np.sqrt(tries[-1] / (tries - 0.5))) / (3 * quartile)
-    shape = np.log1p(-theta[:, None] * excess).mean(axis=1)
-    log_likelihood = tail * (np.log(-theta / shape) - shape - 1)
-    share = np.exp(log_likelihood - log_likelihood.max())
-    best = (theta * share).sum() / share.sum()
-    k = np.log1p(-best * excess).mean()
-    return float((tail * k + 5) / (tail + 10))
 
 
 def _ensemble(

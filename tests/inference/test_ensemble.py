@@ -10,7 +10,7 @@ import pytest
 from shm.documents import posterior_document
 from shm.errors import BadInput, UsageError
 from shm.inference import UpdateOptions, refresh, update, updating
-from shm.inference.importance import Weighted, weigh
+from shm.inference.importance import Weighted, tail_index, weigh
 from shm.inference.problem import Points
 from shm.models import THESIS, Model, build
 from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, Posterior
@@ -220,8 +220,14 @@ def test_the_tail_index_is_that_of_the_weights(shape: float) -> None:
     """Weights of a generalised Pareto distribution have its shape as tail index."""
     uniform = np.random.default_rng(3).random((20, 20000))
     weights = (uniform**-shape - 1) / shape
-    found = np.mean([updating.tail_index(np.log(row)) for row in weights])
+    found = np.mean([tail_index(np.log(row)) for row in weights])
     assert found == pytest.approx(shape, abs=0.1)
+
+
+def test_the_tail_of_a_few_weights_above_zero_is_the_heaviest() -> None:
+    log_weights = np.full(3000, -1e4)
+    log_weights[:30] = 0.0
+    assert tail_index(log_weights) == np.inf
 
 
 def test_even_weights_are_trusted_and_few_or_wild_ones_are_not() -> None:

@@ -14,6 +14,7 @@ from shm.inference.updating import infer
 from shm.models import THESIS, build
 from shm.values import PLANES, BoolArray, FloatArray, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
+from tests.helpers.sharp_oracle import ORACLE, sharp_test
 from tests.helpers.slow import few_of
 
 # Two truths on which the sampler used to lose itself: its population never met the valley.
@@ -50,6 +51,15 @@ def test_a_needle_has_the_same_evidence_and_tension_whatever_the_seed(
         assert low < theta[0] < high
         evidences.append(weighted.log_evidence)
     assert evidences[0] == pytest.approx(evidences[1], abs=0.3)
+
+
+def test_a_heavy_tail_of_the_weights_is_not_taken_for_an_answer() -> None:
+    """A first attempt by this seed all but misses a ridge; its evidence would be 1.0 too low."""
+    model = build("beam2", HANGER_3, THESIS)
+    problem = Problem.of([sharp_test()], model, 1, silent)
+    found = infer(problem, 1000, np.random.default_rng(128))
+    assert found.light_tailed
+    assert found.log_evidence == pytest.approx(ORACLE[1], abs=0.2)
 
 
 def near_the_best(problem: Problem, anchors: Anchors, z: FloatArray) -> BoolArray:
