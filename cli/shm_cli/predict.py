@@ -28,7 +28,7 @@ _MOST_POINTS = 10_000  # technical: a table that a person can still open, in sec
 @click.option("--sweep", metavar="NAME=FROM:TO:N", help="A parameter over a range.")
 @click.option(
     "--figure",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=flags.NewFile(),
     metavar="FILE.png",
     help="Draw the frequencies of the --sweep here, or the --shape.",
 )
@@ -159,12 +159,11 @@ def _show_sweep(
 
 def _solved(model: Model, theta: FloatArray, modes: int) -> FloatArray:
     """Frequencies in Hz, planes by modes; raises UsageError where the parameters have none."""
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         found: FloatArray = model.reference_frequencies_hz(theta[None], modes)[0]
-    if not np.isfinite(found[:, 0]).all():
-        given = ", ".join(
-            f"{name}={value:g}" for name, value in zip(model.parameter_names, theta, strict=True)
-        )
+    of = dict(zip(model.parameter_names, theta, strict=True))
+    if not np.isfinite(found[:, 0]).all() or of.get("theta_L", 1.0) <= 0:
+        given = ", ".join(f"{name}={value:g}" for name, value in of.items())
         raise UsageError(
             f"model class {model.name} has no frequencies at {given}.",
             remedy="Give positive numbers: theta_F is a multiple of the nominal tension.",

@@ -57,7 +57,7 @@ TABLES = tuple(sorted((*frequencies.TABLES, *thesis_tables.TABLES)))
 )
 @click.option(
     "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=flags.NewFile(),
     metavar="FILE.png",
     help="Draw the --figure here.",
 )

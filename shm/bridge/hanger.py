@@ -39,6 +39,8 @@ _LARGEST_POISSONS_RATIO = 0.499
 _LEAST_FACTOR = 1e-6
 _SOFTEST_PA, _STIFFEST_PA = 1e6, 2e12
 """Rubber, and twice a diamond: what lies beyond was written in another unit."""
+# Light timber and osmium; the strongest carbon fibre.
+_LIGHTEST_KG_M3, _DENSEST_KG_M3, _STRONGEST_PA = 300.0, 23000.0, 7e9
 _LONGEST_M = 1000.0  # judgement: the longest stays have 580 m; of 4000 m and more no mode is solved
 
 _FORK_DIAMETERS, _NODE_SHARE = 4.0, 0.03
@@ -72,6 +74,8 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
             f"a section of {max(diameter, math.sqrt(area)):g} m is no hanger of {length_m:g} m",
             "Give lengths and diameters in m, areas in m2.",
         )
+    nominal_tension_n = table.not_negative("nominal_tension_n")
+    _refuse_other_units(table, mass / area, nominal_tension_n / area)
     fittings_m, plate = _fittings(table, length_m), _plate(table.table("plate"), length_m, diameter)
     open_ends = plate is None and not any(fittings_m)
     return Hanger(
@@ -83,7 +87,7 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         area_m2=area,
         second_moment_m4=second_moment,
         mass_per_length_kg_m=mass,
-        nominal_tension_n=table.not_negative("nominal_tension_n"),
+        nominal_tension_n=nominal_tension_n,
         name=str(values.get("name", "")),
         thresholds=_thresholds(table.table("thresholds")),
         diameter_m=diameter,
@@ -100,6 +104,19 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         limits=_limits(table.table("limits")),
         fittings_m=fittings_m,
     )
+
+
+def _refuse_other_units(table: Table, density_kg_m3: float, stress_pa: float) -> None:
+    if not _LIGHTEST_KG_M3 <= density_kg_m3 <= _DENSEST_KG_M3:
+        raise table.refusal(
+            f"{density_kg_m3:g} kg/m3 is the density of no hanger",
+            "Give masses in kg, lengths in m: steel has 7850 kg/m3.",
+        )
+    if stress_pa > _STRONGEST_PA:
+        raise table.refusal(
+            f"nominal_tension_n makes a stress of {stress_pa / 1e6:g} MPa, which no hanger carries",
+            "Give it in N, lengths in m.",
+        )
 
 
 def _scatter(table: Table, length_m: float, area_m2: float, open_ends: bool) -> Scatter:

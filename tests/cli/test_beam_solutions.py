@@ -35,7 +35,7 @@ def test_a_figure_is_shown_drawn_and_given_as_a_document(shm: Shm, tmp_path: Pat
     path = tmp_path / "figure.png"
     told = shm("validate", "--figure", "2.7", "--out", path)
     assert "phi_7" in told.out
-    assert "does not state its springs" in told.out
+    assert "not how stiff" in told.out
     assert path.read_bytes().startswith(PNG)
     assert len(shm("validate", "--figure", "2.6", "--json").document["points"][0]["values"]) == 7
 

@@ -85,6 +85,8 @@ def test_the_table_of_a_sweep_has_a_column_a_mode(shm: Shm, hanger_file: Path) -
         (["beam1", "--set", "theta_F"], "NAME=VALUE"),
         (["beam1", "--set", "theta_X=1"], "unknown ['theta_X']"),
         (["beam1", "--sweep", "theta_F=1:2"], "NAME=FROM:TO:N"),
+        (["beam1", "--set", "theta_L=-1"], "no frequencies at theta_F=1, theta_L=-1"),
+        (["beam1", "--set", "theta_L=0"], "no frequencies at theta_F=1, theta_L=0"),
     ],
 )
 def test_a_wrong_parameter_is_a_usage_error_that_says_how(
@@ -99,6 +101,8 @@ def test_a_sweep_is_drawn(shm: Shm, hanger_file: Path, tmp_path: Path) -> None:
     drawn = ("--sweep", "theta_F=0.5:2:4", "--figure", tmp_path / "sweep.png")
     assert shm("predict", "beam1", "--hanger-file", hanger_file, *drawn).code == 0
     assert (tmp_path / "sweep.png").read_bytes().startswith(b"\x89PNG")
+    nowhere = ("--figure", tmp_path / "no" / "sweep.png")
+    assert "is no folder" in shm("predict", "beam1", *drawn[:2], *nowhere).err
     alone = shm("predict", "beam1", "--hanger-file", hanger_file, *drawn[2:])
     assert alone.code == 2
     assert "--sweep" in alone.err

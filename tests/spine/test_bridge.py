@@ -127,6 +127,8 @@ def test_a_described_hanger_survives_the_way_to_another_process(tmp_path: Path) 
         (("mass_kg", "weight_kg"), "unknown key weight_kg"),
         (("[[hanger.turnbuckle]]", "[hanger.turnbuckle]"), "turnbuckle is not a list of tables"),
         (("elastic_modulus_pa = 200e9", "elastic_modulus_pa = 205"), "205 is that of no material"),
+        (("density_kg_m3 = 7800", "density_kg_m3 = 7.85"), "7.85 kg/m3 is the density of no"),
+        (("nominal_tension_n = 711e3", "nominal_tension_n = 711e6"), "makes a stress of 53"),
         (("diameter_m = 0.130", "diameter_m = 130"), "a section of 130 m is no hanger of 12 m"),
         (("length_m = 12.0", "length_m = 12000"), "length_m = 12000 is longer than any hanger"),
         (("id = 3", "id = 3\npoissons_ratio = 0.5"), "poissons_ratio = 0.5 is not from 0 to 0.499"),

@@ -92,9 +92,12 @@ def _held_faces(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow
         )
         yield _row("3.2", "solid0", condition, ours, printed, 0.3 if whole else np.nan)
     stiff = np.array([[1.0, *[np.log10(STIFFEST_SOLVED)] * _SPRINGS["solid1"]]])
-    sprung = build("solid1", hanger, THESIS).reference_frequencies_hz(stiff, MODES)[0, 0]
-    printed = tables["rotational"]["stiff_springs"]
-    yield _row("3.3", "solid1", "stiff springs, with and without rotations", sprung, printed, 1.5)
+    sprung = build("solid1", hanger, THESIS).reference_frequencies_hz(stiff, MODES)[0]
+    for place, plane in enumerate(PLANES):
+        printed = tables["rotational"][f"stiff_springs{'_y' * place}"]
+        condition = f"stiff springs, with and without rotations{', y' * place}"
+        row = _row("3.3", "solid1", condition, sprung[place], printed, 1.5)
+        yield replace(row, plane=plane)
 
 
 def _table_a_2_explained(hanger: Hanger, tables: dict[str, Any]) -> Iterator[FrequencyRow]:

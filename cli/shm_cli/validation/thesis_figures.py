@@ -110,9 +110,7 @@ Tell = Callable[[str, float], None]
 # As in the thesis, chapter 5: data and N_D; technical: draws enough for a marginal.
 _PRINTING, _REPEAT, _SAMPLES = "table 1.1", 10, 2000
 
-# Class and parameters by figure: one or more alone, "a/b" a against b, "" the frequencies. Of 5.24
-# and 5.31 the captions name a parameter twice, of 5.28 a kx that the class has not: what is left
-# stands for it. 5.32 is of class 2 by its text, not of class 1.
+# Class and parameters by figure: one or more alone, "a/b" a against b, "" the frequencies.
 _ALL = """
 5.1 beam1 L F sigma | 5.2 beam1 L/F | 5.3 beam1
 5.4 beam2 F L k1 k2 | 5.5 beam2 k3 k4 sigma | 5.6 beam2 L/F | 5.7 beam2 k1/F | 5.8 beam2 k1/L
@@ -124,6 +122,12 @@ _ALL = """
 5.30 solid2 F k1 k2 k3 | 5.31 solid2 k4 sigma | 5.32 solid2 k4/k1 | 5.33 solid2 k1/F
 5.34 solid2 k2/F | 5.35 solid2 k3/F | 5.36 solid2 k4/F | 5.37 solid2
 """
+_MISPRINTED = {
+    "5.24": "The caption names kly again; klx, which no other shows, stands for it.",
+    "5.28": "The caption names kx, the list of figures krx and k3; klx stands for it.",
+    "5.31": "The caption names k4 twice; sigma stands for one.",
+    "5.32": "The caption names class 1, the text class 2.",
+}
 POSTERIORS = {
     number: (model, tuple(names))
     for each in _ALL.replace("\n", "|").split("|")
@@ -139,6 +143,7 @@ def posterior(hanger: Hanger, tell: Tell, number: str) -> Figure:
     if not names:
         return _frequencies(hanger, posterior, number)
     alone = tuple(_name(part) for part in "/".join(names).split("/"))
+    data = f"{_DATA} {_MISPRINTED.get(number, '')}".strip()
     heads = ("parameter", "most probable", "mean", "sd", "5 %", "median", "95 %")
     cells, document = [], {}
     for name in alone:
@@ -149,9 +154,9 @@ def posterior(hanger: Hanger, tell: Tell, number: str) -> Figure:
         document[name] = dict(zip(heads[1:], values, strict=True))
     if "/" not in names[0]:
         drawn = parameter_pairs.marginals(posterior, alone)
-        return Figure(_title(number, "alone"), heads, cells, _DATA, document, drawn)
+        return Figure(_title(number, "alone"), heads, cells, data, document, drawn)
     pair = np.array([posterior.parameter(name) for name in alone])
-    statement = f"{_DATA} Correlation {np.corrcoef(pair)[0, 1]:+.2f}. Colours: posterior density."
+    statement = f"{data} Correlation {np.corrcoef(pair)[0, 1]:+.2f}. Colours: posterior density."
     drawn = parameter_pairs.pair(posterior, *alone)
     return Figure(_title(number, "against each other"), heads, cells, statement, document, drawn)
 
@@ -231,7 +236,8 @@ SOLUTIONS = {
         ),
         Drawn(
             "2.7", "phi", *_SMALL, 10.0,
-            "The thesis does not state its springs; 10 is half way between pinned and clamped.",
+            "The thesis's caption says problem A, its text springs, not how stiff; 10 is half way "
+            "between pinned and clamped.",
         ),
     )
 }  # fmt: skip
@@ -287,7 +293,7 @@ def solution(hanger: Hanger, tell: Callable[[str, float], None], number: str) ->
     return Figure(
         found.figure.title,
         ("xi", *(f"{found.figure.quantity}_{n}" for n in range(1, MODES + 1))),
-        [(f"{xi:.1f}", *(f"{value:.4f}" for value in row)) for xi, row in found.rows()],
+        [(f"{xi:.4g}", *(f"{value:.4f}" for value in row)) for xi, row in found.rows()],
         found.statement,
         found.document(),
         found.specification(),
