@@ -89,7 +89,7 @@ def command(ctx: click.Context, hanger_id: int | None, all_tests: bool) -> None:
 @flags.json
 @click.option(
     "--figure",
-    type=flags.NewFile(),
+    type=flags.NewFile(".png"),
     metavar="FILE.png",
     help="Write the elevation of the bridge, hangers coloured by their shift, as a picture.",
 )

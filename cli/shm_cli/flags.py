@@ -55,15 +55,24 @@ class Time(click.ParamType[datetime]):
 
 
 class NewFile(click.Path):
-    """A path at which a file can be written, new or in the place of one."""
+    """A path at which a file can be written, new or in the place of one.
 
-    def __init__(self) -> None:
+    With an `ending` such as ".png" it has no other.
+    """
+
+    def __init__(self, ending: str = "") -> None:
         super().__init__(dir_okay=False, writable=True, path_type=Path)
+        self._ending = ending
 
     def convert(
         self, value: Any, parameter: click.Parameter | None, context: click.Context | None
     ) -> Any:
         path = Path(os.fsdecode(super().convert(value, parameter, context)))
+        if self._ending and path.suffix.lower() != self._ending:
+            raise BadInput(
+                f"{path} is no name of a {self._ending} file.",
+                remedy=f"Let it end in {self._ending}: that is what is written.",
+            )
         folder = path.absolute().parent
         if not folder.is_dir():
             raise BadInput(f"{folder} is no folder.", remedy="Make it first, or name another.")

@@ -28,7 +28,7 @@ _MOST_POINTS = 10_000  # technical: a table that a person can still open, in sec
 @click.option("--sweep", metavar="NAME=FROM:TO:N", help="A parameter over a range.")
 @click.option(
     "--figure",
-    type=flags.NewFile(),
+    type=flags.NewFile(".png"),
     metavar="FILE.png",
     help="Draw the frequencies of the --sweep here, or the --shape.",
 )

@@ -57,7 +57,7 @@ TABLES = tuple(sorted((*frequencies.TABLES, *thesis_tables.TABLES)))
 )
 @click.option(
     "--out",
-    type=flags.NewFile(),
+    type=flags.NewFile(".png"),
     metavar="FILE.png",
     help="Draw the --figure here.",
 )
@@ -83,6 +83,10 @@ def command(
     Example: shm validate --table A.5
     Example: shm validate --formulas
     """
+    given = {"--figure": figure, "--table": wanted, "--formulas": practice, "--list": listed}
+    asked = [option for option, value in given.items() if value]
+    if len(asked) > 1:
+        raise UsageError(f"{' and '.join(asked)} are not one question.", remedy="Give one of them.")
     if figure is not None:
         _show_figure(figure, out)
         return
@@ -181,9 +185,12 @@ def _show_formulas(seed: int) -> None:
 
 
 def _show_list() -> None:
+    files = {"MODES.json": thesis.PRINTINGS["table 1.1"], "H.toml": thesis.HANGER_FILE}
     items = thesis.checklist()
     if flags.wants_json():
         show(items)
     else:
         heads = ("of", "what", "where")
         show_rows("the thesis", heads, [tuple(item[head] for head in heads) for item in items])
+        for name, path in files.items():
+            click.echo(f"{name}: {path}")

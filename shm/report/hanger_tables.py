@@ -207,22 +207,31 @@ def practice(data: HangerReport) -> Table:
 
     def add(name: str, found: Sequence[float], *rest: str) -> None:
         if np.isfinite(found).any():
-            told = [f"{unit.of(n):.0f}" if math.isfinite(n) else "unknown" for n in found]
+            told = [
+                "unknown" if math.isnan(n) else "below 0" if n < 0 else f"{unit.of(n):.0f}"
+                for n in found
+            ]
             rows.append((name, *told, *rest))
 
     for each in FORMULAS:
         found = [each.tension_n(measured.get((p, each.order), np.nan), *bar) for p in PLANES]
-        add(f"{each.name}, mode {each.order}", found, each.ends, each.leaves_out)
+        holds = f"from xi = {each.valid_from_xi:g}, within {each.worst_error:.0%}"
+        add(f"{each.name}, mode {each.order}", found, each.ends, holds, each.leaves_out)
     by_order = [{n: hz for (own, n), hz in measured.items() if own == plane} for plane in PLANES]
     fitted = [equal_springs.tension_n(own, *bar) for own in by_order]
-    add(f"{equal_springs.NAME}, all modes", fitted, equal_springs.ENDS, equal_springs.LEAVES_OUT)
+    add(
+        f"{equal_springs.NAME}, all modes", fitted, equal_springs.ENDS, "", equal_springs.LEAVES_OUT
+    )
     if not rows:
         return Table(title, (), ())
     said = stated(data.averaged, unit)
-    rows.append(("ours, all modes of both planes", said.tension, said.tension, "as found", ""))
-    heads = ("formula", *(f"{plane} ({unit.name})" for plane in PLANES), "ends", "leaves out")
+    rows.append(("ours, all modes of both planes", said.tension, said.tension, "as found", "", ""))
+    planes = (f"{plane} ({unit.name})" for plane in PLANES)
+    heads = ("formula", *planes, "ends", "holds on such ends", "leaves out")
+    xi = hanger.length_m * math.sqrt(data.averaged.tension_n.mean / hanger.bending_stiffness_n_m2)
     note = (
         "Each from the modes that it names, of one plane. "
+        f"xi = L sqrt(T/EI) is some {xi:.2g} here: below its range a formula says nothing. "
         f"The 90 % interval of ours is {said.interval}."
     )
     return Table(title, heads, tuple(rows), note)

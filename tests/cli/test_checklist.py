@@ -44,9 +44,10 @@ OF_THE_THESIS = [
       for each in numbered("table", chapter, last)),
     *numbered("equation", "2", 47),
     *numbered("equation", "4", 18),
-    "section 1.3", "section 2.4.3", "section 2.4.4", "section 3.1.1", "section 3.2.1",
-    "section 3.2.2", "section 3.3", "section 4.2.2", "section 5.1", "section 5.2", "section 6.1",
-    "section 6.2",
+    *(f"section {number}" for number in (
+        "1.1 1.2 1.3 1.4 2.1 2.2 2.3 2.4.1 2.4.2 2.4.3 2.4.4 3.1.1 3.1.2 3.2.1 3.2.2 3.2.3 3.3 "
+        "4.1 4.2.1 4.2.2 4.2.3 4.3 5.1 5.2 5.3 6.1 6.2"
+    ).split()),
 ]  # fmt: skip
 
 
@@ -136,6 +137,28 @@ def test_evidence_and_summary_stand_beside_the_thesis_s(monkeypatch: pytest.Monk
 def test_the_list_names_every_item() -> None:
     output = CliRunner().invoke(validate.command, ["--list", "--json"]).output
     assert all(item["of"] in output for item in ITEMS)
+
+
+def test_the_list_says_where_the_files_of_its_commands_lie() -> None:
+    output = CliRunner().invoke(validate.command, ["--list"]).output
+    assert f"H.toml: {thesis.HANGER_FILE}" in output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--figure", "2.4", "--table", "A.5"], "--figure and --table are not one question"),
+        (["--formulas", "--list"], "--formulas and --list are not one question"),
+        (["--figure", "2.4", "--out", "figure.jpg"], "figure.jpg is no name of a .png file"),
+        (["--figure", "2.4", "--out", "no/figure.png"], "is no folder"),
+    ],
+)
+def test_what_cannot_be_answered_is_refused_before_it_is_computed(
+    arguments: list[str], said: str
+) -> None:
+    result = CliRunner().invoke(validate.command, arguments)
+    assert result.output == ""
+    assert said in str(result.exception)
 
 
 def test_formulas_stand_beside_ours(monkeypatch: pytest.MonkeyPatch) -> None:

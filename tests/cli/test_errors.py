@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 import sqlite3
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +13,7 @@ import click
 import pytest
 
 from shm.store import Workspace
+from shm_cli import main
 from tests.cli.conftest import Ended, Shm
 from tests.helpers.command_lines import commands, examples, words_of
 
@@ -162,3 +165,21 @@ def test_the_dashboard_is_not_announced_where_it_cannot_begin(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "no.pem").write_text("no certificate")
     assert_told(shm("--workspace", empty.folder, "web", *options), {code})
+
+
+def test_an_answer_that_finds_no_room_is_no_fault_of_shm(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Full:
+        """A stream whose disk is full."""
+
+        def write(self, _: str) -> int:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        def flush(self) -> None:
+            """Nothing is held back."""
+
+    monkeypatch.setattr(sys, "stdout", Full())
+    assert main.run(["settings", "--json"]) == 3
+    told = capsys.readouterr().err
+    assert "no room is left where the answer goes" in told
