@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import errno
 import gc
 import sys
 import warnings
@@ -17,7 +16,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from shm import __version__
-from shm.errors import BadInput, ShmError
+from shm.errors import DISK_FULL, BadInput, ShmError
 from shm.resources import one_thread_a_process
 
 if TYPE_CHECKING:
@@ -206,16 +205,13 @@ def run(arguments: Sequence[str]) -> int:
         if isinstance(error, OSError) and error.filename is not None:
             _say(f"[bold red]Error:[/] {escape(_about_file(error))}")
             return BadInput.exit_code
-        if isinstance(error, OSError) and error.errno in _FULL:
+        if isinstance(error, OSError) and error.errno in DISK_FULL:
             _say("[bold red]Error:[/] no room is left where the answer goes. Make some.")
             return BadInput.exit_code
         _say(f"[bold red]Unexpected {type(error).__name__}:[/] {escape(str(error))}")
         _say("This is a fault of shm. `shm --debug ...` shows where; please report it.")
         return UNEXPECTED
     return result if isinstance(result, int) else 0
-
-
-_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def _about_file(error: OSError) -> str:

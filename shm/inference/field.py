@@ -206,12 +206,10 @@ class FieldLikelihood:
         beyond = beyond[:, : self.frequencies]
         return np.asarray(np.sqrt(beyond.mean(axis=1).clip(TAU_LOWER**2)))
 
-    def by_mode(self, predicted: FloatArray) -> FloatArray:
-        """Predictions (n, modes) of every mode of every test from those of the data (n, data).
-
-        With the sensors, supports, fittings and section that the data most probably had, by their
-        normal posterior at the mean prediction.
-        """
+    def explained(self, predicted: FloatArray) -> FloatArray:
+        """Predictions (n, frequencies) from those of the data (n, data), with the sensors,
+        supports, fittings and section that the data most probably had, by their normal posterior at
+        the mean prediction."""
         middle = predicted.mean(axis=0)[None]
         own = self.identification_error[: self.frequencies] ** 2
         repeats = self.likeliest_sigma(middle)[0] ** 2 * self._together
@@ -220,7 +218,11 @@ class FieldLikelihood:
         found = self._shift[: self.frequencies] + shared @ np.linalg.solve(
             np.diag(own) + repeats + shared, off
         )
-        return (predicted[:, : self.frequencies] * np.exp(found))[:, self.of_mode]
+        return np.asarray(predicted[:, : self.frequencies] * np.exp(found))
+
+    def by_mode(self, predicted: FloatArray) -> FloatArray:
+        """Predictions (n, modes) of every mode of every test, `explained`."""
+        return self.explained(predicted)[:, self.of_mode]
 
     def _nodes(self, predicted: FloatArray, step_in_sd: float, floor: float = 0.0) -> FloatArray:
         """Log likelihood and log weight of phi (n, nodes of tau, nodes of phi)."""

@@ -82,6 +82,10 @@ class Likelihood:
         """Fractional standard deviations (measurements,) of all errors but sigma."""
         return self.identification_error
 
+    def explained(self, predicted: FloatArray) -> FloatArray:
+        """Predictions (n, data) as they are: no error is shared."""
+        return predicted
+
     def by_mode(self, predicted: FloatArray) -> FloatArray:
         """Predictions (n, modes) of every mode of every test: each is a datum of its own."""
         return predicted

@@ -31,6 +31,10 @@ _ALIKE = 10.0 ** np.arange(-0.5, 2.1, 0.5)
 """k L/EI of ends that are all alike, from nearly pins to nearly clamped: on bars of
 `tests/benchmarks/round_ends.py` steps half as wide find nothing more."""
 
+_FARTHER = (0.1, 0.25, 0.5, 0.7, 1.4, 2.0)
+"""Of the end of the interval on that side: tensions held there tell how far the data allow any, of
+a slack hanger above all."""
+
 _AS_WELL = 1.0
 """A fit that is worse by less in its log likelihood is as good. The 90 % interval of a normal
 posterior reaches to 1.35: as good a fit beyond it is not its tail but another answer, which the
@@ -117,22 +121,30 @@ def _tension_of_other_ends_n(
 
     NaN where there is none. Frequencies tell springs from tension worst where all ends turn softly
     and alike, which are few among all pairs of ends. And where few modes of a short stiff bar tell
-    nearly nothing, clamped ends rule the nominal tension out that springs would allow.
+    nearly nothing, clamped ends rule the nominal tension out that springs would allow, and the
+    nominal tension a slack bar.
     """
-    found = [
-        climbed(problem, coordinates, best.place, best.sigma, held)
-        for held in (*map(coordinates.springs_alike, _ALIKE), {TENSION: 0.0})
+    low, high = np.quantile(ratio, [0.05, 0.95])
+    tensions = [0.0, *(math.log(of * (low if of < 1 else high)) for of in _FARTHER)]
+    box = coordinates.box
+    at = box.names.index(TENSION)
+    held = [
+        *map(coordinates.springs_alike, _ALIKE),
+        *({TENSION: each} for each in tensions if box.lower[at] < each < box.upper[at]),
     ]
+    found = [climbed(problem, coordinates, best.place, best.sigma, each) for each in held]
+    # From tensions that were held the climb goes on to the nearest optimum.
+    for theta, _ in found[len(_ALIKE) :]:
+        place = coordinates.places(theta[None])[0]
+        found.append(climbed(problem, coordinates, place, best.sigma))
     others = np.array([theta for theta, _ in found])
     fits = _fits(problem, found)
     as_well = fits > max(best.fit, fits.max()) - _AS_WELL
     nominal_n = problem.model.hanger.nominal_tension_n
-    low, high = np.quantile(ratio * nominal_n, [0.05, 0.95])
-    tension_n = others[as_well, 0] * nominal_n
-    away = np.maximum(low - tension_n, tension_n - high)
+    away = np.maximum(low - others[as_well, 0], others[as_well, 0] - high)
     if not (away > _MATERIAL * (high - low)).any():
         return NAN
-    return float(tension_n[away.argmax()])
+    return float(others[as_well, 0][away.argmax()] * nominal_n)
 
 
 def _tension_of_other_orders_n(

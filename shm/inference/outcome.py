@@ -162,8 +162,8 @@ def _at_bounds(problem: Problem, samples: FloatArray) -> tuple[str, ...]:
 
 def _misfit_percent(problem: Problem, predicted: FloatArray) -> float:
     """Root mean square of mean predictions over measured frequencies less 1, in per cent."""
-    count = getattr(problem.likelihood, "frequencies", predicted.shape[1])
-    off = problem.likelihood.misfit(predicted.mean(axis=0)[None])[0, :count]
+    found = problem.likelihood.explained(predicted).mean(axis=0)
+    off = found / problem.likelihood.frequency_hz[: len(found)] - 1
     return float(100 * np.sqrt(np.mean(off**2)))
 
 

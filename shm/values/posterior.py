@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from shm.values.hanger import Hanger, Limits
-from shm.values.kinds import NAN, FloatArray, Plane
+from shm.values.kinds import NAN, BoolArray, FloatArray, Plane
 from shm.values.modes import ModalTest
 from shm.values.rounding import force_unit
 from shm.values.showing import Shown, front, line, tension_words
@@ -308,8 +308,8 @@ class Averaged:
     `tension_n` is absolute, and its interval reaches to the tension with other ends where the data
     do not speak against these; `repeatability_sd_n` that of the most probable class, in N.
     `probability_above_limit` and `probability_slack` are those of a tension beyond the hanger's
-    limits (the thesis's robust reliability, 4.18), NaN where the owner sets none. `caveats` are
-    what keeps it from being taken at its word.
+    limits (the thesis's robust reliability, 4.18), NaN where the owner sets none or other ends
+    leave it open. `caveats` are what keeps it from being taken at its word.
     """
 
     tension_n: Summary
@@ -348,13 +348,21 @@ class Selection(Shown):
         above, slack = limits.tension_max_n, limits.tension_min_n
         likely = [p for p, w in zip(self.posteriors, self.probabilities, strict=True) if w > 0.05]
         others = [p.tension_of_other_ends_n for p in likely]
+        tension_n = Summary.of(draws).reaching([each for each in others if math.isfinite(each)])
         return Averaged(
-            Summary.of(draws).reaching([each for each in others if math.isfinite(each)]),
+            tension_n,
             self.selected.repeatability_sd_n,
-            float(np.mean(draws > above)) if above == above else NAN,
-            float(np.mean(draws < slack)) if slack == slack else NAN,
+            _probability(draws > above, tension_n.q95 > above) if above == above else NAN,
+            _probability(draws < slack, tension_n.q05 < slack) if slack == slack else NAN,
             _distinct([each for posterior in likely for each in posterior.caveats]),
         )
+
+
+def _probability(beyond: BoolArray, reaches: bool) -> float:
+    """The share of draws `beyond` (draws,) a limit; unknown where by these the 90 % interval would
+    not reach beyond it, but by other ends does."""
+    share = float(np.mean(beyond))
+    return NAN if reaches and share < 0.05 else share
 
 
 def _distinct(caveats: Sequence[str]) -> tuple[str, ...]:

@@ -37,9 +37,14 @@ from recordings_trial import (  # noqa: E402
 )
 
 from shm.errors import ShmError  # noqa: E402
-from shm.identify import IdentifyOptions, identification, identify  # noqa: E402
+from shm.identify import IdentifyOptions, identify  # noqa: E402
 from shm.identify.contract import Finding  # noqa: E402
-from shm.identify.estimation import amplitude_dependence, courses, stabilise  # noqa: E402
+from shm.identify.estimation import (  # noqa: E402
+    amplitude_dependence,
+    courses,
+    finished,
+    stabilise,
+)
 from tests.worlds import recordings as world  # noqa: E402
 
 CONSTANTS: Mapping[str, tuple[Any, str, float] | None] = {
@@ -109,7 +114,7 @@ def without_constants(cases: Iterator[world.Recording]) -> None:
                     shares.append((before.frequency_hz / at_rest - 1) / slope)
             return corrected
 
-        with patch.object(identification, "with_amplitude_dependence", all_ways):
+        with patch.object(finished, "with_amplitude_dependence", all_ways):
             _identified(case, {})
     for name, rows in errors.items():
         error, z = np.array(rows).T

@@ -21,15 +21,23 @@ OPTIONS = UpdateOptions(samples=200)
 CLASS = "beam2"
 
 
-def a_test(orders: range, hanger: Hanger = BAR, **about: float) -> ModalTest:
-    """Exact modes of both planes at `TENSION_N`, ends of k L/EI = 30."""
+def a_test(
+    orders: range,
+    hanger: Hanger = BAR,
+    tension_n: float = TENSION_N,
+    springs: tuple[float, ...] = (30, 30, 30, 30),
+    sd: float = 1e-4,
+    **about: float,
+) -> ModalTest:
+    """Exact modes of both planes, ends of k L/EI of `springs`, known to `sd` (fraction)."""
     model = build(CLASS, hanger, THESIS)
-    spring = np.log10(30 * hanger.bending_stiffness_n_m2 / hanger.length_m)
-    truth = {"theta_F": TENSION_N / hanger.nominal_tension_n, "theta_L": 1.0}
-    theta = np.array([[truth.get(name, spring) for name in model.parameter_names]])
+    unit = hanger.bending_stiffness_n_m2 / hanger.length_m
+    theta = np.array(
+        [[tension_n / hanger.nominal_tension_n, 1.0, *np.log10(np.multiply(springs, unit))]]
+    )
     found = model.frequencies_hz(theta, max(orders))[0]
     modes = tuple(
-        Mode(plane, order, float(row[order - 1]), frequency_sd_hz=1e-4 * float(row[order - 1]))
+        Mode(plane, order, float(row[order - 1]), frequency_sd_hz=sd * float(row[order - 1]))
         for plane, row in zip(PLANES, found, strict=True)
         for order in orders
     )
@@ -56,6 +64,26 @@ def test_right_orders_are_left_alone(orders: range) -> None:
     found = posterior(a_test(orders))
     assert np.isnan(found.tension_of_other_orders_n)
     assert found.description_off_sd < 3
+    assert found.faults == ()
+
+
+def test_a_slack_bar_that_looks_as_designed_is_told() -> None:
+    """A stiff bar at a fifth of its design: with other ends the design fits as well."""
+    stiff = shm.round_bar(
+        3, diameter_m=0.113, length_m=12.4, **STEEL | {"nominal_tension_n": 187e3}
+    )
+    test = a_test(range(1, 7), stiff, 40e3, springs=(11, 10, 15, 80), sd=1e-3)
+    found = posterior(test, stiff)
+    assert np.quantile(found.tension_n, 0.05) > 80e3
+    assert found.tension_of_other_ends_n < 60e3
+    assert any(each.startswith("The ends decide") for each in found.caveats)
+
+
+def test_modes_that_a_class_meets_are_not_missed_by_it() -> None:
+    """A short thick bar: that its supports give is expected, and no misfit where they do not."""
+    thick = shm.round_bar(3, diameter_m=0.08, length_m=5.0, **STEEL | {"nominal_tension_n": 277e3})
+    found = posterior(a_test(range(1, 9), thick, tension_n=264e3), thick)
+    assert found.misfit_percent < 0.1
     assert found.faults == ()
 
 
