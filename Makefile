@@ -12,7 +12,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo demo-live test test-others test-slow test-trials test-arithmetic numerics without-avx512 \
-	without-avx2 slow-without-avx512 slow-without-avx2 lint bench bench-peers docs tables lock clean
+	without-avx2 slow-without-avx512 slow-without-avx2 lint bench bench-short bench-peers docs tables lock clean
 
 demo: .venv/runtime
 	$(BIN)/shm demo
@@ -92,6 +92,10 @@ lint: .venv/development
 # Goes on where it stopped, and after what fails: build/bench/table.md.
 bench: .venv/development
 	$(BIN)/python tests/benchmarks/every.py
+
+# Small cases of each, an hour: whether all of them still run.
+bench-short: .venv/development
+	$(BIN)/python tests/benchmarks/every.py --short
 
 # Makes the peers' environments and runs them: hours.
 bench-peers: .venv/development

@@ -11,7 +11,8 @@ import shm
 from shm.inference import UpdateOptions, update
 from shm.inference.other_answers import _description_off_sd
 from shm.models import THESIS, build
-from shm.values import PLANES, Hanger, ModalTest, Mode, Posterior
+from shm.values import PLANES, Hanger, Limits, ModalTest, Mode, Posterior, Selection
+from tests.helpers.nouns import a_posterior
 from tests.helpers.slow import few_of
 
 STEEL = {"elastic_modulus_pa": 200e9, "density_kg_m3": 7850.0, "nominal_tension_n": 180e3}
@@ -85,6 +86,23 @@ def test_modes_that_a_class_meets_are_not_missed_by_it() -> None:
     found = posterior(a_test(range(1, 9), thick, tension_n=264e3), thick)
     assert found.misfit_percent < 0.1
     assert found.faults == ()
+
+
+@pytest.mark.parametrize(
+    ("other_n", "limit_n", "slack"),
+    [
+        (np.nan, 600e3, 0.0),
+        (500e3, 600e3, np.nan),  # the interval reaches beyond the limit, no draw does
+        (620e3, 600e3, 0.0),
+        (500e3, 711e3, 0.5),
+    ],
+)
+def test_how_likely_a_slack_hanger_is_stays_open_where_ends_decide(
+    other_n: float, limit_n: float, slack: float
+) -> None:
+    found = Selection((replace(a_posterior(), tension_of_other_ends_n=other_n),), (1.0,))
+    averaged = found.averaged(Limits(tension_min_n=limit_n))
+    assert averaged.probability_slack == pytest.approx(slack, abs=0.2, nan_ok=True)
 
 
 @pytest.mark.parametrize(
