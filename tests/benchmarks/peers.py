@@ -46,6 +46,7 @@ ENVIRONMENTS = {
     OURS: "",
     "dynesty": "nested",
     "dynesty_dynamic": "nested",
+    "dynesty_walks": "nested",
     "ultranest": "nested",
     "nautilus": "nested",
     "pocomc": "pocomc",

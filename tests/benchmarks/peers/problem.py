@@ -18,6 +18,7 @@ from importlib.metadata import version
 
 import numpy as np
 
+import shm
 from shm.inference.likelihood import Likelihood
 from shm.models import THESIS, build
 from shm.values import FloatArray
@@ -124,5 +125,7 @@ def report(package: str, run: Callable[[Target, int], Outcome]) -> None:
     started = time.process_time()
     outcome = run(target, arguments.seed)
     seconds = time.process_time() - started
-    head = {"version": version(package), "fingerprint": fingerprint, "cpu_seconds": seconds}
+    # An installation from a checkout may be older than what is run from it.
+    released = shm.__version__ if package == "shm" else version(package)
+    head = {"version": released, "fingerprint": fingerprint, "cpu_seconds": seconds}
     print(json.dumps(head | {"evaluations": target.evaluations} | asdict(outcome)), flush=True)

@@ -30,6 +30,7 @@ TITLES = {
     OURS: "**shm**",
     "dynesty": "dynesty, static",
     "dynesty_dynamic": "dynesty, dynamic",
+    "dynesty_walks": "dynesty, random walks",
     "ultranest": "ultranest",
     "nautilus": "nautilus",
     "pocomc": "pocoMC",
@@ -233,6 +234,9 @@ def _in_short(data: tuple[str, int], lines: Sequence[Sequence[str]]) -> str:
     told = []
     for cells in lines:
         row = dict(zip(COLUMNS, cells, strict=True))
+        if row["processor time s"] == "-":
+            told.append(f"{row['sampler']} did not end")
+            continue
         bias = "evidence" if row["bias"] == "-" else f"bias {row['bias']},"
         told.append(f"{row['sampler']} {row['processor time s']} s, {bias} {row['evidence is']}")
     return f"**{_title(data)}**, log evidence {EVIDENCE[data]:.2f}: {'; '.join(told)}."
