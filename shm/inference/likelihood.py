@@ -88,7 +88,7 @@ class Likelihood:
 
     def by_mode(self, predicted: FloatArray) -> FloatArray:
         """Predictions (n, modes) of every mode of every test: each is a datum of its own."""
-        return predicted
+        return self.explained(predicted)
 
     def misfit(self, predicted: FloatArray) -> FloatArray:
         """Fractional differences (n, measurements) of predictions from the measurements."""

@@ -7,10 +7,14 @@ import numpy as np
 from problem import Outcome, Target, kish, moments, report
 
 
-def run(target: Target, seed: int) -> Outcome:
-    """One run; dynesty evaluates point by point."""
+def run(target: Target, seed: int, sample: str = "auto") -> Outcome:
+    """One run; dynesty evaluates point by point. `sample` is its way to draw a live point."""
     sampler = dynesty.NestedSampler(
-        target.at, target.parameters, target.dimension, rstate=np.random.default_rng(seed)
+        target.at,
+        target.parameters,
+        target.dimension,
+        sample=sample,
+        rstate=np.random.default_rng(seed),
     )
     sampler.run_nested(print_progress=False)
     return outcome(sampler.results)
