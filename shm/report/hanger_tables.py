@@ -215,7 +215,7 @@ def practice(data: HangerReport) -> Table:
 
     for each in FORMULAS:
         found = [each.tension_n(measured.get((p, each.order), np.nan), *bar) for p in PLANES]
-        holds = f"from xi = {each.valid_from_xi:g}, within {each.worst_error:.0%}"
+        holds = f"from xi = {each.valid_from_xi:g}, within {100 * each.worst_error:g}%"
         add(f"{each.name}, mode {each.order}", found, each.ends, holds, each.leaves_out)
     by_order = [{n: hz for (own, n), hz in measured.items() if own == plane} for plane in PLANES]
     fitted = [equal_springs.tension_n(own, *bar) for own in by_order]
