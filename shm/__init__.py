@@ -136,7 +136,7 @@ sys.modules[__name__].__class__ = _Shm
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
-        """What is asked for is loaded then, so that `import shm` stays cheap."""
+        """Load a public name at its first use, so that `import shm` stays cheap."""
         if name in (*_MODULES, "notebook"):
             return import_module(f"shm.{name}")
         if name not in _HOME:

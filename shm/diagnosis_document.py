@@ -24,7 +24,7 @@ _PLAIN = (
 
 
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
-    """The document of `shm gap diagnose --json`."""
+    """Return the document of `shm gap diagnose --json`."""
     compatible = diagnosis.compatibility
     return {
         "schema": DIAGNOSIS_SCHEMA,
@@ -52,7 +52,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def bridge_diagnosis_document(found: BridgeDiagnosis) -> dict[str, Any]:
-    """The document of `shm gap diagnose --bridge --json`.
+    """Return the document of `shm gap diagnose --bridge --json`.
 
     `causes` are those that hangers share, with `family` (the hangers tried) and `members` (each
     with its probability and size); `tensions` are before, alone and jointly; `diagnoses` those of
@@ -76,7 +76,7 @@ def _cause_document(cause: Cause) -> dict[str, Any]:
 
 
 def diagnosis_of(document: Mapping[str, Any]) -> Diagnosis:
-    """A diagnosis back from its document; raises KeyError, TypeError or ValueError.
+    """Read a diagnosis from its document; raises KeyError, TypeError or ValueError.
 
     One from before outliers, 95 % intervals, compatibility and remainders were told has none.
     """

@@ -29,7 +29,7 @@ DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def sentence(text: str) -> str:
-    """A text with one full stop at its end, whatever it is quoted from had there already."""
+    """Return the text with exactly one full stop at its end."""
     text = text.rstrip()
     return text if text.endswith(("?", "!", "...")) else f"{text.rstrip('.')}."
 

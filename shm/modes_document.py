@@ -40,7 +40,7 @@ _LARGEST_DOCUMENT_BYTES = 32 << 20  # some thousand tests; it grows thirtyfold w
 
 
 def modes_document(tests: Sequence[ModalTest]) -> dict[str, Any]:
-    """The `shm.modes/1` document of tests of one hanger."""
+    """Return the `shm.modes/1` document of tests of one hanger."""
     hanger = tests[0].hanger if tests else None
     return {
         "schema": MODES_SCHEMA,
@@ -70,7 +70,7 @@ def test_document(test: ModalTest) -> dict[str, Any]:
 
 
 def load_modes(path: Path) -> tuple[ModalTest, ...]:
-    """The tests of a `*.modes.json` file; raises BadInput with file, test, mode and remedy."""
+    """Read the tests of a `*.modes.json` file; raises BadInput with file, test, mode, remedy."""
     try:
         _refuse_large(path)
         document = json.loads(path.read_text(encoding="utf-8"))
@@ -96,7 +96,7 @@ def _refuse_large(path: Path) -> None:
 
 
 def parse_modes(document: Any, file: str | Path = "") -> tuple[ModalTest, ...]:
-    """The tests of a modal-tests document already parsed from JSON; raises BadInput."""
+    """Read the tests of a modal-tests document already parsed from JSON; raises BadInput."""
     if not isinstance(document, dict) or document.get("schema") != MODES_SCHEMA:
         raise BadInput(
             f"not a modal-tests document of schema {MODES_SCHEMA}.",
@@ -160,7 +160,7 @@ def _refuse_misspelt(table: Any, known: Sequence[str], label: str, file: str | P
 
 
 def _faults(test: ModalTest) -> Iterator[tuple[bool, str, str]]:
-    """What may be wrong with values that are of the right types: whether, what, the remedy."""
+    """Yield a condition, its message and its remedy for each value out of range."""
     places = [(mode.plane, mode.order) for mode in test.modes]
     for i, mode in enumerate(test.modes):
         at = f".modes[{i}]:"
@@ -189,7 +189,7 @@ def _faults(test: ModalTest) -> Iterator[tuple[bool, str, str]]:
 
 
 def _sparse(kind: Any, by: Converter) -> Callable[[Any, Any], Any]:
-    """What is null is as good as left out, and what number is left out is not known."""
+    """Drop keys that are null, and set numbers that were left out to NaN."""
     take = make_dict_structure_fn(kind, by)
     numbers = dict.fromkeys(each.name for each in fields(kind) if each.type == "float")
     return lambda node, _: take(

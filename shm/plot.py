@@ -50,7 +50,7 @@ Data = TypeVar("Data")
 
 
 def tension(posterior: Posterior, hanger: Hanger, baseline: Posterior | None = None) -> Figure:
-    """The posterior of the tension: histogram, 90 % interval, nominal and baseline tension.
+    """Draw the posterior of the tension: histogram, 90 % interval, nominal and baseline tension.
 
     Example:
         >>> figure = shm.plot.tension(posterior, hanger)
@@ -66,7 +66,7 @@ def trend(
     hanger: Hanger,
     baseline: Posterior | None = None,
 ) -> Figure:
-    """The tension over time: mean and 90 % band by each test, nominal, baseline, thresholds.
+    """Draw the tension over time: mean and 90 % band by test, nominal, baseline, thresholds.
 
     `posteriors` and `tests` go together, one posterior a test; tests without a time are left out.
 
@@ -117,7 +117,7 @@ def pairs(posterior: Posterior, hanger: Hanger) -> Figure:
 
 
 def frequency_response(test: Identification, hanger: Hanger | None = None) -> Figure:
-    """The frequency response of a test in m/s^2/N over Hz, with the fitted modes and coherence.
+    """Draw a test's frequency response in m/s^2/N over Hz, with fitted modes and coherence.
 
     Example:
         >>> test = shm.identify(shm.read("hanger3.csv"), hanger=hanger)
@@ -127,7 +127,7 @@ def frequency_response(test: Identification, hanger: Hanger | None = None) -> Fi
 
 
 def stabilisation(test: Identification, hanger: Hanger | None = None) -> Figure:
-    """The poles of all model orders over Hz, and which of them became modes.
+    """Draw the poles of all model orders over Hz, and which of them became modes.
 
     Example:
         >>> figure = shm.plot.stabilisation(test)
@@ -136,7 +136,7 @@ def stabilisation(test: Identification, hanger: Hanger | None = None) -> Figure:
 
 
 def shapes(test: Identification, hanger: Hanger) -> Figure:
-    """The identified mode shapes along the hanger in m from the deck end, by plane and order.
+    """Draw the identified mode shapes along the hanger in m from the deck end, by plane and order.
 
     Example:
         >>> figure = shm.plot.shapes(test, hanger)
@@ -154,7 +154,7 @@ def gap(diagnosis: Diagnosis, hanger: Hanger) -> Figure:
 
 
 def causes(diagnosis: Diagnosis, hanger: Hanger) -> Figure:
-    """What causes the gap: the probability of each effect, of no gap, of something unknown.
+    """Draw the probability of each cause of a gap, of no gap, of something unknown.
 
     Example:
         >>> figure = shm.plot.causes(shm.diagnose(tests, hanger), hanger)
@@ -202,7 +202,7 @@ def _report(
     trend: tuple[TrendRow, ...] = (),
     baseline: Posterior | None = None,
 ) -> HangerReport:
-    """What the figures of a hanger are drawn from."""
+    """Return the data that the figures of a hanger are drawn from."""
     return HangerReport(
         bridge="",
         hanger=hanger,

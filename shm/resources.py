@@ -25,24 +25,24 @@ def _locate(relative: str) -> Path:
 
 
 def migrations_folder() -> Path:
-    """The alembic scripts."""
+    """Return the folder of the alembic scripts."""
     return _locate("migrations")
 
 
 def default_config() -> Path:
-    """The commented `bridge.toml` that `shm init` writes, but for the lines of the settings."""
+    """Return the commented `bridge.toml` of `shm init`, without the lines of the settings."""
     return _locate("config/default.toml")
 
 
 def unit_file(name: str) -> Path:
-    """A unit of systemd, such as the daemon's `shm.service`."""
+    """Return the path of a systemd unit, such as the daemon's `shm.service`."""
     return _locate(f"config/{name}")
 
 
 def when_asked(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """The `__getattr__` of a package whose names stand in the modules `homes`, by name."""
+    """Build the `__getattr__` of a package that imports each name from its module in `homes`."""
 
-    def __getattr__(name: str) -> Any:
+    def __getattr__(name: str) -> Any:  # noqa: N807 (the name that Python looks up)
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         return getattr(import_module(homes[name]), name)
@@ -51,7 +51,7 @@ def when_asked(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
 
 
 def one_thread_a_process() -> None:
-    """Keeps the linear algebra of this process and its children to one thread, unless told else.
+    """Limit linear algebra here and in children to one thread, unless the environment says else.
 
     Many threads slow problems of our size down ten times and change the last digits. To be called
     before numpy is imported.
@@ -61,7 +61,7 @@ def one_thread_a_process() -> None:
 
 
 def give_back_memory() -> None:
-    """Gives the memory that this process has freed back to the system, where glibc manages it.
+    """Return the memory that this process has freed to the system, where glibc manages it.
 
     It keeps what lies below anything still in use. After steps that take and free some 60 MB each,
     a process would hold more of it every day.
@@ -82,7 +82,7 @@ def memory_in_use(pid: int | str = "self") -> int:
 
 @cache
 def memory_of_machine() -> int:
-    """The memory of the machine or, where that is less, of our control group, in bytes.
+    """Return the memory of the machine or, if smaller, of our control group, in bytes.
 
     0 where the system does not tell.
     """

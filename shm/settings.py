@@ -83,7 +83,7 @@ def _row(
 
 
 def _choice(help_text: str, *choices: str) -> Any:
-    """A text that is one of `choices`, the first of which is the default."""
+    """Declare a text setting that is one of `choices`; the first is the default."""
     return field(default=choices[0], metadata={"unit": "", "help": help_text, "choices": choices})
 
 
@@ -215,7 +215,7 @@ _HELP_AT = 37  # layout: the column at which the meanings begin
 
 
 def commented() -> str:
-    """A line a setting for a new `bridge.toml`: its default, commented out, and what it means."""
+    """Return the lines of a new `bridge.toml`: each default, commented out, with its help."""
     lines = []
     for row in TABLE:
         meaning = f"{row.help}, in {row.unit}" if row.unit else row.help
@@ -230,7 +230,7 @@ def load_settings(
     environment: Mapping[str, str] | None = None,
     source: str = "bridge.toml",
 ) -> Settings:
-    """The settings in force; raises BadInput for an unknown name or a value out of range."""
+    """Return the settings in force; raises BadInput for an unknown name or bad value."""
     environment = os.environ if environment is None else environment
     file_table = file_table or {}
     flags = {name: value for name, value in (flags or {}).items() if value is not None}

@@ -44,7 +44,7 @@ def cache_of_reduced_bases(tmp_path_factory) -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def quick_stores(tmp_path_factory) -> Iterator[None]:
-    """What each of hundreds of new stores would do alike is done once in a process."""
+    """Do once in a process what each of hundreds of new stores would repeat."""
     with pytest.MonkeyPatch.context() as patch:
         copy_new_stores(patch, tmp_path_factory.mktemp("template"))
         share_compiled_statements(patch)
@@ -55,7 +55,7 @@ def quick_stores(tmp_path_factory) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def logging_ends_with_its_test() -> Iterator[None]:
-    """What a test lets begin to log writes to that test's standard error, which is closed then."""
+    """Remove log handlers of a test, whose standard error is closed at its end."""
     root, level = logging.getLogger(), logging.getLogger().level
     before = set(root.handlers)
     yield
@@ -68,14 +68,14 @@ def logging_ends_with_its_test() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def postgresql() -> Iterator[Databases]:
-    """A PostgreSQL server of this process's own, begun at first need."""
+    """Start a PostgreSQL server for this process at first need."""
     with postgresql_server() as databases:
         yield databases
 
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """The folder of real data, which a checkout may be without."""
+    """Return the folder of real data, which a checkout may be without."""
     fallback = Path(__file__).resolve().parents[2] / "shared" / "data"
     folder = Path(os.environ.get("SHM_DATA", fallback))
     if not folder.is_dir():

@@ -68,8 +68,8 @@ def formatter(kind: str, journal: bool = False) -> logging.Formatter:
 class TextFormatter(logging.Formatter):
     """One line a message: a file's name must not be able to write lines of its own."""
 
-    def formatMessage(self, record: logging.LogRecord) -> str:
-        """The message without control characters; a traceback follows on lines of its own."""
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 (logging's name)
+        """Return the message without control characters; a traceback follows on separate lines."""
         line = super().formatMessage(record)
         return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
 

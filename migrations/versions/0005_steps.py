@@ -111,7 +111,7 @@ def _watch_states() -> None:
 
 
 def _steps() -> None:
-    """The table, and of the stages reached before it what can still be told."""
+    """Create the table, and fill in the earlier stages that are still known."""
     op.create_table(
         "steps",
         sa.Column("id", sa.Integer(), nullable=False),

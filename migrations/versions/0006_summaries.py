@@ -84,7 +84,7 @@ def _mark_called() -> None:
 
 
 def _documents(table: sa.TableClause) -> Iterator[list[tuple[int, dict[str, Any]]]]:
-    """Some rows at a time with their documents, so that memory stays small."""
+    """Yield some rows at a time with their documents, so that memory stays small."""
     query = sa.select(table.c.id, table.c.document).order_by(table.c.id).limit(_ROWS_AT_ONCE)
     last = 0
     while rows := op.get_bind().execute(query.where(table.c.id > last)).all():

@@ -22,7 +22,7 @@ _KEPT = (
 
 
 def upgrade() -> None:
-    """What was tried or has ended was a message of its own: it keeps its key."""
+    """Keep the key of deliveries that were tried or have ended."""
     _resolutions()
     _silences()
     names = ", ".join(_KEPT)

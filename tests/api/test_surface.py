@@ -68,7 +68,7 @@ def named(path: str) -> object:
 
 
 def bare(signature: inspect.Signature) -> str:
-    """The signature without types; a default that is a function is left out."""
+    """Return the signature without types; a default that is a function is left out."""
     parameters = [
         each.replace(
             annotation=inspect.Parameter.empty,

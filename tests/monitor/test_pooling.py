@@ -19,7 +19,7 @@ SD = 2e-4
 def _readings(
     hz: FloatArray, level: FloatArray | None = None, temperature: FloatArray | None = None
 ) -> list[WindowReading]:
-    """A window each ten minutes, with one mode of a frequency near 5 Hz and one near 10 Hz."""
+    """Return a window each ten minutes, with a mode near 5 Hz and one near 10 Hz."""
     number = len(hz)
     levels = np.full(number, 0.01) if level is None else level
     warm = np.full(number, 10.0) if temperature is None else temperature

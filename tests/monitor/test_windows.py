@@ -20,7 +20,7 @@ WIND: FloatArray = values(MOTION, RNG, SECONDS)
 
 
 def _ring(at_s: float, size: float, tau_s: float) -> FloatArray:
-    """A motion that begins at once and decays, of the first mode."""
+    """Return a decaying motion of the first mode that starts at once."""
     since = np.arange(WIND.shape[1]) / RATE_HZ - at_s
     hz = MOTION.frequency_hz["transverse", 1]
     ring = size * np.exp(-since / tau_s) * np.sin(2 * np.pi * hz * since)

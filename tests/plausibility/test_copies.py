@@ -64,7 +64,7 @@ def cut(channel: Channel, samples: int) -> Channel:
 
 
 def part(recording: Recording, start_s: float, end_s: float) -> Recording:
-    """What a recording holds from a time on until another; a negative one counts from its end."""
+    """Return the recording between two times; a negative one counts from its end."""
     first, last = (round(time * recording.sampling_rate_hz) for time in (start_s, end_s))
     return changed(recording, lambda c: replace(c, values=c.values[first:last]))
 
@@ -236,8 +236,7 @@ def test_other_impacts_on_the_same_hanger_are_no_copies(hits: int, noise_m_s2: f
 
 @pytest.mark.parametrize(("hits", "bits"), [(1, 12), (1, 16), (1, 24), (3, 16)])
 def test_hits_of_a_machine_are_no_copies(hits: int, bits: int) -> None:
-    """One force at one sample: what differs is the background alone, or not even that where the
-    converter does not show it."""
+    """Keep identical hits apart, which differ in their background at most."""
     plan = HammerPlan(hits=hits, adc_bits=bits, peak_force_scatter=0.0, hit_time_scatter_s=0.0)
     machine = (
         hammer_test(HANGER_3, STATE, plan, np.random.default_rng(n), time=START, source="s")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime, time
-from datetime import date as Day
+from datetime import UTC, date, datetime, time
 from typing import Annotated
 from urllib.parse import urlencode
 
@@ -34,7 +33,7 @@ _Chosen = Annotated[
     list[Annotated[int, Query(ge=0, le=LARGEST_NUMBER)]] | None,
     Query(description=f"The number of a hanger; up to {MOST} of them."),
 ]
-_Since = Annotated[Day | None, Query(description="The first day; all tests without it.")]
+_Since = Annotated[date | None, Query(description="The first day; all tests without it.")]
 
 
 @router.get("/compare", include_in_schema=False)
@@ -99,7 +98,7 @@ def _chosen(site: Site, numbers: Sequence[int]) -> list[Hanger]:
     return [each for each in site.workspace.bridge.hangers if each.id in wanted]
 
 
-def _is_there(rows: Sequence[HangerLine], since: Day | None) -> bool:
+def _is_there(rows: Sequence[HangerLine], since: date | None) -> bool:
     """Whether `_courses` has anything of these hangers."""
     return any(
         row.baseline_tension_n is not None and row.latest and row.latest >= _begin(since)
@@ -107,21 +106,21 @@ def _is_there(rows: Sequence[HangerLine], since: Day | None) -> bool:
     )
 
 
-def _begin(since: Day | None) -> datetime:
-    return datetime.combine(since or Day.min, time(), UTC)
+def _begin(since: date | None) -> datetime:
+    return datetime.combine(since or date.min, time(), UTC)
 
 
-def _day(text: str) -> Day | None:
+def _day(text: str) -> date | None:
     """Of a form whose field may be left empty; raises BadInput."""
     if not text:
         return None
     try:
-        return Day.fromisoformat(text)
+        return date.fromisoformat(text)
     except ValueError as error:
         raise BadInput(f"{text} is no day.", remedy="Give it as 2026-05-31.") from error
 
 
-def _courses(site: Site, chosen: Sequence[Hanger], since: Day | None) -> list[Course]:
+def _courses(site: Site, chosen: Sequence[Hanger], since: date | None) -> list[Course]:
     """Of those that have a baseline and tests since that day."""
     begin = _begin(since) if since else None
     baselines = site.store.watch.baselines_in_force(chosen)
