@@ -1,46 +1,56 @@
 """A hook that is a program of the owner's: it gets the alert as JSON on its standard input. No
-shell, a bare environment, a time limit; it is ended with all its children.
+shell, a bare environment, a time limit; it is ended with every process that it began.
 """
 
 from __future__ import annotations
 
+import logging
 import os
+import selectors
 import shutil
-import signal
 import subprocess
-import tempfile
+import sys
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from typing import IO
 
 from shm.bridge import CommandHook
 from shm.documents import alert_document, dump
-from shm.values import Alert
-from shm_daemon.hooks.contract import SHOWN_CHARACTERS, HookFailed, Surroundings, one_line
+from shm.values import Alert, printable
+from shm_daemon.hooks import reaper
+from shm_daemon.hooks.contract import SHOWN_CHARACTERS, HookFailed, Surroundings
 
 _PASSED_ON = ("PATH", "HOME", "LANG")
 
+log = logging.getLogger(__name__)
+
 
 class Processes:
-    """Runs programs in the workspace's folder, each in a process group of its own."""
+    """Runs programs in the workspace's folder, each with a process that ends all it began."""
 
     def __init__(self, surroundings: Surroundings):
         self.folder, self._timeout_s = surroundings.folder, surroundings.timeout_s
         given = surroundings.environment
         self._environment = {name: given[name] for name in _PASSED_ON if name in given}
-        self._running: set[int] = set()
+        self._running: set[subprocess.Popen[bytes]] = set()
         self._lock = threading.Lock()
         self._closed = False
 
     def run(self, command: Sequence[str], told: bytes, variables: Mapping[str, str]) -> str:
-        """Runs a program with `told` on its standard input; the end of what it wrote on stdout.
+        """Run a program with ``told`` on its standard input; return the end of its stdout.
 
-        Raises HookFailed with the end of what it wrote on stderr.
+        When it ends, or its time is over, every process that it began is ended. Raises HookFailed
+        with the end of what it wrote on stderr.
         """
-        with tempfile.TemporaryFile() as answer, tempfile.TemporaryFile() as errors:
-            process = self._begin(command, variables, answer, errors)
+        report, its_end = os.pipe()
+        with os.fdopen(report, "rb", buffering=0) as file:
             try:
-                process.communicate(told, self._timeout_s)
+                process = self._begin(command, variables, its_end)
+            finally:
+                os.close(its_end)
+            try:
+                answer, errors = exchange(process, told, self._timeout_s)
             except subprocess.TimeoutExpired:
                 raise HookFailed(
                     f"ended after {self._timeout_s:g} s.",
@@ -48,55 +58,107 @@ class Processes:
                 ) from None
             finally:
                 self._end(process)
-            if process.returncode != 0:
-                said = _tail(errors) or "no message"
-                raise HookFailed(
-                    f"exit code {process.returncode}: {said}",
-                    remedy="See what its program needs, then try `shm alerts test`.",
-                )
-            return _tail(answer)
+            os.set_blocking(report, False)
+            trouble = (file.read() or b"").decode(errors="replace")
+        if trouble and process.returncode == reaper.NOT_RUN:
+            raise HookFailed(f"cannot be run: {trouble}.", remedy="Check its path.")
+        if trouble:
+            log.warning("a hook has ended, but %s", trouble)
+        if process.returncode != 0:
+            raise HookFailed(
+                f"exit code {process.returncode}: {_show_end(errors) or 'no message'}",
+                remedy="See what its program needs, then try `shm alerts test`.",
+            )
+        return _show_end(answer)
 
     def close(self) -> None:
-        """Ends running programs; what they were to deliver is delivered again."""
+        """End running programs; what they were to deliver is delivered again."""
         with self._lock:
             self._closed = True
-            for group in self._running:
-                _kill(group)
+            for process in self._running:
+                process.terminate()
 
     def _begin(
-        self,
-        command: Sequence[str],
-        variables: Mapping[str, str],
-        answer: IO[bytes],
-        errors: IO[bytes],
+        self, command: Sequence[str], variables: Mapping[str, str], report: int
     ) -> subprocess.Popen[bytes]:
+        # -I, -S: nothing of the environment or the folder is imported, and it begins quickly.
+        own = [sys.executable, "-I", "-S", reaper.__file__, str(report), str(os.getpid())]
         with self._lock:
             if self._closed:
                 raise HookFailed("not begun: the daemon is ending.")
             try:
                 process = subprocess.Popen(  # noqa: S603 - the owner's own command, no shell
-                    command,
+                    [*own, *command],
                     stdin=subprocess.PIPE,
-                    stdout=answer,
-                    stderr=errors,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                    bufsize=0,
                     cwd=self.folder,
                     env={**self._environment, **variables},
                     start_new_session=True,
+                    pass_fds=(report,),
                 )
             except (OSError, ValueError) as error:
                 raise HookFailed(f"cannot be run: {error}.", remedy="Check its path.") from error
-            self._running.add(process.pid)
+            self._running.add(process)
             return process
 
-    def _end(self, process: subprocess.Popen[bytes]) -> None:
-        """Ends the whole process group of a program that has not come to an end by itself."""
+    def _end(self, process: subprocess.Popen[bytes], grace_s: float = 15.0) -> None:
+        """End a program that has not ended by itself, with all processes that it began."""
+        process.terminate()
+        try:
+            process.wait(grace_s)
+        except subprocess.TimeoutExpired:
+            log.warning("the process that runs a hook did not end in %g s: killed", grace_s)
+            process.kill()
         with self._lock:
-            if process.returncode is None:
-                _kill(process.pid)
-            self._running.discard(process.pid)
+            self._running.discard(process)
+        for stream in (process.stdin, process.stdout, process.stderr):
+            if stream is not None:
+                stream.close()
         process.wait()
-        if process.stdin is not None:
-            process.stdin.close()
+
+
+def exchange(
+    process: subprocess.Popen[bytes], told: bytes, timeout_s: float, kept_bytes: int = 64 * 1024
+) -> tuple[bytes, bytes]:
+    """Write ``told`` to a process and return the last ``kept_bytes`` of its stdout and its stderr.
+
+    Both are read until the process ends, so that it never waits for a reader and needs no disk.
+    Raises TimeoutExpired.
+    """
+    if process.stdin is None or process.stdout is None or process.stderr is None:
+        raise TypeError("a process with three pipes is needed")
+    latest = time.monotonic() + timeout_s
+    kept: dict[IO[bytes], bytes] = {process.stdout: b"", process.stderr: b""}
+    streams = {each.fileno(): each for each in (process.stdin, *kept)}
+    with selectors.DefaultSelector() as waiting:
+        for number, stream in streams.items():
+            os.set_blocking(number, False)
+            writes = stream is process.stdin
+            waiting.register(number, selectors.EVENT_WRITE if writes else selectors.EVENT_READ)
+        while waiting.get_map():
+            left_s = latest - time.monotonic()
+            if left_s <= 0:
+                raise subprocess.TimeoutExpired(process.args, timeout_s)
+            ended = process.poll() is not None
+            # A process of another user's may live on and hold a stream open: look now and then.
+            ready = waiting.select(0 if ended else min(left_s, 0.5))
+            if ended and not ready:
+                break
+            for key, _ in ready:
+                stream = streams[key.fd]
+                if stream is process.stdin:
+                    told = told[_write(stream, told) :]
+                    more = bool(told)
+                else:
+                    read = stream.read(kept_bytes)
+                    kept[stream] = (kept[stream] + read)[-kept_bytes:]
+                    more = bool(read)
+                if not more:
+                    waiting.unregister(key.fd)
+                    stream.close()
+    return kept[process.stdout], kept[process.stderr]
 
 
 class CommandDeliverer(Processes):
@@ -121,14 +183,15 @@ class CommandDeliverer(Processes):
         return str(found)
 
 
-def _kill(group: int) -> None:
+def _write(stream: IO[bytes], told: bytes) -> int:
+    """Write what a pipe has room for; all of it where nobody reads."""
     try:
-        os.killpg(group, signal.SIGKILL)
-    except ProcessLookupError:
-        return
+        return stream.write(told) or 0
+    except BrokenPipeError:
+        return len(told)
 
 
-def _tail(written: IO[bytes]) -> str:
-    size = written.seek(0, os.SEEK_END)
-    written.seek(max(0, size - SHOWN_CHARACTERS))
-    return one_line(written.read().decode(errors="replace"))
+def _show_end(written: bytes) -> str:
+    """Return the end of what a program wrote, fit for one line of a log."""
+    text = printable(written.decode(errors="replace"), " ")
+    return " ".join(text.split())[-SHOWN_CHARACTERS:]
