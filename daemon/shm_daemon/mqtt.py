@@ -5,6 +5,10 @@ Topic `shm/<bridge>/stream/<name>` is for chunks of permanent sensors: acknowled
 A message lands in the spool as an upload does, and is acknowledged only once the store says that
 its file was received: a daemon or a broker killed before that has it sent again. Protocol 3.1.1,
 which every broker speaks, with a session that the broker keeps while the daemon is down.
+
+Of what has not landed yet no more than `mqtt_max_bytes` wait in memory. What comes beyond is not
+acknowledged; brokers send such messages again on a new connection, so one is made once all that was
+taken has left the spool.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ import logging
 import os
 import queue
 import re
+import socket
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -105,6 +110,11 @@ class _Message:
     payload: bytes
     again: bool
 
+    @property
+    def size_bytes(self) -> int:
+        """The memory that it takes, roughly: many empty ones take some, too."""
+        return len(self.payload) + len(self.topic) + 1024
+
 
 class Listener:
     """One connection and one worker: messages are queued by the first, landed by the second."""
@@ -114,6 +124,8 @@ class Listener:
         self._description = Description(workspace)  # streams may be added while we run
         self._topic = topic_of(workspace.bridge.name)
         self._queue: queue.SimpleQueue[_Message | None] = queue.SimpleQueue()
+        self._queued_bytes, self._room = 0, threading.Lock()
+        self._refusing = False
         self._pending: list[tuple[_Message, Landed]] = []
         self._connection, self._ended = 0, threading.Event()
         self._store: Store | None = None
@@ -170,6 +182,7 @@ class Listener:
             log.warning("the broker %s refuses us: %s", self._broker.host, reason)
             return
         self._connection += 1
+        self._refusing = False
         client.subscribe([(f"{self._topic}/+", 1), (f"{self._topic}/+/+", 1)])
 
     def _granted(self, client: Client, _: Any, mid: int, reasons: Any, properties: Any) -> None:
@@ -182,14 +195,32 @@ class Listener:
     def _disconnected(self, client: Client, _: Any, flags: Any, reason: Any, __: Any) -> None:
         self._connection += 1
         self._subscribed = False
-        if not self._ended.is_set():
+        if not self._ended.is_set() and not self._refusing:
             log.warning("no connection to the broker %s: %s", self._broker.host, reason)
 
     def _heard(self, client: Client, _: Any, message: MQTTMessage) -> None:
         again = message.dup or message.retain
-        self._queue.put(
-            _Message(self._connection, message.mid, message.topic, bytes(message.payload), again)
-        )
+        heard = _Message(self._connection, message.mid, message.topic, message.payload, again)
+        if self._refusing or not self._has_room(heard):
+            self._refuse(message.qos)
+            return
+        self._put(heard)
+
+    def _has_room(self, message: _Message) -> bool:
+        """Return True if a message may wait in memory; one alone always may."""
+        most = self._workspace.settings.mqtt_max_bytes
+        return not self._queued_bytes or self._queued_bytes + message.size_bytes <= most
+
+    def _refuse(self, qos: int) -> None:
+        """Leave a message without acknowledgement, so that the broker keeps it."""
+        if not self._refusing:
+            self._refusing = True
+            self._queue.put(None)  # a worker that waits for a message looks up
+            log.warning(
+                "more messages come than can be taken: the broker keeps them and sends them again."
+            )
+        if qos == 0:
+            log.warning("a message is lost: the broker does not keep one sent with QoS 0. Use 1.")
 
     # ------------------------------------------------------------ on the worker's thread
 
@@ -197,12 +228,15 @@ class Listener:
         while not self._ended.is_set():
             message = None
             with suppress(queue.Empty):
-                message = self._queue.get(timeout=_LOOK_S if self._pending else None)
+                idle = not self._pending and not self._refusing
+                message = self._queue.get(timeout=None if idle else _LOOK_S)
             try:
                 if message is not None:
                     self._take(message)
+                    self._free(message)
                     message = None
                 self._acknowledge_received()
+                self._ask_again()
             except ShmError as error:
                 self._try_later(message, error)
             except Exception as error:  # the daemon goes on without messages rather than not at all
@@ -214,8 +248,32 @@ class Listener:
     def _try_later(self, message: _Message | None, error: Exception) -> None:
         log.warning("a message waits: %s", error)
         if message is not None:
-            self._queue.put(message)
+            self._free(message)
+            self._put(message)
         self._ended.wait(getattr(error, "retry_after_s", None) or _RETRY_S)
+
+    def _put(self, message: _Message) -> None:
+        with self._room:
+            self._queued_bytes += message.size_bytes
+        self._queue.put(message)
+
+    def _free(self, message: _Message) -> None:
+        with self._room:
+            self._queued_bytes -= message.size_bytes
+
+    def _ask_again(self) -> None:
+        """Have the broker send again what was refused, by a new connection (MQTT-4.4.0-1).
+
+        Not before all that was taken has left the spool: the broker sends that again, too.
+        """
+        if not self._refusing or self._queued_bytes:
+            return
+        if any(landed.path.exists() for _, landed in self._pending):
+            return
+        connection = self._client.socket()
+        if connection is not None:
+            with suppress(OSError):  # it broke by itself
+                connection.shutdown(socket.SHUT_RDWR)
 
     def _take(self, message: _Message) -> None:
         """Lands a message; one of an earlier connection comes again by itself."""

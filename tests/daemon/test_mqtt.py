@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 import time
+import tracemalloc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -170,6 +171,30 @@ def test_too_large_a_message_is_laid_in_the_quarantine_with_its_reason(
     with listening(bridge):
         time.sleep(0.5)
     assert not reason.exists()  # it was acknowledged
+
+
+def test_flood_waits_at_broker(tmp_path: Path, broker: Broker) -> None:
+    settings = {"mqtt_url": broker.url, "mqtt_max_bytes": 3_500_000}
+    workspace = make_workspace(tmp_path / "bridge", settings=settings)
+    names = sorted(f"hit{number:02d}.csv" for number in range(9))
+    with listening(workspace):
+        away = workspace.spool.rename(tmp_path / "away")
+        tracemalloc.start()
+        try:
+            for number, name in enumerate(names):
+                broker.publish(f"{TOPIC}/{name}", b"%02d" % number * 500_000)
+            time.sleep(1.0)  # all that will come have come
+            held_bytes = tracemalloc.get_traced_memory()[0]
+        finally:
+            tracemalloc.stop()
+        away.rename(workspace.spool)
+        outcomes: list[Outcome] = []
+        until(lambda: outcomes.extend(received(workspace)) or len(outcomes) >= len(names), 120)
+    assert held_bytes < 6_000_000  # 9 MB were sent
+    assert outcomes == [Outcome.NEW] * len(names)
+    with listening(workspace) as again:
+        time.sleep(0.5)
+        assert (spooled(workspace), again.waiting) == ([], [])  # all are acknowledged
 
 
 @pytest.mark.slow

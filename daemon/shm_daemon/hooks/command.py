@@ -60,8 +60,8 @@ class Processes:
                 self._end(process)
             os.set_blocking(report, False)
             trouble = (file.read() or b"").decode(errors="replace")
-        if trouble and process.returncode == reaper.NOT_RUN:
-            raise HookFailed(f"cannot be run: {trouble}.", remedy="Check its path.")
+        if trouble.startswith("cannot be run"):
+            raise HookFailed(f"{trouble}.", remedy="Check its path.")
         if trouble:
             log.warning("a hook has ended, but %s", trouble)
         if process.returncode != 0:

@@ -19,8 +19,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-NOT_RUN = 127
-
 
 def main(arguments: Sequence[str]) -> int:
     """Run the program and return its exit code, a negative one for the signal that ended it."""
@@ -43,14 +41,14 @@ def main(arguments: Sequence[str]) -> int:
             setsigdef=[signal.SIGPIPE, signal.SIGXFSZ],
         )
     except OSError as error:
-        os.write(report, str(error).encode())
-        return NOT_RUN
+        os.write(report, f"cannot be run: {error}".encode())
+        return 127  # as a shell has it
     status = None
     while status is None and signal.sigwait(awaited) != signal.SIGTERM:
         status = reap(program)
     n_left = end_descendants(program)
     if n_left:
-        os.write(report, b"%d of its processes could not be ended" % n_left)
+        os.write(report, f"{n_left} of its processes could not be ended".encode())
     return -signal.SIGKILL if status is None else os.waitstatus_to_exitcode(status)
 
 
