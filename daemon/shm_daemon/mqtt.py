@@ -200,7 +200,8 @@ class Listener:
 
     def _heard(self, client: Client, _: Any, message: MQTTMessage) -> None:
         again = message.dup or message.retain
-        heard = _Message(self._connection, message.mid, message.topic, message.payload, again)
+        payload = bytes(message.payload)
+        heard = _Message(self._connection, message.mid, message.topic, payload, again)
         if self._refusing or not self._has_room(heard):
             self._refuse(message.qos)
             return
@@ -271,7 +272,7 @@ class Listener:
         if any(landed.path.exists() for _, landed in self._pending):
             return
         connection = self._client.socket()
-        if connection is not None:
+        if isinstance(connection, socket.socket):
             with suppress(OSError):  # it broke by itself
                 connection.shutdown(socket.SHUT_RDWR)
 

@@ -13,7 +13,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from shm.store import Workspace
+from shm.pipeline import utc_now
+from shm.store import Scope, Workspace
 from shm_daemon.web import connections, middleware
 from shm_daemon.web.address import UPLOADS
 from tests.helpers.slow import few_of
@@ -139,6 +140,35 @@ def test_an_upload_may_take_longer_than_the_deadline(
         assert client.post(f"{UPLOADS}?name=slow.csv", content=slowly()).status_code == 202
 
 
+def test_slow_uploads_leave_room_for_others(site: Served, workspace: Workspace) -> None:
+    with workspace.store() as store:
+        logger = store.upkeep.create_token("logger", Scope.WRITE, utc_now())
+    authorized = SLOW_UPLOAD.replace(b"\r\n\r\n", b"\r\nAuthorization: Bearer %s\r\n\r\n")
+    slow = authorized % site.write_token.encode()
+    with callers(site, 40, ["127.0.0.1"], slow) as sockets:
+        refused = []
+        for one in sockets:
+            one.settimeout(1)
+            with suppress(TimeoutError):
+                refused.append(one.recv(65536).split(b" ", 2)[1])
+        with site.client(logger) as client:
+            taken = client.post(f"{UPLOADS}?name=mine.csv", content=b"x")
+        with site.client(site.write_token) as client:
+            further = client.post(f"{UPLOADS}?name=more.csv", content=b"x")
+    assert taken.status_code == 202
+    assert further.status_code == 503
+    assert "token write sends 4 files already" in further.json()["message"]
+    assert "Retry-After" in further.headers
+    assert refused == [b"503"] * 36
+
+
+def test_uploads_may_follow_each_other(site: Served) -> None:
+    with site.client(site.write_token) as client:
+        for number in range(9):
+            sent = client.post(f"{UPLOADS}?name={number}.csv", content=b"%d" % number)
+            assert sent.status_code == 202
+
+
 @pytest.mark.slow
 def test_a_long_answer_may_be_taken_slowly_but_not_left(
     site: Served, monkeypatch: pytest.MonkeyPatch
@@ -170,7 +200,7 @@ def test_a_long_answer_may_be_taken_slowly_but_not_left(
 def test_too_much_at_once_is_refused_in_our_words_and_health_still_answers(
     site: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(middleware, "_PLACES", dict.fromkeys(middleware.Kind, 0))
+    monkeypatch.setattr(middleware, "PLACES", dict.fromkeys(middleware.Kind, 0))
     with site.client() as client:
         refused = client.get("/")
         assert refused.status_code == 503
@@ -185,8 +215,13 @@ def test_more_than_a_request_needs_is_not_read(site: Served) -> None:
 
 
 def test_the_places_leave_threads_for_those_who_watch() -> None:
-    """Anyio has 40 threads for whatever blocks; each request holds one at most."""
-    assert sum(middleware._PLACES.values()) < 40
+    """Anyio has 40 threads for whatever blocks; each request holds one at most.
+
+    Passwords are hashed in a thread of their own.
+    """
+    places = dict(middleware.PLACES)
+    del places[middleware.Kind.HASHING]
+    assert sum(places.values()) < 40
 
 
 @pytest.mark.slow

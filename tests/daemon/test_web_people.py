@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import ExitStack
 from pathlib import Path
 
+import argon2
 import httpx
 import pytest
 import sqlalchemy as sa
+from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
 
 from shm.errors import UsageError
@@ -190,6 +196,70 @@ def test_names_that_an_older_release_took_keep_working(workspace: Workspace) -> 
         assert store.people.sign_in("ANNA", PASSWORD + "one", utc_now())
 
 
+def calls_of(dependant: Dependant) -> Iterator[object]:
+    """Yield what a route depends on, and what that depends on."""
+    for each in dependant.dependencies:
+        yield each.call
+        yield from calls_of(each)
+
+
+def test_guesses_from_many_addresses_wait(workspace: Workspace) -> None:
+    add_a_user_of_each_role(workspace)
+
+    def attempt(number: int, name: str, password: str) -> int:
+        forwarded = {"X-Forwarded-For": f"203.0.113.{number}"}
+        told = {"name": name, "password": password}
+        return client.post("/sign-in", data=told, headers=forwarded).status_code
+
+    with served(workspace, Address("0.0.0.0")) as site, site.client(Origin=site.url) as client:
+        told = [attempt(number // 5, "reader", "wrong") for number in range(100)]
+        assert set(told) == {401}
+        assert attempt(200, " READER ", PASSWORD) == 429
+        assert attempt(201, "engineer", PASSWORD) == 303
+
+
+def test_many_sign_ins_leave_pages_free(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add_a_user_of_each_role(workspace)
+    released, lock, hasher = threading.Event(), threading.Lock(), argon2.PasswordHasher()
+    under_way, most = [0], [0]
+
+    class Slow:
+        def verify(self, *arguments: str) -> bool:
+            with lock:
+                under_way[0] += 1
+                most[0] = max(most[0], under_way[0])
+            released.wait(60)
+            with lock:
+                under_way[0] -= 1
+            return hasher.verify(*arguments)
+
+    monkeypatch.setattr(argon2, "PasswordHasher", Slow)
+    with served(workspace) as site, ThreadPoolExecutor(40) as callers, ExitStack() as stack:
+        clients = [stack.enter_context(site.client(Origin=site.url)) for _ in range(40)]
+        signing = [callers.submit(sign_in, each, "reader") for each in clients]
+        try:
+            until(lambda: most[0] > 0)
+            wait(signing, timeout=2)  # the others have come, too
+            asked = ("/health", "/sign-in", "/api/status", "/metrics")
+            with site.client() as client:
+                told = {path: client.get(path).status_code for path in asked}
+        finally:
+            released.set()
+        assert [each.result() for each in signing] == [303] * 40
+    assert told == {"/health": 503, "/sign-in": 200, "/api/status": 200, "/metrics": 200}
+    assert most == [1]  # so that cores are free for all others; no daemon is running
+
+
+def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
+    """Wait until a condition holds."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
+
+
 def test_every_route_asks_who_it_is_and_what_changes_something_asks_for_an_operator(
     workspace: Workspace,
 ) -> None:
@@ -202,7 +272,7 @@ def test_every_route_asks_who_it_is_and_what_changes_something_asks_for_an_opera
         for route in routes:
             if route.path in OPEN or route.path.startswith("/static"):
                 continue
-            asked = {each.call for each in route.dependant.dependencies}
+            asked = set(calls_of(route.dependant))
             needed = reading if route.methods <= {"GET", "HEAD"} else writing
             assert {needed, engineering, signed_in_person} & asked, route.path
     finally:

@@ -5,12 +5,16 @@ A program sends its token in a header; a browser sends the cookie that signing i
 
 from __future__ import annotations
 
+import asyncio
 import math
+from collections import Counter
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Annotated
 from urllib.parse import urlsplit
 
-from fastapi import Depends, Request
+from fastapi import Depends, Request, Response
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
 from shm.pipeline import utc_now
@@ -19,6 +23,7 @@ from shm.store.audit import Actor
 from shm.store.people import SESSION, Role
 from shm_daemon.web.address import caller_of
 from shm_daemon.web.faults import Refused
+from shm_daemon.web.middleware import PLACES, Kind
 from shm_daemon.web.site import Site
 
 COOKIE = "shm_token"
@@ -114,6 +119,43 @@ Engineer = Annotated[Visitor, Depends(engineering)]
 Person = Annotated[Visitor, Depends(signed_in_person)]
 
 
+async def uploading(request: Request, visitor: Writer) -> AsyncIterator[Visitor]:
+    """Let in who may write, to no more than a third of the places of uploads at once.
+
+    How long a body takes is up to its sender: nobody alone may keep all the others out.
+    """
+    taken: Counter[str] = request.app.state.uploads
+    who, most = visitor.actor.name, PLACES[Kind.UPLOAD] // 3
+    if taken[who] >= most:
+        raise Refused(
+            503,
+            f"{who} sends {most} files already.",
+            "Send fewer at once, or give each logger a token of its own: `shm token create NAME "
+            "--scope write`.",
+            {"Retry-After": "5"},
+        )
+    taken[who] += 1
+    try:
+        yield visitor
+    finally:
+        taken[who] -= 1
+        if not taken[who]:
+            del taken[who]
+
+
+Uploader = Annotated[Visitor, Depends(uploading)]
+
+
+async def with_passwords(request: Request, does: Callable[[], Response]) -> Response:
+    """Do what hashes a password in the one thread for that, with as many waiting as may come.
+
+    None of the threads that answer is taken, and the cores stay free for them.
+    """
+    loop = asyncio.get_running_loop()
+    thread: Executor = request.app.state.passwords
+    return await loop.run_in_executor(thread, does)
+
+
 def refuse_foreign(request: Request) -> None:
     """Raises Refused where a page of somebody else has a browser send this.
 
@@ -183,7 +225,7 @@ def unless_throttled(request: Request, site: Site, name: str | None = None) -> s
     if wait_s > 0:
         raise Refused(
             429,
-            "Too many wrong tokens or passwords came from this address.",
+            "Too many wrong tokens or passwords came from this address or for this user.",
             f"Try again in {wait_s:.0f} s, with one that is in force.",
             {"Retry-After": f"{math.ceil(wait_s)}"},
         )

@@ -15,6 +15,8 @@ NOTES = "/notes"
 """Where notes are sent to, with their photos."""
 SUMMARY = "/api/bridge/summary"
 """Where a bridge says in a line how it is; other versions of shm ask there."""
+PASSWORDS = ("/sign-in", "/password", "/users")
+"""Where passwords are sent to: to hash one takes a core some 50 ms, and 64 MB."""
 STREAMS = "/api/streams"
 """Below it chunks of permanent sensors are sent to."""
 UPLOADS = "/api/recordings"

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import gc
 import logging
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 
 from fastapi import APIRouter, FastAPI, Request
 from fastapi.responses import JSONResponse
@@ -81,6 +83,8 @@ def load_pages(site: Site) -> Pages:
     )
     app.state.site = site
     app.state.background_worker = BackgroundWorker()
+    app.state.uploads = Counter[str]()
+    app.state.passwords = ThreadPoolExecutor(1, "passwords")
     app.state.ordered_baselines = baseline.Ordered()
     app.state.sign_ons = signing_in.SignOns()
     app.state.other_bridges = OtherBridges()
@@ -94,6 +98,7 @@ def load_pages(site: Site) -> Pages:
     def close() -> None:
         app.state.background_worker.close()
         app.state.other_bridges.close()
+        app.state.passwords.shutdown(wait=False, cancel_futures=True)
         watching_site.close()
         site.close()
 

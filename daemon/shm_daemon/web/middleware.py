@@ -6,7 +6,7 @@ What stands before the pages: answers `/health` by itself and sees that no calle
 
 It is there within a second or two; the pages, with all that draws and computes, are loaded behind
 it, and whoever wants one of them waits so long. Where callers keep every place of the pages taken,
-uploads, `/metrics` and `/health` still have places of their own.
+uploads, sign-ins, `/metrics` and `/health` still have places of their own.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from shm_daemon.web.address import IMPORTS, NOTES, STREAMS, UPLOADS
+from shm_daemon.web.address import IMPORTS, NOTES, PASSWORDS, STREAMS, UPLOADS
 from shm_daemon.web.health import health_document
 from shm_daemon.web.site import Site
 
@@ -120,10 +120,13 @@ class Kind(StrEnum):
     PAGE = "pages"
     UPLOAD = "uploads"
     METRICS = "metrics"
+    HASHING = "passwords"
 
 
-_PLACES = {Kind.PAGE: 24, Kind.UPLOAD: 12, Kind.METRICS: 3}
-"""So many requests of a kind at once: together fewer than the 40 threads that answer them."""
+PLACES = {Kind.PAGE: 24, Kind.UPLOAD: 12, Kind.METRICS: 3, Kind.HASHING: 60}
+"""So many requests of a kind at once: together fewer than the 40 threads that answer them, but for
+passwords, which wait in line for a thread of their own.
+"""
 
 
 @dataclass(frozen=True)
@@ -185,6 +188,8 @@ class Front:
             await JSONResponse(document, status)(scope, receive, send)
             return
         kind = Kind.METRICS if path == METRICS else Kind.PAGE
+        if method == "POST" and path in PASSWORDS:
+            kind = Kind.HASHING
         if is_upload(scope):
             kind = Kind.UPLOAD
         else:
@@ -193,7 +198,7 @@ class Front:
                 await _fault(413, "This is more than is taken here.")(scope, receive, send)
                 return
             receive = whole
-        if self._taken[kind] >= _PLACES[kind]:
+        if self._taken[kind] >= PLACES[kind]:
             said = f"Too many requests at once: all places of {kind} are taken."
             await _fault(503, said, "Try again in some seconds.")(scope, receive, send)
             return

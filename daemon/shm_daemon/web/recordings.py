@@ -23,7 +23,7 @@ from shm.store import Stage, Store, StoredRecording
 from shm.store.archive import refuse_oversize
 from shm_daemon.spool import Incoming, Landed, landing_name
 from shm_daemon.streams import take_chunks
-from shm_daemon.web.access import AtSite, Reader, Writer
+from shm_daemon.web.access import AtSite, Reader, Uploader
 from shm_daemon.web.address import STREAMS, UPLOADS, test_page
 from shm_daemon.web.faults import Refused, answers
 from shm_daemon.web.models import (
@@ -95,7 +95,7 @@ def described_by(
 async def upload(
     request: Request,
     site: AtSite,
-    writer: Writer,
+    writer: Uploader,
     described: Annotated[dict[str, object], Depends(described_by)],
     name: Annotated[
         str, Query(min_length=1, max_length=255, description="The name of the file, with suffix.")
@@ -300,7 +300,7 @@ class AcknowledgedChunk(BaseModel):
     summary="Send a chunk of a stream",
 )
 async def chunks(
-    request: Request, site: AtSite, _: Writer, name: Annotated[str, Path(max_length=64)]
+    request: Request, site: AtSite, _: Uploader, name: Annotated[str, Path(max_length=64)]
 ) -> AcknowledgedChunk:
     """Takes one chunk (`shm.chunk/1`) and answers once it is on disk.
 

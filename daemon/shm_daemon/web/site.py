@@ -21,7 +21,7 @@ from shm_daemon.web.address import Address, network_of
 
 MOST_WRONG, WITHIN_S = 10, 60.0
 """A person mistypes a few; a program with an old token comes again and again."""
-_MOST_PASSWORDS = 100  # technical: of all names at an address; each takes a core some 50 ms
+_MOST_PASSWORDS = 100  # NIST SP 800-63B-4, 3.2.2, of one name anywhere; of all names at an address
 _COUNTS_KEPT = 4096  # technical: below a megabyte of memory
 
 
@@ -30,7 +30,8 @@ class WrongAttempts:
     threads.
 
     Passwords count by user too: behind a proxy that names nobody all people have one address, and
-    who mistypes must not keep others out. Memory is bounded: the oldest counts are forgotten.
+    who mistypes must not keep others out. Those of one user count over all addresses, too: who
+    guesses may have thousands. Memory is bounded: the oldest counts are forgotten.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
@@ -58,9 +59,10 @@ class WrongAttempts:
                 while len(self._wrong) > _COUNTS_KEPT:
                     self._wrong.popitem(last=False)
             if times + 1 == most:
+                whose = address if key[0] else f"all addresses for the user {name!r}"
                 log.warning(
                     "%d wrong tokens or passwords came from %s within %.0f s: it has to wait",
-                    most, address, WITHIN_S,
+                    most, whose, WITHIN_S,
                 )  # fmt: skip
         log.warning("a token or password from %s is wrong or revoked", address)
 
@@ -70,7 +72,11 @@ def _counted(address: str, name: str | None) -> tuple[tuple[tuple[str, ...], int
     network = network_of(address)
     if name is None:
         return (((network, "token"), MOST_WRONG),)
-    return ((network, "user", same_name(name)), MOST_WRONG), ((network, "users"), _MOST_PASSWORDS)
+    return (
+        ((network, "user", same_name(name)), MOST_WRONG),
+        ((network, "users"), _MOST_PASSWORDS),
+        (("", "user", same_name(name)), _MOST_PASSWORDS),
+    )
 
 
 log = logging.getLogger(__name__)

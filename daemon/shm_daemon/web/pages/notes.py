@@ -9,7 +9,7 @@ from shm.documents import parse_time
 from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.values.notes import NoteKind
-from shm_daemon.web.access import AtSite, Reader, Writer
+from shm_daemon.web.access import AtSite, Reader, Uploader
 from shm_daemon.web.address import NOTES
 from shm_daemon.web.forms import FormWithPhoto
 from shm_daemon.web.models import Row
@@ -18,7 +18,7 @@ router = APIRouter(prefix=NOTES, include_in_schema=False)
 
 
 @router.post("")
-def write(site: AtSite, writer: Writer, told: FormWithPhoto) -> Response:
+def write(site: AtSite, writer: Uploader, told: FormWithPhoto) -> Response:
     """Keeps what an operator wrote, and shows it where it was written."""
     words = {name: value.decode("utf-8", "replace").strip() for name, value in told.items()}
     number, now, who = words.get("hanger", ""), utc_now(), writer.actor

@@ -9,11 +9,14 @@ import logging
 import secrets
 import threading
 from collections import OrderedDict
+from collections.abc import Mapping
 from datetime import datetime, timedelta
+from functools import partial
 from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, Depends, Request, Response
 from fastapi.responses import RedirectResponse
+from starlette.concurrency import run_in_threadpool
 
 from shm.bridge.description import SingleSignOn
 from shm.errors import NothingThere, ShmError, UsageError, needing
@@ -29,6 +32,7 @@ from shm_daemon.web.access import (
     session_of,
     unless_throttled,
     visitor_in_force,
+    with_passwords,
 )
 from shm_daemon.web.faults import Refused
 from shm_daemon.web.forms import Form, FormOfAnybody, done_or_again
@@ -62,8 +66,13 @@ def sign_in_page(request: Request, site: AtSite, next: str = "/") -> Response:
 
 
 @router.post("/sign-in", dependencies=[Depends(refuse_foreign)])
-def sign_in(request: Request, site: AtSite, told: FormOfAnybody) -> Response:
+async def sign_in(request: Request, site: AtSite, told: FormOfAnybody) -> Response:
     """Gives the cookie to who signs in; removing the user or revoking the token ends it at once."""
+    let_in = partial(_let_in, request, site, told)
+    return await (with_passwords(request, let_in) if "name" in told else run_in_threadpool(let_in))
+
+
+def _let_in(request: Request, site: Site, told: Mapping[str, str]) -> Response:
     wanted, secret = told.get("next", "/"), told.get("token", "").strip()
     try:
         if "name" in told:
@@ -114,7 +123,7 @@ def password_page(request: Request, _: Person, changed: bool = False) -> Respons
 
 
 @router.post("/password")
-def change_password(request: Request, site: AtSite, person: Person, told: Form) -> Response:
+async def change_password(request: Request, site: AtSite, person: Person, told: Form) -> Response:
     """Changes it; other browsers of the person are signed out."""
     password = told.get("password", "")
 
@@ -126,7 +135,8 @@ def change_password(request: Request, site: AtSite, person: Person, told: Form) 
     def again(message: str, status: int) -> Response:
         return page(request, "password.html.j2", status=status, message=message, changed=False)
 
-    return done_or_again(change, "/password?changed=true", again)
+    done = partial(done_or_again, change, "/password?changed=true", again)
+    return await with_passwords(request, done)
 
 
 class SignOns:

@@ -25,7 +25,7 @@ from shm.pipeline.importing import Answers, Import, Question, keep_profile, look
 from shm.report import formatting
 from shm.store import Workspace
 from shm_daemon.spool import Incoming, Landed, landing_name
-from shm_daemon.web.access import AtSite, Reader, Writer
+from shm_daemon.web.access import AtSite, Reader, Uploader
 from shm_daemon.web.address import IMPORTS
 from shm_daemon.web.faults import answers
 from shm_daemon.web.frame import page
@@ -106,7 +106,7 @@ class ImportLook(BaseModel):
 async def import_file(
     request: Request,
     site: AtSite,
-    writer: Writer,
+    writer: Uploader,
     name: Annotated[str, Query(min_length=1, max_length=255)],
     said: Annotated[
         str | None,

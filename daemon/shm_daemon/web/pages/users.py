@@ -13,7 +13,7 @@ from shm.pipeline import utc_now
 from shm.report import formatting
 from shm.report.paper import Table
 from shm.store.people import Role
-from shm_daemon.web.access import AtSite, Engineer
+from shm_daemon.web.access import AtSite, Engineer, with_passwords
 from shm_daemon.web.forms import Form, done_or_again
 from shm_daemon.web.frame import page
 from shm_daemon.web.models import Before, paged
@@ -31,7 +31,7 @@ def users_page(request: Request, site: AtSite, _: Engineer) -> Response:
 
 
 @router.post("/users")
-def change_user(request: Request, site: AtSite, engineer: Engineer, told: Form) -> Response:
+async def change_user(request: Request, site: AtSite, engineer: Engineer, told: Form) -> Response:
     """Adds or removes a user, changes their role or sets a password."""
     people, at = site.store.acting_as(engineer.actor).people, utc_now()
     by_provider = site.workspace.bridge.single_sign_on is not None
@@ -51,7 +51,8 @@ def change_user(request: Request, site: AtSite, engineer: Engineer, told: Form) 
             case _:
                 raise UsageError("nothing was asked for.", remedy="Choose a button of this page.")
 
-    return done_or_again(change, "/users", partial(_page, request, site))
+    again = partial(_page, request, site)
+    return await with_passwords(request, partial(done_or_again, change, "/users", again))
 
 
 def _page(request: Request, site: Site, message: str = "", status: int = 200) -> Response:
