@@ -141,8 +141,9 @@ def list_users(ctx: click.Context) -> None:
     rows = []
     for each in users:
         times = (f"{t:%Y-%m-%d %H:%M}" if t else "" for t in (each.made_at, each.removed_at))
-        rows.append((each.name, each.role, *times))
-    show_rows("users", ("name", "role", "made", "removed"), rows)
+        by = "single sign-on" if each.single_sign_on else "password"
+        rows.append((each.name, each.role, by, *times))
+    show_rows("users", ("name", "role", "signs in by", "made", "removed"), rows)
 
 
 @user.command()
@@ -177,6 +178,23 @@ def password(ctx: click.Context, name: str) -> None:
     with opened_store(ctx) as (_, store):
         store.people.set_password(name, _asked(), utc_now())
     answer({"name": name, "changed": True}, f"{name} has a new password.")
+
+
+@user.command("single-sign-on")
+@click.argument("name")
+@flags.json
+@click.pass_context
+def use_single_sign_on(ctx: click.Context, name: str) -> None:
+    """Let a user in by single sign-on alone, in place of a password; all browsers are signed out.
+
+    \b
+    Example: shm user single-sign-on ann@example.org
+    """
+    from shm.pipeline import utc_now
+
+    with opened_store(ctx) as (_, store):
+        store.people.set_single_sign_on(name, utc_now())
+    answer({"name": name, "changed": True}, f"{name} signs in by single sign-on alone.")
 
 
 def _asked() -> str:

@@ -14,6 +14,7 @@ import sqlite3
 import stat
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from datetime import datetime, timedelta
 from functools import partial
 from importlib.metadata import version
@@ -22,7 +23,7 @@ from pathlib import Path
 
 from shm import __version__
 from shm.bridge import AppriseHook, Bridge, Hook, WebhookHook
-from shm.errors import ShmError
+from shm.errors import NothingThere, ShmError
 from shm.models import competing_names
 from shm.pipeline.telling import quiet_until
 from shm.read import sandbox
@@ -75,6 +76,14 @@ def check_single_sign_on(workspace: Workspace) -> Iterator[Finding]:
     if described.client_secret_file.stat().st_mode & 0o044:
         name = described.client_secret_file.name
         yield warning("single sign-on", f"others can read {name}", f"chmod 600 {name}")
+    with suppress(NothingThere), workspace.store() as store:
+        people = [each for each in store.people.list_all() if each.removed_at is None]
+        if people and not any(each.single_sign_on for each in people):
+            yield warning(
+                "single sign-on",
+                "all users have a password: it lets nobody in",
+                "shm user single-sign-on NAME",
+            )
 
 
 def check_other_bridges(workspace: Workspace) -> Iterator[Finding]:

@@ -29,6 +29,8 @@ SESSION = "session_"
 """What the secret of a session begins with; that of a token begins otherwise."""
 _SHORTEST, _LONGEST = 15, 1024  # NIST SP 800-63B-4, 3.1.1.2, of a password alone; technical: memory
 _LONGEST_NAME = 255  # technical: what a column and a line of a table take
+_NO_PASSWORD = ""
+"""In place of a password's hash: the user comes by single sign-on alone."""
 _SECRET_BYTES = 32  # 256 bits: nobody guesses it
 _NOTED_AGAIN_AFTER = timedelta(minutes=1)
 _UNSEEN = re.compile(
@@ -64,6 +66,8 @@ class User:
     role: Role
     made_at: datetime
     removed_at: datetime | None = None
+    single_sign_on: bool = False
+    """Whether a provider alone lets in, which says who it is; else a password alone does."""
 
 
 class People(Repository):
@@ -75,7 +79,7 @@ class People(Repository):
         Who has none (None) comes by single sign-on alone.
         """
         name = _fit(name)
-        hashed = _hashed(_secret() if password is None else password)
+        hashed = _NO_PASSWORD if password is None else _hashed(password)
         values = {"name": name, "role": role, "password_hash": hashed, "made_at": at}
         with self.writing() as connection:
             for taken in _alike(connection, name):
@@ -90,8 +94,15 @@ class People(Repository):
         """Ends a user and all sessions from now on; raises NothingThere where there is none."""
         self._change(name, at, "user removed", {"removed_at": at})
 
+    def set_single_sign_on(self, name: str, at: datetime) -> None:
+        """Replace a password by single sign-on and end all sessions; raise NothingThere."""
+        self._change(name, at, "single sign-on set", {"password_hash": _NO_PASSWORD})
+
     def set_password(self, name: str, password: str, at: datetime) -> None:
-        """Gives a new password and ends all sessions; raises NothingThere or UsageError."""
+        """Give a new password, in place of single sign-on too, and end all sessions.
+
+        Raises NothingThere or UsageError.
+        """
         self._change(name, at, "password set", {"password_hash": _hashed(password)})
 
     def change_password(
@@ -123,12 +134,22 @@ class People(Repository):
         return None if row is None else self._begin(row.id, at)
 
     def sign_in_as(self, name: str, at: datetime) -> str | None:
-        """The secret of a new session of whom a provider of ours names; None where no user has
-        exactly this name: a provider may tell names apart that read alike.
+        """Return the secret of a new session of whom a provider of ours names.
+
+        None where no user has exactly this name: a provider may tell names apart that read alike.
+        Raises UsageError where the user was made with a password: who holds a name there need not
+        be who was given it here.
         """
         row = self.first(_in_force.where(users.c.name == name))
-        # Once more, since a server's collation may take names for equal.
-        return None if row is None or row.name != name else self._begin(row.id, at)
+        if row is None or row.name != name:  # a server's collation may take names for equal
+            return None
+        if row.password_hash != _NO_PASSWORD:
+            raise UsageError(
+                f"{name} signs in to this bridge with a password, not by single sign-on.",
+                remedy="An engineer can change that on the page Users, or with "
+                f"`shm user single-sign-on {name}`.",
+            )
+        return self._begin(row.id, at)
 
     def user_of(self, secret: str, at: datetime) -> User | None:
         """Whose session this is; None where it has ended or never was."""
@@ -158,8 +179,8 @@ class People(Repository):
         with self.reading() as connection:
             row = _named(connection, name)
         try:
-            kept = _nobodys() if row is None else row.password_hash
-            argon2.PasswordHasher().verify(kept, password[:_LONGEST])
+            kept = _NO_PASSWORD if row is None else row.password_hash
+            argon2.PasswordHasher().verify(kept or _nobodys(), password[:_LONGEST])
         except argon2.exceptions.VerificationError:
             return None
         return row
@@ -270,7 +291,8 @@ def _checksum(secret: str) -> str:
 
 
 def _user(row: sa.Row[Any]) -> User:
-    return User(row.id, row.name, Role(row.role), row.made_at, row.removed_at)
+    by_provider = row.password_hash == _NO_PASSWORD
+    return User(row.id, row.name, Role(row.role), row.made_at, row.removed_at, by_provider)
 
 
 class Scope(StrEnum):

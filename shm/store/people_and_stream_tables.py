@@ -6,7 +6,8 @@ import sqlalchemy as sa
 
 from shm.store.columns import Document, UtcTime, identity, metadata, reference, unique_where
 
-# Who may sign in by name. Of a password only its salted, slow hash is kept.
+# Who may sign in by name. Of a password only its salted, slow hash is kept; it is
+# empty for who comes by single sign-on alone.
 users = sa.Table(
     "users",
     metadata,

@@ -6,6 +6,7 @@ import io
 
 import pytest
 
+from shm.errors import UsageError
 from shm.pipeline import utc_now
 from shm.store import Workspace
 from tests.cli.conftest import Ended, Shm
@@ -54,6 +55,21 @@ def test_the_password_that_stdin_gives_is_the_one_that_signs_in(
         assert store.people.sign_in("a", "four other long words", at)
 
 
+def test_user_changes_to_single_sign_on(user: Shm, empty: Workspace) -> None:
+    user("add", "ann@example.org", password=PASSWORD)
+    with empty.store() as store, pytest.raises(UsageError, match="with a password"):
+        store.people.sign_in_as("ann@example.org", utc_now())
+    assert user("single-sign-on", "ann@example.org").code == 0
+    assert "single sign-on" in user("list").out
+    assert user("list", "--json").document["users"][0]["single_sign_on"] is True
+    with empty.store() as store:
+        assert store.people.sign_in_as("ann@example.org", utc_now())
+        for password in ("", PASSWORD):
+            assert store.people.sign_in("ann@example.org", password, utc_now()) is None
+    assert user("password", "ann@example.org", password=PASSWORD).code == 0
+    assert user("list", "--json").document["users"][0]["single_sign_on"] is False
+
+
 @pytest.mark.parametrize(
     ("words", "password", "code", "said"),
     [
@@ -62,6 +78,7 @@ def test_the_password_that_stdin_gives_is_the_one_that_signs_in(
         ("password a", "short", 2, "four or five words"),
         ("password b", PASSWORD, 4, "shm user list"),
         ("remove b", "", 4, "shm user list"),
+        ("single-sign-on b", "", 4, "shm user list"),
     ],
 )
 def test_what_cannot_be_done_says_how_to_go_on(

@@ -222,6 +222,40 @@ def test_a_removed_user_is_out_and_stays_out_while_passwords_remain_beside(
     assert come(browser, go(browser, scene)).status_code == 200
 
 
+def test_password_user_needs_the_password(scene: Scene, browser: httpx.Client) -> None:
+    with scene.workspace.store() as store:
+        store.people.add("kim@example.org", Role.ENGINEER, PASSWORD, utc_now())
+    scene.provider.claims = {"email": "kim@example.org"}
+    told = {"name": "kim@example.org", "password": PASSWORD}
+    refused = come(browser, go(browser, scene))
+    assert refused.status_code == 403
+    assert COOKIE not in browser.cookies
+    assert "kim@example.org signs in to this bridge with a password" in refused.text
+    assert "shm user single-sign-on kim@example.org" in refused.text
+    assert browser.post("/sign-in", data=told).status_code == 303
+    assert "Use single sign-on" in browser.get("/users").text
+    changed = {"action": "single-sign-on", "name": "kim@example.org"}
+    assert browser.post("/users", data=changed).status_code == 303
+    assert browser.get("/users").status_code == 401  # signed out by it
+    assert browser.post("/sign-in", data=told).status_code == 401
+    assert come(browser, go(browser, scene)).status_code == 200
+    with scene.workspace.store() as store:
+        store.people.set_password("kim@example.org", PASSWORD, utc_now())
+    assert come(browser, go(browser, scene)).status_code == 403
+
+
+def test_store_of_older_release_asks(tmp_path: Path) -> None:
+    with openid_providers.running() as provider:
+        workspace = described(tmp_path / "bridge", provider.issuer)
+        with workspace.store() as store:
+            store.people.add("ann@example.org", Role.ENGINEER, PASSWORD, utc_now())
+        warned = found(workspace)
+        with workspace.store() as store:
+            store.people.set_single_sign_on("ann@example.org", utc_now())
+        assert found(workspace)[0] is Level.OK
+    assert warned == (Level.WARNING, "all users have a password: it lets nobody in")
+
+
 def test_a_wrong_secret_is_told_to_the_engineer(scene: Scene, browser: httpx.Client) -> None:
     secret = scene.workspace.folder / "sign_on.secret"
     told = go(browser, scene)

@@ -220,7 +220,10 @@ def come_back(
 
 
 def _signed_in(request: Request, site: Site, name: str, wanted: str) -> Response:
-    secret = site.store.people.sign_in_as(name, utc_now())
+    try:
+        secret = site.store.people.sign_in_as(name, utc_now())
+    except UsageError as error:
+        return _told(request, wanted, error)
     if secret is None:
         log.warning("single sign-on: %.255r is no user of this bridge", name)
         return _refused(

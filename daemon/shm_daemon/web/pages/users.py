@@ -44,6 +44,8 @@ async def change_user(request: Request, site: AtSite, engineer: Engineer, told: 
                 people.add(name, role, None if by_provider and not password else password, at)
             case "role", Role():
                 people.set_role(name, role, at)
+            case "single-sign-on", _ if by_provider:
+                people.set_single_sign_on(name, at)
             case "password", _:
                 people.set_password(name, password, at)
             case "remove", _:
