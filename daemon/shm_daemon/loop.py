@@ -202,8 +202,7 @@ class Daemon:
         try:
             if is_whole:
                 self._scan()
-            left = self._streaming.advance()
-            left = self._flow.advance() or self._flow.suspects_due_s() is not None or left
+            left = self._advance_streams_and_files()
             if self._once and not left and not self._tracker.watching:
                 left = self._streaming.advance(hurry=True) or self._flow.advance(hurry=True)
             if is_whole:
@@ -227,6 +226,15 @@ class Daemon:
             self._tell_failure(f"{type(error).__name__}: {error}")
             self._scan_at = time.monotonic() + _UNREADABLE_S
         return True
+
+    def _advance_streams_and_files(self) -> bool:
+        """Return True if anything is left to do; files advance although a stream fails."""
+        left = False
+        try:
+            left = self._streaming.advance()
+        finally:
+            left = self._flow.advance() or self._flow.suspects_due_s() is not None or left
+        return left
 
     def _tell_failure(self, why: str) -> None:
         if why != self._failure:

@@ -144,8 +144,10 @@ class Flow:
             if running.future.done():
                 self._finish(running)
                 del self._running[key]
-        self._begin_deliveries(hurry)
-        self._begin_steps()
+        try:
+            self._begin_deliveries(hurry)
+        finally:  # an alert that cannot be sent must not keep files from being worked on
+            self._begin_steps()
         return bool(self._running)
 
     def suspects_due_s(self) -> float | None:
@@ -209,10 +211,43 @@ class Flow:
     # ------------------------------------------------------------ finish
 
     def _finish(self, running: Running) -> None:
-        job, error = running.job, running.future.exception()
-        if error is None:
-            self._keep(running)
-        elif job.delivery is not None:
+        """Store the result of a step that has ended, or handle the error that it ended with.
+
+        Raises StoreError where the store cannot be used now: the result is stored at a later turn.
+        """
+        error = running.future.exception()
+        try:
+            if error is None:
+                self._keep(running)
+                return
+        except DamagedRow as damage:
+            self._stop(running.job, damage)
+            return
+        except StoreError as refusal:
+            if refusal.retry_after_s is not None:
+                raise
+            error = refusal
+        except Exception as fault:  # noqa: BLE001 - one file must not stop the others
+            error = fault
+        try:
+            self._handle_error(running, error)
+        except ShmError:
+            raise
+        except Exception:
+            log.exception("%s %s: its error cannot be noted", *running.job.key)
+            self._hold(running.job, _AGAIN_S)
+
+    def _keep(self, running: Running) -> None:
+        kept = running.step.keep(running.future.result())
+        if isinstance(kept, StoredAlert):
+            about = _about_alert(kept.alert)
+            log.warning("alert %s: %s", kept.alert.key, kept.alert.message, extra=about)
+        log.info("%s %d: done", *running.job.key, extra=_about(running.job))
+        self._forget(running.job)
+
+    def _handle_error(self, running: Running, error: BaseException) -> None:
+        job = running.job
+        if job.delivery is not None:
             self._put_off(job.delivery, job.message or job.delivery.alert, error)
         elif isinstance(error, BrokenExecutor | WorkerDied | MemoryError):
             self._note_death(running, error)
@@ -223,26 +258,6 @@ class Flow:
             log.warning(said, *job.key, wait_s, error, extra=_about(job))
         else:
             self._refuse(job, error)
-
-    def _keep(self, running: Running) -> None:
-        try:
-            kept = running.step.keep(running.future.result())
-            if isinstance(kept, StoredAlert):
-                log.warning(
-                    "alert %s: %s",
-                    kept.alert.key,
-                    kept.alert.message,
-                    extra=_about_alert(kept.alert),
-                )
-            log.info("%s %d: done", *running.job.key, extra=_about(running.job))
-        except DamagedRow as error:
-            self._stop(running.job, error)
-            return
-        except StoreError as error:
-            if error.retry_after_s is not None:
-                raise
-            self._refuse(running.job, error)
-        self._forget(running.job)
 
     def _stop(self, job: Job, error: DamagedRow) -> None:
         """A damaged row stops its hanger alone, until somebody has mended it; that is noted."""

@@ -21,6 +21,7 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from shm.documents import format_time
+from shm.errors import ShmError, StoreError
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day, is_told_already
 from shm.pipeline.unheard import compare_thermometers, heed_silences, note_blindness
@@ -127,8 +128,8 @@ class Streaming:
         self._rest.hurry = hurry
         for name, running in list(self._running.items()):
             if running.future.done():
-                del self._running[name]
                 self._finish(name, running)
+                del self._running[name]
         while not self._news.empty():
             self._note(*self._news.get())
         streams = self.workspace.bridge.streams
@@ -136,8 +137,15 @@ class Streaming:
         for stream in (*streams[self._first :], *streams[: self._first]):
             if len(self._running) >= self.lanes:
                 break
-            if stream.name not in self._running and self._may_begin(stream.name):
+            if stream.name in self._running or not self._may_begin(stream.name):
+                continue
+            try:
                 self._begin(stream)
+            except (ShmError, BrokenExecutor):
+                raise
+            except Exception:  # what one stream holds must not stop the others
+                log.exception("stream %s cannot begin its next step", stream.name)
+                self._retry_later(stream.name)
         self._first = (self._first + 1) % max(1, len(streams))
         if (now := self.clock()) >= self._heed_at:
             self._heed_at = now + _HEED
@@ -330,17 +338,30 @@ class Streaming:
     # ------------------------------------------------------------ finish
 
     def _finish(self, name: str, running: _Running) -> None:
+        """Store the result of a step that has ended, or handle the error that it ended with.
+
+        Raises StoreError where the store cannot be used now: the result is stored at a later turn.
+        """
         error = running.future.exception()
-        if error is None:
-            running.keep(running.future.result())
-        elif isinstance(error, BrokenExecutor | MemoryError) or getattr(
-            error, "retry_after_s", None
-        ):
-            self._not_before[name] = self.clock() + _AGAIN
+        try:
+            if error is None:
+                running.keep(running.future.result())
+                return
+        except StoreError:
+            raise
+        except Exception as fault:  # noqa: BLE001 - it must stop neither stream nor files
+            error = fault
+        if isinstance(error, BrokenExecutor | MemoryError) or getattr(error, "retry_after_s", None):
+            self._retry_later(name)
             log.warning("stream %s is tried again in a minute: %s", name, error)
         else:
             log.error("stream %s: a step failed", name, exc_info=error)
             running.fail(error)
+
+    def _retry_later(self, name: str) -> None:
+        """Leave a stream alone for a minute, then look for its unread windows again."""
+        self._not_before[name] = self.clock() + _AGAIN
+        self._known.discard(name)
 
     def _keep_window(self, stream: Stream, found: WindowFound) -> None:
         for event in found.events:

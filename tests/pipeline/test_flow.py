@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import pkgutil
 import threading
 import time
 from collections.abc import Sequence
@@ -24,8 +25,10 @@ from shm.modes_document import modes_document
 from shm.pipeline import Flow, steps
 from shm.read import Limits
 from shm.store import DeliveryState, Stage, Workspace
+from shm.store.archive import Quarantine
 from shm.store.stored_tests import Tests
 from shm.values import AddedMass, ModalTest, Posterior
+from tests.helpers import quick_update
 from tests.helpers.flows import Clock, Postman, a_flow, ingest, receive_all, tension_kn
 from tests.helpers.taken_in import copied
 from tests.helpers.workspaces import (
@@ -635,6 +638,80 @@ def test_a_result_that_the_store_will_not_have_refuses_its_file(
     spool(workspace, "t1")
     ingest(workspace)
     assert set(stages(workspace).values()) == {Stage.REFUSED}
+
+
+@pytest.mark.parametrize(
+    ("place", "error"),
+    [
+        ("shm.pipeline.jobs.judge", KeyError("tension")),
+        ("shm.pipeline.jobs.settled", ValueError("The truth value of an array is ambiguous")),
+        ("shm.store.stored_posteriors.Posteriors.save", TypeError("not a number")),
+    ],
+)
+def test_advance_storing_raises(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, place: str, error: Exception
+) -> None:
+    """Only the file whose result cannot be stored is refused; every other file is done."""
+    spool(workspace, "t1", day=1)
+    ingest(workspace)
+    original, failures = pkgutil.resolve_name(place), [error]
+
+    def fail_once(*args: Any, **values: Any) -> Any:
+        if failures:
+            raise failures.pop()
+        return original(*args, **values)
+
+    monkeypatch.setattr(place, fail_once)
+    for day in (2, 3, 4):
+        spool(workspace, f"t{day}", day=day)
+    ingest(workspace)
+    assert list(stages(workspace).values()) == [Stage.DONE, Stage.REFUSED, Stage.DONE, Stage.DONE]
+    reason = json.loads((workspace.folder / "quarantine/t2.modes.json.reason.json").read_text())
+    assert repr(error) in reason["message"]
+
+
+def test_advance_refusing_raises(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that can neither be stored nor refused keeps no other file from being done."""
+
+    def fail(*_: Any, **__: Any) -> None:
+        raise KeyError("tension")
+
+    spool(workspace, "t1", day=1)
+    ingest(workspace)
+    monkeypatch.setattr(steps, "load_modes", fail)
+    monkeypatch.setattr(Quarantine, "put", fail)
+    spool(workspace, "t2", day=2)
+    with a_flow(workspace, clock=(clock := Clock())) as flow:
+        receive_all(flow)
+        flow.drain()
+        monkeypatch.undo()
+        quick_update.stand_in(monkeypatch.setattr)
+        spool(workspace, "t3", day=3)
+        receive_all(flow)
+        flow.drain()
+        assert list(stages(workspace).values()) == [Stage.DONE, Stage.RECEIVED, Stage.DONE]
+        clock.pass_by(61)
+        flow.drain()
+    assert set(stages(workspace).values()) == {Stage.DONE}
+
+
+def test_advance_delivering_raises(untold: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An alert that no message can be made of keeps no file from being done."""
+
+    def fail(*_: Any) -> None:
+        raise ValueError("no message")
+
+    monkeypatch.setattr("shm.pipeline.jobs.plan", fail)
+    spool(untold, "late", day=90)
+    with a_flow(untold, notifier=Postman()) as flow:
+        receive_all(flow)
+        for _ in range(50):
+            with pytest.raises(ValueError, match="no message"):
+                flow.advance()
+            if stages(untold)["late.modes.json"] is Stage.DONE:
+                return
+            time.sleep(0.1)
+    pytest.fail("the file still waits")
 
 
 def test_a_test_with_a_mass_beyond_the_hanger_is_refused_with_its_file(

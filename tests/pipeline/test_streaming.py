@@ -8,9 +8,11 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from shm.errors import StoreBusy
 from shm.modes_document import load_modes
 from shm.pipeline import stream_steps
 from shm.pipeline.stream_state import stream_states
@@ -19,6 +21,7 @@ from shm.read.chunk_document import chunk_document
 from shm.simulate.ambient import streamed
 from shm.store import Store, Workspace
 from shm.store.ring import ring_of
+from shm.store.stored_streams import Streams
 from shm.values.stream import PooledReading
 from shm.watch.stream_reading import ModeTable
 from shm.watch.stream_state import StreamState
@@ -159,6 +162,54 @@ def test_a_step_that_fails_is_said_in_its_window_and_the_stream_goes_on(
         False
     ] * 3
     assert "odd" in windows[2].why
+
+
+@pytest.mark.parametrize("place", ["save_window", "save_pooled"])
+@pytest.mark.parametrize("error", [ValueError("not a number"), StoreBusy("", retry_after_s=1.0)])
+def test_advance_storing_raises(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, place: str, error: Exception
+) -> None:
+    """No ten minutes are lost and no later ones held up by an error while one result is stored."""
+    save, failures = getattr(Streams, place), [error]
+
+    def fail_once(*args: Any) -> Any:
+        if failures:
+            raise failures.pop()
+        return save(*args)
+
+    monkeypatch.setattr(Streams, place, fail_once)
+    send(workspace, 1)
+    clock = Clock(FIRST + timedelta(days=1))
+    with at_work(workspace, clock) as (streaming, store):
+        if isinstance(error, StoreBusy):
+            with pytest.raises(StoreBusy):
+                drain(streaming, clock)
+        drain(streaming, clock)
+        windows = store.streams.list_windows(3, FIRST, FIRST + HOUR)
+        unread = [each for each in windows if "not a number" in each.why]
+        assert len(windows) == 6
+        given_up = isinstance(error, ValueError)
+        assert len(unread) == (given_up and place == "save_window")
+        assert len(hours_of(store)) == 1 - (given_up and place == "save_pooled")
+
+
+def test_advance_without_memory(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten minutes that could not be read for want of memory are read a minute later."""
+    read, failures = stream_steps.read_stream_window, [MemoryError()]
+
+    def fail_once(*args: Any) -> Any:
+        if failures:
+            raise failures.pop()
+        return read(*args)
+
+    monkeypatch.setattr(stream_steps, "read_stream_window", fail_once)
+    send(workspace, 1)
+    clock = Clock(FIRST + timedelta(days=1))
+    with at_work(workspace, clock) as (streaming, store):
+        drain(streaming, clock)
+        clock.pass_by(61)
+        drain(streaming, clock)
+        assert len(store.streams.list_windows(3, FIRST, FIRST + HOUR)) == 6
 
 
 def test_an_alert_is_owed_to_the_hooks_and_the_raw_samples_before_it_stay(
