@@ -65,6 +65,8 @@ def decide(
         known = {stored.id for stored in store.alerts.list_all()}
         recording_id, test = store.recordings.find(which)
         held = _is_held(store, recording_id, test)
+        if held and test is not None:
+            _refuse_part(store.recordings.latest_hold(recording_id), test, decision)
         if not held:
             _refuse_without_reason(store, recording_id, decision, why)
         withdrawal = None
@@ -90,6 +92,21 @@ def _is_held(store: Store, recording_id: int, test: str | None) -> bool:
         return False
     present = [each for each in store.tests.list_former(recording_id) if each.superseded_at is None]
     return test is None or any(t.name == test and t.stage is Stage.HELD for t in present)
+
+
+def _refuse_part(hold: Hold | None, test: str, decision: Decision) -> None:
+    """Raise UsageError where one test is named of several that are held together."""
+    others = [each.name for each in (hold.tests if hold else ()) if each.name != test]
+    if hold is None or not others:
+        return
+    verb = "confirm" if decision is Decision.CONFIRMED else "discard"
+    other = "discard" if decision is Decision.CONFIRMED else "confirm"
+    raise UsageError(
+        f"recording {hold.recording_id} ({hold.file_name}) holds {test} together with "
+        f"{', '.join(others)}.",
+        remedy=f"Decide on all with `shm ingest --{verb} {hold.recording_id}`, then turn single "
+        f"ones round with `shm ingest --{other} {others[0]} --why TEXT`.",
+    )
 
 
 def _refuse_without_reason(store: Store, recording_id: int, decision: Decision, why: str) -> None:
@@ -123,8 +140,12 @@ def decided_words(decided: Decided, stage: Stage) -> str:
     what = f"Recording {hold.recording_id} ({hold.file_name})"
     if withdrawal is not None:
         return f"{_withdrawn_words(what, withdrawal)} {taking_back(hold)}"
-    if hold.decision is Decision.DISCARDED:
+    if hold.decision is Decision.DISCARDED and stage is Stage.REFUSED:
         return f"{what} is discarded and counts in nothing. {taking_back(hold)}"
+    if hold.decision is Decision.DISCARDED:
+        names = ", ".join(test.name for test in hold.tests)
+        said = f"{names} is discarded and counts in nothing; its other tests go on counting."
+        return f"{what}: {said} {taking_back(hold)}"
     verb = "counts again" if hold.decision is Decision.REINSTATED else "is confirmed and counts"
     time = ""
     if hold.time is not None:

@@ -15,7 +15,6 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError, sentence
 from shm.store.audit import note
-from shm.store.checksums import loads
 from shm.store.database import Repository, insert
 from shm.store.files import (
     advance_recordings,
@@ -104,20 +103,17 @@ class Decisions(Repository):
             return decide(connection, decided, who, why, at)
 
     def discard(self, recording_id: int, who: str, why: str, at: datetime) -> Hold:
-        """Ends the held tests of a recording; its raw file stays in the archive.
+        """Refuse the held tests of a recording; its other tests go on counting.
 
+        Its raw file stays in the archive, and the recording ends where no test of it is left.
         Raises NothingThere where there is no such recording, UsageError where it is not held.
         """
         with self.writing() as connection:
             hold = undecided(connection, recording_id)
             held = [row.id for row in held_rows(connection, recording_id)]
             end_tests(connection, recording_id, held, at)
-            reason = connection.scalar(
-                sa.select(recordings.c.reason).where(recordings.c.id == recording_id)
-            )
             decided = replace(hold, decision=Decision.DISCARDED, decided_at=at, who=who, why=why)
-            told = {"message": discarded_reason(decided), "remedy": taking_back(decided)}
-            end_recording(connection, recording_id, {**(loads(reason) or {}), **told}, at)
+            _end_or_advance(connection, by_id(connection, recording_id), decided, at)
             return decide(connection, decided, who, why, at)
 
     def withdraw(
@@ -152,9 +148,7 @@ class Decisions(Repository):
             held = [HeldTest(row.position, row.name, ()) for row in chosen]
             record = (Decision.WITHDRAWN, who, why, at, None)
             hold = _decide_unheld(connection, recording, held, record)
-            if not connection.scalar(_left(recording_id)):
-                reason = reason_of(recording, discarded_reason(hold), at, taking_back(hold))
-                end_recording(connection, recording_id, reason, at)
+            _end_or_advance(connection, recording, hold, at)
             names = tuple(sorted(row.name for row in chosen if row.id in own))
             return Withdrawal(hold, names, min(row.time for row in chosen), again)
 
@@ -252,6 +246,19 @@ def _chosen(
     if test is not None:
         query = query.where(tests.c.name == test)
     return connection.execute(query.order_by(tests.c.id)).all()
+
+
+def _end_or_advance(connection: Connection, recording: Row[Any], hold: Hold, at: datetime) -> None:
+    """End a recording of which a decision left no test; else move it on without that test."""
+    if connection.scalar(_left(recording.id)):
+        still_held = sa.update(recordings).where(
+            recordings.c.id == recording.id, recordings.c.stage == Stage.HELD
+        )
+        connection.execute(still_held.values(reason=None))
+        advance_recordings(connection, [recording.id], at)
+    else:
+        reason = reason_of(recording, discarded_reason(hold), at, taking_back(hold))
+        end_recording(connection, recording.id, reason, at)
 
 
 def _left(recording_id: int) -> sa.Select[Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -110,6 +110,48 @@ def test_what_is_discarded_says_that_its_raw_file_stays(shm: Shm, held: Workspac
     back = shm(*say, "--confirm", "lost", "--why", "it was right", "--time", "2026-06-01T10:00Z")
     assert back.code == 0
     assert "counts again from now on; it is done. Its time is 2026-06-01 10:00." in back.out
+
+
+def a_visit(workspace: Workspace) -> str:
+    """A file of two sound tests and two that are held, `1970a` and `1970b`."""
+    test, reset = modelled_test("t", workspace.bridge.hanger(3)), datetime(1970, 1, 1, tzinfo=UTC)
+    times = {
+        "sound9": START + timedelta(days=9),
+        "sound10": START + timedelta(days=10),
+        "1970a": reset,
+        "1970b": reset + timedelta(days=1),
+    }
+    return dump(modes_document([replace(test, id=name, time=at) for name, at in times.items()]))
+
+
+def test_discard_leaves_other_tests_counting(shm: Shm, held: Workspace, tmp_path: Path) -> None:
+    say = ("--workspace", held.folder, "ingest")
+    (tmp_path / "visit.modes.json").write_text(a_visit(held))
+    (row,) = shm(*say, tmp_path / "visit.modes.json", "--json").document["files"]
+    assert row["stage"] == "held"
+    ended = shm(*say, "--discard", 3, "--why", "the clock was reset")
+    assert "1970a, 1970b is discarded" in " ".join(ended.out.split())
+    assert "its other tests go on counting" in " ".join(ended.out.split())
+    with held.store() as store:
+        assert store.recordings.get(3).stage is Stage.DONE
+        assert store.recordings.get(3).reason is None
+        assert [each.test.id for each in store.tests.list_all(3)] == ["good", "sound9", "sound10"]
+    (row,) = shm(*say, tmp_path / "visit.modes.json", "--json").document["files"]
+    assert (row["outcome"], row["stage"]) == ("known already", "done")
+    back = shm(*say, "--confirm", "1970b", "--why", "right", "--time", "2026-06-01T10:00Z")
+    assert "counts again from now on; it is done" in " ".join(back.out.split())
+
+
+@pytest.mark.parametrize("verb", ["--confirm", "--discard"])
+def test_decide_refuses_part_of_hold(shm: Shm, held: Workspace, tmp_path: Path, verb: str) -> None:
+    """A test that was not named is neither counted nor discarded."""
+    say = ("--workspace", held.folder, "ingest")
+    (tmp_path / "visit.modes.json").write_text(a_visit(held))
+    shm(*say, tmp_path / "visit.modes.json")
+    ended = shm(*say, verb, "1970b", "--why", "so it is")
+    assert ended.code == 2
+    assert "holds 1970b together with 1970a" in " ".join(ended.err.split())
+    assert len(shm(*say, "--held", "--json").document["held"]) == 2
 
 
 def test_a_discarded_file_that_comes_again_is_told_in_one_line(
