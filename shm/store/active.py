@@ -1,7 +1,8 @@
 """Who may ingest: one process a store is active, others stand by.
 
 The lock is the operating system's on a file, or the PostgreSQL server's for as long as a connection
-lives: either is let go of when its holder dies, however it dies.
+lives: either is let go of when its holder dies, however it dies. Who looks whether it is held takes
+no lock, so that nobody who asks for it at that moment is refused.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import fcntl
 import os
 import socket
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -40,7 +42,10 @@ def active(location: str | Path, lock_file: Path, wait: Wait | None) -> Iterator
 
 
 def holder(location: str | Path, lock_file: Path) -> str | None:
-    """Who ingests into a store now; None where nobody does. Raises StoreError."""
+    """Return who ingests into a store now, without locking; None where nobody does.
+
+    Raises StoreError.
+    """
     if not is_server(location):
         return FileLock(lock_file).holder()
     lock = ServerLock(location)
@@ -76,7 +81,9 @@ class FileLock:
                 remedy="Give this user write access to its folder.",
             ) from error
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # processes of shm 1.0.0 know only it
+            if _HAS_OFD_LOCKS:
+                fcntl.fcntl(file, fcntl.F_OFD_SETLK, _pack_lock(fcntl.F_WRLCK))
         except BlockingIOError:
             file.seek(0)
             holder = file.read().strip() or "unknown"
@@ -113,16 +120,32 @@ class FileLock:
             self._file = None
 
     def holder(self) -> str | None:
-        """Who has it, told by one who does not ask for it; None where nobody has."""
+        """Return who has it, without locking; None where nobody has."""
         try:
             with self._path.open(encoding="utf-8") as file:
-                try:
-                    fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-                except BlockingIOError:
-                    return f"process {file.read().strip() or 'unknown'}"
+                return f"process {file.read().strip() or 'unknown'}" if _is_locked(file) else None
         except OSError:
             return None
-        return None
+
+
+_HAS_OFD_LOCKS = hasattr(fcntl, "F_OFD_GETLK")  # Linux; elsewhere nobody can look without locking
+
+
+def _pack_lock(kind: int) -> bytes:
+    """Pack the `struct flock` of a lock of some kind on a complete file."""
+    return struct.pack("hhqqi0q", kind, os.SEEK_SET, 0, 0, 0)
+
+
+def _is_locked(file: IO[str]) -> bool:
+    """Return True if another open file holds the lock, which is left as it is."""
+    if _HAS_OFD_LOCKS:
+        found = fcntl.fcntl(file, fcntl.F_OFD_GETLK, _pack_lock(fcntl.F_WRLCK))
+        return bool(struct.unpack_from("h", found)[0] != fcntl.F_UNLCK)
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    return False
 
 
 class ServerLock:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import multiprocessing
 import os
 import threading
@@ -12,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from shm.errors import StoreBusy, StoreError
-from shm.store.active import active
+from shm.store.active import active, holder
+from shm.store.database import is_server
 from tests.helpers.postgres import Databases
 
 
@@ -104,6 +106,61 @@ def test_a_standby_takes_over_within_seconds_of_a_kill(
     with active(location, file, patient()):
         assert time.monotonic() - began < 5.0
     process.join()
+
+
+def _look(location: str | Path, file: Path, ready: multiprocessing.synchronize.Event) -> None:
+    while True:
+        holder(location, file)
+        ready.set()
+
+
+def test_holder_hinders_nobody(location: str | Path, tmp_path: Path) -> None:
+    """Looking who is active is never in the way of one who becomes it."""
+    file, context = tmp_path / "shm.lock", multiprocessing.get_context("spawn")
+    ready = context.Event()
+    with active(location, file, None):
+        pass
+    process = context.Process(target=_look, args=(location, file, ready))
+    process.start()
+    try:
+        assert ready.wait(60)
+        for _ in range(20 if is_server(location) else 2000):
+            with active(location, file, None):
+                assert str(os.getpid()) in str(holder(location, file))
+        assert process.is_alive()
+    finally:
+        process.kill()
+        process.join()
+
+
+def test_holder_names_process(location: str | Path, tmp_path: Path) -> None:
+    file, context = tmp_path / "shm.lock", multiprocessing.get_context("spawn")
+    ready = context.Event()
+    assert holder(location, file) is None
+    process = context.Process(target=_be_active, args=(location, file, ready))
+    process.start()
+    assert ready.wait(60)
+    if file.exists():
+        file.chmod(0o444)
+    assert f"process {process.pid}" in str(holder(location, file))
+    process.kill()
+    process.join()
+    end = time.monotonic() + 20
+    while holder(location, file) is not None:
+        assert time.monotonic() < end, "it is dead and still named"
+        time.sleep(0.02)
+
+
+def test_active_excludes_older_version(sqlite: Path, tmp_path: Path) -> None:
+    """Processes of 1.0.0 lock by flock(2) alone: no two of either are active together."""
+    file = tmp_path / "shm.lock"
+    with file.open("a+") as older:
+        fcntl.flock(older, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with pytest.raises(StoreBusy), active(sqlite, file, None):
+            pytest.fail("two were active")
+        fcntl.flock(older, fcntl.LOCK_UN)
+        with active(sqlite, file, None), pytest.raises(BlockingIOError):
+            fcntl.flock(older, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def test_who_loses_the_connection_is_no_longer_active(
