@@ -5,9 +5,10 @@
     python tests/benchmarks/every.py --only evidence,golden --anew
 
 A benchmark is each file beside this one that can be run, but those that make environments of other
-packages (`make bench-peers`). What it prints is kept in `build/bench/NAME.txt`, and the table in
-`build/bench/table.md`; of the short form in `build/bench/short`. What held is not run again as long
-as neither the files that git knows nor its arguments change, so an interrupted run goes on. A mark
+packages (`make -C tests/benchmarks bench-peers`). What it prints is kept in `build/bench/NAME.txt`,
+and the table in `build/bench/table.md`; of the short form in `build/bench/short`. What held is not
+run again as long as neither the files that git knows nor its arguments change, so an interrupted run
+goes on. A mark
 is missed where the exit code is 1 and nothing was traced back; any other fault is a broken
 benchmark, and makes the exit code 1. One without marks holds when it comes to its end. With few
 cases, or on a busy machine, a mark is also missed by chance.
@@ -70,7 +71,7 @@ SHORT = {
     "watch_worlds": "--world tied_arch --scenarios quiet --bridges 1 --years 1 --jobs 1",
     "week": "--tests 24 --hangers 2 --every 6 --samples 200", "worlds": "--hangers 1",
 }  # fmt: skip
-# What `make bench` runs besides: tests, in the targets of the Makefile that set their processor.
+# Tests that `make bench` runs too, by targets of the Makefile here, which set their processor.
 TESTS = {
     "test-slow": "The slow tests.",
     "test-trials": "The statistical trials among the tests.",
@@ -104,7 +105,7 @@ def benchmarks() -> dict[str, str]:
 
 def commands(name: str, short: bool, folder: Path) -> list[list[str]]:
     if name in TESTS:
-        return [["make", name]]
+        return [["make", "--directory", str(HERE), name]]
     script = [sys.executable, str(HERE / f"{name}.py")]
     rows = (SHORT if short else WHOLE).get(name, "").split(";")
     return [script + row.replace("FOLDER", str(folder / name / "trial")).split() for row in rows]

@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 from shm_cli.main import cli
 from tests.benchmarks import every
+from tests.helpers.makefiles import make_targets
 
 # The proof of docs/trials/validation.md names a command a row: by its first word.
 PROOF: dict[str, list[str]] = defaultdict(list)
@@ -26,6 +27,7 @@ BEGUN = """
 import argparse, contextlib, io, runpy, shlex, sys, traceback
 from pathlib import Path
 from tests.benchmarks import every
+from tests.helpers.makefiles import make_targets
 
 class Parsed(Exception):
     pass
@@ -83,7 +85,11 @@ def test_a_missed_mark_is_no_broken_benchmark(program: str, verdict: str, tmp_pa
 def test_every_command_of_the_proof_exists() -> None:
     """Scripts take their arguments by the test above."""
     assert set(PROOF) == {"make", "shm", "python"}
-    assert {command.split()[1] for command in PROOF["make"]} <= _targets()
+    at_root, here = make_targets(every.ROOT), make_targets(every.HERE)
+    for command in PROOF["make"]:
+        *options, target = command.split()[1:]
+        assert options in ([], ["-C", "tests/benchmarks"]), command
+        assert target in (here if options else at_root), command
     words = [command.split() for command in PROOF["python"]]
     assert all((every.ROOT / each[1]).is_file() for each in words)
     # Of several commands one after the other, `every.py --only NAME` is the one.
@@ -94,11 +100,6 @@ def test_every_command_of_the_proof_exists() -> None:
         assert helped.exit_code == 0, helped.output
 
 
-def _targets() -> set[str]:
-    makefile = (every.ROOT / "Makefile").read_text(encoding="utf-8").splitlines()
-    return {line.partition(":")[0] for line in makefile}
-
-
-def test_the_table_of_arguments_names_benchmarks_and_targets() -> None:
+def test_the_table_of_arguments_names_benchmarks_andmake_targets() -> None:
     assert set(every.WHOLE | every.SHORT) <= set(every.benchmarks())
-    assert set(every.TESTS) <= _targets()
+    assert set(every.TESTS) <= make_targets(every.HERE)

@@ -1,0 +1,49 @@
+"""The commands of a developer: few at the root, the others with the benchmarks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.helpers.makefiles import dry_run, make_targets
+
+ROOT = Path(__file__).resolve().parents[2]
+BENCHMARKS = ROOT / "tests" / "benchmarks"
+AT_ROOT = {"demo", "demo-live", "test", "lint", "docs", "bench", "lock", "clean"}
+
+
+def test_makefile_targets_at_root() -> None:
+    assert make_targets(ROOT) == AT_ROOT
+
+
+@pytest.mark.parametrize("folder", [ROOT, BENCHMARKS], ids=["root", "benchmarks"])
+def test_makefile_first_comment_names_targets(folder: Path) -> None:
+    comment = (folder / "Makefile").read_text(encoding="utf-8").partition("\n\n")[0]
+    named = {word.strip(",") for line in comment.splitlines() for word in line[1:].split()}
+    assert make_targets(folder) - {"environment"} <= named
+
+
+@pytest.mark.parametrize("target", sorted(make_targets(BENCHMARKS) - {"environment", "lint"}))
+def test_benchmark_target_runs_at_root(target: str) -> None:
+    assert f"cd {ROOT} && " in dry_run(BENCHMARKS, target)
+
+
+def test_make_test_runs_each_file_once() -> None:
+    """The quick numerics run in one part; the other part leaves out exactly these."""
+    shown = dry_run(ROOT, "test")
+    left_out = {word[9:] for word in shown.split() if word.startswith("--ignore=")}
+    alone = {word for word in shown.split() if word.startswith("tests/") and word.endswith(".py")}
+    assert left_out == alone
+    assert len(alone) > 50
+    assert all((ROOT / name).is_file() for name in alone)
+    for command in ("ruff check .", "ruff format --check .", "mypy", "lint-imports"):
+        assert f"/{command}" in shown
+
+
+def test_long_test_files_exist() -> None:
+    """A file of this list that was renamed would silently run with the quick ones."""
+    shown = dry_run(BENCHMARKS, "slow-without-avx2").split()
+    named = [word for word in shown if word.startswith("tests/") and word.endswith(".py")]
+    assert named
+    assert [name for name in named if not (ROOT / name).is_file()] == []
