@@ -5,7 +5,7 @@ repository: `shm VERB --help`, `shm settings`, `shm gap effects` and `shm valida
 same.
 
 python docs/build.py --quick    # what follows from the code alone; `make docs` does this first
-python docs/build.py            # the computed tables too (`tables` of tests/benchmarks/Makefile): validation, gap
+python docs/build.py            # the computed tables too: validation, gap
 
 The blind trial takes hours; its page is filled from one that was solved by docs/blind_page.py.
 The real measurements are not in this repository; docs/real_cases_page.py fills their page in two

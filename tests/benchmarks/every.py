@@ -7,11 +7,10 @@
 A benchmark is each file beside this one that can be run, but those that make environments of other
 packages (`make -C tests/benchmarks bench-peers`). What it prints is kept in `build/bench/NAME.txt`,
 and the table in `build/bench/table.md`; of the short form in `build/bench/short`. What held is not
-run again as long as neither the files that git knows nor its arguments change, so an interrupted run
-goes on. A mark
-is missed where the exit code is 1 and nothing was traced back; any other fault is a broken
-benchmark, and makes the exit code 1. One without marks holds when it comes to its end. With few
-cases, or on a busy machine, a mark is also missed by chance.
+run again as long as neither the files that git knows nor its arguments change, so an interrupted
+run goes on. A mark is missed where the exit code is 1 and nothing was traced back; any other fault
+is a broken benchmark, and makes the exit code 1. One without marks holds when it comes to its end.
+With few cases, or on a busy machine, a mark is also missed by chance.
 """
 
 from __future__ import annotations
