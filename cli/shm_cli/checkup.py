@@ -8,7 +8,6 @@ from dataclasses import asdict
 from pathlib import Path
 
 import rich_click as click
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -17,6 +16,7 @@ from shm.pipeline import utc_now
 from shm.values import printable
 from shm_cli import flags
 from shm_cli.common import open_workspace, paragraph, show
+from shm_cli.terminal import Terminal
 from shm_daemon.doctor import Finding, Level, examine
 
 _STYLES = {
@@ -57,7 +57,7 @@ def _show_findings(findings: Sequence[Finding]) -> None:
         remedy = f"\n-> {each.remedy}" if each.remedy else ""
         level = Text(each.level, style=_STYLES[each.level])
         made.add_row(level, Text(each.check), Text(f"{each.found}{remedy}"))
-    console = Console(highlight=False)
+    console = Terminal(highlight=False)
     console.print(made)
     counted = Counter(each.level for each in findings)
     console.print(f"faults: {counted[Level.FAULT]}, warnings: {counted[Level.WARNING]}")

@@ -28,6 +28,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.table import Column, Table
+from rich.text import Text
 
 from shm.bridge import load_hanger
 from shm.documents import dump
@@ -35,6 +36,7 @@ from shm.errors import NothingThere, UsageError
 from shm.modes_document import load_modes
 from shm.values import Hanger, ModalTest
 from shm_cli.flags import wants_json
+from shm_cli.terminal import Terminal, escape_controls
 
 if TYPE_CHECKING:
     from shm.report.figures.specification import Illustration
@@ -60,16 +62,19 @@ def answer(document: object, words: str) -> None:
 
 
 def show_rows(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Prints rows of texts as a table; columns after the first are aligned to the right."""
+    """Print rows of texts as a table, as they are: none is markup of rich.
+
+    Columns after the first are aligned to the right.
+    """
     made = table(title, *headings)
     for row in rows:
-        made.add_row(*row)
+        made.add_row(*(Text(escape_controls(cell)) for cell in row))
     show_table(made)
 
 
 def show_table(table: Table) -> None:
     """Prints a table on stdout; one that the terminal is too narrow for as a list a row."""
-    console = Console(highlight=False)
+    console = Terminal(highlight=False)
     if not sys.stdout.isatty() and "COLUMNS" not in os.environ:
         console.width = max(console.width, _WIDTH_OF_A_FILE)
     console.print(table.title, style="bold", soft_wrap=True, markup=False)
@@ -117,7 +122,7 @@ def _listed(headings: Sequence[str], cells: Sequence[RenderableType]) -> Table:
     listed.add_column(overflow="fold")
     named = [(heading, cell) for heading, cell in zip(headings, cells, strict=True) if cell]
     for heading, cell in named:
-        listed.add_row(heading, cell)
+        listed.add_row(Text(heading), cell)
     return listed
 
 
@@ -151,7 +156,7 @@ def table(title: str, *columns: str) -> Table:
     """An empty table; columns after the first are aligned to the right."""
     made = Table(title=title, header_style="bold")
     for index, column in enumerate(columns):
-        made.add_column(column, justify="left" if index == 0 else "right")
+        made.add_column(Text(column), justify="left" if index == 0 else "right")
     return made
 
 
@@ -274,7 +279,7 @@ def counting_bar() -> Progress:
 
 
 def _bar(done: ProgressColumn) -> Progress:
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -289,7 +294,7 @@ def _bar(done: ProgressColumn) -> Progress:
 @contextmanager
 def waiting(label: str) -> Iterator[None]:
     """A turning sign and the time gone, on stderr, where nobody can tell how much is left."""
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     with Progress(
         SpinnerColumn(),
         TextColumn("{task.description}"),

@@ -9,15 +9,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import rich_click as click
-from rich.console import Console
 from rich.markdown import Markdown
-from rich.markup import escape
 
 from shm.bridge import load_hanger
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey
 from shm.values import PLANES
 from shm_cli import completion, flags, thesis
 from shm_cli.common import markdown, show, show_rows
+from shm_cli.terminal import Terminal
 
 _HANGER = replace(load_hanger(thesis.HANGER_FILE), plate=None)
 
@@ -95,11 +94,11 @@ def effects(name: str | None) -> None:
 
 def _print(text: str) -> None:
     """Markdown for a terminal; what a link leads to is no use there."""
-    Console().print(Markdown(re.sub(r"\[([^\]]+)\]\([^)]+\)", r"\1", text)))
+    Terminal().print(Markdown(re.sub(r"\[([^\]]+)\]\([^)]+\)", r"\1", text)))
 
 
 def _print_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    show_rows("", heads, [[escape(cell.replace("`", "")) for cell in row] for row in rows])
+    show_rows("", heads, [[cell.replace("`", "") for cell in row] for row in rows])
 
 
 def _document(effect: Effect) -> dict[str, object]:

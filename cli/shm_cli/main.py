@@ -12,12 +12,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 import rich_click as click
-from rich.console import Console
 from rich.markup import escape
 
 from shm import __version__
 from shm.errors import DISK_FULL, BadInput, ShmError
 from shm.resources import one_thread_a_process
+from shm_cli.terminal import Terminal, cleaned_output, escape_controls
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -116,6 +116,7 @@ class Verbs(click.RichGroup):
         command: click.Command = getattr(import_module(verb.module), verb.name)
         gc.enable()
         _take_workspace(command)
+        _clean_output(command)
         return command
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
@@ -169,6 +170,19 @@ def _take_workspace(command: click.Command) -> None:
         )
 
 
+def _clean_output(command: click.Command) -> None:
+    """Have a command, and all below it, print no control character of anybody's text.
+
+    What is printed while a command line is parsed, help and usage, is ours, and in colours.
+    """
+    if isinstance(command, click.Group):
+        for member in command.commands.values():
+            _clean_output(member)
+    if command.callback is not None and not hasattr(command.callback, "cleans_output"):
+        command.callback = cleaned_output()(command.callback)
+        command.callback.cleans_output = True  # type: ignore[attr-defined]
+
+
 def _use_workspace(ctx: click.Context, option: click.Parameter, folder: str | None) -> None:
     if folder is not None:
         ctx.obj = folder
@@ -191,6 +205,7 @@ def run(arguments: Sequence[str]) -> int:
     try:
         result = cli.main(list(arguments), prog_name="shm", standalone_mode=False)
     except click.ClickException as error:
+        vars(error)["message"] = escape_controls(error.message)
         error.show()
         return error.exit_code
     except ShmError as error:
@@ -228,4 +243,4 @@ def _warn(message: Warning | str, *where: object, **_: object) -> None:
 
 
 def _say(text: str) -> None:
-    Console(stderr=True, highlight=False).print(text, soft_wrap=True)
+    Terminal(stderr=True, highlight=False).print(text, soft_wrap=True)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import rich_click as click
-from rich.markup import escape
 
 from shm.documents import format_time
 from shm.errors import NothingThere
@@ -191,9 +190,7 @@ def _show_events(store: Store, since: datetime) -> None:
         show({"events": [asdict(event) for event in found]})
         return
     headings = ("stream", "what", "from", "to", "channel", "details")
-    rows = [
-        (e.stream, e.kind, _time(e.start), _time(e.end), e.channel, escape(e.detail)) for e in found
-    ]
+    rows = [(e.stream, e.kind, _time(e.start), _time(e.end), e.channel, e.detail) for e in found]
     show_rows("Events of streams", headings, rows)
 
 
