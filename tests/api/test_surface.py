@@ -124,18 +124,16 @@ def test_a_wrong_name_is_an_attribute_error() -> None:
         shm.indentify  # noqa: B018
 
 
-def test_importing_loads_nothing_and_takes_little() -> None:
+def test_import_loads_nothing_else() -> None:
     code = (
-        "import sys, time; before = set(sys.modules); start = time.process_time(); import shm\n"
-        "took = time.process_time() - start; new = set(sys.modules) - before\n"
-        "print(took, *(name for name in new if name.startswith('shm') or 'numpy' in name))"
+        "import sys; before = set(sys.modules); import shm\n"
+        "new = set(sys.modules) - before\n"
+        "print(*(name for name in new if name.startswith('shm') or 'numpy' in name))"
     )
     ran = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    took, *loaded = ran.stdout.split()
-    assert loaded == ["shm"]
-    assert float(took) < 0.1
+    assert ran.stdout.split() == ["shm"]
 
 
 def test_the_steps_are_at_hand_without_the_libraries_that_take_long_to_load() -> None:

@@ -49,6 +49,7 @@ SHORT = {
     "blind_trial_2": "make FOLDER --cases 2; solve FOLDER --at-once 1; score FOLDER",
     "calibration": "--draws 20 --samples 300", "clock_faults": "1", "copies": "3",
     "damage": "--minutes 0.5", "dashboard": "--hangers 4 --tests 10 --rounds 1 --warm-only",
+    "durations": "--repeats 1",
     "evidence": "--seeds 2 --textbook-seeds 2", "full_disk": "--files 1 --every 40",
     "fuzz_readers": "--files 200 --flow 5 --processes 1", "gap_calibration": "--cases 1 --jobs 1",
     "gap_dynamics": "--cases 1 --seed 300", "gap_family": "--families 1 --sound 0 --hangers 2",

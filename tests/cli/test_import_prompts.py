@@ -29,7 +29,7 @@ from shm_cli.main import run
 from tests.cli.test_import import export, modes_file
 from tests.helpers.workspaces import make_workspace
 
-PATIENCE_S = 60.0
+PATIENCE_S = 120.0
 _STYLE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -102,10 +101,8 @@ def test_a_service_that_does_not_take_the_alert_is_named_without_its_password(
 
 
 def test_a_service_that_hangs_is_ended(tmp_path: Path) -> None:
-    began = time.monotonic()
     with a_silent_listener(b"HTTP/1.1 200 OK\r\n" + b"X-A: 1\r\n" * 500) as url:
         assert "ended after 2 s" in failure(tmp_path, address(url), timeout_s=2.0)
-    assert time.monotonic() - began < 8
 
 
 def test_without_the_library_it_is_said_how_to_get_it(

@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 import tracemalloc
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,6 +16,7 @@ import pytest
 from shm.bridge import CommandHook
 from shm_daemon import HookFailed, HookNotifier
 from tests.helpers.nouns import an_alert
+from tests.helpers.waiting import until
 
 ENVIRONMENT = {"PATH": os.environ["PATH"], "HOME": "/home/owner", "SHM_SECRET": "token"}
 
@@ -171,14 +171,14 @@ def test_closing_ends_running_hooks_and_begins_no_more(tmp_path: Path) -> None:
     while not (tmp_path / "begun").exists():
         time.sleep(0.01)
     notifier.close()
-    thread.join(60)
+    thread.join(120)
     assert not thread.is_alive()
     assert "exit code -9" in failures[0]
     with pytest.raises(HookFailed, match="ending"):
         notifier(CommandHook("mail", ("true",)), an_alert())
 
 
-def is_gone(pid: int, seconds: float = 20.0) -> bool:
+def is_gone(pid: int, seconds: float = 120.0) -> bool:
     """Return True once a process has ended; one that nobody has buried yet counts."""
     status = Path(f"/proc/{pid}/stat")
     for _ in range(int(seconds / 0.05)):
@@ -189,11 +189,3 @@ def is_gone(pid: int, seconds: float = 20.0) -> bool:
             return True
         time.sleep(0.05)
     return False
-
-
-def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
-    """Wait until a condition holds."""
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.02)

@@ -6,7 +6,7 @@ import json
 import threading
 import time
 import tracemalloc
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from shm_daemon.mqtt import Broker as Address
 from shm_daemon.mqtt import Listener, messages, topic_of
 from shm_daemon.spool import scan
 from tests.helpers.brokers import Broker, a_broker
+from tests.helpers.waiting import until
 from tests.helpers.workspaces import make_workspace
 
 TOPIC = "shm/test-bridge/3"
@@ -40,13 +41,6 @@ def bridge(tmp_path: Path, broker: Broker) -> Workspace:
 def a_bridge(folder: Path, broker: Broker, name: str = "bridge") -> Workspace:
     settings = {"mqtt_url": broker.url, "mqtt_max_bytes": 10_000}
     return make_workspace(folder / name, settings=settings)
-
-
-def until(condition: Callable[[], object], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.02)
 
 
 def spooled(workspace: Workspace) -> list[str]:
@@ -189,7 +183,7 @@ def test_flood_waits_at_broker(tmp_path: Path, broker: Broker) -> None:
             tracemalloc.stop()
         away.rename(workspace.spool)
         outcomes: list[Outcome] = []
-        until(lambda: outcomes.extend(received(workspace)) or len(outcomes) >= len(names), 120)
+        until(lambda: outcomes.extend(received(workspace)) or len(outcomes) >= len(names))
     assert held_bytes < 6_000_000  # 9 MB were sent
     assert outcomes == [Outcome.NEW] * len(names)
     with listening(workspace) as again:

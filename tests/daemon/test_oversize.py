@@ -7,7 +7,8 @@ import json
 import os
 import threading
 import time
-from itertools import pairwise
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from shm.store import Archive, Stage, Workspace
 from shm_daemon import Wakeup, run
 from shm_daemon.heartbeat import HEARTBEAT
 from tests.helpers.flows import threads
+from tests.helpers.waiting import until
 from tests.helpers.workspaces import START, make_workspace, put, write_test
 
 HUNDRED_GB = 100 * 10**9
@@ -34,22 +36,19 @@ def on_disk(folder: Path) -> int:
     return sum(path.lstat().st_blocks * 512 for path in folder.rglob("*"))
 
 
-def serve_for(workspace: Workspace, seconds: float, done: threading.Event | None = None) -> float:
-    """Runs a daemon for a while; the longest time between two signs of it."""
-    wakeup, heart, seen = Wakeup(), workspace.folder / HEARTBEAT, [time.time()]
+@contextmanager
+def serving(workspace: Workspace) -> Iterator[None]:
+    """A daemon that runs until the end of the block."""
+    wakeup = Wakeup()
     daemon = threading.Thread(
         target=run, args=(workspace,), kwargs={"wakeup": wakeup, "make_executor": threads}
     )
     daemon.start()
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if heart.exists() and heart.stat().st_mtime > seen[-1]:
-            seen.append(heart.stat().st_mtime)
-        time.sleep(0.02)
-    seen.append(time.time())
-    wakeup.stop()
-    daemon.join(60)
-    return max(after - before for before, after in pairwise(seen))
+    try:
+        yield
+    finally:
+        wakeup.stop()
+        daemon.join(120)
 
 
 def test_a_hundred_sparse_gigabytes_go_to_the_quarantine_unread(tmp_path: Path) -> None:
@@ -98,7 +97,8 @@ def test_what_cannot_be_moved_stays_where_it_is_and_is_said_once(
 
     monkeypatch.setattr(Path, "rename", other_disk)
     run(workspace, once=True, make_executor=threads)
-    serve_for(workspace, 2.0)
+    with serving(workspace):
+        time.sleep(2.0)
     assert huge.exists()
     assert on_disk(workspace.quarantine.folder) < 100_000
     reason = json.loads((workspace.quarantine.folder / "huge.csv.reason.json").read_text())
@@ -166,6 +166,7 @@ def test_the_heart_beats_while_a_large_permitted_file_is_copied_and_refused(
     """Each MB takes 50 ms, as on a slow card: 4 s to archive, and again for the quarantine."""
     workspace = make_workspace(tmp_path / "bridge", settings={"spool_scan_seconds": 30.0})
     (workspace.spool / "large.csv").write_bytes(os.urandom(1 << 20) * 80)
+    heart, beats = workspace.folder / HEARTBEAT, set[float]()
     digest, slow = "shm.store.archive.hashlib.sha256", __import__("hashlib").sha256
 
     class Slow:
@@ -174,6 +175,7 @@ def test_the_heart_beats_while_a_large_permitted_file_is_copied_and_refused(
 
         def update(self, chunk: bytes) -> None:
             time.sleep(0.05 * len(chunk) / (1 << 20))
+            beats.add(heart.stat().st_mtime)
             self.inner.update(chunk)
 
         def digest(self) -> bytes:
@@ -183,6 +185,8 @@ def test_the_heart_beats_while_a_large_permitted_file_is_copied_and_refused(
             return str(self.inner.hexdigest())
 
     monkeypatch.setattr(digest, lambda data=b"": slow(data) if data else Slow())
-    assert serve_for(workspace, 7.0) < 3.5
+    with serving(workspace):
+        until(lambda: not (workspace.spool / "large.csv").exists())
+    assert len(beats) > 2  # while it was copied
     with workspace.store() as store:
         assert len(store.recordings.list_all()) == 1

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,14 +9,8 @@ import pytest
 from shm.store import Stage, Workspace
 from shm_daemon.__main__ import main
 from tests.helpers.daemons import quick_daemons, real_daemon
+from tests.helpers.waiting import until
 from tests.helpers.workspaces import write_test
-
-
-def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.05)
 
 
 def log_of(workspace: Workspace) -> str:
@@ -55,7 +47,7 @@ def test_sigterm_ends_it_cleanly_and_a_kill_leaves_no_process_behind(
         until(lambda: "identify 1: done" in log_of(workspace))  # and the next one is under way
         daemon.terminate()
         assert daemon.wait(10) == 0
-    until(lambda: not processes_of(workspace), 10)
+    until(lambda: not processes_of(workspace))
     assert log_of(workspace).splitlines()[-1].endswith("ended")
     assert "Traceback" not in log_of(workspace)
 
@@ -63,7 +55,7 @@ def test_sigterm_ends_it_cleanly_and_a_kill_leaves_no_process_behind(
         until(lambda: len(processes_of(workspace)) > 2)  # itself, a helper, a worker
         daemon.kill()
         assert daemon.wait(10) == -9
-    until(lambda: not processes_of(workspace), 20)
+    until(lambda: not processes_of(workspace))
 
     with quick_daemons(workspace.folder) as daemons:
         daemons.begin(once=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +14,7 @@ from shm_daemon import Wakeup, run
 from tests.helpers import quick_update
 from tests.helpers.flows import threads
 from tests.helpers.postgres import Databases
+from tests.helpers.waiting import until
 from tests.helpers.workspaces import make_workspace, write_test
 
 
@@ -38,18 +39,9 @@ def served(
     yield workspace
     assert daemon.is_alive()
     wakeup.stop()
-    daemon.join(30)
+    daemon.join(120)
     assert not daemon.is_alive()
     assert "hush" not in caplog.text
-
-
-def until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
-    passing = threading.Event()
-    for _ in range(int(seconds / 0.05)):
-        if condition():
-            return
-        passing.wait(0.05)
-    pytest.fail("it did not come about")
 
 
 def done(url: str) -> int:

@@ -86,7 +86,7 @@ def systemd(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.
     """Where systemd would listen."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
         line.bind(str(tmp_path / "notify"))
-        line.settimeout(10)
+        line.settimeout(120)
         monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
         yield line
 
@@ -97,7 +97,7 @@ def hear(systemd: socket.socket) -> list[str]:
 
 def hear_until(systemd: socket.socket, word: str) -> list[str]:
     """What is told in the first message that holds a word."""
-    end = time.monotonic() + 20
+    end = time.monotonic() + 120
     while word not in (said := hear(systemd)):
         assert time.monotonic() < end, f"{word} never came"
     return said
@@ -121,7 +121,7 @@ def test_the_daemon_says_that_it_is_ready_lives_and_ends(
             assert "WATCHDOG=1" in hear(systemd)
     finally:
         wakeup.stop()
-        thread.join(20)
+        thread.join(120)
     assert "STOPPING=1" in hear_until(systemd, "STOPPING=1")
 
 
@@ -141,7 +141,7 @@ def test_standing_by_counts_as_being_ready(tmp_path: Path, systemd: socket.socke
             assert any(line.startswith("STATUS=standing by") for line in said)
         finally:
             wakeup.stop()
-            thread.join(20)
+            thread.join(120)
 
 
 def test_a_daemon_that_fails_says_that_it_ends(

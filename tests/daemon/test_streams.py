@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -29,6 +29,7 @@ from shm_daemon.streams import StreamKeeper
 from tests.helpers.brokers import a_broker
 from tests.helpers.flows import threads
 from tests.helpers.streams import a_chunk, with_stream
+from tests.helpers.waiting import until
 from tests.helpers.web_servers import served
 from tests.helpers.workspaces import make_workspace
 from tests.helpers.written import write
@@ -156,13 +157,6 @@ def test_too_large_a_body_is_not_held(client: httpx.Client) -> None:
 
 
 # ---------------------------------------------------------------- MQTT
-
-
-def until(condition: Callable[[], object], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.05)
 
 
 def test_chunks_by_mqtt_are_kept_apart_from_recordings(tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -24,6 +23,7 @@ from shm_daemon.web.address import Address
 from shm_daemon.web.serving import web_beside
 from tests.helpers.brokers import a_broker
 from tests.helpers.daemons import ROOT, quick_daemons, until_serving
+from tests.helpers.waiting import until
 from tests.helpers.workspaces import make_workspace, modelled_test
 
 ALONE = """
@@ -50,13 +50,6 @@ with ending_in_order():
     make_server(app, Address(port=0)).run()
 """
 ENVIRONMENT = {**os.environ, "PYTHONPATH": ".:daemon"}
-
-
-def until(condition: Callable[[], object], seconds: float = 90.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.05)
 
 
 def answers(port: int) -> bool:

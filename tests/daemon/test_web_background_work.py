@@ -42,7 +42,7 @@ class Order:
         if self.how == "bug":
             raise ZeroDivisionError
         if self.how == "slow":
-            _LET_GO.wait(10)
+            _LET_GO.wait(600)
         if self.how == "dies":
             os._exit(3)
         if self.how == "dies once" and not Path(self.word).exists():
@@ -60,14 +60,14 @@ def a_process(workers: int) -> ProcessPoolExecutor:
 def background_worker() -> Iterator[BackgroundWorker[Text]]:
     _MADE.clear()
     _LET_GO.clear()
-    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=5.0, pool=a_thread)
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=120.0, pool=a_thread)
     yield background_worker
     _LET_GO.set()
     background_worker.close()
 
 
 def until(found: Callable[[], Text | None]) -> Text:
-    for _ in range(1000):
+    for _ in range(24_000):
         if (text := found()) is not None:
             return text
         time.sleep(0.005)
@@ -118,10 +118,10 @@ def test_the_oldest_go_where_memory_runs_out(background_worker: BackgroundWorker
 
 
 def test_what_takes_too_long_is_given_up() -> None:
-    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=0.3, pool=a_thread)
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=2.0, pool=a_thread)
     _LET_GO.clear()
     try:
-        with pytest.raises(ShmError, match=r"more than 0\.3 s"):
+        with pytest.raises(ShmError, match="more than 2 s"):
             until(lambda: background_worker.wanted(Order("slow one", "slow")))
         # It hangs on, and nobody waits for it.
         assert until(lambda: background_worker.wanted(Order("quick one"))) == Text("quick one")
@@ -131,7 +131,7 @@ def test_what_takes_too_long_is_given_up() -> None:
 
 
 def test_a_process_that_dies_is_told_and_replaced() -> None:
-    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=20.0, pool=a_process)
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=120.0, pool=a_process)
     try:
         with pytest.raises(ShmError, match="died"):
             until(lambda: background_worker.wanted(Order("last words", "dies")))
@@ -141,7 +141,7 @@ def test_a_process_that_dies_is_told_and_replaced() -> None:
 
 
 def test_an_order_whose_process_is_ended_once_is_made_all_the_same(tmp_path: Path) -> None:
-    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=20.0, pool=a_process)
+    background_worker: BackgroundWorker[Text] = BackgroundWorker(longest_s=120.0, pool=a_process)
     order = Order(str(tmp_path / "ended"), "dies once")
     try:
         assert until(lambda: background_worker.wanted(order)) == Text(order.word)
@@ -154,9 +154,10 @@ def test_closing_ends_the_work_at_once() -> None:
     _LET_GO.clear()
     assert background_worker.wanted(Order("endless", "slow")) is None
     time.sleep(0.2)
-    began = time.monotonic()
-    background_worker.close()
-    assert time.monotonic() - began < 5
+    closing = threading.Thread(target=background_worker.close)
+    closing.start()
+    closing.join(120)
+    assert not closing.is_alive()  # the order would take ten minutes
     assert background_worker.wanted(Order("endless", "slow")) is None
     assert background_worker.wanted(Order("another")) is None
     until(lambda: None if multiprocessing.active_children() else Text("all gone"))

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from pathlib import Path
@@ -26,6 +25,7 @@ from shm_daemon.web.address import Address
 from shm_daemon.web.app import load_pages
 from shm_daemon.web.site import MOST_WRONG, Description, Site
 from tests.helpers.taken_in import with_a_slow_loss
+from tests.helpers.waiting import until
 from tests.helpers.web_servers import served
 
 PASSWORD = "correct horse battery"
@@ -250,14 +250,6 @@ def test_many_sign_ins_leave_pages_free(
         assert [each.result() for each in signing] == [303] * 40
     assert told == {"/health": 503, "/sign-in": 200, "/api/status": 200, "/metrics": 200}
     assert most == [1]  # so that cores are free for all others; no daemon is running
-
-
-def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
-    """Wait until a condition holds."""
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.02)
 
 
 def test_every_route_asks_who_it_is_and_what_changes_something_asks_for_an_operator(

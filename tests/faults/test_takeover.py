@@ -28,5 +28,4 @@ def test_a_worker_and_then_the_active_daemon_die_and_the_standby_ends_the_work(
     run(quiet, once=True)
     with postgresql.store() as url:
         made = kill_a_worker_then_the_active_daemon(tmp_path, url, FILES)
-        assert made.takeover_s < 20.0  # seconds on a machine that does nothing else
         assert_nothing_lost_doubled_or_half_written(made.feed, quiet)

@@ -41,7 +41,7 @@ class Broker:
         here = [sys.executable, "-m", "tests.helpers.brokers", str(self.port)]
         command = [mosquitto, "-p", str(self.port)] if mosquitto else here
         self.process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.DEVNULL)
-        end = time.monotonic() + 20
+        end = time.monotonic() + 120
         while True:
             try:
                 socket.create_connection(("127.0.0.1", self.port), 1).close()

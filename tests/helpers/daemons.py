@@ -81,7 +81,7 @@ def quick_daemons(folder: Path) -> Iterator[QuickDaemons]:
         daemons.close()
 
 
-def until_serving(pid: int, folder: Path, seconds: float = 30.0) -> None:
+def until_serving(pid: int, folder: Path, seconds: float = 120.0) -> None:
     """Waits until a daemon begun a moment ago holds the workspace: its lock says so, or its log."""
     lock, log, end = folder / "shm.lock", folder / "daemon.log", time.monotonic() + seconds
     while not (_says(lock, str(pid)) or f"{pid} watching" in _text(log)):

@@ -32,7 +32,7 @@ class Served:
             headers["Authorization"] = f"Bearer {token}"
         verify = self.url.startswith("https")  # whom the machine trusts takes 29 ms to load
         return httpx.Client(
-            base_url=self.url, headers=headers, timeout=30, trust_env=False, verify=verify
+            base_url=self.url, headers=headers, timeout=120, trust_env=False, verify=verify
         )
 
 

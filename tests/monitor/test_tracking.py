@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -211,19 +210,6 @@ def test_two_cables_exchanged_are_no_new_modes() -> None:
     reading = read_window([piece(samples)], stream(), motion.known(), HANGER, OPTIONS)
     assert reading.modes == ()
     assert "exchanged" in reading.why
-
-
-def test_a_window_takes_a_sixth_of_a_second() -> None:
-    """Ten minutes, four channels of 200 Hz, ten modes; twice that where others work beside."""
-    rng = np.random.default_rng(11)
-    motion = drawn(rng)
-    pieces = [piece(values(motion, rng))]
-    seconds = []
-    for _ in range(3):
-        begun = time.process_time()
-        read_window(pieces, stream(), motion.known(), HANGER, OPTIONS)
-        seconds.append(time.process_time() - begun)
-    assert min(seconds) < 0.3
 
 
 def test_a_real_recording_in_chunks_gives_the_modes_of_the_whole() -> None:

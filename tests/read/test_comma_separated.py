@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-import time
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -257,19 +256,3 @@ def test_a_simulated_test_survives_to_nine_digits(tmp_path: Path) -> None:
     assert isinstance(found, Recording)
     for one, other in zip(found.channels, original.channels, strict=True):
         np.testing.assert_allclose(one.values, other.values, rtol=1e-8, atol=0)
-
-
-def test_a_hundred_thousand_rows_of_five_take_less_than_half_a_second(tmp_path: Path) -> None:
-    values = np.random.default_rng(1).standard_normal((5, 100_000))
-    names = ["force", "acc_1", "acc_2", "acc_3", "acc_4"]
-    channels = tuple(
-        Channel(name, "force" if name == "force" else "acceleration", row)
-        for name, row in zip(names, values, strict=True)
-    )
-    write(Recording("", channels, 2048.0), tmp_path / "test.csv")
-    seconds = []
-    for _ in range(3):
-        start = time.process_time()
-        read(tmp_path / "test.csv")
-        seconds.append(time.process_time() - start)
-    assert min(seconds) < 0.5

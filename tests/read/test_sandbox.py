@@ -302,7 +302,7 @@ def test_the_reading_process_ends_with_the_one_that_asks(csv: Path) -> None:
     assert reader.exists()
     process.kill()
     process.wait()
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 120
     while reader.exists() and "Z" not in (reader / "stat").read_text():
         assert time.monotonic() < deadline
         time.sleep(0.05)

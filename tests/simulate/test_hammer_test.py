@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-import time as clock
 from dataclasses import replace
 from datetime import UTC, datetime
 
@@ -173,16 +172,6 @@ def test_a_hit_beyond_the_range_is_clipped(hanger: Hanger) -> None:
         limit = 800.0 if channel.quantity == "force" else 2.0
         assert np.abs(channel.values).max() == pytest.approx(limit, rel=1e-5)
         assert np.sum(np.abs(channel.values) > 0.999 * limit) >= 5
-
-
-def test_a_whole_test_takes_less_than_a_third_of_a_second(hanger: Hanger) -> None:
-    simulate(hanger, STATE, HammerPlan())
-    seconds = []
-    for _ in range(3):
-        start = clock.thread_time()
-        simulate(hanger, STATE, HammerPlan())
-        seconds.append(clock.thread_time() - start)
-    assert min(seconds) < 0.3
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """The world of network-arch seasons against closed forms, a second route, and its own promises."""
 
 import json
-import time
 from dataclasses import replace
 from typing import Any
 
@@ -232,10 +231,8 @@ def test_relaxation_and_ramp_lower_the_baseline() -> None:
     assert truth["baseline_tension_n"] / truth["reference_tension_n"] == pytest.approx(expected)
 
 
-def test_thirty_hangers_are_fast_and_as_faulty_as_promised() -> None:
-    start = time.perf_counter()
+def test_season_is_as_faulty_as_promised() -> None:
     whole = season(1)
-    assert time.perf_counter() - start < 15  # about 1.2 s alone
     visits = [v for h in whole.hangers for v in h.visits]
     modes = sum(len(v["modes"]) for v in visits)
     wrong = sum(len(h.truth["mistaken"]) for h in whole.hangers)
