@@ -310,6 +310,8 @@ def alert_document(alert: Alert) -> dict[str, Any]:
         **asdict(lead),
         "urgency": lead.urgency,
     }
+    if alert.limit is None:
+        del document["limit"]
     if alert.alerts:
         return {**document, "alerts": [alert_document(each) for each in alert.alerts]}
     del document["alerts"]

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime
-from math import isfinite
+from math import isclose, isfinite, isnan
 
 from shm.pipeline.ending import SHM
 from shm.store import Store, StoredAlert, Workspace
 from shm.store.list_rows import TrendPoint
-from shm.values import Alert, AlertKind, Averaged, Hanger
+from shm.values import Alert, AlertKind, Averaged, CrossedLimit, Hanger
 
 _KIND: AlertKind = "limit"
 
@@ -34,8 +34,8 @@ def heed_limits(
         alerts = store.alerts.list_all(hanger.id)
         own = [each for each in alerts if _KIND in each.alert.kinds]
         ended = dict(_ended(own, hanger, point))
-        for side in _limits(hanger):
-            alert = _alert(store, hanger, side, point, own)
+        for limit in _limits(hanger):
+            alert = _alert(store, hanger, limit, point, own)
             if alert or ended:
                 store.alerts.settle(alert, hooks, ended, at)
                 ended = {}
@@ -43,45 +43,47 @@ def heed_limits(
             store.alerts.settle(None, hooks, ended, at)
 
 
-def _limits(hanger: Hanger) -> Iterator[str]:
-    """The limits that are set, each as its alerts name it in their keys."""
+def _limits(hanger: Hanger) -> Iterator[CrossedLimit]:
+    """Give the limits that are set."""
     limits = hanger.limits
-    for side, value_n in (("above", limits.tension_max_n), ("below", limits.tension_min_n)):
-        if isfinite(value_n):
-            yield f"{side}-{value_n:.6g}"
+    if isfinite(limits.tension_max_n):
+        yield CrossedLimit("above", limits.tension_max_n)
+    if isfinite(limits.tension_min_n):
+        yield CrossedLimit("below", limits.tension_min_n)
 
 
 def _probability(averaged: Averaged, side: str) -> float:
-    above = side.startswith("above")
-    return averaged.probability_above_limit if above else averaged.probability_slack
+    return averaged.probability_above_limit if side == "above" else averaged.probability_slack
 
 
 def _ended(
     own: Sequence[StoredAlert], hanger: Hanger, point: TrendPoint
 ) -> Iterator[tuple[int, str]]:
-    sides = set(_limits(hanger))
+    limits = tuple(_limits(hanger))
     for each in own:
-        side = _side(each)
         if each.resolution is not None:
             continue
-        if side not in sides:
+        if not any(_is_of(each.alert, limit) for limit in limits):
             yield each.id, "the limit has been changed"
-        elif _probability(point.averaged, side) < hanger.thresholds.end_probability:
+        elif _probability(point.averaged, _side(each.alert)) < hanger.thresholds.end_probability:
             yield each.id, f"test {point.test} has it within the limit"
 
 
 def _alert(
-    store: Store, hanger: Hanger, side: str, point: TrendPoint, own: Sequence[StoredAlert]
+    store: Store, hanger: Hanger, limit: CrossedLimit, point: TrendPoint, own: Sequence[StoredAlert]
 ) -> Alert | None:
-    """That the limit of a side is crossed; None where it is not, or was told."""
-    probability, level = _probability(point.averaged, side), hanger.thresholds.alert_probability
-    same = [each for each in own if _side(each) == side]
+    """Make the alert that a limit is crossed; None where it is not, or was told."""
+    probability, level = (
+        _probability(point.averaged, limit.side),
+        hanger.thresholds.alert_probability,
+    )
+    same = [each for each in own if _is_of(each.alert, limit)]
     if not probability >= level or (same and not _is_another_crossing(store, hanger, same[-1])):
         return None
     from shm.report.hanger_status import off_limits  # it computes: not before it is needed
 
     lead = off_limits(hanger, point.averaged)
-    key = f"hanger-{hanger.id}:{_KIND}:{side}:{point.test_id}"
+    key = f"hanger-{hanger.id}:{_KIND}:{limit.side}-{limit.tension_n:.12g}:{point.test_id}"
     key += f":again-{same[-1].id}" if same else ""
     sure = "above 0.99" if probability > 0.99 else f"{probability:.2f}"
     return Alert(
@@ -89,11 +91,12 @@ def _alert(
         hanger=hanger.id,
         test=point.test,
         time=point.time,
-        message=f"{lead.words if lead else ''} Details: probability {sure} that it is {side[:5]} "
-        f"the limit of {float(side[6:]) / 1e3:.6g} kN that its owner has set.",
+        message=f"{lead.words if lead else ''} Details: probability {sure} that it is {limit.side} "
+        f"the limit of {limit.tension_n / 1e3:.6g} kN that its owner has set.",
         drifts=(),
         kinds=(_KIND,),
         tension=point.averaged,
+        limit=limit,
     )
 
 
@@ -104,10 +107,23 @@ def _is_another_crossing(store: Store, hanger: Hanger, last: StoredAlert) -> boo
         return False
     if last.resolution.who == SHM:
         return True
-    side, end = _side(last), hanger.thresholds.end_probability
+    side, end = _side(last.alert), hanger.thresholds.end_probability
     since = store.posteriors.trend(hanger, last.alert.time)
     return any(_probability(each.averaged, side) < end for each in since)
 
 
-def _side(stored: StoredAlert) -> str:
-    return stored.alert.key.split(":")[2]
+def _is_of(alert: Alert, limit: CrossedLimit) -> bool:
+    """Return True if an alert is of a limit; those of shm 1.0.0 are known by their side alone."""
+    if alert.limit is None:
+        return _side(alert) == limit.side
+    same_value = isclose(alert.limit.tension_n, limit.tension_n, rel_tol=1e-9)
+    return alert.limit.side == limit.side and same_value
+
+
+def _side(alert: Alert) -> str:
+    if alert.limit is not None:
+        return alert.limit.side
+    if alert.tension is None or isnan(alert.tension.probability_slack):
+        return "above"
+    above = alert.tension.probability_above_limit
+    return "above" if above > alert.tension.probability_slack else "below"

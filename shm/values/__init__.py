@@ -42,6 +42,7 @@ from shm.values.drift import (
     Beside,
     Change,
     CreepRate,
+    CrossedLimit,
     Drift,
     End,
     ModeReading,

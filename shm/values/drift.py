@@ -365,13 +365,22 @@ class Beside:
 
 
 @dataclass(frozen=True)
+class CrossedLimit:
+    """The limit that its owner sets and that a tension is beyond, in N."""
+
+    side: Literal["above", "below"]
+    tension_n: float
+
+
+@dataclass(frozen=True)
 class Alert:
     """A shift that its owner should know of. `key` makes its delivery idempotent.
 
     `kinds` are the rules that raised it; `change` is None where the sequential test had no part.
     A `held` one says that a test is held until a person has looked, and what it would mean.
     A `test` alert is no finding: it shows that a hook works. `tension` is that by the test,
-    averaged over the model classes; None where the alert does not say.
+    averaged over the model classes; None where the alert does not say. `limit` is the one that it
+    is beyond; None of other alerts, and of those that shm 1.0.0 stored.
 
     A `resolved` one says that the condition of the alert has ended whose key it has, with
     `:resolved` behind it. Where one message tells of several hangers, `alerts` are theirs.
@@ -387,3 +396,4 @@ class Alert:
     change: Change | None = None
     tension: Averaged | None = None
     alerts: tuple[Alert, ...] = ()
+    limit: CrossedLimit | None = None
