@@ -74,6 +74,7 @@ def unpack_response(blob: bytes, source: str, test: ModalTest) -> FrequencyRespo
         hanger=test.hanger,
         time=test.time,
         temperature_c=test.temperature_c,
+        added_mass=test.added_mass,
     )
 
 

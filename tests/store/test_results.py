@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, fields, replace
 from datetime import timedelta
 
 import numpy as np
@@ -95,6 +95,32 @@ def test_a_frequency_response_comes_back_in_single_precision(store: Store) -> No
     assert found.coherence is not None
     np.testing.assert_allclose(found.coherence, response.coherence, rtol=1e-6)
     assert (found.source, found.hanger) == ("h3-1.csv", 3)
+
+
+def test_frequency_response_every_field(store: Store) -> None:
+    """A response and its test come back with every field, of which none has its default here."""
+    mass = AddedMass(25.0, 3.6)
+    conditions = {"time": NOW, "temperature_c": 11.5, "added_mass": mass}
+    response = replace(a_response(), **conditions)
+    measured = {
+        "amplitude": 1.2,
+        "tension_read_n": 7e5,
+        "tension_read_sd_n": 7e3,
+        "rattles_above": 3.0,
+    }
+    test = a_test(**conditions, **measured)
+    for value in (response, test):
+        for field in fields(value):
+            assert repr(getattr(value, field.name)) != repr(field.default), field.name
+    (stored,) = identified(store, 1, IdentifiedTest(test, 0, response))
+    found = store.tests.frequency_response(stored)
+    assert found is not None
+    single = {
+        "accelerance": response.accelerance.astype(np.complex64),
+        "coherence": np.asarray(response.coherence, np.float32),
+    }
+    np.testing.assert_equal(asdict(found), asdict(response) | single)
+    np.testing.assert_equal(asdict(stored.test), asdict(test))
 
 
 def test_a_response_of_unknown_coherence_stays_so(store: Store) -> None:
