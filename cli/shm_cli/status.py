@@ -39,7 +39,7 @@ from shm.watch.change_words import frequency_words
 from shm_cli import flags
 from shm_cli.common import opened_store, paragraph, show, show_rows
 from shm_cli.held import hold_document
-from shm_daemon.heartbeat import seconds_since_beat, told
+from shm_daemon.heartbeat import seconds_since_beat, told, why_turn_failed
 from shm_daemon.spool import never_taken, scan
 
 if TYPE_CHECKING:
@@ -108,6 +108,8 @@ def _show(document: dict[str, Any]) -> None:
     click.echo(paragraph(" ".join(part for part in parts if part)))
     click.echo(f"{document['bridge']}: recordings: {recordings or 'none yet'}")
     click.echo(f"daemon: {daemon['active'] or 'none active'}{ago}")
+    if daemon["failed"]:
+        click.echo(paragraph(f"its last turn failed: {daemon['failed']}"))
     click.echo(f"waiting: {document['spool']} in the spool, {document['under_way']} stored{since}")
     if document["never_taken"]:
         named = ", ".join(f"{one['path']} ({one['what']})" for one in document["never_taken"][:5])
@@ -262,7 +264,8 @@ def _quiet(workspace: Workspace, store: Store, now: datetime) -> list[str]:
 def _daemon(workspace: Workspace) -> dict[str, Any]:
     seen_s = seconds_since_beat(workspace)
     seen_at = None if seen_s is None else utc_now() - timedelta(seconds=seen_s)
-    return {"active": workspace.holder(), "seen_at": seen_at}
+    failed = why_turn_failed(workspace) or None
+    return {"active": workspace.holder(), "seen_at": seen_at, "failed": failed}
 
 
 def _structures(

@@ -157,6 +157,7 @@ class Daemon:
         self._scan_at = 0.0
         self._described_at = modified_ns(flow.workspace), flow.workspace.newest_change
         self._once, self._failure = False, ""
+        self._not_taken: dict[Path, str] = {}
         folders = flow.workspace.spool, flow.workspace.archive.folder
         self._devices = {folder: _device(folder) for folder in folders}
         turn_failed(flow.workspace, "")
@@ -206,7 +207,7 @@ class Daemon:
             if self._once and not left and not self._tracker.watching:
                 left = self._streaming.advance(hurry=True) or self._flow.advance(hurry=True)
             if is_whole:
-                self._tell_failure("")
+                self._tell_failure(self._describe_delays())
             return left
         except BrokenExecutor:
             log.warning("a worker process died; beginning new ones")
@@ -240,6 +241,14 @@ class Daemon:
         if why != self._failure:
             self._failure = why
             turn_failed(self._flow.workspace, one_line(why))
+
+    def _describe_delays(self) -> str:
+        """Return which files wait for something that a person must mend, and why; empty if none."""
+        self._not_taken = {p: why for p, why in self._not_taken.items() if os.path.lexists(p)}
+        spooled = [f"{path.name} is not taken in: {why}" for path, why in self._not_taken.items()]
+        delays = [*spooled, *self._flow.delays.values()]
+        more = f" ({len(delays) - 1} other files wait, too)" if delays[1:] else ""
+        return "".join(delays[:1]) + more
 
     def _is_fatal(self, error: ShmError) -> bool:
         """Whether the service ends: not by what a damaged store answers, unless once is enough."""
@@ -279,9 +288,19 @@ class Daemon:
         except (ShmError, OSError) as error:
             log.warning("%s is left for now: %s", path.name, error)
             wait_s = error.retry_after_s if isinstance(error, ShmError) else None
-            self._tracker.put_off(path, wait_s or _UNREADABLE_S)
+            self._put_off(path, str(error), wait_s or _UNREADABLE_S)
+        except Exception as error:
+            log.exception("%s is left for now", path.name)
+            self._put_off(path, f"{type(error).__name__}: {error}", _UNREADABLE_S)
         else:
             self._tracker.forget(path)
+            self._not_taken.pop(path, None)
+
+    def _put_off(self, path: Path, why: str, wait_s: float) -> None:
+        """Try a file again later; say why where it will not pass by itself at once."""
+        self._tracker.put_off(path, wait_s)
+        if wait_s >= _UNREADABLE_S:
+            self._not_taken[path] = why
 
     def _refuse_other_disks(self) -> None:
         """Raises StoreError where a folder is gone or another disk than at the beginning.

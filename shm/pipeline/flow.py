@@ -93,6 +93,8 @@ class Flow:
         self._running: dict[tuple[str, int], Running] = {}
         self._couriers = ThreadPoolExecutor(DELIVERIES, thread_name_prefix="hook")
         self._damaged: dict[int, datetime] = {}  # hangers that stand still, and until when
+        self.delays: dict[int, str] = {}
+        """Why recordings wait that something outside keeps from being worked on, by number."""
         deaths = store.recordings.deaths()
         self._suspects = set(deaths)
         self._postponed = {key: each.last_at + _pause(each) for key, each in deaths.items()}
@@ -254,6 +256,8 @@ class Flow:
         elif (wait_s := _passes_in_s(error)) is not None:
             until = self.clock() + timedelta(seconds=wait_s)
             self._postponed.update(dict.fromkeys(job.recordings, until))
+            names = ", ".join(map(str, job.recordings))
+            self.delays |= dict.fromkeys(job.recordings, f"recording {names} waits: {error}")
             said = "%s %s is tried again in %.0f s: %s"
             log.warning(said, *job.key, wait_s, error, extra=_about(job))
         else:
@@ -277,6 +281,7 @@ class Flow:
         for recording_id in job.recordings:
             self._suspects.discard(recording_id)
             self._postponed.pop(recording_id, None)
+            self.delays.pop(recording_id, None)
 
     def _note_death(self, running: Running, error: BaseException) -> None:
         """A process died: of what it worked on, of a neighbour's memory, or somebody killed it.

@@ -50,7 +50,7 @@ def test_a_bridge_with_a_history_is_examined(shm: Shm, bridge: Workspace) -> Non
 def test_status_shows_the_daemon_the_queue_and_what_is_open(shm: Shm, empty: Workspace) -> None:
     call = ("--workspace", empty.folder, "status")
     document = shm(*call, "--json").document
-    assert document["daemon"] == {"active": None, "seen_at": None}
+    assert document["daemon"] == {"active": None, "seen_at": None, "failed": None}
     assert (document["under_way"], document["open_alerts"]) == (0, 0)
     assert document["disk_free_bytes"] > 0
     assert "daemon: none active, never seen" in shm(*call).out

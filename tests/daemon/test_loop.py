@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import threading
@@ -13,11 +14,13 @@ from pathlib import Path
 import pytest
 
 from shm.errors import ShmError, StoreBusy, StoreError
-from shm.pipeline import Flow, Sharing, utc_now
+from shm.pipeline import Flow, Sharing, steps, utc_now
+from shm.pipeline.streaming import Streaming
 from shm.settings import Settings
 from shm.store import Archive, Delivery, DeliveryState, Stage, Workspace
 from shm.store.checking import check_store
 from shm.store.stored_recordings import Recordings
+from shm_cli import main as cli
 from shm_daemon import Wakeup, loop, run
 from shm_daemon.heartbeat import why_turn_failed
 from shm_daemon.spool import Look, scan
@@ -27,6 +30,7 @@ from tests.helpers.flows import Postman
 from tests.helpers.flows import threads as make_threads
 from tests.helpers.footprint import open_files
 from tests.helpers.waiting import until
+from tests.helpers.web_servers import served
 from tests.helpers.workspaces import SLOW_LOSS, make_workspace, put, write_slow_loss, write_test
 
 
@@ -197,6 +201,79 @@ def test_a_turn_that_fails_is_shown_until_one_goes_well(
         serve()
         until(lambda: "the spool is odd" in why_turn_failed(workspace))
     until(lambda: why_turn_failed(workspace) == "")
+
+
+def test_receive_unwritable_archive_shows(
+    workspace: Workspace, serve: Callable[..., Wakeup], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Wherever people look they see that files are not taken in, and why, until they are."""
+    obstacle = workspace.archive.folder / ".incoming"
+    obstacle.write_text("where files are copied to")
+    write_test(workspace.spool / "a.modes.json", workspace)
+    serve()
+    until(lambda: "a.modes.json is not taken in" in why_turn_failed(workspace))
+    with served(workspace) as site, site.client(Accept="text/html") as client:
+        health = client.get("/health")
+        home = client.get("/").text
+    assert (health.status_code, health.json()["status"]) == (503, "failing")
+    assert "a.modes.json is not taken in" in home
+    assert str(workspace.folder) not in home
+    for verb in ("status", "doctor"):
+        cli.run(["--workspace", str(workspace.folder), verb])
+        assert "a.modes.json is not taken in" in " ".join(capsys.readouterr().out.split())
+    obstacle.unlink()
+    (workspace.spool / "a.modes.json").unlink()
+    write_test(workspace.spool / "b.modes.json", workspace)
+    until(lambda: counts(workspace) == {Stage.DONE: 1})
+    until(lambda: why_turn_failed(workspace) == "")
+
+
+def test_receive_raises_anything(
+    workspace: Workspace, serve: Callable[..., Wakeup], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file that cannot be taken in for a fault of shm keeps no other file from being done."""
+    receive = Flow.receive
+
+    def fail_on_a(self: Flow, path: Path, sharing: Sharing | None = None) -> object:
+        if path.name.startswith("a"):
+            raise KeyError("layout")
+        return receive(self, path, sharing)
+
+    monkeypatch.setattr(Flow, "receive", fail_on_a)
+    for name in "ab":
+        write_test(workspace.spool / f"{name}.modes.json", workspace, day=ord(name))
+    serve()
+    until(lambda: counts(workspace) == {Stage.DONE: 1})
+    until(lambda: "a.modes.json is not taken in: KeyError" in why_turn_failed(workspace))
+
+
+def test_turn_streams_raise(
+    workspace: Workspace, serve: Callable[..., Wakeup], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Files are done although no stream can be brought forward."""
+
+    def fail(*_: object, **__: object) -> None:
+        raise ValueError("no stream")
+
+    monkeypatch.setattr(Streaming, "advance", fail)
+    write_test(workspace.spool / "a.modes.json", workspace)
+    serve()
+    until(lambda: counts(workspace) == {Stage.DONE: 1}, 60.0)
+    assert "no stream" in why_turn_failed(workspace)
+
+
+def test_advance_delayed_recording_shows(
+    workspace: Workspace, serve: Callable[..., Wakeup], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Why a recording waits that was taken in is shown, as why a file waits in the spool."""
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(steps, "load_modes", fail)
+    write_test(workspace.spool / "a.modes.json", workspace)
+    serve()
+    until(lambda: "recording 1 waits: [Errno 5]" in why_turn_failed(workspace))
 
 
 def test_an_alert_reaches_the_hook(tmp_path: Path) -> None:

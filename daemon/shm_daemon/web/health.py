@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from datetime import timedelta
 from typing import Any
 
-from shm.errors import ShmError
+from shm.errors import ShmError, sentence
 from shm.pipeline import utc_now
 from shm.pipeline.unheard import heard, leads_of
 from shm.store.stored_alerts import said_of
@@ -40,7 +40,7 @@ def health_document(site: Site) -> tuple[int, dict[str, Any]]:
 
 def troubles(site: Site) -> list[str]:
     """Why work stands still; empty where all is well."""
-    return _found(site, _store, _spool, _disk, _daemon)
+    return _found(site, _store, _folders, _disk, _daemon)
 
 
 def limits(site: Site) -> list[str]:
@@ -72,12 +72,14 @@ def notices(site: Site) -> list[Lead]:
 
 
 def _of_daemon(site: Site) -> list[Lead]:
-    silence = _silence(site)
-    if not silence:
+    if silence := _silence(site):
+        action = "Until it runs again (`shm daemon`), recordings wait and no alert is raised."
+        return [Lead(silence, action)]
+    failed = why_turn_failed(site.workspace).replace(f"{site.workspace.folder}{os.sep}", "")
+    if not failed:
         return []
-    return [
-        Lead(silence, "Until it runs again (`shm daemon`), recordings wait and no alert is raised.")
-    ]
+    action = "What it names waits until that is mended; it is tried again each minute."
+    return [Lead(f"The daemon's last turn failed: {sentence(failed)}", action)]
 
 
 def _of_description(site: Site) -> list[Lead]:
@@ -155,10 +157,15 @@ def _store(site: Site) -> list[str]:
     return [*stopped, *(["A row of the store is damaged."] if damage and not stopped else [])]
 
 
-def _spool(site: Site) -> list[str]:
-    if os.access(site.workspace.spool, os.W_OK | os.X_OK):
-        return []
-    return ["The spool cannot be written."]
+def _folders(site: Site) -> list[str]:
+    workspace = site.workspace
+    named = {"spool": workspace.spool, "archive": workspace.archive.folder}
+    named["quarantine"] = workspace.quarantine.folder
+    return [
+        f"The {name} cannot be written."
+        for name, folder in named.items()
+        if not os.access(folder, os.W_OK | os.X_OK)
+    ]
 
 
 def _disk(site: Site) -> list[str]:
