@@ -21,7 +21,7 @@ from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.pipeline.telling import quiet_until
-from shm.pipeline.unheard import heard, leads_of
+from shm.pipeline.unheard import stream_leads
 from shm.report.contents import HangerLine
 from shm.report.formatting import model_class
 from shm.report.hanger_status import Status, bridge_message
@@ -242,7 +242,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
         "quiet_hours": _quiet(workspace, store, now),
         "silences": [said_of(each) for each in store.silences.list_in_force(now)],
-        "streams": [each.words for each in leads_of(heard(workspace, store, now))],
+        "streams": [each.words for each in stream_leads(workspace, store, now)],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
         "changed_settings": [str(each) for each in store.settings.list_current().values()],

@@ -30,6 +30,7 @@ import numpy as np
 
 from shm.errors import BadInput, DoubledChunk, ShmError
 from shm.pipeline.lineage import read_limits
+from shm.pipeline.unheard import sweep_ring
 from shm.read import sidecar_path
 from shm.read.chunk_document import BY_TIME, chunk_document
 from shm.read.sandbox import read_test
@@ -219,9 +220,8 @@ class StreamKeeper:
             self._sealed(sealed)
         if time.monotonic() >= self._sweep_at:
             self._sweep_at = time.monotonic() + _SWEEP_S
-            settings = workspace.settings
-            ring.sweep(now, settings.ring_days, settings.ring_bytes)
-            self._store.streams.sweep(now, settings.window_days)
+            sweep_ring(workspace, ring, self._store, now)
+            self._store.streams.sweep(now, workspace.settings.window_days)
         return left
 
     def close(self) -> None:

@@ -24,7 +24,13 @@ from shm.documents import format_time
 from shm.errors import ShmError, StoreError
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day, is_told_already
-from shm.pipeline.unheard import compare_thermometers, heed_silences, note_blindness
+from shm.pipeline.unheard import (
+    compare_thermometers,
+    heed_silences,
+    lateness_limit,
+    list_unread,
+    note_blindness,
+)
 from shm.store import Store, Workspace
 from shm.store.archive import nothing
 from shm.store.ring import ring_of
@@ -187,9 +193,7 @@ class Streaming:
         name = stream.name
         self._known.add(name)
         done = self.store.streams.progress(name)
-        settings = self.workspace.settings
-        kept_hours = min(settings.late_hours, 24 * settings.window_days)
-        since = self.clock() - timedelta(hours=kept_hours)
+        since = lateness_limit(self.workspace, self.clock())
         changed = self.store.streams.first_unpooled(name, since)
         if changed is not None:
             self._changed[name] = changed
@@ -200,11 +204,8 @@ class Streaming:
             self._settled[name] = last + PERIODS["hour"]
         if done is not None:
             self._done[name] = done
-        begin = _EVER if done is None else min(done, since)
-        read = self.store.streams.window_starts(name, begin)
-        for start in self.ring.periods(name, begin):
-            if start not in read:
-                self._note(name, start)
+        for start in list_unread(self.workspace, self.ring, self.store, name, self.clock()):
+            self._note(name, start)
 
     def _go_back(self, stream: Stream, changed: datetime) -> None:
         """What windows that came late belong to is pooled next, from the earliest of them on.

@@ -8,14 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta
-from typing import Literal
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING, Literal
 
 from shm.store import Store, StoredAlert, Workspace
 from shm.values import Alert, AlertKind
 from shm.values.messages import WEEK, Lead
 from shm.values.rounding import listed
 from shm.values.stream import PooledReading, Stream, StreamEvent
+
+if TYPE_CHECKING:
+    from shm.store.ring import Ring
 
 State = Literal[
     "live", "late", "silent", "never sent", "sensor at fault", "sees nothing", "clock ahead"
@@ -95,6 +98,11 @@ def word_of(last: datetime | None, events: Sequence[StreamEvent], now: datetime)
     return "live" if standing.isdisjoint(_AT_FAULT) else "sensor at fault"
 
 
+def stream_leads(workspace: Workspace, store: Store, now: datetime) -> tuple[Lead, ...]:
+    """Return what somebody should know of the streams and of the ring of their samples."""
+    return (*leads_of(heard(workspace, store, now)), *ring_leads(workspace))
+
+
 def leads_of(found: Sequence[Heard]) -> tuple[Lead, ...]:
     """Of each state that somebody should know of, the streams that are in it, and the remedy."""
     leads = []
@@ -105,6 +113,54 @@ def leads_of(found: Sequence[Heard]) -> tuple[Lead, ...]:
             what = "Streams" if own[1:] else "Stream"
             leads.append(Lead(f"{what} {listed([*own[:_NAMED], *more])}: {state}.", remedy))
     return tuple(leads)
+
+
+def lateness_limit(workspace: Workspace, now: datetime) -> datetime:
+    """Return the time of the oldest samples that may still come late and are read then."""
+    settings = workspace.settings
+    return now - timedelta(hours=min(settings.late_hours, 24 * settings.window_days))
+
+
+def list_unread(
+    workspace: Workspace, ring: Ring, store: Store, stream: str, now: datetime
+) -> tuple[datetime, ...]:
+    """Return when the sealed ten minutes of a stream begin that the watch has not read."""
+    done, since = store.streams.progress(stream), lateness_limit(workspace, now)
+    begin = datetime.min.replace(tzinfo=UTC) if done is None else min(done, since)
+    read = store.streams.window_starts(stream, begin)
+    return tuple(start for start in ring.periods(stream, begin) if start not in read)
+
+
+def sweep_ring(workspace: Workspace, ring: Ring, store: Store, now: datetime) -> None:
+    """Remove old samples from the ring, but none that the watch has yet to read."""
+    settings = workspace.settings
+    names = [stream.name for stream in workspace.bridge.streams]
+    unread = {name: list_unread(workspace, ring, store, name, now) for name in names}
+    ring.sweep(now, settings.ring_days, settings.ring_bytes, unread)
+
+
+def ring_leads(workspace: Workspace) -> tuple[Lead, ...]:
+    """Return what to say of a ring that is larger than `ring_bytes` though it was swept."""
+    if not (workspace.folder / "ring").is_dir():
+        return ()
+    from shm.store.ring import ring_of  # it brings h5py, and most bridges have no streams
+
+    limit, swept = workspace.settings.ring_bytes, ring_of(workspace).last_sweep()
+    if swept is None or swept.left_bytes <= limit:
+        return ()
+    return (
+        Lead(
+            f"The ring holds {_gigabytes(swept.left_bytes)}, more than ring_bytes "
+            f"({_gigabytes(limit)}), and nothing more may be removed.",
+            f"Raise ring_bytes in bridge.toml: {_gigabytes(swept.unread_bytes)} are unread, "
+            f"{_gigabytes(swept.recent_bytes)} of the last day, {_gigabytes(swept.kept_bytes)} "
+            "kept for good until their file in ring/NAME/kept/ is removed.",
+        ),
+    )
+
+
+def _gigabytes(size: int) -> str:
+    return f"{size / 1e9:.3g} GB"
 
 
 def blind_hangers(found: Sequence[Heard]) -> dict[int, Lead]:

@@ -8,16 +8,18 @@ What may leave the ring: the old, and the oldest where it grows too large.
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
 from shm.bridge.streams import stream_named
-from shm.documents import dump, format_time
+from shm.documents import Misfit, dump, format_time, value_of
 from shm.errors import BadInput, DoubledChunk, StoreBusy
 from shm.read.atomic import replace_text
 from shm.read.chunk_document import chunk_document, numbered, parse_chunk, refuse_long_chunk
@@ -33,29 +35,59 @@ from shm.values.stream import Chunk, Piece, Stream
 
 @dataclass(frozen=True)
 class Swept:
-    """How many segments were taken out, and what is left."""
+    """Count the segments that were removed, and what is left in the ring.
+
+    `unread_bytes` are of samples that the watch has not read, `recent_bytes` of the day before
+    them, `kept_bytes` of what is kept for good: none of these is removed to meet a limit.
+    """
 
     segments: int
     freed_bytes: int
     left_bytes: int
+    unread_bytes: int = 0
+    recent_bytes: int = 0
+    kept_bytes: int = 0
 
 
-def sweep(folders: Sequence[StreamFolder], before: datetime, most_bytes: int) -> Swept:
-    """Takes out segments that ended before a time, and the oldest beyond so many bytes."""
+def sweep(
+    folders: Sequence[StreamFolder],
+    now: datetime,
+    longest: timedelta,
+    most_bytes: int,
+    unread: Mapping[str, Collection[datetime]],
+    recent: timedelta = timedelta(days=1),
+) -> Swept:
+    """Remove segments older than `longest`, and the oldest beyond so many bytes.
+
+    `unread` are the beginnings of the ten minutes that nobody has read, by stream. They stay, and
+    so does what is `recent` before them or before now: an alert keeps it for good.
+    """
     kept = {folder.folder: _kept(folder) for folder in folders}
-    segments = sorted(segment for folder in folders for segment in folder.segments())
-    found = [(segment, segment.path.stat().st_size) for segment in segments]
-    total = left = sum(size for _, size in found)
+    found = [
+        (segment, segment.path.stat().st_size, folder)
+        for folder in folders
+        for segment in folder.segments()
+    ]
+    total = left = sum(size for _, size, _ in found)
+    held_bytes = {"unread": 0, "recent": 0, "kept": 0}
     removed = 0
-    for segment, size in found:
-        if segment.start + PERIOD > before and left <= most_bytes:
-            break
-        if not _is_kept(segment, kept[segment.path.parent.parent]):
+    for segment, size, folder in sorted(found, key=lambda each: each[0]):
+        waiting = unread.get(folder.folder.name, ())
+        is_old = segment.start + PERIOD <= now - longest
+        since = min(waiting, default=now) - recent
+        if segment.start in waiting:
+            held_bytes["unread"] += size
+        elif _is_kept(segment, kept[folder.folder]):
+            held_bytes["kept"] += size
+        elif segment.start >= since and not is_old:
+            held_bytes["recent"] += size
+        elif is_old or left > most_bytes:
             segment.path.unlink(missing_ok=True)
             left, removed = left - size, removed + 1
     for folder in folders:
         _remove_empty(folder)
-    return Swept(removed, total - left, left)
+    held = {f"{name}_bytes": size for name, size in held_bytes.items()}
+    return Swept(removed, total - left, left, **held)
 
 
 def _kept(folder: StreamFolder) -> list[tuple[datetime, datetime]]:
@@ -85,6 +117,7 @@ then further off than the setting frequency_allowance grants. Crystals keep to i
 """
 _OVER_RANGE = 2.0
 """Of full_scale. Judgement: a sensor that clips at 5 V, before a converter that does at 10 V."""
+_SWEEP = "last_sweep.json"
 _UNFINISHED = timedelta(hours=1)  # technical: no file takes so long; a killed process left it
 
 
@@ -183,13 +216,35 @@ class Ring:
         for each in (path, kept, kept.parent):
             sync(each)
 
-    def sweep(self, now: datetime, ring_days: float = 30, ring_bytes: int = 200 * 10**9) -> Swept:
-        """Takes out what is older than so many days, and the oldest beyond so many bytes, but for
-        what is kept for good.
+    def sweep(
+        self,
+        now: datetime,
+        ring_days: float = 30,
+        ring_bytes: int = 200 * 10**9,
+        unread: Mapping[str, Collection[datetime]] = MappingProxyType({}),
+    ) -> Swept:
+        """Remove what is older than so many days, and the oldest beyond so many bytes.
+
+        What is kept for good stays, and so do the `unread` ten minutes of each stream and the day
+        before them. What was left is noted for `last_sweep`.
         """
         for folder in self._folders():
             folder.remove_unfinished(now - _UNFINISHED)
-        return sweep(list(self._folders()), now - timedelta(days=ring_days), ring_bytes)
+        longest = timedelta(days=ring_days)
+        swept = sweep(list(self._folders()), now, longest, ring_bytes, unread)
+        if self.folder.is_dir():
+            replace_text(self.folder / _SWEEP, dump(asdict(swept)) + "\n")
+        return swept
+
+    def last_sweep(self) -> Swept | None:
+        """Return what the last sweep left; None where there was none or its note is damaged."""
+        try:
+            return value_of(Swept, json.loads((self.folder / _SWEEP).read_text(encoding="utf-8")))
+        except FileNotFoundError:
+            return None
+        except (Misfit, ValueError) as error:
+            log.warning("%s cannot be read: %s", self.folder / _SWEEP, error)
+            return None
 
     def latest(self) -> dict[str, datetime]:
         """When the last sample of each stream ended."""

@@ -565,15 +565,24 @@ def test_old_samples_go_but_for_those_that_are_kept(logger: Logger) -> None:
     assert starts == tuple(NOW + timedelta(minutes=m) for m in (20, 30, 50))
 
 
-def test_the_oldest_samples_go_where_the_ring_is_too_large(logger: Logger) -> None:
+def test_sweep_removes_oldest_beyond_limit(logger: Logger) -> None:
     logger.send(*minutes(*range(60)))
     most = logger.ring.size_bytes("h3") // 2
-    swept = logger.ring.sweep(logger.now, 30, most)
+    swept = logger.ring.sweep(logger.now + timedelta(days=2), 30, most)
     assert 3 <= swept.segments <= 4
     assert logger.ring.size_bytes("h3") <= most
     assert logger.ring.periods("h3", NOW)[-1] == NOW + timedelta(minutes=50)
     logger.ring.sweep(logger.now + FOR_EVER, 30)
     assert not list(logger.ring.folder.glob("h3/2*"))
+
+
+@pytest.mark.parametrize("later", [timedelta(0), timedelta(days=2)])
+def test_sweep_keeps_last_day(logger: Logger, later: timedelta) -> None:
+    logger.send(*minutes(*range(60)))
+    swept = logger.ring.sweep(logger.now + later, 30, 1)
+    assert swept.segments == (6 if later else 0)
+    assert (swept.left_bytes, swept.recent_bytes) == (logger.ring.size_bytes("h3"),) * 2
+    assert logger.ring.last_sweep() == swept
 
 
 def test_a_real_recording_in_chunks_is_the_same_recording(

@@ -1,0 +1,100 @@
+"""A ring that is too large, or a watch that is behind, is reported wherever somebody looks."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from shm.pipeline import utc_now
+from shm.read.chunk_document import chunk_document
+from shm.store import Workspace
+from shm.store.ring import ring_of
+from shm.store.ring_files import PERIOD
+from shm.values.stream import Window, WindowReading, period_start
+from shm_cli.main import run
+from shm_daemon.doctor import examine
+from shm_daemon.heartbeat import beat
+from shm_daemon.streams import StreamKeeper
+from tests.helpers.streams import MODES, a_chunk, with_stream
+from tests.helpers.web_servers import served
+from tests.helpers.workspaces import make_workspace
+
+HOUR = timedelta(hours=1)
+SMALL_RING_BYTES = 10**6
+Faces = Callable[[Workspace], dict[str, str]]
+
+
+@pytest.fixture
+def bridge(tmp_path: Path) -> Workspace:
+    return with_stream(
+        make_workspace(tmp_path / "bridge", settings={"ring_bytes": SMALL_RING_BYTES})
+    )
+
+
+@pytest.fixture
+def faces(capsys: pytest.CaptureFixture[str]) -> Faces:
+    """Return what `/health`, `shm status`, the home page and `shm doctor` show."""
+
+    def read(workspace: Workspace) -> dict[str, str]:
+        beat(workspace)
+        with served(workspace) as site, site.client(Accept="text/html") as client:
+            health, home = client.get("/health").text, client.get("/").text
+        capsys.readouterr()
+        run(["--workspace", str(workspace.folder), "status"])
+        status = capsys.readouterr().out
+        findings = examine(workspace.folder, utc_now())
+        doctor = "\n".join(f"{each.level} {each.found} {each.remedy}" for each in findings)
+        return {"health": health, "home": home, "status": status, "doctor": doctor}
+
+    return read
+
+
+@pytest.fixture
+def keep(bridge: Workspace) -> Iterator[Callable[[], int]]:
+    """Let the daemon's keeper of the ring seal and sweep once."""
+    keeper = StreamKeeper(bridge, utc_now)
+    yield keeper.turn
+    keeper.close()
+
+
+def send_minutes(workspace: Workspace, start: datetime, minutes: int) -> None:
+    """Send a chunk for each minute, as it is recorded."""
+    for minute in range(minutes):
+        at = start + timedelta(minutes=minute)
+        ring = ring_of(workspace, lambda at=at: at + timedelta(minutes=1))
+        ring.append(chunk_document(a_chunk(minute, at, samples=6000)))
+
+
+def save_windows(workspace: Workspace, start: datetime, count: int) -> None:
+    with workspace.store() as store:
+        for at in (start + number * PERIOD for number in range(count)):
+            window = Window("h3", 3, at, PERIOD.total_seconds(), "wind", 0.01)
+            store.streams.save_window(WindowReading(window, MODES, "tracked"))
+
+
+def hours_ago(hours: float) -> datetime:
+    return period_start(utc_now() - hours * HOUR, HOUR)
+
+
+def test_sweep_keeps_unread_samples(
+    bridge: Workspace, keep: Callable[[], int], faces: Faces
+) -> None:
+    """What is kept for good exceeds the limit; two read and two unread segments are beside it."""
+    start = hours_ago(75)
+    send_minutes(bridge, start, 70)
+    ring = ring_of(bridge)
+    ring.seal(utc_now())
+    ring.keep("h3", start, start + 3 * PERIOD - timedelta(minutes=1), "a heavy transport")
+    save_windows(bridge, start, 5)
+    keep()
+    left = {(each - start) // PERIOD for each in ring.periods("h3", start)}
+    assert {0, 1, 5, 6} <= left
+    found = faces(bridge)
+    for name, text in found.items():
+        assert "more than ring_bytes (0.001 GB)" in text, name
+    assert json.loads(found["health"])["status"] == "degraded"
+    assert "Raise ring_bytes in bridge.toml" in found["doctor"]
