@@ -220,9 +220,16 @@ def _as_changed(
     )
 
 
-def _leading(evidence: Evidence, part: FloatArray) -> tuple[FloatArray, list[tuple[int, ...]]]:
-    """The likeliest changes in the directions of `part` (D,) with their weights, which add to 1."""
+def _leading(
+    evidence: Evidence, part: FloatArray, *, is_last_counted: bool = True
+) -> tuple[FloatArray, list[tuple[int, ...]]]:
+    """Return the most probable changes in the directions of `part` (D,) and their weights, sum 1.
+
+    Unless `is_last_counted`, changes that begin at the last test are left out.
+    """
     log_mass = np.where(part[:, None], evidence.log_mass, -np.inf)
+    if not is_last_counted:  # before the weights: those of the others may all underflow
+        log_mass[-1] = -np.inf
     flat = log_mass.ravel()
     most = min(_MOST, len(flat))
     best = np.argpartition(flat, len(flat) - most)[-most:]
@@ -347,11 +354,7 @@ def _shifts(
     layout = evidence.layout
     if not len(evidence.beginnings):
         return np.zeros(0), np.zeros((0, layout.q)), np.zeros((0, layout.q)), []
-    weights, changes = _leading(evidence, part)
-    if not alone:
-        kept = [n for n, each in enumerate(changes) if each[0] < len(evidence.beginnings) - 1]
-        weights, changes = weights[kept], [changes[n] for n in kept]
-        weights = weights / weights.sum() if len(kept) else weights
+    weights, changes = _leading(evidence, part, is_last_counted=alone)
     if not changes:
         return weights, np.zeros((0, layout.q)), np.zeros((0, layout.q)), []
     found = evidence.changes_at(changes)
