@@ -56,6 +56,7 @@ def decide(
     `record` is who decided and why. Raises NothingThere, UsageError; then nothing is changed.
     """
     # It brings the hooks' libraries; `shm status` and `shm ingest --held` only tell.
+    from shm.pipeline.intake import learn_from_answer
     from shm.plausibility import refuse_impossible
     from shm_cli.working import finish_now
 
@@ -78,6 +79,7 @@ def decide(
         elif held:
             _refuse_copy_without_reason(store.recordings.latest_hold(recording_id), why)
             hold = store.recordings.confirm(recording_id, who, why, utc_now(), time)
+            learn_from_answer(workspace, store, hold)
         else:
             hold = store.recordings.reinstate(recording_id, who, why, utc_now(), time, test)
         finish_now(workspace, recording_id)

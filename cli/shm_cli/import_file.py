@@ -191,7 +191,7 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, **said: Any) -> in
         while found.questions:  # a column with a unit may be a sensor, whose place is asked next
             answers = asked(found.questions, answers, workspace, partial(_answer, found))
             found = understand(found.survey, workspace, answers)
-        answers = asked_if_it_stays(answers, is_known=found.profile is not None or dry_run)
+        answers = asked_if_it_stays(answers, is_known=_is_described(found) or dry_run)
     landed, profile = None, found.profile
     if found.is_ready and not dry_run:
         profile = keep_profile(found, workspace, each_time=answers.each_time)
@@ -202,6 +202,10 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, **said: Any) -> in
         _show(found)
         _say_next(found, profile, landed, file, workspace)
     return 0 if found.is_ready else BadInput.exit_code
+
+
+def _is_described(found: Import) -> bool:
+    return found.profile is not None and found.profile.answers_questions
 
 
 def _modes_in(file: Path, workspace: Workspace) -> ForeignModes | None:
@@ -304,10 +308,11 @@ def _land(file: Path, workspace: Workspace, found: Import) -> Landed:
 
 def _show(found: Import) -> None:
     rate, survey = found.sampling_rate_hz, found.survey
+    time = found.described.get("time", survey.time)
     parts = (
         f"{Path(survey.source).name}: {survey.format}",
         f"hanger {found.hanger}" if found.hanger is not None else "hanger not named",
-        f"{survey.time:%Y-%m-%d %H:%M} UTC" if survey.time else "time not recorded",
+        f"{time:%Y-%m-%d %H:%M} UTC" if isinstance(time, datetime) else "time not recorded",
         f"{survey.samples} samples" if survey.samples else "",
         f"{survey.samples / rate:.1f} s at {rate:g} Hz" if rate > 0 else "rate not recorded",
     )

@@ -11,6 +11,7 @@ from typing import TypeVar
 import rich_click as click
 
 from shm.errors import BadInput, UsageError
+from shm.pipeline.import_answers import answer_time
 from shm.pipeline.importing import Answers, Question
 from shm.store import Workspace
 
@@ -29,6 +30,8 @@ def asked(
             answers = replace(answers, hanger=_prompt(question, lambda t: _hanger(t, workspace)))
         elif question.about == "rate":
             answers = replace(answers, sampling_rate_hz=_prompt(question, _rate_hz))
+        elif question.about == "time":
+            answers = _prompt(question, partial(answer_time, answers=answers))
         else:
             given = _prompt(question, partial(of_channel, question))
             tables.setdefault(question.channel, {}).update(given)

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import logging
 import math
+import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -33,7 +34,7 @@ from shm.store import (
 from shm.store.archive import refuse_oversize
 from shm.values import Alert
 from shm_cli import flags
-from shm_cli.common import open_workspace, show, show_rows
+from shm_cli.common import is_workspace, open_workspace, show, show_rows
 from shm_cli.held import (
     decide,
     decided_words,
@@ -100,7 +101,7 @@ def command(
     """
     _refuse_mixture(files, about, together or look)
     if look:
-        return show_peeks(files)
+        return show_peeks(files, open_workspace(ctx) if is_workspace(ctx) else None)
     logging.getLogger("shm").addHandler(logging.NullHandler())  # all is said in the table
     workspace = open_workspace(ctx)
     if about["held"]:
@@ -268,13 +269,18 @@ def _show(rows: Sequence[dict[str, object]], raised: Sequence[Alert], **more: ob
 _MODES_SUFFIX = ".modes.json"
 
 
-def show_peeks(files: Sequence[Path]) -> int:
-    """Shows all files; exit code 3 where one cannot be read or its headers have faults."""
-    looks = [look for path in files for look in _looks(path)]
+def show_peeks(files: Sequence[Path], workspace: Workspace | None = None) -> int:
+    """Show what is in files, as a workspace would take them in by their loggers' profiles.
+
+    The exit code is 3 where one cannot be read, its headers have faults, or something is missing.
+    """
+    looks = [look for path in files for look in _looks(path, workspace)]
+    missing = [_missing(look, workspace) for look in looks]
     if flags.wants_json():
-        show({"files": [asdict(look) for look in looks]})
+        found = zip(looks, missing, strict=True)
+        show({"files": [{**asdict(look), "missing": lacks} for look, lacks in found]})
     else:
-        for look in looks:
+        for look, lacks in zip(looks, missing, strict=True):
             if look.channels:
                 _show_channels(look)
             else:
@@ -283,15 +289,53 @@ def show_peeks(files: Sequence[Path]) -> int:
                 click.echo(f"left out: {', '.join(look.left_out)}")
             for problem in look.problems:
                 click.echo(f"problem: {problem}", err=True)
-    return BadInput.exit_code if any(look.problems for look in looks) else 0
+            if lacks:
+                click.echo(f"missing: {'; '.join(lacks)}: {_say_it(look)}", err=True)
+    is_lacking = any(missing) or any(look.problems for look in looks)
+    return BadInput.exit_code if is_lacking else 0
 
 
-def _looks(path: Path) -> Sequence[Peek]:
+def _looks(path: Path, workspace: Workspace | None) -> Sequence[Peek]:
     """A file of which nothing can be made out is one with a problem and no channels."""
     try:
-        return [_modes(path)] if path.name.lower().endswith(_MODES_SUFFIX) else peek_test(path)
+        if path.name.lower().endswith(_MODES_SUFFIX):
+            return [_modes(path)]
+        return peek_test(path) if workspace is None else _by_profile(path, workspace)
     except BadInput as error:
         return [Peek(str(path), "not readable", (), 0, problems=(str(error),))]
+
+
+def _by_profile(path: Path, workspace: Workspace) -> Sequence[Peek]:
+    """Look into a file that is completed by its logger's profile, under its own name."""
+    from shm.pipeline.intake import as_taken_in
+
+    with as_taken_in(path, workspace) as taken:
+        looks = peek_test(taken)
+    return looks if taken == path else [replace(look, source=str(path)) for look in looks]
+
+
+def _missing(look: Peek, workspace: Workspace | None) -> list[str]:
+    """List what no file may lack: planes of its sensors, its day and, in a workspace, its hanger.
+
+    A structure without a model needs no planes.
+    """
+    structures = workspace.bridge.structures if workspace is not None else ()
+    needs_planes = look.hanger not in [each.id for each in structures]
+    sensors = [each for each in look.channels if each.quantity == "acceleration"]
+    bare = [each.name for each in sensors if each.plane is None] if needs_planes else []
+    days = [f"{each:%Y-%m-%d}" for each in look.possible_times]
+    lacks = {
+        "hanger": workspace is not None and bool(sensors) and look.hanger is None,
+        f"plane of {', '.join(bare)}": bool(bare),
+        f"which day, {' or '.join(days)}": bool(days),
+    }
+    return [what for what, is_missing in lacks.items() if is_missing]
+
+
+def _say_it(look: Peek) -> str:
+    file = shlex.quote(look.source)
+    is_member = not Path(look.source).is_file()
+    return "unpack it and run `shm import` on it" if is_member else f"run `shm import {file}`"
 
 
 def _modes(path: Path) -> Peek:

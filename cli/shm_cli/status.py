@@ -25,6 +25,7 @@ from shm.pipeline.unheard import stream_leads
 from shm.report.contents import HangerLine
 from shm.report.formatting import model_class
 from shm.report.hanger_status import Status, bridge_message
+from shm.report.open_warnings import dated_by_receipt
 from shm.store import (
     ENDED,
     Decision,
@@ -85,6 +86,9 @@ def command(ctx: click.Context, which: str | None) -> None:
             rest = said.removeprefix(f"{row['state']} {row['action']}").strip()
             if rest:
                 click.echo(paragraph(f"hanger {row['hanger']}: check: {rest}"))
+        if row["dated_by_receipt"]:
+            undated = dated_by_receipt(row["dated_by_receipt"])
+            click.echo(paragraph(f"hanger {row['hanger']}: {undated}"))
         if row["left_out"]:
             said = "; ".join(row["left_out"])
             click.echo(paragraph(f"hanger {row['hanger']}: left out of its baseline: {said}"))
@@ -157,7 +161,8 @@ def _told_of_structure(row: Mapping[str, Any]) -> str:
     told = f"structure {row['structure']}{name}: {row['tests']} tests"
     told += f", the latest {latest:%Y-%m-%d %H:%M}" if latest else ""
     told += f", baseline since {since:%Y-%m-%d}" if since else ", no baseline yet"
-    return f"{told}, {row['open_alerts']} open alerts. {row['said']}".rstrip()
+    undated = dated_by_receipt(row["dated_by_receipt"])
+    return f"{told}, {row['open_alerts']} open alerts. {row['said']} {undated}".rstrip()
 
 
 def _told_of_held(held: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -272,7 +277,7 @@ def _structures(
     workspace: Workspace, store: Store, open_alerts: Mapping[int, int]
 ) -> list[dict[str, Any]]:
     """Those without a model, of which frequencies alone are watched."""
-    latest, rows = store.tests.latest(), []
+    latest, rows, undated = store.tests.latest(), [], store.tests.names_without_time()
     for each in workspace.bridge.structures:
         found, damage, said = latest.get(each.id), None, ""
         of_baseline: Sequence[StoredTest] = ()
@@ -292,6 +297,7 @@ def _structures(
                 "baseline_since": min((test.time for test in of_baseline), default=None),
                 "open_alerts": open_alerts[each.id],
                 "said": damage or said,
+                "dated_by_receipt": list(undated.get(each.id, ())),
             }
         )
     return rows
@@ -336,6 +342,7 @@ def _hangers(
                 "open_alerts": open_alerts[hanger.id],
                 "held": held[hanger.id],
                 "warnings": list(lines[hanger.id].warnings),
+                "dated_by_receipt": list(lines[hanger.id].undated),
                 "left_out": list(check.left_out) if check else [],
                 "gap": gap,
                 "damage": damage.get(hanger.id),

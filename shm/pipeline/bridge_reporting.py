@@ -186,6 +186,7 @@ class HangersNow:
     damaged: Mapping[int, DamagedRow]
     warnings: Mapping[int, tuple[str, ...]]
     blind: Mapping[int, Lead]
+    undated: Mapping[int, tuple[str, ...]]
 
     @classmethod
     def of(
@@ -214,6 +215,7 @@ class HangersNow:
             damaged,
             warnings_from(every, hangers, baselines, watches, now_at, works),
             blind_hangers(heard(workspace, store, now)),
+            store.tests.names_without_time(),
         )
 
     def line(self, hanger: Hanger) -> HangerLine:
@@ -240,6 +242,7 @@ class HangersNow:
             baseline_tension_n=Interval.of_averaged(baseline.averaged) if baseline else None,
             averaged=point.averaged,
             warnings=self.warnings.get(hanger.id, ()),
+            undated=self.undated.get(hanger.id, ()),
         )
 
     def _watched(self, hanger: Hanger) -> WatchedTest | None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
+from shm.documents import parse_time
 from shm.errors import UsageError
-from shm.pipeline.importing import WORTHS, Import, Question, Understood
+from shm.pipeline.importing import WORTHS, Answers, Import, Question, Understood
 from shm.read.logger_words import KNOWN, seconds_of, sensitivity_of, unit_of, volts_of
 from shm.values import PLANES, Plane
 
@@ -44,6 +46,16 @@ def answer_to(question: Question, text: str, found: Import) -> dict[str, object]
     unit = unit_recorded(question.channel, found)
     is_raw = volts_of(unit) is not None or unit in WORTHS
     return channel_answer("sensitivity" if is_raw else "unit", plain, unit)
+
+
+def answer_time(text: str, answers: Answers) -> Answers:
+    """Return the answers with the time of the test, by an ISO 8601 time or day, or 'unknown'."""
+    if text.strip().lower() in _UNKNOWN:
+        return replace(answers, is_time_unknown=True)
+    try:
+        return replace(answers, time=parse_time(text.strip()))
+    except (ValueError, OverflowError):
+        raise UsageError(f"{text!r} is no day.", remedy="Write it as 2026-05-01.") from None
 
 
 def unit_recorded(name: str, found: Import) -> str:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from datetime import time as clock_time
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -26,9 +27,10 @@ from shm.read import logger_words as words
 from shm.read.assemble import recording
 from shm.read.base import Survey, SurveyedColumn
 from shm.read.header import CHANNEL_KEYS, Entry, Header
-from shm.read.profiles import Profile, completed, profile_for, save_profile
+from shm.read.profiles import Profile, completed, profile_for, save_profile, with_day_order
 from shm.read.sandbox import survey
 from shm.read.sidecar import Described, document_beside
+from shm.read.stamps import DAY_ORDERS, DayOrder, order_of_choice
 from shm.store import Workspace
 from shm.values import NAN, Channel, Plane, Quantity, Recording
 
@@ -46,7 +48,8 @@ class Answers:
     """What a person says of a file; NaN and None where nothing.
 
     `channels` are keys of a sidecar's table of a channel, by its name. `each_time`: the logger
-    goes from hanger to hanger, and its profile is to name none.
+    goes from hanger to hanger, and its profile is to name none. `is_time_unknown`: which of two
+    days the file means is not known either.
     """
 
     hanger: int | None = None
@@ -55,6 +58,7 @@ class Answers:
     temperature_c: float = NAN
     channels: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     each_time: bool = False
+    is_time_unknown: bool = False
 
     @property
     def said(self) -> dict[str, Any]:
@@ -148,12 +152,15 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     path = Path(found.source)
     profile = profile_for(found.layout, workspace.folder)
     own = _joined(document_beside(path), answers.said)
+    own, order = _with_chosen_time(own, found)
     _refuse_unknown(own, found, path)
     known = profile.described if profile is not None else {}
     described = with_times(completed(known, found.layout, own, path.name), found)
     hanger = described.get("hanger", found.hanger)
     rate, uneven = rate_told(found, described)
     questions = _questions(found, described, hanger, rate)
+    if found.layout.possible_times and "time" not in described and not answers.is_time_unknown:
+        questions.append(_of_time(found.layout.possible_times))
     problems = (
         *_hanger_problem(hanger, workspace),
         *_place_problems(found, described, hanger, workspace),
@@ -164,7 +171,7 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
         fault = ""  # the answers may mend it
     if _holds_nothing(found, described, questions):
         questions, fault = [], "; ".join(found.problems) or fault
-    kept = _to_keep(known, answers.said, found)
+    kept = with_day_order(_to_keep(known, answers.said, found), order)
     columns = _columns(found, described, record, rate)
     problems = (*problems, *((fault,) if fault else ()))
     return Import(
@@ -179,6 +186,18 @@ def keep_profile(found: Import, workspace: Workspace, *, each_time: bool = False
     if not each_time and (not found.kept or found.kept == before):
         return found.profile
     return save_profile(found.kept, found.survey.layout, workspace.folder, roams=each_time)
+
+
+def _with_chosen_time(own: dict[str, Any], found: Survey) -> tuple[dict[str, Any], DayOrder | None]:
+    """Return the sidecar with the complete time, and the order of day and month that is known now.
+
+    A person may name one of two possible times by its day alone.
+    """
+    possible, time = found.layout.possible_times, own.get("time")
+    order = order_of_choice(time, possible) if isinstance(time, datetime) else None
+    if order is None or time is None or time.time() != clock_time.min:
+        return own, order or found.layout.day_order
+    return {**own, "time": possible[DAY_ORDERS.index(order)]}, order
 
 
 def _joined(first: Described, then: Described) -> dict[str, Any]:
@@ -245,6 +264,12 @@ def _questions(found: Survey, described: Described, hanger: object, rate: float)
     columns = [_told(column, described) for column in found.columns]
     asked += [_of_unit(column) for column in _open(columns)]
     return asked + [each for column in columns for each in _of_sensor(column, described)]
+
+
+def _of_time(possible: Sequence[datetime]) -> Question:
+    first, second = (f"{each:%Y-%m-%d}" for each in possible)
+    text = f"Was the test on {first} or on {second} (or 'unknown')?"
+    return Question("time", "", text, f"--time {first}|{second}", needed=False)
 
 
 def _holds_nothing(found: Survey, described: Described, questions: Sequence[Question]) -> bool:

@@ -19,10 +19,12 @@ from pathlib import Path
 from shm.errors import BadInput, TooLarge
 from shm.pipeline.lineage import read_limits
 from shm.read import holds_test, sidecar_path
-from shm.read.profiles import any_profile, completed, profile_for
+from shm.read.base import Layout
+from shm.read.profiles import Profile, any_profile, completed, learn_day_order, profile_for
 from shm.read.sandbox import layout_of
-from shm.read.sidecar import document_beside, sidecar_text
-from shm.store import Receipt, ReceivedFile, Store, Workspace
+from shm.read.sidecar import Described, document_beside, sidecar_text
+from shm.read.stamps import may_hold_days, order_of_choice
+from shm.store import Hold, Receipt, ReceivedFile, Store, Workspace
 from shm.store.archive import (
     MODES_SUFFIX,
     Kept,
@@ -120,7 +122,7 @@ def _keep(
     kept_sidecar = None
     if _is_plain(sidecar):
         kept_sidecar = archive.keep(sidecar, most_bytes=most, meanwhile=meanwhile)
-    text = _by_profile(path, workspace, follow)
+    text = _learnt_sidecar(path, workspace, follow)
     if text is not None:
         with tempfile.TemporaryDirectory(prefix="shm-") as folder:
             made_up = Path(folder) / sidecar.name
@@ -134,7 +136,7 @@ def _keep(
 def as_taken_in(path: Path, workspace: Workspace) -> Iterator[Path]:
     """A recording beside the sidecar with which it would be taken in: itself, or a copy for as
     long as it is used, where its logger's profile says more than its own sidecar."""
-    text = _by_profile(path, workspace, follow=True)
+    text = _by_profile(path, workspace)
     if text is None:
         yield path
         return
@@ -144,26 +146,60 @@ def as_taken_in(path: Path, workspace: Workspace) -> Iterator[Path]:
         yield copied
 
 
-def _by_profile(path: Path, workspace: Workspace, follow: bool) -> str | None:
-    """The sidecar that the profile of a file's logger makes; None where there is no such profile.
+def _learnt_sidecar(path: Path, workspace: Workspace, follow: bool) -> str | None:
+    """Make the sidecar of a file by its logger's profile, which learns from the file first.
 
-    It is kept with the file, so that a profile which changes later changes no test of before.
+    It is kept with the file, so that a profile which changes later changes no test of before. None
+    where there is no such profile, or it adds nothing.
     """
-    is_one_recording = not holds_test(path) and not path.name.lower().endswith(MODES_SUFFIX)
-    if not is_one_recording or not any_profile(workspace.folder):
+    may_teach = any_profile(workspace.folder) or may_hold_days(path)
+    if not may_teach or (path.is_symlink() and not follow):
         return None
-    if path.is_symlink() and not follow:
+    known = _layout_and_sidecar(path, workspace)
+    if known is None:
+        return None
+    profile = learn_day_order(known[0], known[0].day_order, workspace.folder)
+    return _completed_text(profile, *known, path)
+
+
+def _by_profile(path: Path, workspace: Workspace) -> str | None:
+    """Make the sidecar of a file by its logger's profile, which stays as it is."""
+    known = _layout_and_sidecar(path, workspace) if any_profile(workspace.folder) else None
+    if known is None:
+        return None
+    return _completed_text(profile_for(known[0], workspace.folder), *known, path)
+
+
+def _layout_and_sidecar(path: Path, workspace: Workspace) -> tuple[Layout, Described] | None:
+    """Return how a recording looks and what its own sidecar says; None of what cannot be read."""
+    if holds_test(path) or path.name.lower().endswith(MODES_SUFFIX):
         return None
     try:
-        layout = layout_of(path, read_limits(workspace.settings))
-        own = document_beside(path)
+        return layout_of(path, read_limits(workspace.settings)), document_beside(path)
     except BadInput:
         return None  # it is refused with its reason where it is read
-    profile = profile_for(layout, workspace.folder)
-    if profile is None:
-        return None
-    whole = completed(profile.described, layout, own, path.name)
+
+
+def _completed_text(
+    profile: Profile | None, layout: Layout, own: Described, path: Path
+) -> str | None:
+    """Return what a profile adds to a file's own sidecar, with it; None where that is nothing."""
+    whole = completed(profile.described, layout, own, path.name) if profile is not None else own
     return sidecar_text(whole) if whole != own else None
+
+
+def learn_from_answer(workspace: Workspace, store: Store, hold: Hold) -> None:
+    """Store the order of day and month of a logger that a person's answer to a hold tells."""
+    if hold.time is None or all(doubt.check != "clock ambiguous" for doubt in hold.doubts):
+        return
+    recording = store.recordings.get(hold.recording_id)
+    try:
+        with workspace.archive.opened(recording.file) as path:
+            layout = layout_of(path, read_limits(workspace.settings))
+    except BadInput:
+        return  # an archive of several files has no logger's layout
+    order = order_of_choice(hold.time, layout.possible_times)
+    learn_day_order(layout, order, workspace.folder)
 
 
 def _set_aside(

@@ -109,6 +109,7 @@ def _candidate(
         tolerance=timedelta(seconds=workspace.settings.future_tolerance_seconds),
         modified_at=recording.file.modified_at,
         built=workspace.bridge.built,
+        possible_times=item.possible_times,
         file_times=item.times,
         neighbours=[other.test.time for other in found if other is not item and other.test.time],
         same_time=[each.test for each in sorted(at_once, key=lambda t: t.stage is Stage.HELD)],

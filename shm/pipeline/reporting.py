@@ -88,6 +88,7 @@ def structure_report(
         drifts=watched[-1].drifts if watched else (),
         alerts=tuple(stored.alert for stored in alerts),
         open_alerts=store.alerts.open_counts().get(number, 0),
+        undated=store.tests.names_without_time().get(number, ()),
         generated_at=generated_at,
         version=shm.__version__,
     )
@@ -148,6 +149,7 @@ def hanger_now(
         notes=notes_of(standing, silences, hanger.id, generated_at),
         inspections=store.notes.list_all(hanger.id),
         unwatched=_unwatched(workspace, store, latest, generated_at),
+        undated=store.tests.names_without_time().get(hanger.id, ()),
     )
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -149,7 +150,15 @@ def _test_in(path: Path, bridge: Bridge, settings: Settings) -> IdentifiedTest:
         signals=tuple(each.text for each in signal_doubts(measured, hanger))
         if hanger.is_modelled
         else (),
+        possible_times=_possible_times(result.test, measured),
     )
+
+
+def _possible_times(test: ModalTest, records: Sequence[Recording]) -> tuple[datetime, ...]:
+    """Return both times of a test whose day can be read in both orders; empty for others."""
+    if test.time is not None:
+        return ()
+    return next((each.possible_times for each in records if each.possible_times), ())
 
 
 def identify_options(settings: Settings, bridge: Bridge) -> IdentifyOptions:

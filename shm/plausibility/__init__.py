@@ -21,6 +21,7 @@ __all__ = [
 CHECKS: tuple[Check, ...] = (
     clock.before_the_bridge,
     clock.ahead,
+    clock.ambiguous,
     clock.scattered,
     clock.stuck,
     clock.before_the_baseline,

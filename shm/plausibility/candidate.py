@@ -8,6 +8,7 @@ from datetime import date, datetime, timedelta
 
 import numpy as np
 
+from shm.documents import format_time
 from shm.models.tensioned_beam import frequencies_hz
 from shm.values import (
     NAN,
@@ -26,6 +27,7 @@ from shm.values.messages import TODAY, WEEK
 class Candidate:
     """An identified test before it counts, and what is known to judge it by.
 
+    `possible_times` are two where the day of its time can be read day first or month first.
     `file_times` are those of all files or records of this one test, `neighbours` those of other
     tests in the same file, `same_time` are tests of the same hanger in other recordings with the
     very same time. `modified_at` is when the file was last written, which copying resets.
@@ -43,6 +45,7 @@ class Candidate:
     tolerance: timedelta
     modified_at: datetime | None = None
     built: date | None = None
+    possible_times: Sequence[datetime] = ()
     file_times: Sequence[datetime] = ()
     neighbours: Sequence[datetime] = ()
     same_time: Sequence[ModalTest] = ()
@@ -152,14 +155,18 @@ def notice_of(
     lead = f"{loss} T{held[1:]}" if loss else f"Hanger {candidate.hanger.id}: {held}"
     why = " ".join(doubt.why for doubt in doubts)
     # Whose it is must be known as soon as it would have to be repeated.
-    to_do = _what_to_do(doubts, recording_id, TODAY if TODAY in if_own else WEEK)
+    to_do = _what_to_do(candidate, doubts, recording_id, TODAY if TODAY in if_own else WEEK)
     return f"{lead} {to_do} {why} {if_own}Until then it counts in nothing."
 
 
-def _what_to_do(doubts: Sequence[Doubt], recording_id: int, soon: str) -> str:
-    time = " --time TIME" if any(doubt.check.startswith("clock") for doubt in doubts) else ""
+def _what_to_do(candidate: Candidate, doubts: Sequence[Doubt], recording_id: int, soon: str) -> str:
+    given = [""]
+    if any(doubt.check.startswith("clock") for doubt in doubts):
+        times = [str(format_time(each)) for each in candidate.possible_times]
+        given = [f" --time {each}" for each in times or ["TIME"]]
     why = " --why TEXT" if any(doubt.check == "copy" for doubt in doubts) else ""
-    ways = [f"--confirm {recording_id}{time}{why}", f"--discard {recording_id}"]
+    ways = [f"--confirm {recording_id}{time}{why}" for time in given]
+    ways.append(f"--discard {recording_id}")
     leading = next((doubt for doubt in doubts if _is_of_others(doubt)), doubts[0])
     action = f"{soon.capitalize()}, {leading.action[:1].lower()}{leading.action[1:]}"
     if leading.instead_of:
@@ -167,11 +174,11 @@ def _what_to_do(doubts: Sequence[Doubt], recording_id: int, soon: str) -> str:
         first = ", ".join(discards)
         return (
             f"{action}: {first}, then `shm ingest {ways[0]}`. Or keep the part: "
-            f"`shm ingest {ways[1]}`."
+            f"`shm ingest {ways[-1]}`."
         )
     if _is_of_others(leading):
         ways.reverse()  # most of these are what they seem
-    return f"{action}: `shm ingest {ways[0]}` or `shm ingest {ways[1]}`."
+    return f"{action}: {' or '.join(f'`shm ingest {way}`' for way in ways)}."
 
 
 def _is_of_others(doubt: Doubt) -> bool:

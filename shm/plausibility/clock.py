@@ -63,6 +63,19 @@ def ahead(candidate: Candidate) -> Doubt | None:
     return _unknown_time("clock ahead", candidate, why)
 
 
+def ambiguous(candidate: Candidate) -> Doubt | None:
+    """Doubt a time whose day can be read day first or month first."""
+    if not candidate.possible_times:
+        return None
+    first, second = (f"{each:%Y-%m-%d}" for each in candidate.possible_times)
+    why = (
+        "Its file writes the day in figures that can be read day first or month first, and its "
+        "logger's profile does not say which: your answer is kept there."
+    )
+    state = f"its day may be {first} or {second}"
+    return Doubt("clock ambiguous", state, _SET_RIGHT, why, time_unknown=True)
+
+
 def scattered(candidate: Candidate) -> Doubt | None:
     """Parts of one test that claim to be days apart, or a test far from all others of its file."""
     times, time = candidate.file_times, candidate.test.time

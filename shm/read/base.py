@@ -13,6 +13,7 @@ from datetime import datetime
 from pathlib import Path
 
 from shm.read.logger_words import Sensitivity
+from shm.read.stamps import DayOrder
 from shm.values import NAN, AddedMass, FloatArray, FrequencyResponse, Plane, Quantity, Recording
 
 
@@ -35,7 +36,9 @@ class LoggerTable:
 
     `said_rate_hz` is what its heading says, `times_rate_hz` what a column of times tells, NaN
     without. `layout` are the words by which files of one logger are known. `is_text` is False of a
-    format that has a reader of its own; `title` is that of a text with one signal.
+    format that has a reader of its own; `title` is that of a text with one signal. `day_order` is
+    what its days prove of their order; `possible_times` are two where nothing does and `time` can
+    be read in both orders.
     """
 
     columns: tuple[LoggerColumn, ...]
@@ -49,6 +52,8 @@ class LoggerTable:
     remarks: tuple[str, ...]
     is_text: bool = True
     title: str = ""
+    possible_times: tuple[datetime, ...] = ()
+    day_order: DayOrder | None = None
 
     @property
     def samples(self) -> int:
@@ -76,7 +81,8 @@ class Peek:
     """The headers of a file; `problems` are what a reader would refuse.
 
     A time record has `samples` and a rate, a frequency response `lines` and their step.
-    `left_out` names what the file holds besides.
+    `left_out` names what the file holds besides. `possible_times` are two where `time` is None
+    because its day can be read day first or month first.
     """
 
     source: str
@@ -92,6 +98,7 @@ class Peek:
     lines: int = 0
     frequency_step_hz: float = NAN
     left_out: tuple[str, ...] = ()
+    possible_times: tuple[datetime, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -173,7 +180,8 @@ class Survey:
 class Layout:
     """How the files of one logger look, and what this one says of itself.
 
-    `hanger` and `says_rate` are what a profile must not say in its stead.
+    `hanger` and `says_rate` are what a profile must not say in its stead. `day_order` and
+    `possible_times` are those of its table.
     """
 
     fingerprint: str
@@ -181,3 +189,5 @@ class Layout:
     columns: tuple[str, ...]
     hanger: int | None = None
     says_rate: bool = False
+    day_order: DayOrder | None = None
+    possible_times: tuple[datetime, ...] = ()

@@ -39,10 +39,10 @@ from shm.read.logger_rows import (
     script_of,
     values_of,
 )
-from shm.read.logger_times import Clock, clock_of, two_days
+from shm.read.logger_times import Clock, clock_of, day_order_of
 from shm.read.logger_words import UNSAID
 from shm.read.sidecar import channels_described, with_sidecar
-from shm.read.stamps import moment, parsed
+from shm.read.stamps import DayOrder, moment, parsed, possible_times
 from shm.values import NAN, FloatArray, Recording
 
 _PLAIN_NAME = set("abcdefghijklmnopqrstuvwxyz0123456789_")
@@ -102,7 +102,9 @@ def parse(text: str, path: Path, preamble: Sequence[str] = ()) -> LoggerTable | 
     heading = heading_of((*preamble, *block.above), script)
     _refuse_split_decimals(heading, block, path)
     rate = rate_said(heading.facts, script.decimal)
-    clock = clock_of(heading, block, rate, path)
+    order = day_order_of(_days(heading), block)
+    clock = clock_of(heading, block, rate, order, path)
+    time = clock.start or _time(heading, order)
     _refuse_wrapped(block, path)
     columns = tuple(
         _column(heading, block, clock, place, path)
@@ -114,12 +116,14 @@ def parse(text: str, path: Path, preamble: Sequence[str] = ()) -> LoggerTable | 
         said_rate_hz=unrounded(rate, clock.rate_hz, heading.facts, script.decimal),
         times_rate_hz=clock.rate_hz,
         hanger=_hanger(heading, path),
-        time=clock.start or _time(heading),
+        time=time,
         temperature_c=_temperature(heading, script.decimal),
         names_line=max(0, heading.names_line - len(preamble)),
         layout=_layout(heading, block),
         title=_of_one_signal(heading, words.means_title),
-        remarks=(*clock.remarks, *block.remarks, *_two_days(heading)),
+        remarks=(*clock.remarks, *block.remarks),
+        possible_times=() if time else clock.possible_starts or _possible_times(heading),
+        day_order=order,
     )
 
 
@@ -209,22 +213,32 @@ def _hanger(heading: Heading, path: Path) -> int | None:
     return said.pop() if len(said) == 1 else words.hanger_numbered(path.stem)
 
 
-def _time(heading: Heading) -> datetime | None:
-    days = [v for k, v in heading.facts if words.means_date(k) and parsed(v)]
-    clocks = [v for k, v in heading.facts if words.means_moment(k) and parsed(v)]
-    whole = [v for v in clocks if moment("", v) is not None]
+def _dates(heading: Heading) -> list[str]:
+    return [v for k, v in heading.facts if words.means_date(k) and parsed(v)]
+
+
+def _moments(heading: Heading) -> list[str]:
+    return [v for k, v in heading.facts if words.means_moment(k) and parsed(v)]
+
+
+def _days(heading: Heading) -> list[str]:
+    """Return all days and times of a heading, as they are written."""
+    return [*_dates(heading), *_moments(heading)]
+
+
+def _time(heading: Heading, order: DayOrder | None) -> datetime | None:
+    days, clocks = _dates(heading), _moments(heading)
+    whole = [v for v in clocks if moment("", v, order) is not None]
     if whole:
-        return moment("", whole[0])
-    return moment(days[0] if days else "", clocks[0] if clocks else "") if days else None
+        return moment("", whole[0], order)
+    return moment(days[0], clocks[0] if clocks else "", order) if days else None
 
 
-def _two_days(heading: Heading) -> tuple[str, ...]:
-    """A remark on a day such as 05/06/2026, from which no time is taken."""
-    for key, value in heading.facts:
-        found = parsed(value) if words.means_date(key) or words.means_moment(key) else None
-        if found is not None and not found[1] and found[0].year > 1:
-            return (two_days(value),)
-    return ()
+def _possible_times(heading: Heading) -> tuple[datetime, ...]:
+    """Return both times of a heading whose day can be read in both orders; empty for others."""
+    days, clocks = _dates(heading), _moments(heading)
+    texts = [*clocks, *(f"{day} {clock}" for day in days for clock in clocks), *days]
+    return next((both for text in texts if (both := possible_times(text))), ())
 
 
 def _temperature(heading: Heading, decimal: str) -> float:
@@ -309,14 +323,16 @@ def recording(table: LoggerTable, path: Path) -> Recording:
     """The recording that a table holds, described by file and sidecar; raises BadInput."""
     header, used, _ = header_of(table, path)
     rate = told_rate(table, header, path)
-    return assemble.recording(header, _values(table, used), path, rate)
+    found = assemble.recording(header, _values(table, used), path, rate)
+    return found if found.time else replace(found, possible_times=table.possible_times)
 
 
 def peeked(table: LoggerTable, file_format: str, path: Path) -> Peek:
     """What the headers say; faults become problems."""
     header, _, out = header_of(table, path)
     rate = told_rate(table, header, path)
-    return assemble.peeked(header, file_format, table.samples, lambda: rate, path, left_out=out)
+    look = assemble.peeked(header, file_format, table.samples, lambda: rate, path, left_out=out)
+    return look if look.time else replace(look, possible_times=table.possible_times)
 
 
 def _values(table: LoggerTable, used: Sequence[int]) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -15,7 +15,14 @@ from shm.read import logger_words as words
 from shm.read.comma_table import REMEDY, evened
 from shm.read.logger_heading import Heading
 from shm.read.logger_rows import Block, second_record, values_of
-from shm.read.stamps import parsed, seconds_of_stamps
+from shm.read.stamps import (
+    DayOrder,
+    find_day_order,
+    follow_days,
+    parsed,
+    possible_times,
+    seconds_of_stamps,
+)
 from shm.values import NAN, FloatArray
 
 # Judgement: no logger records a hammer test slower than this, and none faster.
@@ -29,21 +36,28 @@ _FINE = 1e-4  # judgement: of the span; times rounded more coarsely do not give 
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """What the columns of times tell; `used` are the columns that hold no measurement."""
+    """What the columns of times tell; `used` are the columns that hold no measurement.
+
+    `possible_starts` are two where the day of the start can be read in both orders.
+    """
 
     used: frozenset[int]
     rate_hz: float = NAN
     start: datetime | None = None
+    possible_starts: tuple[datetime, ...] = ()
     evened: Callable[[FloatArray], FloatArray] = lambda values: values
     remarks: tuple[str, ...] = ()
 
 
-def clock_of(heading: Heading, block: Block, said_hz: float, path: Path) -> Clock:
-    """The times of the rows; raises BadInput naming the line where they are uneven.
+def clock_of(
+    heading: Heading, block: Block, said_hz: float, order: DayOrder | None, path: Path
+) -> Clock:
+    """Return the times of the rows; raises BadInput naming the line where they are uneven.
 
-    `said_hz` is the rate by the preamble, which decides in what unit times are that have none.
+    `said_hz` is the rate by the preamble, which decides in what unit times are that have none;
+    `order` that of the file's days.
     """
-    stamps = [i for i, kind in enumerate(block.script.kinds) if kind == "stamp"]
+    stamps = _stamp_columns(block)
     numbers = [i for i, kind in enumerate(block.script.kinds) if kind == "number"]
     times = [
         i for i in numbers if _is_time(heading, i) or _keeps_step(heading, block, i, said_hz, path)
@@ -58,13 +72,33 @@ def clock_of(heading: Heading, block: Block, said_hz: float, path: Path) -> Cloc
         found = _of_numbers(heading, block, place, said_hz, path)
         if found is not None:
             seconds, start = found
-            start = start or _start_of(block, stamps)
-            return _even(seconds, said_hz, start, used, heading.names[place], block, path)
+            clock = _even(seconds, said_hz, start, used, heading.names[place], block, path)
+            return clock if start or not stamps else _started(clock, _stamps(block, 0), order)
     if stamps:
-        texts = [" ".join(row[i] for i in stamps) for row in block.rows]
-        return _of_stamps(texts, said_hz, used, heading.names[stamps[0]], block, path)
+        texts = _stamps(block)
+        return _of_stamps(texts, said_hz, order, used, heading.names[stamps[0]], block, path)
     remarks = (f"the unit of {heading.names[times[0]]} is not said; left out.",) if times else ()
     return Clock(used, remarks=remarks)
+
+
+def day_order_of(days: Sequence[str], block: Block) -> DayOrder | None:
+    """Return the order that the days of a heading, or of the first and last row, prove.
+
+    None where none of them does, or where they contradict each other.
+    """
+    ends = [text for row in (0, -1) for text in _stamps(block, row)]
+    return find_day_order([*days, *ends]) or (follow_days(ends) if ends else None)
+
+
+def _stamp_columns(block: Block) -> list[int]:
+    return [i for i, kind in enumerate(block.script.kinds) if kind == "stamp"]
+
+
+def _stamps(block: Block, row: int | None = None) -> list[str]:
+    """Return day and clock time of each row, or of one; empty without columns of such."""
+    columns = _stamp_columns(block)
+    rows = (block.rows if row is None else [block.rows[row]]) if columns else []
+    return [" ".join(cells[i] for i in columns) for cells in rows]
 
 
 def _is_time(heading: Heading, place: int) -> bool:
@@ -143,28 +177,23 @@ def _factor(values: FloatArray, said_hz: float) -> float | None:
     return 1.0 if _SLOWEST_HZ <= rate <= _FASTEST_HZ else None
 
 
-def _start_of(block: Block, stamps: list[int]) -> datetime | None:
-    found = parsed(" ".join(block.rows[0][i] for i in stamps)) if stamps else None
-    return found[0] if found is not None and found[1] else None
+def _started(clock: Clock, stamps: Sequence[str], order: DayOrder | None) -> Clock:
+    """Return a clock with the start that its first stamp tells, or both where its day is unsure."""
+    found = parsed(stamps[0], order)
+    if found is not None and found[1]:
+        return replace(clock, start=found[0])
+    return replace(clock, possible_starts=possible_times(stamps[0]))
 
 
 def _of_stamps(
-    texts: list[str], said_hz: float, used: frozenset[int], name: str, block: Block, path: Path
-) -> Clock:
-    seconds = seconds_of_stamps(texts)
-    first = parsed(texts[0])
-    if seconds is None or first is None:
+    texts: list[str], said_hz: float, order: DayOrder | None, used: frozenset[int],
+    name: str, block: Block, path: Path,
+) -> Clock:  # fmt: skip
+    seconds = seconds_of_stamps(texts, order)
+    if seconds is None:
         wrong = next(place for place, text in enumerate(texts) if parsed(text) is None)
         raise _fault(block, name, path)(wrong, f"{texts[wrong][:40]!r} is no time")
-    start = first[0] if first[1] else None
-    clock = _even(seconds, said_hz, start, used, name, block, path)
-    unsure = () if start or first[0].year == 1 else (two_days(texts[0]),)
-    return replace(clock, remarks=(*clock.remarks, *unsure))
-
-
-def two_days(text: str) -> str:
-    """The remark on a day such as 05/06/2026, from which no time is taken."""
-    return f"{text} may be one day or another: the time of the test is left open (--time)."
+    return _started(_even(seconds, said_hz, None, used, name, block, path), texts, order)
 
 
 def _even(
@@ -178,7 +207,9 @@ def _even(
         raise second_record(block.seam, path)
     if len(seconds) < 2 or np.all(np.diff(seconds) > 0):
         _, rate = evened(seconds, seconds[np.newaxis], fault)
-        return Clock(used, rate, start, lambda v: evened(seconds, v[np.newaxis], fault)[0][0])
+        return Clock(
+            used, rate, start, evened=lambda v: evened(seconds, v[np.newaxis], fault)[0][0]
+        )
     rate = _rate_of_coarse(seconds, said_hz, fault)
     return Clock(used, rate, start)
 

@@ -6,10 +6,15 @@ A profile is a sidecar for all files of one layout: `loggers/NAME.toml`, written
     format = "Excel"
     columns = ["Kraft [N]", "Beschl 1 [g]"]
     hanger = 3
+    day_order = "month first"
 
     [channel."Beschl 1"]
     plane = "transverse"
     x_m = 2.52
+
+`day_order` says how days such as 05/01/2026 are read. It is learnt from the first file of the
+logger whose days can be read in one order alone; where later ones prove the other it is `mixed`,
+and such days are asked of a person.
 
 A sidecar of its own goes before it, and so does a hanger or a rate that the file itself says. With
 `roams = true`, which a logger that has been at two hangers gets by itself, a profile names no
@@ -31,9 +36,13 @@ from shm.read.content import unreadable
 from shm.read.header import CHANNEL_KEYS
 from shm.read.logger_words import hanger_numbered
 from shm.read.sidecar import Described, sidecar_text
+from shm.read.stamps import DAY_ORDERS, DayOrder
 
 FOLDER = "loggers"
-_OF_PROFILE = ("hanger", "sampling_rate_hz", "channel")
+DAY_ORDER = "day_order"
+MIXED = "mixed"
+"""The `day_order` of a logger whose files have proven both."""
+_OF_PROFILE = ("hanger", "sampling_rate_hz", DAY_ORDER, "channel")
 _COMMENT = (
     "# What the files of one logger do not say themselves, as `shm import` asked. It holds for\n"
     "# every file with these columns; correct it here, or import a file again.\n"
@@ -49,6 +58,11 @@ class Profile:
     fingerprint: str
     described: Described
     roams: bool = False
+
+    @property
+    def answers_questions(self) -> bool:
+        """Return whether a person has described the logger, and it was not only read."""
+        return self.roams or bool(self.described.keys() - {DAY_ORDER})
 
 
 def profile_for(layout: Layout, workspace: Path) -> Profile | None:
@@ -70,6 +84,9 @@ def completed(
 ) -> dict[str, Any]:
     """The sidecar of one file: what its own says, and what its name and the profile add to that."""
     added = {key: profile[key] for key in _OF_PROFILE if key in profile}
+    order = added.pop(DAY_ORDER, MIXED)
+    if layout.possible_times and order in DAY_ORDERS:
+        added["time"] = layout.possible_times[DAY_ORDERS.index(order)]
     named = hanger_numbered(file_name)
     if named is not None:
         added["hanger"] = named
@@ -88,6 +105,27 @@ def completed(
     }
     whole = {**added, **own}
     return {**whole, "channel": channels} if channels else whole
+
+
+def with_day_order(known: Described, order: DayOrder | None) -> dict[str, Any]:
+    """Return what a profile says, with the order of day and month that a file of it proves."""
+    if order is None:
+        return dict(known)
+    is_new = known.get(DAY_ORDER, order) == order
+    return {**known, DAY_ORDER: order if is_new else MIXED}
+
+
+def learn_day_order(layout: Layout, order: DayOrder | None, workspace: Path) -> Profile | None:
+    """Store the order of day and month that a file of a logger proves; return its profile.
+
+    Return None where the logger has no profile and nothing is proven.
+    """
+    profile = profile_for(layout, workspace)
+    known = profile.described if profile is not None else {}
+    learnt = with_day_order(known, order)
+    if learnt == known:
+        return profile
+    return save_profile(learnt, layout, workspace, roams=profile is not None and profile.roams)
 
 
 def save_profile(
@@ -148,6 +186,13 @@ def _load(path: Path) -> Profile:
                 remedy=f"The keys are {', '.join(CHANNEL_KEYS)}.",
             )
     known = {key: document[key] for key in _OF_PROFILE if key in document}
+    orders = (*DAY_ORDERS, MIXED)
+    if known.get(DAY_ORDER, MIXED) not in orders:
+        raise BadInput(
+            f"{DAY_ORDER} = {known[DAY_ORDER]!r} is no order of day and month.",
+            file=path,
+            remedy=f"Write one of {', '.join(orders)}.",
+        )
     roams = document.get("roams") is True
     if roams:
         known.pop("hanger", None)

@@ -324,4 +324,6 @@ def _layout(found: Format, table: LoggerTable | None, look: Peek) -> Layout:
         columns,
         table.hanger if table is not None else look.hanger,
         table is not None and (table.said_rate_hz > 0 or table.times_rate_hz > 0),
+        table.day_order if table is not None else None,
+        table.possible_times if table is not None else (),
     )

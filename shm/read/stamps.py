@@ -1,14 +1,16 @@
 """The clock times that loggers write, as text: 2026-05-01T10:00:00.5Z, 01.05.2026 10:00:00,5, ...
 
-A day written 05/01/2026 is the first of May or the fifth of January. What happens within a record
-does not depend on it; where nothing tells, the time of the test stays unknown.
+A day written 05/01/2026 is the first of May or the fifth of January. The other days of the file
+tell which, or another file of its logger; else the time stays unknown and both times are given.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -24,9 +26,16 @@ _NAMED_DAYS = (
     "%d-%b-%Y %H:%M:%S", "%d %b %Y %H:%M:%S", "%d. %B %Y %H:%M:%S", "%B %d, %Y %H:%M:%S",
     "%b %d, %Y %H:%M:%S", "%d-%b-%Y", "%d %B %Y", "%B %d, %Y", "%a %b %d %H:%M:%S %Y",
 )  # fmt: skip
+_DAY_IN_BYTES = re.compile(rb"(?<!\d)\d{1,2}([-/])\d{1,2}\1\d{2}")
+_PACKED = (".xlsx", ".xlsm", ".gz")  # whose first bytes tell nothing
 _MONTH = re.compile("jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec", re.IGNORECASE)
 _DAY_S = 86400.0
 _CLOCK_ONLY = datetime(1, 1, 1, tzinfo=UTC)
+
+DayOrder = Literal["day first", "month first"]
+"""Which of the two comes first in a day written as figures, such as 05/01/2026."""
+
+DAY_ORDERS: tuple[DayOrder, DayOrder] = ("day first", "month first")
 
 
 def is_stamp(text: str) -> bool:
@@ -34,33 +43,88 @@ def is_stamp(text: str) -> bool:
     return parsed(text) is not None
 
 
-def parsed(text: str) -> tuple[datetime, bool] | None:
-    """A time in UTC (taken as such where no zone is said) and whether its day is certain.
+def parsed(text: str, order: DayOrder | None = None) -> tuple[datetime, bool] | None:
+    """Return a time in UTC (taken as such where no zone is said) and whether its day is certain.
 
-    A clock time without a day is one of the first of January of the year 1, its day not certain.
+    A day that can be read in both orders is read in `order` where that is known, else day first. A
+    clock time without a day is one of the first of January of the year 1, its day not certain.
     """
     found = _STAMP.fullmatch(text.strip())
     if found is None:
         return _named(text.strip())
     try:
         alone = found["da"] is not None
-        day, certain = _day(found, "d" if alone else "")
+        day, certain = _day(found, "d" if alone else "", order)
         return (day, certain) if alone else (_clocked(day, found), certain)
     except (ValueError, OverflowError):
         return None
 
 
-def _day(found: re.Match[str], prefix: str) -> tuple[datetime, bool]:
+def possible_times(text: str) -> tuple[datetime, ...]:
+    """Return both times of a text whose day can be read in both orders, in those of `DAY_ORDERS`.
+
+    Empty where its day is certain, or where it has none.
+    """
+    found = parsed(text)
+    if found is None or found[1] or found[0].year == 1:
+        return ()
+    both = (parsed(text, order) for order in DAY_ORDERS)
+    return tuple(each[0] for each in both if each is not None)
+
+
+def order_of_choice(time: datetime, possible: Sequence[datetime]) -> DayOrder | None:
+    """Return the order in which one of two possible times has the day of `time`, else None."""
+    chosen = [
+        order
+        for order, each in zip(DAY_ORDERS, possible, strict=False)
+        if each.date() == time.date()
+    ]
+    return chosen[0] if len(chosen) == 1 else None
+
+
+def find_day_order(texts: Iterable[str]) -> DayOrder | None:
+    """Return the order that the days in these texts prove; None where none does, or they differ."""
+    proven = {_proven_order(text) for text in texts} - {None}
+    return proven.pop() if len(proven) == 1 else None
+
+
+def _proven_order(text: str) -> DayOrder | None:
+    """Return the only order in which a day in figures is one; None of all other texts."""
+    found = _STAMP.fullmatch(text.strip())
+    if found is None or parsed(text) is None:
+        return None
+    a, mark, b, _ = _parts(found, "" if found["da"] is None else "d")
+    if a is None or mark == "." or len(a) == 4:
+        return None  # those are always written in one order
+    orders = _orders(mark, int(a), int(b))
+    return orders[0] if len(orders) == 1 else None
+
+
+def _orders(mark: str, first: int, second: int) -> tuple[DayOrder, ...]:
+    """Return the orders in which two figures are day and month."""
+    day_first, month_first = DAY_ORDERS
+    if mark == "." or first > 12:
+        return (day_first,)
+    return (month_first,) if second > 12 else DAY_ORDERS
+
+
+def _parts(found: re.Match[str], prefix: str) -> tuple[str, str, str, str]:
     a, mark, b, c = (found[f"{prefix}{part}"] for part in ("a", "mark", "b", "c"))
+    return a, mark, b, c
+
+
+def _day(found: re.Match[str], prefix: str, order: DayOrder | None) -> tuple[datetime, bool]:
+    a, mark, b, c = _parts(found, prefix)
     if a is None:
         return _CLOCK_ONLY, False
     first, second, third = int(a), int(b), int(c)
     if len(a) == 4:
         return datetime(first, second, third, tzinfo=UTC), True
     year = third + 2000 if third < 100 else third
-    is_american = mark == "/" and second > 12  # AM and PM say nothing: they do not stay in America
-    day, month = (second, first) if is_american else (first, second)
-    certain = mark == "." or is_american or first > 12 or first == second
+    orders = _orders(mark, first, second)  # AM and PM tell nothing: they do not stay in America
+    chosen = order if order in orders else orders[0]
+    day, month = (first, second) if chosen == DAY_ORDERS[0] else (second, first)
+    certain = len(orders) == 1 or order is not None or first == second
     return datetime(year, month, day, tzinfo=UTC), certain
 
 
@@ -94,14 +158,38 @@ def _named(text: str) -> tuple[datetime, bool] | None:
     return None
 
 
-def seconds_of_stamps(texts: Sequence[str]) -> FloatArray | None:
-    """Seconds since the first of the stamps, midnights passed; None where one is no stamp."""
-    first = parsed(texts[0]) if texts else None
+def follow_days(texts: Sequence[str]) -> DayOrder | None:
+    """Return the order in which stamps that pass midnight follow each other; None where none do."""
+    first, last = (possible_times(text) for text in (texts[0], texts[-1]))
+    spans = [abs(end - start) for start, end in zip(first, last, strict=False)]
+    if len(spans) < len(DAY_ORDERS) or spans[0] == spans[1]:
+        return None
+    return DAY_ORDERS[spans.index(min(spans))]
+
+
+def may_hold_days(path: Path, head_bytes: int = 20_000) -> bool:
+    """Return whether the first bytes of a file hold days such as 05/01/2026, or it is packed."""
+    if path.suffix.lower() in _PACKED:
+        return True
+    try:
+        with path.open("rb") as file:
+            head = file.read(head_bytes)
+    except OSError:
+        return False  # it is refused with its reason where it is read
+    return bool(_DAY_IN_BYTES.search(head.replace(b"\0", b"")))
+
+
+def seconds_of_stamps(texts: Sequence[str], order: DayOrder | None = None) -> FloatArray | None:
+    """Return seconds since the first of the stamps, midnights passed; None where one is no stamp.
+
+    Days that can be read in both orders are read in `order`.
+    """
+    first = parsed(texts[0], order) if texts else None
     if first is None:
         return None
     seconds, days = np.empty(len(texts)), 0.0
     for place, text in enumerate(texts):
-        found = parsed(text)
+        found = parsed(text, order)
         if found is None:
             return None
         seconds[place] = (found[0] - first[0]).total_seconds() + days
@@ -111,10 +199,13 @@ def seconds_of_stamps(texts: Sequence[str]) -> FloatArray | None:
     return seconds
 
 
-def moment(day: str, clock: str) -> datetime | None:
-    """The time that a day and a clock time say, of which either may hold both; None if unsure."""
+def moment(day: str, clock: str, order: DayOrder | None = None) -> datetime | None:
+    """Return the time of a day and a clock time, of which either may hold both; None if unsure.
+
+    A day that can be read in both orders is read in `order`.
+    """
     for text in (f"{day} {clock}".strip(), day, clock):
-        found = parsed(text) if text else None
+        found = parsed(text, order) if text else None
         if found is not None and found[1]:
             return found[0] if found[0].year > 1 else None
     return None

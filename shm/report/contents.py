@@ -102,7 +102,8 @@ class HangerReport:
     hanger's description has changed since the baseline, where that moves results; `discarded` names
     the tests of the baseline that count no more. `warnings` are the open ones, `standing` the
     alerts whose condition has not ended, `notes` what people did about these; `inspections`
-    what they wrote, the latest first; `unwatched` says that nothing has looked at it for long.
+    what they wrote, the latest first; `unwatched` says that nothing has looked at it for long;
+    `undated` names the tests that are dated by their receipt.
     """
 
     bridge: str
@@ -136,6 +137,7 @@ class HangerReport:
     notes: tuple[str, ...] = ()
     inspections: tuple[Note, ...] = ()
     unwatched: Lead | None = None
+    undated: tuple[str, ...] = ()
     letterhead: Letterhead = NO_LETTERHEAD
 
     @property
@@ -254,7 +256,8 @@ class HangerLine:
     `tension_n` is that of its latest test, None before the first, `averaged` all that is said of
     it; `drift` that of its tension since its baseline, None where nothing was compared; `called`
     says in a few words what was called since; `open_alerts` is `store.alerts.open_counts`.
-    `course` is None without a period; `warnings` are the open ones.
+    `course` is None without a period; `warnings` are the open ones; `undated` names the tests that
+    are dated by their receipt.
     """
 
     hanger: Hanger
@@ -270,6 +273,7 @@ class HangerLine:
     baseline_tension_n: Interval | None = None
     averaged: Averaged | None = None
     warnings: tuple[str, ...] = ()
+    undated: tuple[str, ...] = ()
 
     @property
     def status(self) -> Status | None:

@@ -15,6 +15,7 @@ from shm.report.diagnosis_report import diagnosis_json, diagnosis_part
 from shm.report.figures.every_figure import OF_HANGER_NAMES, hanger_figures
 from shm.report.hanger_summary import advice, further, is_found, summary, tension_change, why
 from shm.report.hanger_tables import numbers, origins, results
+from shm.report.open_warnings import dated_by_receipt
 from shm.report.paper import CREDIBLE, Fact, Paper, Part, Table, appendices, filled
 from shm.report.states import period_json, temperature_documents
 from shm.values import Alert, Drift, FrequencyResponse, Hanger
@@ -179,6 +180,7 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
         "warnings": list(data.warnings),
         "redescribed": list(data.redescribed),
         "discarded_of_baseline": list(data.discarded),
+        "dated_by_receipt": list(data.undated),
         "temperature_coefficients": temperature_documents(data.states),
         "neighbours": pattern_json(data.neighbours) if data.neighbours else None,
         "period": period_json(data.period),
@@ -207,7 +209,8 @@ _NOT_WATCHED = "No test was watched yet: its first tests make the baseline."
 @dataclass(frozen=True, eq=False)
 class StructureReport:
     """What is known of a structure; `baseline_hz` are its first frequencies by name, `said` is what
-    the watch says after the latest of its tests, empty before one was watched."""
+    the watch says after the latest of its tests, empty before one was watched; `undated` names the
+    tests that are dated by their receipt."""
 
     bridge: str
     structure: Hanger
@@ -221,6 +224,7 @@ class StructureReport:
     open_alerts: int
     generated_at: datetime
     version: str
+    undated: tuple[str, ...] = ()
 
 
 def structure_paper(data: StructureReport) -> Paper:
@@ -234,13 +238,14 @@ def structure_paper(data: StructureReport) -> Paper:
     )
     told = tuple((f"{each.time:%Y-%m-%d}", each.message) for each in data.alerts)
     alerts = Table("Alerts", ("test of", "message"), told)
+    said = f"{data.said or _NOT_WATCHED} {dated_by_receipt(data.undated)}".strip()
     return Paper(
         title=structure_words(data.structure),
         bridge=data.bridge,
         status="Alert" if data.open_alerts else "",
         style="alert" if data.open_alerts else "first",
         parts=(
-            Part("In short", summary=data.said or _NOT_WATCHED, facts=facts),
+            Part("In short", summary=said, facts=facts),
             Part("Numbers", tables=filled(_structure_frequencies(data), alerts)),
         ),
         generated_at=data.generated_at,
@@ -284,6 +289,7 @@ def structure_json(data: StructureReport) -> dict[str, Any]:
         "drifts": [drift_document(each) for each in data.drifts],
         "alerts": [alert_document(each) for each in data.alerts],
         "open_alerts": data.open_alerts,
+        "dated_by_receipt": list(data.undated),
         "generated_at": data.generated_at,
         "version": data.version,
     }

@@ -78,6 +78,7 @@ def _sentences(data: HangerReport) -> tuple[str, ...]:
         _model(data),
         _gap(data),
         *_further_advice(data),
+        open_warnings.dated_by_receipt(data.undated),
     )
     return tuple(each for each in found if each)
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from itertools import islice
 
 from shm.report.contents import HangerReport
-from shm.report.formatting import listed
+from shm.report.formatting import counted, listed
 from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
 from shm.values.messages import WEEK
 from shm.values.rounding import rounded_percent
@@ -157,6 +157,19 @@ def discarded(data: HangerReport) -> str:
     return (
         f"The baseline of hanger {number} was made from {names}, discarded since: the comparison "
         f"with it is no longer valid. {_anew(number)}"
+    )
+
+
+def dated_by_receipt(names: Sequence[str]) -> str:
+    """Return that tests without a time are dated by their receipt; empty where there are none."""
+    if not names:
+        return ""
+    more = f" and {len(names) - _MOST_CHANGES} more" if len(names) > _MOST_CHANGES else ""
+    listed = ", ".join(names[:_MOST_CHANGES])
+    are = "is" if len(names) == 1 else "are"
+    return (
+        f"{counted(len(names), 'test')} without a time {are} dated by the receipt of the file: "
+        f"{listed}{more}. Say `time` in the file's header or its sidecar, and send it again."
     )
 
 

@@ -119,7 +119,8 @@ class IdentifiedTest:
 
     `quality` and `set_aside` are empty where a file gave the modes. `times` are those of all files
     of the test, `fingerprint` is that of their samples, None where the modes were given; `signals`
-    says which channels are doubtful.
+    says which channels are doubtful. `possible_times` are two where the test has no time because
+    the day in its file can be read day first or month first.
     """
 
     test: ModalTest
@@ -131,6 +132,7 @@ class IdentifiedTest:
     times: tuple[datetime, ...] = ()
     fingerprint: Fingerprint | None = None
     signals: tuple[str, ...] = ()
+    possible_times: tuple[datetime, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -181,6 +181,15 @@ class Tests(Repository):
         rows = self.rows(sa.select(*counted).where(shown).group_by(tests.c.hanger))
         return {row[0]: LatestTest(int(row[1]), row[2]) for row in rows}
 
+    def names_without_time(self) -> dict[int, tuple[str, ...]]:
+        """Return the names of the tests that are dated by their receipt, by hanger."""
+        undated = counts(tests) & in_force(tests) & tests.c.taken_at.is_(None)
+        query = sa.select(tests.c.hanger, tests.c.name).where(undated).order_by(tests.c.id)
+        found: dict[int, tuple[str, ...]] = {}
+        for hanger, name in self.rows(query):
+            found[hanger] = (*found.get(hanger, ()), name)
+        return found
+
     def tested_hangers(self) -> frozenset[int]:
         """The numbers of hangers of which tests are in force: one look into the index for each."""
         least = sa.select(sa.func.min(tests.c.hanger)).where(in_force(tests), counts(tests))

@@ -41,7 +41,8 @@ class Recording:
     """Accelerations over time, as received, with the hammer's force unless nobody hit.
 
     One file, one or many hits. The force channel's `x_m` and `plane` say where and in which
-    direction the hammer hit.
+    direction the hammer hit. `possible_times` are two where `time` is None because its day can be
+    read day first or month first; empty otherwise.
     """
 
     source: str
@@ -51,6 +52,7 @@ class Recording:
     time: datetime | None = None
     temperature_c: float = NAN
     added_mass: AddedMass | None = None
+    possible_times: tuple[datetime, ...] = ()
 
     @property
     def force(self) -> Channel | None:

@@ -39,6 +39,10 @@ HALVED = tuple(
 DOUBTED = {
     "clock before the bridge": {"test": replace(PLAIN.test, time=datetime(1970, 1, 1, tzinfo=UTC))},
     "clock ahead": {"received_at": START + DAY},
+    "clock ambiguous": {
+        "test": replace(PLAIN.test, time=None),
+        "possible_times": [START - 30 * DAY, START + 3 * DAY],
+    },
     "clock scattered": {"file_times": [START, START + 3 * DAY]},
     "clock stuck": {"same_time": [modelled_test("other", HANGER_3, 3, 1.1)]},
     "clock before the baseline": {

@@ -106,6 +106,3 @@ def test_the_unit_of_times_follows_from_the_rate_that_is_said(
 
 def test_times_that_stand_still_have_no_unit() -> None:
     assert logger_times._factor(np.zeros(5), 200.0) is None
-    assert logger_times.two_days("05/06/2026") == (
-        "05/06/2026 may be one day or another: the time of the test is left open (--time)."
-    )

@@ -39,7 +39,7 @@ def test_frequency_responses_and_ambient_records_are_named_as_such(
 ) -> None:
     write(response, tmp_path / "response.mat")
     write(Recording("", recording.channels[1:], 512.0), tmp_path / "ambient.npz")
-    out = shown(capsys, tmp_path / "response.mat", tmp_path / "ambient.npz")
+    out = shown(capsys, tmp_path / "response.mat", tmp_path / "ambient.npz", code=3)
     assert "frequency responses of 65 lines every 0.0195312 Hz" in out
     assert "ambient (no hammer force)" in out
 

@@ -19,6 +19,7 @@ import shm
 from shm.documents import parse_time
 from shm.errors import BadInput, ShmError
 from shm.pipeline import utc_now
+from shm.pipeline.intake import learn_from_answer
 from shm.plausibility import refuse_impossible
 from shm.report import formatting
 from shm.report.paper import Table
@@ -95,7 +96,8 @@ def decide(site: AtSite, writer: Writer, recording: Row, told: Form) -> Response
         case "confirm":
             time = time_in(told, "time")
             refuse_impossible(time, site.workspace.bridge.built)
-            decisions.confirm(recording, who.name, why, now, time)
+            hold = decisions.confirm(recording, who.name, why, now, time)
+            learn_from_answer(site.workspace, site.store, hold)
         case "discard":
             decisions.discard(recording, who.name, why, now)
         case "withdraw":

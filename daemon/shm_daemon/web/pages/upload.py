@@ -20,7 +20,7 @@ from starlette.concurrency import run_in_threadpool
 
 from shm.errors import BadInput, UsageError
 from shm.pipeline import utc_now
-from shm.pipeline.import_answers import answer_to, import_document
+from shm.pipeline.import_answers import answer_time, answer_to, import_document
 from shm.pipeline.importing import Answers, Import, Question, keep_profile, look_into, understand
 from shm.report import formatting
 from shm.store import Workspace
@@ -113,8 +113,8 @@ async def import_file(
         Query(
             max_length=_MOST_ANSWERS,
             description='Answers, as JSON: {"hanger": 3, "columns": {"A1": {"plane": "transverse",'
-            ' "place": "2.5"}}}; with "each_time": true the hanger is not kept. Without answers the'
-            " file is only looked into.",
+            ' "place": "2.5"}}}; with "each_time": true the hanger is not kept; "time" is an ISO'
+            " 8601 time or day. Without answers the file is only looked into.",
         ),
     ] = None,
 ) -> Any:
@@ -177,7 +177,7 @@ def _answers(said: str, found: Import) -> Answers:
     hanger = document.get("hanger")
     if hanger is not None and not (type(hanger) is int and 0 <= hanger <= LARGEST_NUMBER):
         raise _misread("hanger is no number of a hanger")
-    return Answers(
+    answers = Answers(
         hanger,
         _number(document, "sampling_rate_hz", least=0.0),
         None,
@@ -185,6 +185,14 @@ def _answers(said: str, found: Import) -> Answers:
         tables,
         each_time=document.get("each_time") is True,
     )
+    return _with_time(answers, document["time"]) if "time" in document else answers
+
+
+def _with_time(answers: Answers, text: object) -> Answers:
+    try:
+        return answer_time(str(text), answers)
+    except UsageError as error:
+        raise BadInput(error.message, remedy=error.remedy) from error
 
 
 def _answered(question: Question, about: str, text: str, found: Import) -> dict[str, object]:

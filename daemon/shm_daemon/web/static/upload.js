@@ -148,6 +148,7 @@
         for (const [{ about, channel }, { value }] of fields) {
           if (about === "hanger") answers.hanger = Number(value);
           else if (about === "rate") answers.sampling_rate_hz = Number(value);
+          else if (about === "time") answers.time = value;
           else (answers.columns[channel] ??= {})[about] = value;
         }
         ended(answers);
