@@ -323,7 +323,7 @@ def _missing(look: Peek, workspace: Workspace | None) -> list[str]:
     needs_planes = look.hanger not in [each.id for each in structures]
     sensors = [each for each in look.channels if each.quantity == "acceleration"]
     bare = [each.name for each in sensors if each.plane is None] if needs_planes else []
-    days = [f"{each:%Y-%m-%d}" for each in look.possible_times]
+    days = [] if look.time else [f"{each:%Y-%m-%d}" for each in look.possible_times]
     lacks = {
         "hanger": workspace is not None and bool(sensors) and look.hanger is None,
         f"plane of {', '.join(bare)}": bool(bare),

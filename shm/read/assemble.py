@@ -105,7 +105,7 @@ def peeked(
         channels=channels,
         samples=samples,
         sampling_rate_hz=rate,
-        **_of_test(header, found),
+        **read_of_test(header, found),
         problems=tuple(found),
         left_out=(*left_out, *out),
     )
@@ -173,8 +173,11 @@ def _peek_channel(header: Header, name: str, problems: list[str]) -> PeekChannel
     )
 
 
-def _of_test(header: Header, problems: list[str]) -> dict[str, Any]:
-    """What a header says of the whole test; None and NaN where that is faulty."""
+def read_of_test(header: Header, problems: list[str]) -> dict[str, Any]:
+    """Return what a header says of the complete test; None and NaN where that is faulty.
+
+    Each fault is added to `problems`.
+    """
     unknown = dict.fromkeys(OF_TEST) | {"temperature_c": NAN}
     return {
         key: attempt(partial(getattr, header, key), nothing, problems)
@@ -260,14 +263,14 @@ def peeked_response(
 ) -> Peek:
     """What the headers of frequency responses say; faults become `problems`."""
     problems: list[str] = []
-    channels = tuple(_peek_point(header, name, problems) for name in header.channels)
+    channels = tuple(peek_point(header, name, problems) for name in header.channels)
     frequency = attempt(lambda: grid(listed_hz, path)[1], np.zeros(0), problems)
     return Peek(
         source=str(path),
         format=file_format,
         channels=channels,
         samples=0,
-        **_of_test(header, problems),
+        **read_of_test(header, problems),
         problems=tuple(problems),
         lines=len(frequency),
         frequency_step_hz=float(frequency[1]) if len(frequency) else NAN,
@@ -275,7 +278,8 @@ def peeked_response(
     )
 
 
-def _peek_point(header: Header, name: str, problems: list[str]) -> PeekChannel:
+def peek_point(header: Header, name: str, problems: list[str]) -> PeekChannel:
+    """Return a point of frequency responses as its header describes it; faults are `problems`."""
     attempt(lambda: header.accelerance_si(name), NAN, problems)
     return PeekChannel(
         name=name,

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from shm import modes_document
 from shm.errors import BadInput, UsageError
 from shm.read import logger_text
 from shm.read import logger_words as words
+from shm.read.assemble import read_of_test
 from shm.read.base import (
     Format,
     Layout,
@@ -150,7 +151,7 @@ def read_test(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
         return (read(path),)
     head_of(path)
     records = each_member(path, lambda file, name: replace(_named(read, file, name), source=name))
-    return tuple(_as_said(record, entries_of_test(path)) for record in records)
+    return tuple(_as_said(record, entries_of_test(path).of_test) for record in records)
 
 
 def peek_test(path: Path) -> tuple[Peek, ...]:
@@ -158,8 +159,10 @@ def peek_test(path: Path) -> tuple[Peek, ...]:
     if not holds_test(path):
         return (peek(path),)
     head_of(path)
-    said = entries_of_test(path)
-    return tuple(_as_said(found, said) for found in each_member(path, _peek_member))
+    problems: list[str] = []
+    said = read_of_test(entries_of_test(path), problems)
+    looks = (_as_said(found, said) for found in each_member(path, _peek_member))
+    return tuple(replace(look, problems=(*look.problems, *problems)) for look in looks)
 
 
 def _peek_member(file: Path, name: str) -> Peek:
@@ -193,18 +196,13 @@ def load_modes(path: Path) -> tuple[ModalTest, ...]:
     _refuse_channels(path)
     said = entries_of_test(path)
     _refuse_what_samples_have(said, tests, path)
-    return tuple(_as_said(test, said) for test in tests)
+    return tuple(_as_said(test, said.of_test) for test in tests)
 
 
-def _as_said(found: Found, said: Header) -> Found:
-    """With what a sidecar says of the whole test; what it does not say stays."""
-    return replace(
-        found,
-        hanger=found.hanger if said.hanger is None else said.hanger,
-        time=said.time or found.time,
-        temperature_c=found.temperature_c if math.isnan(said.temperature_c) else said.temperature_c,
-        added_mass=said.added_mass or found.added_mass,
-    )
+def _as_said(found: Found, said: Mapping[str, Any]) -> Found:
+    """Return a test with what a sidecar says of all of it; None and NaN change nothing."""
+    known = {key: value for key, value in said.items() if value is not None and value == value}
+    return replace(found, **known)
 
 
 def _refuse_channels(path: Path) -> None:

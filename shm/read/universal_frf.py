@@ -19,7 +19,7 @@ import numpy as np
 from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read import assemble
-from shm.read.base import Peek, PeekChannel
+from shm.read.base import Peek
 from shm.read.header import KEYS, Entry, Header, mass_entries
 from shm.read.logger_words import accelerance_si
 from shm.read.sidecar import with_sidecar
@@ -36,7 +36,6 @@ from shm.values import (
 
 # UC-SDRL, Universal File Formats, data set 58, records 7 to 10
 _ACCELERATION, _EXCITATION, _FREQUENCY, _EVEN = 12, 13, 18, 1
-_UNIT = "m/s2/N"
 _STEP = "frequency_step_hz"
 _OFF_GRID = 0.01  # judgement: of a step; six digits of first and step leave 0.01 at line 1000
 _SAME_STEP = 1e-4  # judgement: a step printed with six digits errs by 5e-6 at most
@@ -71,18 +70,19 @@ def frequency_response(content: Content, path: Path) -> FrequencyResponse:
 
 
 def peek(content: Content, file_format: str, path: Path) -> Peek:
+    """Return what the headers of frequency responses say; faults become `problems`."""
     sets = response_sets(content)
     header = _header(sets, content, path)
-    channels = tuple(
-        PeekChannel(name, "acceleration", _UNIT, header.plane(name), header.x_m(name))
-        for name in header.channels
-    )
+    problems: list[str] = []
+    channels = tuple(assemble.peek_point(header, name, problems) for name in header.channels)
+    assemble.attempt(lambda: _frequencies(sets, path), None, problems)
     return Peek(
         source=str(path),
         format=file_format,
         channels=channels,
         samples=0,
-        **header.of_test,
+        **assemble.read_of_test(header, problems),
+        problems=tuple(problems),
         lines=sets[0].points,
         frequency_step_hz=_step(sets[0]) or NAN,
     )

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput, UsageError
-from shm.read import FORMATS, Format, peek, read, sidecar_path
+from shm.read import FORMATS, Format, bundle, peek, peek_test, read, sidecar_path
 from shm.read import write as write_ours
 from shm.values import Channel, FrequencyResponse, Recording
 from tests.helpers.written import needs_responses, write
@@ -396,3 +396,45 @@ def test_what_is_only_read_is_refused_on_writing(recording: Recording, tmp_path:
     with pytest.raises(UsageError, match=r"no format is written as \.h5.*\.npz, \.uff, \.csv"):
         write_ours(recording, tmp_path / "test.h5")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("kind", ["recording", "response"])
+@pytest.mark.parametrize(
+    ("fault", "problem"),
+    [
+        ('temperature_c = "warm"', "temperature_c = 'warm' is not a number"),
+        ('time = "noon"', "time = 'noon' is not an ISO 8601 time"),
+        ('plane = "up"', "'up'"),
+        ("added_mass_kg = -1\nadded_mass_at_m = 2", "added_mass_kg = -1 is not positive"),
+    ],
+)
+@formats
+def test_peek_lists_sidecar_faults(
+    file_format: Format,
+    fault: str,
+    problem: str,
+    kind: str,
+    request: pytest.FixtureRequest,
+    tmp_path: Path,
+) -> None:
+    """A fault of the sidecar hides no channel, in whatever format."""
+    if kind == "response":
+        needs_responses(file_format)
+    path = written(file_format, request.getfixturevalue(kind), tmp_path)
+    names = [channel.name for channel in peek(path).channels]
+    sidecar_path(path).write_text(f"{fault}\n")
+    look = peek(path)
+    assert [channel.name for channel in look.channels] == names
+    assert look.problems
+    assert all(problem in each and "test.toml" in each for each in look.problems)
+
+
+def test_peek_lists_archive_sidecar_faults(recording: Recording, tmp_path: Path) -> None:
+    write(recording, tmp_path / "a.csv")
+    archive = bundle([tmp_path / "a.csv"], tmp_path / "test.zip")
+    sidecar_path(archive).write_text('temperature_c = "warm"\n')
+    (look,) = peek_test(archive)
+    assert len(look.channels) == len(recording.channels)
+    (problem,) = look.problems
+    assert "test.toml" in problem
+    assert "temperature_c = 'warm'" in problem
