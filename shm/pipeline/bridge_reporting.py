@@ -236,7 +236,7 @@ class HangersNow:
             Interval.of_averaged(point.averaged),
             "; ".join(called_words(change) for change in called),
             opened,
-            next((d for d in (watched.drifts if watched else ()) if d.quantity == TENSION), None),
+            next((d for d in (watched.told if watched else ()) if d.quantity == TENSION), None),
             point.test,
             point.model,
             baseline_tension_n=Interval.of_averaged(baseline.averaged) if baseline else None,
@@ -335,8 +335,8 @@ def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]
 
 def _known_drifts(store: Store, latest: StoredWatch) -> Sequence[Drift]:
     """Those of the latest test; of all, where its shift of the tension is not known."""
-    drifts = latest.watched.drifts
+    drifts = latest.watched.told
     if any(each.quantity == TENSION and math.isfinite(each.shift_mean) for each in drifts):
         return drifts
     watches = store.watch.list_all(latest.hanger, latest.baseline_id)
-    return [drift for watch in watches for drift in watch.watched.drifts]
+    return [drift for watch in watches for drift in watch.watched.told]

@@ -95,17 +95,19 @@ def _further_advice(data: HangerReport) -> tuple[str, ...]:
 
 
 def tension_change(data: HangerReport) -> Interval | None:
-    """Relative change of the tension since the baseline; None where there is no earlier test.
+    """Return the relative change of the tension since the baseline; None if it is not known.
 
-    As the watch found it; else of two independent estimates, standard deviations in squares.
+    As the watch found it; if it has not compared the test, of two independent estimates, standard
+    deviations in squares.
     """
     then, now = data.baseline_tension_n, data.tension_n
     if then is None:
         return None
-    for drift in data.drifts:
-        if drift.quantity == TENSION and math.isfinite(drift.shift_mean + drift.shift_sd):
-            return Interval.normal(drift.shift_mean, drift.shift_sd)
-    return now.since(then)
+    drift = next((each for each in data.drifts if each.quantity == TENSION), None)
+    if drift is None:
+        return now.since(then)
+    is_known = math.isfinite(drift.shift_mean + drift.shift_sd)
+    return Interval.normal(drift.shift_mean, drift.shift_sd) if is_known else None
 
 
 def misfits_percent(data: HangerReport) -> list[tuple[PredictedFrequency, Interval]]:
@@ -148,8 +150,10 @@ def _against_nominal(data: HangerReport) -> str:
 
 def _against_baseline(data: HangerReport) -> str:
     change = tension_change(data)
-    if change is None or data.baseline is None:
+    if data.baseline is None or data.baseline_tension_n is None:
         return "There is no earlier test to compare with: this one is the baseline."
+    if change is None:
+        return "How far it has moved from the baseline is not known: its latest test cannot tell."
     size = rounded_percent(change.mean, change.width / 2, "+")
     doubt = "" if is_found(data) else ", if it has changed at all"
     said = f"Against the baseline of {counted_tests(data.baseline.tests)} it is {size}{doubt}"

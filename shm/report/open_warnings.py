@@ -18,6 +18,7 @@ from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
 from shm.values.messages import WEEK
 from shm.values.rounding import rounded_percent
 from shm.watch.alert_text import against_baseline_words
+from shm.watch.change_words import look_again
 from shm.watch.mistaken_modes import warning_words
 
 # Judgement: hangers of sound bridges are within a quarter of their nominal tension, or all are off.
@@ -61,6 +62,12 @@ def open_warnings(
     notable = [each for each in latest.mistaken if each.is_notable] if latest else []
     if notable:
         found.append(warning_words(notable, hanger))
+    elif latest is not None and latest.is_unexplained:
+        found.append(
+            f"Hanger {hanger.id}: no tension and no end stiffness explains its latest test. "
+            f"{look_again(hanger)} {WEEK}, and compare how its modes were numbered with the "
+            "baseline's."
+        )
     return tuple(found)
 
 

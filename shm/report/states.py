@@ -28,6 +28,7 @@ from shm.values import (
     kind_of,
 )
 from shm.watch.change_words import group_words, is_stiffness, probable_groups, quantity_words
+from shm.watch.mistaken_modes import off_the_baseline
 from shm.watch.state import Band, StateHistory, StateOptions, set_free, states
 
 if TYPE_CHECKING:
@@ -116,6 +117,15 @@ class QuantityOverTime:
         )
         return replace(self, read=read, filtered=filtered, smoothed=smoothed)
 
+    def where(self, known: BoolArray) -> QuantityOverTime:
+        """Return the same with NaN at tests that are not `known` (n,)."""
+        bands = (self.read, self.filtered, self.smoothed)
+        read, filtered, smoothed = (
+            Band(*(np.where(known, each, np.nan) for each in (band.low, band.middle, band.high)))
+            for band in bands
+        )
+        return replace(self, read=read, filtered=filtered, smoothed=smoothed)
+
 
 @dataclass(frozen=True)
 class CalledChange:
@@ -130,8 +140,9 @@ class CalledChange:
 class StatesOverTime:
     """All that the figure shows of a hanger's n tests, oldest first.
 
-    `outlier` (n,) marks readings taken as blunders; `temperatures_c` (n,) is NaN where unknown;
-    levels hold at `reference_temperature_c`, NaN where no temperature is known.
+    `outlier` (n,) marks readings taken as blunders. Of a test that no state explains nothing is
+    known: its bands are NaN. `temperatures_c` (n,) is NaN where unknown; levels hold at
+    `reference_temperature_c`, NaN where no temperature is known.
     `temperature_coefficients` are per kelvin, beside what the softening of steel explains.
     """
 
@@ -164,16 +175,20 @@ NOTHING_WATCHED = StatesOverTime((), np.empty(0), NAN, np.empty(0, bool), ())
 def states_over_time(watched: Watched, hanger: Hanger) -> StatesOverTime:
     """The states of a hanger at all tests of its watch, at the baseline's mean temperature."""
     outlier = np.array([each.change.outlier_probability for each in watched.watch.tests])
+    explained = np.array([not off_the_baseline(each).any() for each in watched.readings])
     calls = [call.change for call in watched.watch.calls]
     options = StateOptions(reference_temperature_c=watched.reader.reference_temperature_c)
     changes = set_free(calls, watched.readings)
-    history = states(watched.readings, watched.reader.quantities, outlier, changes, options)
+    weights = np.where(explained, outlier, 1.0)
+    history = states(watched.readings, watched.reader.quantities, weights, changes, options)
     return StatesOverTime(
         history.times,
         history.temperatures_c,
         history.reference_temperature_c,
         outlier > 0.5,
-        tuple(_over_time(each, history, hanger) for each in watched.reader.quantities),
+        tuple(
+            _over_time(each, history, hanger).where(explained) for each in watched.reader.quantities
+        ),
         tuple(CalledChange(call.began_after, call.began_by, called_words(call)) for call in calls),
         history.temperature_coefficients(),
     )

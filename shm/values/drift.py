@@ -311,16 +311,29 @@ class WatchedTest:
     mistaken: tuple[RepeatedMistake, ...] = ()
 
     @property
+    def is_unexplained(self) -> bool:
+        """Return True if no state of the baseline's model explains the modes of this test."""
+        return any(each.is_misfit and not each.fits for each in self.mistaken)
+
+    @property
     def told(self) -> tuple[Drift, ...]:
-        """The drifts as all tell them: what is clearly beyond its threshold where a change is
-        called is as probable as that it moved."""
+        """Return the drifts as they are reported.
+
+        What is clearly beyond its threshold where a change is called is as probable as that it
+        moved. Of a test that no state explains no shift is known, unless one is probable.
+        """
+        return tuple(map(self._reported, self.drifts))
+
+    def _reported(self, drift: Drift) -> Drift:
         moved = {each.quantity: each.probability for each in self.change.moved}
-        return tuple(
-            replace(each, probability=max(each.probability, moved.get(each.quantity, 0.0)))
-            if self.change.called and each.is_clearly_beyond
-            else each
-            for each in self.drifts
-        )
+        if self.change.called:
+            if not drift.is_clearly_beyond:
+                return drift
+            probability = max(drift.probability, moved.get(drift.quantity, 0.0))
+            return replace(drift, probability=probability)
+        if self.is_unexplained and drift.probability < 0.5:
+            return replace(drift, value=NAN, shift_mean=NAN, shift_sd=NAN, probability=NAN)
+        return drift
 
 
 @dataclass(frozen=True)

@@ -60,8 +60,9 @@ class HangerGlance:
         As the watch found it, the swing with the temperature taken out; else of two estimates.
         """
         line = self.line
-        if line.drift is not None:
-            return Interval.normal(line.drift.shift_mean, line.drift.shift_sd)
+        if (drift := line.drift) is not None:
+            is_known = math.isfinite(drift.shift_mean + drift.shift_sd)
+            return Interval.normal(drift.shift_mean, drift.shift_sd) if is_known else None
         if line.tension_n is None or line.baseline_tension_n is None or self.is_baseline:
             return None
         return line.tension_n.since(line.baseline_tension_n)

@@ -23,13 +23,18 @@ _TENSION_TITLE = "tension by the selected model class: estimate to date and retr
 
 def specify(data: StatesOverTime, least_tests: int = 1) -> spec.Specification | None:
     """None of fewer tests."""
-    if len(data.times) < least_tests or not data.quantities:
+    if not any(_known(each) >= least_tests for each in data.quantities):
         return None
     panels = [_panel(data, quantity) for quantity in data.quantities]
     if np.any(np.isfinite(data.temperatures_c)):
         panels.append(_temperature(data))
     panels[-1] = replace(panels[-1], x=time_axes.time_axis(data.times))
     return spec.stacked(panels, sum(panel.height for panel in panels) + _REST_INCHES, 5)
+
+
+def _known(quantity: QuantityOverTime) -> int:
+    """Count the tests at which the state is known."""
+    return int(np.isfinite(quantity.filtered.middle).sum())
 
 
 def _panel(data: StatesOverTime, quantity: QuantityOverTime) -> spec.Panel:
@@ -142,8 +147,8 @@ def _caption(data: StatesOverTime) -> str:
         "what each test says by itself with its own 90 % interval, hollow where it was taken as an "
         "outlier, triangles where it lies out of view. Solid: the state from the tests up to each, "
         "with its 90 % band; dashed orange: from all tests. Dashed green: baseline; dash-dotted: "
-        "thresholds. Upright spans: when a detected change began, with 90 % probability. At the "
-        "bottom: temperature of the tests."
+        "thresholds. Nothing is drawn of a test that no state explains. Upright spans: when a "
+        "detected change began, with 90 % probability. At the bottom: temperature of the tests."
     )
 
 
@@ -160,7 +165,12 @@ def _last(quantity: QuantityOverTime) -> str:
     band = quantity.filtered
     scale, name = _scale(quantity)
     unit = f" {name}" if quantity.is_tension else ""
-    low, middle, high = (float(part[-1]) * scale for part in (band.low, band.middle, band.high))
+    known = np.flatnonzero(np.isfinite(band.middle))
+    if not len(known):
+        return f"{quantity.title} not known"
+    low, middle, high = (
+        float(part[known[-1]]) * scale for part in (band.low, band.middle, band.high)
+    )
     return (
         f"{quantity.title} {middle:.4g}{unit} (90 % interval {low:.4g} to {high:.4g}{unit}), "
         f"baseline {quantity.baseline * scale:.4g}{unit}"
