@@ -245,6 +245,7 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
         **of("repeatability_sd_n", "nominal_tension_n"),
         "parameters": {
             name: summary(posterior.parameter(name), most_probable[name])
+            | ({"unit": unit} if (unit := posterior.unit(name)) else {})
             for name in posterior.names
         },
         **of("log_evidence", "log_evidence_sd"),

@@ -118,9 +118,7 @@ def _posterior(posterior: Posterior) -> Sheet:
     ]
     for name in posterior.names:
         interval = Interval.of_samples(posterior.parameter(name))
-        rows.append(
-            _interval_row(name, interval, best[name], formatting.meaning(name, posterior.model))
-        )
+        rows.append(_interval_row(name, interval, best[name], formatting.meaning(posterior, name)))
     head = ("", "mean", "90 % interval", "most probable", "what it is")
     sampled = (
         f"{len(posterior.samples)} draws, log evidence {posterior.log_evidence:.2f} "

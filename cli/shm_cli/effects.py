@@ -14,6 +14,7 @@ from rich.markdown import Markdown
 from shm.bridge import load_hanger
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey
 from shm.values import PLANES
+from shm.values.parameter_names import is_logarithm
 from shm_cli import completion, flags, thesis
 from shm_cli.common import markdown, show, show_rows
 from shm_cli.terminal import Terminal
@@ -188,5 +189,5 @@ def _row(group: list[Parameter]) -> tuple[str, ...]:
 
 
 def _prior(parameter: Parameter) -> str:
-    spread = "uniform in log10" if parameter.name.startswith("log10_") else parameter.spread
+    spread = "uniform in log10" if is_logarithm(parameter.name) else parameter.spread
     return f"{spread}, either sign" if parameter.signed else spread

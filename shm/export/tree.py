@@ -4,8 +4,6 @@ The layout is ArviZ's schema of inference data: dimensions `chain` and `draw` fi
 by importance sampling, equally weighted and in no order, so they are one chain of independent draws
 and `r_hat` is an attribute (ArviZ's own needs several chains).
 
-The unit of a parameter, from its name and the model class that has it.
-
 What each draw of a posterior says of each measured frequency.
 """
 
@@ -27,6 +25,7 @@ from shm.inference.options import silent
 from shm.inference.problem import Problem
 from shm.models import THESIS, class_of
 from shm.values import FloatArray, Hanger, ModalTest, Posterior
+from shm.values.parameter_names import is_logarithm
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
@@ -126,8 +125,7 @@ def _groups(posterior: Posterior) -> dict[str, Group]:
     """What a posterior holds by itself."""
     parameters = dict(zip(posterior.names, posterior.samples.T, strict=True))
     drawn: Group = {
-        name: (_DRAWN, values, unit_of(name, posterior.model))
-        for name, values in parameters.items()
+        name: (_DRAWN, values, _unit(posterior, name)) for name, values in parameters.items()
     }
     rows = posterior.predicted
     return {
@@ -199,21 +197,10 @@ def _lineage(posterior: Posterior) -> dict[str, Any]:
     return {name: value for name, value in told.items() if value is not None and value == value}
 
 
-_NONE = ("theta_F", "theta_L", "sigma", "section", "density", "length", "modulus")
-_UNITS = {"kg": "kg", "m": "m", "n": "N", "hz": "Hz", "s": "s", "rad": "rad", "c": "degC"}
-
-
-def unit_of(name: str, model: str) -> str:
-    """As a text, `1` where it has none; empty where the name does not say.
-
-    End springs are in N m/rad for beams, in N/m a node for solids; of a logarithm, the unit of what
-    it is the logarithm of.
-    """
-    if name in _NONE:
-        return "1"
-    if name.startswith("log10_k") and "+" not in model:
-        return "log10(N m/rad)" if model.startswith("beam") else "log10(N/m)"
-    return _UNITS.get(name.rpartition("_")[2], "")
+def _unit(posterior: Posterior, name: str) -> str:
+    """Return the unit of a parameter, `log10(N m/rad)` of a logarithm; empty where unknown."""
+    unit = posterior.unit(name)
+    return f"log10({unit})" if unit and is_logarithm(name) else unit
 
 
 _TOLERANCE = 1e-6  # technical: rounding through a store and back, far below another likelihood

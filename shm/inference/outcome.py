@@ -71,6 +71,7 @@ def assembled(
         model=model.name,
         hanger=tests[0].hanger,
         names=(*problem.prior.names, SIGMA),
+        units=(*(model.units.get(name, "") for name in problem.prior.names), "1"),
         samples=samples,
         log_likelihood=log_likelihood,
         most_probable=most_probable,

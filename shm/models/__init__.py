@@ -6,7 +6,7 @@ adopted is made from its name (see `shm.models.adopted`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from shlex import quote
 
 import numpy as np
@@ -72,6 +72,15 @@ def class_of(posterior: Posterior, hanger: Hanger) -> Model:
     return described(posterior.model, hanger, posterior.priors)
 
 
+def class_units(name: str) -> Mapping[str, str]:
+    """Return the units of the parameters of model class `name`, as far as its registry has them.
+
+    Those of adopted effects depend on the hanger: the class itself (`class_of`) has them.
+    """
+    registered = MODELS.get(name.partition("+")[0], Model)
+    return {**registered.units, "sigma": "1"}
+
+
 def applicable(hanger: Hanger, names: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:
     """Which of the model classes `names` apply to `hanger`, and why each other one does not.
 
@@ -129,6 +138,7 @@ __all__ = [
     "build",
     "check_baseline",
     "class_of",
+    "class_units",
     "competing_names",
     "described",
     "is_adopted",

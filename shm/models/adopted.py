@@ -65,7 +65,7 @@ class Adopted(Model):
         held = [scatter.get(each.name) == 0 for each in self._composed.parameters]
         self._free = np.flatnonzero(~np.array(held))
         free = [self._composed.parameters[index] for index in self._free]
-        of_class = MODELS[made.baseline].bounds
+        of_class, units = MODELS[made.baseline].bounds, MODELS[made.baseline].units
         # The class's own keep their names, and are uniform as they are there.
         self._logarithmic = np.array([in_log(e) and e.name not in of_class for e in free])
         half = {name: _HALF_WIDTH_IN_SD * sd for name, sd in asdict(hanger.scatter).items()}
@@ -74,6 +74,7 @@ class Adopted(Model):
             e.name if e.name in of_class else own_name(e): known.get(e.name, bounds_of(e))
             for e in free
         }
+        self.units = {name: units.get(e.name, e.unit) for name, e in zip(bounds, free, strict=True)}
         if math.isfinite(hanger.scatter.tension) and TENSION in bounds:
             bounds[TENSION] = bounds_of(free[0])  # weighed: as exactly as the description says
         bounds |= {name: (-half[name], half[name]) for name in bounds if name in half}

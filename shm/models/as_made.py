@@ -66,7 +66,7 @@ class AsMade(Model):
             model = copy(model)
             model.bounds = {**model.bounds, TENSION: TENSION_RATIO}
         self.model = model
-        self.name, self.title = model.name, model.title
+        self.name, self.title, self.units = model.name, model.title, model.units
         hanger = self.hanger
         deck_m, arch_m = self.stiff_ends_m
         self.swaps = model.swaps if deck_m == arch_m else ()

@@ -42,6 +42,16 @@ def held_otherwise(hanger: Hanger) -> str:
     return ""
 
 
+RATIOS: Mapping[str, str] = dict.fromkeys(
+    (
+        *("theta_F", "theta_L", "section", "density", "length", "modulus"),
+        *("bending_factor", "shear_share"),
+    ),
+    "1",
+)
+"""The unit of parameters that are ratios to the description."""
+
+
 class Model:
     """A model class of one hanger. A member declares its parameters and overrides two verbs.
 
@@ -50,6 +60,8 @@ class Model:
 
     `bounds` are the uniform priors of the parameters; `swaps` lists pairs of end springs (log10)
     that can be exchanged without changing any frequency, so that sampling may keep to one copy.
+    `units` names the unit of each parameter, that of the quantity itself where the parameter is its
+    log10; a parameter that is not listed has no known unit.
     `expensive` says that an evaluation costs much more than a beam's; `priors` is one of `PRIORS`.
     """
 
@@ -57,6 +69,7 @@ class Model:
     title: str
     bounds: Mapping[str, tuple[float, float]]
     swaps: Sequence[Swap] = ()
+    units: Mapping[str, str] = RATIOS
     expensive: ClassVar[bool] = False
     priors: str = THESIS
 

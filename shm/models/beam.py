@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from shm.models import tensioned_beam
-from shm.models.base import Model
+from shm.models.base import RATIOS, Model
 from shm.models.end_effects import alike_from_both_ends, coupled_bar
 from shm.models.hanger import PhysicalHanger, solve
 from shm.values import PLANES, FloatArray, Hanger, Plane
@@ -104,6 +106,10 @@ class Beam2(Beam):
         "log10_k4": (5.0, 12.0),
     }
     swaps = (("log10_k1", "log10_k3"), ("log10_k2", "log10_k4"))
+    units: Mapping[str, str] = {
+        **RATIOS,
+        **dict.fromkeys(("log10_k1", "log10_k2", "log10_k3", "log10_k4"), "N m/rad"),
+    }
 
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         springs = 10 ** theta[:, 2:]

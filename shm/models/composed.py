@@ -217,11 +217,11 @@ class Baseline:
         known = self.hanger.scatter.tension
         if key == _TENSION and math.isfinite(known):
             reason = "the nominal tension, as exactly as the hanger's description states it"
-            return Deviation(key, "", 1 - known, 1 + known, NAN, reason)
+            return Deviation(key, "1", 1 - known, 1 + known, NAN, reason)
         reason = "the prior of the hanger's description"
         if key == _TENSION:
-            return Parameter(key, "", *TENSION_RATIO, NAN, reason, spread="logarithmic")
-        return Parameter(key, _unit(key), lower, upper, NAN, reason)
+            return Parameter(key, "1", *TENSION_RATIO, NAN, reason, spread="logarithmic")
+        return Parameter(key, self._model.units.get(key, ""), lower, upper, NAN, reason)
 
     def _whole(self, theta: FloatArray) -> FloatArray:
         """As the class takes them, with its length at the description's."""
@@ -235,10 +235,6 @@ def _ends_m(model: Model) -> tuple[float, float]:
     plate = model.hanger.plate
     plate_m = plate.length_m if isinstance(model, S2) and plate is not None else 0.0
     return plate_m, model.hanger.length_m - plate_m
-
-
-def _unit(name: str) -> str:
-    return "" if name.startswith("theta") else "N m/rad"
 
 
 @dataclass(frozen=True)

@@ -159,9 +159,7 @@ def _members(diagnosis: BridgeDiagnosis) -> Table:
             (
                 str(each.hanger),
                 formatting.probability(each.probability),
-                f"{quantity(each.size.name)} {size(each.size)}"
-                if each.hanger in leading.named
-                else "",
+                f"{quantity(each.size)} {size(each.size)}" if each.hanger in leading.named else "",
             )
             for each in leading.members
         ),

@@ -194,7 +194,7 @@ def sizes(sheet: DiagnosisSheet) -> Table:
         "Sizes of the likeliest causes",
         ("cause", "parameter", "size (90 % interval)"),
         tuple(
-            (label(cause), quantity(estimate.name), str(size(estimate)))
+            (label(cause), quantity(estimate), str(size(estimate)))
             for claim in claims(sheet.diagnosis)
             if claim.probability >= 0.05
             for cause in claim.causes

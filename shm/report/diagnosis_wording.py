@@ -12,6 +12,7 @@ from shm.report import formatting
 from shm.report.formatting import Interval
 from shm.values import Cause, Diagnosis, EffectEstimate, Residual, TensionEstimate, effect_label
 from shm.values.diagnosis import joined
+from shm.values.parameter_names import base_name, is_logarithm, quantity_name
 from shm.values.rounding import ForceUnit, force_unit
 
 # Even odds; two places fit a sentence.
@@ -159,11 +160,9 @@ def own_estimates(cause: Cause, number: int) -> tuple[EffectEstimate, ...]:
     return tuple(e for e in cause.parameters if prefixed.get(e.name, own) == own)
 
 
-_LOGARITHM = "log10_"
 _SPRING_PLANES = {1: "transverse", 2: "longitudinal", 3: "transverse", 4: "longitudinal"}
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""))
 _LOPSIDED = 3.0
-_UNIT_ENDINGS = ("_n_m", "_n_k", "_kg", "_deg", "_hz", "_m")
 _SCALED_UNITS = ("N", "N m/rad", "N/m", "N/K")
 _FACTORS = {"fraction": (100.0, "%"), "lambda^2": (1.0, "")}
 """Units of the catalogue that read better otherwise: a factor and the unit it gives."""
@@ -211,7 +210,7 @@ class Size:
 def size(estimate: EffectEstimate) -> Size:
     """An estimate in the unit and prefix that suit it; logarithms as what they are of."""
     interval = Interval(estimate.mean, estimate.q05, estimate.q95)
-    if logarithmic := estimate.name.startswith(_LOGARITHM):
+    if logarithmic := is_logarithm(estimate.name):
         interval = Interval(
             *(10.0**value for value in (interval.mean, interval.low, interval.high))
         )
@@ -259,17 +258,9 @@ def _significant(value: float, sign: str) -> str:
     return f"{round(value, places):{sign}.{max(0, places)}f}"
 
 
-def quantity(name: str) -> str:
-    """`mass_kg` as `mass`, `log10_k1` as `k1`, `x_m` as `place`: its unit stands with its size."""
-    plain = base_name(name).removeprefix(_LOGARITHM)
-    ending = next((each for each in _UNIT_ENDINGS if plain.endswith(each)), "")
-    plain = plain.removesuffix(ending)
-    return "place" if plain == "x" else plain.replace("_", " ")
-
-
-def base_name(name: str) -> str:
-    """A parameter's name in the catalogue; in a pair it may carry its effect before a dot."""
-    return name.rpartition(".")[2]
+def quantity(estimate: EffectEstimate) -> str:
+    """Return the name of an estimate's quantity without its unit, which its size has."""
+    return quantity_name(estimate.name, estimate.unit)
 
 
 class Sizes(dict[str, "Size | str"]):

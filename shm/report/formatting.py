@@ -15,10 +15,12 @@ import numpy as np
 from shm.values import (
     Averaged,
     FloatArray,
+    Posterior,
     Summary,
     stated_tension,
 )
 from shm.values.diagnosis import joined
+from shm.values.parameter_names import is_logarithm, quantity_name
 from shm.values.rounding import ForceUnit, rounded, to_two_digits
 
 NORMAL_90 = 1.6448536269514722
@@ -250,17 +252,22 @@ def quantity(name: str) -> str:
     return name.replace("_", " ")
 
 
-def meaning(name: str, model: str) -> str:
-    """What a parameter is, with its unit: beams have rotational springs, solids springs a node.
+def meaning(posterior: Posterior, name: str) -> str:
+    """Return what a parameter is, with its unit.
 
-    A parameter of an adopted effect has the name that the catalogue gives it, with its unit.
+    A parameter of an adopted effect has the name that the catalogue gives it.
     """
-    spring = name.removeprefix("log10_")
-    if model.startswith("beam") and spring in _ROTATIONAL_SPRINGS:
-        return f"log10 of end stiffness {spring} ({_ROTATIONAL_SPRINGS[spring]}) in N m/rad"
-    if spring in _FACE_SPRINGS:
-        return f"log10 of spring {spring} ({_FACE_SPRINGS[spring]}) in N/m per node"
-    return _MEANINGS.get(name, name.replace("log10_", "log10 of ").replace("_", " "))
+    unit = posterior.unit(name)
+    called = quantity_name(name, unit)
+    if name in _MEANINGS:
+        return _MEANINGS[name]
+    if unit == "N m/rad" and called in _ROTATIONAL_SPRINGS:
+        called = f"end stiffness {called} ({_ROTATIONAL_SPRINGS[called]})"
+    elif unit == "N/m" and called in _FACE_SPRINGS:
+        called, unit = f"spring {called} ({_FACE_SPRINGS[called]})", "N/m per node"
+    effect = name.rpartition(".")[0].replace("_", " ")
+    logarithm = "log10 of " if is_logarithm(name) else ""
+    return f"{effect and effect + ': '}{logarithm}{called}{unit and ' in ' + unit}"
 
 
 def model_class(name: str) -> str:

@@ -160,7 +160,7 @@ def _parameter_row(posterior: Posterior, name: str) -> tuple[str, ...]:
     best = posterior.most_probable[posterior.names.index(name)]
     return (
         name,
-        formatting.meaning(name, posterior.model),
+        formatting.meaning(posterior, name),
         formatting.mean(interval),
         formatting.span(interval),
         f"{best:.{formatting.decimals(interval.width)}f}",

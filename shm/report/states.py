@@ -92,8 +92,8 @@ def _day(time: datetime) -> str:
 class QuantityOverTime:
     """One quantity at n tests: what each says by itself, filtered and smoothed, each (n,).
 
-    The tension is in N, a stiffness log10 of it. `title` is what people call it. Thresholds
-    are values, not shifts; NaN where there is none.
+    The tension is in N, a stiffness the log10 of it in its `unit`. `title` is what people call it.
+    Thresholds are values, not shifts; NaN where there is none.
     """
 
     name: str
@@ -104,6 +104,7 @@ class QuantityOverTime:
     baseline: float
     lower_threshold: float
     upper_threshold: float
+    unit: str = ""
 
     @property
     def is_tension(self) -> bool:
@@ -211,6 +212,7 @@ def _over_time(
         level,
         level - reach,
         level + reach,
+        quantity.unit,
     )
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from shm.documents import number, value_of
+from shm.models import class_units
 from shm.modes_document import MODES_SCHEMA, parse_modes
 from shm.store.checksums import loads
 from shm.values import (
@@ -103,8 +104,13 @@ def posterior_from(document: Mapping[str, Any], blob: bytes) -> Posterior:
         {**entry, "mean_hz": entry["frequency_hz"]["mean"], "sd_hz": entry["frequency_hz"]["sd"]}
         for entry in document["predicted"]
     ]
-    names = list(document["parameters"])
-    return value_of(Posterior, {**document, **unpack(blob), "names": names, "predicted": predicted})
+    known = class_units(document["model"])
+    units = {
+        name: entry.get("unit", known.get(name, ""))
+        for name, entry in document["parameters"].items()
+    }
+    named = {"names": list(units), "units": list(units.values())}
+    return value_of(Posterior, {**document, **unpack(blob), **named, "predicted": predicted})
 
 
 # ---------------------------------------------------------------- watches

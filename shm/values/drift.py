@@ -96,6 +96,7 @@ class WatchedQuantity:
     (m,) map it to the tension in N or to log10 of the stiffness; `baseline` is the value at 0.
     `step_sd` is the standard deviation of a change, if there is one, before any data, in the
     coordinate. `scale_sd` is by what share of itself a shift may be off, as the baseline is.
+    `unit` is that of the tension or of the stiffness; empty where it is not known.
     """
 
     name: str
@@ -107,6 +108,7 @@ class WatchedQuantity:
     plane: Plane | None = None
     parameters: tuple[str, ...] = ()
     scale_sd: float = 0.0
+    unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)

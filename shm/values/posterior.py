@@ -175,6 +175,8 @@ class Posterior(Shown):
     modes that are all numbered one higher or one lower, nearer to the nominal tension.
     `description_off_sd` is by how many of its standard deviations the description would be off,
     `reading_off_sd` by how many a tension that was read is off what the frequencies say.
+    `units` (parameters,) are those of the parameters, of the quantity itself where a parameter is
+    its log10, and `1` of a ratio; empty where they are not known.
     `baseline_check` is what was found of the tests of a baseline before it was made of them; None
     of any other posterior, and of a baseline by a former version.
     """
@@ -206,6 +208,7 @@ class Posterior(Shown):
     description_off_sd: float = NAN
     reading_off_sd: float = NAN
     baseline_check: BaselineCheck | None = None
+    units: tuple[str, ...] = ()
 
     @property
     def caveats(self) -> tuple[str, ...]:
@@ -276,6 +279,10 @@ class Posterior(Shown):
     def parameter(self, name: str) -> FloatArray:
         """Samples of one parameter, shape (samples,)."""
         return self.samples[:, self.names.index(name)]
+
+    def unit(self, name: str) -> str:
+        """Return the unit of one parameter, of its quantity where it is a log10; empty: unknown."""
+        return dict(zip(self.names, self.units, strict=False)).get(name, "")
 
     @property
     def tension_n(self) -> FloatArray:

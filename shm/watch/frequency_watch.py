@@ -170,6 +170,7 @@ def measured_levels(tests: Sequence[ModalTest], seed: int) -> Posterior:
         model=WITHOUT_MODEL,
         hanger=tests[0].hanger,
         names=tuple(levels),
+        units=("Hz",) * len(levels),
         samples=values,
         log_likelihood=np.zeros(2),
         most_probable=values[0],

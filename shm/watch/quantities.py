@@ -84,7 +84,7 @@ def watched_quantities(
     model = class_of(baseline, hanger)
     base = base_point(baseline, model)
     responses = _responses(model, base, _held(model, base, modes), modes)
-    springs = (_spring(each, baseline) for each in responses if each.largest > _INVISIBLE)
+    springs = (_spring(each, baseline, model) for each in responses if each.largest > _INVISIBLE)
     return (_tension(baseline, model, base), *springs)
 
 
@@ -187,6 +187,7 @@ def _tension(baseline: Posterior, model: Model, base: FloatArray) -> WatchedQuan
         _TENSION_STEP,
         parameters=(_TENSION_RATIO,),
         scale_sd=_off_by(at_base_n / baseline.tension_n),
+        unit="N",
     )
 
 
@@ -312,7 +313,7 @@ def _grid(model: Model, columns: Sequence[int], base: float) -> FloatArray:
     return np.sort(np.append(nodes[np.abs(nodes - base) > 0.01], base))
 
 
-def _spring(response: _Response, baseline: Posterior) -> WatchedQuantity:
+def _spring(response: _Response, baseline: Posterior, model: Model) -> WatchedQuantity:
     kept = _rising(response.mean, int(np.searchsorted(response.log10_k, response.base)))
     samples = np.column_stack([baseline.parameter(name) for name in response.names])
     alone = len(response.names) == 1
@@ -327,6 +328,7 @@ def _spring(response: _Response, baseline: Posterior) -> WatchedQuantity:
         plane=response.plane,
         parameters=response.names,
         scale_sd=_off_by(_step_at(response, np.array([response.base])) / of_samples),
+        unit=model.units.get(response.names[0], ""),
     )
 
 

@@ -14,8 +14,9 @@ import pytest
 import xarray
 
 import shm
+from shm.documents import posterior_document
 from shm.errors import BadInput, UsageError
-from shm.export.tree import unit_of
+from shm.models import MODELS
 
 
 @pytest.fixture(scope="module")
@@ -146,9 +147,34 @@ def test_a_missing_library_is_named_with_what_to_install(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_units_follow_name_and_class() -> None:
-    assert unit_of("theta_F", "beam2") == "1"
-    assert unit_of("log10_k1", "beam2") == "log10(N m/rad)"
-    assert unit_of("log10_k1", "solid2") == "log10(N/m)"
-    assert unit_of("point_mass.mass_kg", "beam1+point_mass@everywhere") == "kg"
-    assert unit_of("share", "beam1+section_loss@everywhere") == ""
+# A lateral spring along the hanger, whose name ends as a length does; an end spring of an effect.
+SPRING = "beam1+intermediate_support@everywhere"
+ENDS = "beam1+rotational_end_flexibility@deck_end.transverse"
+
+
+@pytest.mark.parametrize(
+    ("model", "units"),
+    [
+        ("beam2", {"theta_F": "1", "log10_k1": "log10(N m/rad)", "sigma": "1"}),
+        (SPRING, {"log10_stiffness_n_m": "log10(N/m)", "x_m": "m", "section": "1"}),
+        (ENDS, {"log10_k1": "log10(N m/rad)"}),
+    ],
+)
+def test_datatree_units(
+    hanger: shm.Hanger, test_of_711_kn: shm.ModalTest, model: str, units: dict[str, str]
+) -> None:
+    posterior = shm.update(test_of_711_kn, hanger, model, samples=50)
+    group = shm.export.datatree(posterior)["posterior"]
+    assert {name: group[name].attrs["units"] for name in units} == units
+    parameters = posterior_document(posterior)["parameters"]
+    assert {name: f"log10({each['unit']})" if "log10" in name else each["unit"]
+            for name, each in parameters.items() if name in units} == units  # fmt: skip
+
+
+@pytest.mark.parametrize("name", list(MODELS))
+def test_model_class_units(name: str) -> None:
+    """Every parameter of every class has a unit; a solid's springs are forces on a length."""
+    units, spring = MODELS[name].units, "N/m" if name.startswith("solid") else "N m/rad"
+    assert {each: units[each] for each in MODELS[name].bounds} == {
+        each: spring if each.startswith("log10_k") else "1" for each in MODELS[name].bounds
+    }

@@ -28,6 +28,7 @@ def posterior(theta: Sequence[float], model: str = "beam2", hanger: Hanger = HAN
         model=model,
         hanger=3,
         names=made.parameter_names,
+        units=tuple(made.units[name] for name in made.parameter_names),
         samples=samples,
         log_likelihood=np.zeros(300),
         most_probable=np.array(theta),

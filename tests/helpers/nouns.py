@@ -80,6 +80,7 @@ def a_posterior(model: str = "beam1", tests: tuple[str, ...] = ("t1",), seed: in
         model=model,
         hanger=3,
         names=("theta_F", "theta_L", "sigma"),
+        units=("1", "1", "1"),
         samples=rng.normal([1.0, 0.98, 0.01], [0.02, 0.005, 0.001], (50, 3)),
         log_likelihood=rng.normal(size=50),
         most_probable=np.array([1.0, 0.98, 0.01]),

@@ -47,6 +47,7 @@ def update(tests: Sequence[ModalTest], model: Model, options: UpdateOptions) -> 
         model=model.name,
         hanger=tests[0].hanger,
         names=(*model.parameter_names, "sigma"),
+        units=(*(model.units[name] for name in model.parameter_names), "1"),
         samples=samples,
         log_likelihood=rng.normal(size=options.samples),
         most_probable=np.concatenate([[centre], middle[1:], [0.005]]),

@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
+from shm.models import class_units
 from shm.report.contents import HangerReport, trend_row
 from shm.report.figures import specification
 from shm.report.figures.specification import Illustration, Member, illustration
@@ -59,6 +60,7 @@ def make_posterior(test: str, model: str, tension_n: float, seed: int) -> Poster
         most_probable=centre, nominal_tension_n=NOMINAL_N, log_evidence=-12.3 - 4 * (springs == 0),
         log_evidence_sd=0.08, effective_sample_size=840.0, r_hat=1.01, evaluations=30_000,
         predicted=predicted, tests=(test,), seed=1, seconds=1.4,
+        units=tuple(class_units(model)[name] for name in names),
     )  # fmt: skip
 
 

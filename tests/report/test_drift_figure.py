@@ -40,6 +40,7 @@ def quantity(name: str, title: str, level: float, step: float, reach: float) -> 
         baseline=level,
         lower_threshold=level - reach,
         upper_threshold=level + reach,
+        unit="N" if name == "tension" else "N m/rad",
     )
 
 
@@ -77,6 +78,13 @@ def named(axes: Axes) -> set[str]:
 def test_each_quantity_has_a_panel_and_the_temperature_a_strip(data: StatesOverTime) -> None:
     labels = [axes.get_ylabel() for axes in drawn(data).axes]
     assert labels == ["tension (kN)", "log10 of\nN m/rad", "temp.\n(°C)"]
+
+
+@pytest.mark.parametrize(("unit", "label"), [("N/m", "log10 of\nN/m"), ("", "log10 of\nstiffness")])
+def test_specify_stiffness_unit(data: StatesOverTime, unit: str, label: str) -> None:
+    solid = replace(data.quantities[1], unit=unit)
+    axes = drawn(replace(data, quantities=(data.quantities[0], solid))).axes
+    assert axes[1].get_ylabel() == label
 
 
 def test_without_temperatures_there_is_no_strip(data: StatesOverTime) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from shm.report import formatting
 from shm.report.formatting import Interval
 from shm.values.rounding import force_unit
+from tests.helpers.nouns import a_posterior
 
 KILONEWTON = force_unit(1e5)
 
@@ -69,10 +71,22 @@ def test_times_are_given_in_utc() -> None:
 
 def test_parameters_and_springs_have_plain_names_and_units() -> None:
     assert formatting.quantity("transverse_end_stiffness") == "transverse end stiffness"
-    beam, solid = formatting.meaning("log10_k3", "beam2"), formatting.meaning("log10_krx", "solid1")
-    assert beam == "log10 of end stiffness k3 (transverse, arch end) in N m/rad"
-    assert solid == "log10 of spring krx (across the bridge, deck end) in N/m per node"
-    assert formatting.meaning("theta_F", "beam2") == "tension over nominal tension"
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "meaning"),
+    [
+        ("theta_F", "1", "tension over nominal tension"),
+        ("log10_k3", "N m/rad", "log10 of end stiffness k3 (transverse, arch end) in N m/rad"),
+        ("log10_krx", "N/m", "log10 of spring krx (across the bridge, deck end) in N/m per node"),
+        ("log10_stiffness_n_m", "N/m", "log10 of stiffness in N/m"),
+        ("point_mass.x_m", "m", "point mass: place in m"),
+        ("log10_k9", "", "log10 of k9"),
+    ],
+)
+def test_meaning_names_unit(name: str, unit: str, meaning: str) -> None:
+    posterior = replace(a_posterior(), names=(name, "theta_L", "sigma"), units=(unit, "1", "1"))
+    assert formatting.meaning(posterior, name) == meaning
 
 
 def test_a_normal_interval_holds_ninety_percent() -> None:

@@ -59,6 +59,19 @@ def test_of_clamped_ends_the_tension_alone_is_watched() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("theta", "model", "unit"),
+    [
+        ((1.1, 0.97, 8.0, 8.0, 8.0, 8.0), "beam2", "N m/rad"),
+        pytest.param((1.1, *[8.0] * 4), "solid2", "N/m", marks=pytest.mark.slow),
+    ],
+)
+def test_watched_quantities_units(theta: tuple[float, ...], model: str, unit: str) -> None:
+    tension, *springs = watched_quantities(baseline(theta, model), HANGER_3, BOTH)
+    assert tension.unit == "N"
+    assert {each.unit for each in springs} == {unit}
+
+
 def test_the_tension_comes_first_and_then_the_ends_of_each_plane_in_one() -> None:
     found = watched_quantities(baseline(SPRUNG), HANGER_3, BOTH)
     assert [(each.name, each.plane, each.parameters) for each in found] == [

@@ -134,7 +134,7 @@ def _courses(view: HangerView) -> list[hanger_stiffness.Course]:
     tests = [named.get(time, "test") for time in states.times]
     return [
         hanger_stiffness.Course(
-            each.title, states.times, tests, each.read, each.baseline, each.filtered
+            each.title, states.times, tests, each.read, each.baseline, each.filtered, each.unit
         )
         for each in watched
     ]

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from shm.errors import BadInput
-from shm.models.base import Model, silent
+from shm.models.base import RATIOS, Model, silent
 from shm.models.solid.basis import Description, transverse_basis
 from shm.models.solid.geometry import (
     ALL_SPRINGS,
@@ -252,6 +252,10 @@ class Solid1(SolidModel):
             _SPRING_BOUNDS,
         ),
     }
+    units: Mapping[str, str] = {
+        **RATIOS,
+        **dict.fromkeys((*AXIAL, "log10_klx", "log10_kly", "log10_krx", "log10_kry"), "N/m"),
+    }
     support = ALL_SPRINGS
 
 
@@ -264,4 +268,5 @@ class Solid2(SolidModel):
         "theta_F": (0.5, 5.0),
         **dict.fromkeys(AXIAL, _SPRING_BOUNDS),
     }
+    units: Mapping[str, str] = {**RATIOS, **dict.fromkeys(AXIAL, "N/m")}
     support = AXIAL_SPRINGS

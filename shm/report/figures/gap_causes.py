@@ -15,6 +15,7 @@ from shm.report.diagnosis_summary import verdict
 from shm.report.diagnosis_wording import Claim, claims, label, quantity, size
 from shm.report.figures import specification as spec
 from shm.values import BridgeDiagnosis, Cause, Diagnosis, effect_label
+from shm.values.parameter_names import is_logarithm
 
 _MOST, _MOST_ON_SCREEN = 10, 8
 _ROW_INCHES, _TALL_ROW_INCHES = 0.3, 0.4
@@ -209,7 +210,7 @@ def specify_shared(diagnosis: BridgeDiagnosis) -> spec.Specification | None:
             marks.append(spec.Bars(x=rows, y=shares, width=0.62, colour=colour, texts=texts))
     sizes = [leading.members[i].size for i in named]
     common = leading.size
-    unit = f" (log10, {common.unit})" if common.name.startswith("log10_") else f" ({common.unit})"
+    unit = f" (log10, {common.unit})" if is_logarithm(common.name) else f" ({common.unit})"
     ends = [-0.7, len(leading.members) - 0.3]
     below = [
         spec.Band(
@@ -227,7 +228,7 @@ def specify_shared(diagnosis: BridgeDiagnosis) -> spec.Specification | None:
                 y=spec.Axis(label="probability", range=(0, 1.05)),
                 marks=[*marks, spec.Rule(at=_LIKELIER_THAN_NOT, dash="dot", colour="ink")],
             ),
-            spec.Panel(y=spec.Axis(label=quantity(common.name) + unit), x=across, marks=below),
+            spec.Panel(y=spec.Axis(label=quantity(common) + unit), x=across, marks=below),
         ],
         _INCHES,
     )

@@ -74,7 +74,7 @@ def _panel(data: StatesOverTime, quantity: QuantityOverTime) -> spec.Panel:
         ),
     ]
     is_tension = quantity.is_tension
-    label = f"tension ({unit})" if is_tension else f"log10 of\n{unit}"
+    label = f"tension ({unit})" if is_tension else f"log10 of\n{unit or 'stiffness'}"
     return spec.Panel(
         y=spec.Axis(label=label, range=(low, high)), marks=marks,
         title=_TENSION_TITLE if is_tension else quantity.title, title_side="left",
@@ -85,7 +85,7 @@ def _panel(data: StatesOverTime, quantity: QuantityOverTime) -> spec.Panel:
 def _scale(quantity: QuantityOverTime) -> tuple[float, str]:
     """What turns its values into those of its axis, and their unit: that of a tension fits it."""
     if not quantity.is_tension:
-        return 1.0, "N m/rad"
+        return 1.0, quantity.unit
     unit = force_unit(quantity.baseline, *quantity.filtered.middle.tolist())
     return 1 / unit.newtons, unit.name
 

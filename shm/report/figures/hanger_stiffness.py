@@ -17,10 +17,13 @@ from shm.report.figures import time_axes
 from shm.values import FloatArray
 from shm.watch.state import Band as Bounds
 
+END_STIFFNESS_UNIT = "N m/rad"
+"""The unit of what `shm.models.end_stiffness` returns."""
+
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """One stiffness over time, log10 of N m/rad, or of N/m a node for a solid class.
+    """One stiffness over time, as the log10 of it in `unit` (N/m a node for a solid class).
 
     `baseline` is NaN where there is none; `state` is what all tests up to each say together.
     """
@@ -31,6 +34,7 @@ class Course:
     alone: Bounds
     baseline: float
     state: Bounds | None = None
+    unit: str = END_STIFFNESS_UNIT
 
 
 def specify(
@@ -42,7 +46,8 @@ def specify(
     panels = [_panel(course, reach_decades, is_on_screen) for course in courses]
     if is_on_screen:
         return spec.stacked([*(replace(each, x=None) for each in panels[:-1]), panels[-1]], 3.0)
-    label = spec.Axis(label="log10 of stiffness in N m/rad")
+    units = " or ".join(sorted({course.unit for course in courses if course.unit}))
+    label = spec.Axis(label=f"log10 of stiffness{units and ' in ' + units}")
     ends = [end for panel in panels for end in panel.y.range or ()]
     shared = [
         replace(each, y=spec.Axis(range=(min(ends), max(ends))), shares_y=place > 0)

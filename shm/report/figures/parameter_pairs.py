@@ -159,7 +159,7 @@ def _correlation(columns: list[_Column]) -> FloatArray:
 def caption(posterior: Posterior) -> str:
     shown = posterior.names[:_MOST_PARAMETERS]
     meanings = "; ".join(
-        f"{name.removeprefix('log10_')}: {formatting.meaning(name, posterior.model)}"
+        f"{name.removeprefix('log10_')}: {formatting.meaning(posterior, name)}"
         for name in shown
         if name != "theta_F"
     )
