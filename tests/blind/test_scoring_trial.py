@@ -18,6 +18,7 @@ from shm.blind.scoring.scores import (
     share,
 )
 from shm.values import Answer, Mark, MarkName, Score, TrialScore, TrueCase
+from tests.helpers.comparing import assert_same
 from tests.helpers.trial_answers import a_truth, an_answer, liar, oracle, plausible, some_truths
 
 SHA = ("0" * 64, "1" * 64)
@@ -76,7 +77,7 @@ def test_the_same_trial_has_the_same_intervals() -> None:
     truths, rng = some_truths(48), np.random.default_rng(3)
     answers = [plausible(truth, rng) for truth in truths]
     one, other = of(truths, answers, []), of(truths, answers, [])
-    assert repr(one) == repr(other)
+    assert_same(one, other)
     assert {each.name for each in one.marks if each.name.startswith("left out")} == set()
 
 

@@ -10,6 +10,8 @@ import sqlalchemy as sa
 from shm.pipeline import steps
 from shm.store import Workspace
 from shm.store.tables import watch_states
+from shm.values import WatchedTest
+from tests.helpers.comparing import assert_same
 from tests.helpers.flows import ingest
 from tests.helpers.slow import few_of
 from tests.helpers.workspaces import make_workspace, write_test
@@ -34,9 +36,9 @@ def add(workspace: Workspace, day: int) -> None:
     ingest(workspace)
 
 
-def said(workspace: Workspace) -> list[str]:
+def said(workspace: Workspace) -> list[WatchedTest]:
     with workspace.store() as store:
-        return [repr(each.watched) for each in store.watch.list_all(3)]
+        return [each.watched for each in store.watch.list_all(3)]
 
 
 def change_state(workspace: Workspace, **values: object) -> None:
@@ -80,4 +82,4 @@ def test_what_is_kept_may_be_damaged_or_old(
     whole = make_workspace(workspace.folder.with_name("whole"))
     for day in range(4):
         add(whole, day)
-    assert said(workspace) == said(whole)
+    assert_same(said(workspace), said(whole))

@@ -6,6 +6,7 @@ import pytest
 
 from shm.pipeline import Flow
 from shm.store import Stage, Workspace
+from tests.helpers.comparing import assert_same
 from tests.helpers.flows import a_flow, ingest, tension_kn
 from tests.helpers.workspaces import write_loss
 
@@ -28,10 +29,10 @@ def test_a_test_done_again_gives_the_same_and_raises_no_second_alert(
     done: Workspace, stage: Stage
 ) -> None:
     with a_flow(done) as flow:
-        before = tension_kn(flow.store), repr(flow.store.watch.list_all(3)[-1].watched)
+        before = tension_kn(flow.store), flow.store.watch.list_all(3)[-1].watched
         alerts = flow.store.alerts.list_all()
         do_again(flow, "t2", stage)
-        assert (tension_kn(flow.store), repr(flow.store.watch.list_all(3)[-1].watched)) == before
+        assert_same((tension_kn(flow.store), flow.store.watch.list_all(3)[-1].watched), before)
         assert flow.store.alerts.list_all() == alerts
         assert flow.store.recordings.stage_counts()[Stage.DONE] == 3
         rows = flow.store.tests.list_former(flow.store.recordings.find("t2")[0])

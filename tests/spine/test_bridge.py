@@ -12,6 +12,7 @@ import pytest
 from shm.bridge import Bridge, load_bridge, load_hanger
 from shm.errors import BadInput
 from shm.values import MEASUREMENT_HOURS, EndPlate, Thresholds, Turnbuckle
+from tests.helpers.comparing import assert_same
 
 ROUND = """
 [[hanger]]
@@ -102,8 +103,7 @@ def test_admitted_models_plate_and_turnbuckles_are_read(tmp_path: Path) -> None:
 
 def test_a_described_hanger_survives_the_way_to_another_process(tmp_path: Path) -> None:
     hanger = load_hanger(written(tmp_path, ROUND + PLATE + TURNBUCKLE))
-    # By their texts: unknown numbers are NaN, which equals itself in one process alone.
-    assert repr(pickle.loads(pickle.dumps(hanger))) == repr(hanger)
+    assert_same(pickle.loads(pickle.dumps(hanger)), hanger)
 
 
 @pytest.mark.parametrize(

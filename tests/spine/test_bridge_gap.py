@@ -10,6 +10,7 @@ from shm.bridge import load_hanger
 from shm.errors import BadInput
 from shm.models.effects import check_effect_priors
 from shm.values import NAN, EffectPrior, Hanger, Scatter
+from tests.helpers.comparing import assert_same
 
 ROUND = """
 [[hanger]]
@@ -47,7 +48,7 @@ def test_ranges_of_effects_are_read_in_the_order_of_the_file(tmp_path: Path) -> 
 
 def test_scatter_that_is_left_out_is_the_usual_one(tmp_path: Path) -> None:
     hanger = loaded(tmp_path, "[hanger.scatter]\nsection = 0.01\nlength = 0\n")
-    assert repr(hanger.scatter) == repr(Scatter(section=0.01, length=0.0))
+    assert_same(hanger.scatter, Scatter(section=0.01, length=0.0))
 
 
 @pytest.mark.parametrize(("by", "sd"), [("faces", NAN), ("pins", 0.0468), ("nodes", 0.0324)])
@@ -67,7 +68,7 @@ def test_the_manuals_example_is_read_and_allowed(tmp_path: Path) -> None:
     hanger = loaded(tmp_path, section.split("```toml\n")[1].split("```")[0])
     check_effect_priors(hanger)
     assert len(hanger.effect_priors) == 3
-    assert repr(hanger.scatter) == repr(Scatter(0.01, 0.002, 0.0005, 0.01))
+    assert_same(hanger.scatter, Scatter(0.01, 0.002, 0.0005, 0.01))
 
 
 @pytest.mark.parametrize(

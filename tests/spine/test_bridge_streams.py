@@ -10,6 +10,7 @@ from shm.bridge import Bridge, load_bridge
 from shm.errors import BadInput
 from shm.resources import default_config
 from shm.values.stream import Stream, StreamChannel
+from tests.helpers.comparing import assert_same
 from tests.spine.test_bridge import ROUND, written
 
 STREAM = """
@@ -41,7 +42,7 @@ def test_a_stream_has_a_hanger_a_rate_and_sensors(tmp_path: Path) -> None:
         StreamChannel("acc_1", "transverse", 3.0, 20.0),
         StreamChannel("acc_2", "longitudinal", 3.5),
     )
-    assert repr(found.streams) == repr((Stream("h3", 3, 200.0, channels),))
+    assert_same(found.streams, (Stream("h3", 3, 200.0, channels),))
     assert found.stream("h3") is found.streams[0]
     assert found.hanger(3).has_sensors
     assert not bridge(tmp_path, "").hanger(3).has_sensors

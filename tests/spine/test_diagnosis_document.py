@@ -12,6 +12,7 @@ import pytest
 from shm.diagnosis_document import diagnosis_document, diagnosis_of
 from shm.documents import dump
 from shm.values import Diagnosis
+from tests.helpers.comparing import assert_same
 from tests.report.diagnoses import BLUNDER, CASES, LED
 
 
@@ -19,7 +20,7 @@ from tests.report.diagnoses import BLUNDER, CASES, LED
 def test_a_diagnosis_is_read_back_as_it_was(name: str) -> None:
     text = dump(diagnosis_document(CASES[name]))
     assert "NaN" not in text
-    assert repr(diagnosis_of(json.loads(text))) == repr(CASES[name])
+    assert_same(diagnosis_of(json.loads(text)), CASES[name])
 
 
 def test_the_document_has_the_names_and_nesting_of_the_contract() -> None:

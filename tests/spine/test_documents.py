@@ -17,6 +17,7 @@ from shm.documents import dump, parse_time, summary
 from shm.errors import BadInput
 from shm.modes_document import load_modes, modes_document, parse_modes
 from shm.values import AddedMass, ModalTest, Mode, ShapePoint
+from tests.helpers.comparing import assert_same
 
 FULL = ModalTest(
     id="t1",
@@ -42,7 +43,7 @@ def test_a_document_is_read_back_as_it_was(tmp_path: Path) -> None:
     path = tmp_path / "t.modes.json"
     path.write_text(dump(modes_document([FULL])), encoding="utf-8")
     (back,) = load_modes(path)
-    assert repr(back) == repr(FULL)
+    assert_same(back, FULL)
 
 
 def test_unknown_is_null_in_json_and_nan_in_memory() -> None:

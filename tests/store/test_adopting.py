@@ -13,6 +13,7 @@ from shm.errors import NothingThere, StoreBusy, UsageError
 from shm.store import Adoption, Baseline, IdentifiedTest, Lineage, Stage, Store, StoredAdoption
 from shm.store.tables import adoptions, baselines, posteriors, selections
 from shm.values import Selection
+from tests.helpers.comparing import assert_same
 from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.nouns import NOW, a_file, a_posterior, a_test
 
@@ -71,7 +72,7 @@ def test_a_diagnosis_comes_back_as_it_was_and_the_newest_holds(store: Store) -> 
     made = store.posteriors.save_diagnosis(3, a_diagnosis(), LINEAGE, later)
     found = store.posteriors.latest_diagnosis(3)
     assert found is not None
-    assert repr(found.diagnosis) == repr(a_diagnosis())  # NaN differs from itself
+    assert_same(found.diagnosis, a_diagnosis())
     assert (found.id, found.diagnosed_at, found.lineage) == (made.id, later, LINEAGE)
     assert store.posteriors.latest_diagnosis(4) is None
 

@@ -11,6 +11,7 @@ import sqlalchemy as sa
 from shm.errors import StoreError
 from shm.store import DeliveryState, Store
 from shm.store.people_and_stream_tables import stream_windows
+from tests.helpers.comparing import assert_same
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import MODES, a_reading, a_window, an_event
 
@@ -22,7 +23,7 @@ def test_a_window_comes_back_and_is_replaced_where_it_is_done_anew(store: Store)
     store.streams.save_window(a_window(0))
     store.streams.save_window(a_window(10))
     found = store.streams.list_windows(3, *EVER)
-    assert [repr(each) for each in found] == [repr(a_window(0)), repr(a_window(10))]
+    assert_same(found, (a_window(0), a_window(10)))
     assert store.streams.list_windows(4, *EVER) == ()
     assert len(store.streams.list_windows(3, NOW, NOW + timedelta(minutes=10))) == 1
 
@@ -42,8 +43,8 @@ def test_the_last_modes_are_those_of_the_latest_windows_each_as_it_was_seen_last
     store.streams.save_window(a_window(10, (moved,)))
     store.streams.save_window(a_window(20, ()))
     store.streams.save_window(a_window(0))
-    assert repr(store.streams.last_modes("h3")) == repr((moved, *MODES[1:]))
-    assert repr(store.streams.last_window("h3")) == repr(a_window(20, ()))
+    assert_same(store.streams.last_modes("h3"), (moved, *MODES[1:]))
+    assert_same(store.streams.last_window("h3"), a_window(20, ()))
     assert store.streams.last_window("h4") is None
 
 
@@ -62,10 +63,7 @@ def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) ->
     assert raised is not None
     assert raised.raised_at == NOW + timedelta(hours=1)
     assert store.streams.watch_state(3) == b"state"
-    assert [repr(each) for each in store.streams.list_pooled(3, "hour", *EVER)] == [
-        repr(a_reading(-1)),
-        repr(a_reading()),
-    ]
+    assert_same(store.streams.list_pooled(3, "hour", *EVER), (a_reading(-1), a_reading()))
     (owed,) = store.alerts.list_deliveries()
     assert (owed.hook, owed.stored.alert.key) == ("mail", "hanger-3:stream")
     again = store.streams.save_pooled(a_reading(1), b"later", alert, ["mail"], NOW)
@@ -126,10 +124,8 @@ def test_a_damaged_row_hides_no_other(store: Store) -> None:
             changed = "document = replace(document, '5.8', '5.9')"
             connection.exec_driver_sql(f"UPDATE {table} SET {changed} WHERE id = 2")
         connection.exec_driver_sql("UPDATE stream_watch SET hanger = 3, checksum = 1")
-    assert [repr(each) for each in store.streams.list_windows(3, *EVER)] == [repr(a_window())]
-    assert [repr(each) for each in store.streams.list_pooled(3, "hour", *EVER)] == [
-        repr(a_reading())
-    ]
+    assert_same(store.streams.list_windows(3, *EVER), (a_window(),))
+    assert_same(store.streams.list_pooled(3, "hour", *EVER), (a_reading(),))
     assert store.streams.watch_state(3) is None
 
 

@@ -19,6 +19,7 @@ from shm.store import (
     StoredTest,
 )
 from shm.values import Alert, Drift, Selection
+from tests.helpers.comparing import assert_same
 from tests.helpers.nouns import (
     NOW,
     a_change,
@@ -185,7 +186,7 @@ def test_what_the_watch_did_not_know_comes_back_unknown(
     said = replace(a_watched_test("t1", sudden=nan, moved=()), temperature_c=nan)
     store.watch.save(updated[0], baseline(store), said, None, [], NOW)
     (kept,) = store.watch.list_all()
-    assert repr(kept.watched) == repr(said)
+    assert_same(kept.watched, said)
 
 
 def test_watches_come_by_time_and_each_with_its_own_shifts(
@@ -221,4 +222,4 @@ def test_unknown_numbers_of_a_drift_come_back_unknown(
     store.watch.save(
         updated[0], baseline(store), replace(a_watched_test(), drifts=(drift,)), None, [], NOW
     )
-    assert repr(store.watch.list_drifts(3)) == repr((drift,))
+    assert_same(store.watch.list_drifts(3), (drift,))

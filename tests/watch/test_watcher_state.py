@@ -13,6 +13,7 @@ from shm.values import Reading, WatchedTest
 from shm.watch.options import WatchOptions
 from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watcher
+from tests.helpers.comparing import assert_same
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.synthetic_readings import (
     PLANES_ALONE,
@@ -62,7 +63,7 @@ def test_a_watch_from_kept_states_is_bit_for_bit_that_of_one_pass() -> None:
     _, tests = by_kept_states(given)
 
     assert once.calls
-    assert [repr(each) for each in tests] == [repr(each) for each in once.tests]
+    assert_same(list(tests), list(once.tests))
 
 
 def test_a_state_knows_how_far_it_has_come_and_what_was_told() -> None:
