@@ -276,9 +276,18 @@ def _motions_as_a_whole(physical: PhysicalHanger) -> IntArray:
 
 
 def _shift(physical: PhysicalHanger) -> FloatArray:
-    """What makes the stiffness definite (n, planes): k^4 - P k^2 + shift > 0 for compression P."""
-    squeezed = np.maximum(-stiffness_ratio(physical), 0.0)
-    return np.asarray(0.3 * squeezed**2 + (_FREE_SHIFT if _is_free(physical) else 0.0))
+    """Return the shift (n, planes) for which stiffness + shift x mass is definite.
+
+    Under a compression P, a bar of bending stiffness b and mass m needs b k^4 - P k^2 + shift m > 0
+    for every wave number k, hence shift > P^2 / (4 b m) for the smallest b and m along the bar.
+    """
+    compression = np.maximum(-stiffness_ratio(physical), 0.0)
+    weakest = np.ones_like(compression)
+    for zone in physical.zones:
+        stiffness = zone.stiffness_factor.reshape(len(compression), -1)
+        weakest = weakest * np.minimum(stiffness, 1) * np.minimum(zone.mass_factor, 1)[:, None]
+    free = _FREE_SHIFT if _is_free(physical) else 0.0
+    return np.asarray(0.3 * compression**2 / weakest + free)
 
 
 def _without_supports(
@@ -373,11 +382,15 @@ class Spectrum:
 def spectrum(
     stiffness: FloatArray, mass: FloatArray, shift: FloatArray, with_vectors: bool
 ) -> Spectrum:
-    """All modes of systems (rows, unknowns, unknowns).
+    """Return all modes of systems (rows, unknowns, unknowns).
 
-    `shift` (rows,) makes K + shift M definite.
+    `shift` (rows,) makes K + shift M definite, but for directions whose mass is lost in rounding.
     """
-    held = stiffness + shift[:, None, None] * mass if np.any(shift) else stiffness
+    held = stiffness
+    if np.any(shift):
+        largest = np.einsum("nii->ni", mass).max(axis=1)[:, None, None]
+        rounding = mass.shape[-1] * np.finfo(float).eps * largest * np.eye(mass.shape[-1])
+        held = stiffness + shift[:, None, None] * (mass + rounding)
     inverse = np.linalg.inv(np.linalg.cholesky(held))
     transposed = inverse.transpose(0, 2, 1)
     reduced = inverse @ mass @ transposed
