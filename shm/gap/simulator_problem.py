@@ -143,6 +143,16 @@ class SimulatorProblem:
         object.__setattr__(self, "value", value)
         object.__setattr__(self, "sd", sd)
         object.__setattr__(self, "scale", np.sqrt(same @ value**2 / same.sum(axis=1)))
+        for reading in self.readings:
+            if np.isnan(reading.sd) and not np.any(value[self._indices_of(reading.observable)]):
+                raise BadInput(
+                    f"All readings of {reading.observable} are 0 and have no standard deviation: "
+                    "how large an error could be is unknown.",
+                    remedy="Give `sd` to each reading, or check what was recorded.",
+                )
+
+    def _indices_of(self, observable: str) -> list[int]:
+        return [i for i, each in enumerate(self.readings) if each.observable == observable]
 
     @property
     def same_observable(self) -> FloatArray:

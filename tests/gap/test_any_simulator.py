@@ -195,3 +195,17 @@ def test_what_cannot_be_is_refused_with_a_remedy() -> None:
     silent = replace(LINE, predict=lambda p, at: {"y": np.nan * p["slope"]})
     with pytest.raises(BadInput, match="no prediction of the simulator is finite"):
         diagnose_simulator(silent, READINGS)
+
+
+@pytest.mark.parametrize("other", [(), (Reading({"x": 1.0}, "z", 2.0),)])
+def test_diagnose_simulator_all_zero(other: tuple[Reading, ...]) -> None:
+    zeros = tuple(Reading({"x": x}, "y", 0.0) for x in (0.0, 1.0, 2.0))
+    with pytest.raises(BadInput, match=r"All readings of y are 0.*Give `sd`"):
+        diagnose_simulator(LINE, (*other, *zeros))
+
+
+def test_diagnose_simulator_zero_with_sd() -> None:
+    zeros = tuple(Reading({"x": x}, "y", 0.0, 0.1) for x in (0.0, 1.0, 2.0))
+    answer = diagnose_simulator(LINE, zeros)
+    mean, _ = answer.parameters_after["slope"]
+    assert abs(mean) < 0.2
