@@ -30,7 +30,8 @@ from shm.gap.problem import GapProblem
 from shm.gap.search import SUPPORTED, Search
 from shm.inference.mixture import normalised
 from shm.inference.options import Progress, silent
-from shm.values import Leads, leads
+from shm.values import Leads
+from shm.values.leading import NO_GAP_STANDS_FROM, find_leading_cause
 
 WITHIN_REACH = 7.0
 """Judgement: at log odds of a thousand to one a cause has no chance beside the best one."""
@@ -92,21 +93,17 @@ class Attribution:
 
     @property
     def leads(self) -> Leads:
-        """What it says: a cause, no gap, or something unknown."""
-        claim = self.claimed(self.explanations[0]) if self.explanations else 0.0
-        return leads(self.no_gap_probability, self.unexplained_probability, claim)
+        """Return whether a cause leads, no gap, or something unknown."""
+        if self.leading is not None:
+            return "cause"
+        return "no gap" if self.no_gap_probability >= NO_GAP_STANDS_FROM else "unexplained"
 
     @property
     def leading(self) -> Explanation | None:
-        """The likeliest explanation; None where no cause leads."""
-        return self.explanations[0] if self.leads == "cause" else None
-
-    def claimed(self, explanation: Explanation) -> float:
-        """The probability of its group, or its own where it has none."""
-        if explanation.group is None:
-            return explanation.probability
-        members = [each for each in self.explanations if each.group == explanation.group]
-        return sum(each.probability for each in members)
+        """Return the most probable explanation of the most probable group, as a diagnosis does."""
+        return find_leading_cause(
+            self.no_gap_probability, self.unexplained_probability, self.explanations
+        )
 
     def with_unknown(self, probability: float) -> Attribution:
         """No gap stands only as far as nothing acts of this `probability` beyond what was tried."""

@@ -28,7 +28,7 @@ from shm.gap.model_probabilities import NO_GAP, UNKNOWN, Family
 from shm.gap.noise import same_mode
 from shm.models.effects import EFFECTS
 from shm.values import FloatArray, ModalTest
-from shm.values.diagnosis import NO_GAP_STANDS_FROM
+from shm.values.leading import NO_GAP_STANDS_FROM
 
 MOST = float(np.log(20))
 _ANY = 3.0  # judgement: of a mode, in logarithms, so wide that it says nothing

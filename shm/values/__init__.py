@@ -32,7 +32,6 @@ from shm.values.diagnosis import (
     TensionEstimate,
     Trend,
     effect_label,
-    leads,
 )
 from shm.values.drift import (
     FREQUENCY,

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from shm.values.diagnosis import NO_GAP_STANDS_FROM, Diagnosis, EffectEstimate, TensionEstimate
+from shm.values.diagnosis import Diagnosis, EffectEstimate, TensionEstimate
+from shm.values.leading import NO_GAP_STANDS_FROM, find_leading_cause, sum_group_probability
 
 BridgeLeads = Literal["shared cause", "each for itself", "shared unknown"]
 
@@ -81,22 +82,20 @@ class BridgeDiagnosis:
     seconds: float
 
     def claim(self, cause: SharedCause) -> float:
-        """The probability of a cause together with those that the data cannot tell it from."""
-        if cause.group is None:
-            return cause.probability
-        return sum(each.probability for each in self.causes if each.group == cause.group)
+        """Return the probability of a cause and of those that the data cannot tell from it."""
+        return sum_group_probability(cause, self.causes)
 
     @property
     def leads(self) -> BridgeLeads:
-        """What it says. As with no gap, sharing is not shown while its absence keeps 0.05."""
-        if self.each_for_itself_probability >= NO_GAP_STANDS_FROM:
-            return "each for itself"
-        claim = max((self.claim(cause) for cause in self.causes), default=0.0)
-        return "shared cause" if claim > self.unknown_probability else "shared unknown"
+        """Return whether a shared cause leads, none is shared, or a shared unknown leads."""
+        if self.leading is not None:
+            return "shared cause"
+        is_shared = self.each_for_itself_probability < NO_GAP_STANDS_FROM
+        return "shared unknown" if is_shared else "each for itself"
 
     @property
     def leading(self) -> SharedCause | None:
-        """The likeliest cause of the likeliest group; None where no shared cause leads."""
-        if self.leads != "shared cause":
-            return None
-        return max(self.causes, key=lambda cause: (self.claim(cause), cause.probability))
+        """Return the most probable cause of the most probable group; None where none leads."""
+        return find_leading_cause(
+            self.each_for_itself_probability, self.unknown_probability, self.causes
+        )

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, Plane
+from shm.values.leading import NO_GAP_STANDS_FROM, find_leading_cause, sum_group_probability
 from shm.values.showing import Shown, front, line, tension_words
 
 if TYPE_CHECKING:
@@ -20,10 +21,6 @@ FEW_MODES = 4
 
 NO_GAP = "no gap"
 """How `Compatibility` calls the baseline without any effect."""
-
-NO_GAP_STANDS_FROM = 0.05
-"""A gap is not shown while no gap keeps this probability, what a 95 % interval leaves out: many
-faint causes together outweigh it sooner than any of them is worth naming."""
 
 
 def effect_label(effect: str, at: str) -> str:
@@ -40,13 +37,6 @@ def joined(names: Iterable[str]) -> str:
 def parted(name: str) -> tuple[str, ...]:
     """The names that `joined` made one."""
     return tuple(name.split(_AND))
-
-
-def leads(no_gap: float, unexplained: float, claim: float) -> Leads:
-    """What a diagnosis says by the probabilities of no gap, the unknown and the likeliest claim."""
-    if no_gap >= NO_GAP_STANDS_FROM:
-        return "no gap"
-    return "cause" if claim > unexplained else "unexplained"
 
 
 @dataclass(frozen=True)
@@ -332,26 +322,27 @@ class Diagnosis(Shown):
     widest_swing_m: float = NAN
 
     def claim(self, cause: Cause) -> float:
-        """The probability of a cause together with those that the data cannot tell it from."""
-        if cause.group is None:
-            return cause.probability
-        return sum(each.probability for each in self.causes if each.group == cause.group)
+        """Return the probability of a cause and of those that the data cannot tell from it."""
+        return sum_group_probability(cause, self.causes)
 
     @property
     def leads(self) -> Leads:
-        """What it says: a cause, no gap, or something unknown; that too where a frequency that was
-        set aside may be no blunder."""
-        claim = max((self.claim(cause) for cause in self.causes), default=0.0)
-        found = leads(self.no_gap_probability, self.unexplained_probability, claim)
+        """Return whether a cause leads, no gap, or something unknown.
+
+        The unknown does, too, where an excluded frequency may be no blunder.
+        """
+        if self.leading is not None:
+            return "cause"
         alone = max((each.acts_alone for each in self.outliers), default=0.0)
-        return "unexplained" if found == "no gap" and alone >= NO_GAP_STANDS_FROM else found
+        shown = self.no_gap_probability < NO_GAP_STANDS_FROM or alone >= NO_GAP_STANDS_FROM
+        return "unexplained" if shown else "no gap"
 
     @property
     def leading(self) -> Cause | None:
-        """The likeliest cause of the likeliest group; None where no cause leads."""
-        if self.leads != "cause":
-            return None
-        return max(self.causes, key=lambda cause: (self.claim(cause), cause.probability))
+        """Return the most probable cause of the most probable group; None where none leads."""
+        return find_leading_cause(
+            self.no_gap_probability, self.unexplained_probability, self.causes
+        )
 
     def __repr__(self) -> str:
         leading, tension = self.leading, self.tension_after_n
