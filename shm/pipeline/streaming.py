@@ -244,11 +244,15 @@ class Streaming:
 
         hanger = self.workspace.bridge.tested(stream.hanger)
         options = identify_options(self.workspace.settings, self.workspace.bridge)
+        pieces = self.ring.read(stream.name, start, start + WINDOW)
+        if not pieces:
+            self._save_unusable(stream, start, "none of its samples count any more")
+            return
         self._submit(
             stream.name,
             partial(
                 read_stream_window,
-                self.ring.read(stream.name, start, start + WINDOW),
+                pieces,
                 stream,
                 self.store.streams.last_modes(stream.name),
                 hanger,
@@ -383,9 +387,12 @@ class Streaming:
 
     def _give_up_window(self, stream: Stream, start: datetime, error: BaseException) -> None:
         """Said in the window's own row: what one window holds must not stop its stream."""
+        self._save_unusable(stream, start, f"it could not be read: {error}")
+
+    def _save_unusable(self, stream: Stream, start: datetime, why: str) -> None:
+        """Save a window without modes, and the reason."""
         seconds = WINDOW.total_seconds()
         window = Window(stream.name, stream.hanger, start, seconds, "unusable", float("nan"))
-        why = f"it could not be read: {error}"
         self._save(WindowReading(window, (), "none", why))
 
     def _keep_pooled(self, stream: Stream, period: Period, start: datetime, found: Pooled) -> None:

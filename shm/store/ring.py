@@ -25,9 +25,10 @@ from shm.read.atomic import replace_text
 from shm.read.chunk_document import chunk_document, numbered, parse_chunk, refuse_long_chunk
 from shm.read.ring_segment import ChunkKey, microseconds, time_of
 from shm.store.archive import disk_error, sync
+from shm.store.ring_clock import was_ahead
 from shm.store.ring_files import PERIOD, Segment, StreamFolder, checksum_of_chunk, log
 from shm.store.ring_notices import DRIFT_PPM, StreamState, load_state
-from shm.store.ring_pieces import agree, joined
+from shm.store.ring_pieces import agree, came_early, joined
 from shm.store.ring_sealing import Note, seal_stream
 from shm.store.workspace import Workspace
 from shm.values.stream import Chunk, Piece, Stream
@@ -282,19 +283,33 @@ class Ring:
 
     def _place(self, chunk: Chunk) -> tuple[Path, bytes] | None:
         """The file for a chunk, in the one form in which all are kept; None where its samples are
-        there. Raises DoubledChunk.
+        there. Raises DoubledChunk, unless those that differ are of a clock that was ahead.
         """
         folder, content = self._folder(chunk.stream), chunk_document(chunk)
         key = ChunkKey(microseconds(chunk.start), chunk.sequence, checksum_of_chunk(content))
         path = folder.chunk_path(key, microseconds(chunk.end))
         if path.exists():
             return None
-        for other in folder.alike(key):
-            if not agree(self._ordered(other), chunk):
-                raise _doubled(chunk)
-            if other.values.shape[1] >= chunk.values.shape[1]:
-                return None
+        others = [(other, self._ordered(each)) for other, each in folder.alike(key)]
+        known = [each for _, each in others if agree(each, chunk)]
+        if any(each.values.shape[1] >= chunk.values.shape[1] for each in known):
+            return None
+        differing = [other for other in others if not agree(other[1], chunk)]
+        if differing and not self._is_of_clock_ahead(key, chunk, differing):
+            raise _doubled(chunk)
         return path, content
+
+    def _is_of_clock_ahead(
+        self, key: ChunkKey, chunk: Chunk, differing: Sequence[tuple[ChunkKey, Chunk]]
+    ) -> bool:
+        """Return True if a clock that was ahead dated all of the chunks that differ from one."""
+        folder = self._folder(chunk.stream)
+        if self._clock is not None:
+            arrived_us = microseconds(self._clock())
+            if came_early(replace(key, arrived_us=arrived_us), chunk):
+                return False
+        known = self.state(chunk.stream).step_times
+        return all(was_ahead(folder, known, each, chunk) for each in differing)
 
     def _kept(self, chunk: Chunk, placed: tuple[Path, bytes] | None) -> Kept:
         if placed is not None:
@@ -376,7 +391,7 @@ def _doubled(chunk: Chunk) -> DoubledChunk:
         f"{_named(chunk)} of {format_time(chunk.start)} is kept "
         "already, with other samples, which stay.",
         remedy="Send a chunk again unchanged only; send other samples under the next number and "
-        "their own time.",
+        "their own time, by a clock in UTC.",
     )
 
 

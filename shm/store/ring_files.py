@@ -48,6 +48,11 @@ class WaitingChunk:
     def arrived(self) -> datetime:
         return datetime.fromtimestamp(self.path.stat().st_mtime, UTC)
 
+    @property
+    def arrived_key(self) -> ChunkKey:
+        """Return the key with the time of arrival."""
+        return replace(self.key, arrived_us=microseconds(self.arrived))
+
 
 @dataclass(frozen=True, order=True)
 class Segment:
@@ -136,22 +141,34 @@ class StreamFolder:
         for each in waiting:
             is_within = each.key.start_us < until_us and since_us < each.end_us
             if is_within and each.key not in found:
-                key = replace(each.key, arrived_us=microseconds(each.arrived))
+                key = each.arrived_key
                 if (chunk := self.load(each)) is not None:
                     found[key] = chunk
         return found
 
-    def alike(self, key: ChunkKey) -> Iterator[Chunk]:
-        """Chunks of the same number and beginning, sealed or not."""
+    def alike(self, key: ChunkKey) -> Iterator[tuple[ChunkKey, Chunk]]:
+        """Yield the chunks of the same number and beginning, sealed or not."""
         for each in self.waiting(f"{key.start_us:017d}-*-{key.sequence}-*"):
             with suppress(FileNotFoundError):  # it has been sealed
+                arrived_key = each.arrived_key
                 if (chunk := self.load(each)) is not None:
-                    yield chunk
+                    yield arrived_key, chunk
         same = key.start_us, key.sequence
         for path in self.segments_at(period_of(key.start_us)):
             if any((k.start_us, k.sequence) == same for k in self.spans(path)):
                 found = self.chunks(path)
-                yield from (c for k, c in found.items() if (k.start_us, k.sequence) == same)
+                yield from ((k, c) for k, c in found.items() if (k.start_us, k.sequence) == same)
+
+    def is_tangled(self, start: datetime, end: datetime, waiting: Sequence[WaitingChunk]) -> bool:
+        """Return True if chunks within a time have more in common than rounding."""
+        ends = {each.key: each.end_us for each in waiting}
+        for segment in self.segments(start - PERIOD):
+            if segment.start >= end:
+                break
+            ends |= self.spans(segment.path)
+        since_us, until_us = microseconds(start), microseconds(end)
+        spans = sorted((key.start_us, end_us) for key, end_us in ends.items())
+        return _have_common((s, e) for s, e in spans if s < until_us and since_us < e)
 
     def last_segments(self) -> Iterator[Segment]:
         """Those of the last two days that have any."""
@@ -214,9 +231,13 @@ class StreamFolder:
 
 
 def _is_tangled(spans: Iterable[tuple[int, int]]) -> bool:
-    """Whether two of them, in microseconds, have more in common than rounding."""
+    """Return True if two different spans, in microseconds, have more in common than rounding."""
+    return _have_common(sorted(set(spans)))
+
+
+def _have_common(spans: Iterable[tuple[int, int]]) -> bool:
     until_us = 0
-    for start_us, end_us in sorted(set(spans)):
+    for start_us, end_us in spans:
         if start_us < until_us - _ROUNDING_US:
             return True
         until_us = max(until_us, end_us)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import logging
 from bisect import bisect_left, insort
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 
-from shm.documents import Misfit, dump, value_of
+from shm.documents import Misfit, dump, parse_time, value_of
 from shm.read.atomic import replace_text
 from shm.read.chunk_document import BY_TIME, numbered
 from shm.read.ring_segment import ChunkKey, microseconds
@@ -48,7 +48,8 @@ class StreamState:
     """What is known of a stream: its last chunk, since when its samples have been counted without
     a break and how long they say that is, and of each ten minutes how many seconds of samples
     count, how many are kept apart, being of a time that was there before, which are the least and
-    the greatest number of a chunk that belongs there, and when these begin and end.
+    the greatest number of a chunk that belongs there, and when these begin and end. `steps` are
+    when samples begin that were set aside because the clock was ahead, with by how many hours.
     """
 
     last: PassedChunk | None = None
@@ -58,6 +59,11 @@ class StreamState:
     apart_s: dict[str, float] = field(default_factory=dict)
     numbers: dict[str, tuple[int, int]] = field(default_factory=dict)
     spans: dict[str, tuple[datetime, datetime]] = field(default_factory=dict)
+    steps: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def step_times(self) -> tuple[datetime, ...]:
+        return tuple(time for time in map(parse_time, self.steps) if time is not None)
 
 
 def load_state(path: Path) -> StreamState:
@@ -122,6 +128,19 @@ def notice_overlap(
     )
     end = max(chunk.end for chunk, _ in found)
     return [_event(first.stream, "overlap", first.start, end, said)]
+
+
+def notice_early(found: Mapping[ChunkKey, Chunk], keys: Collection[ChunkKey]) -> list[StreamEvent]:
+    """Return an event of the chunks that came before their time, so that others count."""
+    if not keys:
+        return []
+    early = [found[key] for key in sorted(keys)]
+    said = (
+        "the clock was ahead: samples came before the time they are dated; those that came in "
+        "time count"
+    )
+    end = max(chunk.end for chunk in early)
+    return [_event(early[0].stream, "clock step", early[0].start, end, said)]
 
 
 def misplaced(
@@ -218,6 +237,8 @@ def _between(stream: str, before: PassedChunk | None, chunk: PassedChunk) -> Ite
 def _stepped(stream: str, before: PassedChunk, chunk: PassedChunk) -> StreamEvent:
     off_s = (chunk.start - before.end).total_seconds()
     said = f"the clock jumped by {off_s:+.3f} s before chunk {chunk.sequence}, which is the next"
+    if abs(off_s) > 1800 and abs(off_s - 3600 * round(off_s / 3600)) <= _slack_s(before, chunk):
+        said += ": whole hours (daylight saving?)"
     return _event(stream, "clock step", before.end, chunk.start, said)
 
 

@@ -103,12 +103,22 @@ def agree(one: Chunk, other: Chunk) -> bool:
     return _is_alike(one, other) and np.array_equal(first, second, equal_nan=True)
 
 
+def overlaps(one: Chunk, other: Chunk) -> bool:
+    """Return True if two chunks have at least half of the shorter one's time in common."""
+    common = min(one.end, other.end) - max(one.start, other.start)
+    return 2 * common >= min(one.end - one.start, other.end - other.start)
+
+
+def came_early(key: ChunkKey, chunk: Chunk) -> bool:
+    """Return True if a chunk came before it ends by its stamps: its clock was ahead."""
+    return microseconds(chunk.end) - key.arrived_us > _AHEAD_US
+
+
 def _rank(item: tuple[ChunkKey, Chunk]) -> tuple[bool, int, int, int, str]:
     """By when they came; what came at once, by number. Those last that came before they were: their
     clock was ahead, and the time is that of others."""
     key, chunk = item
-    is_ahead = microseconds(chunk.end) - key.arrived_us > _AHEAD_US
-    return is_ahead, key.arrived_us, key.sequence, key.start_us, key.checksum
+    return came_early(key, chunk), key.arrived_us, key.sequence, key.start_us, key.checksum
 
 
 def _free(chunk: Chunk, earlier: Sequence[Chunk]) -> NDArray[np.bool_]:

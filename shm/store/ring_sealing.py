@@ -22,6 +22,7 @@ from shm.read.atomic import replace_file
 from shm.read.chunk_document import numbered
 from shm.read.ring_segment import ChunkKey, microseconds, time_of, write_segment
 from shm.store.archive import sync
+from shm.store.ring_clock import exclude_ahead
 from shm.store.ring_files import PERIOD, StreamFolder, WaitingChunk, period_of
 from shm.store.ring_notices import (
     GRACE,
@@ -30,13 +31,14 @@ from shm.store.ring_notices import (
     load_state,
     misplaced,
     notice,
+    notice_early,
     notice_misplaced,
     notice_missing,
     notice_overlap,
     notice_told,
     save_state,
 )
-from shm.store.ring_pieces import Layout, agree, lay_out
+from shm.store.ring_pieces import Layout, agree, came_early, lay_out
 from shm.values.stream import Chunk, StreamEvent
 
 _QUIET = timedelta(seconds=10)  # technical: a segment is not written anew for each late chunk
@@ -56,12 +58,13 @@ def seal_stream(folder: StreamFolder, now: datetime, note: Note) -> list[datetim
     if not finished:
         return []
     path = folder.folder / "state.json"
-    state, sealed = load_state(path), []
+    state, changed = _exclude_ahead(folder, waiting, finished, load_state(path), note)
+    waiting, sealed = folder.waiting() if changed else waiting, changed
     for start, own in finished:
         near = _near(waiting, start)
         beside = [each.key for each in waiting]
         state, has_new = _seal(folder, start, own, near, beside, state, note)
-        if has_new:
+        if has_new and start not in sealed:
             sealed.append(start)
     oldest = format_time(now - _RECEIVED_KEPT) or ""
     received_s, apart_s = (
@@ -74,6 +77,32 @@ def seal_stream(folder: StreamFolder, now: datetime, note: Note) -> list[datetim
     state = replace(state, received_s=received_s, apart_s=apart_s, numbers=numbers, spans=spans)
     save_state(path, state)
     return sealed
+
+
+def _exclude_ahead(
+    folder: StreamFolder,
+    waiting: Sequence[WaitingChunk],
+    finished: Sequence[tuple[datetime, Sequence[WaitingChunk]]],
+    state: StreamState,
+    note: Note,
+) -> tuple[StreamState, list[datetime]]:
+    """Exclude what a clock dated ahead; the state without it, and the ten minutes it leaves."""
+    changed: list[datetime] = []
+    for step, event, leaving in exclude_ahead(folder, waiting, finished, state.step_times):
+        note(event)
+        changed += leaving.keys()
+        state = replace(state, steps={**state.steps, format_time(step.start) or "": step.hours})
+        if state.last is not None and step.start <= state.last.start < step.end:
+            state = replace(state, last=None, counted_since=None)
+    for start in changed:
+        name = format_time(start) or ""
+        numbers = {k: each for k, each in state.numbers.items() if k != name}
+        spans = {k: each for k, each in state.spans.items() if k != name}
+        found = folder.between(start, start + PERIOD, ())
+        own = [key.sequence for key in found if period_of(key.start_us) == start]
+        state = _with_numbers(replace(state, numbers=numbers, spans=spans), name, own)
+        state = _counting(state, start, lay_out(found), found)
+    return state, sorted(set(changed))
 
 
 def _near(waiting: Sequence[WaitingChunk], start: datetime) -> Sequence[WaitingChunk]:
@@ -121,8 +150,12 @@ def _seal(
     passed = [_passed(chunk, time_of(key.arrived_us)) for key, chunk in sorted(chunks.items())]
     state, events = notice(folder.folder.name, state, passed)
     layout = lay_out(found)
-    events += notice_overlap(chunks, layout.covered) + notice_missing(chunks)
-    events += notice_told(chunks)
+    early = {key for key in layout.covered if came_early(key, found[key])}
+    covered = {key: samples for key, samples in layout.covered.items() if key not in early}
+    events += notice_overlap(chunks, covered) + notice_early(
+        found, {key for key in early if period_of(key.start_us) == start}
+    )
+    events += notice_missing(chunks) + notice_told(chunks)
     others = {parse_time(k): each for k, each in state.numbers.items()}
     others.pop(start, None)
     free = chunks.keys() - layout.covered.keys()  # of those that overlap it is said already
@@ -151,12 +184,15 @@ def _doubled(found: Mapping[ChunkKey, Chunk], new: Set[ChunkKey]) -> list[ChunkK
     """Of chunks of one number and time that differ, all but the first: two that came at the same
     moment were both taken.
     """
-    seen = {(k.start_us, k.sequence): chunk for k, chunk in found.items() if k not in new}
-    by_arrival = sorted((k for k in found if k in new), key=lambda key: key.arrived_us)
+
+    def name(key: ChunkKey) -> tuple[int, int, bool]:
+        # What came before its own time gives way to what came in time (`lay_out`).
+        return key.start_us, key.sequence, came_early(key, found[key])
+
+    seen = {name(key): chunk for key, chunk in found.items() if key not in new}
+    by_arrival = sorted((k for k in found if k in new), key=lambda key: (key.arrived_us, key))
     return [
-        key
-        for key in by_arrival
-        if not agree(seen.setdefault((key.start_us, key.sequence), found[key]), found[key])
+        key for key in by_arrival if not agree(seen.setdefault(name(key), found[key]), found[key])
     ]
 
 

@@ -1,0 +1,216 @@
+"""Find samples of a logger whose clock was ahead by whole hours, and exclude them from the ring.
+
+They are dated later than they were recorded, after a pause that is whole hours too long. Once the
+clock is right again, true samples come for the same times, and differ. Then these count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from functools import partial
+from statistics import median
+
+from shm.documents import dump
+from shm.read.atomic import replace_file, replace_text
+from shm.read.chunk_document import chunk_document
+from shm.read.ring_segment import ChunkKey, microseconds, time_of, write_segment
+from shm.store.archive import sync
+from shm.store.ring_files import PERIOD, StreamFolder, WaitingChunk, period_of
+from shm.store.ring_pieces import agree, came_early, overlaps
+from shm.values.stream import Chunk, StreamEvent
+
+_MICROSECOND = timedelta(microseconds=1)
+_HOUR = timedelta(hours=1)
+
+
+@dataclass(frozen=True)
+class HourStep:
+    """A clock that was `hours` ahead in what is dated from `start` on and before `end`.
+
+    `last_end` is when the last of these samples ends.
+    """
+
+    start: datetime
+    end: datetime
+    hours: int
+    last_end: datetime
+
+    @property
+    def words(self) -> str:
+        hours = "1 hour" if self.hours == 1 else f"{self.hours} hours"
+        return f"the clock was {hours} ahead (daylight saving?)"
+
+
+def find_hour_step(
+    spans: Iterable[tuple[int, int]],
+    chunk: tuple[int, int],
+    known: Collection[datetime],
+    tolerance: timedelta = timedelta(seconds=2),
+) -> HourStep | None:
+    """Return the step of a clock that was ahead before a chunk came; None where none shows.
+
+    `spans` are when the chunks that came earlier begin and end, and `chunk` the same of one that
+    contradicts them, in microseconds. The last pause of an hour or more before it must be whole
+    hours longer than usual, with no sample from that much after it on. `known` are the beginnings
+    of former steps.
+    """
+    pauses, until_us = [], None
+    for start_us, end_us in sorted(spans):
+        if until_us is not None and start_us > until_us:
+            pauses.append((until_us, start_us))
+        until_us = max(end_us, until_us or end_us)
+    long_us, slack_us = (each // _MICROSECOND for each in (_HOUR - tolerance, tolerance))
+    usual = [b - a for a, b in pauses if slack_us < b - a < long_us]
+    long = [(a, b) for a, b in pauses if b - a >= long_us and b < chunk[1]]
+    if until_us is None or not long or time_of(long[-1][1]) in known:
+        return None
+    pause_us = long[-1][1] - long[-1][0]
+    for usual_us in {0.0, float(median(usual or [0]))}:
+        hours = round((pause_us - usual_us) / (_HOUR // _MICROSECOND))
+        step_us = hours * (_HOUR // _MICROSECOND)
+        is_whole = hours > 0 and abs(pause_us - usual_us - step_us) <= slack_us
+        if is_whole and all(start_us < chunk[0] + step_us for start_us, _ in spans):
+            start, end = time_of(long[-1][1]), time_of(chunk[0] + step_us)
+            return HourStep(start, end, hours, time_of(until_us))
+    return None
+
+
+def was_ahead(
+    folder: StreamFolder,
+    known: Collection[datetime],
+    earlier: tuple[ChunkKey, Chunk],
+    chunk: Chunk,
+) -> bool:
+    """Return True if an earlier chunk of the same number and time was dated by a clock ahead."""
+    if came_early(*earlier):
+        return True
+    span = microseconds(chunk.start), microseconds(chunk.end)
+    spans = [(key.start_us, end_us) for key, end_us in _list_spans(folder, folder.waiting(), span)]
+    return find_hour_step(spans, span, known) is not None
+
+
+def exclude_ahead(
+    folder: StreamFolder,
+    waiting: Sequence[WaitingChunk],
+    finished: Iterable[tuple[datetime, Sequence[WaitingChunk]]],
+    known: Collection[datetime],
+) -> Iterator[tuple[HourStep, StreamEvent, Mapping[datetime, Sequence[ChunkKey]]]]:
+    """Exclude the samples that a clock dated ahead, now that others came for their time.
+
+    Yields each step, what to note of it, and the ten minutes with the chunks that leave them;
+    these leave once it is noted, when the next step is asked for.
+    """
+    steps = set(known)
+    for start, own in finished:
+        near = [each for each in waiting if each.path.exists()]
+        if not folder.is_tangled(start, start + PERIOD, near):
+            continue
+        found = folder.between(start, start + PERIOD, near)
+        of_period = {each.key for each in own}
+        new = [key for key in found if key in of_period]
+        for key in sorted(new, key=lambda each: (each.arrived_us, each)):
+            step = _find_step(folder, near, found, key, steps)
+            if step is None:
+                continue
+            steps.add(step.start)
+            leaving = _list_excluded(folder, near, step, key.arrived_us)
+            count = sum(len(keys) for keys in leaving.values())
+            chunks = "1 chunk is" if count == 1 else f"{count} chunks are"
+            said = f"{step.words}: {chunks} set aside; the samples that came later count"
+            stream = folder.folder.name
+            yield step, StreamEvent(stream, "clock step", step.start, step.last_end, said), leaving
+            gone = {each for keys in leaving.values() for each in keys}
+            _set_aside(folder, near, leaving, said)
+            found = {each: chunk for each, chunk in found.items() if each not in gone}
+
+
+def _find_step(
+    folder: StreamFolder,
+    waiting: Sequence[WaitingChunk],
+    found: Mapping[ChunkKey, Chunk],
+    key: ChunkKey,
+    known: Collection[datetime],
+) -> HourStep | None:
+    """Return the step that a chunk shows by contradicting what came earlier.
+
+    Its clock was set back by the step, give or take half of it: no correction of seconds.
+    """
+    chunk = found[key]
+    earlier = [each for at, each in found.items() if at.arrived_us < key.arrived_us]
+    if not any(overlaps(each, chunk) and not agree(each, chunk) for each in earlier):
+        return None
+    span = microseconds(chunk.start), microseconds(chunk.end)
+    spans = [
+        (each.start_us, end_us)
+        for each, end_us in _list_spans(folder, waiting, span)
+        if each.arrived_us < key.arrived_us
+    ]
+    step = find_hour_step(spans, span, known)
+    if step is None or step.last_end - chunk.start < step.hours * _HOUR / 2:
+        return None
+    return step
+
+
+def _list_spans(
+    folder: StreamFolder,
+    waiting: Sequence[WaitingChunk],
+    span: tuple[int, int],
+    reach: timedelta = timedelta(hours=96),
+) -> list[tuple[ChunkKey, int]]:
+    """Return chunks around a span, each with its end: from `reach` before it on."""
+    found: list[tuple[ChunkKey, int]] = []
+    for segment in folder.segments(time_of(span[0]) - reach):
+        found += folder.spans(segment.path).items()
+    for each in waiting:
+        with suppress(FileNotFoundError):  # it has been sealed
+            found.append((each.arrived_key, each.end_us))
+    return found
+
+
+def _list_excluded(
+    folder: StreamFolder, waiting: Sequence[WaitingChunk], step: HourStep, before_us: int
+) -> dict[datetime, list[ChunkKey]]:
+    """Return the chunks that a step dates wrongly, by ten minutes: those that came before."""
+    since_us, until_us = microseconds(step.start), microseconds(step.end)
+    keys = [each.arrived_key for each in waiting]
+    for segment in folder.segments(period_of(since_us)):
+        if segment.start < step.end:
+            keys += folder.spans(segment.path)
+    found: dict[datetime, list[ChunkKey]] = {}
+    for key in sorted(set(keys)):
+        if since_us <= key.start_us < until_us and key.arrived_us < before_us:
+            found.setdefault(period_of(key.start_us), []).append(key)
+    return found
+
+
+def _set_aside(
+    folder: StreamFolder,
+    waiting: Sequence[WaitingChunk],
+    leaving: Mapping[datetime, Sequence[ChunkKey]],
+    reason: str,
+) -> None:
+    """Move chunks out of their segments and of what waits into `aside/`, each with the reason."""
+    aside = folder.folder / "aside"
+    aside.mkdir(exist_ok=True)
+    for each in waiting:
+        if each.key in leaving.get(period_of(each.key.start_us), ()):
+            replace_text(aside / f"{each.path.name}.reason.json", dump({"message": reason}) + "\n")
+            each.path.replace(aside / each.path.name)
+    for start, keys in leaving.items():
+        for path in folder.segments_at(start):
+            chunks = folder.chunks(path)
+            for key in chunks.keys() & set(keys):
+                chunk = chunks.pop(key)
+                name = folder.chunk_path(key, microseconds(chunk.end)).name
+                replace_text(aside / f"{name}.reason.json", dump({"message": reason}) + "\n")
+                (aside / name).write_bytes(chunk_document(chunk))
+                sync(aside / name)
+            sync(aside)
+            if chunks:
+                replace_file(path, partial(write_segment, chunks=sorted(chunks.items())))
+            else:
+                path.unlink()
+            sync(path.parent)
