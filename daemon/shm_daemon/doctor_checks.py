@@ -14,7 +14,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from shm.pipeline.lineage import discarded_of, redescribed
-from shm.pipeline.unheard import REMEDIES, heard, ring_leads
+from shm.pipeline.unheard import REMEDIES, backlog_leads, heard, ring_leads
 from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
 from shm.store.checking import of_no_recording, quick_troubles, unknown_files
@@ -360,9 +360,12 @@ def check_streams(examined: Examined) -> Iterator[Finding]:
         names = [each.named for each in found if each.state == state]
         if names:
             yield warning("streams", f"{state}: {some(names)}", remedy)
+    behind = backlog_leads(found)
+    for lead in behind:
+        yield warning("streams", lead.state, lead.action)
     for lead in ring_leads(examined.workspace):
         yield warning("ring", lead.state, lead.action)
-    if found and not any(each.state in REMEDIES for each in found):
+    if found and not behind and not any(each.state in REMEDIES for each in found):
         yield ok("streams", f"{counted(len(found), 'stream')}, heard within the hour")
 
 

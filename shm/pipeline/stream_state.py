@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from shm.documents import parse_time
-from shm.pipeline.unheard import LATELY, State, word_of
+from shm.pipeline.unheard import LATELY, State, last_samples, measure_unread, word_of
 from shm.report.figures.stream_course import Course
 from shm.store import Store, Workspace
 from shm.store.ring import Ring
@@ -62,18 +62,29 @@ def stream_states(
     workspace: Workspace, ring: Ring, store: Store, now: datetime
 ) -> tuple[StreamCondition, ...]:
     """One for each stream that `bridge.toml` describes, in its order."""
-    latest = ring.latest()
+    last = last_samples(workspace, ring, store)
     return tuple(
-        _state(stream, latest.get(stream.name), ring, store, now)
+        _state(
+            stream,
+            last[stream.name],
+            measure_unread(workspace, ring, store, stream.name, now),
+            ring,
+            store,
+            now,
+        )
         for stream in workspace.bridge.streams
     )
 
 
 def _state(
-    stream: Stream, last: datetime | None, ring: Ring, store: Store, now: datetime
+    stream: Stream,
+    last: datetime | None,
+    unread: timedelta,
+    ring: Ring,
+    store: Store,
+    now: datetime,
 ) -> StreamCondition:
     events = store.streams.list_events(stream.name, now - LATELY)
-    progress = store.streams.progress(stream.name)
     window = store.streams.last_window(stream.name)
     state = ring.state(stream.name)
     received, lost = _received(state, now)
@@ -82,7 +93,7 @@ def _state(
         state=word_of(last, events, now),
         last_sample=last,
         lag=None if last is None else max(timedelta(0), now - last),
-        behind=None if last is None or progress is None else max(timedelta(0), last - progress),
+        behind=None if last is None else unread,
         received_hz=received * stream.sampling_rate_hz,
         lost_share=lost,
         apart_s=_lately_s(state.apart_s, now),

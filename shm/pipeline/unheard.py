@@ -52,11 +52,12 @@ _BLIND: dict[State, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class Heard:
-    """A stream and how it is, by its last sample."""
+    """A stream and how it is, by its last sample; `unread` is how much the watch has not read."""
 
     stream: Stream
     state: State
     last_sample: datetime | None
+    unread: timedelta = timedelta(0)
 
     @property
     def named(self) -> str:
@@ -72,12 +73,27 @@ def heard(workspace: Workspace, store: Store, now: datetime) -> tuple[Heard, ...
     # It brings h5py, and most bridges have no streams.
     from shm.store.ring import ring_of
 
-    latest = ring_of(workspace).latest()
+    ring = ring_of(workspace)
+    last = last_samples(workspace, ring, store)
     return tuple(
-        Heard(each, word_of(last, store.streams.list_events(each.name, now - LATELY), now), last)
+        Heard(
+            each,
+            word_of(last[each.name], store.streams.list_events(each.name, now - LATELY), now),
+            last[each.name],
+            measure_unread(workspace, ring, store, each.name, now),
+        )
         for each in workspace.bridge.streams
-        for last in [latest.get(each.name)]
     )
+
+
+def last_samples(workspace: Workspace, ring: Ring, store: Store) -> dict[str, datetime | None]:
+    """Return when the last sample of each described stream ended, None where it never sent.
+
+    Where the ring is empty, after a restore or a long silence, it is when the last window ended.
+    """
+    latest = ring.latest()
+    names = [stream.name for stream in workspace.bridge.streams]
+    return {name: latest.get(name) or store.streams.progress(name) for name in names}
 
 
 def word_of(last: datetime | None, events: Sequence[StreamEvent], now: datetime) -> State:
@@ -100,7 +116,30 @@ def word_of(last: datetime | None, events: Sequence[StreamEvent], now: datetime)
 
 def stream_leads(workspace: Workspace, store: Store, now: datetime) -> tuple[Lead, ...]:
     """Return what somebody should know of the streams and of the ring of their samples."""
-    return (*leads_of(heard(workspace, store, now)), *ring_leads(workspace))
+    found = heard(workspace, store, now)
+    return (*leads_of(found), *backlog_leads(found), *ring_leads(workspace))
+
+
+def backlog_leads(
+    found: Sequence[Heard], longest: timedelta = timedelta(hours=1)
+) -> tuple[Lead, ...]:
+    """Return what to say of streams of which more than `longest` is not read yet."""
+    behind = [each for each in found if each.unread > longest]
+    if not behind:
+        return ()
+    names = [
+        f"{each.stream.name} ({each.unread / timedelta(hours=1):.3g} hours)" for each in behind
+    ]
+    more = ["others"] if names[_NAMED:] else []
+    what = "Streams" if names[1:] else "Stream"
+    return (
+        Lead(
+            f"{what} {listed([*names[:_NAMED], *more])}: samples are not read yet, so the watch is "
+            "behind.",
+            "Look whether the daemon runs (`shm doctor`); if it does, give it more processors and "
+            "raise the setting workers.",
+        ),
+    )
 
 
 def leads_of(found: Sequence[Heard]) -> tuple[Lead, ...]:
@@ -129,6 +168,16 @@ def list_unread(
     begin = datetime.min.replace(tzinfo=UTC) if done is None else min(done, since)
     read = store.streams.window_starts(stream, begin)
     return tuple(start for start in ring.periods(stream, begin) if start not in read)
+
+
+def measure_unread(
+    workspace: Workspace, ring: Ring, store: Store, stream: str, now: datetime
+) -> timedelta:
+    """Return the length of all ten minutes with samples that the watch has not read."""
+    from shm.store.ring_files import PERIOD
+
+    unread = set(list_unread(workspace, ring, store, stream, now))
+    return len(unread | ring.unsealed_periods(stream)) * PERIOD
 
 
 def sweep_ring(workspace: Workspace, ring: Ring, store: Store, now: datetime) -> None:

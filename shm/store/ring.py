@@ -26,7 +26,7 @@ from shm.read.chunk_document import chunk_document, numbered, parse_chunk, refus
 from shm.read.ring_segment import ChunkKey, microseconds, time_of
 from shm.store.archive import disk_error, sync
 from shm.store.ring_clock import was_ahead
-from shm.store.ring_files import PERIOD, Segment, StreamFolder, checksum_of_chunk, log
+from shm.store.ring_files import PERIOD, Segment, StreamFolder, checksum_of_chunk, log, period_of
 from shm.store.ring_notices import DRIFT_PPM, StreamState, load_state
 from shm.store.ring_pieces import agree, came_early, joined
 from shm.store.ring_sealing import Note, seal_stream
@@ -254,7 +254,12 @@ class Ring:
 
     def periods(self, stream: str, since: datetime) -> tuple[datetime, ...]:
         """The beginnings of the ten minutes from `since` on that have sealed samples."""
-        return tuple(dict.fromkeys(each.start for each in self._folder(stream).segments(since)))
+        return tuple(self._folder(stream).periods(since))
+
+    def unsealed_periods(self, stream: str) -> frozenset[datetime]:
+        """Return the beginnings of the ten minutes of which chunks wait to be sealed."""
+        waiting = self._folder(stream).waiting()
+        return frozenset(period_of(each.key.start_us) for each in waiting)
 
     def state(self, stream: str) -> StreamState:
         """What is known of a stream from what is sealed."""
@@ -345,11 +350,9 @@ class Ring:
     def _recent(self, folder: StreamFolder) -> set[tuple[int, int]]:
         """Start and end of the chunks of the last segments and of those that wait."""
         spans = {(each.key.start_us, each.end_us) for each in folder.waiting()}
-        segments = list(folder.last_segments())
-        for segment in segments:
-            if segment.start >= segments[-1].start - 2 * PERIOD:
-                ends = folder.spans(segment.path)
-                spans |= {(key.start_us, end_us) for key, end_us in ends.items()}
+        for segment in folder.last_segments():
+            ends = folder.spans(segment.path)
+            spans |= {(key.start_us, end_us) for key, end_us in ends.items()}
         return spans
 
     def _ordered(self, chunk: Chunk) -> Chunk:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -107,13 +108,30 @@ class StreamFolder:
         return sorted(found)
 
     def segments(self, since: datetime | None = None) -> Iterator[Segment]:
-        """The segments that began from a time on, by time."""
+        """Yield the segments that began from a time on, by time."""
+        for day, name in self._segment_names(since):
+            yield Segment(_start_of(name), day / name)
+
+    def periods(self, since: datetime | None = None) -> Iterator[datetime]:
+        """Yield the beginnings of the ten minutes that have segments, from a time on."""
+        names = (name.partition("-")[0] for _, name in self._segment_names(since))
+        yield from map(_start_of, dict.fromkeys(names))
+
+    def _segment_names(self, since: datetime | None) -> Iterator[tuple[Path, str]]:
+        """Yield the day and the name of each segment from a time on, by time.
+
+        Pages ask for thousands, and plain names are quicker than paths.
+        """
         least = "" if since is None else f"{since.astimezone(UTC):{_NAME}}"
         for day in sorted(self.folder.glob("[0-9]*")):
             if day.name >= least[:8]:
-                for path in sorted(day.glob("[0-9]*.h5")):
-                    if path.name >= least:
-                        yield Segment(datetime.strptime(path.stem[:14], f"{_NAME[:-1]}%z"), path)
+                try:
+                    names = sorted(os.listdir(day))  # noqa: PTH208 - no path of each is made
+                except FileNotFoundError:  # it has become empty
+                    continue
+                for name in names:
+                    if name >= least and name[0].isdigit() and name.endswith(".h5"):
+                        yield day, name
 
     def segments_at(self, start: datetime) -> list[Path]:
         """Those of the ten minutes from `start` on: one for each way to sample."""
@@ -171,9 +189,12 @@ class StreamFolder:
         return _have_common((s, e) for s, e in spans if s < until_us and since_us < e)
 
     def last_segments(self) -> Iterator[Segment]:
-        """Those of the last two days that have any."""
-        days = sorted(self.folder.glob("[0-9]*"))[-2:]
-        return self.segments(datetime.strptime(f"{days[0].name}Z", "%Y%m%d%z") if days else None)
+        """Yield the segments of the last half hour that has any."""
+        for day in sorted(self.folder.glob("[0-9]*"), reverse=True):
+            names = [path.name for path in day.glob("[0-9]*.h5")]
+            if names:
+                return self.segments(_start_of(max(names)) - 2 * PERIOD)
+        return iter(())
 
     def load(self, waiting: WaitingChunk) -> Chunk | None:
         """A chunk that is not sealed; None where it is damaged, which is set aside."""
@@ -228,6 +249,12 @@ class StreamFolder:
         log.error("%s is set aside: %s", path, error.message)
         replace_text(aside / f"{path.name}.reason.json", dump({"message": error.message}) + "\n")
         path.replace(aside / path.name)
+
+
+def _start_of(name: str) -> datetime:
+    """Return when a segment begins, by its name; ten times as quick as `strptime`."""
+    parts = name[:4], name[4:6], name[6:8], name[9:11], name[11:13]
+    return datetime(*map(int, parts), tzinfo=UTC)  # type: ignore[misc, arg-type]
 
 
 def _is_tangled(spans: Iterable[tuple[int, int]]) -> bool:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from shm.pipeline import utc_now
+from shm.pipeline.unheard import stream_leads
 from shm.read.chunk_document import chunk_document
 from shm.store import Workspace
 from shm.store.ring import ring_of
@@ -98,3 +99,35 @@ def test_sweep_keeps_unread_samples(
         assert "more than ring_bytes (0.001 GB)" in text, name
     assert json.loads(found["health"])["status"] == "degraded"
     assert "Raise ring_bytes in bridge.toml" in found["doctor"]
+
+
+@pytest.mark.parametrize(("read", "is_sealed"), [(2, True), (2, False), (0, True)])
+def test_faces_name_unread_hours(
+    bridge: Workspace, faces: Faces, read: int, is_sealed: bool
+) -> None:
+    """The stream sends, and is not silent; the watch has read little of it or nothing."""
+    start = period_start(utc_now(), PERIOD) - 15 * PERIOD
+    send_minutes(bridge, start, 150)
+    if is_sealed:
+        ring_of(bridge).seal(utc_now() + PERIOD)
+    save_windows(bridge, start, read)
+    hours = {0: "2.5", 2: "2.17"}[read] if is_sealed else "2.5"
+    found = faces(bridge)
+    for name, text in found.items():
+        assert f"Stream h3 ({hours} hours): samples are not read yet" in text, name
+    assert json.loads(found["health"])["status"] == "degraded"
+    save_windows(bridge, start, 15)
+    ring_of(bridge).seal(utc_now() + PERIOD)
+    with bridge.store() as store:
+        assert stream_leads(bridge, store, utc_now()) == ()
+
+
+def test_faces_know_readings_after_restore(bridge: Workspace, faces: Faces) -> None:
+    """A backup leaves the ring out; the readings are there."""
+    start = period_start(utc_now(), PERIOD) - 15 * PERIOD
+    save_windows(bridge, start, 3)
+    found = faces(bridge)
+    last = start + 3 * PERIOD
+    for name, text in found.items():
+        assert "never sent" not in text, name
+        assert f"h3 (last sample {last:%Y-%m-%d %H:%M} UTC)" in text, name

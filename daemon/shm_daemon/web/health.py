@@ -15,7 +15,7 @@ from typing import Any
 
 from shm.errors import ShmError, sentence
 from shm.pipeline import utc_now
-from shm.pipeline.unheard import heard, leads_of, ring_leads
+from shm.pipeline.unheard import backlog_leads, heard, leads_of, ring_leads, stream_leads
 from shm.store.stored_alerts import said_of
 from shm.values.messages import Lead
 from shm_daemon.heartbeat import NEARLY_FULL, patience_s, seconds_since_beat, told, why_turn_failed
@@ -45,7 +45,7 @@ def troubles(site: Site) -> list[str]:
 
 def limits(site: Site) -> list[str]:
     """Why work goes on otherwise than it is described; empty where all is well."""
-    return _found(site, _of_description, _of_strangers, _of_ring)
+    return _found(site, _of_description, _of_strangers, _of_backlog)
 
 
 def attention(site: Site) -> list[str]:
@@ -64,8 +64,7 @@ def notices(site: Site) -> list[Lead]:
             *_of_description(site),
             *_of_strangers(site),
             *_of_silences(site),
-            *_of_streams(site),
-            *_of_ring(site),
+            *_of_streams_and_ring(site),
         ]
     except Exception:
         log.exception("the notices of a page cannot be made")
@@ -126,6 +125,13 @@ def _of_silences(site: Site) -> list[Lead]:
     ]
 
 
+def _of_streams_and_ring(site: Site) -> Sequence[Lead]:
+    try:
+        return stream_leads(site.workspace, site.store, utc_now())
+    except ShmError:
+        return []  # told as a trouble
+
+
 def _of_streams(site: Site) -> Sequence[Lead]:
     try:
         return leads_of(heard(site.workspace, site.store, utc_now()))
@@ -133,8 +139,13 @@ def _of_streams(site: Site) -> Sequence[Lead]:
         return []  # told as a trouble
 
 
-def _of_ring(site: Site) -> Sequence[Lead]:
-    return ring_leads(site.workspace)
+def _of_backlog(site: Site) -> Sequence[Lead]:
+    """Return what is not read of the streams, and that the ring is larger than described."""
+    try:
+        found = heard(site.workspace, site.store, utc_now())
+    except ShmError:
+        return []  # told as a trouble
+    return [*backlog_leads(found), *ring_leads(site.workspace)]
 
 
 def _found(site: Site, *checks: Callable[[Site], Sequence[str | Lead]]) -> list[str]:
