@@ -9,6 +9,7 @@ from datetime import datetime
 import numpy as np
 import scipy
 
+from shm.errors import NothingThere
 from shm.identify import IdentifyOptions
 from shm.identify.options import PASSED
 from shm.monitor import as_modal_test, offsets, pooled, read_window, sensor_faults
@@ -40,7 +41,12 @@ def read_stream_window(
     options: IdentifyOptions,
     earlier: Sequence[Mapping[str, float]],
 ) -> WindowFound:
-    """The modes of ten minutes by the last `known` ones; `earlier` are the offsets before."""
+    """Return the modes of ten minutes by the last `known` ones; `earlier` are the offsets before.
+
+    Raises NothingThere where no sample counts, as where the clock was ahead.
+    """
+    if not pieces:
+        raise NothingThere("none of its samples count.")
     passed_hz = PASSED * stream.sampling_rate_hz
     if options.band_low_hz < passed_hz < options.band_high_hz:
         options = replace(options, band_high_hz=passed_hz)

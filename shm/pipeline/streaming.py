@@ -244,15 +244,11 @@ class Streaming:
 
         hanger = self.workspace.bridge.tested(stream.hanger)
         options = identify_options(self.workspace.settings, self.workspace.bridge)
-        pieces = self.ring.read(stream.name, start, start + WINDOW)
-        if not pieces:
-            self._save_unusable(stream, start, "none of its samples count any more")
-            return
         self._submit(
             stream.name,
             partial(
                 read_stream_window,
-                pieces,
+                self.ring.read(stream.name, start, start + WINDOW),
                 stream,
                 self.store.streams.last_modes(stream.name),
                 hanger,
@@ -360,7 +356,8 @@ class Streaming:
             self._retry_later(name)
             log.warning("stream %s is tried again in a minute: %s", name, error)
         else:
-            log.error("stream %s: a step failed", name, exc_info=error)
+            unexpected = None if isinstance(error, ShmError) else error
+            log.error("stream %s: a step failed: %s", name, error, exc_info=unexpected)
             running.fail(error)
 
     def _retry_later(self, name: str) -> None:
@@ -387,12 +384,9 @@ class Streaming:
 
     def _give_up_window(self, stream: Stream, start: datetime, error: BaseException) -> None:
         """Said in the window's own row: what one window holds must not stop its stream."""
-        self._save_unusable(stream, start, f"it could not be read: {error}")
-
-    def _save_unusable(self, stream: Stream, start: datetime, why: str) -> None:
-        """Save a window without modes, and the reason."""
         seconds = WINDOW.total_seconds()
         window = Window(stream.name, stream.hanger, start, seconds, "unusable", float("nan"))
+        why = f"it could not be read: {error}"
         self._save(WindowReading(window, (), "none", why))
 
     def _keep_pooled(self, stream: Stream, period: Period, start: datetime, found: Pooled) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -111,6 +112,20 @@ def test_a_silence_of_a_day_is_one_alert_which_ends_with_it(tmp_path: Path) -> N
         (over,) = store.alerts.list_all()
         assert over.resolution is not None
         assert over.resolution.why == "stream hanger03 sends again"
+
+
+def test_heed_silences_after_ring_is_empty(tmp_path: Path) -> None:
+    """Whether a sweep or a restore emptied it: the stream did not send again."""
+    workspace = with_live_streams(make_workspace(tmp_path / "bridge"))
+    send(workspace, hours=1 / 6, first=NOW)
+    with workspace.store() as store:
+        window = replace(a_window().window, stream="hanger03")
+        store.streams.save_window(replace(a_window(), window=window))
+        for later in (2, 40):
+            heed_silences(workspace, store, NOW + timedelta(days=later))
+            (raised,) = store.alerts.list_all()
+            assert raised.resolution is None
+            shutil.rmtree(workspace.folder / "ring", ignore_errors=True)
 
 
 def test_a_stream_that_saw_nothing_for_a_day_is_one_alert_until_it_sees_again(
