@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
 
 import httpx
 import pytest
@@ -96,3 +99,33 @@ def test_the_examination_comes_when_it_is_made(client: httpx.Client) -> None:
     fragment = client.get("/operation/examination")
     assert fragment.text.count("<tr class=") == len(answer.json()["findings"])
     assert "<html" not in fragment.text
+
+
+@pytest.mark.parametrize(
+    ("free_mb", "waiting", "status", "reason"),
+    [
+        (60, 0, "degraded", "The disk is nearly full: 60 MB are free."),
+        (60, 1, "degraded", "The disk is nearly full: 60 MB are free."),
+        (3, 0, "failing", "The disk is full: 3 MB are free."),
+        (3, 2, "failing", "The disk is full: 3 MB are free, and 2 files wait in the spool."),
+        (300, 0, "ok", ""),
+    ],
+)
+def test_health_reports_free_space(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    free_mb: int,
+    waiting: int,
+    status: str,
+    reason: str,
+) -> None:
+    workspace = make_workspace(tmp_path / "bridge")
+    for number in range(waiting):
+        put(workspace.spool / f"{number}.csv", "a recording")
+    beat(workspace)
+    usage = SimpleNamespace(total=10**10, used=0, free=free_mb * 10**6)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage)
+    with served(workspace) as site, site.client(**BROWSER) as client:
+        found = client.get("/health").json()
+        assert (found["status"], found["reasons"]) == (status, [reason] if reason else [])
+        assert ("nearly full" in client.get("/").text) is (status == "degraded")

@@ -19,7 +19,7 @@ from shm.pipeline.unheard import backlog_leads, heard, leads_of, ring_leads, str
 from shm.store.stored_alerts import said_of
 from shm.values.messages import Lead
 from shm_daemon.heartbeat import NEARLY_FULL, patience_s, seconds_since_beat, told, why_turn_failed
-from shm_daemon.spool import never_taken
+from shm_daemon.spool import never_taken, scan
 from shm_daemon.web.site import Site
 
 _NAMED = 5  # of many: the pages list them all
@@ -45,7 +45,7 @@ def troubles(site: Site) -> list[str]:
 
 def limits(site: Site) -> list[str]:
     """Why work goes on otherwise than it is described; empty where all is well."""
-    return _found(site, _of_description, _of_strangers, _of_backlog)
+    return _found(site, _of_description, _of_strangers, _of_backlog, _of_disk)
 
 
 def attention(site: Site) -> list[str]:
@@ -61,6 +61,7 @@ def notices(site: Site) -> list[Lead]:
     try:
         return [
             *_of_daemon(site),
+            *_of_disk(site),
             *_of_description(site),
             *_of_strangers(site),
             *_of_silences(site),
@@ -184,12 +185,30 @@ def _folders(site: Site) -> list[str]:
     ]
 
 
-def _disk(site: Site) -> list[str]:
-    """A daemon on a full disk cannot even write that its turn failed."""
+def _disk(site: Site, full_bytes: int = 32 << 20) -> list[str]:
+    """Return that the disk is full: the largest chunk of a stream has no room on it.
+
+    A daemon on a full disk cannot even write that its turn failed.
+    """
     free = shutil.disk_usage(site.workspace.folder).free
-    if free >= NEARLY_FULL * site.workspace.settings.min_free_bytes:
+    if free >= full_bytes:
         return []
-    return [f"The disk is full: {free / 1e9:.2f} GB are free, and recordings wait."]
+    waiting = len(scan(site.workspace.spool))
+    files = "1 file waits" if waiting == 1 else f"{waiting} files wait"
+    waits = f", and {files} in the spool" if waiting else ""
+    return [f"The disk is full: {free / 1e6:.0f} MB are free{waits}."]
+
+
+def _of_disk(site: Site) -> list[Lead]:
+    free = shutil.disk_usage(site.workspace.folder).free
+    if _disk(site) or free >= NEARLY_FULL * site.workspace.settings.min_free_bytes:
+        return []
+    return [
+        Lead(
+            f"The disk is nearly full: {free / 1e6:.0f} MB are free.",
+            "Free some space; `shm archive prune --dry-run` lists what could go.",
+        )
+    ]
 
 
 def _silence(site: Site) -> str:
