@@ -57,8 +57,9 @@ def find_hour_step(
     hours longer than usual, with no sample from that much after it on. `known` are the beginnings
     of former steps.
     """
+    by_time = sorted(spans)
     pauses, until_us = [], None
-    for start_us, end_us in sorted(spans):
+    for start_us, end_us in by_time:
         if until_us is not None and start_us > until_us:
             pauses.append((until_us, start_us))
         until_us = max(end_us, until_us or end_us)
@@ -68,11 +69,11 @@ def find_hour_step(
     if until_us is None or not long or time_of(long[-1][1]) in known:
         return None
     pause_us = long[-1][1] - long[-1][0]
-    for usual_us in {0.0, float(median(usual or [0]))}:
+    for usual_us in (0.0, float(median(usual or [0]))):
         hours = round((pause_us - usual_us) / (_HOUR // _MICROSECOND))
         step_us = hours * (_HOUR // _MICROSECOND)
         is_whole = hours > 0 and abs(pause_us - usual_us - step_us) <= slack_us
-        if is_whole and all(start_us < chunk[0] + step_us for start_us, _ in spans):
+        if is_whole and by_time[-1][0] < chunk[0] + step_us:
             start, end = time_of(long[-1][1]), time_of(chunk[0] + step_us)
             return HourStep(start, end, hours, time_of(until_us))
     return None

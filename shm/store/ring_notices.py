@@ -47,8 +47,8 @@ class PassedChunk:
 class StreamState:
     """What is known of a stream: its last chunk, since when its samples have been counted without
     a break and how long they say that is, and of each ten minutes how many seconds of samples
-    count, how many are kept apart, being of a time that was there before, which are the least and
-    the greatest number of a chunk that belongs there, and when these begin and end. `steps` are
+    count, how many are kept apart, being of a time that was there before, which are the numbers of
+    the first and the last chunk that belongs there, and when these begin and end. `steps` are
     when samples begin that were set aside because the clock was ahead, with by how many hours.
     """
 
@@ -143,24 +143,30 @@ def notice_early(found: Mapping[ChunkKey, Chunk], keys: Collection[ChunkKey]) ->
     return [_event(early[0].stream, "clock step", early[0].start, end, said)]
 
 
-def misplaced(
-    new: Iterable[ChunkKey], beside: Iterable[ChunkKey], numbers: Mapping[datetime, tuple[int, int]]
+def find_misplaced(
+    new: Iterable[ChunkKey],
+    others: Iterable[ChunkKey],
+    numbers: Mapping[datetime, tuple[int, int]],
 ) -> dict[ChunkKey, tuple[int, int]]:
-    """Which new chunks have a number that does not belong between those around them in time, as of
-    a clock that stepped into a gap, and these two. Of those around only what came before tells;
-    `numbers` are the least and the greatest of ten minutes. Where a session began anew, none does.
+    """Return the new chunks whose number does not belong between its neighbours in time, and these.
+
+    It belongs after both: the clock stepped back into a gap. A number below both may be of a logger
+    that counts from the beginning again. Only neighbours that came earlier count. `numbers` are
+    those of the first and the last chunk of ten minutes, by time.
     """
-    by_arrival = sorted({*new, *beside}, key=lambda key: (key.arrived_us, key.sequence))
-    ends = [(at + n * PERIOD, each[n]) for at, each in numbers.items() for n in (0, 1)]
-    around = sorted((microseconds(time), number) for time, number in ends)
-    asked, found = set(new), {}
+    asked = set(new)
+    by_arrival = sorted({*asked, *others}, key=lambda key: (key.arrived_us, key.sequence, key))
+    edges = ((at, at + PERIOD - timedelta(microseconds=1)) for at in numbers)
+    ends = zip(edges, numbers.values(), strict=True)
+    around = sorted((microseconds(at), n) for pair in ends for at, n in zip(*pair, strict=True))
+    found = {}
     for key in by_arrival:
         if key.sequence >= BY_TIME:
             continue
         place = bisect_left(around, (key.start_us, key.sequence))
         if 0 < place < len(around):
             before, behind = around[place - 1][1], around[place][1]
-            if before < behind and not before < key.sequence < behind:
+            if before < behind <= key.sequence:
                 if key in asked:
                     found[key] = before, behind
                 continue

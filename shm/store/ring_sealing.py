@@ -28,8 +28,8 @@ from shm.store.ring_notices import (
     GRACE,
     PassedChunk,
     StreamState,
+    find_misplaced,
     load_state,
-    misplaced,
     notice,
     notice_early,
     notice_misplaced,
@@ -60,9 +60,9 @@ def seal_stream(folder: StreamFolder, now: datetime, note: Note) -> list[datetim
     path = folder.folder / "state.json"
     state, changed = _exclude_ahead(folder, waiting, finished, load_state(path), note)
     waiting, sealed = folder.waiting() if changed else waiting, changed
+    beside = [each.arrived_key for each in waiting]
     for start, own in finished:
         near = _near(waiting, start)
-        beside = [each.key for each in waiting]
         state, has_new = _seal(folder, start, own, near, beside, state, note)
         if has_new and start not in sealed:
             sealed.append(start)
@@ -99,8 +99,8 @@ def _exclude_ahead(
         numbers = {k: each for k, each in state.numbers.items() if k != name}
         spans = {k: each for k, each in state.spans.items() if k != name}
         found = folder.between(start, start + PERIOD, ())
-        own = [key.sequence for key in found if period_of(key.start_us) == start]
-        state = _with_numbers(replace(state, numbers=numbers, spans=spans), name, own)
+        own = [key for key in found if period_of(key.start_us) == start]
+        state = _with_numbers(replace(state, numbers=numbers, spans=spans), start, own)
         state = _counting(state, start, lay_out(found), found)
     return state, sorted(set(changed))
 
@@ -159,25 +159,24 @@ def _seal(
     others = {parse_time(k): each for k, each in state.numbers.items()}
     others.pop(start, None)
     free = chunks.keys() - layout.covered.keys()  # of those that overlap it is said already
-    strays = misplaced(free, [*found, *beside], others)
+    strays = find_misplaced(free, [*found, *beside], others)
     events += notice_misplaced(folder.folder.name, strays, chunks)
     for event in events:
         note(event)
     _write_all(folder, {k: c for k, c in found.items() if period_of(k.start_us) == start}, new)
     for each in waiting:
         each.path.unlink(missing_ok=True)  # what was damaged is set aside already
-    own = [k.sequence for k in found if period_of(k.start_us) == start and k not in strays]
-    state = _with_numbers(state, format_time(start) or "", own)
+    own = [k for k in found if period_of(k.start_us) == start and k not in strays]
+    state = _with_numbers(state, start, own)
     return _counting(state, start, layout, found), bool(new)
 
 
-def _with_numbers(state: StreamState, name: str, own: Sequence[int]) -> StreamState:
-    """With the least and the greatest number of a chunk of ten minutes."""
-    known = state.numbers.get(name)
-    if not own and known is None:
+def _with_numbers(state: StreamState, start: datetime, own: Sequence[ChunkKey]) -> StreamState:
+    """Return the state with the numbers of the first and the last chunk of ten minutes, by time."""
+    if not own:
         return state
-    of = (*own, *(known or ()))
-    return replace(state, numbers={**state.numbers, name: (min(of), max(of))})
+    ends = min(own).sequence, max(own).sequence
+    return replace(state, numbers={**state.numbers, format_time(start) or "": ends})
 
 
 def _doubled(found: Mapping[ChunkKey, Chunk], new: Set[ChunkKey]) -> list[ChunkKey]:

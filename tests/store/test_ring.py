@@ -7,7 +7,7 @@ import math
 import os
 import random
 import resource
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
 from itertools import pairwise
@@ -21,8 +21,11 @@ from shm.documents import format_time
 from shm.errors import BadInput, DoubledChunk, ShmError, StoreBusy, StoreError
 from shm.read import read, ring_segment
 from shm.read.chunk_document import chunk_document
+from shm.read.ring_segment import ChunkKey, microseconds
 from shm.store import ring as ring_module
 from shm.store.ring import Ring
+from shm.store.ring_files import PERIOD
+from shm.store.ring_notices import find_misplaced
 from shm.store.ring_pieces import recording_of
 from shm.values import Recording
 from shm.values.stream import Chunk, Stream, StreamChannel, StreamEvent
@@ -31,6 +34,7 @@ from tests.helpers.stream_killing import assert_none_lost_none_doubled, killed_a
 from tests.helpers.streams import STREAM, a_chunk
 
 HOUR = timedelta(hours=1)
+NUMBERS = {NOW: (1, 3), NOW + 6 * PERIOD: (20, 22)}
 FOR_EVER = timedelta(days=3650)
 
 
@@ -409,6 +413,35 @@ def test_a_clock_that_steps_into_a_gap_is_noted(
     assert not any(f"chunk {last - 1} is" in each for each in told)
 
 
+@pytest.mark.parametrize("seals", [False, True])
+@pytest.mark.parametrize("pause_s", [0, 5, 300])
+@pytest.mark.parametrize(("first", "length"), [(5000, 17), (0, 2), (1, 20)])
+def test_seal_accepts_restarted_numbers(
+    logger: Logger, first: int, length: int, pause_s: float, seals: bool
+) -> None:
+    """The logger counts from the beginning again after each of three pauses."""
+    start = NOW
+    for session in range(4):
+        for number in range(length if session % 2 == 0 else 33):
+            sequence = number if session else first + number
+            logger.send(a_chunk(sequence, start, samples=6000), seals=False)
+            start += timedelta(minutes=1)
+            if seals:
+                logger.ring.seal(logger.now)
+        start += timedelta(seconds=pause_s)
+    logger.seal()
+    assert "clock step" not in logger.kinds
+
+
+def test_seal_accepts_late_chunk_of_restarted_numbers(logger: Logger) -> None:
+    again = [replace(each, sequence=n) for n, each in enumerate(minutes(*range(20, 40)))]
+    logger.send(*minutes(*range(10, 20)), *again[:2], *again[12:])
+    logger.send(*again[2:12])
+    assert "clock step" not in logger.kinds
+    (piece,) = logger.ring.read("h3", NOW, NOW + HOUR)
+    assert np.array_equal(piece.values, samples([*minutes(*range(10, 20)), *again]))
+
+
 @pytest.mark.slow
 def test_a_clock_that_drifts_is_noted(logger: Logger) -> None:
     """250 ppm more samples than the stamps say."""
@@ -583,6 +616,22 @@ def test_sweep_keeps_last_day(logger: Logger, later: timedelta) -> None:
     assert swept.segments == (6 if later else 0)
     assert (swept.left_bytes, swept.recent_bytes) == (logger.ring.size_bytes("h3"),) * 2
     assert logger.ring.last_sweep() == swept
+
+
+@pytest.mark.parametrize("kind", [list, iter, tuple])
+def test_find_misplaced_any_iterable(kind: Callable[..., Iterable[ChunkKey]]) -> None:
+    key = ChunkKey(microseconds(NOW + 2 * PERIOD), 41, "a", 1)
+    assert find_misplaced(kind([key]), kind([]), NUMBERS) == {key: (3, 20)}
+
+
+def test_find_misplaced_ties_by_time() -> None:
+    """Two keys of one arrival and number: their checksums, and so their hashes, decide nothing."""
+    for checksum in map(str, range(20)):
+        first, last = (
+            ChunkKey(microseconds(NOW + n * PERIOD), 7, f"{n}{checksum}", 1) for n in (2, 4)
+        )
+        found = find_misplaced([last, first], [], NUMBERS)
+        assert found == find_misplaced([first, last], [], NUMBERS) == {}
 
 
 def test_a_real_recording_in_chunks_is_the_same_recording(
