@@ -136,8 +136,8 @@ def backlog_leads(
         Lead(
             f"{what} {listed([*names[:_NAMED], *more])}: samples are not read yet, so the watch is "
             "behind.",
-            "Look whether the daemon runs (`shm doctor`); if it does, give it more processors and "
-            "raise the setting workers.",
+            "Start `shm daemon` if none is active; if one is, give it more processors and raise "
+            "the setting workers.",
         ),
     )
 
@@ -195,15 +195,21 @@ def ring_leads(workspace: Workspace) -> tuple[Lead, ...]:
     from shm.store.ring import ring_of  # it brings h5py, and most bridges have no streams
 
     limit, swept = workspace.settings.ring_bytes, ring_of(workspace).last_sweep()
-    if swept is None or swept.left_bytes <= limit:
+    if swept is None:
         return ()
+    held = {
+        "are unread": swept.unread_bytes,
+        "are of the last day": swept.recent_bytes,
+        "are kept for good until their file in ring/NAME/kept/ is removed": swept.kept_bytes,
+    }
+    if sum(held.values()) <= limit:  # the next sweep meets it
+        return ()
+    parts = [f"{_gigabytes(size)} {what}" for what, size in held.items() if size]
     return (
         Lead(
             f"The ring holds {_gigabytes(swept.left_bytes)}, more than ring_bytes "
             f"({_gigabytes(limit)}), and nothing more may be removed.",
-            f"Raise ring_bytes in bridge.toml: {_gigabytes(swept.unread_bytes)} are unread, "
-            f"{_gigabytes(swept.recent_bytes)} of the last day, {_gigabytes(swept.kept_bytes)} "
-            "kept for good until their file in ring/NAME/kept/ is removed.",
+            f"Raise ring_bytes in bridge.toml: {listed(parts)}.",
         ),
     )
 
