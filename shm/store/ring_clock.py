@@ -18,8 +18,8 @@ from shm.read.atomic import replace_file, replace_text
 from shm.read.chunk_document import chunk_document
 from shm.read.ring_segment import ChunkKey, microseconds, time_of, write_segment
 from shm.store.archive import sync
-from shm.store.ring_files import PERIOD, StreamFolder, WaitingChunk, period_of
-from shm.store.ring_pieces import agree, came_early, overlaps
+from shm.store.ring_files import PERIOD, StreamFolder, WaitingChunk, near_period, period_of
+from shm.store.ring_pieces import came_early, contradicts
 from shm.values.stream import Chunk, StreamEvent
 
 _MICROSECOND = timedelta(microseconds=1)
@@ -66,7 +66,9 @@ def find_hour_step(
     long_us, slack_us = (each // _MICROSECOND for each in (_HOUR - tolerance, tolerance))
     usual = [b - a for a, b in pauses if slack_us < b - a < long_us]
     long = [(a, b) for a, b in pauses if b - a >= long_us and b < chunk[1]]
-    if until_us is None or not long or time_of(long[-1][1]) in known:
+    if until_us is None or not long:
+        return None
+    if any(abs(time_of(long[-1][1]) - each) < _HOUR for each in known):
         return None
     pause_us = long[-1][1] - long[-1][0]
     for usual_us in (0.0, float(median(usual or [0]))):
@@ -106,43 +108,43 @@ def exclude_ahead(
     """
     steps = set(known)
     for start, own in finished:
-        near = [each for each in waiting if each.path.exists()]
-        if not folder.is_tangled(start, start + PERIOD, near):
+        near = near_period(waiting, start)
+        if not folder.has_doubled_time(start, start + PERIOD, near):
             continue
         found = folder.between(start, start + PERIOD, near)
         of_period = {each.key for each in own}
         new = [key for key in found if key in of_period]
         for key in sorted(new, key=lambda each: (each.arrived_us, each)):
-            step = _find_step(folder, near, found, key, steps)
-            if step is None:
+            earlier = [each for at, each in found.items() if at.arrived_us < key.arrived_us]
+            if not any(contradicts(each, found[key]) for each in earlier):
                 continue
+            step = _find_step(folder, waiting, key, found[key], steps)
+            if step is None:
+                break
             steps.add(step.start)
-            leaving = _list_excluded(folder, near, step, key.arrived_us)
+            leaving = _list_excluded(folder, waiting, step, key.arrived_us)
             count = sum(len(keys) for keys in leaving.values())
             chunks = "1 chunk is" if count == 1 else f"{count} chunks are"
             said = f"{step.words}: {chunks} set aside; the samples that came later count"
             stream = folder.folder.name
             yield step, StreamEvent(stream, "clock step", step.start, step.last_end, said), leaving
             gone = {each for keys in leaving.values() for each in keys}
-            _set_aside(folder, near, leaving, said)
+            _set_aside(folder, waiting, leaving, said)
             found = {each: chunk for each, chunk in found.items() if each not in gone}
+            waiting = [each for each in waiting if each.key not in gone]
 
 
 def _find_step(
     folder: StreamFolder,
     waiting: Sequence[WaitingChunk],
-    found: Mapping[ChunkKey, Chunk],
     key: ChunkKey,
+    chunk: Chunk,
     known: Collection[datetime],
 ) -> HourStep | None:
-    """Return the step that a chunk shows by contradicting what came earlier.
+    """Return the step that a chunk shows that contradicts what came earlier; None without any.
 
     Its clock was set back by the step, give or take half of it: no correction of seconds.
     """
-    chunk = found[key]
-    earlier = [each for at, each in found.items() if at.arrived_us < key.arrived_us]
-    if not any(overlaps(each, chunk) and not agree(each, chunk) for each in earlier):
-        return None
     span = microseconds(chunk.start), microseconds(chunk.end)
     spans = [
         (each.start_us, end_us)

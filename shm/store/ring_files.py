@@ -12,6 +12,7 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -66,6 +67,15 @@ class Segment:
 def period_of(time_us: int) -> datetime:
     """When the ten minutes began that a time is in."""
     return time_of(time_us // _PERIOD_US * _PERIOD_US)
+
+
+def near_period(waiting: Sequence[WaitingChunk], start: datetime) -> Sequence[WaitingChunk]:
+    """Return those by which it is decided which samples count of what began in ten minutes."""
+    low, high = (
+        bisect_left(waiting, microseconds(time), key=lambda each: each.key.start_us)
+        for time in (start - 3 * PERIOD, start + 4 * PERIOD)
+    )
+    return waiting[low:high]
 
 
 def checksum_of_chunk(content: bytes) -> str:
@@ -177,16 +187,24 @@ class StreamFolder:
                 found = self.chunks(path)
                 yield from ((k, c) for k, c in found.items() if (k.start_us, k.sequence) == same)
 
-    def is_tangled(self, start: datetime, end: datetime, waiting: Sequence[WaitingChunk]) -> bool:
-        """Return True if chunks within a time have more in common than rounding."""
+    def has_doubled_time(
+        self, start: datetime, end: datetime, waiting: Sequence[WaitingChunk]
+    ) -> bool:
+        """Return True if chunks within a time have half of one's length in common."""
         ends = {each.key: each.end_us for each in waiting}
         for segment in self.segments(start - PERIOD):
             if segment.start >= end:
                 break
             ends |= self.spans(segment.path)
         since_us, until_us = microseconds(start), microseconds(end)
-        spans = sorted((key.start_us, end_us) for key, end_us in ends.items())
-        return _have_common((s, e) for s, e in spans if s < until_us and since_us < e)
+        last = 0, 0
+        for span in sorted((key.start_us, end_us) for key, end_us in ends.items()):
+            if span[0] < until_us and since_us < span[1]:
+                common_us = min(span[1], last[1]) - span[0]
+                if 2 * common_us >= min(span[1] - span[0], last[1] - last[0]) > 0:
+                    return True
+                last = max(last, span, key=lambda each: each[1])
+        return False
 
     def last_segments(self) -> Iterator[Segment]:
         """Yield the segments of the last half hour that has any."""
@@ -259,12 +277,8 @@ def _start_of(name: str) -> datetime:
 
 def _is_tangled(spans: Iterable[tuple[int, int]]) -> bool:
     """Return True if two different spans, in microseconds, have more in common than rounding."""
-    return _have_common(sorted(set(spans)))
-
-
-def _have_common(spans: Iterable[tuple[int, int]]) -> bool:
     until_us = 0
-    for start_us, end_us in spans:
+    for start_us, end_us in sorted(set(spans)):
         if start_us < until_us - _ROUNDING_US:
             return True
         until_us = max(until_us, end_us)

@@ -103,10 +103,16 @@ def agree(one: Chunk, other: Chunk) -> bool:
     return _is_alike(one, other) and np.array_equal(first, second, equal_nan=True)
 
 
-def overlaps(one: Chunk, other: Chunk) -> bool:
-    """Return True if two chunks have at least half of the shorter one's time in common."""
-    common = min(one.end, other.end) - max(one.start, other.start)
-    return 2 * common >= min(one.end - one.start, other.end - other.start)
+def contradicts(before: Chunk, chunk: Chunk) -> bool:
+    """Return True if two chunks have half of the shorter one's time in common, but not its samples.
+
+    Less in common is a correction of the clock by seconds.
+    """
+    common = min(before.end, chunk.end) - max(before.start, chunk.start)
+    if 2 * common < min(before.end - before.start, chunk.end - chunk.start):
+        return False
+    taken = _taken(before, chunk)
+    return bool(taken.stop) and not _repeats(before, chunk, taken)
 
 
 def came_early(key: ChunkKey, chunk: Chunk) -> bool:

@@ -6,7 +6,6 @@ next time was left by a crash, or came again, and goes.
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
@@ -20,10 +19,10 @@ from shm.documents import format_time, parse_time
 from shm.errors import BadInput
 from shm.read.atomic import replace_file
 from shm.read.chunk_document import numbered
-from shm.read.ring_segment import ChunkKey, microseconds, time_of, write_segment
+from shm.read.ring_segment import ChunkKey, time_of, write_segment
 from shm.store.archive import sync
 from shm.store.ring_clock import exclude_ahead
-from shm.store.ring_files import PERIOD, StreamFolder, WaitingChunk, period_of
+from shm.store.ring_files import PERIOD, StreamFolder, WaitingChunk, near_period, period_of
 from shm.store.ring_notices import (
     GRACE,
     PassedChunk,
@@ -62,7 +61,7 @@ def seal_stream(folder: StreamFolder, now: datetime, note: Note) -> list[datetim
     waiting, sealed = folder.waiting() if changed else waiting, changed
     beside = [each.arrived_key for each in waiting]
     for start, own in finished:
-        near = _near(waiting, start)
+        near = near_period(waiting, start)
         state, has_new = _seal(folder, start, own, near, beside, state, note)
         if has_new and start not in sealed:
             sealed.append(start)
@@ -103,15 +102,6 @@ def _exclude_ahead(
         state = _with_numbers(replace(state, numbers=numbers, spans=spans), start, own)
         state = _counting(state, start, lay_out(found), found)
     return state, sorted(set(changed))
-
-
-def _near(waiting: Sequence[WaitingChunk], start: datetime) -> Sequence[WaitingChunk]:
-    """Those by which it is told which samples count of what began in ten minutes."""
-    low, high = (
-        bisect_left(waiting, microseconds(time), key=lambda each: each.key.start_us)
-        for time in (start - 3 * PERIOD, start + 4 * PERIOD)
-    )
-    return waiting[low:high]
 
 
 def _finished(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -189,6 +190,8 @@ def test_seal_excludes_numbered_chunks_ahead(
     send(ring, clock, true[20:])
     pieces = ring.read("h3", BEGIN, BEGIN + 12 * HOUR)
     assert np.array_equal(np.concatenate([p.values for p in pieces], axis=1), join_values(true))
+    send(ring, clock, wrong[:3])  # they come again, and change nothing
+    assert len(ring.read("h3", BEGIN, BEGIN + 12 * HOUR)) == len(pieces)
     received_s = sum(ring.state("h3").received_s.values())
     assert received_s == pytest.approx(60 * len(true))
 
@@ -203,3 +206,19 @@ def test_seal_keeps_samples_after_true_pause(ring: Ring, clock: Clock, back: tim
     found = np.concatenate([piece.values for piece in pieces], axis=1)
     assert np.array_equal(found, join_values([*before, *after]))
     assert not list(ring.folder.glob("h3/aside/*.chunk"))
+
+
+def test_seal_keeps_samples_sent_again(ring: Ring, clock: Clock) -> None:
+    """After an hour's power cut an hour is sent again, in chunks cut otherwise."""
+    before, after = make_minutes(range(20)), make_minutes(range(80, 140))
+    values = join_values(after)
+    again = [
+        replace(each, start=each.start + 20 * MINUTE / 60, values=values[:, n : n + 6000])
+        for n, each in zip(range(2000, 350_000, 6000), after, strict=False)
+    ]
+    send(ring, clock, [*before, *after])
+    send(ring, clock, [replace(each, sequence=each.sequence + 60) for each in again])
+    assert not list(ring.folder.glob("h3/aside/*.chunk"))
+    pieces = ring.read("h3", BEGIN, BEGIN + 12 * HOUR)
+    found = np.concatenate([piece.values for piece in pieces], axis=1)
+    assert np.array_equal(found, join_values([*before, *after]))
