@@ -20,10 +20,9 @@ from shm.read.ring_segment import ChunkKey, microseconds, time_of, write_segment
 from shm.store.archive import sync
 from shm.store.ring_files import PERIOD, StreamFolder, WaitingChunk, near_period, period_of
 from shm.store.ring_pieces import came_early, contradicts
-from shm.values.stream import Chunk, StreamEvent
+from shm.values.stream import PERIODS, Chunk, StreamEvent
 
-_MICROSECOND = timedelta(microseconds=1)
-_HOUR = timedelta(hours=1)
+_HOUR = PERIODS["hour"]
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,10 @@ def find_hour_step(
         if until_us is not None and start_us > until_us:
             pauses.append((until_us, start_us))
         until_us = max(end_us, until_us or end_us)
-    long_us, slack_us = (each // _MICROSECOND for each in (_HOUR - tolerance, tolerance))
+    long_us, slack_us = (
+        each // timedelta(microseconds=1) for each in (_HOUR - tolerance, tolerance)
+    )
+    hour_us = long_us + slack_us
     usual = [b - a for a, b in pauses if slack_us < b - a < long_us]
     long = [(a, b) for a, b in pauses if b - a >= long_us and b < chunk[1]]
     if until_us is None or not long:
@@ -72,8 +74,8 @@ def find_hour_step(
         return None
     pause_us = long[-1][1] - long[-1][0]
     for usual_us in (0.0, float(median(usual or [0]))):
-        hours = round((pause_us - usual_us) / (_HOUR // _MICROSECOND))
-        step_us = hours * (_HOUR // _MICROSECOND)
+        hours = round((pause_us - usual_us) / hour_us)
+        step_us = hours * hour_us
         is_whole = hours > 0 and abs(pause_us - usual_us - step_us) <= slack_us
         if is_whole and by_time[-1][0] < chunk[0] + step_us:
             start, end = time_of(long[-1][1]), time_of(chunk[0] + step_us)
