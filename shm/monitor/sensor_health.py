@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import timedelta
 from itertools import combinations
 
 import numpy as np
 
 from shm.monitor.spectrum import Stretch, power_near, shape_on, stretch
-from shm.values import FloatArray, Mode
+from shm.values import PLANES, FloatArray, Mode, Plane
 from shm.values.stream import (
     Piece,
     Stream,
     StreamChannel,
     StreamEvent,
     StreamEventKind,
+    Window,
     WindowReading,
 )
 
@@ -102,38 +103,133 @@ def sensor_faults(
 
 
 def sees_nothing(
-    windows: Sequence[WindowReading], told: Sequence[StreamEvent] = ()
+    windows: Sequence[WindowReading], reported: Sequence[StreamEvent] = ()
 ) -> StreamEvent | None:
-    """That the last of `windows` of a stream, oldest first, show a hanger that is not there.
+    """Return the event that the sensors of a stream do not see its hanger any more, if so.
 
-    No mode for an hour, where the windows before had modes, and less motion than these ever had;
-    or no mode for a whole day, whatever the level and whatever was before. Windows that cannot be
-    used say nothing, nor do those of which it was `told` before.
+    `windows` are oldest first; `reported` are earlier events of this. Unusable ones do not count.
     """
-    known = [each.window for each in windows if math.isfinite(each.window.level_m_s2)]
-    seen = {each.window.start for each in windows if each.modes}
-    last = max((row for row, each in enumerate(known) if each.start in seen), default=-1)
-    blind = known[last + 1 :]
-    if not blind:
+    rows = [_Row(each.window, max(_count_modes(each).values())) for each in windows]
+    return _find_loss(rows, [each for each in reported if not each.channel], "the hanger", "")
+
+
+def find_lost_planes(
+    windows: Sequence[WindowReading], stream: Stream, reported: Sequence[StreamEvent] = ()
+) -> tuple[StreamEvent, ...]:
+    """Return an event for each channel whose plane lost its modes while the other has its own.
+
+    The windows of a plane are those in which the other plane shows that the hanger moves.
+    """
+    counts = [_count_modes(each) for each in windows]
+    found = []
+    for plane, other in (PLANES, PLANES[::-1]):
+        usual = _usual([each[other] for each in counts])
+        rows = [
+            _Row(each.window, own[plane])
+            for each, own in zip(windows, counts, strict=True)
+            if 2 * own[other] > usual
+        ]
+        for channel in stream.channels:
+            if channel.plane == plane:
+                earlier = [each for each in reported if each.channel == channel.name]
+                what = f"the {plane} modes, while the {other} modes are seen"
+                found.append(_find_loss(rows, earlier, what, channel.name))
+    return tuple(each for each in found if each)
+
+
+def _count_modes(reading: WindowReading) -> dict[Plane, int]:
+    return {plane: sum(mode.plane == plane for mode in reading.modes) for plane in PLANES}
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A window and how many modes it showed in a plane."""
+
+    window: Window
+    n_modes: int
+
+
+def _usual(counts: Sequence[int]) -> float:
+    """Return how many modes a window shows that shows any."""
+    seen = [each for each in counts if each]
+    return float(np.median(seen)) if seen else 0.0
+
+
+def _find_loss(
+    rows: Sequence[_Row],
+    reported: Sequence[StreamEvent],
+    what: str,
+    channel: str,
+    enough: float = 0.95,
+) -> StreamEvent | None:
+    """Return the event that the modes of the last windows are lost, if one of three things holds.
+
+    For an hour, fewer than half the usual modes, though at this level they are visible; for an
+    hour, no mode and less motion than ever; for a day, no mode.
+    """
+    rows = [each for each in rows if math.isfinite(each.window.level_m_s2)]
+    sound = [
+        each
+        for each in rows
+        if not any(event.start <= each.window.start < event.end for event in reported)
+    ]
+    usual = _usual([each.n_modes for each in sound])
+    few = _tail(rows, lambda each: 2 * each.n_modes > usual)
+    if not few:
         return None
-    first, now = blind[0], blind[-1]
+    now = few[-1].window
     end = now.start + timedelta(seconds=now.duration_s)
-    if going_on := [each for each in told if each.end > first.start]:
+    if going_on := [each for each in reported if each.end > few[0].window.start]:
         return replace(going_on[-1], start=now.start, end=end)
-    before = [w for w in known[: last + 1] if not any(e.start <= w.start < e.end for e in told)]
-    if len(blind) < _HOUR:
+    if len(few) < _HOUR:
         return None
-    is_known = sum(1 for each in before if each.start in seen) >= _LEAST_BEFORE
-    level = max(w.level_m_s2 for w in blind)
-    lowest = min(w.level_m_s2 for w in before) if is_known else math.nan
-    if not level < _FALLEN * lowest and end - first.start < _BLIND:
-        return None
-    compared = f" where the lowest before was {lowest:.2g}" if is_known else ""
+    none = _tail(few, lambda each: each.n_modes > 0)
+    before = [each for each in sound if each.window.start < few[0].window.start]
+    is_known = sum(1 for each in before if each.n_modes) >= _LEAST_BEFORE
+    level = float(np.median([each.window.level_m_s2 for each in few]))
+    lowest = min(each.window.level_m_s2 for each in before) if is_known else math.nan
+    since = few
+    if not (is_known and _are_visible(before, level, usual)):
+        since = none
+        highest = max((each.window.level_m_s2 for each in none), default=math.nan)
+        fallen = len(none) >= _HOUR and highest < _FALLEN * lowest
+        if not fallen and not (none and end - none[0].window.start >= _BLIND):
+            return None
+    first = since[0].window
+    compared = f"; the lowest before was {lowest:.2g}" if is_known else ""
     detail = (
-        f"it sees nothing of the hanger: no mode since {first.start:%Y-%m-%d %H:%M} UTC, at most "
-        f"{level:.2g} m/s^2{compared}; see whether the sensors are fixed to it and connected"
+        f"since {first.start:%Y-%m-%d %H:%M} UTC it does not see {what} (level {level:.2g} m/s^2"
+        f"{compared}): check that it is fixed to the hanger and connected"
     )
-    return StreamEvent(now.stream, "lost modes", first.start, end, detail)
+    return StreamEvent(now.stream, "lost modes", first.start, end, detail, channel)
+
+
+def _are_visible(
+    before: Sequence[_Row],
+    level_m_s2: float,
+    usual: float,
+    enough: float = 0.95,
+    visible_db: float = 10.0,
+) -> bool:
+    """Return True if `enough` of the earlier windows that were as quiet had most of their modes.
+
+    Where hardly any was as quiet, the quietest count whose peaks would have been `visible_db` high
+    at this level.
+    """
+    found: list[bool] = []
+    for each in sorted(before, key=lambda each: each.window.level_m_s2):
+        quieter_db = 20 * math.log10(level_m_s2 / each.window.level_m_s2)
+        height_db = each.window.signal_to_noise_db + quieter_db
+        if quieter_db < 0 and (math.isnan(height_db) or len(found) >= _HOUR):
+            continue
+        found.append(2 * each.n_modes > usual and (quieter_db >= 0 or height_db >= visible_db))
+    return len(found) >= _HOUR and float(np.mean(found)) >= enough
+
+
+def _tail(rows: Sequence[_Row], is_seen: Callable[[_Row], bool]) -> Sequence[_Row]:
+    """Return the rows after the last one in which something is seen."""
+    last = max((place for place, each in enumerate(rows) if is_seen(each)), default=-1)
+    return rows[last + 1 :]
 
 
 def exchanged(

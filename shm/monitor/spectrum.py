@@ -15,7 +15,7 @@ from shm.values.stream import StreamChannel
 REACH = 0.06
 """A tenth of the tension lost moves the frequencies of a taut string by 5 %."""
 _STEP = 2e-4  # technical: of a grid of frequencies, a fifth of the peaks' width at 0.5 % of damping
-_ALONE, _ALONE_SHARE = 0.004, 0.3
+ALONE, _ALONE_SHARE = 0.004, 0.3
 """judgement: how far a mode may be from where the others say that all have gone: what temperature
 does to one more than to another between windows, and a share of the whole change."""
 _DAMPING = 0.003
@@ -189,7 +189,7 @@ def found_peaks(
     ]
     height = np.array(rows).reshape(len(known), len(shift))
     common = shift[int(np.argmax(height.sum(axis=0)))]
-    reach = _ALONE + _ALONE_SHARE * abs(common)
+    reach = ALONE + _ALONE_SHARE * abs(common)
     alone = (shift - common) / reach
     # To the reach there are two standard deviations: a higher peak farther off is another mode's.
     best = np.argmax(np.where(np.abs(alone) <= 1, height - 2 * alone**2, -np.inf), axis=1)

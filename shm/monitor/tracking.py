@@ -15,7 +15,7 @@ from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.planes import shape_points
 from shm.monitor.close_modes import Band, BandFit, CloseModes, directions, lines_of
 from shm.monitor.sensor_health import exchanged
-from shm.monitor.spectrum import REACH, Peaks, Stretch
+from shm.monitor.spectrum import ALONE, REACH, Peaks, Stretch
 from shm.monitor.windows import Judged, judged
 from shm.values import (
     NAN,
@@ -50,7 +50,8 @@ _STEPS_WITHOUT = 6  # technical: from the fit with the mode; what is gained late
 _SAME = 3.0  # standard deviations
 _REVIEW_S, _REVIEW_FEW_S, _FEW = 12 * 3600, 3600, 2
 """judgement: how often modes are sought that were missed at first, by day and by night; each hour
-where so few are known. From scratch costs as much as twenty windows that are followed."""
+where so few are known, or most are lost. From scratch costs as much as twenty windows that are
+followed."""
 
 
 def read_window(
@@ -59,8 +60,14 @@ def read_window(
     known: Sequence[Mode],
     hanger: Hanger,
     options: IdentifyOptions,
+    is_confirmed: bool = True,
 ) -> WindowReading:
-    """The modes of a window by the last `known` ones; from scratch where most of them are lost."""
+    """Read the modes of a window by following the last `known` ones.
+
+    Where most of them are lost, modes are searched from scratch. If a window has followed the known
+    modes (`is_confirmed`), they are searched once an hour, and what is found only counts where one
+    change of tension moved all of them.
+    """
     found = judged(pieces, stream, known)
     if not found.parts:
         return WindowReading(found.window, (), "none", found.reason)
@@ -74,12 +81,15 @@ def read_window(
     if 2 * len(modes) <= len(known) or guessed:
         if found.window.kind == "quiet":
             why.append("the modes are hidden by the noise of the sensors")
-        else:
+        elif not is_confirmed or _is_due(found.window, _REVIEW_FEW_S):
             try:
                 fresh = _from_scratch(found, stream, hanger, options)
-                return WindowReading(found.window, fresh, "from scratch", "; ".join(why))
+                if not is_confirmed or is_moved_by_tension(known, fresh):
+                    return WindowReading(found.window, fresh, "from scratch", "; ".join(why))
+                why.append(f"no change of tension explains the {len(fresh)} modes that are seen")
             except ShmError as error:
                 why.append(str(error))
+        modes = _exclude_strays(modes, known)
     elif found.window.kind != "quiet" and _is_reviewed(known, found.window):
         return _reviewed(known, found, modes, stream, hanger, options, "; ".join(why))
     return WindowReading(found.window, modes, "tracked" if modes else "none", "; ".join(why))
@@ -95,7 +105,11 @@ def _is_reviewed(known: Sequence[Mode], window: Window) -> bool:
     highest = max(mode.order for mode in known)
     if all(len(each) == highest for each in orders):
         return False
-    every_s = _REVIEW_S if len(known) > _FEW else _REVIEW_FEW_S
+    return _is_due(window, _REVIEW_S if len(known) > _FEW else _REVIEW_FEW_S)
+
+
+def _is_due(window: Window, every_s: int) -> bool:
+    """Return True once in ``every_s``, at a time of its own for each stream."""
     since_s = window.start.timestamp() + crc32(window.stream.encode()) % every_s
     return since_s % every_s < window.duration_s
 
@@ -109,26 +123,73 @@ def _reviewed(
     options: IdentifyOptions,
     why: str,
 ) -> WindowReading:
-    """The followed modes with those that were missed at first; all from scratch, where these are
-    more than twice as many: what was followed was a peak of the deck or of the traffic.
+    """Add modes that were missed at first to the followed ones.
 
-    One that the windows after this do not show again is forgotten, and no hour has it (`pooling`).
+    Where hardly any are known and a search finds more than twice as many, all are from scratch:
+    what was followed was a peak of the deck or of the traffic. A mode that the windows after this
+    do not show again is forgotten, and no hour has it (`pooling`).
     """
     try:
         fresh = _from_scratch(found, stream, hanger, options)
     except ShmError as error:
         return WindowReading(found.window, modes, "tracked", f"{why}; none sought: {error}")
-    if len(fresh) > 2 * len(known):
+    if len(known) <= _FEW and len(fresh) > 2 * len(known):
         return WindowReading(found.window, fresh, "from scratch", why)
-    return WindowReading(found.window, modes + _missed(known, fresh), "tracked", why)
+    return WindowReading(found.window, modes + _missed(known, modes, fresh), "tracked", why)
 
 
-def _missed(known: Sequence[Mode], fresh: Sequence[Mode]) -> tuple[Mode, ...]:
-    """Modes from scratch that are not followed, each where its order puts it in its plane: the
-    orders and frequencies of those that are followed stand."""
+def is_moved_by_tension(
+    known: Sequence[Mode], fresh: Sequence[Mode], share: float = 0.1, least: int = 3
+) -> bool:
+    """Return True if one change of tension explains where a search finds the known modes.
+
+    A tension adds the same x k^2 to the square of each frequency of order k, in both planes. Up to
+    a `share` of its change a mode may differ, as ends and other temperatures move it.
+    """
+    after = {(mode.plane, mode.order): mode.frequency_hz for mode in fresh}
+    pairs = [
+        (mode.order, mode.frequency_hz, after[mode.plane, mode.order])
+        for mode in known
+        if (mode.plane, mode.order) in after
+    ]
+    if len(pairs) < min(least, max(len(known), 1)):
+        return not known
+    order, before_hz, after_hz = np.array(pairs).T
+    added = float(np.median((after_hz**2 - before_hz**2) / order**2))
+    expected = np.log(np.maximum(1 + added * order**2 / before_hz**2, 0.01)) / 2
+    off = np.abs(np.log(after_hz / before_hz) - expected)
+    return bool(np.all(off <= ALONE + share * np.abs(expected)))
+
+
+def _exclude_strays(
+    modes: tuple[Mode, ...], known: Sequence[Mode], least: int = 3
+) -> tuple[Mode, ...]:
+    """Exclude modes that moved while most are lost and too few are left to confirm each other.
+
+    A peak of the deck near one of many lost modes is none of them.
+    """
+    if len(modes) >= least:
+        return modes
+    before = {(mode.plane, mode.order): mode.frequency_hz for mode in known}
+    return tuple(
+        mode
+        for mode in modes
+        if abs(mode.frequency_hz / before[mode.plane, mode.order] - 1) <= ALONE
+    )
+
+
+def _missed(
+    known: Sequence[Mode], modes: Sequence[Mode], fresh: Sequence[Mode]
+) -> tuple[Mode, ...]:
+    """Return modes from scratch that are not known, each where its order puts it in its plane.
+
+    A plane whose known modes are mostly lost gains none: its sensors see something else.
+    """
 
     def is_between(mode: Mode) -> bool:
         own = [each for each in known if each.plane == mode.plane]
+        if own and 2 * sum(_has(modes, each) for each in own) <= len(own):
+            return False
         return all(
             (each.frequency_hz - mode.frequency_hz) * (each.order - mode.order) > 0
             and abs(each.frequency_hz / mode.frequency_hz - 1) > _OTHER_PLANE

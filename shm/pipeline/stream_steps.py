@@ -13,7 +13,7 @@ from shm.errors import NothingThere
 from shm.identify import IdentifyOptions
 from shm.identify.options import PASSED
 from shm.monitor import as_modal_test, offsets, pooled, read_window, sensor_faults
-from shm.values import Alert, Hanger, ModalTest, Mode, Posterior
+from shm.values import PLANES, Alert, Hanger, ModalTest, Mode, Plane, Posterior
 from shm.values.stream import Period, Piece, PooledReading, Stream, StreamEvent, WindowReading
 from shm.watch.stream_cause import led_by
 from shm.watch.stream_state import windows_as_mounted, with_believed
@@ -26,11 +26,15 @@ _FLOOR_DB = -200  # of a channel that is exactly 0
 
 @dataclass(frozen=True, eq=False)
 class WindowFound:
-    """What a window says, faults of sensors, and what later windows compare their offsets with."""
+    """What a window says, faults of sensors, and what later windows compare their offsets with.
+
+    `lacks_modes`: of a plane, half of the known modes or more were not found.
+    """
 
     reading: WindowReading
     events: tuple[StreamEvent, ...]
     offsets: Mapping[str, float]
+    lacks_modes: bool = False
 
 
 def read_stream_window(
@@ -40,6 +44,7 @@ def read_stream_window(
     hanger: Hanger,
     options: IdentifyOptions,
     earlier: Sequence[Mapping[str, float]],
+    is_confirmed: bool = True,
 ) -> WindowFound:
     """Return the modes of ten minutes by the last `known` ones; `earlier` are the offsets before.
 
@@ -50,12 +55,18 @@ def read_stream_window(
     passed_hz = PASSED * stream.sampling_rate_hz
     if options.band_low_hz < passed_hz < options.band_high_hz:
         options = replace(options, band_high_hz=passed_hz)
-    reading = read_window(pieces, stream, known, hanger, options)
+    reading = read_window(pieces, stream, known, hanger, options, is_confirmed)
     return WindowFound(
         replace(reading, spectrum_db=spectrum_db(pieces)),
         sensor_faults(pieces, stream, known, earlier),
         offsets(pieces),
+        any(_lacks_modes(plane, known, reading) for plane in PLANES),
     )
+
+
+def _lacks_modes(plane: Plane, known: Sequence[Mode], reading: WindowReading) -> bool:
+    usual, seen = (sum(m.plane == plane for m in modes) for modes in (known, reading.modes))
+    return 2 * seen <= usual
 
 
 def spectrum_db(pieces: Sequence[Piece]) -> tuple[int, ...]:

@@ -254,6 +254,7 @@ class Streaming:
                 hanger,
                 options,
                 tuple(self._offsets[stream.name]),
+                self.store.streams.has_followed_modes(stream.name),
             ),
             partial(self._keep_window, stream),
             partial(self._give_up_window, stream, start),
@@ -370,7 +371,7 @@ class Streaming:
             self.store.streams.save_event(event)
         self._offsets[stream.name].append(found.offsets)
         self._save(found.reading)
-        if not found.reading.modes:
+        if found.lacks_modes or not found.reading.modes:
             note_blindness(self.store, stream, found.reading.window.start)
 
     def _save(self, reading: WindowReading) -> None:

@@ -37,7 +37,7 @@ LATELY = timedelta(days=1)
 _LATE, _SILENT = timedelta(minutes=5), timedelta(hours=1)
 """judgement: loggers send each minute; a router begins anew within five minutes."""
 _AHEAD = timedelta(minutes=2)  # judgement: clocks without GPS or NTP are seconds off
-_AT_FAULT = ("dead", "drifting", "swapped", "saturated", "thermometer")
+_AT_FAULT = ("dead", "drifting", "swapped", "saturated", "lost modes", "thermometer")
 _FAULT_STANDS = timedelta(hours=1)  # six windows: one that shows nothing ends it
 _STANDS = {"thermometer": timedelta(hours=2)}  # derived: an hour is judged once it is over
 _NAMED = 5  # of many: the page of sensors lists them all
@@ -106,12 +106,10 @@ def word_of(last: datetime | None, events: Sequence[StreamEvent], now: datetime)
         return "silent"
     if now - last > _LATE:
         return "late"
-    standing = {
-        each.kind for each in events if last - each.end < _STANDS.get(each.kind, _FAULT_STANDS)
-    }
-    if "lost modes" in standing:
+    standing = [e for e in events if last - e.end < _STANDS.get(e.kind, _FAULT_STANDS)]
+    if any(each.kind == "lost modes" and not each.channel for each in standing):
         return "sees nothing"
-    return "live" if standing.isdisjoint(_AT_FAULT) else "sensor at fault"
+    return "sensor at fault" if any(each.kind in _AT_FAULT for each in standing) else "live"
 
 
 def stream_leads(workspace: Workspace, store: Store, now: datetime) -> tuple[Lead, ...]:
@@ -266,7 +264,7 @@ def _blind_since(store: Store, name: str, at: datetime) -> datetime:
     """Since when a stream has seen nothing; no longer ago than twice what an alert takes."""
     since = None
     for each in reversed(store.streams.list_events(name, at - 2 * _LONG)):
-        if each.kind == "lost modes":
+        if each.kind == "lost modes" and not each.channel:
             if since and since - each.end > _BROKEN_OFF:
                 break
             since = min(since or at, each.start)
@@ -274,19 +272,18 @@ def _blind_since(store: Store, name: str, at: datetime) -> datetime:
 
 
 def note_blindness(store: Store, stream: Stream, start: datetime) -> None:
-    """Notes that a stream sees nothing of its hanger where its windows up to one show it."""
-    from shm.monitor.sensor_health import SEEN_BEFORE, sees_nothing  # they compute
+    """Save the events that the windows of a stream up to one do not see the hanger, or a plane."""
+    from shm.monitor.sensor_health import SEEN_BEFORE, find_lost_planes, sees_nothing  # compute
     from shm.store.ring_files import PERIOD
 
     since = start - SEEN_BEFORE
     found = store.streams.list_windows(stream.hanger, since, start + PERIOD)
     events = store.streams.list_events(stream.name, since)
-    event = sees_nothing(
-        [each for each in found if each.window.stream == stream.name],
-        [each for each in events if each.kind == "lost modes" and each.start <= start],
-    )
-    if event is not None:
-        store.streams.save_event(event)
+    windows = [each for each in found if each.window.stream == stream.name]
+    reported = [each for each in events if each.kind == "lost modes" and each.start <= start]
+    event = sees_nothing(windows, reported)
+    for each in [event] if event else find_lost_planes(windows, stream, reported):
+        store.streams.save_event(each)
 
 
 def _told(stored: StoredAlert) -> tuple[str, str]:

@@ -101,18 +101,25 @@ class Streams(Repository):
         return next(iter(self._values(table, query.limit(1), WindowReading)), None)
 
     def last_modes(self, stream: str) -> tuple[Mode, ...]:
-        """The modes of the latest windows of a stream that have any, each as it was seen last.
+        """Return the modes of the latest windows that have any, each as it was seen last.
 
         A mode that one window hides is looked for again in the next.
         """
-        table = stream_windows
-        query = sa.select(table).where(table.c.stream == stream, table.c.has_modes)
-        latest = query.order_by(table.c.start.desc()).limit(_LATEST)
         found: dict[tuple[Plane, int], Mode] = {}
-        for reading in self._values(table, latest, WindowReading):
+        for reading in self._latest_with_modes(stream):
             for mode in reading.modes:
                 found.setdefault((mode.plane, mode.order), mode)
         return tuple(sorted(found.values(), key=lambda mode: mode.frequency_hz))
+
+    def has_followed_modes(self, stream: str) -> bool:
+        """Return True if one of the latest windows followed modes that an earlier one had found."""
+        return any(each.how == "tracked" for each in self._latest_with_modes(stream))
+
+    def _latest_with_modes(self, stream: str) -> tuple[WindowReading, ...]:
+        table = stream_windows
+        query = sa.select(table).where(table.c.stream == stream, table.c.has_modes)
+        latest = query.order_by(table.c.start.desc()).limit(_LATEST)
+        return self._values(table, latest, WindowReading)
 
     def last_hour(self, stream: str) -> PooledReading | None:
         """The latest reading of an hour of a stream."""

@@ -263,7 +263,7 @@ def _names(pattern: _Pattern) -> tuple[str, ...]:
     return (f"{pattern.plane}_end_stiffness",) if pattern.name == "end" else (pattern.name,)
 
 
-_HINTS = ("logger", "swapped", "saturated", "drifting", "dead", "clock step")
+_HINTS = ("logger", "swapped", "saturated", "drifting", "dead", "lost modes", "clock step")
 """Kinds of events that may be behind frequencies that move, the likeliest first."""
 BESIDE = timedelta(hours=3)
 """Judgement: before a change and behind it: who exchanges a sensor works for an hour or two, and

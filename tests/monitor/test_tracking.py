@@ -12,7 +12,7 @@ import pytest
 
 from shm.identify import IdentifyOptions, identify
 from shm.monitor import read_window, tracking
-from shm.values import Channel, Hanger, Mode, Recording
+from shm.values import PLANES, Channel, Hanger, Mode, Recording
 from shm.values.stream import Piece, Stream, StreamChannel, WindowReading
 from tests.helpers.ambient_stream import (
     LENGTH_M,
@@ -173,6 +173,42 @@ def test_a_mode_that_is_gone_is_told_and_the_others_stay() -> None:
     assert gone not in _by_name(reading.modes)
     assert len(reading.modes) == 9
     assert "longitudinal 2" in reading.why
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_read_window_detached_plane(seed: int) -> None:
+    """Known modes keep their numbers though the transverse sensors see the deck instead.
+
+    A peak of the deck may pass for a mode, but within 0.4 % of where that mode was.
+    """
+    rng = np.random.default_rng(seed)
+    motion = drawn(rng, orders=4)
+    deck = {(plane, order): rng.uniform(2, 40) for plane in PLANES for order in range(1, 7)}
+    off = replace(motion, frequency_hz=deck, damping=dict.fromkeys(deck, 0.01))
+    samples = values(motion, rng)
+    samples[[0, 2]] = values(off, rng)[[0, 2]]
+    at = replace(piece(samples), start=START.replace(minute=30))
+    reading = read_window([at], stream(), motion.known(), HANGER, OPTIONS)
+    for mode in reading.modes:
+        expected = motion.frequency_hz[mode.plane, mode.order]
+        assert mode.frequency_hz == pytest.approx(expected, rel=5e-3)
+    assert sum(mode.plane == "longitudinal" for mode in reading.modes) >= 3
+
+
+@pytest.mark.parametrize("share", [-0.3, 0.3])
+def test_read_window_large_change(share: float) -> None:
+    """A change of tension beyond reach is found from scratch and keeps all numbers."""
+    rng = np.random.default_rng(3)
+    motion = drawn(rng, orders=4)
+    added = share * motion.frequency_hz["transverse", 1] ** 2
+    hz = {key: (f**2 + added * key[1] ** 2) ** 0.5 for key, f in motion.frequency_hz.items()}
+    now = replace(motion, frequency_hz=hz)
+    at = replace(piece(values(now, rng)), start=START.replace(minute=30))
+    reading = read_window([at], stream(), motion.known(), HANGER, OPTIONS)
+    assert reading.how == "from scratch"
+    assert len(reading.modes) >= 6
+    for mode in reading.modes:
+        assert mode.frequency_hz == pytest.approx(hz[mode.plane, mode.order], rel=2e-3)
 
 
 @pytest.mark.slow

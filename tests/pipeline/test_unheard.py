@@ -52,6 +52,12 @@ def test_a_stream_is_in_one_state(ago: timedelta, kind: str, state: State) -> No
     assert word_of(NOW - ago, [an_event(kind, NOW - ago)], NOW) == state
 
 
+def test_word_of_channel_without_modes() -> None:
+    event = replace(an_event("lost modes", NOW), channel="acc_1")
+    assert word_of(NOW, [event], NOW) == "sensor at fault"
+    assert word_of(NOW, [event, an_event("lost modes", NOW)], NOW) == "sees nothing"
+
+
 def test_each_state_that_asks_for_a_person_is_told_once_with_its_remedy() -> None:
     found = [
         Heard(STREAM, "silent", NOW),
