@@ -77,10 +77,11 @@ def sensor_faults(
     now = offsets(pieces)
     broken = set()
     for channel in stream.channels:
-        if fault := _fault(channel, _samples(pieces, channel.name)):
+        values = _samples(pieces, channel.name)
+        if fault := _fault(channel, values):
             found.append((fault[0], channel.name, fault[1]))
             broken.add(channel.name)
-        elif drift := _drift(channel.name, now, earlier):
+        elif drift := _drift(channel.name, now, earlier, _measure_scatter(values)):
             found.append(("drifting", channel.name, drift))
     usable = [channel for channel in stream.channels if channel.name not in broken]
     stretches = [
@@ -301,14 +302,26 @@ def _fault(channel: StreamChannel, values: FloatArray) -> tuple[StreamEventKind,
     return None
 
 
-def _drift(name: str, now: Mapping[str, float], earlier: Sequence[Mapping[str, float]]) -> str:
+def _measure_scatter(values: FloatArray) -> float:
+    """Return the usual deviation of the finite samples from their median."""
+    known = values[np.isfinite(values)]
+    return _USUAL_SD * float(np.median(np.abs(known - np.median(known)))) if len(known) else 0.0
+
+
+def _drift(
+    name: str,
+    now: Mapping[str, float],
+    earlier: Sequence[Mapping[str, float]],
+    motion: float,
+) -> str:
+    """Describe a drift that no chance makes and that is more than the `motion` of the samples."""
     before = np.array([each[name] for each in earlier if name in each])
     if len(before) < _LEAST_EARLIER or name not in now:
         return ""
     usual = float(np.median(before))
     scatter = _USUAL_SD * float(np.median(np.abs(before - usual)))
     change = now[name] - usual
-    if abs(change) <= _DRIFT * scatter or scatter == 0:
+    if abs(change) <= max(_DRIFT * scatter, motion) or scatter == 0:
         return ""
     return (
         f"its offset is {now[name]:.3g} m/s^2, {change:+.2g} from its median before "

@@ -77,6 +77,15 @@ def test_sound_sensors_are_not_accused() -> None:
     assert sensor_faults([], stream(), (), ()) == ()
 
 
+def test_sensor_faults_negligible_drift() -> None:
+    """An offset that moves by a fifth of a mm/s^2 is less than the hanger's own motion."""
+    earlier = [{name: 0.01 + 1e-6 * float(RNG.normal()) for name in EARLIER[0]} for _ in EARLIER]
+    samples = SAMPLES - np.median(SAMPLES, axis=1, keepdims=True) + 0.01
+    assert sensor_faults([piece(samples + 2e-4)], stream(), MOTION.known(), earlier) == ()
+    found = sensor_faults([piece(samples + 0.05)], stream(), MOTION.known(), earlier)
+    assert {each.kind for each in found} == {"drifting"}
+
+
 def test_offsets_are_medians_and_know_of_no_samples() -> None:
     samples = SAMPLES + 0.02
     samples[0] = np.nan
