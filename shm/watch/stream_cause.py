@@ -19,7 +19,7 @@ from datetime import timedelta
 
 import numpy as np
 
-from shm.values import PLANES, Alert, BoolArray, Change, FloatArray, Moved
+from shm.values import NAN, PLANES, Alert, BoolArray, Change, FloatArray, Moved
 from shm.values.stream import StreamEvent
 from shm.watch.stream_reading import ModeTable, planes_of
 
@@ -102,13 +102,18 @@ class Cause:
 
 
 def cause_of(moved: FloatArray, table: ModeTable, readings: FloatArray) -> Cause:
-    """Of mean log frequencies that moved (n,), NaN where unknown, over so many `readings` each."""
+    """Find the cause of mean log frequencies that moved (n,), over so many `readings` each.
+
+    What moved a mode is NaN where unknown; where that holds for all, nothing explains the change.
+    """
     known = np.isfinite(moved) & (readings > 0)
     sub = replace(
         table,
         modes=tuple(mode for mode, own in zip(table.modes, known, strict=True) if own),
         **{name: getattr(table, name)[known] for name in ("tension", "ends", "spread", "level")},
     )
+    if not known.any():
+        return Cause(_UNEXPLAINED, (Moved(_UNEXPLAINED, 1.0, NAN, NAN),), moved, NAN)
     # Hours do not average out what a mode keeps for a day.
     y, variance = moved[known], sub.spread + _DAY_SD**2
     patterns, fits = _best_of_each(_patterns(sub, y), y, variance)

@@ -242,6 +242,18 @@ def test_where_ends_and_tension_cannot_be_told_apart_both_are_named() -> None:
     assert first.shift_mean == pytest.approx(math.log(0.98), abs=0.003)
 
 
+@pytest.mark.parametrize(("moved", "readings"), [(math.nan, 24.0), (0.01, 0.0)])
+def test_cause_of_no_known_mode(moved: float, readings: float) -> None:
+    """Where no mode is known both before and after, the change is unexplained."""
+    hz = zip(MODES, np.exp(BASE).tolist(), strict=True)
+    table = ModeTable.of(None, HANGER, [Mode(*own, each, 2e-4 * each) for own, each in hz])
+    cause = cause_of(np.full(10, moved), table, np.full(10, readings))
+    assert (cause.name, cause.takes_hours) == ("unexplained", True)
+    (alone,) = cause.moved
+    assert (alone.quantity, alone.probability) == ("unexplained", 1.0)
+    assert math.isnan(alone.shift_mean)
+
+
 def test_without_a_thermometer_it_is_careful_and_goes_on() -> None:
     readings = hours(700, seed=5)
     blind = [replace(each, temperature_c=math.nan) for each in readings[400:500]]
