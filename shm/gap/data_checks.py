@@ -306,15 +306,21 @@ def _contradictions(tests: Sequence[ModalTest]) -> list[str]:
 
 
 def _alike(one: ModalTest, other: ModalTest) -> bool:
-    """Whether nothing is known to differ between the tests' conditions."""
+    """Return True if the tests were made under the same conditions, as far as these are known.
+
+    A temperature must be known of both; what else is unknown of both counts as the same.
+    """
     if one.added_mass != other.added_mass:
         return False
-    if abs(one.temperature_c - other.temperature_c) > _SAME_TEMPERATURE_K:
+    if not abs(one.temperature_c - other.temperature_c) <= _SAME_TEMPERATURE_K:
+        return False
+    pairs = [(one.tension_read_n, other.tension_read_n), (one.amplitude, other.amplitude)]
+    if any(math.isnan(first) != math.isnan(second) for first, second in pairs):
         return False
     if abs(one.tension_read_n - other.tension_read_n) > 0:
         return False
-    levels = sorted([one.amplitude, other.amplitude])
-    return not levels[1] > _SAME_LEVEL * levels[0]
+    levels = one.amplitude, other.amplitude
+    return not max(levels) > _SAME_LEVEL * min(levels)
 
 
 def _worst_difference(one: ModalTest, other: ModalTest) -> tuple[str, float, float] | None:

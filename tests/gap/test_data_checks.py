@@ -154,6 +154,26 @@ def test_tests_under_other_conditions_may_differ() -> None:
         assert usable([_test("t1"), changed], HANGER).remarks == ()
 
 
+@pytest.mark.parametrize(
+    "unknown",
+    [{"temperature_c": NAN}, {"amplitude": NAN}, {"tension_read_n": 500e3}],
+    ids=["temperature", "amplitude", "tension"],
+)
+@pytest.mark.parametrize("first", [True, False])
+def test_usable_unknown_conditions(unknown: dict[str, float], first: bool) -> None:
+    """A test whose condition is unknown, next to one of which it is known, contradicts nothing."""
+    tests = [_test("t1"), _test("t2", tuple(1.01 * f for f in FREQUENCIES))]
+    changed = 0 if first else 1
+    tests[changed] = replace(tests[changed], **unknown)
+    assert not any("contradict" in each for each in usable(tests, HANGER).remarks)
+
+
+def test_usable_unknown_temperatures() -> None:
+    tests = [_test("t1"), _test("t2", tuple(1.01 * f for f in FREQUENCIES))]
+    unknown = [replace(each, temperature_c=NAN) for each in tests]
+    assert not any("contradict" in each for each in usable(unknown, HANGER).remarks)
+
+
 def test_an_unknown_temperature_among_known_ones_is_said() -> None:
     unknown = replace(_test("t2"), temperature_c=NAN)
     (remark,) = usable([_test("t1"), unknown], HANGER).remarks
