@@ -10,8 +10,9 @@ nothing, and late tests take their place.
 
 Each change has a mass in years: the time in which it may have begun times its Bayes factor to no
 change. Their sum is the Shiryaev-Roberts statistic. Under no change each mass stays the same on
-average, and all masses together are the time watched: a statistic of which that is true exceeds L
-years not before L years on average (Shiryaev 1963, Roberts 1966, Pollak 1985).
+average, and all masses together are at most the time watched: a statistic of which that is true
+exceeds L years not before L years on average (Shiryaev 1963, Roberts 1966, Pollak 1985). Most runs
+show three quarters of that time: the masses of large changes have it from rare large values.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""The stated rate of false calls, and what it rests on: the statistic's mean is the time."""
+"""The rate of false calls that the manual states: the statistic's mean is at most the time.
+
+Causes other than tension and ends hold a third of the prior. Their changes are large, so that their
+part of the mean rests on rare large values: hardly any run of this size shows it.
+"""
 
 from __future__ import annotations
 
@@ -13,26 +17,15 @@ from tests.helpers.synthetic_readings import BOTH_ENDS, START, History, tension,
 
 WEAK_STEP = 0.001
 """A change much below the scatter: then the statistic's mean is not that of a few large values."""
+LIMIT_YEARS = 2.0
 
 
 def years(readings: list[Reading], index: int) -> float:
     return (readings[index].time - START).total_seconds() / 86400 / 365.25
 
 
-def statistics(history: History, options: WatchOptions, n: int) -> FloatArray:
-    """Years watched and the statistic (n, 2) of n hangers without change, never called."""
-    found = []
-    for seed in range(n):
-        readings = history.readings(seed)
-        result = watch_of(readings, history.quantities, options).tests[-1].change
-        # The last test alone speaks for no change: its time is not counted.
-        found.append((years(readings, -2) - years(readings, 0), result.evidence_years))
-    return np.array(found)
-
-
-@pytest.mark.trial
-@pytest.mark.parametrize("beginnings", [40, 8])
-def test_without_change_the_statistic_is_the_time_watched_on_average(beginnings: int) -> None:
+def measure_statistics(beginnings: int, hangers: int) -> FloatArray:
+    """Return years watched and the statistic (n, 2) of hangers without change, never called."""
     history = History((tension(WEAK_STEP),), tests=16, days_between=30, scatter=0.003, outliers=0)
     options = WatchOptions(
         limit_years=math.inf,
@@ -41,31 +34,56 @@ def test_without_change_the_statistic_is_the_time_watched_on_average(beginnings:
         scatter_scales=(1.0,),
         beginnings=beginnings,
     )
+    found = []
+    for seed in range(hangers):
+        readings = history.readings(seed)
+        result = watch_of(readings, history.quantities, options).tests[-1].change
+        # The last test alone speaks for no change: its time is not counted.
+        found.append((years(readings, -2) - years(readings, 0), result.evidence_years))
+    return np.array(found)
 
-    time, statistic = statistics(history, options, 100).T
 
-    error = np.std(statistic - time) / math.sqrt(len(time))
-    assert error < 0.2 * time.mean()
-    assert abs(np.mean(statistic - time)) < 3 * error
-
-
-@pytest.mark.trial
-@pytest.mark.parametrize("scatter", [0.003, 0.0055])
-def test_false_calls_are_no_more_than_stated(scatter: float) -> None:
-    limit, hangers = 2.0, 50
-    history = History((tension(0.006),), tests=20, days_between=30, scatter=scatter)
-    options = WatchOptions(limit_years=limit)
-
+def count_calls(scatter: float, hangers: int, step: float = 0.0) -> tuple[int, float]:
+    """Return how many hangers were called, and how many calls the limit allows for their time."""
+    history = History(
+        (tension(0.006),),
+        tests=20,
+        days_between=30,
+        scatter=scatter,
+        change_at=10 if step else 10**6,
+        step=[step],
+    )
     called, watched_years = 0, 0.0
     for seed in range(hangers):
         readings = history.readings(seed)
-        calls = watch_of(readings, history.quantities, options).calls
+        calls = watch_of(readings, history.quantities, WatchOptions(limit_years=LIMIT_YEARS)).calls
         called += bool(calls)
         watched_years += years(readings, -1)
+    return called, watched_years / LIMIT_YEARS
 
-    stated = watched_years / limit / hangers
-    assert called > 0
-    assert called / hangers <= stated + 2 * math.sqrt(stated / hangers)
+
+@pytest.mark.parametrize(
+    "hangers", [pytest.param(8, id="few"), pytest.param(100, id="many", marks=pytest.mark.trial)]
+)
+@pytest.mark.parametrize("beginnings", [40, 8])
+def test_evidence_years_without_change(beginnings: int, hangers: int) -> None:
+    """It grows by 0.75 of the time watched: by the prior of tension and ends, 0.68, and a little
+    of the others'."""
+    time, statistic = measure_statistics(beginnings, hangers).T
+    error = np.std(statistic - time) / math.sqrt(hangers) / time.mean()
+    assert error < 0.05
+    assert 0.68 - 3 * error < statistic.mean() / time.mean() < 0.85 + 3 * error
+
+
+@pytest.mark.parametrize(
+    "hangers", [pytest.param(6, id="few"), pytest.param(50, id="many", marks=pytest.mark.trial)]
+)
+@pytest.mark.parametrize("scatter", [0.003, 0.0055])
+def test_false_calls_below_limit(scatter: float, hangers: int) -> None:
+    """Far fewer than the limit allows are called, and nearly all that lost a twelfth."""
+    called, allowed = count_calls(scatter, hangers)
+    assert called <= 0.2 * allowed
+    assert count_calls(scatter, 3, math.log(1 - 1 / 12))[0] >= 2
 
 
 def test_five_quantities_without_change_are_left_alone_at_the_usual_limit() -> None:
