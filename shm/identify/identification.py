@@ -28,7 +28,7 @@ from shm.identify.estimation.ssi import looked_at_again, summed_hankel_ssi
 from shm.identify.estimation.stabilise import completed
 from shm.identify.measuring.setups import measured, refuse_off_the_hanger, without_unused_force
 from shm.identify.mode_ordering.confirmed import placed_with_doubtful
-from shm.identify.mode_ordering.placement import Placement, placed
+from shm.identify.mode_ordering.placement import STATE_PLANES, Placement, placed
 from shm.identify.mode_ordering.planes import directions
 from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
@@ -49,6 +49,7 @@ from shm.values import (
     Mode,
     QualityCheck,
     Recording,
+    ResponsePoint,
     as_test_id,
 )
 
@@ -124,7 +125,7 @@ def identify(
     if not placement.modes:
         calm = _once_calm(measurements, options, hanger, steady)
         if calm is None and placement.check is None:
-            raise _nothing_found(records[0].source, found.finding, placement)
+            raise _nothing_found(records[0].source, found.finding, placement, found.points)
         placement, level_left, noted = calm or (placement, 1.0, noted)
         free = level_left
     else:
@@ -207,7 +208,8 @@ def _of_placed(
     """What numbered modes say of their numbers and of the sensors."""
     checks = [placement.check]
     if hanger and hanger.as_hanger and placement.modes:
-        checks.append(first_orders(placement.modes, hanger, options.band_low_hz))
+        if any(point.plane for point in found.points):  # else no plane can lack a mode
+            checks.append(first_orders(placement.modes, hanger, options.band_low_hz))
         checks.append(sensor_gain(measurements, found.apart, placement.modes, hanger))
         checks.append(sensor_places(placement.modes, hanger))
     return [check for check in checks if check is not None]
@@ -317,14 +319,21 @@ def _test(
     )
 
 
-def _nothing_found(source: str, found: Finding, placement: Placement) -> NotIdentifiable:
+def _nothing_found(
+    source: str, found: Finding, placement: Placement, points: Sequence[ResponsePoint]
+) -> NotIdentifiable:
+    """Return the refusal of a test without a mode, missing planes before all that is dropped."""
     reasons = [f"{d.count} {d.what}: {d.reason}" for d in found.dropped if d.count]
     reasons += [f"{mode.frequency_hz:.4g} Hz: {mode.reason}" for mode in placement.set_aside]
+    remedy = (
+        "Check that hits ring down undisturbed, that the band holds modes and that nothing knocks "
+        "while the hanger swings far: hit softer."
+    )
+    if not any(point.plane for point in points):
+        reasons.insert(0, "no channel states its plane")
+        remedy = f"{STATE_PLANES} {remedy}"
     return NotIdentifiable(
-        f"no mode can be trusted ({'; '.join(reasons)}).",
-        file=source,
-        remedy="Check that hits ring down undisturbed, that the band holds modes and that nothing "
-        "knocks while the hanger swings far: hit softer.",
+        f"no mode can be trusted ({'; '.join(reasons)}).", file=source, remedy=remedy
     )
 
 

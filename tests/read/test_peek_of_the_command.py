@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from shm.pipeline.importing import Answers, keep_profile, look_into, understand
 from shm.read import bundle, sidecar_path
 from shm.values import FrequencyResponse, Recording
 from shm_cli.main import run
+from tests.helpers.workspaces import make_workspace
 from tests.helpers.written import write
 
 
@@ -68,3 +71,58 @@ def test_what_is_left_out_is_no_problem(
     assert run(["ingest", "--peek", "--json", str(path)]) == 0
     (look,) = json.loads(capsys.readouterr().out)["files"]
     assert (look["left_out"], look["problems"]) == (["acc_2"], [])
+
+
+def strip_planes(recording: Recording) -> Recording:
+    bare = tuple(replace(channel, plane=None) for channel in recording.channels)
+    return replace(recording, channels=bare, hanger=None)
+
+
+def test_peek_missing_planes(
+    recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "test.csv"
+    write(strip_planes(recording), path)
+    assert run(["ingest", "--peek", str(path)]) == 3
+    said = capsys.readouterr().err
+    assert f"missing: plane of acc_1, acc_2: run `shm import {path}`" in said
+    assert run(["ingest", "--peek", "--json", str(path)]) == 3
+    (look,) = json.loads(capsys.readouterr().out)["files"]
+    assert look["missing"] == ["plane of acc_1, acc_2"]
+    sidecar_path(path).write_text('plane = ["transverse", "longitudinal"]\n')
+    assert run(["ingest", "--peek", str(path)]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_peek_in_workspace(
+    recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A workspace needs the hanger as well, and knows what its loggers' profiles say."""
+    workspace = make_workspace(tmp_path / "bridge", hangers=(3,))
+    path = tmp_path / "test.csv"
+    write(strip_planes(recording), path)
+    peek = ["--workspace", str(workspace.folder), "ingest", "--peek", str(path)]
+    assert run(peek) == 3
+    assert "missing: hanger; plane of acc_1, acc_2: run" in capsys.readouterr().err
+    found = look_into(path, workspace, Answers())
+    sensors = {
+        "acc_1": {"plane": "transverse", "x_m": 2.5},
+        "acc_2": {"plane": "longitudinal", "x_m": 2.5},
+    }
+    keep_profile(understand(found.survey, workspace, Answers(3, channels=sensors)), workspace)
+    assert run(peek) == 0
+    out = capsys.readouterr()
+    assert out.out.startswith(f"{path}: CSV, hanger 3")
+    assert out.err == ""
+
+
+def test_peek_structure_needs_no_planes(
+    recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    workspace = make_workspace(tmp_path / "bridge", hangers=(3,))
+    described = workspace.folder / "bridge.toml"
+    described.write_text(f'{described.read_text()}\n[[structure]]\nid = 9\nname = "deck"\n')
+    path = tmp_path / "test.csv"
+    write(replace(strip_planes(recording), hanger=9), path)
+    assert run(["--workspace", str(workspace.folder), "ingest", "--peek", str(path)]) == 0
+    assert capsys.readouterr().err == ""

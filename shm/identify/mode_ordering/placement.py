@@ -49,6 +49,7 @@ from shm.values import (
     QualityCheck,
     ResponsePoint,
     ShapePoint,
+    Verdict,
 )
 from shm.values.modes import NUMBERING
 
@@ -116,7 +117,7 @@ def placed(
             *_order_notes(numbered.ordered),
             *_irregular_notes(numbered.ordered),
         ),
-        check=_check(numbered, known, found),
+        check=_check(numbered, known, found, points),
     )
 
 
@@ -271,13 +272,22 @@ def _by_frequency(modes: Sequence[ForeignMode]) -> tuple[ForeignMode, ...]:
     return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
 
 
+STATE_PLANES = (
+    "State the plane of each channel: `shm import FILE` asks for it and keeps it for all files of "
+    "the logger, or write `plane` into the file's header or its sidecar."
+)
 _MORE = "Measure more of the lowest modes: hit with a softer tip, and away from the ends."
 
 
 def _check(
-    numbered: _Numbered, known: Hanger | None, found: Sequence[FoundMode]
+    numbered: _Numbered,
+    known: Hanger | None,
+    found: Sequence[FoundMode],
+    points: Sequence[ResponsePoint],
 ) -> QualityCheck | None:
-    """Whether the orders are known, or guessed."""
+    """Judge how sure the orders are; None where there is no mode."""
+    if found and not any(point.plane for point in points):
+        return _of_no_planes(numbered)
     if not numbered.ordered:
         return _of_no_order(numbered) if found else None
     value = float(min(numbered.margin, 100.0))  # technical: of a figure that can be read
@@ -287,6 +297,15 @@ def _check(
     return QualityCheck(
         NUMBERING, "good", value, LEAST_MARGIN, "", "no other numbering fits as well"
     )
+
+
+def _of_no_planes(numbered: _Numbered) -> QualityCheck:
+    """Blame the missing planes before the test: modes of both planes are taken for one series."""
+    verdict: Verdict = "warning" if numbered.ordered else "refused"
+    found = "no channel states its plane: modes of both planes may be mixed"
+    if not numbered.ordered:
+        found = f"the orders of the modes are not known: {found}"
+    return QualityCheck(NUMBERING, verdict, 0.0, LEAST_MARGIN, "", found, STATE_PLANES)
 
 
 def _of_no_order(numbered: _Numbered) -> QualityCheck:
