@@ -330,7 +330,8 @@ def _of_unit(column: SurveyedColumn) -> Question:
     quoted = shlex.quote(column.name)
     if words.volts_of(column.unit) is None and column.unit not in WORTHS:
         said = f"; {column.unit!r} is unknown or unlike its name" if column.unit else ""
-        text = f"In what unit is {column.name} recorded (N, kN, m/s2, g{said})?"
+        units = f"N, kN, m/s2, g, s; 'none' leaves it out{said}"
+        text = f"In what unit is {column.name} recorded ({units})?"
         option = f"--unit {quoted}=UNIT or --leave-out {quoted}"
     else:
         text = f"What does the sensor of {column.name} give (such as 100 mV/g, 2.25 mV/N)?"

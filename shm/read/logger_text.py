@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from itertools import pairwise
@@ -26,7 +26,7 @@ from shm.errors import BadInput
 from shm.read import assemble
 from shm.read import logger_words as words
 from shm.read.base import LoggerColumn, LoggerTable, Peek
-from shm.read.comma_table import LINE_BREAK, cells_of, mark_between
+from shm.read.comma_table import LINE_BREAK, REMEDY, cells_of, mark_between, rate_of
 from shm.read.header import Entry, Header, quantity_named
 from shm.read.limits import refuse_long_header
 from shm.read.logger_heading import Heading, heading_of, quantity_said, rate_said, unlike, unrounded
@@ -275,7 +275,8 @@ def header_of(table: LoggerTable, path: Path) -> tuple[Header, list[int], tuple[
     used = [
         place
         for place, column in enumerate(table.columns)
-        if column.name in described or is_measured(column)
+        if (column.name in described and not _described_seconds(described[column.name]))
+        or (column.name not in described and is_measured(column))
     ]
     channels = {
         table.columns[place].name: _entries(table.columns[place], table.names_line, path)
@@ -290,6 +291,11 @@ def header_of(table: LoggerTable, path: Path) -> tuple[Header, list[int], tuple[
     }
     entries = {key: Entry(value, path) for key, value in said.items() if value is not None}
     return with_sidecar(Header(path, channels, entries), path, out), used, out
+
+
+def _described_seconds(entries: Mapping[str, Entry]) -> float | None:
+    """Return the seconds of a unit of time that a sidecar gives a column; None of other units."""
+    return words.seconds_of(entries["unit"].text) if "unit" in entries else None
 
 
 def is_measured(column: LoggerColumn) -> bool:
@@ -330,8 +336,10 @@ def recording(table: LoggerTable, path: Path) -> Recording:
 def peeked(table: LoggerTable, file_format: str, path: Path) -> Peek:
     """What the headers say; faults become problems."""
     header, _, out = header_of(table, path)
-    rate = told_rate(table, header, path)
-    look = assemble.peeked(header, file_format, table.samples, lambda: rate, path, left_out=out)
+    look = assemble.peeked(
+        header, file_format, table.samples, lambda: told_rate(table, header, path), path,
+        left_out=out,
+    )  # fmt: skip
     return look if look.time else replace(look, possible_times=table.possible_times)
 
 
@@ -348,9 +356,28 @@ def told_rate(table: LoggerTable, header: Header, path: Path) -> float:
     A column of times is rounded to its last digit, and a preamble's rate is the one that was set.
     """
     entry = header.entries.get("sampling_rate_hz")
+    if entry is None and math.isnan(table.times_rate_hz):
+        return _described_rate(table, path)
     said = table.said_rate_hz
     agree = abs(table.times_rate_hz - said) <= _SAME * said
     return NAN if agree and entry is not None and entry.file == path else table.times_rate_hz
+
+
+def _described_rate(table: LoggerTable, path: Path) -> float:
+    """Return the rate by the column that the sidecar gives a unit of time; NaN where none has."""
+    for name, entries in channels_described(path).items():
+        seconds = _described_seconds(entries)
+        column = next((each for each in table.columns if each.name == name), None)
+        if seconds is not None and column is not None:
+            fault = _refusal_of_times(path, name)
+            return rate_of(column.values * seconds, fault)
+    return NAN
+
+
+def _refusal_of_times(path: Path, name: str) -> Callable[[int, str], BadInput]:
+    return lambda row, what: BadInput(
+        f"{what} at sample {row + 1}.", file=path, channel=name, remedy=REMEDY
+    )
 
 
 _SAME = 1e-3  # judgement: of the rate; a frequency that is off by so little moves no tension

@@ -118,13 +118,18 @@ def _keeps_step(heading: Heading, block: Block, place: int, said_hz: float, path
 
 
 def _is_counter(heading: Heading, block: Block, place: int, path: Path) -> bool:
-    """Whether a column counts the rows: by its name, or in the first place without a name."""
+    """Return whether a column counts the rows: by its name, or in the first place without a name.
+
+    Its steps may differ by the rounding of the last digit, as those of times do.
+    """
     named = words.means_counter(heading.names[place])
     if not named and not (place == 0 and heading.names[place] == "column_1"):
         return False
     values, _ = values_of(block, place, path)
     steps = np.diff(values)
-    return bool(len(steps) and np.all(steps == steps[0]) and steps[0] > 0)
+    if not len(steps) or not steps[0] > 0:
+        return False
+    return bool(np.all(np.abs(steps - steps[0]) <= _EVEN * steps[0]))
 
 
 def _nameless_times(heading: Heading, block: Block, counters: list[int], path: Path) -> list[int]:

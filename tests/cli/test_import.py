@@ -364,3 +364,43 @@ def modes_file(path: Path, with_nodes: bool = True) -> Path:
         )  # fmt: skip
     pyuff.UFF(str(path)).write_sets(sets[not with_nodes :], mode="add")
     return path
+
+
+def bare_export(path: Path, seed: int = 1, decimals: int = 6) -> Path:
+    """Write the numbers of a logger that writes no heading at all, times first."""
+    rng = np.random.default_rng(seed)
+    count = 4000
+    force = np.where(np.arange(count) % 2000 == 500, 900.0, rng.normal(0, 0.5, count))
+    rows = zip(np.arange(count) / 512, force, rng.normal(0, 1, count), strict=True)
+    path.write_text("".join(f"{t:.{decimals}f},{f:.4f},{a:.5f}\n" for t, f, a in rows))
+    return path
+
+
+def test_import_file_without_heading(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
+    """Its first column is rounded, and yet its times; what is asked once the next file knows."""
+    in_place = ("--workspace", workspace.folder)
+    units = ("--unit", "column_2=N", "--unit", "column_3=m/s2")
+    said = (*units, "--hanger", 3, "--place", "2.52", "--plane", "transverse")
+    ended = shm(*in_place, "import", bare_export(tmp_path / "a.csv"), *said, "--json")
+    assert ended.code == 0
+    assert ended.document["sampling_rate_hz"] == pytest.approx(512, rel=1e-5)
+    look = shm(*in_place, "ingest", "--peek", bare_export(tmp_path / "b.csv", 2), "--json")
+    assert look.code == 0
+    (found,) = look.document["files"]
+    assert found["sampling_rate_hz"] == pytest.approx(512, rel=1e-5)
+    assert [channel["name"] for channel in found["channels"]] == ["column_2", "column_3"]
+
+
+def test_import_column_in_seconds(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
+    """What the import accepts is read: a column that a person calls times is no channel."""
+    file = bare_export(tmp_path / "a.csv")
+    file.write_text("ticks,b,c\n" + file.read_text())
+    in_place = ("--workspace", workspace.folder)
+    units = ("--unit", "ticks=s", "--unit", "b=N", "--unit", "c=m/s2")
+    said = (*units, "--hanger", 3, "--place", "2.52", "--plane", "transverse")
+    ended = shm(*in_place, "import", file, *said)
+    assert ended.code == 0, ended.err
+    found = read(workspace.spool / "a.csv")
+    assert isinstance(found, Recording)
+    assert [channel.name for channel in found.channels] == ["b", "c"]
+    assert found.sampling_rate_hz == pytest.approx(512, rel=1e-5)
