@@ -27,8 +27,8 @@ In a notebook, from a recording to the tension and what limits it::
 - What goes wrong on purpose is a `ShmError`, which says what to do (`shm.errors` has the tree).
 
 SI units throughout (N, m, kg, s, Hz), temperatures in deg C, unknown numbers NaN. The same seed
-gives the same result. `read`, `identify` and `simulate` are packages too: call the name
-for the step, import from it what else it holds (`from shm.identify import IdentifyOptions`).
+gives the same result. `read`, `identify` and `simulate` are functions, and packages of the same
+name hold what they are made of: `from shm.identify import IdentifyOptions`.
 """
 
 from __future__ import annotations
@@ -39,8 +39,6 @@ from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from inspect import Signature
-
     from shm import export as export
     from shm import notebook as notebook
     from shm import plot as plot
@@ -90,45 +88,49 @@ _HOMES = {
     ),
 }  # fmt: skip
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
-_MODULES = ("export", "plot", *_STEPS_AND_PACKAGES)
+_MODULES = ("export", "plot")
 
-__all__ = sorted([*_HOME, *_MODULES])
+__all__ = sorted([*_HOME, *_MODULES, *_STEPS_AND_PACKAGES])
 
 
-class _StepAndPackage(ModuleType):
-    """A package that is also the step of its name: `shm.identify(...)`.
+class _Package(ModuleType):
+    """A package whose name is also that of a step: what it holds is an attribute of the step, too.
 
-    A package and a function of one name would hide each other, by the order of the imports.
+    So `import shm.identify.options as options` finds its way through the function.
     """
 
-    def __call__(self, *arguments: Any, **options: Any) -> Any:
-        return _step(self)(*arguments, **options)
-
-    @property
-    def __signature__(self) -> Signature:
-        from inspect import signature
-
-        return signature(_step(self))
-
-    @property
-    def __doc__(self) -> str:  # type: ignore[override]
-        return f"{_step(self).__doc__}\nAs a package: {vars(self)['__doc__']}"
-
-
-def _step(package: ModuleType) -> FunctionType:
-    step: FunctionType = getattr(import_module("shm.api"), package.__name__.removeprefix("shm."))
-    return step
+    def __setattr__(self, name: str, value: object) -> None:
+        super().__setattr__(name, value)
+        step = vars(sys.modules["shm"]).get(self.__name__.removeprefix("shm."))
+        if isinstance(step, FunctionType):
+            vars(step)[name] = value
 
 
 class _Shm(ModuleType):
     """This package; it hears of each sub-package as it is imported, whoever imports it."""
 
     def __setattr__(self, name: str, value: object) -> None:
-        if name in _STEPS_AND_PACKAGES and type(value) is ModuleType:
-            value.__class__ = _StepAndPackage
         if name == "values":
             import_module("shm.values.showing").hand_over_to(self)
+        if name in _STEPS_AND_PACKAGES and type(value) is ModuleType:
+            value.__class__ = _Package
+            return  # the name is the step's, which `__getattr__` loads
         super().__setattr__(name, value)
+
+
+def _load_step(name: str) -> object:
+    """Return the step of a name, with what the package of that name holds as its attributes."""
+    package = import_module(f"shm.{name}")
+    step = getattr(import_module("shm.api"), name, None)
+    if not isinstance(step, FunctionType):
+        return package  # asked for while the steps are being loaded
+    names = {*vars(package), *getattr(package, "__all__", ())}
+    held = {each for each in names if not each.startswith("__")} | {"__file__", "__path__"}
+    vars(step).update({each: getattr(package, each) for each in held})
+    if hasattr(package, "__all__"):
+        vars(step)["__all__"] = package.__all__
+    setattr(sys.modules[__name__], name, step)
+    return step
 
 
 sys.modules[__name__].__class__ = _Shm
@@ -137,6 +139,8 @@ if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
         """Load a public name at its first use, so that `import shm` stays cheap."""
+        if name in _STEPS_AND_PACKAGES:
+            return _load_step(name)
         if name in (*_MODULES, "notebook"):
             return import_module(f"shm.{name}")
         if name not in _HOME:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import pickle
+import pydoc
 import subprocess
 import sys
 import types
@@ -107,16 +109,54 @@ def test_help_and_dir_tell_every_name() -> None:
     assert [name for name in shm.__all__ if f"`{name}`" not in text] == []
 
 
-def test_a_step_is_a_package_too_whatever_was_imported_first() -> None:
-    from shm.identify import identify as inner
-    from shm.identify.options import IdentifyOptions
+STEPS = ("read", "identify", "simulate")
 
-    assert isinstance(shm.identify, types.ModuleType)
-    assert shm.identify.options.IdentifyOptions is IdentifyOptions
-    assert shm.identify.identify is inner
-    assert callable(shm.identify)
-    assert "band_hz" in inspect.signature(shm.identify).parameters
-    assert (shm.identify.__doc__ or "").startswith("The modes of one test")
+
+@pytest.mark.parametrize("name", STEPS)
+def test_help_shows_function(name: str) -> None:
+    """As `help(shm.identify)` and IPython's `shm.identify?` do."""
+    step = getattr(shm, name)
+    assert isinstance(step, types.FunctionType)
+    heading, _, signature, *text = pydoc.render_doc(step, renderer=pydoc.plaintext).split("\n")
+    assert heading == f"Python Library Documentation: function {name} in module shm.api"
+    assert signature.startswith(f"{name}({next(iter(inspect.signature(step).parameters))}: ")
+    assert text[0].strip() == (inspect.getdoc(step) or "").partition("\n")[0]
+    assert pydoc.locate(f"shm.{name}") is step
+
+
+@pytest.mark.parametrize(
+    "imported",
+    [
+        "import shm.identify.options",
+        "import shm.identify.options as options",
+        "from shm.identify.options import IdentifyOptions",
+        "from shm.identify import options",
+        "from shm import identify",
+        "import shm",
+        "import shm.api",
+        "import shm; shm.identify; import shm.identify.estimation.courses as courses; courses.np",
+    ],
+)
+def test_step_after_any_import(imported: str) -> None:
+    code = (
+        f"{imported}\nimport shm, sys, types\n"
+        "assert isinstance(shm.identify, types.FunctionType)\n"
+        "import shm.identify.options as again\n"
+        "assert again is sys.modules['shm.identify.options'] is shm.identify.options\n"
+        "assert shm.identify.IdentifyOptions is again.IdentifyOptions\n"
+        "assert isinstance(sys.modules['shm.identify'], types.ModuleType)\n"
+        "try: shm.identify.nothing\nexcept AttributeError as e: print(e)"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (ran.stdout, ran.stderr) == ("'function' object has no attribute 'nothing'\n", "")
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_step_pickles(name: str) -> None:
+    step = getattr(shm, name)
+    assert pickle.loads(pickle.dumps(step)) is step
 
 
 def test_a_wrong_name_is_an_attribute_error() -> None:
