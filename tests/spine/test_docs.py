@@ -135,3 +135,18 @@ def test_writing_the_page_of_validation_gives_what_is_kept(tmp_path: Path) -> No
     assert copy.read_text() == validation_page.PAGE.read_text()
     for name, whole in rows.items():
         assert validation_page.kept(name, copy) == whole
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_manual_pages_link_inside_manual(page: Path) -> None:
+    """Sphinx takes a Markdown file outside of `docs` for a missing page, and `make docs` fails."""
+    targets = [(page.parent / name).resolve() for name, _ in links(page.read_text()) if name]
+    outside = [t.name for t in targets if t.suffix == ".md" and not t.is_relative_to(DOCS)]
+    assert outside == []
+
+
+def test_glossary_defines_terms_once() -> None:
+    rows = re.findall(r"^\| ([a-z ]+) \| (.+) \|$", (DOCS / "glossary.md").read_text(), re.M)
+    terms = [term for term, meaning in rows if meaning != "meaning"]
+    assert len(terms) == len(set(terms)) >= 30
+    assert all(meaning.endswith(".") for _, meaning in rows if meaning != "meaning")
