@@ -40,10 +40,11 @@ def command(
     form: str | None,
     out: Path,
 ) -> None:
-    """Posterior samples for other programs.
+    """Posterior samples of the selected model class for other programs.
 
-    One column a parameter, then tension_n and log_likelihood; equally weighted rows. NetCDF adds
-    the measured frequencies and the likelihood of each, with units.
+    `shm report` states the tension over all classes, with a wider interval. One column a
+    parameter, then tension_n and log_likelihood; equally weighted rows. NetCDF adds the measured
+    frequencies and the likelihood of each, with units.
 
     \b
     Example: shm export --hanger 3 --out hanger3.csv

@@ -59,15 +59,21 @@ def main() -> None:
 
         with shm.Store(arch) as store:
             kept = store.tests(3)
+            tensions = store.tensions(3)
+            latest = store.tension(3).tension_n
             posteriors = store.posteriors(3)
             selection = store.selection(3)
             figure = shm.plot.trend(posteriors, kept, store.hanger(3))
 
-    for test, posterior in zip(kept, posteriors, strict=True):
-        print(f"{test.time:%Y-%m-%d}: {posterior.tension_n.mean() / 1e3:.1f} kN")
+    for test in kept:
+        tension = tensions[test.id].tension_n
+        interval = f"90 % interval {tension.q05 / 1e3:.0f} to {tension.q95 / 1e3:.0f} kN"
+        print(f"{test.time:%Y-%m-%d}: {tension.mean / 1e3:.0f} kN, {interval}")
 
     assert [test.id for test in kept] == ["day 0", "day 30"]
     assert selection.selected.model == "beam1"
+    assert latest == tensions["day 30"].tension_n
+    assert latest.q05 < 700e3 < latest.q95
     assert abs(posteriors[0].tension_n.mean() / 711e3 - 1) < 0.005
     assert abs(posteriors[1].tension_n.mean() / 700e3 - 1) < 0.005
     assert figure.axes[0].get_xlabel() == "time of the test (UTC)"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Self
 from shm.errors import NothingThere
 from shm.read import read_test
 from shm.values import (
+    Averaged,
     Diagnosis,
     FrequencyResponse,
     Hanger,
@@ -31,9 +33,9 @@ class Store:
 
     Example:
         >>> with shm.Store("arch") as store:
-        ...     posterior = store.posterior(3)
-        >>> posterior.tension_n.mean()
-        711000.0
+        ...     tension = store.tension(3).tension_n
+        >>> tension.mean, tension.q05, tension.q95
+        (711000.0, 669000.0, 742000.0)
     """
 
     def __init__(self, workspace: str | Path):
@@ -57,13 +59,67 @@ class Store:
         self.hanger(hanger_id)
         return tuple(stored.test for stored in self._store.tests.list_all(hanger_id))
 
-    def posterior(self, hanger_id: int, test_id: str | None = None) -> Posterior:
-        """The latest posterior of a hanger, or that of one test; raises NothingThere."""
+    def tension(self, hanger_id: int, test_id: str | None = None) -> Averaged:
+        """Return the tension by the latest test of a hanger, or by one test, in N.
+
+        It is averaged over all model classes and absolute, as reports and pages state it:
+        `tension_n.mean`, with a 90 % interval from `tension_n.q05` to `tension_n.q95`. Raises
+        NothingThere.
+        """
+        known = self.tensions(hanger_id) if test_id is not None else self._latest(hanger_id)
+        if not known or test_id not in (None, *known):
+            self._store.posteriors.get(hanger_id, test_id)  # raises what is missing
+            raise NothingThere(f"hanger {hanger_id} has no tension.", remedy="Run `shm doctor`.")
+        return next(reversed(known.values())) if test_id is None else known[test_id]
+
+    def tensions(self, hanger_id: int) -> dict[str, Averaged]:
+        """Return the tension by each test of a hanger, oldest first: see `tension`."""
+        points = self._store.posteriors.trend(self.hanger(hanger_id))
+        return {point.test: point.averaged for point in points}
+
+    def _latest(self, hanger_id: int) -> dict[str, Averaged]:
+        points = self._store.posteriors.latest_trends([self.hanger(hanger_id)])
+        return {point.test: point.averaged for point in points.values()}
+
+    def posterior(
+        self, hanger_id: int, test_id: str | None = None, model: str | None = None
+    ) -> Posterior:
+        """Return the latest posterior of a hanger, or that of one test, in one model class.
+
+        Its interval leaves out that another class may be right: `tension` does not. Name the class
+        as `model`; without it that is the selected one, and a UserWarning says so. Of the other
+        classes there are posteriors of the tests that made the baseline. Raises NothingThere.
+        """
         self.hanger(hanger_id)
-        return self._store.posteriors.get(hanger_id, test_id)
+        found = self._store.posteriors.get(hanger_id, test_id)
+        if model is None:
+            warnings.warn(
+                f"posterior({hanger_id}) is of the model class {found.model} alone, and its "
+                f"interval is too narrow for the tension. Use tension({hanger_id}), or name the "
+                f"class: posterior({hanger_id}, model={found.model!r}).",
+                UserWarning,
+                stacklevel=2,
+            )
+            return found
+        if found.model == model:
+            return found
+        compared = self._store.posteriors.selection(hanger_id)
+        classes = compared.selection.posteriors if compared is not None else ()
+        for each in classes:
+            if each.model == model and (test_id is None or test_id in each.tests):
+                return each
+        of_test = f" by test {test_id}" if test_id is not None else ""
+        names = ", ".join(sorted({found.model, *(each.model for each in classes)}))
+        raise NothingThere(
+            f"hanger {hanger_id} has no posterior of the class {model}{of_test}.",
+            remedy=f"Its classes are {names}; all but {found.model} are of its baseline alone.",
+        )
 
     def posteriors(self, hanger_id: int) -> tuple[Posterior, ...]:
-        """The posterior of each test that is through updating, oldest first: all samples."""
+        """Return the posterior of each test in its one model class, oldest first: all samples.
+
+        For the tension over all classes see `tensions`.
+        """
         self.hanger(hanger_id)
         return tuple(posterior for _, posterior in self._store.posteriors.history(hanger_id))
 
