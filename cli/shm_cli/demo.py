@@ -238,7 +238,6 @@ def dropped(tests: Sequence[PlannedTest], workspace: Workspace) -> Iterator[Plan
 
 _MARK = ".shm-demo"
 _DAEMON_LIMIT_S = 600.0  # technical: several times what a slow machine takes
-_POLL_S = 0.3  # technical: a bar that moves
 
 
 @click.command()
@@ -328,15 +327,15 @@ def _await(
             return
 
 
-def _watched(store: Store, daemon: subprocess.Popen[bytes]) -> Iterator[int]:
-    """How many recordings are through, again and again while the daemon lives."""
+def _watched(store: Store, daemon: subprocess.Popen[bytes], poll_s: float = 0.3) -> Iterator[int]:
+    """Yield how many recordings are done, every ``poll_s`` while the daemon lives."""
     deadline = time.monotonic() + _DAEMON_LIMIT_S
     while time.monotonic() < deadline and daemon.poll() is None:
         refused = store.recordings.list_all(Stage.REFUSED)
         if refused:
             raise ShmError(f"a file of the demo was refused: {refused[0].reason}.")
         yield store.recordings.stage_counts()[Stage.DONE]
-        time.sleep(_POLL_S)
+        time.sleep(poll_s)
     raise ShmError("the demo's daemon did not finish.", remedy="Read daemon.log in its folder.")
 
 
