@@ -103,7 +103,11 @@ def _modal_test(test: ModalTest) -> Sheet:
 
 
 def _posterior(posterior: Posterior) -> Sheet:
-    """Tension and parameters: mean, 90 % interval, most probable value, meaning."""
+    """Show tension and parameters: mean, 90 % interval, most probable value, meaning."""
+    from shm.values.posterior import WITHOUT_MODEL
+
+    if posterior.model == WITHOUT_MODEL:
+        return _frequencies(posterior)
     from shm.report import formatting
     from shm.report.formatting import Interval
     from shm.values.rounding import force_unit
@@ -128,6 +132,14 @@ def _posterior(posterior: Posterior) -> Sheet:
     title = f"{_whose(posterior)}, {formatting.model_class(posterior.model)}"
     said = " ".join(stated(averaged_now(posterior), unit).sentences)
     return Sheet(title, head, rows, (said, *posterior.caveats, sampled))
+
+
+def _frequencies(posterior: Posterior) -> Sheet:
+    """Show the measured frequencies of a structure that has no model."""
+    values = zip(posterior.names, posterior.most_probable, strict=True)
+    rows = [(name, f"{value:.3f}") for name, value in values]
+    title = f"{_whose(posterior)}, measured frequencies without a model"
+    return Sheet(title, ("mode", "frequency in Hz"), rows)
 
 
 def _selection(selection: Selection) -> Sheet:

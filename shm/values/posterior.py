@@ -290,6 +290,10 @@ class Posterior(Shown):
         return self.parameter("theta_F") * self.nominal_tension_n
 
     def __repr__(self) -> str:
+        if self.model == WITHOUT_MODEL:
+            n_modes = len(self.names)
+            modes = "1 measured frequency" if n_modes == 1 else f"{n_modes} measured frequencies"
+            return line("Posterior", self.hanger, f"{modes}, no model")
         tension = Selection((self,), (1.0,)).averaged().tension_n
         said = f"{self.model}, {tension_words(tension.mean, tension.q05, tension.q95)}"
         return line("Posterior", self.hanger, said)

@@ -14,6 +14,7 @@ from shm.errors import UsageError
 from shm.report.diagnosis_summary import verdict
 from shm.report.formatting import Interval, tension
 from shm.values.rounding import force_unit
+from shm.watch.frequency_watch import measured_levels
 from tests.helpers.diagnoses import a_diagnosis
 
 
@@ -87,3 +88,11 @@ def test_without_arviz_it_says_what_to_install(
     monkeypatch.setitem(sys.modules, "arviz", None)
     with pytest.raises(UsageError, match=r"arviz is not installed.*pip install 'shm\[arviz\]'"):
         posterior.to_arviz()
+
+
+def test_posterior_of_structure_shows(test_of_711_kn: shm.ModalTest) -> None:
+    found = measured_levels([test_of_711_kn], seed=1)
+    assert repr(found) == "<Posterior of hanger 3: 8 measured frequencies, no model>"
+    html = found._repr_html_()
+    assert "measured frequencies without a model" in html
+    assert f"{test_of_711_kn.modes[0].frequency_hz:.3f}" in html
