@@ -13,7 +13,7 @@ from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
 
-from shm.pipeline.lineage import discarded_of, redescribed
+from shm.pipeline.lineage import discarded_of_baselines, redescribed
 from shm.pipeline.unheard import REMEDIES, backlog_leads, heard, ring_leads
 from shm.report.formatting import counted
 from shm.store import Stage, Store, Workspace
@@ -343,7 +343,8 @@ def _outdated_baselines(examined: Examined) -> Iterator[Finding]:
         (each, store.watch.baseline(each.id)) for each in examined.workspace.bridge.hangers
     ]
     changed = [str(each.id) for each, made in baselines if redescribed(each, made)]
-    gone = [str(each.id) for each, made in baselines if discarded_of(store, made)]
+    discarded = discarded_of_baselines(store)
+    gone = [str(each.id) for each, _ in baselines if each.id in discarded]
     for hangers, found in (
         (changed, "described otherwise since the baseline"),
         (gone, "baseline made from a test that was discarded"),

@@ -15,12 +15,24 @@ from typing import TYPE_CHECKING
 
 import shm
 from shm.errors import DamagedRow, NothingThere
-from shm.pipeline.lineage import settings_words, software
+from shm.pipeline.lineage import (
+    discarded_of_baselines,
+    redescribed,
+    settings_words,
+    software,
+)
 from shm.pipeline.unheard import blind_hangers, heard
 from shm.report.contents import BridgeReport, Course, HangerLine
 from shm.report.formatting import Interval
 from shm.report.hanger_status import Known, findings, hanger_message, still_detected
-from shm.report.open_warnings import nearly_slack, open_warnings, passed_over, standing_out
+from shm.report.open_warnings import (
+    discarded,
+    nearly_slack,
+    open_warnings,
+    passed_over,
+    redescription_words,
+    standing_out,
+)
 from shm.report.states import Period, called_words
 from shm.store import (
     BaselineGlance,
@@ -41,17 +53,6 @@ if TYPE_CHECKING:
     from shm.watch.neighbours import BridgePattern, HangerShift
 
 
-def warnings_of(
-    workspace: Workspace, store: Store, hangers: Sequence[Hanger]
-) -> dict[int, tuple[str, ...]]:
-    """The open warnings of each of `hangers` that has a baseline, by hanger."""
-    every = workspace.bridge.hangers
-    latest = of_readable(partial(store.watch.latest, hangers=hangers), {})
-    now, baselines = store.posteriors.latest_trends(hangers), store.watch.baselines_in_force(every)
-    works = [each for each in store.silences.list_all() if each.is_maintenance]
-    return warnings_from(every, hangers, baselines, latest, now, works)
-
-
 def warnings_from(
     every: Sequence[Hanger],
     hangers: Sequence[Hanger],
@@ -59,10 +60,12 @@ def warnings_from(
     latest: Mapping[int, StoredWatch],
     now: Mapping[int, TrendPoint],
     works: Sequence[Silence],
+    gone: Mapping[int, Sequence[str]],
 ) -> dict[int, tuple[str, ...]]:
-    """The same of what was asked already: the `baselines` of `every` hanger of the bridge.
+    """Return the open warnings of each of `hangers` that has a baseline, by hanger.
 
-    `works` are maintenance windows.
+    `baselines` are those of `every` hanger of the bridge, `works` maintenance windows, `gone` the
+    tests of baselines that were discarded since.
     """
     tensions = {id_: each.averaged.tension_n for id_, each in baselines.items()}
 
@@ -90,7 +93,12 @@ def warnings_from(
             baselines[hanger.id].check,
             standing_out(hanger, every, tensions),
             latest[hanger.id].watched if hanger.id in latest else None,
-            (slack(hanger), of_works(hanger)),
+            (
+                redescription_words(hanger, redescribed(hanger, baselines[hanger.id])),
+                discarded(hanger, gone.get(hanger.id, ())),
+                slack(hanger),
+                of_works(hanger),
+            ),
         )
         for hanger in hangers
         if hanger.id in baselines
@@ -213,20 +221,21 @@ class HangersNow:
             standing,
             tuple(each for each in silences if not each.is_over(now)),
             damaged,
-            warnings_from(every, hangers, baselines, watches, now_at, works),
+            warnings_from(
+                every, hangers, baselines, watches, now_at, works, discarded_of_baselines(store)
+            ),
             blind_hangers(heard(workspace, store, now)),
             store.tests.names_without_time(),
         )
 
     def line(self, hanger: Hanger) -> HangerLine:
         opened, point = self.open_alerts.get(hanger.id, 0), self.latest.get(hanger.id)
+        message = hanger_message(self.known(hanger))
         if hanger.id in self.damaged:  # no status: what would be said of it cannot be read
             said = str(self.damaged[hanger.id])
-            message = hanger_message(Known(hanger, damage=said))
             return HangerLine(hanger, message, called=said, open_alerts=opened)
         baseline, watched = self.baselines.get(hanger.id), self._watched(hanger)
         called = self.called.get(hanger.id, ())
-        message = hanger_message(self._known(hanger, point))
         if point is None:
             return HangerLine(hanger, message, open_alerts=opened)
         return HangerLine(
@@ -249,7 +258,11 @@ class HangersNow:
         found = self.watches.get(hanger.id)
         return found.watched if found else None
 
-    def _known(self, hanger: Hanger, point: TrendPoint | None) -> Known:
+    def known(self, hanger: Hanger) -> Known:
+        """Return what the state of a hanger is decided from."""
+        if hanger.id in self.damaged:
+            return Known(hanger, damage=str(self.damaged[hanger.id]))
+        point = self.latest.get(hanger.id)
         watched = self._watched(hanger)
         standing = self.standing.get(hanger.id, ())
         baseline = self.baselines.get(hanger.id)

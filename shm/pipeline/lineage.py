@@ -25,7 +25,16 @@ from shm.models import Model, build, competing_names
 from shm.pipeline.ending import SHM
 from shm.read import Limits
 from shm.settings import TABLE, Settings
-from shm.store import Baseline, Lineage, Stage, Store, StoredRecording, StoredTest, Workspace, files
+from shm.store import (
+    Baseline,
+    BaselineGlance,
+    Lineage,
+    Store,
+    StoredRecording,
+    StoredTest,
+    Workspace,
+    files,
+)
 from shm.values import Hanger, Posterior
 
 IDENTIFY_SETTINGS = (
@@ -177,23 +186,25 @@ MOVES_NOTHING = frozenset(
 what is of the gap diagnosis alone."""
 
 
-def redescribed(hanger: Hanger, baseline: Baseline | None) -> tuple[str, ...]:
-    """What has changed since the baseline was made, as `length_m from 12 to 12.4`."""
+def redescribed(hanger: Hanger, baseline: Baseline | BaselineGlance | None) -> tuple[str, ...]:
+    """Return what has changed since the baseline was made, as `length_m from 12 to 12.4`."""
     if baseline is None or baseline.described is None:
         return ()
     before, now = _comparable(baseline.described), _comparable(asdict(hanger))
     return tuple(_changes(before, now))
 
 
-def discarded_of(store: Store, baseline: Baseline | None) -> tuple[str, ...]:
-    """The tests of a baseline that count no more, by name: a person has discarded them since.
+def discarded_of_baselines(store: Store) -> dict[int, tuple[str, ...]]:
+    """Return the tests of baselines in force that people have discarded since, by hanger.
 
-    A day of a stream in whose place the whole day stands measured the same, of fewer hours.
+    A day of a stream that was replaced by the complete day measured the same, of fewer hours.
     """
-    tests = () if baseline is None else store.tests.of_baseline(baseline)
-    refused = [each for each in tests if each.stage == Stage.REFUSED]
-    out = [(each, store.recordings.discard_in_force(each.recording_id)) for each in refused]
-    return tuple(each.test.id for each, why in out if why is None or why.who != SHM)
+    found: dict[int, tuple[str, ...]] = {}
+    for hanger, name, recording_id in store.tests.refused_of_baselines():
+        why = store.recordings.discard_in_force(recording_id)
+        if why is None or why.who != SHM:
+            found[hanger] = (*found.get(hanger, ()), name)
+    return found
 
 
 def _comparable(described: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,10 +10,10 @@ import shm
 from shm.errors import NothingThere
 from shm.identify import identify
 from shm.pipeline.adopting import gap_watch
-from shm.pipeline.bridge_reporting import notes_of, stored_pattern, unwatched, warnings_of
+from shm.pipeline.bridge_reporting import HangersNow, stored_pattern
 from shm.pipeline.lineage import (
     IDENTIFY_SETTINGS,
-    discarded_of,
+    discarded_of_baselines,
     identify_lineage,
     read_limits,
     redescribed,
@@ -21,17 +21,14 @@ from shm.pipeline.lineage import (
     test_lineage,
 )
 from shm.pipeline.steps import identify_options
-from shm.pipeline.unheard import blind_hangers, heard
 from shm.pipeline.watching import dated_tests
 from shm.read.sandbox import read_test
 from shm.report.contents import HangerReport, ModalTestReport, TrendRow
 from shm.report.formatting import Interval
 from shm.report.hanger_report import StructureReport
-from shm.report.hanger_status import findings, still_detected
 from shm.report.states import NOTHING_WATCHED, Period, StatesOverTime, states_over_time
-from shm.store import Baseline, Store, StoredAlert, StoredTest, TrendPoint, Workspace
+from shm.store import Baseline, Store, StoredAlert, TrendPoint, Workspace
 from shm.values import Hanger, WatchedTest
-from shm.values.messages import Lead
 from shm.watch import WatchOptions, watch_hanger
 from shm.watch.alert_text import watch_words
 from shm.watch.change_words import frequency_words
@@ -114,8 +111,7 @@ def hanger_now(
     in_force = store.watch.baseline(hanger.id)
     diagnosis, watch = store.posteriors.latest_diagnosis(hanger.id), gap_watch(store, hanger.id)
     watched, alerts = _watched_against(store, baseline), store.alerts.list_all(hanger.id)
-    standing = [each for each in alerts if each.resolution is None]
-    silences = store.silences.list_current(generated_at)
+    known = HangersNow.of(workspace, store, [hanger], generated_at).known(hanger)
     return HangerReport(
         bridge=workspace.bridge.name,
         letterhead=workspace.bridge.letterhead,
@@ -127,7 +123,7 @@ def hanger_now(
         trend=tuple(_trend_row(point) for point in trend),
         baseline=baseline.posterior if baseline else None,
         selection=selection.selection if selection else None,
-        drifts=watched[-1].told if watched else (),
+        drifts=tuple(known.drifts),
         alerts=tuple(stored.alert for stored in alerts),
         acknowledged=_acknowledged(alerts),
         quality=latest.quality,
@@ -135,29 +131,19 @@ def hanger_now(
         gap_watch=str(watch) if watch else "",
         drift_watch=watch_words(watched),
         creep=watched[-1].creep_per_year if watched else None,
-        called=still_detected(
-            (each.change for each in watched if each.change.called),
-            watched[-1] if watched else None,
-            hanger,
-        ),
+        called=tuple(known.called),
         lineage={**test_lineage(store, latest), **_baseline_words(baseline)},
         settings={**settings_words(workspace.settings), **_changed(store, hanger)},
         redescribed=redescribed(hanger, in_force),
-        discarded=discarded_of(store, in_force),
-        warnings=warnings_of(workspace, store, [hanger]).get(hanger.id, ()),
-        standing=findings(each.alert for each in standing),
-        notes=notes_of(standing, silences, hanger.id, generated_at),
+        discarded=discarded_of_baselines(store).get(hanger.id, ()),
+        warnings=tuple(known.warnings),
+        standing=tuple(known.standing),
+        notes=known.notes,
         inspections=store.notes.list_all(hanger.id),
-        unwatched=_unwatched(workspace, store, latest, generated_at),
+        unwatched=known.unwatched,
+        known=known,
         undated=store.tests.names_without_time().get(hanger.id, ()),
     )
-
-
-def _unwatched(
-    workspace: Workspace, store: Store, latest: StoredTest, now: datetime
-) -> Lead | None:
-    blind = blind_hangers(heard(workspace, store, now))
-    return unwatched(workspace, latest.hanger, latest.time, blind, now)
 
 
 def _changed(store: Store, hanger: Hanger) -> dict[str, str]:

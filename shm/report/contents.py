@@ -103,7 +103,8 @@ class HangerReport:
     the tests of the baseline that count no more. `warnings` are the open ones, `standing` the
     alerts whose condition has not ended, `notes` what people did about these; `inspections`
     what they wrote, the latest first; `unwatched` says that nothing has looked at it for long;
-    `undated` names the tests that are dated by their receipt.
+    `undated` names the tests that are dated by their receipt. `known` is what home page and
+    `shm status` decide the state from; None: it follows from these.
     """
 
     bridge: str
@@ -139,6 +140,7 @@ class HangerReport:
     unwatched: Lead | None = None
     undated: tuple[str, ...] = ()
     letterhead: Letterhead = NO_LETTERHEAD
+    known: Known | None = None
 
     @property
     def is_called(self) -> bool:
@@ -192,7 +194,8 @@ class HangerReport:
 def message(data: HangerReport) -> HangerMessage:
     """What is said first of the hanger."""
     return hanger_message(
-        Known(
+        data.known
+        or Known(
             data.hanger,
             data.averaged,
             data.latest.time or data.generated_at,

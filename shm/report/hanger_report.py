@@ -88,7 +88,12 @@ def facts(data: HangerReport) -> tuple[Fact, ...]:
     said = stated(data.averaged, unit)
     repeats = f"; repeatability {said.repeatability}" if said.repeatability else ""
     return (
-        ("Tension", said.tension, f"90 % interval {said.interval}{repeats}"),
+        (
+            "Tension",
+            said.tension,
+            f"{'' if data.averaged.is_usable else 'do not use it; '}"
+            f"90 % interval {said.interval}{repeats}",
+        ),
         *_limits(data, said),
         _of_nominal(data),
         _since_baseline(data),

@@ -1,7 +1,8 @@
-"""The state of a hanger: in a word, and in the two sentences that everybody reads first.
+"""The state of a hanger: in a word, in the two sentences that everybody reads first, and why.
 
-Home page, the hanger's page, report, `shm status` and their documents call `hanger_message`; an
-alert and what its hooks get lead with the same words of what was found (`lead_of`).
+`hanger_message` alone decides state, action, urgency and reasons. Home page, the hanger's page,
+report, `shm status` and their documents show its answer; an alert and what its hooks get lead with
+the same words of what was found (`lead_of`).
 """
 
 from __future__ import annotations
@@ -73,11 +74,15 @@ class Known:
 
 @dataclass(frozen=True)
 class HangerMessage:
-    """The state in a word, None where nothing is known; its lead; what people did about it."""
+    """The state in a word, None where nothing is known; its lead; what people did about it.
+
+    `reasons` are all doubts that the lead has not said, the worst first.
+    """
 
     status: Status | None
     lead: Lead
     notes: tuple[str, ...] = ()
+    reasons: tuple[str, ...] = ()
 
     @property
     def urgency(self) -> Urgency:
@@ -104,7 +109,7 @@ class HangerMessage:
     @property
     def document(self) -> dict[str, object]:
         """As every JSON document gives it."""
-        return _document(self)
+        return {**_document(self), "reason": " ".join(self.reasons)}
 
 
 @dataclass(frozen=True)
@@ -183,36 +188,55 @@ def _how_soon(needing: Mapping[int, HangerMessage], others: Iterable[int]) -> st
 
 
 def hanger_message(known: Known) -> HangerMessage:
-    """What is said first of a hanger, wherever it is said."""
+    """Decide state, action, urgency and reasons of a hanger, for every place that shows them."""
+    status, lead = _decide(known)
+    said = HangerMessage(status, lead, known.notes if status else ())
+    caveats = known.tension.caveats if known.tension else ()
+    return replace(said, reasons=(*said.beyond_lead(known.warnings), *caveats))
+
+
+def _decide(known: Known) -> tuple[Status | None, Lead]:
     name = f"Hanger {known.hanger.id}"
     if known.damage:
-        lead = Lead(f"{name}: its results cannot be read.", "Run `shm doctor` today.")
-        return HangerMessage(None, lead)
+        return None, Lead(f"{name}: its results cannot be read.", "Run `shm doctor` today.")
     if known.latest is None and not known.standing:
-        return HangerMessage(None, Lead(f"{name}: no test yet.", f"Test it {NEXT_TEST}."))
+        return None, Lead(f"{name}: no test yet.", f"Test it {NEXT_TEST}.")
+    faults = known.tension.faults if known.tension else ()
     status = status_of(
         known.drifts,
         known.hanger,
         is_first=known.is_first,
         is_called=bool(known.called),
-        warnings=known.warnings,
+        warnings=(*known.warnings, *faults),
         standing=known.standing,
     )
     if status in (Status.ALERT, Status.WATCH):
-        return HangerMessage(status, _of_change(known), known.notes)
+        return status, _of_change(known)
     if status is Status.CHECK:
-        doubts = [Lead.of(each) for each in known.warnings]
         off = _off_limits(known)  # as it is now, where an alert says how it was
-        doubts += [
-            off if off and "limit" in each.kinds else Lead.of(each.message)
-            for each in reversed(known.standing)
+        doubts = [
+            *(Lead.of(each) for each in known.warnings),
+            *([_in_doubt(known)] if faults else []),
+            *([off] if off else []),
+            *(
+                Lead.of(each.message)
+                for each in reversed(known.standing)
+                if not (off and "limit" in each.kinds)
+            ),
         ]
         silent = all(each.kinds == ("silent",) for each in known.standing)
-        if known.unwatched and silent and not (known.warnings or off):
+        if known.unwatched and silent and not (known.warnings or faults or off):
             status = Status.UNCLEAR
-        return HangerMessage(status, _first(doubts), known.notes)
-    status, lead = _quiet(known, status)
-    return HangerMessage(status, lead, known.notes)
+        return status, _first(doubts)
+    return _quiet(known, status)
+
+
+def _in_doubt(known: Known) -> Lead:
+    """Return what to do about a tension whose caveats say that something is wrong."""
+    name, check = f"Hanger {known.hanger.id}", "Check its description and the numbers of its modes"
+    if known.tension is None or known.tension.is_usable:
+        return Lead(f"{name}: its tension is in doubt.", f"{check} {NEXT_TEST}.")
+    return Lead(f"{name}: do not use its tension.", f"{check} {WEEK}.")
 
 
 def still_detected(
@@ -370,7 +394,7 @@ def off_limits(hanger: Hanger, tension: Averaged) -> Lead | None:
 def _off_limits(known: Known) -> Lead | None:
     """That the tension is beyond the owner's limits; without limits, far off the nominal one."""
     hanger, tension = known.hanger, known.tension
-    if tension is None:
+    if tension is None or not tension.is_usable:
         return None
     if beyond := off_limits(hanger, tension):
         return beyond

@@ -39,14 +39,8 @@ def _why(data: HangerReport) -> tuple[str, ...]:
 
 
 def _doubts(data: HangerReport) -> tuple[str, ...]:
-    """What must not wait until the details: warnings, an outdated baseline, caveats."""
-    found = (
-        *message(data).beyond_lead(data.warnings),
-        open_warnings.redescribed(data),
-        open_warnings.discarded(data),
-        *data.averaged.caveats,
-    )
-    return tuple(each for each in found if each)
+    """Return what must not wait until the details: warnings, an outdated baseline, caveats."""
+    return message(data).reasons
 
 
 def details(data: HangerReport) -> str:

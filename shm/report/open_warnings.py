@@ -12,7 +12,6 @@ import statistics
 from collections.abc import Mapping, Sequence
 from itertools import islice
 
-from shm.report.contents import HangerReport
 from shm.report.formatting import counted, listed
 from shm.values import BaselineCheck, Hanger, Summary, WatchedTest
 from shm.values.messages import WEEK
@@ -142,28 +141,26 @@ def _share(hanger: Hanger, tensions: Mapping[int, Summary]) -> tuple[float, floa
 _MOST_CHANGES = 3  # what a sentence bears
 
 
-def redescribed(data: HangerReport) -> str:
-    """That the description has changed since the baseline, and what to do; empty where not."""
-    if not data.redescribed:
+def redescription_words(hanger: Hanger, changes: Sequence[str]) -> str:
+    """Return that the description has changed since the baseline, and what to do; else ""."""
+    if not changes:
         return ""
-    changed, more = data.redescribed[:_MOST_CHANGES], data.redescribed[_MOST_CHANGES:]
+    changed, more = changes[:_MOST_CHANGES], changes[_MOST_CHANGES:]
     named = ", ".join(changed) + (f" and {len(more)} more" if more else "")
-    number = data.hanger.id
     return (
-        f"The description of hanger {number} has changed since its baseline: {named}. "
-        f"{_anew(number)} "
+        f"The description of hanger {hanger.id} has changed since its baseline: {named}. "
+        f"{_anew(hanger.id)} "
         "Until then shifts and alerts compare two descriptions, not two states of the hanger."
     )
 
 
-def discarded(data: HangerReport) -> str:
-    """That tests of the baseline count no more, and what to do; empty where all do."""
-    if not data.discarded:
+def discarded(hanger: Hanger, tests: Sequence[str]) -> str:
+    """Return that `tests` of the baseline count no more, and what to do; else ""."""
+    if not tests:
         return ""
-    names, number = ", ".join(data.discarded), data.hanger.id
     return (
-        f"The baseline of hanger {number} was made from {names}, discarded since: the comparison "
-        f"with it is no longer valid. {_anew(number)}"
+        f"The baseline of hanger {hanger.id} was made from {', '.join(tests)}, discarded since: "
+        f"the comparison with it is no longer valid. {_anew(hanger.id)}"
     )
 
 
@@ -172,13 +169,14 @@ def dated_by_receipt(names: Sequence[str]) -> str:
     if not names:
         return ""
     more = f" and {len(names) - _MOST_CHANGES} more" if len(names) > _MOST_CHANGES else ""
-    listed = ", ".join(names[:_MOST_CHANGES])
+    first = ", ".join(names[:_MOST_CHANGES])
     are = "is" if len(names) == 1 else "are"
     return (
         f"{counted(len(names), 'test')} without a time {are} dated by the receipt of the file: "
-        f"{listed}{more}. Say `time` in the file's header or its sidecar, and send it again."
+        f"{first}{more}. Say `time` in the file's header or its sidecar, and send it again."
     )
 
 
 def _anew(number: int) -> str:
-    return f"Set a new baseline: `shm drift rebaseline --hanger {number} --since DAY --why TEXT`."
+    command = f"shm drift rebaseline --hanger {number} --since DAY --why TEXT"
+    return f"Set a new baseline {WEEK}: `{command}`."

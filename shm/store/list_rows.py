@@ -283,6 +283,7 @@ class BaselineGlance(Numbers):
     temperature_c: float
     check: BaselineCheck | None = None
     begins_at: datetime | None = None
+    described: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from shm.store.holding import Judged, fingerprint_from, keep_judgement
 from shm.store.list_rows import LatestTest, TestRow
 from shm.store.queries import (
     WEIGHED,
+    baselines_now,
     compared_with,
     counted_tests,
     lineage_from,
@@ -167,6 +168,18 @@ class Tests(Repository):
         return self._tests(
             plain_tests.where(tests.c.id.in_(made)).order_by(tests.c.time, tests.c.id)
         )
+
+    def refused_of_baselines(self) -> tuple[tuple[int, str, int], ...]:
+        """Return hanger, name and recording of each refused test of a baseline in force."""
+        made = (
+            sa.select(posterior_tests.c.test_id)
+            .join(baselines, baselines.c.posterior_id == posterior_tests.c.posterior_id)
+            .where(baselines.c.id.in_(baselines_now()))
+        )
+        query = sa.select(tests.c.hanger, tests.c.name, tests.c.recording_id)
+        refused = tests.c.id.in_(made), tests.c.stage == Stage.REFUSED
+        rows = self.rows(query.where(*refused).order_by(tests.c.time, tests.c.id))
+        return tuple((row.hanger, row.name, row.recording_id) for row in rows)
 
     def taken_at(self, hanger: int, time: datetime, recording_id: int) -> tuple[StoredTest, ...]:
         """Tests of a hanger with the very same time, in other recordings."""

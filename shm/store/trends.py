@@ -35,6 +35,7 @@ from shm.store.queries import (
     selection_numbers,
     selection_of,
 )
+from shm.store.rows import DESCRIBED
 from shm.store.tables import baselines, posterior_tests, posteriors, summaries, tests
 from shm.values import NAN, Averaged, BaselineCheck, Hanger, Posterior, Selection, Summary
 from shm.values.stated_tension import averaged_now
@@ -336,8 +337,19 @@ def _baseline(row: Row[Any], made_of: Sequence[Row[Any]], numbers: Numbers) -> B
         temperature_c=fmean(temperatures_c) if temperatures_c else NAN,
         check=_check(row.document),
         begins_at=min((each.time for each in made_of), default=None),
+        described=_described(row.document),
         **vars(numbers),
     )
+
+
+@lru_cache(_NUMBERS_HELD)
+def _described(document: str) -> Mapping[str, Any] | None:
+    """Return the hanger as it was described then; None of a damaged document."""
+    try:
+        found: Mapping[str, Any] | None = loads(document).get(DESCRIBED)
+    except ValueError:
+        return None
+    return found
 
 
 @lru_cache(_NUMBERS_HELD)

@@ -101,6 +101,7 @@ CONTRADICTS_FROM_SD = 3.0
 WITHOUT_MODEL = "frequencies"
 """Stands for the class of a posterior of a structure without a model: frequencies as measured."""
 
+_DO_NOT_USE = "Do not use this tension."
 _ENDS_DECIDE, _ORDERS_DECIDE = "The ends decide", "The orders decide"
 _SAID_ONCE = (
     _ENDS_DECIDE,
@@ -222,7 +223,7 @@ class Posterior(Shown):
         if self.effective_sample_size < min(ENOUGH_EFFECTIVE, len(self.samples)):
             found.append(
                 f"The sampler failed: {self.effective_sample_size:.0f} effective draws of "
-                f"{len(self.samples)}, {ENOUGH_EFFECTIVE} are needed. Do not use this tension."
+                f"{len(self.samples)}, {ENOUGH_EFFECTIVE} are needed. {_DO_NOT_USE}"
             )
         if self.log_occam > 0:
             found.append(
@@ -241,7 +242,7 @@ class Posterior(Shown):
             found.append(
                 f"{self.model} misses the measured frequencies by {self.misfit_percent:.1f} % "
                 "(root mean square): the description or the model class does not fit this hanger."
-                + (" Do not use this tension." if self.misfit_percent > NO_TENSION_PERCENT else "")
+                + (f" {_DO_NOT_USE}" if self.misfit_percent > NO_TENSION_PERCENT else "")
             )
         if self.reading_off_sd > CONTRADICTS_FROM_SD:
             found.append(
@@ -328,6 +329,16 @@ class Averaged:
     probability_above_limit: float = NAN
     probability_slack: float = NAN
     caveats: tuple[str, ...] = ()
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Return the caveats that say that something is wrong, as `Posterior.faults` does."""
+        return tuple(each for each in self.caveats if not each.startswith(_ENDS_DECIDE))
+
+    @property
+    def is_usable(self) -> bool:
+        """Return False if a caveat says that this tension must not be used."""
+        return not any(_DO_NOT_USE in each for each in self.caveats)
 
 
 @dataclass(frozen=True, eq=False)

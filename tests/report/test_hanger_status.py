@@ -307,3 +307,20 @@ def test_a_message_says_what_its_warnings_add_to_the_lead() -> None:
     assert message(None, "Go today.").needs_action
     assert one.document["notes"] == ["Ada looked."]
     assert message(None).document["status"] is None
+
+
+@pytest.mark.parametrize(
+    ("caveat", "state"),
+    [
+        ("The sampler failed: 12 effective draws. Do not use this tension.", "do not use its"),
+        ("The evidence is wrong.", "its tension is in doubt"),
+    ],
+)
+def test_hanger_message_tension_unusable(caveat: str, state: str) -> None:
+    """No hanger is called unchanged, or beyond a limit, by a tension that must not be used."""
+    doubtful = replace(tension(840e3), caveats=(caveat,))
+    said = hanger_message(replace(QUIET, tension=doubtful))
+    assert said.status is Status.CHECK
+    assert state in said.lead.state
+    assert said.lead.action != NOTHING
+    assert caveat in said.reasons

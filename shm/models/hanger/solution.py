@@ -276,18 +276,38 @@ def _motions_as_a_whole(physical: PhysicalHanger) -> IntArray:
 
 
 def _shift(physical: PhysicalHanger) -> FloatArray:
-    """Return the shift (n, planes) for which stiffness + shift x mass is definite.
+    """Return a shift (n, planes) that makes stiffness + shift * mass positive definite.
 
-    Under a compression P, a bar of bending stiffness b and mass m needs b k^4 - P k^2 + shift m > 0
-    for every wave number k, hence shift > P^2 / (4 b m) for the smallest b and m along the bar.
+    Every stretch of the bar has at least `stiff` times the described bending stiffness and `heavy`
+    times the mass. Between ends that are held the least eigenvalue of a uniform bar under
+    compression p is above -p^2/4, on ends that give way above -(12 p + p^2): it may turn as a
+    whole, and the end of a long bar buckles at a quarter of the load. Springs, shear that is small
+    and masses clamped on only add to it.
     """
-    compression = np.maximum(-stiffness_ratio(physical), 0.0)
-    weakest = np.ones_like(compression)
+    stiff, heavy = _least_factors(physical)
+    squeezed = np.maximum(-stiffness_ratio(physical), 0.0) / stiff
+    bent = squeezed**2
+    least = np.where(_ends_move(physical), 12 * squeezed + bent, bent / 4) * stiff / heavy
+    return np.asarray(1.2 * least + (_FREE_SHIFT if _is_free(physical) else 0.0))
+
+
+def _least_factors(physical: PhysicalHanger) -> tuple[FloatArray, FloatArray]:
+    """Return lower bounds of the bar's stiffness and mass factors, each (n, planes or 1).
+
+    Where zones overlap their factors multiply.
+    """
+    stiff = heavy = np.ones((len(physical.tension_n), 1))
     for zone in physical.zones:
-        stiffness = zone.stiffness_factor.reshape(len(compression), -1)
-        weakest = weakest * np.minimum(stiffness, 1) * np.minimum(zone.mass_factor, 1)[:, None]
-    free = _FREE_SHIFT if _is_free(physical) else 0.0
-    return np.asarray(0.3 * compression**2 / weakest + free)
+        stiff = stiff * np.minimum(by_plane(zone), 1.0)
+        heavy = heavy * np.minimum(zone.mass_factor, 1.0)[:, None]
+    return stiff, heavy
+
+
+def _ends_move(physical: PhysicalHanger) -> BoolArray:
+    """Return a mask (n, planes) of the hangers that any end lets deflect."""
+    modes = (each.compliance_m_n for each in physical.support_modes)
+    compliances = [physical.translational_compliance_m_n, *modes]
+    return np.asarray(np.any([np.any(each > 0, axis=1) for each in compliances], axis=0))
 
 
 def _without_supports(
@@ -384,13 +404,16 @@ def spectrum(
 ) -> Spectrum:
     """Return all modes of systems (rows, unknowns, unknowns).
 
-    `shift` (rows,) makes K + shift M definite, but for directions whose mass is lost in rounding.
+    `shift` (rows,) makes K + shift M definite: by how much is lost in rounding where functions are
+    nearly dependent, such as kinks close to each other, so its diagonal is raised by that.
     """
     held = stiffness
     if np.any(shift):
-        largest = np.einsum("nii->ni", mass).max(axis=1)[:, None, None]
-        rounding = mass.shape[-1] * np.finfo(float).eps * largest * np.eye(mass.shape[-1])
-        held = stiffness + shift[:, None, None] * (mass + rounding)
+        held = stiffness + shift[:, None, None] * mass
+        unknowns = np.arange(held.shape[-1])
+        # At least a tenth of what cancels in the diagonal is left there.
+        rounding = 10 * len(unknowns) * np.finfo(float).eps
+        held[:, unknowns, unknowns] *= np.where(shift > 0, 1 + rounding, 1.0)[:, None]
     inverse = np.linalg.inv(np.linalg.cholesky(held))
     transposed = inverse.transpose(0, 2, 1)
     reduced = inverse @ mass @ transposed

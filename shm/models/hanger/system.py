@@ -225,7 +225,8 @@ def _sag(physical: PhysicalHanger, bar: Bar, stiffness: FloatArray, kept: IntArr
 
     A motion w stretches it by the integral of y' w', y the curve at rest: a string's parabola or,
     where it sags as it bends, the bar's own under its weight, as large as makes a motion by that
-    very curve stretch both alike (Irvine 1981, 2.4 and 3.3).
+    very curve stretch both alike (Irvine 1981, 2.4 and 3.3). Stretching stiffens under compression
+    as under tension.
     """
     pull = np.zeros(stiffness.shape[:3])
     pull[..., : len(kept)] = bar.area[:, None, kept]
@@ -237,7 +238,8 @@ def _sag(physical: PhysicalHanger, bar: Bar, stiffness: FloatArray, kept: IntArr
         alike = (pull * rest).sum(axis=-1) / (slope * rest).sum(axis=-1)
         pull = alike[..., None] * slope
     dyad = pull[..., :, None] * pull[..., None, :]
-    return np.asarray((stiffness_ratio(physical) * physical.sag_parameter)[..., None, None] * dyad)
+    stretch = np.abs(stiffness_ratio(physical)) * physical.sag_parameter
+    return np.asarray(stretch[..., None, None] * dyad)
 
 
 def _mass(physical: PhysicalHanger, bar: Bar) -> FloatArray:
