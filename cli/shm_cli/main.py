@@ -71,7 +71,9 @@ VERBS: dict[str, Verb] = {
     "alerts": Verb("shm_cli.alerts", "Alerts that were raised, and their deliveries."),
     "simulate": Verb("shm_cli.simulate", "Hammer tests of a hanger whose truth you choose."),
     "validate": Verb("shm_cli.validate", "Our figures beside the thesis's, with a gate."),
-    "export": Verb("shm_cli.export", "Posterior samples for other programs."),
+    "export": Verb(
+        "shm_cli.export", "Posterior samples of the selected model class for other programs."
+    ),
     "db": Verb("shm_cli.db", "Upgrade, check, back up, restore or copy the store."),
     "archive": Verb(
         "shm_cli.archive", "Keep the archive and the quarantine from growing for ever."
