@@ -10,8 +10,7 @@ DOCS = ROOT / "docs"
 BUILT = {DOCS / f"{name}.md" for name in ("commands", "effects", "settings", "thesis")}
 """Long reference that `shm VERB --help`, `settings` and `gap effects` give too: built, not kept."""
 PAGES = sorted(
-    {path for folder in (".", "trials", "decisions") for path in (DOCS / folder).glob("*.md")}
-    - BUILT
+    {*DOCS.glob("*.md"), *(DOCS / "trials").glob("*.md"), DOCS / "decisions" / "index.md"} - BUILT
 )
 """The manual's pages that the repository holds."""
 
