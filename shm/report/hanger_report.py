@@ -139,7 +139,7 @@ def _of_nominal(data: HangerReport) -> Fact:
 def _since_baseline(data: HangerReport) -> Fact:
     change = tension_change(data)
     if change is None and data.baseline_tension_n is not None:
-        return ("Since the baseline", "not known", "the latest test cannot tell")
+        return ("Since the baseline", "not known", "the latest test does not show it")
     if change is None:
         return ("Since the baseline", "first test", "nothing earlier to compare with")
     percent = change.scaled(100)
