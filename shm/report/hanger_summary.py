@@ -147,7 +147,7 @@ def _against_baseline(data: HangerReport) -> str:
     if data.baseline is None or data.baseline_tension_n is None:
         return "There is no earlier test to compare with: this one is the baseline."
     if change is None:
-        return "How far it has moved from the baseline is not known: its latest test does not show it."
+        return "The change since the baseline is not known: its latest test does not show it."
     size = rounded_percent(change.mean, change.width / 2, "+")
     doubt = "" if is_found(data) else ", if it has changed at all"
     said = f"Against the baseline of {counted_tests(data.baseline.tests)} it is {size}{doubt}"
