@@ -81,4 +81,4 @@ def test_report_gives_no_unknown_shift(season: HangerReport) -> None:
     assert tension_change(unknown) is None
     values = {what: value for what, value, _ in facts(unknown)}
     assert values["Since the baseline"] == "not known"
-    assert "moved from the baseline is not known" in summary(unknown)
+    assert "change since the baseline is not known" in summary(unknown)
