@@ -1,7 +1,8 @@
-"""Where text leaves for a terminal: none of it moves the cursor, hides or turns other text.
+"""Escape control characters in all text that a verb prints to a terminal.
 
-Names, notes, reasons and files are written by others. Whatever a verb prints goes through
-`escape_controls`: in `cleaned_output` by `click.echo` or `print`, by `Terminal` with rich.
+Names, notes, reasons and files are written by others, and must not move the cursor or hide other
+text. Whatever a verb prints goes through `escape_controls`: in `cleaned_output` by `click.echo` or
+`print`, by `Terminal` with rich.
 """
 
 from __future__ import annotations

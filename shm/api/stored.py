@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class Store:
-    """What a workspace keeps of its hangers: tests, posteriors, diagnoses, raw records.
+    """Read what a workspace stores of its hangers: tensions, tests, posteriors, raw records.
 
     It only reads, also while a daemon works on the same workspace. `workspace` is the folder with
     `bridge.toml`. Use it in a `with`, or close it. Raises BadInput where `bridge.toml` is missing

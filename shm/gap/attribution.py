@@ -31,7 +31,7 @@ from shm.gap.search import SUPPORTED, Search
 from shm.inference.mixture import normalised
 from shm.inference.options import Progress, silent
 from shm.values import Leads
-from shm.values.leading import NO_GAP_STANDS_FROM, find_leading_cause
+from shm.values.leading import MIN_NO_GAP_PROBABILITY, find_leading_cause
 
 WITHIN_REACH = 7.0
 """Judgement: at log odds of a thousand to one a cause has no chance beside the best one."""
@@ -96,7 +96,7 @@ class Attribution:
         """Return whether a cause leads, no gap, or something unknown."""
         if self.leading is not None:
             return "cause"
-        return "no gap" if self.no_gap_probability >= NO_GAP_STANDS_FROM else "unexplained"
+        return "no gap" if self.no_gap_probability >= MIN_NO_GAP_PROBABILITY else "unexplained"
 
     @property
     def leading(self) -> Explanation | None:

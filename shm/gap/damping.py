@@ -28,7 +28,7 @@ from shm.gap.model_probabilities import NO_GAP, UNKNOWN, Family
 from shm.gap.noise import same_mode
 from shm.models.effects import EFFECTS
 from shm.values import FloatArray, ModalTest
-from shm.values.leading import NO_GAP_STANDS_FROM
+from shm.values.leading import MIN_NO_GAP_PROBABILITY
 
 MOST = float(np.log(20))
 _ANY = 3.0  # judgement: of a mode, in logarithms, so wide that it says nothing
@@ -106,7 +106,7 @@ _SOUND_RATTLES = 1 / 200
 _SOUND_IS_ASTRAY = 1 / 100
 """And one whose ring-downs begin as no sum of the modes found (1 of 97 awkward records, seeds 7000
 to 7006), or whose slopes together are three standard deviations from zero (1 of 137)."""
-_CONTRADICTED = 0.8 * NO_GAP_STANDS_FROM
+_CONTRADICTED = 0.8 * MIN_NO_GAP_PROBABILITY
 """Judgement: what three standard deviations contradict is no answer, however poor the others."""
 
 

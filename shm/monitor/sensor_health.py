@@ -161,7 +161,6 @@ def _find_loss(
     reported: Sequence[StreamEvent],
     what: str,
     channel: str,
-    enough: float = 0.95,
 ) -> StreamEvent | None:
     """Return the event that the modes of the last windows are lost, if one of three things holds.
 

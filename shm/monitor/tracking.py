@@ -68,6 +68,7 @@ def read_window(
     modes (`is_confirmed`), they are searched once an hour, and what is found only counts where one
     change of tension moved all of them.
     """
+    is_confirmed = is_confirmed and bool(known)
     found = judged(pieces, stream, known)
     if not found.parts:
         return WindowReading(found.window, (), "none", found.reason)
@@ -152,8 +153,8 @@ def is_moved_by_tension(
         for mode in known
         if (mode.plane, mode.order) in after
     ]
-    if len(pairs) < min(least, max(len(known), 1)):
-        return not known
+    if len(pairs) < min(least, len(known)):
+        return False
     order, before_hz, after_hz = np.array(pairs).T
     added = float(np.median((after_hz**2 - before_hz**2) / order**2))
     expected = np.log(np.maximum(1 + added * order**2 / before_hz**2, 0.01)) / 2

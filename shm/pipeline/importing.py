@@ -45,7 +45,7 @@ _ASKED_UNITS = ("", "full scale", "1", "-", "counts", "digits", "lsb")
 
 @dataclass(frozen=True)
 class Answers:
-    """What a person says of a file; NaN and None where nothing.
+    """The answers of a person about a file; NaN and None where there are none.
 
     `channels` are keys of a sidecar's table of a channel, by its name. `each_time`: the logger
     goes from hanger to hanger, and its profile is to name none. `is_time_unknown`: which of two

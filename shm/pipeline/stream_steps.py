@@ -26,9 +26,9 @@ _FLOOR_DB = -200  # of a channel that is exactly 0
 
 @dataclass(frozen=True, eq=False)
 class WindowFound:
-    """What a window says, faults of sensors, and what later windows compare their offsets with.
+    """The modes of a window, faults of sensors, and offsets for comparison by later windows.
 
-    `lacks_modes`: of a plane, half of the known modes or more were not found.
+    `lacks_modes`: of some plane, half of the known modes or more were not found.
     """
 
     reading: WindowReading
@@ -65,8 +65,8 @@ def read_stream_window(
 
 
 def _lacks_modes(plane: Plane, known: Sequence[Mode], reading: WindowReading) -> bool:
-    usual, seen = (sum(m.plane == plane for m in modes) for modes in (known, reading.modes))
-    return 2 * seen <= usual
+    n_known, n_seen = (sum(m.plane == plane for m in modes) for modes in (known, reading.modes))
+    return n_known > 0 and 2 * n_seen <= n_known
 
 
 def spectrum_db(pieces: Sequence[Piece]) -> tuple[int, ...]:

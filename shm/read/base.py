@@ -32,7 +32,7 @@ class LoggerColumn:
 
 @dataclass(frozen=True, eq=False)
 class LoggerTable:
-    """What a file says: columns but those of times and counters, and facts of the whole.
+    """The content of a logger's file: its measured columns, and facts about all of it.
 
     `said_rate_hz` is what its heading says, `times_rate_hz` what a column of times tells, NaN
     without. `layout` are the words by which files of one logger are known. `is_text` is False of a
@@ -178,7 +178,7 @@ class Survey:
 
 @dataclass(frozen=True)
 class Layout:
-    """How the files of one logger look, and what this one says of itself.
+    """The layout by which files of one logger are recognised, and facts of this one.
 
     `hanger` and `says_rate` are what a profile must not say in its stead. `day_order` and
     `possible_times` are those of its table.

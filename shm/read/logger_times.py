@@ -36,7 +36,7 @@ _FINE = 1e-4  # judgement: of the span; times rounded more coarsely do not give 
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """What the columns of times tell; `used` are the columns that hold no measurement.
+    """Rate and start by the columns of times; `used` are the columns without a measurement.
 
     `possible_starts` are two where the day of the start can be read in both orders.
     """

@@ -215,9 +215,11 @@ _NOT_WATCHED = "No test was watched yet: its first tests make the baseline."
 
 @dataclass(frozen=True, eq=False)
 class StructureReport:
-    """What is known of a structure; `baseline_hz` are its first frequencies by name, `said` is what
-    the watch says after the latest of its tests, empty before one was watched; `undated` names the
-    tests that are dated by their receipt."""
+    """The data that the report of a structure is made of.
+
+    `baseline_hz` are its first frequencies by name, `said` is the message of the watch after its
+    latest test, empty before one was watched; `undated` names the tests dated by their receipt.
+    """
 
     bridge: str
     structure: Hanger

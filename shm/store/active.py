@@ -1,4 +1,4 @@
-"""Who may ingest: one process a store is active, others stand by.
+"""Lock a store for the one process that ingests into it; others stand by.
 
 The lock is the operating system's on a file, or the PostgreSQL server's for as long as a connection
 lives: either is let go of when its holder dies, however it dies. Who looks whether it is held takes

@@ -131,7 +131,7 @@ def exclude_ahead(
             stream = folder.folder.name
             yield step, StreamEvent(stream, "clock step", step.start, step.last_end, said), leaving
             gone = {each for keys in leaving.values() for each in keys}
-            _set_aside(folder, waiting, leaving, said)
+            _move_to_aside(folder, waiting, leaving, said)
             found = {each: chunk for each, chunk in found.items() if each not in gone}
             waiting = [each for each in waiting if each.key not in gone]
 
@@ -191,7 +191,7 @@ def _list_excluded(
     return found
 
 
-def _set_aside(
+def _move_to_aside(
     folder: StreamFolder,
     waiting: Sequence[WaitingChunk],
     leaving: Mapping[datetime, Sequence[ChunkKey]],

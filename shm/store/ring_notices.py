@@ -45,7 +45,7 @@ class PassedChunk:
 
 @dataclass(frozen=True)
 class StreamState:
-    """What is known of a stream: its last chunk, since when its samples have been counted without
+    """The state of a stream: its last chunk, since when its samples have been counted without
     a break and how long they say that is, and of each ten minutes how many seconds of samples
     count, how many are kept apart, being of a time that was there before, which are the numbers of
     the first and the last chunk that belongs there, and when these begin and end. `steps` are

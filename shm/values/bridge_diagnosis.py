@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from shm.values.diagnosis import Diagnosis, EffectEstimate, TensionEstimate
-from shm.values.leading import NO_GAP_STANDS_FROM, find_leading_cause, sum_group_probability
+from shm.values.leading import MIN_NO_GAP_PROBABILITY, find_leading_cause, sum_group_probability
 
 BridgeLeads = Literal["shared cause", "each for itself", "shared unknown"]
 
@@ -90,7 +90,7 @@ class BridgeDiagnosis:
         """Return whether a shared cause leads, none is shared, or a shared unknown leads."""
         if self.leading is not None:
             return "shared cause"
-        is_shared = self.each_for_itself_probability < NO_GAP_STANDS_FROM
+        is_shared = self.each_for_itself_probability < MIN_NO_GAP_PROBABILITY
         return "shared unknown" if is_shared else "each for itself"
 
     @property

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
 from shm.values.kinds import NAN, Plane
-from shm.values.leading import NO_GAP_STANDS_FROM, find_leading_cause, sum_group_probability
+from shm.values.leading import MIN_NO_GAP_PROBABILITY, find_leading_cause, sum_group_probability
 from shm.values.showing import Shown, front, line, tension_words
 
 if TYPE_CHECKING:
@@ -334,7 +334,7 @@ class Diagnosis(Shown):
         if self.leading is not None:
             return "cause"
         alone = max((each.acts_alone for each in self.outliers), default=0.0)
-        shown = self.no_gap_probability < NO_GAP_STANDS_FROM or alone >= NO_GAP_STANDS_FROM
+        shown = self.no_gap_probability < MIN_NO_GAP_PROBABILITY or alone >= MIN_NO_GAP_PROBABILITY
         return "unexplained" if shown else "no gap"
 
     @property

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Protocol, TypeVar
 
-NO_GAP_STANDS_FROM = 0.05
-"""A gap is not shown while no gap keeps this probability, what a 95 % interval leaves out: many
-faint causes together outweigh it sooner than any of them is worth naming."""
+MIN_NO_GAP_PROBABILITY = 0.05
+"""A gap is not stated while "no gap" keeps this probability: a 95 % interval leaves out as much."""
 
 
 class WeighedCause(Protocol):
@@ -37,9 +36,9 @@ def find_leading_cause(
 ) -> _Cause | None:
     """Return the most probable cause of the most probable group; None where no cause leads.
 
-    None leads while no gap keeps ``NO_GAP_STANDS_FROM``, or while the unknown is as probable.
+    None leads while no gap keeps ``MIN_NO_GAP_PROBABILITY``, or while the unknown is as probable.
     """
-    if no_gap >= NO_GAP_STANDS_FROM or not causes:
+    if no_gap >= MIN_NO_GAP_PROBABILITY or not causes:
         return None
     best = max(causes, key=lambda each: (sum_group_probability(each, causes), each.probability))
     return best if sum_group_probability(best, causes) > unexplained else None

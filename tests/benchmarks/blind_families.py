@@ -31,7 +31,7 @@ from shm.gap import GapOptions, diagnose_bridge
 from shm.modes_document import load_modes
 from shm.read.atomic import replace_text
 from shm.values import TrueCase
-from shm.values.diagnosis import NO_GAP_STANDS_FROM
+from shm.values.leading import MIN_NO_GAP_PROBABILITY
 from tests.benchmarks import gap_family
 from tests.benchmarks.blind_trial_2 import TRIALS, Plan, moment, share, true_case, write_case
 
@@ -124,7 +124,7 @@ def claimed(found: dict[str, Any]) -> tuple[list[str], set[int]]:
         by_group.setdefault(group, []).append(each)
     claims = [(sum(each["probability"] for each in group), group) for group in by_group.values()]
     claim, leading = max(claims, key=lambda pair: pair[0], default=(0.0, []))
-    if found["each_for_itself_probability"] >= NO_GAP_STANDS_FROM:
+    if found["each_for_itself_probability"] >= MIN_NO_GAP_PROBABILITY:
         return [], set()
     if claim <= found["unknown_probability"]:
         return [], set()

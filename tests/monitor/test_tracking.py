@@ -211,7 +211,6 @@ def test_read_window_large_change(share: float) -> None:
         assert mode.frequency_hz == pytest.approx(hz[mode.plane, mode.order], rel=2e-3)
 
 
-@pytest.mark.slow
 def test_without_known_modes_they_are_found_from_scratch_and_then_tracked() -> None:
     rng = np.random.default_rng(8)
     motion = drawn(rng, orders=4)

@@ -37,8 +37,8 @@ class Processes:
         self._lock = threading.Lock()
         self._closed = False
 
-    def run(self, command: Sequence[str], told: bytes, variables: Mapping[str, str]) -> str:
-        """Run a program with ``told`` on its standard input; return the end of its stdout.
+    def run(self, command: Sequence[str], message: bytes, variables: Mapping[str, str]) -> str:
+        """Run a program with ``message`` on its standard input; return the end of its stdout.
 
         When it ends, or its time is over, every process that it began is ended. Raises HookFailed
         with the end of what it wrote on stderr.
@@ -50,7 +50,7 @@ class Processes:
             finally:
                 os.close(its_end)
             try:
-                answer, errors = exchange(process, told, self._timeout_s)
+                answer, errors = exchange(process, message, self._timeout_s)
             except subprocess.TimeoutExpired:
                 raise HookFailed(
                     f"ended after {self._timeout_s:g} s.",
@@ -82,13 +82,13 @@ class Processes:
         self, command: Sequence[str], variables: Mapping[str, str], report: int
     ) -> subprocess.Popen[bytes]:
         # -I, -S: nothing of the environment or the folder is imported, and it begins quickly.
-        own = [sys.executable, "-I", "-S", reaper.__file__, str(report), str(os.getpid())]
+        runner = [sys.executable, "-I", "-S", reaper.__file__, str(report), str(os.getpid())]
         with self._lock:
             if self._closed:
                 raise HookFailed("not begun: the daemon is ending.")
             try:
                 process = subprocess.Popen(  # noqa: S603 - the owner's own command, no shell
-                    [*own, *command],
+                    [*runner, *command],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.PIPE,
@@ -120,9 +120,9 @@ class Processes:
 
 
 def exchange(
-    process: subprocess.Popen[bytes], told: bytes, timeout_s: float, kept_bytes: int = 64 * 1024
+    process: subprocess.Popen[bytes], message: bytes, timeout_s: float, max_bytes: int = 64 * 1024
 ) -> tuple[bytes, bytes]:
-    """Write ``told`` to a process and return the last ``kept_bytes`` of its stdout and its stderr.
+    """Write ``message`` to a process; return the last ``max_bytes`` of its stdout and stderr.
 
     Both are read until the process ends, so that it never waits for a reader and needs no disk.
     Raises TimeoutExpired.
@@ -130,8 +130,8 @@ def exchange(
     if process.stdin is None or process.stdout is None or process.stderr is None:
         raise TypeError("a process with three pipes is needed")
     latest = time.monotonic() + timeout_s
-    kept: dict[IO[bytes], bytes] = {process.stdout: b"", process.stderr: b""}
-    streams = {each.fileno(): each for each in (process.stdin, *kept)}
+    output: dict[IO[bytes], bytes] = {process.stdout: b"", process.stderr: b""}
+    streams = {each.fileno(): each for each in (process.stdin, *output)}
     with selectors.DefaultSelector() as waiting:
         for number, stream in streams.items():
             os.set_blocking(number, False)
@@ -149,16 +149,16 @@ def exchange(
             for key, _ in ready:
                 stream = streams[key.fd]
                 if stream is process.stdin:
-                    told = told[_write(stream, told) :]
-                    more = bool(told)
+                    message = message[_write(stream, message) :]
+                    more = bool(message)
                 else:
-                    read = stream.read(kept_bytes)
-                    kept[stream] = (kept[stream] + read)[-kept_bytes:]
+                    read = stream.read(max_bytes)
+                    output[stream] = (output[stream] + read)[-max_bytes:]
                     more = bool(read)
                 if not more:
                     waiting.unregister(key.fd)
                     stream.close()
-    return kept[process.stdout], kept[process.stderr]
+    return output[process.stdout], output[process.stderr]
 
 
 class CommandDeliverer(Processes):
@@ -166,8 +166,8 @@ class CommandDeliverer(Processes):
 
     def __call__(self, hook: CommandHook, alert: Alert) -> str:
         """Runs the command; raises HookFailed with what it wrote."""
-        told = dump(alert_document(alert)).encode()
-        answer = self.run(hook.command, told, {"SHM_ALERT_KEY": alert.key})
+        message = dump(alert_document(alert)).encode()
+        answer = self.run(hook.command, message, {"SHM_ALERT_KEY": alert.key})
         return f"exit code 0: {answer}" if answer else "exit code 0"
 
     def ready(self, hook: CommandHook) -> str:
@@ -183,12 +183,12 @@ class CommandDeliverer(Processes):
         return str(found)
 
 
-def _write(stream: IO[bytes], told: bytes) -> int:
+def _write(stream: IO[bytes], message: bytes) -> int:
     """Write what a pipe has room for; all of it where nobody reads."""
     try:
-        return stream.write(told) or 0
+        return stream.write(message) or 0
     except BrokenPipeError:
-        return len(told)
+        return len(message)
 
 
 def _show_end(written: bytes) -> str:

@@ -26,8 +26,7 @@ _COUNTS_KEPT = 4096  # technical: below a megabyte of memory
 
 
 class WrongAttempts:
-    """How many wrong passwords and tokens have come lately, by address. May be used from many
-    threads.
+    """Count the recent wrong passwords and tokens by address and by user; safe for threads.
 
     Passwords count by user too: behind a proxy that names nobody all people have one address, and
     who mistypes must not keep others out. Those of one user count over all addresses, too: who

@@ -221,7 +221,7 @@ def _stiffness(physical: PhysicalHanger, bar: Bar) -> FloatArray:
 
 
 def _sag(physical: PhysicalHanger, bar: Bar, stiffness: FloatArray, kept: IntArray) -> FloatArray:
-    """What a hanger that hangs in a curve adds to its stiffness (n, planes, unknowns, unknowns).
+    """Return the stiffness that sag adds (n, planes, unknowns, unknowns).
 
     A motion w stretches it by the integral of y' w', y the curve at rest: a string's parabola or,
     where it sags as it bends, the bar's own under its weight, as large as makes a motion by that

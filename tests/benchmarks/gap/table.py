@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import beta
 
 from shm.simulate import PLANTED
-from shm.values.diagnosis import NO_GAP_STANDS_FROM
+from shm.values.leading import MIN_NO_GAP_PROBABILITY
 from tests.benchmarks.gap.outcomes import ABOUT, NONE, Outcome
 
 NAMED, COVERED, NO_GAP, UNEXPLAINED, SECONDS = 0.90, (0.80, 0.98), 0.95, 0.80, 60.0
@@ -56,7 +56,7 @@ def answered(outcome: Outcome) -> bool:
 
 def quiet(outcome: Outcome) -> bool:
     """Whether no gap leads."""
-    return outcome.no_gap >= NO_GAP_STANDS_FROM
+    return outcome.no_gap >= MIN_NO_GAP_PROBABILITY
 
 
 def covers(outcomes: Sequence[Outcome]) -> list[bool]:
