@@ -12,7 +12,7 @@ import pytest
 
 from shm.identify import IdentifyOptions, identify
 from shm.monitor import read_window, tracking
-from shm.values import PLANES, Channel, Hanger, Mode, Recording
+from shm.values import PLANES, Channel, FloatArray, Hanger, Mode, Recording
 from shm.values.stream import Piece, Stream, StreamChannel, WindowReading
 from tests.helpers.ambient_stream import (
     LENGTH_M,
@@ -175,24 +175,60 @@ def test_a_mode_that_is_gone_is_told_and_the_others_stay() -> None:
     assert "longitudinal 2" in reading.why
 
 
+def detached(seed: int, rows: list[int], n_windows: int) -> tuple[Motion, list[FloatArray]]:
+    """Return a motion, and windows of it in which the sensors `rows` lie on the deck instead."""
+    rng = np.random.default_rng(seed)
+    motion = drawn(rng, orders=4)
+    deck = {(plane, order): rng.uniform(2, 40) for plane in PLANES for order in range(1, 7)}
+    off = replace(motion, frequency_hz=deck, damping=dict.fromkeys(deck, 0.01))
+    windows = []
+    for _ in range(n_windows):
+        samples = values(motion, rng)
+        samples[rows] = values(off, rng)[rows]
+        windows.append(samples)
+    return motion, windows
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_read_window_detached_plane(seed: int) -> None:
     """Known modes keep their numbers though the transverse sensors see the deck instead.
 
     A peak of the deck may pass for a mode, but within 0.4 % of where that mode was.
     """
-    rng = np.random.default_rng(seed)
-    motion = drawn(rng, orders=4)
-    deck = {(plane, order): rng.uniform(2, 40) for plane in PLANES for order in range(1, 7)}
-    off = replace(motion, frequency_hz=deck, damping=dict.fromkeys(deck, 0.01))
-    samples = values(motion, rng)
-    samples[[0, 2]] = values(off, rng)[[0, 2]]
+    motion, (samples,) = detached(seed, [0, 2], 1)
     at = replace(piece(samples), start=START.replace(minute=30))
     reading = read_window([at], stream(), motion.known(), HANGER, OPTIONS)
     for mode in reading.modes:
         expected = motion.frequency_hz[mode.plane, mode.order]
         assert mode.frequency_hz == pytest.approx(expected, rel=5e-3)
     assert sum(mode.plane == "longitudinal" for mode in reading.modes) >= 3
+
+
+@pytest.mark.parametrize("seed", [101, 103])
+def test_read_window_excludes_strays(seed: int) -> None:
+    """A peak of the deck near a lost mode is not followed from window to window."""
+    motion, windows = detached(seed, [0, 1, 2, 3], 3)
+    known = {(mode.plane, mode.order): mode for mode in motion.known()}
+    for number, samples in enumerate(windows):
+        at = replace(piece(samples), start=START + timedelta(minutes=10 * number))
+        reading = read_window([at], stream(), tuple(known.values()), HANGER, OPTIONS)
+        known |= {(mode.plane, mode.order): mode for mode in reading.modes}
+    for name, mode in known.items():
+        assert mode.frequency_hz == pytest.approx(motion.frequency_hz[name], rel=5e-3)
+
+
+@pytest.mark.parametrize("seed", [302, 309])
+def test_read_window_detached_plane_gains_no_mode(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A search for missed modes adds none to a plane whose known modes are lost."""
+    monkeypatch.setattr("shm.monitor.tracking._is_due", lambda window, every_s: True)
+    motion, (samples,) = detached(seed, [0, 2], 1)
+    known = tuple(m for m in motion.known() if m.plane != "transverse" or m.order <= 2)
+    reading = read_window([piece(samples)], stream(), known, HANGER, OPTIONS)
+    for mode in reading.modes:
+        expected = motion.frequency_hz[mode.plane, mode.order]
+        assert mode.frequency_hz == pytest.approx(expected, rel=5e-3)
 
 
 @pytest.mark.parametrize("share", [-0.3, 0.3])
