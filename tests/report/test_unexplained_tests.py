@@ -57,6 +57,15 @@ def test_told_is_unknown_if_unexplained() -> None:
     assert all(math.isnan(each.probability) for each in latest.told)
 
 
+def test_told_keeps_probable_shift() -> None:
+    """A loss that is probable is reported although the modes fit no state."""
+    latest = watched().latest
+    drifts = tuple(replace(each, probability=0.9) for each in latest.drifts)
+    probable = replace(latest, drifts=drifts)
+    assert probable.is_unexplained
+    assert probable.told == drifts
+
+
 def test_states_omit_unexplained_tests() -> None:
     states = states_over_time(watched(), HANGER_3)
     (tension,) = (each for each in states.quantities if each.is_tension)
