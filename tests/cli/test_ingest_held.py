@@ -10,7 +10,7 @@ import pytest
 
 from shm.documents import dump
 from shm.modes_document import modes_document
-from shm.pipeline.lineage import discarded_of
+from shm.pipeline.lineage import discarded_of_baselines
 from shm.store import Stage, Workspace
 from tests.cli.conftest import Shm
 from tests.helpers.taken_in import copied, ingest_quickly
@@ -191,7 +191,7 @@ def test_what_counts_is_discarded_with_a_reason_and_taken_back(shm: Shm, held: W
     assert "`shm ingest --confirm 1 --why TEXT`" in said
     with held.store() as store:
         assert store.tests.list_all(3) == ()
-        assert discarded_of(store, store.watch.baseline(3)) == ("good",)
+        assert discarded_of_baselines(store) == {3: ("good",)}
     assert shm("--workspace", held.folder, "db", "check").code == 0
     stages = " ".join(shm("--workspace", held.folder, "status", "--of", 1).out.split())
     assert "refused" not in stages

@@ -14,7 +14,7 @@ import pytest
 
 from shm.models.tensioned_beam import frequencies_hz
 from shm.pipeline import stream_days, stream_steps, streaming
-from shm.pipeline.lineage import discarded_of
+from shm.pipeline.lineage import discarded_of_baselines
 from shm.pipeline.stream_days import hand_on_day
 from shm.pipeline.streaming import Streaming
 from shm.store import Stage, Store, Workspace
@@ -193,5 +193,5 @@ def test_the_whole_day_takes_the_place_of_what_was_known_of_it(workspace: Worksp
         baseline = store.watch.baseline(3)
         assert baseline is not None
         assert any(each.stage == Stage.REFUSED for each in store.tests.of_baseline(baseline))
-        assert discarded_of(store, baseline) == ()  # no person discarded it
+        assert discarded_of_baselines(store) == {}  # no person discarded it
     assert found == [2.002, 2.001]
