@@ -157,7 +157,7 @@ def bridge_description() -> str:
     lines = [
         '[bridge]\nname = "Arch bridge of the demo"',
         '[[hook]]\nname = "file"\ncommand = ["tee", "-a", "alerts.jsonl"]',
-        '[settings]\nsamples = 400\nworkers = 2\nmodels = "beam1,beam2"\n'
+        '[settings]\nworkers = 2\nmodels = "beam1,beam2"\n'
         "spool_scan_seconds = 0.5\nspool_stable_seconds = 0.5",
     ]
     for number in range(1, HANGERS + 1):

@@ -236,6 +236,9 @@ def _in_doubt(known: Known) -> Lead:
     name, check = f"Hanger {known.hanger.id}", "Check its description and the numbers of its modes"
     if known.tension is None or known.tension.is_usable:
         return Lead(f"{name}: its tension is in doubt.", f"{check} {NEXT_TEST}.")
+    if not known.tension.has_converged:
+        check = "Raise `samples` in bridge.toml and run"
+        check += f" `shm ingest --again {known.test} --from updated`"
     return Lead(f"{name}: do not use its tension.", f"{check} {WEEK}.")
 
 

@@ -101,7 +101,7 @@ CONTRADICTS_FROM_SD = 3.0
 WITHOUT_MODEL = "frequencies"
 """Stands for the class of a posterior of a structure without a model: frequencies as measured."""
 
-_DO_NOT_USE = "Do not use this tension."
+_DO_NOT_USE, _SAMPLER_FAILED = "Do not use this tension.", "The sampler failed"
 _ENDS_DECIDE, _ORDERS_DECIDE = "The ends decide", "The orders decide"
 _SAID_ONCE = (
     _ENDS_DECIDE,
@@ -222,7 +222,7 @@ class Posterior(Shown):
         found = []
         if self.effective_sample_size < min(ENOUGH_EFFECTIVE, len(self.samples)):
             found.append(
-                f"The sampler failed: {self.effective_sample_size:.0f} effective draws of "
+                f"{_SAMPLER_FAILED}: {self.effective_sample_size:.0f} effective draws of "
                 f"{len(self.samples)}, {ENOUGH_EFFECTIVE} are needed. {_DO_NOT_USE}"
             )
         if self.log_occam > 0:
@@ -339,6 +339,11 @@ class Averaged:
     def is_usable(self) -> bool:
         """Return False if a caveat says that this tension must not be used."""
         return not any(_DO_NOT_USE in each for each in self.caveats)
+
+    @property
+    def has_converged(self) -> bool:
+        """Return False if a caveat says that the sampler failed."""
+        return not any(_SAMPLER_FAILED in each for each in self.caveats)
 
 
 @dataclass(frozen=True, eq=False)
