@@ -81,6 +81,15 @@ def bare(signature: inspect.Signature) -> str:
     return str(signature.replace(parameters=parameters, return_annotation=inspect.Signature.empty))
 
 
+def run_python(code: str) -> str:
+    """Return what a new interpreter prints that runs some code without a complaint."""
+    ran = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (ran.returncode, ran.stderr) == (0, "")
+    return ran.stdout
+
+
 def test_the_names_are_pinned() -> None:
     top = {name for name in SIGNATURES if "." not in name}
     assert set(shm.__all__) == top | NOUNS | {"plot", "export"}
@@ -147,10 +156,7 @@ def test_step_after_any_import(imported: str) -> None:
         "assert isinstance(sys.modules['shm.identify'], types.ModuleType)\n"
         "try: shm.identify.nothing\nexcept AttributeError as e: print(e)"
     )
-    ran = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert (ran.stdout, ran.stderr) == ("'function' object has no attribute 'nothing'\n", "")
+    assert run_python(code) == "'function' object has no attribute 'nothing'\n"
 
 
 @pytest.mark.parametrize("name", STEPS)
@@ -170,10 +176,8 @@ def test_import_loads_nothing_else() -> None:
         "new = set(sys.modules) - before\n"
         "print(*(name for name in new if name.startswith('shm') or 'numpy' in name))"
     )
-    ran = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert ran.stdout.split() == ["shm"]
+    printed = run_python(code)
+    assert printed.split() == ["shm"]
 
 
 def test_the_steps_are_at_hand_without_the_libraries_that_take_long_to_load() -> None:
@@ -183,16 +187,12 @@ def test_the_steps_are_at_hand_without_the_libraries_that_take_long_to_load() ->
         "    for name in home.__all__: getattr(home, name)\n"
         "print(*sys.modules)"
     )
-    ran = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
-    )
+    printed = run_python(code)
     slow = {"scipy.special", "scipy.linalg", "scipy.sparse", "sqlalchemy", "matplotlib", "pandas"}
-    assert not slow & set(ran.stdout.split())
+    assert not slow & set(printed.split())
 
 
 def test_a_step_can_be_called_after_its_package_was_imported() -> None:
     code = "import shm.read, shm\ntry: shm.read('none.csv')\nexcept shm.ShmError as e: print(e)"
-    ran = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert ran.stdout.startswith("none.csv: ")
+    printed = run_python(code)
+    assert printed.startswith("none.csv: ")
