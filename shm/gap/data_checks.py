@@ -36,10 +36,14 @@ near to another unit calls for a tension beyond the prior."""
 
 @dataclass(frozen=True)
 class Usable:
-    """The tests that a diagnosis uses, and what was found on the way to them."""
+    """The tests that a diagnosis uses, and what was found on the way to them.
+
+    `other_unit` is the one of `remarks` that the frequencies look given in another unit, if any.
+    """
 
     tests: tuple[ModalTest, ...]
     remarks: tuple[str, ...]
+    other_unit: tuple[str, ...] = ()
 
 
 def usable(tests: Sequence[ModalTest], hanger: Hanger) -> Usable:
@@ -63,7 +67,8 @@ def usable(tests: Sequence[ModalTest], hanger: Hanger) -> Usable:
             "no test holds a mode that can be used. " + " ".join(remarks),
             remedy="Give tests with modes whose orders rise with their frequencies.",
         )
-    return Usable(tuple(kept), (*remarks, *_said_of_all(kept, hanger)))
+    remarks = [*remarks, *_said_of_all(kept, hanger)]
+    return Usable(tuple(kept), tuple(remarks), (unit,) if unit else ())
 
 
 def _refuse(tests: Sequence[ModalTest], hanger: Hanger) -> None:

@@ -13,9 +13,18 @@ from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
 from shm.gap.damping import acting
 from shm.gap.data_checks import Usable, tension_of_any_ends_n, usable
 from shm.gap.law_error import mixed
+from shm.gap.misfit import refuse_misfit
 from shm.gap.next_measurement import ranked
 from shm.gap.observations import observed
-from shm.gap.outlier_removal import Cleared, cleared, doubtful, outliers, set_aside, with_outliers
+from shm.gap.outlier_removal import (
+    Cleared,
+    doubtful,
+    exclude_outliers,
+    outliers,
+    search_further,
+    set_aside,
+    with_outliers,
+)
 from shm.gap.places import places
 from shm.gap.problem import GapProblem
 from shm.gap.remainder import remainder_of
@@ -57,8 +66,9 @@ def diagnose(
     """Where the baseline and the tests of a hanger differ, which effect causes it, what it changes.
 
     The same tests, options and seed give the same answer. Raises BadInput where the tests cannot
-    be used (what can be used in spite of a fault is used, and `Diagnosis.remarks` says so),
-    UsageError for a model class, effect, test or order that is not there.
+    be used (what can be used in spite of a fault is used, and `Diagnosis.remarks` says so) or where
+    even the best explanation misses their frequencies by more than 10 %, UsageError for a model
+    class, effect, test or order that is not there.
 
     Example:
         >>> diagnosis = shm.diagnose(tests, hanger, baseline="beam1")
@@ -75,11 +85,14 @@ def examined(
     started = time.perf_counter()
     found, whole = _to_explain(tests, hanger, options)
     rng = np.random.default_rng(options.seed)
-    clear = cleared(whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done))
+    first = exclude_outliers(
+        whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done)
+    )
+    refuse_misfit(first, found.other_unit)
+    clear = search_further(first)
     problem = clear.problem
-    first = clear.attribution
-    share, dynamic = acting(first.no_gap_probability, found.tests, whole.observations)
-    attribution = first.with_unknown(share)
+    share, dynamic = acting(clear.attribution.no_gap_probability, found.tests, whole.observations)
+    attribution = clear.attribution.with_unknown(share)
     progress("shrinkage", _ATTRIBUTION)
     answer, before = answered(attribution), attribution.baseline
     after = attribution.leading.best.fit if attribution.leading else None
@@ -188,9 +201,7 @@ def _states(
             f"{TENSION_RATIO[1]:g} times nominal): check nominal_tension_n and the description."
         )
     best = after or before
-    count = problem.design.frequencies
-    rest = (problem.observations.value - best.predicted)[:count]
-    misfit_percent = 100 * float(np.sqrt(np.mean(rest**2)))
+    misfit_percent = problem.misfit_percent(best)
     if misfit_percent > MOST_MISFIT_PERCENT:
         found.append(
             f"The leading explanation misses the frequencies by {misfit_percent:.1f} % (root mean "

@@ -151,7 +151,7 @@ def _starts(problem: GapProblem, hypothesis: Hypothesis, rng: np.random.Generato
         return found.starts(coordinates, STARTS)
     starts = np.zeros((len(_BASELINE_STARTS), coordinates.dimension))
     starts[:, 0] = _BASELINE_STARTS
-    return starts
+    return np.vstack([starts, problem.near])
 
 
 def _seen_from_the_other_end(landscape: Landscape, found: list[Optimum]) -> list[Optimum]:

@@ -39,7 +39,8 @@ class Cleared:
 
     `aside` are the others, `doubted` at most one of those kept: more likely than not a gross error,
     but not surely. `otherwise` is the cause that would lead, were none of `aside` one; "" for none.
-    `misnumbered` is a remark where the orders look wrong.
+    `misnumbered` is a remark where the orders look wrong. `first` is the attribution of all
+    frequencies.
     """
 
     whole: GapProblem
@@ -50,6 +51,7 @@ class Cleared:
     doubted: tuple[GrossError, ...] = ()
     otherwise: str = ""
     misnumbered: tuple[str, ...] = ()
+    first: Attribution | None = None
 
     def seen(self, error: GrossError, fit: Fit) -> LeftOut:
         """A frequency seen from the other data that are kept, to which `fit` was fitted."""
@@ -63,14 +65,12 @@ class Cleared:
         return float(deviation[0]), float(sd[0])
 
 
-def cleared(
+def exclude_outliers(
     whole: GapProblem, options: GapOptions, rng: np.random.Generator, progress: Progress = silent
 ) -> Cleared:
-    """Attributed, and where that leaves gross errors, attributed anew without them.
+    """Attribute the gap, and where that leaves gross errors, attribute it again without them.
 
-    Where the last attribution expects one of them as it was measured, the first one stands. It is
-    searched thoroughly only then, for among many pairs there always is one that takes a gross error
-    for its own, and not where the orders look wrong: they must be put right first.
+    Where the last attribution expects one of them as it was measured, the first one applies.
     """
     every = np.arange(whole.design.frequencies)
     first = found = Cleared(whole, whole, every, attributed(whole, options, rng, progress))
@@ -87,9 +87,18 @@ def cleared(
         found = Cleared(whole, part, rows, again, (*found.aside, *sure))
     found = found if all(_stands(found, each) for each in found.aside) else first
     wrong = misnumbered(found.problem, found.attribution)
-    last = found.attribution if wrong else more_thorough(found.attribution)
-    otherwise = _led_before(first.attribution, last)
-    done = replace(found, attribution=last, otherwise=otherwise, misnumbered=wrong)
+    return replace(found, first=first.attribution, misnumbered=wrong)
+
+
+def search_further(found: Cleared) -> Cleared:
+    """Search thoroughly what the first search leaves open, and weigh that an outlier acts alone.
+
+    Among many pairs there always is one that takes a gross error for its own: outliers must be
+    excluded before. Where the orders look wrong nothing is searched: they must be put right first.
+    """
+    last = found.attribution if found.misnumbered else more_thorough(found.attribution)
+    otherwise = _led_before(found.first or found.attribution, last)
+    done = replace(found, attribution=last, otherwise=otherwise)
     # No gap stands only as far as what was set aside was a slip and no part that acts alone.
     slips = np.prod([1 - _alone(done, each, last.baseline) for each in done.aside])
     return replace(done, attribution=last.with_unknown(1 - float(slips)))

@@ -163,7 +163,7 @@ class GapProblem:
         """What the section along the bar, the sensors' mass and the supports' give do to the
         frequencies of a design: loads (F, k), the same k of every design.
         """
-        theta = self.theta(Hypothesis(), self._near)[:, : len(self._baseline.names)]
+        theta = self.theta(Hypothesis(), self.near)[:, : len(self._baseline.names)]
         alike = self._baseline.physical(np.repeat(theta, STRETCHES + 1, axis=0), 0)
         section = section_loads(design, alike, self.hanger)
         if not self.hanger.as_hanger:
@@ -182,7 +182,12 @@ class GapProblem:
 
     def _predicted_near(self, design: Design) -> FloatArray:
         """The data (data,) that the baseline near the measured ones predicts of a design."""
-        return np.asarray(self.predict(Hypothesis(), self._near, design)[0])
+        return np.asarray(self.predict(Hypothesis(), self.near, design)[0])
+
+    def misfit_percent(self, fit: Fit) -> float:
+        """Return by how much a fit misses the frequencies, root mean square."""
+        apart = (self.observations.value - fit.predicted)[: self.design.frequencies]
+        return 100 * float(np.sqrt(np.mean(apart**2)))
 
     @property
     def near_misfit(self) -> float:
@@ -190,7 +195,7 @@ class GapProblem:
         return self._nearest[1]
 
     @property
-    def _near(self) -> FloatArray:
+    def near(self) -> FloatArray:
         """A point z (1, d) of the baseline at the tension that fits the frequencies best."""
         return self._nearest[0]
 

@@ -42,7 +42,7 @@ from shm.gap.data_checks import usable
 from shm.gap.law_error import allowances, by_its_laws, second_cause
 from shm.gap.model_probabilities import CALIBRATION, FILE, Calibration, Provenance, Share, log_prior
 from shm.gap.observations import observed
-from shm.gap.outlier_removal import Cleared, cleared
+from shm.gap.outlier_removal import Cleared, exclude_outliers, search_further
 from shm.gap.problem import GapProblem
 from shm.modes_document import load_modes
 from shm.values import TrueCase
@@ -98,7 +98,7 @@ def diagnosed(directory: Path, without: tuple[str, ...]) -> Cleared:
     tests = load_modes(modes) if modes.exists() else identify_tests(directory, hanger).tests
     options = GapOptions(str(told["baseline"]), without, seed=int(told["seed"]))
     problem = GapProblem(hanger, options.baseline, observed(usable(tests, hanger).tests, hanger))
-    return cleared(problem, options, np.random.default_rng(options.seed))
+    return search_further(exclude_outliers(problem, options, np.random.default_rng(options.seed)))
 
 
 def _with_the_whole_catalogue(clear: Cleared, truth: TrueCase) -> dict[str, object]:

@@ -68,7 +68,7 @@ def test_a_readings_error_moves_all_modes_of_its_test_together() -> None:
     """Of a string d ln f/dT = 1/(2 T): half the reading's fraction, in every mode."""
     tests = loadings(np.outer([1.0, 1.0], 3.45 * np.array(ORDERS)), (690e3, 732e3), SD_N)
     problem = GapProblem(STRING, "beam1", observed(tests, STRING))
-    theta = problem.theta(Hypothesis(), problem._near)
+    theta = problem.theta(Hypothesis(), problem.near)
     level_n = float(theta[0, 0]) * STRING.nominal_tension_n
     loads = problem.readings_of(problem.design)
     assert loads.shape == (8, 2)

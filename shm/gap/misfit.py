@@ -1,0 +1,74 @@
+"""Refuse to diagnose tests that no explanation comes near: of another hanger, or wrongly described.
+
+A cause, its size and a tension would be named after the least bad of wrong models.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shm.errors import BadInput
+from shm.gap.fit import BASELINE
+from shm.gap.outlier_removal import Cleared
+from shm.gap.problem import GapProblem
+from shm.values.posterior import NO_TENSION_PERCENT
+from shm.values.rounding import force_unit
+
+
+def refuse_misfit(found: Cleared, reasons: Sequence[str]) -> None:
+    """Raise BadInput where even the best explanation misses the frequencies by far.
+
+    `reasons` are sentences on what is wrong with the data. Tried are no gap and each effect and
+    pair that was fitted, without excluded outliers.
+    """
+    problem = found.problem
+    fits = [each.fit for each in found.attribution.tried if not each.hypothesis.flexible]
+    fitted = [fit for fit in fits if fit is not None]
+    best = min(fitted, key=problem.misfit_percent)
+    misfit = problem.misfit_percent(best)
+    if misfit <= NO_TENSION_PERCENT:
+        return
+    hanger = problem.hanger
+    name = best.hypothesis.name.replace("_", " ") or f"the baseline {problem.baseline}"
+    raise BadInput(
+        f"no explanation fits the frequencies of hanger {hanger.id}: the best, {name}, misses them "
+        f"by {misfit:.0f} % (root mean square){_range_over_tests(problem)}. "
+        "No cause can be named, and no tension given. "
+        + " ".join((*found.misnumbered, *reasons, *_compare_with_string(problem))),
+        remedy="Check that all tests are of this hanger, the orders of the modes, and diameter, "
+        "length and nominal tension.",
+    )
+
+
+def _range_over_tests(problem: GapProblem) -> str:
+    """Return how far the baseline misses the lowest and the highest test, if there are several."""
+    design, best = problem.design, problem.fits[BASELINE]
+    apart = (problem.observations.value - best.predicted)[: design.frequencies]
+    names = [each.test for each in design.conditions]
+    by_test = {
+        names[test]: 100 * float(np.expm1(apart[design.frequency_test == test].mean()))
+        for test in np.unique(design.frequency_test)
+    }
+    if len(by_test) < 2:
+        return ""
+    low, high = min(by_test, key=by_test.__getitem__), max(by_test, key=by_test.__getitem__)
+    return (
+        f"; the baseline misses test {low} by {by_test[low]:+.0f} % and test {high} by "
+        f"{by_test[high]:+.0f} %"
+    )
+
+
+def _compare_with_string(problem: GapProblem) -> tuple[str, ...]:
+    """Return the tension of a taut string with these frequencies, beside the nominal one."""
+    hanger, design = problem.hanger, problem.design
+    if not hanger.nominal_tension_n:
+        return ()
+    frequency_hz = np.exp(problem.observations.value[: design.frequencies])
+    speed_m_s = 2 * hanger.length_m * np.median(frequency_hz / design.frequency_order)
+    tension_n = float(hanger.mass_per_length_kg_m * speed_m_s**2)
+    return (
+        f"A taut string with these frequencies carries {force_unit(tension_n).told(tension_n)}, "
+        f"{tension_n / hanger.nominal_tension_n:.2g} times the nominal tension.",
+    )
