@@ -88,7 +88,8 @@ def examined(
     first = exclude_outliers(
         whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done)
     )
-    refuse_misfit(first, found.other_unit)
+    doubts = _of_another(found.tests, hanger)
+    refuse_misfit(first, (*found.other_unit, *doubts))
     clear = search_further(first)
     problem = clear.problem
     share, dynamic = acting(clear.attribution.no_gap_probability, found.tests, whole.observations)
@@ -122,7 +123,7 @@ def examined(
         tension_after_n=after_n,
         next_measurements=_following(problem, attribution, progress),
         remarks=(
-            *_of_another(found.tests, hanger),
+            *doubts,
             *_states(problem, before, after, (before_n, after_n)),
             *dynamic,
             *_on_the_way(found, clear, aside, doubted, after or before),

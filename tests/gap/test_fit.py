@@ -52,6 +52,10 @@ class LinearProblem:
     def straight(self, coordinates: Coordinates) -> Straight:
         return Straight(())
 
+    @property
+    def near(self) -> FloatArray:
+        return np.zeros((1, self.slopes.shape[1]))
+
     def exact_log_evidence(self) -> float:
         return toy.log_evidence(nodes(self.observations), self.slopes, self.observations.value)
 
