@@ -47,7 +47,7 @@ beam (where P = p and Q = q) the four end conditions give
 and the same phase phi in [0, pi) raises mode n above n pi. Given q, Omega^2 is the smaller root of
 r Omega^4 - (q^2 + s + r (s + t) q^2) Omega^2 + q^2 ((s + t) q^2 + s t) = 0, and
 p^2 = Omega^2 (s - r Omega^2) / ((s + t) q^2). This holds below the cut-off Omega^2 = s/r, beyond
-which sections swing by themselves: no mode of a hanger comes near.
+which sections swing by themselves: no mode of a hanger comes near, and a mode beyond it is NaN.
 """
 
 from __future__ import annotations
@@ -265,6 +265,10 @@ _SMALL_SECANT_STEP = 1e-7
 _MOST_SECANT_STEPS = 12
 """Never reached by finite numbers, which take four steps, rarely five; NaN must end too."""
 
+_SMALLEST_P_SQUARED = 1e-16
+"""Below it p coth p and p / sinh p are 1 in double precision: the phase at the cut-off is its limit
+for p = 0, which also holds it where a secant step passes the cut-off."""
+
 
 def timoshenko_frequencies_hz(
     length_m: FloatArray,
@@ -279,7 +283,8 @@ def timoshenko_frequencies_hz(
 ) -> FloatArray:
     """Natural frequencies, shape S + (modes,), where the arguments broadcast to the shape S.
 
-    `shear_stiffness_n` is kappa G A, `gyration_m` the radius of gyration sqrt(I/A).
+    `shear_stiffness_n` is kappa G A, `gyration_m` the radius of gyration sqrt(I/A). Modes beyond
+    the cut-off, at which sections swing by themselves, are NaN.
     """
 
     def solve(*sets: FloatArray) -> FloatArray:
@@ -320,13 +325,13 @@ def _omega(
     for _ in range(_MOST_SECANT_STEPS):
         moved = q + step
         found = rest(moved)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            slope = (found - value) / step
+        slope = np.divide(found - value, step, out=np.ones_like(step), where=step != 0)
         slope = np.where(np.isfinite(slope) & (slope > 0.5), slope, 1.0)
         q, value, step = moved, found, -found / slope
         if np.nanmax(np.abs(step), initial=0.0) < _SMALL_SECANT_STEP:
             break
-    return np.sqrt(_square(q + step, t, s, r))
+    omega2 = _square(q + step, t, s, r)
+    return np.sqrt(np.where(r * omega2 < s, omega2, np.nan))
 
 
 def _square(q: FloatArray, t: FloatArray, s: FloatArray, r: FloatArray) -> FloatArray:
@@ -347,11 +352,12 @@ def _phase(
 ) -> FloatArray:
     """phi (modes, sets): 2 atan((B - c)/(A + sqrt(A^2 + B^2 - c^2))), c = (-1)^n C."""
     omega2, q2 = _square(q, t, s, r), q * q
-    p2 = np.maximum(omega2 * (s - r * omega2), np.finfo(float).tiny) / ((s + t) * q2)
+    p2 = np.maximum(omega2 * (s - r * omega2) / ((s + t) * q2), _SMALLEST_P_SQUARED)
     p = np.sqrt(p2)
     big_p, big_q = ((s + t) * p2 + omega2) / (s * p), ((s + t) * q2 - omega2) / (s * q)
     decay = np.exp(-p)
-    coth, csch = (1 + decay * decay) / (1 - decay * decay), 2 * decay / (1 - decay * decay)
+    below_one = -np.expm1(-2 * p)
+    coth, csch = (1 + decay * decay) / below_one, 2 * decay / below_one
     none, one, both = ends
     v = big_p * p + big_q * q
     a = none * v * v + one * v * big_p * coth + both * (big_p**2 - big_q**2)

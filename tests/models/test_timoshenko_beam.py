@@ -44,13 +44,18 @@ def test_pinned_ends_give_the_closed_form(length_m: float, tension_n: float) -> 
 
     Of their energies the smaller eigenvalue is omega^2.
     """
+    found = found_hz(0.0, 0.0, 10, length_m, tension_n)
+    np.testing.assert_allclose(found, pinned_hz(length_m, tension_n, 10), rtol=1e-9)
+
+
+def pinned_hz(length_m: float, tension_n: float, modes: int) -> FloatArray:
+    """Return the frequencies (modes,) of a bar on hinges from its two energies."""
     expected = []
-    for q in np.arange(1, 11) * np.pi / length_m:
+    for q in np.arange(1, modes + 1) * np.pi / length_m:
         stiffness = [[(SHEAR + tension_n) * q**2, -SHEAR * q], [-SHEAR * q, EI * q**2 + SHEAR]]
         inertia = np.diag([MASS, MASS * GYRATION**2])
         expected.append(np.sqrt(eigh(stiffness, inertia, eigvals_only=True)[0]) / (2 * np.pi))
-    found = found_hz(0.0, 0.0, 10, length_m, tension_n)
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    return np.array(expected)
 
 
 @pytest.mark.parametrize("tension_n", [1.0, TENSION, 1e3 * TENSION])
@@ -160,6 +165,33 @@ def test_sets_that_are_no_bar_end_and_leave_the_others_alone() -> None:
     found = found_hz(1e6, 1e6, 4, tension_n=np.array([TENSION, np.nan]))
     assert np.isnan(found[1]).all()
     np.testing.assert_allclose(found[0], found_hz(1e6, 1e6, 4), rtol=1e-12)
+
+
+@pytest.mark.parametrize("tension_n", [1.0, TENSION, 1e9])
+def test_timoshenko_pinned_beyond_cutoff(tension_n: float) -> None:
+    """Sections swing by themselves from (1/2 pi) sqrt(kappa G A / (m r^2)). A mode below keeps its
+    frequency, also where the search passes the cut-off; a mode beyond is unknown."""
+    lengths_m = np.geomspace(0.02, 2.0, 60)
+    expected = np.array([pinned_hz(each, tension_n, 8) for each in lengths_m])
+    expected[expected >= cutoff_hz()] = np.nan
+    assert np.isnan(expected).any(axis=0).all()
+    np.testing.assert_allclose(found_hz(0.0, 0.0, 8, lengths_m, tension_n), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("deck", "arch"), [(0.0, np.inf), (1e4, 1e6), (np.inf, np.inf)])
+def test_timoshenko_sprung_beyond_cutoff(deck: float, arch: float) -> None:
+    """The first modes of a shorter bar reach the cut-off, the highest one first."""
+    found = found_hz(deck, arch, 8, np.geomspace(0.02, 2.0, 60))
+    known = np.isfinite(found)
+    assert np.all(known[:, :-1] | ~known[:, 1:])
+    assert np.all(known[:-1] <= known[1:])
+    assert np.all(found[known] < cutoff_hz())
+    assert not known[0].any()
+    assert known[-1].any()
+
+
+def cutoff_hz() -> float:
+    return float(np.sqrt(SHEAR / MASS) / (2 * np.pi * GYRATION))
 
 
 def test_beam_3_is_this_beam_and_beam_2_its_limit_for_slender_bars() -> None:
