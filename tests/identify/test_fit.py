@@ -71,6 +71,22 @@ def test_unknown_lines_are_not_fitted_but_drawn() -> None:
     np.testing.assert_allclose(found[:, 60:590], measured[:, 60:590], atol=1e-6)
 
 
+def test_fitted_without_known_lines() -> None:
+    """Points whose known lines do not overlap have no line on which to fit the modes."""
+    holes = _accelerance(PLANTED, np.inf)
+    holes[0, 400:] = holes[1, :400] = np.nan
+    found = fitted([_measurement(holes, np.inf)], [MODES], OPTIONS)
+    assert found is not None
+    assert found.shape == holes.shape
+    assert np.isnan(found).all()
+
+
+def test_fitted_without_modes_has_residual_terms() -> None:
+    found = fitted([_measurement(_accelerance((BEYOND,), np.inf), np.inf)], [[]], OPTIONS)
+    assert found is not None
+    assert _error(_accelerance((BEYOND,), np.inf), np.inf, []) < 0.1
+
+
 def test_set_ups_stand_below_one_another_and_ambient_records_have_no_fit() -> None:
     measurement = _measurement(_accelerance(PLANTED, np.inf), np.inf)
     both = fitted([measurement, measurement], [MODES, MODES], OPTIONS)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from shm.identify.measuring.frf import (
     HitRecord,
     Window,
     averaged_response,
+    common_window,
 )
 from shm.identify.measuring.hits import find_pulses
 from shm.values import FrequencyResponse, Recording, ResponsePoint
@@ -22,14 +24,17 @@ MODES = (Planted(12.0, 0.02, (1.0,)), Planted(31.0, 0.02, (-0.5,)))
 
 
 def _average(record: Recording) -> AveragedResponse:
+    return averaged_response(_hits(record), record.sampling_rate_hz, 60.0)
+
+
+def _hits(record: Recording) -> list[HitRecord]:
     force = record.force
     assert force is not None
     signals = np.array([channel.values for channel in record.accelerations])
-    hits = [
+    return [
         HitRecord(force.values, signals, pulse)
         for pulse in find_pulses(force.values, record.sampling_rate_hz)
     ]
-    return averaged_response(hits, record.sampling_rate_hz, 60.0)
 
 
 def _record(modes: tuple[Planted, ...] = MODES, **changes: float) -> Recording:
@@ -85,6 +90,19 @@ def test_a_long_ring_down_is_brought_to_a_hundredth_by_its_window() -> None:
     own = math.exp(-0.001 * 2 * math.pi * 12.0 * 7.0)
     window = math.exp(-7.7 / average.window_time_constant_s)
     assert own * window == pytest.approx(END_LEVEL, rel=0.15)
+
+
+def test_common_window_ignores_what_follows_the_ring_down() -> None:
+    """Neither lost samples nor a knock after the end of a ring-down changes its window."""
+    hits = _hits(_record((Planted(12.0, 0.001, (1.0,)),), hits=3, seconds=4.0))[:2]
+    expected = common_window(hits, RATE_HZ, 60.0)
+    assert math.isfinite(expected.time_constant_s)
+    for strange in (np.nan, 1e4):
+        signals = hits[0].accelerations.copy()
+        for hit in hits:
+            signals[:, hit.pulse.stop : hit.pulse.stop + 10] = strange
+        others = [replace(hit, accelerations=signals) for hit in hits]
+        assert common_window(others, RATE_HZ, 60.0) == expected
 
 
 def test_the_window_adds_just_the_damping_that_its_time_constant_says() -> None:

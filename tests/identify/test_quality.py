@@ -155,6 +155,36 @@ def test_a_jump_that_comes_back_slowly_is_a_surprise() -> None:
     assert [value > 10.0 for value in surprise(parts)] == [False, True, False]
 
 
+def test_surprise_without_motion() -> None:
+    """A channel that shows no motion at all, as a coarse recorder's may, has no rule to leave."""
+    np.testing.assert_array_equal(surprise([np.zeros(2000)] * 2), [0.0, 0.0])
+
+
+def test_repeatability_force_lost_before_hits() -> None:
+    """What the force was before a hit is not needed: the hits agree as they do without the gap."""
+
+    def lose(values: FloatArray) -> None:
+        for hit in range(1, SOUND.samples // SLOT):
+            values[hit * SLOT + FIRST - 12 : hit * SLOT + FIRST - 8] = np.nan
+
+    found = check_of("repeatability", changed("force", lose))
+    assert found.verdict == "good"
+    assert found.value == pytest.approx(check_of("repeatability", SOUND).value, rel=0.01)
+
+
+def test_noise_unknown_of_one_channel() -> None:
+    """A channel that lost samples whenever nothing rang says nothing of the noise; others do."""
+
+    def lose(values: FloatArray) -> None:
+        values[FIRST // 2] = values[-100] = np.nan
+        for hit in range(1, SOUND.samples // SLOT):
+            values[hit * SLOT + FIRST - 100] = np.nan
+
+    sound = check_of("noise", SOUND)
+    found = check_of("noise", changed("acc_2", lose))
+    assert found.value == pytest.approx(sound.value, abs=3.0)
+
+
 def test_a_missing_sample_is_told() -> None:
     def lose(values: FloatArray) -> None:
         values[SLOT + 3000] = np.nan

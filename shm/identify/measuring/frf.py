@@ -65,7 +65,7 @@ def common_window(
     before = min(_margin(sampling_rate_hz), *(hit.pulse.start for hit in hits))
     longest = int(MOST_LINES / (BAND_MARGIN * band_high_hz) * sampling_rate_hz)
     length = min(longest, *(hit.pulse.stop - hit.pulse.start + before for hit in hits))
-    constants = [_time_constant(hit, length, sampling_rate_hz) for hit in hits]
+    constants = [_time_constant(hit, length - before, sampling_rate_hz) for hit in hits]
     return Window(before, length, min(constants))
 
 
@@ -102,7 +102,10 @@ def _margin(sampling_rate_hz: float) -> int:
 
 
 def _time_constant(hit: HitRecord, length: int, sampling_rate_hz: float) -> float:
-    """Of the window that brings a ring-down to 1 % at its end; inf where it is there already."""
+    """Return that of the window that brings a ring-down to 1 % at its end; inf where it is there.
+
+    `length` is the samples from the hit on: beyond them a gap or the next hit may lie.
+    """
     ring_down = hit.accelerations[:, hit.pulse.end : hit.pulse.start + length]
     tenth = max(1, ring_down.shape[1] // 10)
     first, last = np.std(ring_down[:, :tenth]), np.std(ring_down[:, -tenth:])

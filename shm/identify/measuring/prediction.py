@@ -92,6 +92,8 @@ def prediction_rule(parts: Sequence[FloatArray]) -> FloatArray:
     rows = np.vstack([sliding_window_view(part[:_FIT_SAMPLES], _ORDER + 1) for part in parts])
     past, now = rows[:, :-1], rows[:, -1]
     square = past.T @ past
+    if not square.any():  # no motion at all, which the rule of no coefficients predicts
+        return np.eye(1, 1 + _ORDER)[0]
     square += _RIDGE * float(np.trace(square)) / _ORDER * np.eye(_ORDER)
     weights = scipy.linalg.solve(square, past.T @ now, assume_a="pos")
     return np.concatenate(([1.0], -weights[::-1]))

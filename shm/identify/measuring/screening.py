@@ -367,5 +367,6 @@ def _force_spectrum(hit: HitRecord, gap: int, length: int) -> ComplexArray:
     begin = max(0, pulse.start - gap)
     force = np.zeros(length)
     known = hit.force[pulse.start : min(pulse.end + gap, pulse.start + length)]
-    force[: len(known)] = known - np.median(hit.force[begin : pulse.stop])
+    # A force may have lost samples before the hit: its level is that of the others.
+    force[: len(known)] = known - np.nanmedian(hit.force[begin : pulse.stop])
     return np.asarray(np.fft.rfft(force))

@@ -224,9 +224,13 @@ def _ratios_db(measurement: Measurement, inspection: Inspection) -> tuple[float,
     if not loud or not still:
         return NAN, before
     signal = np.median(loud, axis=0)
-    noise = np.maximum(np.nanmin(still, axis=0), signal * 10 ** (-_MOST_DB / 10))
+    known = np.isfinite(signal) & np.isfinite(still).any(axis=0)
+    if not known.any():
+        return NAN, before
+    signal, quietest = signal[known], np.nanmin(np.array(still)[:, known], axis=0)
+    noise = np.maximum(quietest, signal * 10 ** (-_MOST_DB / 10))
     ratio = signal / np.maximum(noise, np.finfo(float).tiny)
-    return float(10 * np.log10(max(float(np.nanmax(ratio)), 1e-30))), before
+    return float(10 * np.log10(max(float(np.max(ratio)), 1e-30))), before
 
 
 def _power(

@@ -180,7 +180,8 @@ def fitted(
 ) -> ComplexArray | None:
     """The accelerance (points, lines) that the modes of each set-up make; None without a force.
 
-    The factors of each point are the linear least-squares ones over the lines of the band.
+    The factors of each point are the linear least-squares ones over the lines of the band; NaN
+    where no line of the band is known.
     """
     parts = [
         _fitted(m.frequency_response, m.window_time_constant_s, own, options)
@@ -199,6 +200,8 @@ def _fitted(
     s = np.asarray(2j * np.pi * response.frequency_hz + 1 / time_constant_s, np.complex128)
     basis = _basis(s, modes, 2 * math.pi * options.band_high_hz)
     band = _band(response, options)
+    if not band.any():
+        return np.full(response.accelerance.shape, np.nan, np.complex128)
     stacked = np.hstack([basis[:, band].real, basis[:, band].imag])
     wanted = np.hstack([response.accelerance[:, band].real, response.accelerance[:, band].imag])
     scale = np.maximum(np.linalg.norm(stacked, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -210,8 +213,8 @@ def _fitted(
 
 def _basis(s: ComplexArray, modes: Sequence[FoundMode], scale: float) -> ComplexArray:
     """Two rows a mode and the two residual terms, (2 * modes + 2, lines)."""
-    omega = 2 * np.pi * np.array([[mode.frequency_hz] for mode in modes])
-    damping = np.array([[mode.damping_ratio] for mode in modes])
+    omega = 2 * np.pi * np.array([mode.frequency_hz for mode in modes])[:, None]
+    damping = np.array([mode.damping_ratio for mode in modes])[:, None]
     single = s**2 / (s**2 + 2 * damping * omega * s + omega**2)
     return np.vstack([single, single * s / omega, np.ones_like(s), s**2 / scale**2])
 
