@@ -67,10 +67,10 @@ def signal_doubts(
 def apparent_mass_kg(record: Recording) -> float:
     """J/v by the sensor that moves most, the median over the hits; NaN where there is no hit."""
     velocities = _velocities(record)
-    if not len(velocities):
+    fastest = max(velocities[np.isfinite(velocities)], default=NAN)
+    if math.isnan(fastest):
         return NAN
-    fastest = float(velocities.max())
-    return 1 / fastest if fastest > 0 else math.inf
+    return 1 / float(fastest) if fastest > 0 else math.inf
 
 
 def _units(record: Recording, hanger: Hanger | None) -> list[SignalDoubt]:
@@ -122,9 +122,11 @@ def _unlike_its_neighbours(record: Recording) -> list[SignalDoubt]:
     found = []
     for row, channel in enumerate(channels if len(velocities) else ()):
         rest = [
-            velocities[n] for n, c in enumerate(channels) if n != row and c.plane == channel.plane
+            velocities[n]
+            for n, c in enumerate(channels)
+            if n != row and c.plane == channel.plane and np.isfinite(velocities[n])
         ]
-        if not rest or velocities[row] == 0 or min(rest) == 0:
+        if not rest or not velocities[row] > 0 or min(rest) == 0:
             continue
         above, below = velocities[row] / max(rest), min(rest) / velocities[row]
         if max(above, below) > SENSORS_APART:
@@ -143,12 +145,13 @@ def _unlike_its_neighbours(record: Recording) -> list[SignalDoubt]:
 def _velocities(record: Recording) -> FloatArray:
     """Velocity for an impulse of 1 N s (channels,), root mean square over 0.5 s after a hit.
 
-    The median over the hits; empty where there is none.
+    The median over the hits after which a channel has samples, NaN without; empty where nobody hit.
     """
     force = record.force
     pulses = [] if force is None else find_pulses(force.values, record.sampling_rate_hz)
-    rows = [_velocity(record, pulse) for pulse in pulses]
-    return np.median(rows, axis=0) if rows else np.empty(0)
+    rows = np.array([_velocity(record, pulse) for pulse in pulses])
+    known = [column[np.isfinite(column)] for column in rows.T]
+    return np.array([np.median(column) if len(column) else NAN for column in known])
 
 
 def _velocity(record: Recording, pulse: Pulse) -> FloatArray:
@@ -157,17 +160,21 @@ def _velocity(record: Recording, pulse: Pulse) -> FloatArray:
     push = force.values[pulse.start : pulse.end]
     impulse = abs(float(np.nansum(push - np.nanmedian(force.values)))) / rate
     first = pulse.end + int(_AFTER_S * rate)
-    rings = [c.values[first : first + int(_RING_S * rate)] for c in record.accelerations]
-    rest = np.nan_to_num(np.array([r - np.nanmean(r) if len(r) else r for r in rings]))
-    if not rest.size or impulse == 0:
-        return np.zeros(len(rings))
+    rings = np.array([c.values[first : first + int(_RING_S * rate)] for c in record.accelerations])
+    known = np.isfinite(rings).any(axis=1)
+    velocity = np.full(len(rings), NAN)
+    if not known.any() or impulse == 0:
+        return velocity
+    rings = rings[known]
+    rest = np.nan_to_num(rings - np.nanmean(rings, axis=1, keepdims=True))
     samples = rest.shape[1]
     lines = np.fft.rfft(rest * np.hanning(samples), axis=1)
     hz = np.fft.rfftfreq(samples, 1 / rate)
     band = (hz >= _LOWEST_HZ) & (hz <= min(_HIGHEST_HZ, 0.4 * rate))
     power = (np.abs(lines[:, band] / (2 * np.pi * hz[band])) ** 2).sum(axis=1)
     # Parseval, and 3/8 of the power that a Hann window lets through.
-    return np.asarray(np.sqrt(2 * power / samples**2 / 0.375) / impulse)
+    velocity[known] = np.sqrt(2 * power / samples**2 / 0.375) / impulse
+    return velocity
 
 
 def _not_a_hammer(record: Recording) -> list[SignalDoubt]:

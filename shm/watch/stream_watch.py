@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
@@ -346,11 +345,13 @@ def _cause_of(state: StreamState, evidence: Evidence) -> Cause:
     before = np.vstack([state.old, state.ring[earlier]])
     weight = np.append(OLD_READINGS, np.ones(earlier.sum()))[:, None] * np.isfinite(before)
     count = np.isfinite(state.ring[later]).sum(axis=0)
-    with warnings.catch_warnings():  # a mode that none of them has is not known
-        warnings.simplefilter("ignore", RuntimeWarning)
-        first = np.nansum(weight * np.nan_to_num(before), axis=0) / weight.sum(axis=0)
-        last = np.nanmedian(state.ring[later], axis=0)  # of a mode mistaken for its neighbour once
-    return cause_of(last - first, state.table, count)
+    known = (weight.sum(axis=0) > 0) & (count > 0)  # a mode that none of them has is unknown
+    weight, before = weight[:, known], np.nan_to_num(before[:, known])
+    first = np.sum(weight * before, axis=0) / weight.sum(axis=0)
+    last = np.nanmedian(state.ring[later][:, known], axis=0)  # one may be mistaken for a neighbour
+    moved = np.full(len(count), np.nan)
+    moved[known] = last - first
+    return cause_of(moved, state.table, count)
 
 
 def _sized(evidence: Evidence, cause: Cause, state: StreamState) -> Evidence:

@@ -54,6 +54,20 @@ def test_a_unit_that_is_wrong_by_1000_is_doubted_by_the_mass_of_the_hanger(facto
         assert "right unit" in doubt.text
 
 
+@pytest.mark.parametrize("lost_hits", [1, 3])
+def test_apparent_mass_lost_samples(lost_hits: int) -> None:
+    """A channel that lost the ring-down of some hits is judged by the others, or not at all."""
+    name, samples = ACCELERATIONS[0], SOUND.samples
+    lost = np.arange(samples) < lost_hits * samples / PLAN.hits
+    holes = tuple(
+        replace(c, values=np.where(lost, np.nan, c.values)) if c.name == name else c
+        for c in SOUND.channels
+    )
+    record = replace(SOUND, channels=holes)
+    assert signal_doubts([record], ROD) == ()
+    assert apparent_mass_kg(record) == pytest.approx(apparent_mass_kg(SOUND), rel=0.5)
+
+
 @pytest.mark.parametrize("factor", [1000.0, 0.001])
 def test_one_sensor_in_another_unit_is_named(factor: float) -> None:
     for name in ACCELERATIONS:

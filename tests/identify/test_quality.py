@@ -9,7 +9,7 @@ import pytest
 
 from shm.errors import NotIdentifiable
 from shm.identify.contract import Finding, FoundMode, Measurement, Poles
-from shm.identify.measuring.prediction import surprise
+from shm.identify.measuring.prediction import prediction_rule, surprise
 from shm.identify.measuring.setups import measured_recordings
 from shm.identify.measuring.signal_faults import KNOCK
 from shm.identify.quality import CHECKS, Inspection, assess, refusal, tones
@@ -158,6 +158,14 @@ def test_a_jump_that_comes_back_slowly_is_a_surprise() -> None:
 def test_surprise_without_motion() -> None:
     """A channel that shows no motion at all, as a coarse recorder's may, has no rule to leave."""
     np.testing.assert_array_equal(surprise([np.zeros(2000)] * 2), [0.0, 0.0])
+
+
+def test_prediction_rule_lost_samples() -> None:
+    """The rule is that of the samples that are there, whatever is lost between them."""
+    ring = np.sin(0.3 * np.arange(2000)) * np.exp(-0.001 * np.arange(2000))
+    holes = ring.copy()
+    holes[[300, 301, 900]] = np.nan
+    np.testing.assert_allclose(prediction_rule([holes]), prediction_rule([ring]), atol=1e-3)
 
 
 def test_repeatability_force_lost_before_hits() -> None:

@@ -90,10 +90,11 @@ def knocked_at(ring_downs: Sequence[FloatArray], number: int, limit: float) -> i
 def prediction_rule(parts: Sequence[FloatArray]) -> FloatArray:
     """Coefficients (1 + order,) that annihilate the parts, by least squares over all of them."""
     rows = np.vstack([sliding_window_view(part[:_FIT_SAMPLES], _ORDER + 1) for part in parts])
+    rows = rows[np.isfinite(rows).all(axis=1)]  # lost samples of a hit leave the rule to the others
     past, now = rows[:, :-1], rows[:, -1]
     square = past.T @ past
     if not square.any():  # no motion at all, which the rule of no coefficients predicts
-        return np.eye(1, 1 + _ORDER)[0]
+        return np.asarray(np.eye(1, 1 + _ORDER)[0])
     square += _RIDGE * float(np.trace(square)) / _ORDER * np.eye(_ORDER)
     weights = scipy.linalg.solve(square, past.T @ now, assume_a="pos")
     return np.concatenate(([1.0], -weights[::-1]))
