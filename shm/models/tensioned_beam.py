@@ -265,10 +265,6 @@ _SMALL_SECANT_STEP = 1e-7
 _MOST_SECANT_STEPS = 12
 """Never reached by finite numbers, which take four steps, rarely five; NaN must end too."""
 
-_SMALLEST_P_SQUARED = 1e-16
-"""Below it p coth p and p / sinh p are 1 in double precision: the phase at the cut-off is its limit
-for p = 0, which also holds it where a secant step passes the cut-off."""
-
 
 def timoshenko_frequencies_hz(
     length_m: FloatArray,
@@ -352,7 +348,8 @@ def _phase(
 ) -> FloatArray:
     """phi (modes, sets): 2 atan((B - c)/(A + sqrt(A^2 + B^2 - c^2))), c = (-1)^n C."""
     omega2, q2 = _square(q, t, s, r), q * q
-    p2 = np.maximum(omega2 * (s - r * omega2) / ((s + t) * q2), _SMALLEST_P_SQUARED)
+    # Below it p coth p and p / sinh p round to their limit 1, used beyond the cut-off as well.
+    p2 = np.maximum(omega2 * (s - r * omega2) / ((s + t) * q2), np.finfo(float).eps)
     p = np.sqrt(p2)
     big_p, big_q = ((s + t) * p2 + omega2) / (s * p), ((s + t) * q2 - omega2) / (s * q)
     decay = np.exp(-p)

@@ -169,8 +169,7 @@ def test_sets_that_are_no_bar_end_and_leave_the_others_alone() -> None:
 
 @pytest.mark.parametrize("tension_n", [1.0, TENSION, 1e9])
 def test_timoshenko_pinned_beyond_cutoff(tension_n: float) -> None:
-    """Sections swing by themselves from (1/2 pi) sqrt(kappa G A / (m r^2)). A mode below keeps its
-    frequency, also where the search passes the cut-off; a mode beyond is unknown."""
+    """Keep modes below the cut-off, also where the search passes it; those beyond are unknown."""
     lengths_m = np.geomspace(0.02, 2.0, 60)
     expected = np.array([pinned_hz(each, tension_n, 8) for each in lengths_m])
     expected[expected >= cutoff_hz()] = np.nan
@@ -191,6 +190,7 @@ def test_timoshenko_sprung_beyond_cutoff(deck: float, arch: float) -> None:
 
 
 def cutoff_hz() -> float:
+    """Return the frequency from which sections swing by themselves."""
     return float(np.sqrt(SHEAR / MASS) / (2 * np.pi * GYRATION))
 
 
