@@ -31,7 +31,9 @@ from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
 from shm.report.figures.every_figure import bridge_diagnosis_figures, diagnosis_figures
 from shm.report.figures.specification import Illustration
 from shm.report.paper import Paper
-from shm.values import Diagnosis, Hanger, ModalTest
+from shm.store import Store, StoredTest
+from shm.values import Diagnosis, Hanger, ModalTest, ResponsePoint
+from shm.values.bar_description import describe_bar, list_sensors
 from shm_cli import completion, flags
 from shm_cli.adopt import adopt, adopted, drop
 from shm_cli.blind import blind
@@ -242,7 +244,8 @@ def diagnose(
         sheet = _of_workspace(ctx, one_hanger(ctx, hanger_file, hanger_id), count, options)
     else:
         tests, hanger = tests_and_hanger(ctx, files[0], hanger_file, hanger_id)
-        sheet = DiagnosisSheet(_diagnosis(tests, hanger, options), hanger)
+        found = _diagnosis(tests, hanger, options)
+        sheet = DiagnosisSheet(found, hanger, sensors=_sensors(tests))
     draw = partial(diagnosis_figures, sheet)
     _show(diagnosis_paper(sheet), diagnosis_json(sheet), draw, html, figures)
     if write_effect is not None:
@@ -264,7 +267,19 @@ def _of_workspace(
         store.posteriors.save_diagnosis(
             hanger.id, found, diagnosis_lineage(stored, hanger, asdict(options)), utc_now()
         )
-    return DiagnosisSheet(found, hanger, workspace.bridge.name)
+        sensors = _stored_sensors(store, stored)
+    return DiagnosisSheet(found, hanger, workspace.bridge.name, sensors)
+
+
+def _sensors(tests: Sequence[ModalTest]) -> tuple[ResponsePoint, ...]:
+    """Return the sensors of all tests, each once."""
+    return tuple(dict.fromkeys(point for test in tests for point in list_sensors(test)))
+
+
+def _stored_sensors(store: Store, tests: Sequence[StoredTest]) -> tuple[ResponsePoint, ...]:
+    """Return the sensors of all tests as their recordings had them, each once."""
+    responses = ((each.test, store.tests.frequency_response(each)) for each in tests)
+    return tuple(dict.fromkeys(p for test, found in responses for p in list_sensors(test, found)))
 
 
 def _diagnosis(tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions) -> Diagnosis:
@@ -293,7 +308,8 @@ def _jointly(
         told_doubts(tests, hanger)
     with advancing_bar() as progress:
         named = [(hanger, tests) for tests, hanger in found]
-        return BridgeDiagnosisSheet(diagnose_bridge(named, options, progress))
+        bars = tuple(describe_bar(hanger, _sensors(tests)) for tests, hanger in found)
+        return BridgeDiagnosisSheet(diagnose_bridge(named, options, progress), bars=bars)
 
 
 def _pairs(files: tuple[Path, ...]) -> list[tuple[Path, Path]]:
@@ -326,7 +342,10 @@ def _of_bridge(ctx: click.Context, count: int, options: GapOptions) -> BridgeDia
         for (hanger, tests), own in zip(stored.items(), found.diagnoses, strict=True):
             lineage = diagnosis_lineage(tests, hanger, asdict(options))
             store.posteriors.save_diagnosis(hanger.id, own, lineage, utc_now())
-    return BridgeDiagnosisSheet(found, workspace.bridge.name)
+        bars = tuple(
+            describe_bar(hanger, _stored_sensors(store, tests)) for hanger, tests in stored.items()
+        )
+    return BridgeDiagnosisSheet(found, workspace.bridge.name, bars)
 
 
 def _effect_name(file: Path) -> str:

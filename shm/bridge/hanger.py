@@ -19,10 +19,12 @@ from shm.values import (
     EndPlate,
     Hanger,
     Kind,
+    LengthBy,
     Limits,
     Scatter,
     Support,
     Supports,
+    Survey,
     Thresholds,
     Turnbuckle,
 )
@@ -32,7 +34,7 @@ _SECTION = ("area_m2", "second_moment_m4", "mass_per_length_kg_m")
 _OPTIONAL = (
     "name", "diameter_m", "density_kg_m3", "poissons_ratio", "bending_stiffness_factor", "models",
     "plate", "turnbuckle", "thresholds", "scatter", "effects", "supports", "kind", "family",
-    "limits", "fittings_m", "length_by",
+    "limits", "fittings_m", "length_by", "length_measured", "measured_by",
 )  # fmt: skip
 _KNOWN = {*_REQUIRED, *_SECTION, *_OPTIONAL}
 _LARGEST_POISSONS_RATIO = 0.499
@@ -103,6 +105,7 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         family=str(values.get("family", "")),
         limits=_limits(table.table("limits")),
         fittings_m=fittings_m,
+        survey=_survey(table),
     )
 
 
@@ -123,19 +126,31 @@ def _scatter(table: Table, length_m: float, area_m2: float, open_ends: bool) -> 
     """As stated; where nothing is said of ends, the way of taping tells how well the length that
     swings is known."""
     scatter = scatter_of(table.table("scatter"))
-    by = table.value(
-        "length_by",
-        Literal["faces", "pins", "nodes"],
-        "is no way to tape a hanger",
-        'Write "faces" (free bar between its fittings), "pins" or "nodes" (system lines).',
-        "faces",
-    )
+    by = _length_by(table) or "faces"
     if by == "faces" or not open_ends or math.isfinite(scatter.effective_length):
         return scatter
     fork_m = _FORK_DIAMETERS * math.sqrt(4 * area_m2 / math.pi)
     takes = fork_m / length_m if by == "pins" else _NODE_SHARE
     # Root mean square of what two ends take, each evenly from nothing to all.
     return replace(scatter, effective_length=math.sqrt(7 / 6) * takes)
+
+
+def _length_by(table: Table) -> LengthBy | Literal[""]:
+    """Return how the hanger was taped; empty where the table does not say."""
+    if "length_by" not in table:
+        return ""
+    remedy = 'Write "faces" (free bar between its fittings), "pins" or "nodes" (system lines).'
+    return cast(LengthBy, table.value("length_by", LengthBy, "is no way to tape a hanger", remedy))
+
+
+def _survey(table: Table) -> Survey:
+    """Return what the table says of how the bar was measured, and which keys it has."""
+    return Survey(
+        length_by=_length_by(table),
+        length_measured=table.text("length_measured", ""),
+        measured_by=table.text("measured_by", ""),
+        stated_keys=tuple(sorted(table.values)),
+    )
 
 
 def structure_of(values: dict[str, Any], path: Path) -> Hanger:

@@ -45,7 +45,8 @@ from shm.store import (
 )
 from shm.store.checksums import of_readable
 from shm.store.stored_alerts import said_of, silenced_until
-from shm.values import TENSION, Change, Drift, Hanger, WatchedTest
+from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint, WatchedTest
+from shm.values.bar_description import list_sensors
 from shm.values.messages import WEEK, Lead
 from shm.watch.change_words import look_again
 
@@ -131,7 +132,14 @@ def bridge_report(
     pattern, why_not = _pattern_or_why(store, [hanger.id for hanger in hangers])
     return BridgeReport(
         workspace.bridge.name,
-        tuple(replace(line, course=courses.get(line.hanger.id)) for line in lines),
+        tuple(
+            replace(
+                line,
+                course=courses.get(line.hanger.id),
+                sensors=_sensors(workspace, store, line),
+            )
+            for line in lines
+        ),
         pattern,
         why_not,
         generated_at,
@@ -140,6 +148,15 @@ def bridge_report(
         {"software": software()},
         settings_words(workspace.settings),
     )
+
+
+def _sensors(workspace: Workspace, store: Store, line: HangerLine) -> tuple[ResponsePoint, ...]:
+    """Return the sensors of a hanger's latest test; before the first those that stay on it."""
+    if line.test:
+        stored = store.tests.named(line.hanger.id, line.test)
+        return list_sensors(stored.test, store.tests.frequency_response(stored))
+    streams = [each for each in workspace.bridge.streams if each.hanger == line.hanger.id]
+    return tuple(ResponsePoint(c.name, c.plane, c.x_m) for each in streams for c in each.channels)
 
 
 def hanger_lines(

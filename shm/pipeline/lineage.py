@@ -90,10 +90,15 @@ def identify_lineage(
     inputs = [recording.file.sha256, recording.file.sidecar_as]
     terms = {
         **identify_settings(workspace.settings),
-        "hanger": [asdict(hanger) for hanger in bridge.watched if hanger.id == hanger_id],
+        "hanger": [_described(hanger) for hanger in bridge.watched if hanger.id == hanger_id],
         "disturbances": [asdict(each) for each in bridge.disturbances],
     }
     return Lineage.of(inputs, terms)
+
+
+def _described(hanger: Hanger) -> dict[str, Any]:
+    """Return the description that results depend on: without how the bar was measured."""
+    return {key: value for key, value in asdict(hanger).items() if key != "survey"}
 
 
 def diagnosis_lineage(
@@ -101,7 +106,7 @@ def diagnosis_lineage(
 ) -> Lineage:
     """What a diagnosis depends on: tests, description, options, version."""
     inputs = [[test.key, test.lineage.columns] for test in tests]
-    return Lineage.of(inputs, {**terms, "hanger": asdict(hanger)})
+    return Lineage.of(inputs, {**terms, "hanger": _described(hanger)})
 
 
 def update_terms(
@@ -119,7 +124,7 @@ def update_terms(
     inputs: list[object] = [[test.key, test.lineage.columns] for test in tests]
     from_others = [known, taught.posterior if taught else None]
     inputs += [hashlib.sha256(each.samples.tobytes()).hexdigest() for each in from_others if each]
-    described = asdict(hanger)
+    described = _described(hanger)
     settled = {"models": list(models), **plain, "hanger": described}
     return terms, Lineage.of(inputs, settled, described)
 
@@ -178,7 +183,7 @@ def settings_words(settings: Settings, names: Sequence[str] = _ALL) -> dict[str,
 
 
 MOVES_NOTHING = frozenset(
-    {"id", "name", "thresholds", "limits", "models", "effect_priors"}
+    {"id", "name", "thresholds", "limits", "models", "effect_priors", "survey"}
     | {"scatter.sensor_gain", "scatter.sensor_place_m", "scatter.sensor_turn_deg"}
     | {"scatter.sensor_cross_axis"}
 )
@@ -190,7 +195,7 @@ def redescribed(hanger: Hanger, baseline: Baseline | BaselineGlance | None) -> t
     """Return what has changed since the baseline was made, as `length_m from 12 to 12.4`."""
     if baseline is None or baseline.described is None:
         return ()
-    before, now = _comparable(baseline.described), _comparable(asdict(hanger))
+    before, now = _comparable(baseline.described), _comparable(_described(hanger))
     return tuple(_changes(before, now))
 
 

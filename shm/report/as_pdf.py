@@ -26,6 +26,7 @@ from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import (
     BaseDocTemplate,
     CallerMacro,
+    CondPageBreak,
     Flowable,
     Frame,
     Image,
@@ -48,6 +49,7 @@ _PAGE_WIDTH, _PAGE_HEIGHT = A4
 _SIDE = (_PAGE_WIDTH - WIDTH) / 2
 _TOP, _BOTTOM = 22 * mm, 20 * mm
 _TALLEST = 200 * mm
+_LEAST_OF_TABLE = 40 * mm  # heading, title and some rows: less of a table goes on a new page
 _PADDING = 4.0
 _CELL_SIZE, _LINE_SIZE = 7.6, 7.4
 _PLAIN, _BOLD = "DejaVuSans", "DejaVuSans-Bold"
@@ -77,6 +79,7 @@ def _letters(name: str, size: float, font: str = _PLAIN, **more: Any) -> Paragra
 _TITLE = _letters("title", 17, _BOLD, spaceAfter=6)
 _HEADING = _letters("heading", 12.5, _BOLD, spaceBefore=12, spaceAfter=6, keepWithNext=1)
 _SUBHEADING = _letters("subheading", 9.5, _BOLD, spaceAfter=3, keepWithNext=1)
+_LOOSE_SUBHEADING = _letters("loose subheading", 9.5, _BOLD, spaceAfter=3)
 _BODY = _letters("body", 9, leading=13.2)
 _NOTE = _letters("note", 7.6, textColor=_QUIET, spaceBefore=2, spaceAfter=9)
 _REMARK = _letters("remark", 8.6, leftIndent=10, bulletIndent=0, spaceAfter=2)
@@ -245,7 +248,15 @@ def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> l
     if groups and not found:
         # Stated, because a heading is not kept with what is itself kept together.
         groups[0], heading = [*heading, *groups[0]], []
-    return [*heading, *found, *(KeepTogether(each) for each in groups)]
+    loose = [False] * (len(groups) - len(part.tables)) + [each.may_break for each in part.tables]
+    set_groups = [
+        each
+        for group, is_loose in zip(groups, loose, strict=True)
+        for each in (
+            [CondPageBreak(_LEAST_OF_TABLE), *group] if is_loose else [KeepTogether(group)]
+        )
+    ]
+    return [*heading, *found, *set_groups]
 
 
 def _mark(title: str) -> Flowable:
@@ -299,7 +310,10 @@ def _figure(item: Illustration, number: int) -> list[Flowable]:
 def _table(table: Table, number: int) -> list[Flowable]:
     """With title and note; rows break over pages, under repeated headings, only where one does not
     hold them all."""
-    title = Paragraph(f"Table {number}. {escape(table.title)}", _SUBHEADING)
+    table = table.folded() if table.is_folded else table
+    # What is kept with a table keeps the table in one piece, too.
+    style = _LOOSE_SUBHEADING if table.may_break else _SUBHEADING
+    title = Paragraph(f"Table {number}. {escape(table.title)}", style)
     rows = [[Paragraph(escape(cell), _HEAD) for cell in table.headings]]
     rows += [[Paragraph(escape(cell), _CELL) for cell in row] for row in table.rows]
     set_table = SetTable(

@@ -8,6 +8,7 @@ from typing import Any
 
 from shm.diagnosis_document import bridge_diagnosis_document
 from shm.report import formatting
+from shm.report.bar_table import bar_document, bars_table
 from shm.report.contents import BridgeDiagnosisSheet
 from shm.report.diagnosis_summary import verdict
 from shm.report.diagnosis_wording import effect_phrase, quantity, size, tension_of
@@ -38,7 +39,12 @@ def bridge_diagnosis_paper(sheet: BridgeDiagnosisSheet) -> Paper:
         status=status,
         style=style,
         parts=(
-            Part("In short", lead=shared_verdict(diagnosis), summary=_consequences(diagnosis)),
+            Part(
+                "In short",
+                lead=shared_verdict(diagnosis),
+                summary=_consequences(diagnosis),
+                tables=filled(bars_table(sheet.bars)),
+            ),
             Part("Who has it", figures=lambda: bridge_diagnosis_figures(diagnosis)),
             Part(
                 "The answer in numbers",
@@ -60,6 +66,7 @@ def bridge_diagnosis_json(sheet: BridgeDiagnosisSheet) -> dict[str, Any]:
         **bridge_diagnosis_document(sheet.diagnosis),
         "answer": sheet.diagnosis.leads,
         "summary": summary,
+        "bars": [bar_document(bar) for bar in sheet.bars],
     }
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from shm.documents import averaged_document, drift_document
 from shm.report import formatting
+from shm.report.bar_table import bar_document, bars_table
 from shm.report.contents import BridgeReport, Course, HangerLine, hangers_unit
 from shm.report.figures.every_figure import bridge_figures
 from shm.report.formatting import Interval
@@ -31,7 +32,13 @@ def bridge_paper(data: BridgeReport) -> Paper:
         status=data.worst.value if data.worst else "",
         style=data.worst.name.lower() if data.worst else "first",
         parts=(
-            Part("In short", lead=data.message.words, summary=details(data), facts=facts(data)),
+            Part(
+                "In short",
+                lead=data.message.words,
+                summary=details(data),
+                facts=facts(data),
+                tables=(bars_table([line.bar for line in data.hangers]),),
+            ),
             Part("Along the bridge", figures=lambda: bridge_figures(data)),
             Part("Numbers", tables=tables(data)),
         ),
@@ -303,6 +310,7 @@ def bridge_json(data: BridgeReport) -> dict[str, Any]:
             {
                 "hanger": line.hanger.id,
                 "name": line.hanger.name,
+                "bar": bar_document(line.bar),
                 **line.message.document,
                 "warnings": list(line.warnings),
                 "latest": line.latest,

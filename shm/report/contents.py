@@ -38,8 +38,10 @@ from shm.values import (
     PredictedFrequency,
     QualityCheck,
     Recording,
+    ResponsePoint,
     Selection,
 )
+from shm.values.bar_description import BarDescription, describe_bar, list_sensors
 from shm.values.messages import Lead
 from shm.values.notes import Note
 from shm.values.rounding import ForceUnit, force_unit
@@ -152,6 +154,11 @@ class HangerReport:
         return self.tests[-1]
 
     @property
+    def bar(self) -> BarDescription:
+        """The bar, with the sensors of the latest test."""
+        return describe_bar(self.hanger, list_sensors(self.latest, self.frequency_response))
+
+    @property
     def predicted(self) -> tuple[PredictedFrequency, ...]:
         """The predictions for the latest test, where the posterior is of several."""
         measured = {(mode.plane, mode.order): mode.frequency_hz for mode in self.latest.modes}
@@ -224,19 +231,26 @@ def of_nominal(tension_n: Interval, hanger: Hanger) -> Interval | None:
 
 @dataclass(frozen=True)
 class DiagnosisSheet:
-    """A gap diagnosis with the hanger it is of, and the bridge's name where it is known."""
+    """A gap diagnosis with its hanger, and bridge and sensors of the tests where known."""
 
     diagnosis: Diagnosis
     hanger: Hanger
     bridge: str = ""
+    sensors: tuple[ResponsePoint, ...] = ()
+
+    @property
+    def bar(self) -> BarDescription:
+        """The bar, with these sensors."""
+        return describe_bar(self.hanger, self.sensors)
 
 
 @dataclass(frozen=True)
 class BridgeDiagnosisSheet:
-    """A joint diagnosis of several hangers, and the bridge's name where it is known."""
+    """A joint diagnosis of several hangers, with the bridge's name and bars where known."""
 
     diagnosis: BridgeDiagnosis
     bridge: str = ""
+    bars: tuple[BarDescription, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -260,7 +274,7 @@ class HangerLine:
     it; `drift` that of its tension since its baseline, None where nothing was compared; `called`
     says in a few words what was called since; `open_alerts` is `store.alerts.open_counts`.
     `course` is None without a period; `warnings` are the open ones; `undated` names the tests that
-    are dated by their receipt.
+    are dated by their receipt. `sensors` are those of the latest test, or those that stay.
     """
 
     hanger: Hanger
@@ -277,6 +291,12 @@ class HangerLine:
     averaged: Averaged | None = None
     warnings: tuple[str, ...] = ()
     undated: tuple[str, ...] = ()
+    sensors: tuple[ResponsePoint, ...] = ()
+
+    @property
+    def bar(self) -> BarDescription:
+        """The bar, with these sensors."""
+        return describe_bar(self.hanger, self.sensors)
 
     @property
     def status(self) -> Status | None:
@@ -346,6 +366,13 @@ class ModalTestReport:
     @property
     def recordings(self) -> tuple[Recording, ...]:
         return tuple(record for record in self.records if isinstance(record, Recording))
+
+    @property
+    def bar(self) -> BarDescription:
+        """The bar, with the sensors of the test."""
+        found = self.identification
+        sensors = list_sensors(found.test, found.frequency_response, self.records)
+        return describe_bar(self.hanger, sensors)
 
     @property
     def modes(self) -> tuple[Mode, ...]:

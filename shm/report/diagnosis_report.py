@@ -9,6 +9,7 @@ from typing import Any
 
 from shm.diagnosis_document import diagnosis_document
 from shm.report import formatting
+from shm.report.bar_table import bar_document, bar_table
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_summary import (
     consequences,
@@ -56,7 +57,7 @@ def diagnosis_paper(sheet: DiagnosisSheet) -> Paper:
         status=part.status,
         style=part.style,
         parts=(
-            replace(part, figures=tuple, tables=(), status=""),
+            replace(part, figures=tuple, tables=(bar_table(sheet.bar),), status=""),
             Part("Figures", figures=part.figures),
             Part("The answer in numbers", tables=answers(sheet)),
             Part("What it rests on", tables=evidence(sheet)),
@@ -374,4 +375,5 @@ def diagnosis_json(sheet: DiagnosisSheet) -> dict[str, Any]:
         **diagnosis_document(sheet.diagnosis),
         "answer": answer(sheet.diagnosis).name.lower(),
         "summary": summary(sheet),
+        "bar": bar_document(sheet.bar),
     }

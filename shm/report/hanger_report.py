@@ -9,6 +9,7 @@ from typing import Any
 from shm import documents, modes_document
 from shm.documents import alert_document, drift_document
 from shm.report import formatting
+from shm.report.bar_table import bar_document, bar_table
 from shm.report.bridge_report import pattern_json
 from shm.report.contents import DiagnosisSheet, HangerReport, message, of_nominal, status
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_part
@@ -34,7 +35,13 @@ def hanger_paper(data: HangerReport) -> Paper:
         status=state.value,
         style=state.name.lower(),
         parts=(
-            Part("In short", lead=message(data).words, summary=why(data), facts=facts(data)),
+            Part(
+                "In short",
+                lead=message(data).words,
+                summary=why(data),
+                facts=facts(data),
+                tables=(bar_table(data.bar),),
+            ),
             Part("Results", figures=lambda: hanger_figures(data, TREND), tables=(results(data),)),
             Part("Fit of the model", figures=lambda: hanger_figures(data, FIT)),
             Part("Details", paragraphs=[further(data)]),
@@ -70,7 +77,7 @@ def diagnosed(data: HangerReport) -> DiagnosisSheet | None:
     """The latest diagnosis of the report's hanger."""
     if data.diagnosis is None:
         return None
-    return DiagnosisSheet(data.diagnosis, data.hanger, data.bridge)
+    return DiagnosisSheet(data.diagnosis, data.hanger, data.bridge, data.bar.sensors)
 
 
 def how_to_diagnose(data: HangerReport) -> str:
@@ -160,6 +167,7 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
         "schema": REPORT_SCHEMA,
         "bridge": data.bridge,
         "hanger": asdict(data.hanger),
+        "bar": bar_document(data.bar),
         "status": status(data).name.lower(),
         "message": message(data).document,
         "summary": summary(data),

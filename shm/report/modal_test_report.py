@@ -11,6 +11,7 @@ from typing import Any
 
 from shm import modes_document
 from shm.report import formatting
+from shm.report.bar_table import bar_document, bar_table
 from shm.report.contents import ModalTestReport
 from shm.report.figures.every_figure import modal_test_figures
 from shm.report.figures.style import VERDICT_STYLES
@@ -29,7 +30,12 @@ def modal_test_paper(sheet: ModalTestReport) -> Paper:
         status=headline(sheet.identification.quality),
         style=VERDICT_STYLES[verdict],
         parts=(
-            Part("In short", summary=summary(sheet), facts=facts(sheet)),
+            Part(
+                "In short",
+                summary=summary(sheet),
+                facts=facts(sheet),
+                tables=(bar_table(sheet.bar),),
+            ),
             Part("Modes and quality", tables=results(sheet)),
             Part("Figures", figures=lambda: modal_test_figures(sheet)),
             Part("How it came about", tables=details(sheet)),
@@ -230,6 +236,7 @@ def modes(sheet: ModalTestReport) -> Table:
         tuple(mode_row(mode) for mode in sheet.modes),
         note="sd: standard deviation. Amplitude: with which the mode rings right after a hit, at "
         "the sensor that moves most; as measured, without interval.",
+        may_break=True,
     )
 
 
@@ -373,6 +380,7 @@ def modal_test_json(sheet: ModalTestReport) -> dict[str, Any]:
     return {
         "schema": SHEET_SCHEMA,
         "hanger": found.test.hanger,
+        "bar": bar_document(sheet.bar),
         "verdict": overall(found.quality),
         "summary": summary(sheet),
         "test": modes_document.test_document(found.test),

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
+from itertools import zip_longest
 from pathlib import Path
 from string import ascii_uppercase
 from typing import TYPE_CHECKING
@@ -73,7 +74,8 @@ class Table:
     indices are in `terminal_rows`, all where it is None; `hidden_note` says in place of `{}` how
     many more there are, and a table without either is left out there. `terminal_column`, a
     heading and a cell for each row, stands after the first column in a terminal, which has no
-    figures.
+    figures. One that `may_break` goes on over a page's end, where others begin a new page; paper
+    shows the two halves of one that `is_folded` next to each other.
     """
 
     title: str
@@ -84,6 +86,8 @@ class Table:
     terminal_rows: tuple[int, ...] | None = None
     hidden_note: str = "... and {} more rows (in HTML and JSON)."
     terminal_column: tuple[str, ...] = ()
+    may_break: bool = False
+    is_folded: bool = False
 
     def shortened(self, most: int, last: int = 0) -> Table:
         """With so many rows in a terminal, of which so many are the last; one more may stay."""
@@ -91,6 +95,14 @@ class Table:
         if count <= most + 1:
             return self
         return replace(self, terminal_rows=(*range(most - last), *range(count - last, count)))
+
+    def folded(self) -> Table:
+        """Return the table with its second half to the right of its first."""
+        half = (len(self.rows) + 1) // 2
+        empty = ("",) * len(self.headings)
+        pairs = zip_longest(self.rows[:half], self.rows[half:], fillvalue=empty)
+        rows = tuple((*left, *right) for left, right in pairs)
+        return replace(self, headings=self.headings * 2, rows=rows, is_folded=False)
 
     def not_in_terminal(self) -> Table:
         """Left out in a terminal."""

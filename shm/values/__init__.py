@@ -60,11 +60,13 @@ from shm.values.hanger import (
     EndPlate,
     Hanger,
     Kind,
+    LengthBy,
     Limits,
     MonitoredHanger,
     Scatter,
     Support,
     Supports,
+    Survey,
     Thresholds,
     Turnbuckle,
 )

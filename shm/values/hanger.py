@@ -150,6 +150,24 @@ class Supports:
         return tuple(end for end, own in enumerate((self.deck, self.arch)) if own in kinds)
 
 
+LengthBy: TypeAlias = Literal["faces", "pins", "nodes"]
+"""Between which points a hanger was taped: its fittings' faces, its pins, the system lines."""
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What the owner wrote of how the bar was measured; no result rests on it. Empty: not stated.
+
+    `length_measured` is with what and when the length was taped, `measured_by` who measured the
+    bar, `stated_keys` the keys of its description, which tell a default from a statement.
+    """
+
+    length_by: LengthBy | Literal[""] = ""
+    length_measured: str = ""
+    measured_by: str = ""
+    stated_keys: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True)
 class EffectPrior:
     """The owner's range of one parameter of an effect of the gap diagnosis, in its unit."""
@@ -170,7 +188,7 @@ class Hanger(Shown):
     its siblings. `fittings_m` is over which length forks, sockets or threads stiffen the deck and
     the arch end: so far the length that swings is open. `models` names the model classes that
     the owner admits; empty: all that the settings name. `effect_priors` replace ranges of the
-    catalogue of effects. A bar with a nominal tension of 0 carries none.
+    catalogue of effects. A bar with a nominal tension of 0 carries none. `survey` is for reports.
     """
 
     id: int
@@ -195,6 +213,7 @@ class Hanger(Shown):
     family: str = ""
     limits: Limits = field(default_factory=Limits)
     fittings_m: tuple[float, float] = (0.0, 0.0)
+    survey: Survey = field(default_factory=Survey)
 
     @property
     def bending_stiffness_n_m2(self) -> float:
