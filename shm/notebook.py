@@ -7,7 +7,6 @@ notebook is enough for its figures; elsewhere `%load_ext shm.notebook`.
 from __future__ import annotations
 
 import io
-import math
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -71,22 +70,18 @@ def sheet(value: Any) -> Sheet:
 
 
 def _hanger(hanger: Hanger) -> Sheet:
-    """The description of a hanger, in the units of a drawing."""
+    """Show the description of a hanger as reports do, and what follows from it."""
     from shm.report import formatting
+    from shm.report.bar_table import bar_rows
+    from shm.values.bar_description import describe_bar
     from shm.values.rounding import force_unit
 
     nominal_n, stiffness = hanger.nominal_tension_n, hanger.bending_stiffness_n_m2
     unit = force_unit(nominal_n)
-    round_bar = math.isfinite(hanger.diameter_m)
     rows = [
-        ("diameter", f"{1e3 * hanger.diameter_m:.0f} mm" if round_bar else "not round"),
-        ("length", f"{hanger.length_m:.3f} m"),
-        ("area", f"{1e6 * hanger.area_m2:.0f} mm²"),
-        ("mass", f"{hanger.mass_per_length_kg_m:.1f} kg/m"),
+        *((label.lower(), value) for label, value in bar_rows(describe_bar(hanger))),
         ("bending stiffness", f"{formatting.rounded_tension(stiffness, force_unit(stiffness))} m²"),
         ("nominal tension", f"{unit.of(nominal_n):.{unit.decimals(nominal_n)}f} {unit.name}"),
-        ("ends", f"{hanger.supports.deck} (deck), {hanger.supports.arch} (arch)"),
-        ("end plates", "yes" if hanger.plate else "none"),
     ]
     return Sheet(formatting.hanger_name(hanger.id, hanger.name), ("", ""), rows)
 

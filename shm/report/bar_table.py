@@ -102,7 +102,7 @@ def _fittings(bar: BarDescription) -> str:
 def _ends(ends: Supports | None) -> str:
     if ends is None:
         return NOT_STATED
-    mass = f", {ends.hanging_mass_kg:g} kg hang from it" if ends.hanging_mass_kg else ""
+    mass = f", {ends.hanging_mass_kg:g} kg hang from the free end" if ends.hanging_mass_kg else ""
     return f"{ends.deck} (deck), {ends.arch} (arch){mass}"
 
 

@@ -13,8 +13,9 @@ from shm.documents import dump
 from shm.models.effects import EFFECTS
 from shm.modes_document import modes_document
 from shm.store import Workspace
-from shm.values import PLANES, ModalTest, Mode
+from shm.values import PLANES, ModalTest, Mode, ShapePoint
 from tests.cli.conftest import Shm
+from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.effects import all_but
 from tests.helpers.flows import ingest
 from tests.helpers.workspaces import make_workspace
@@ -63,6 +64,9 @@ def test_files_alone_are_diagnosed_as_document_page_and_figures(
     assert total == pytest.approx(1.0, abs=1e-9)
     assert len(document["where"]) == 6
     assert sorted(document["left_out"]) == sorted(set(EFFECTS) - set(TRIED))
+    assert document["bar"]["length_m"] == 12.0
+    assert document["bar"]["sensors"] == []
+    assert "The bar as described" in page.read_text()
     assert "<svg" in page.read_text()
     assert {"causes.png", "gap_map.png"} <= {path.name for path in figures.iterdir()}
 
@@ -82,6 +86,29 @@ def test_a_diagnosis_of_a_workspace_is_kept_for_the_report(shm: Shm, tmp_path: P
     kept = shm(*at, "report", "--hanger", 3, "--json").document["diagnosis"]
     assert kept == ended.document
     assert "Gap diagnosis: " in shm(*at, "report", "--hanger", 3).out
+
+
+def test_the_bar_has_the_sensors_of_all_tests(
+    shm: Shm, hanger_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("shm_cli.gap.diagnosed", lambda *_: a_diagnosis())
+    tests = []
+    for name, x_m in (("t1", 2.5), ("t2", 4.4)):
+        test = measured(name)
+        shape = (ShapePoint(x_m, 1.0),)
+        modes = tuple(replace(mode, shape=shape) for mode in test.modes)
+        tests.append(replace(test, modes=modes, temperature_c=10 * x_m))
+    path = tmp_path / "both.modes.json"
+    path.write_text(dump(modes_document(tests)))
+    workspace = make_workspace(tmp_path / "bridge")
+    for test in tests:
+        (workspace.spool / f"{test.id}.modes.json").write_text(dump(modes_document([test])))
+    ingest(workspace)
+    kept = ("--workspace", workspace.folder, "gap", "diagnose", "--hanger", 3)
+    for command in (("gap", "diagnose", path, "--hanger-file", hanger_file), kept):
+        ended = shm(*command)
+        assert ended.code == 0, ended.err
+        assert re.search(r"Sensors +both planes at 2.5 and 4.4 m", ended.out)
 
 
 def test_a_hanger_without_tests_is_nothing_there(shm: Shm, bridge: Workspace) -> None:

@@ -63,6 +63,8 @@ def test_pairs_of_files_are_diagnosed_together(
     assert document["schema"] == "shm.bridge_diagnosis/1"
     assert document["answer"] == "shared cause"
     assert "shared by all 4 hangers" in document["summary"]
+    assert [bar["hanger"] for bar in document["bars"]] == [3, 4]
+    assert "The bars as described" in page.read_text()
     assert "<svg" in page.read_text()
     assert [path.name for path in figures.iterdir()] == ["shared.png"]
 

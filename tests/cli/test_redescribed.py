@@ -8,13 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from shm.pipeline.lineage import MOVES_NOTHING, redescribed
+from shm.pipeline.bridge_reporting import bridge_report
+from shm.pipeline.lineage import (
+    MOVES_NOTHING,
+    diagnosis_lineage,
+    identify_lineage,
+    redescribed,
+    update_terms,
+)
 from shm.pipeline.reporting import hanger_report
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.hanger_report import hanger_json, hanger_paper
-from shm.store import Workspace
-from shm.values import Hanger
+from shm.store import Lineage, Workspace
+from shm.values import Hanger, ResponsePoint
 from tests.cli.conftest import Shm
 from tests.helpers.taken_in import ingest_quickly
 from tests.helpers.web_servers import served
@@ -99,6 +106,29 @@ def test_what_no_posterior_depends_on_asks_for_nothing(before: Workspace) -> Non
     assert redescribed(hanger, replace(baseline, described=None)) == ()
 
 
+def test_how_a_bar_was_measured_moves_no_lineage(before: Workspace) -> None:
+    with before.store() as store:
+        (test, *_) = store.tests.list_all(3)
+        baseline = store.watch.baseline(3)
+        recording = store.recordings.get(test.recording_id)
+
+    def lineages(workspace: Workspace) -> list[Lineage]:
+        hanger = workspace.bridge.hanger(3)
+        return [
+            identify_lineage(recording, 3, workspace),
+            update_terms(hanger, ["beam1"], [test], workspace.settings)[1],
+            diagnosis_lineage([test], hanger, {}),
+        ]
+
+    plain = lineages(before)
+    line = 'measured_by = "Ann"\nlength_by = "faces"\nlength_m = 12.0'
+    stated = rewritten(before, "length_m = 12.0", line)
+    assert stated.bridge.hanger(3).survey.measured_by == "Ann"
+    assert lineages(stated) == plain
+    assert redescribed(stated.bridge.hanger(3), baseline) == ()
+    assert lineages(rewritten(stated, "length_m = 12.0", "length_m = 12.5")) != plain
+
+
 def test_a_field_that_an_older_version_did_not_know_has_its_default(before: Workspace) -> None:
     hanger = before.bridge.hanger(3)
     known = {"length_m", "elastic_modulus_pa", "area_m2", "second_moment_m4"}
@@ -129,6 +159,30 @@ def test_every_other_field_of_a_hanger_is_compared(before: Workspace, name: str)
     assert baseline.described is not None
     other = replace(baseline, described={**baseline.described, name: "another"})
     assert [each.split()[0] for each in redescribed(before.bridge.hanger(3), other)] == [name]
+
+
+def test_page_and_bridge_report_describe_the_bar(made: Workspace, tmp_path: Path) -> None:
+    workspace = Workspace.open(shutil.copytree(made.folder, tmp_path / "bridge"))
+    path = workspace.folder / "bridge.toml"
+    text = path.read_text().replace("length_m = 12.0", 'measured_by = "Ann"\nlength_m = 12.0')
+    first = text[text.index("[[hanger]]") : text.index("[settings]")]
+    stream = (
+        '[[stream]]\nname = "h4"\nhanger = 4\nsampling_rate_hz = 200\n'
+        '[[stream.channel]]\nname = "acc_1"\nplane = "transverse"\nx_m = 3.0\n\n'
+    )
+    more = f"{first.replace('id = 3', 'id = 4')}{stream}"
+    path.write_text(text.replace("[settings]", f"{more}[settings]"))
+    workspace = workspace.reopened()
+    with workspace.store() as store:
+        tested, untested = bridge_report(workspace, store, START).hangers
+    assert (tested.bar.measured_by, tested.bar.sensors) == ("Ann", ())  # its modes have no shapes
+    assert untested.bar.sensors == (ResponsePoint("acc_1", "transverse", 3.0),)
+    with served(workspace) as site, site.client() as client:
+        for number in (3, 4):
+            page = client.get(f"/hangers/{number}", headers={"Accept": "text/html"}).text
+            table = page[page.index("The bar as described") :].split("</table>")[0]
+            assert "diameter 130 mm" in table
+            assert "Ann" in table
 
 
 def test_the_page_of_the_hanger_says_so_first(before: Workspace) -> None:

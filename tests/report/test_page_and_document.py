@@ -54,7 +54,7 @@ def test_ids_are_unique_on_the_page(outline: Outline) -> None:
 
 def test_every_table_has_a_caption_and_scoped_headings(outline: Outline) -> None:
     names = [tag for tag, _ in outline.tags]
-    assert names.count("table") == names.count("caption") == 8
+    assert names.count("table") == names.count("caption") == 9
     scopes = {attributes.get("scope") for tag, attributes in outline.tags if tag == "th"}
     assert scopes == {"col", "row"}
 

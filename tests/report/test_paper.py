@@ -101,7 +101,9 @@ def _texts_of_part(part: Part, renderer: str, is_first: bool) -> Iterator[str]:
     yield from part.remarks
     for figure in figures:
         yield from (figure.title, figure.caption)
-    for table in part.tables:
+    for stated in part.tables:
+        folds = stated.is_folded and renderer == "as_pdf"
+        table = stated.folded() if folds else stated
         yield from (table.title, *table.headings)
         yield from (cell for row in table.rows for cell in row)
         yield table.note

@@ -63,6 +63,20 @@ def test_how_a_length_was_taped_says_how_well_the_swinging_one_is_known(
         loaded(tmp_path, 'length_by = "eye"\n')
 
 
+def test_how_a_bar_was_measured_is_read_as_stated(tmp_path: Path) -> None:
+    nothing = loaded(tmp_path, "").survey
+    assert (nothing.length_by, nothing.length_measured, nothing.measured_by) == ("", "", "")
+    assert "fittings_m" not in nothing.stated_keys
+    text = 'length_by = "faces"\nlength_measured = "tape, 2026-04"\nmeasured_by = " Ann "\n'
+    stated = loaded(tmp_path, f"{text}fittings_m = [0, 0]\n[hanger.supports]\n").survey
+    assert stated.length_by == "faces"
+    assert (stated.length_measured, stated.measured_by) == ("tape, 2026-04", "Ann")
+    assert {"fittings_m", "supports"} <= set(stated.stated_keys)
+    for wrong in ("measured_by = 3", 'length_measured = "a\\nb"'):
+        with pytest.raises(BadInput, match="is not a text"):
+            loaded(tmp_path, wrong)
+
+
 def test_the_manuals_example_is_read_and_allowed(tmp_path: Path) -> None:
     section = HANGERS_PAGE.read_text(encoding="utf-8").split("## Ranges of effects")[1]
     hanger = loaded(tmp_path, section.split("```toml\n")[1].split("```")[0])

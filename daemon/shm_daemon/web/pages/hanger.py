@@ -21,6 +21,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.pipeline.reporting import hanger_report
 from shm.report import formatting, hanger_tables
+from shm.report.bar_table import bar_table
 from shm.report.contents import HangerReport, message
 from shm.report.diagnosis_report import answers, evidence
 from shm.report.hanger_report import facts, gap_part, hanger_paper
@@ -29,6 +30,7 @@ from shm.report.paper import Table
 from shm.report.states import called_words, temperature_table
 from shm.store import EventKind, Store, TrendPoint, Workspace
 from shm.values import Hanger
+from shm.values.bar_description import describe_bar
 from shm_daemon.web.access import AtSite, Reader
 from shm_daemon.web.background_work import RETRY_AFTER, BackgroundWorker, background_worker_of
 from shm_daemon.web.faults import Refused
@@ -94,6 +96,7 @@ def hanger(request: Request, site: AtSite, _: Reader, view: View) -> HTMLRespons
         "has_more": len(rows) > _LATEST_TESTS,
         "held": held_documents(site, one.id),
         "notes": view.notes,
+        "bar": bar_table(describe_bar(one) if view.report is None else view.report.bar),
     }
     if view.report is None:
         (line,) = hanger_lines(site.workspace, site.store, utc_now(), [one])
