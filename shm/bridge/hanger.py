@@ -58,12 +58,7 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
     """The hanger of a `[[hanger]]` table; raises BadInput naming table and key at fault."""
     table = Table(values, f"[[hanger]] id {values.get('id', '?')}", path)
     table.refuse_unknown(_KNOWN)
-    length_m, elastic_modulus = table.positive("length_m"), table.positive("elastic_modulus_pa")
-    if not _SOFTEST_PA <= elastic_modulus <= _STIFFEST_PA:
-        raise table.refusal(
-            f"elastic_modulus_pa = {elastic_modulus:g} is that of no material",
-            "Give it in Pa: steel has 2.0e11 to 2.1e11.",
-        )
+    length_m, elastic_modulus = table.positive("length_m"), _elastic_modulus(table)
     area, second_moment, mass = _section(table)
     diameter = table.positive("diameter_m") if "diameter_m" in table else NAN
     if length_m > _LONGEST_M:
@@ -107,6 +102,17 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         fittings_m=fittings_m,
         survey=_survey(table),
     )
+
+
+def _elastic_modulus(table: Table) -> float:
+    """Return Young's modulus in Pa; raises BadInput where it is that of no material."""
+    modulus = table.positive("elastic_modulus_pa")
+    if not _SOFTEST_PA <= modulus <= _STIFFEST_PA:
+        raise table.refusal(
+            f"elastic_modulus_pa = {modulus:g} is that of no material",
+            "Give it in Pa: steel has 2.0e11 to 2.1e11.",
+        )
+    return modulus
 
 
 def _refuse_other_units(table: Table, density_kg_m3: float, stress_pa: float) -> None:
