@@ -85,12 +85,8 @@ def examined(
     started = time.perf_counter()
     found, whole = _to_explain(tests, hanger, options)
     rng = np.random.default_rng(options.seed)
-    first = exclude_outliers(
-        whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done)
-    )
     doubts = _of_another(found.tests, hanger)
-    refuse_misfit(first, (*found.other_unit, *doubts))
-    clear = search_further(first)
+    clear = _search(whole, (*found.other_unit, *doubts), options, rng, progress)
     problem = clear.problem
     share, dynamic = acting(clear.attribution.no_gap_probability, found.tests, whole.observations)
     attribution = clear.attribution.with_unknown(share)
@@ -147,6 +143,21 @@ def _to_explain(
     whole = GapProblem(hanger, options.baseline, observed(found.tests, hanger))
     check_hold_out(whole, options.hold_out)
     return found, whole
+
+
+def _search(
+    whole: GapProblem,
+    reasons: Sequence[str],
+    options: GapOptions,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> Cleared:
+    """Search for causes without outliers; raises BadInput with `reasons` where none comes near."""
+    first = exclude_outliers(
+        whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done)
+    )
+    refuse_misfit(first, reasons)
+    return search_further(first)
 
 
 def _widest_swing_m(tests: Sequence[ModalTest]) -> float:
