@@ -15,7 +15,7 @@ Physics, one plane, x from the deck end. The bar is straight but for the sag of 
   the same mesh. Each mode then stretches the bar by the integral of y' w', which the axial
   stiffness of bar and supports in series resists (Irvine, Cable Structures, 1981);
 * zones (forks, sockets, end plates, turnbuckles) have another bending stiffness in each plane, and
-  another mass; they are as heavy as they say but their shear stiffness follows the mass;
+  another mass, which their axial and shear stiffness follow;
 * at both ends a rotational spring and a lateral one; sensors are point masses.
 
 The fork of a bar turns about its pin softly in one plane and stiffly in the other. Rotational
@@ -383,7 +383,7 @@ def draw_strand(
 def draw_springs(
     draws: Draws, low: float, high: float, between_ends: float = 0.4, between_planes: float = 0.3
 ) -> tuple[float, float, float, float]:
-    """Draw k1 to k4 (k1, k3 transverse; k3, k4 at the arch); the deviations are in the logarithm.
+    """Draw k1 to k4 (odd ones transverse, the last two at the arch); deviations are logarithmic.
 
     Half of the time the ends of a plane differ by their details only, likewise the planes.
     """
