@@ -38,7 +38,7 @@ from shm.simulate.ambient import Loss, MonitoringPlan, described_stream
 from shm.store import Stage, Store, StoredAlert, Workspace
 from shm.store.ring import ring_of
 from shm.values import Hanger
-from shm_cli import flags, thesis
+from shm_cli import example, flags
 from shm_cli.common import counting_bar
 from shm_cli.planting import arriving, send
 
@@ -178,7 +178,7 @@ def _length_m(number: int) -> float:
 
 def drop_measured_test(workspace: Workspace) -> None:
     """Drop the frequencies that the thesis measured, as the one test of their hanger."""
-    (test,) = load_modes(thesis.PRINTINGS["table 1.1"])
+    (test,) = load_modes(example.MODES_FILE)
     test = replace(test, id="thesis_table_1_1", time=_START - timedelta(weeks=1))
     document = modes_document([replace(test, hanger=MEASURED)])
     replace_text(workspace.spool / f"hanger{MEASURED}_measured.modes.json", dump(document))

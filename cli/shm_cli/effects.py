@@ -15,11 +15,11 @@ from shm.bridge import load_hanger
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey
 from shm.values import PLANES
 from shm.values.parameter_names import is_logarithm
-from shm_cli import completion, flags, thesis
+from shm_cli import completion, example, flags
 from shm_cli.common import markdown, show, show_rows
 from shm_cli.terminal import Terminal
 
-_HANGER = replace(load_hanger(thesis.HANGER_FILE), plate=None)
+_HANGER = replace(load_hanger(example.HANGER_FILE), plate=None)
 
 # Two tests that differ in all that an effect may follow, and one that shows the least.
 _EVERYTHING = Survey(("t1", "t2"), PLANES, (1.2, 2.4, 3.6), True, (5.0, 20.0), (0.5, 1.0), ())

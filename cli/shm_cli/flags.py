@@ -16,7 +16,6 @@ import rich_click as click
 
 from shm.documents import parse_time
 from shm.errors import BadInput
-from shm.inference import METHODS
 from shm.models import PRIORS
 from shm_cli import completion
 
@@ -117,18 +116,6 @@ samples = click.option(
     type=click.IntRange(100, 1_000_000),
     default=1000,
     help="Posterior samples.",
-)
-repeat = click.option(
-    "--repeat",
-    type=click.IntRange(min=1),
-    default=1,
-    help="How often the data set counts (N_D of the thesis).",
-)
-method = click.option(
-    "--method",
-    type=click.Choice(METHODS),
-    default=METHODS[0],
-    help="How the sampler works; `textbook` is for fidelity, its evidence is biased.",
 )
 
 priors = click.option(

@@ -70,7 +70,6 @@ VERBS: dict[str, Verb] = {
     "drift": Verb("shm_cli.drift", "How far tension and stiffness have moved."),
     "alerts": Verb("shm_cli.alerts", "Alerts that were raised, and their deliveries."),
     "simulate": Verb("shm_cli.simulate", "Hammer tests of a hanger whose truth you choose."),
-    "validate": Verb("shm_cli.validate", "Our figures beside the thesis's, with a gate."),
     "export": Verb(
         "shm_cli.export", "Posterior samples of the selected model class for other programs."
     ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,28 +12,12 @@ import rich_click as click
 
 from shm.documents import posterior_document, selection_document, summary
 from shm.errors import BadInput, UsageError
-from shm.inference import (
-    NOISE_FLOOR,
-    Progress,
-    UpdateOptions,
-    modal_groups,
-    select,
-    sigma_by_group,
-    update,
-)
-from shm.models import (
-    DESCRIPTION,
-    THESIS,
-    Model,
-    applicable,
-    build,
-    class_of,
-    competing_names,
-)
+from shm.inference import Progress, UpdateOptions, select, update
+from shm.models import DESCRIPTION, Model, applicable, build, competing_names
 from shm.modes_document import load_modes
 from shm.pipeline.lineage import Taught
 from shm.settings import load_settings
-from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior, Selection, Summary
+from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior, Selection
 from shm.values.rounding import force_unit
 from shm.values.stated_tension import averaged_now, stated
 from shm_cli import completion, flags
@@ -57,7 +41,7 @@ _calibrated_by = click.option(
 
 def _updating(function: flags.F) -> flags.F:
     """The options that both have."""
-    updating = (flags.seed, flags.samples, flags.repeat, flags.method, flags.priors, _calibrated_by)
+    updating = (flags.seed, flags.samples, flags.priors, _calibrated_by)
     for option in reversed((flags.hanger(), flags.hanger_file, *updating, flags.json)):
         function = option(function)
     return function
@@ -106,21 +90,6 @@ def calibrated(
     return replace(options, calibration=calibration(Taught(posterior, own), hanger))
 
 
-def update_options(samples: int, seed: int, repeat: int, method: str, priors: str) -> UpdateOptions:
-    """How to update; raises UsageError for what the thesis's priors alone allow."""
-    if priors != THESIS:
-        asked = [f"--repeat {repeat}"] * (repeat != 1) + [f"--method {method}"] * (
-            method != NOISE_FLOOR
-        )
-        for option in asked:
-            raise UsageError(
-                f"{option} is the thesis's way: with priors of the description each test counts "
-                "once and the sampler works its own way.",
-                remedy=f"Add --priors {THESIS}, or leave {option} out.",
-            )
-    return UpdateOptions(samples, seed, repeat, method)
-
-
 _POOR_FIT_PERCENT = 5.0
 """Model errors beyond it are blunders: clamped ends where springs are right cost some 2 %."""
 
@@ -147,8 +116,6 @@ def command(
     hanger_file: Path | None,
     seed: int,
     samples: int,
-    repeat: int,
-    method: str,
     priors: str,
     calibrated_by: Path | None,
 ) -> None:
@@ -159,7 +126,7 @@ def command(
     \b
     Example: shm update hanger3.modes.json --hanger-file H.toml --model beam2
     """
-    options = update_options(samples, seed, repeat, method, priors)
+    options = UpdateOptions(samples, seed)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
     doubts = told_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
@@ -259,13 +226,6 @@ def show_posterior(posterior: Posterior, limits: Limits | None = None) -> None:
     metavar="CLASS=P,...",
     help="How probable each class is beforehand, such as beam1=0.25,beam2=0.75.",
 )
-@click.option(
-    "--sigma",
-    metavar="|".join((*modal_groups.NAMED, "1-3,4-6")),
-    default=modal_groups.ONE,
-    help="One model error of all modes, or of each plane, order, mode or group of orders; with "
-    "--priors thesis.",
-)
 @_updating
 @click.pass_context
 def select_command(
@@ -273,13 +233,10 @@ def select_command(
     modes_file: Path | None,
     models: str | None,
     class_priors: str | None,
-    sigma: str,
     hanger_id: int | None,
     hanger_file: Path | None,
     seed: int,
     samples: int,
-    repeat: int,
-    method: str,
     priors: str,
     calibrated_by: Path | None,
 ) -> None:
@@ -292,10 +249,8 @@ def select_command(
 
     \b
     Example: shm select hanger3.modes.json --hanger-file H.toml --models beam1,beam2
-    Example: shm select hanger3.modes.json --hanger-file H.toml --priors thesis --sigma plane
-    Example: shm select hanger3.modes.json --hanger-file H.toml --priors thesis --sigma 1-3,4-6
     """
-    options = replace(update_options(samples, seed, repeat, method, priors), sigma=sigma)
+    options = UpdateOptions(samples, seed)
     stated = None if class_priors is None else _stated_priors(class_priors)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
     names = _names(ctx, models, None if hanger_file else hanger.id)
@@ -307,37 +262,13 @@ def select_command(
         options = calibrated(options, calibrated_by, hanger, chosen, progress)
         selection = select(tests, chosen, options, progress, stated)
     tell_poor_fit(selection.selected)
-    errors = _errors_by_group(selection, tests, hanger, options)
     if flags.wants_json():
         document = selection_document(selection, hanger.limits)
-        if errors:
-            told = {m: {g: asdict(s) for g, s in own.items()} for m, own in errors.items()}
-            document["sigma_by_group"] = told
         show({**document, "not_applicable": not_applicable, "doubts": doubts})
         return
     show_selection(selection, hanger.limits)
-    if errors:
-        rows = [
-            (model, group, *(f"{share:.2%}" for share in (each.mean, each.q05, each.q95)))
-            for model, own in errors.items()
-            for group, each in own.items()
-        ]
-        headings = ("class", "group", "mean", "5 %", "95 %")
-        show_rows("model error of each group of modes", headings, rows)
     for name, reason in not_applicable.items():
         click.echo(f"{name} does not apply: {reason}")
-
-
-def _errors_by_group(
-    selection: Selection, tests: Sequence[ModalTest], hanger: Hanger, options: UpdateOptions
-) -> dict[str, dict[str, Summary]]:
-    """By class; empty where one model error is of all modes."""
-    if options.sigma == modal_groups.ONE:
-        return {}
-    return {
-        each.model: sigma_by_group(each, tests, class_of(each, hanger), options)
-        for each in selection.posteriors
-    }
 
 
 def _names(ctx: click.Context, models: str | None, hanger_id: int | None) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from shm.gap import diagnose as diagnosed
 from shm.gap.any_simulator import diagnose_simulator
 from shm.identify import Identification, IdentifyOptions
 from shm.identify.identification import identify as identified
-from shm.inference import METHODS, UpdateOptions, updating
+from shm.inference import UpdateOptions, updating
 from shm.inference.options import silent
 from shm.models import DESCRIPTION, build, competing_names
 from shm.read import read as read_file
@@ -224,8 +224,6 @@ def update(
     *,
     seed: int = 1,
     samples: int = 1000,
-    repeat: int = 1,
-    method: str = METHODS[0],
     priors: str = DESCRIPTION,
     progress: Progress = silent,
 ) -> Posterior:
@@ -237,8 +235,7 @@ def update(
     to 5 times nominal, ends from pinned to clamped, the tolerances of its `scatter`), or by the
     `thesis`: its ranges, an exact description and f_hat ~ N(f(theta), (sigma f_hat)^2 + sd^2),
     thesis (4.5), with the unknown fractional model error sigma and the identification's standard
-    deviation sd. With the thesis's, `repeat` counts the data set N_D times and `method` may be any
-    of `shm.inference.METHODS`. `progress` hears a label and the fraction done.
+    deviation sd. `progress` hears a label and the fraction done.
 
     `Posterior.samples` (samples, parameters) are equally weighted draws, `Posterior.tension_n`
     (samples,) is in N; its interval is absolute, `Posterior.repeatability_sd_n` is for shifts and
@@ -251,7 +248,7 @@ def update(
         >>> posterior.tension_n.mean(), posterior.tension_n.std()
         (711000.0, 4000.0)
     """
-    options = UpdateOptions(samples, seed, repeat, method)
+    options = UpdateOptions(samples, seed)
     return updating.update(modal_tests(tests), build(model, hanger, priors), options, progress)
 
 
@@ -262,8 +259,6 @@ def select(
     *,
     seed: int = 1,
     samples: int = 1000,
-    repeat: int = 1,
-    method: str = METHODS[0],
     priors: str = DESCRIPTION,
     progress: Progress = silent,
 ) -> Selection:
@@ -283,7 +278,7 @@ def select(
     """
     usual = () if models else competing_names(hanger, load_settings().model_names)
     classes = [build(name, hanger, priors) for name in models or usual]
-    options = UpdateOptions(samples, seed, repeat, method)
+    options = UpdateOptions(samples, seed)
     return updating.select(modal_tests(tests), classes, options, progress)
 
 

@@ -249,7 +249,7 @@ def predictive(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hanger)
 
 def _of_the_field(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hanger) -> Predictive:
     """The same where the likelihood is that of `shm.inference.field`."""
-    problem = Problem.of(tests, class_of(posterior, hanger), 1, silent)
+    problem = Problem.of(tests, class_of(posterior, hanger), silent)
     likelihood, sigma = problem.likelihood, posterior.samples[:, -1]
     if isinstance(likelihood, FieldLikelihood):
         likelihood.settle(problem.model, posterior.most_probable[:-1])
@@ -268,7 +268,10 @@ def _of_the_field(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hang
 
 
 def _refuse_another(posterior: Posterior, joint: FloatArray) -> None:
-    """The joint likelihood was kept; a data set that counts N_D times has N_D times as much."""
+    """Refuse a posterior whose stored joint likelihood is another.
+
+    Earlier versions could count a data set N_D times: the stored one is then N_D times as large.
+    """
     repeat = max(1, round(float(np.median(posterior.log_likelihood / joint))))
     if not np.allclose(repeat * joint, posterior.log_likelihood, rtol=_TOLERANCE, atol=_TOLERANCE):
         raise _another(posterior)

@@ -4,37 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from shm.inference.options import METHODS, NOISE_FLOOR, TEXTBOOK, Progress, UpdateOptions
+from shm.inference.options import Progress, UpdateOptions
 from shm.resources import when_asked
 
 if TYPE_CHECKING:
-    from shm.inference.likelihood import sigma_by_group
-    from shm.inference.tmcmc import BiasedEvidenceWarning
     from shm.inference.updating import class_probabilities, refresh, select, update
 
-__all__ = [
-    "METHODS",
-    "NOISE_FLOOR",
-    "TEXTBOOK",
-    "BiasedEvidenceWarning",
-    "Progress",
-    "UpdateOptions",
-    "class_probabilities",
-    "refresh",
-    "select",
-    "sigma_by_group",
-    "update",
-]
+__all__ = ["Progress", "UpdateOptions", "class_probabilities", "refresh", "select", "update"]
 
 if not TYPE_CHECKING:
     # Every command has the options of an update, and few make one.
     __getattr__ = when_asked(
         __name__,
-        {
-            "sigma_by_group": "shm.inference.likelihood",
-            "BiasedEvidenceWarning": "shm.inference.tmcmc",
-            **dict.fromkeys(
-                ("class_probabilities", "refresh", "select", "update"), "shm.inference.updating"
-            ),
-        },
+        dict.fromkeys(
+            ("class_probabilities", "refresh", "select", "update"), "shm.inference.updating"
+        ),
     )

@@ -75,8 +75,6 @@ class FieldLikelihood:
     last datum is that tension. Raises BadInput where the tests hold no mode.
     """
 
-    repeat = 1
-
     def __init__(
         self, tests: Sequence[ModalTest], model: Model, reading: tuple[float, float] | None = None
     ):

@@ -11,17 +11,14 @@ standard deviation 1/sqrt(2 N) for N data: to the sampler the model error costs 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 
 import numpy as np
 import scipy
 
 from shm.errors import BadInput
-from shm.inference.modal_groups import groups
-from shm.inference.options import UpdateOptions
 from shm.models import Model
 from shm.models.base import Conditions
-from shm.values import PLANES, FloatArray, IntArray, ModalTest, Mode, Posterior, Summary
+from shm.values import PLANES, FloatArray, IntArray, ModalTest, Mode
 
 # Numerical: the trapezoidal rule of a bell in steps of h sd is off by 2 exp(-2 pi^2/h^2), 2e-6; a
 # draw is spread over its step, which adds h^2/12 to the variance, 0.3 %.
@@ -36,14 +33,12 @@ _SMALLEST_SIGMA = 1e-4
 class Likelihood:
     """Measured frequencies (measurements,) and the likelihood of predictions of them.
 
-    `repeat` counts the data set N_D times, as the thesis does. Raises BadInput where the tests
-    hold no mode.
+    Raises BadInput where the tests hold no mode.
     """
 
-    def __init__(self, tests: Sequence[ModalTest], repeat: int = 1):
+    def __init__(self, tests: Sequence[ModalTest]):
         self.modes = modes = measured(tests)
         self.tests = tuple(tests)
-        self.repeat = repeat
         self.frequency_hz: FloatArray = np.array([mode.frequency_hz for mode in modes])
         sd_hz: FloatArray = np.array([mode.frequency_sd_hz for mode in modes])
         self.identification_error: FloatArray = np.nan_to_num(sd_hz, nan=0.0) / self.frequency_hz
@@ -51,17 +46,6 @@ class Likelihood:
         self._order = np.array([mode.order - 1 for mode in modes])
         self._constant = -np.log(self.frequency_hz).sum() - len(modes) / 2 * np.log(2 * np.pi)
         self._log_sigma, self._log_share = self._grid(_STEP_IN_SD)
-
-    def part(self, index: IntArray) -> Likelihood:
-        """That of some of the measurements, with a sigma of their own."""
-        own = copy(self)
-        own.__class__ = Likelihood
-        own.modes = [self.modes[place] for place in index]
-        own.frequency_hz = self.frequency_hz[index]
-        own.identification_error = self.identification_error[index]
-        own._constant = -np.log(own.frequency_hz).sum() - len(index) / 2 * np.log(2 * np.pi)
-        own._log_sigma, own._log_share = own._grid(_STEP_IN_SD)
-        return own
 
     @property
     def highest_order(self) -> int:
@@ -104,7 +88,7 @@ class Likelihood:
         """Log likelihood (n,) of predictions (n, measurements), each with its sigma (n,)."""
         variance = sigma[:, None] ** 2 + self.identification_error**2
         terms = self.misfit(predicted) ** 2 / variance + np.log(variance)
-        return np.asarray(self.repeat * (self._constant - 0.5 * terms.sum(axis=1)))
+        return np.asarray(self._constant - 0.5 * terms.sum(axis=1))
 
     def draw_sigma(self, predicted: FloatArray, rng: np.random.Generator) -> FloatArray:
         """sigma (n,) from its posterior given each prediction (n, measurements)."""
@@ -131,67 +115,17 @@ class Likelihood:
         variance = sigma**2 + floor**2 + self.identification_error[:, None] ** 2
         quadratic = self.misfit(predicted) ** 2 @ (1 / variance)
         constant = self._constant - 0.5 * np.log(variance).sum(axis=0)
-        return np.asarray(self.repeat * (constant - 0.5 * quadratic))
+        return np.asarray(constant - 0.5 * quadratic)
 
     def _grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
         """Nodes of log sigma, and the log of each one's share of the uniform prior."""
         lowest = np.log(_SMALLEST_SIGMA)
-        step = step_in_sd / np.sqrt(2 * len(self.modes) * self.repeat)
+        step = step_in_sd / np.sqrt(2 * len(self.modes))
         nodes, spacing = np.linspace(lowest, 0.0, int(-lowest / step) + 2, retstep=True)
         share = np.log(spacing) + nodes
         share[[0, -1]] -= np.log(2)
         share[0] = np.logaddexp(share[0], lowest)
         return nodes, share
-
-
-class GroupedLikelihood(Likelihood):
-    """A model error of its own for each group of modes: thesis (4.7) to (4.12).
-
-    Each is uniform on [0, 1] and integrated out by itself, so that the marginal likelihood is a
-    product over the groups. What the rest of the sampler calls sigma is their root mean square
-    over the modes; `joint` stands for the parameters alone.
-    """
-
-    def __init__(self, tests: Sequence[ModalTest], repeat: int, sigma: str):
-        super().__init__(tests, repeat)
-        self.by_name = groups(self.modes, sigma)
-        self._parts = [Likelihood.part(self, own) for own in self.by_name.values()]
-
-    def marginal(self, predicted: FloatArray, floor: float = 0.0) -> FloatArray:
-        parts = zip(self._parts, self.by_name.values(), strict=True)
-        terms = [part.marginal(predicted[:, own], floor) for part, own in parts]
-        return np.asarray(np.sum(terms, axis=0))
-
-    def joint(self, predicted: FloatArray, sigma: FloatArray) -> FloatArray:
-        return self.marginal(predicted)
-
-    def draw_sigma(self, predicted: FloatArray, rng: np.random.Generator) -> FloatArray:
-        return self._mean([*self.draw_each(predicted, rng).values()])
-
-    def draw_each(self, predicted: FloatArray, rng: np.random.Generator) -> dict[str, FloatArray]:
-        """sigma (n,) of each group, by its name, given each prediction (n, measurements)."""
-        parts = zip(self._parts, self.by_name.items(), strict=True)
-        return {name: part.draw_sigma(predicted[:, own], rng) for part, (name, own) in parts}
-
-    def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
-        parts = zip(self._parts, self.by_name.values(), strict=True)
-        return self._mean([part.likeliest_sigma(predicted[:, own]) for part, own in parts])
-
-    def _mean(self, sigmas: Sequence[FloatArray]) -> FloatArray:
-        weights = [len(own) for own in self.by_name.values()]
-        return np.asarray(np.sqrt(np.average(np.square(sigmas), axis=0, weights=weights)))
-
-
-def sigma_by_group(
-    posterior: Posterior, tests: Sequence[ModalTest], model: Model, options: UpdateOptions
-) -> dict[str, Summary]:
-    """The model error of each group of modes, given what the posterior's draws predict."""
-    likelihood = GroupedLikelihood(tests, options.repeat, options.sigma)
-    theta = np.column_stack([posterior.parameter(name) for name in model.parameter_names])
-    drawn = likelihood.draw_each(
-        likelihood.predict(model, theta), np.random.default_rng(options.seed)
-    )
-    return {name: Summary.of(values) for name, values in drawn.items()}
 
 
 def measured(tests: Sequence[ModalTest]) -> list[Mode]:

@@ -167,7 +167,7 @@ def _tension_of_other_orders_n(
         renumbered = _renumbered(tests, by)
         if renumbered is None:
             continue
-        other = Problem.of(renumbered, problem.model, 1, silent, problem.calibration)
+        other = Problem.of(renumbered, problem.model, silent, problem.calibration)
         start = theta.copy()
         start[0] *= (middle / (middle + by)) ** 2
         climbs = []

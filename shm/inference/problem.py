@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.errors import UsageError
 from shm.inference.coordinates import Coordinates
 from shm.inference.described import DescribedCoordinates
 from shm.inference.field import FieldLikelihood
-from shm.inference.likelihood import GroupedLikelihood, Likelihood
+from shm.inference.likelihood import Likelihood
 from shm.inference.mixture import Rows
-from shm.inference.modal_groups import ONE
 from shm.inference.options import Progress
 from shm.inference.priors import Calibration, reading_of
 from shm.models import THESIS, AsMade, Model
@@ -65,10 +63,8 @@ class Problem:
         cls,
         tests: Sequence[ModalTest],
         model: Model,
-        repeat: int,
         progress: Progress,
         calibration: Calibration | None = None,
-        sigma: str = ONE,
     ) -> Problem:
         """The problem of `tests`, each of which the model can describe, the model made ready.
 
@@ -76,7 +72,7 @@ class Problem:
         """
         for test in tests:
             model.refuse(test)
-        problem = cls(model, _likelihood(tests, model, repeat, calibration, sigma), calibration)
+        problem = cls(model, _likelihood(tests, model, calibration), calibration)
         label = f"{model.name}: reduced basis"
         model.prepare(problem.likelihood.highest_order, lambda done: progress(label, done))
         return problem
@@ -122,26 +118,10 @@ class Problem:
 
 
 def _likelihood(
-    tests: Sequence[ModalTest],
-    model: Model,
-    repeat: int,
-    calibration: Calibration | None,
-    sigma: str,
+    tests: Sequence[ModalTest], model: Model, calibration: Calibration | None
 ) -> Likelihood | FieldLikelihood:
     if model.priors == THESIS:
-        if sigma == ONE:
-            return Likelihood(tests, repeat)
-        return GroupedLikelihood(tests, repeat, sigma)
-    if sigma != ONE:
-        raise UsageError(
-            f"a model error of each {sigma} is the thesis's: the noise of the field has its own.",
-            remedy="Leave sigma out, or take the priors of the thesis.",
-        )
-    if repeat != 1:
-        raise UsageError(
-            f"a data set that counts {repeat} times is the thesis's: real tests count once.",
-            remedy="Leave repeat out, or take the priors of the thesis.",
-        )
+        return Likelihood(tests)
     reading = reading_of(tests)
     if reading is None:
         return FieldLikelihood(tests, model)

@@ -165,7 +165,7 @@ def _descend(
 def _noise(problem: Problem, sigma: FloatArray) -> FloatArray:
     """Fractional standard deviations (m, measurements) for model errors (m,)."""
     own = problem.likelihood.fit_error
-    return np.asarray(np.hypot(sigma[:, None], own) / np.sqrt(problem.likelihood.repeat))
+    return np.asarray(np.hypot(sigma[:, None], own))
 
 
 def _step(

@@ -22,13 +22,13 @@ import numpy as np
 from shm.errors import UsageError
 from shm.inference.importance import FARTHEST, Weighted, weigh
 from shm.inference.mixture import normalised
-from shm.inference.options import TEXTBOOK, Progress, UpdateOptions, silent
+from shm.inference.options import Progress, UpdateOptions, silent
 from shm.inference.other_answers import reading_off_sd
-from shm.inference.outcome import assembled, posterior_of
+from shm.inference.outcome import posterior_of
 from shm.inference.priors import DECADES, reading_of
 from shm.inference.problem import Problem
 from shm.inference.search import Anchors, WarmStart, carried, search, warm_start_from
-from shm.inference.tmcmc import sample, textbook
+from shm.inference.tmcmc import sample
 from shm.models import THESIS, AsMade, Model
 from shm.values import ENOUGH_EFFECTIVE, NAN, FloatArray, ModalTest, Posterior, Selection
 
@@ -60,29 +60,13 @@ def update(
     is the agreement of their batches), and a few steps spread equal draws. `warm_start`, the
     posterior of another class on the same tests, saves evaluations and changes nothing else.
     `progress` hears the model's name and the fraction done. Raises BadInput where a test has no
-    modes or conditions that the model class cannot describe, UsageError where the textbook method
-    or a data set that counts twice meets priors of the description. Warns (BiasedEvidenceWarning)
-    about the method.
+    modes or conditions that the model class cannot describe.
     """
     options = options or UpdateOptions()
-    if options.method == TEXTBOOK and model.priors != THESIS:
-        raise UsageError(
-            "the textbook's sampler is the thesis's: it draws the model error uniformly and has no "
-            "part in the noise of the field.",
-            remedy="Leave the method out, or take the priors of the thesis.",
-        )
-    if options.method == TEXTBOOK and options.sigma != "one":
-        raise UsageError(
-            "the textbook's sampler draws one model error.", remedy="Leave the method or sigma out."
-        )
-    problem = Problem.of(tests, model, options.repeat, progress, options.calibration, options.sigma)
+    problem = Problem.of(tests, model, progress, options.calibration)
     started = time.perf_counter()
     rng = np.random.default_rng(options.seed)
     progress(model.name, 0.0)
-    if options.method == TEXTBOOK:
-        outcome = textbook(problem, options.samples, rng)
-        progress(model.name, 1.0)
-        return assembled(problem, outcome, tests, options, started)
     weighted = infer(problem, options.samples, rng, progress, warm_start)
     progress(model.name, 1.0)
     found = posterior_of(problem, weighted, tests, options, rng, started)
@@ -97,7 +81,7 @@ def _off_the_reading(
     if reading is None or model.priors == THESIS:
         return NAN
     unread = [replace(each, tension_read_n=NAN, tension_read_sd_n=NAN) for each in tests]
-    problem = Problem.of(unread, model, 1, silent, options.calibration)
+    problem = Problem.of(unread, model, silent, options.calibration)
     drawn = infer(problem, _DRAWS_WITHOUT_READING, rng).resampled(_DRAWS_WITHOUT_READING, rng)
     theta = problem.coordinates.finished(drawn.z, rng)
     return reading_off_sd(np.log(theta[:, 0]), reading, model.hanger.nominal_tension_n)
@@ -249,15 +233,14 @@ def refresh(
     """The posterior of `model` given `tests` alone, found from a `known` one of the same class.
 
     The same posterior as that of `update`, within Monte Carlo error, for less work; the
-    same seed, tests and known posterior give the same draws. `options.method` counts where it
-    comes to a start from scratch. Raises UsageError where the known posterior is of another class,
+    same seed, tests and known posterior give the same draws. Raises UsageError where the known posterior is of another class,
     BadInput as `update` does.
     """
     options = options or UpdateOptions()
     _refuse_stranger(model, known)
     if reading_of(tests) is not None:  # rare, and to be held against what frequencies alone say
         return update(tests, model, options, progress)
-    problem = Problem.of(tests, model, options.repeat, progress, options.calibration)
+    problem = Problem.of(tests, model, progress, options.calibration)
     started = time.perf_counter()
     rng = np.random.default_rng(options.seed)
     progress(model.name, 0.0)

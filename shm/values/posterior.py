@@ -164,7 +164,8 @@ class Posterior(Shown):
     `samples` (samples, parameters) are equally weighted draws; `log_likelihood` (samples,).
     `most_probable` (parameters,) has the largest posterior density. `r_hat` compares independent
     batches of draws, the worst parameter (1 is converged). `method` is the way it was sampled:
-    `tmcmc` or `textbook` from scratch, or from a known posterior `re-weighted` or by an `ensemble`.
+    `tmcmc` from scratch, or from a known posterior `re-weighted` or by an `ensemble`; of an earlier
+    version also `textbook`.
     `priors` are those of the `thesis` or of the hanger's `description`. The tension's draws are
     absolute: they hold the uncertainty of the description. `repeatability_sd_n` is the standard
     deviation, in N, with which the same test repeats it, description held: what counts in shifts.
