@@ -233,8 +233,8 @@ def refresh(
     """The posterior of `model` given `tests` alone, found from a `known` one of the same class.
 
     The same posterior as that of `update`, within Monte Carlo error, for less work; the
-    same seed, tests and known posterior give the same draws. Raises UsageError where the known posterior is of another class,
-    BadInput as `update` does.
+    same seed, tests and known posterior give the same draws. Raises UsageError where the known
+    posterior is of another class, BadInput as `update` does.
     """
     options = options or UpdateOptions()
     _refuse_stranger(model, known)

@@ -13,7 +13,7 @@ import numpy as np
 from shm.models import THESIS, build
 from shm.models.solid.classes import SolidModel
 from shm.values import PLANES, FloatArray, Hanger, Plane
-from shm_cli import thesis
+from tests.benchmarks.thesis import thesis_data
 
 # Of the thesis's tables A.1 to A.7: modes, springs of a class.
 MODES = 6
@@ -62,7 +62,7 @@ def compared(
     hanger: Hanger, progress: Callable[[str, float], None], table: str = ""
 ) -> list[FrequencyRow]:
     """All columns of one table, or of all."""
-    tables = tomllib.loads(thesis.TABLES_FILE.read_text(encoding="utf-8"))
+    tables = tomllib.loads(thesis_data.TABLES_FILE.read_text(encoding="utf-8"))
     makers = [make for make, made in _PARTS.items() if not table or table in made]
     rows: list[FrequencyRow] = []
     for done, make in enumerate(makers, start=1):

@@ -10,21 +10,16 @@ import numpy as np
 from shm.errors import UsageError
 from shm.values import IntArray, Mode
 
-ONE, PLANE, ORDER, MODE = "one", "plane", "order", "mode"
-NAMED = (ONE, PLANE, ORDER, MODE)
+PLANE, ORDER, MODE = "plane", "order", "mode"
+NAMED = (PLANE, ORDER, MODE)
 _RANGE = re.compile(r"(\d+)(?:-(\d+))?")
 
 
-def check(sigma: str) -> None:
-    """Raises UsageError for groups that are neither named nor ranges of orders."""
-    if sigma not in NAMED:
-        _ranges(sigma)
-
-
 def groups(modes: Sequence[Mode], sigma: str) -> dict[str, IntArray]:
-    """The places (members,) of each group's modes, by what the group is called.
+    """Return the places (members,) of each group's modes, by what the group is called.
 
-    Raises UsageError where a mode is in no group.
+    `sigma` is "plane", "order" or "mode", or names groups of orders: "1-3,4-6". Raises UsageError
+    where it is none of these, and where a mode is in no group.
     """
     ranges = () if sigma in NAMED else _ranges(sigma)
     called = [_called(mode, sigma, ranges) for mode in modes]
@@ -36,7 +31,7 @@ def groups(modes: Sequence[Mode], sigma: str) -> dict[str, IntArray]:
 def _called(mode: Mode, sigma: str, ranges: Sequence[tuple[int, int]]) -> str:
     if sigma in NAMED:
         names = {PLANE: mode.plane, ORDER: f"order {mode.order}"}
-        return names.get(sigma, f"{mode.plane} {mode.order}" if sigma == MODE else "all")
+        return names.get(sigma, f"{mode.plane} {mode.order}")
     for first, last in ranges:
         if first <= mode.order <= last:
             return f"order {first}" if first == last else f"orders {first} to {last}"

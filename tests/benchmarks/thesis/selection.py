@@ -9,9 +9,8 @@ import numpy as np
 
 from shm.inference import UpdateOptions, select
 from shm.models import THESIS, build
-from shm.modes_document import load_modes
 from shm.values import Hanger, Posterior, Selection
-from shm_cli import thesis
+from tests.benchmarks.thesis import thesis_data
 
 _REPEATS = (1, 10)  # once, and N_D of the thesis's evidence (docs/trials/validation.md)
 
@@ -51,7 +50,7 @@ class SelectionRow:
         return self._from_both(self.most_probable["theta_F"] * self.nominal_tension_kn)
 
     def _from_both(self, tension_kn: float) -> str:
-        other = thesis.OTHER_NOMINAL_TENSION_N / 1e3
+        other = thesis_data.OTHER_NOMINAL_TENSION_N / 1e3
         return f"{tension_kn / self.nominal_tension_kn - 1:+.0%} / {tension_kn / other - 1:+.0%}"
 
 
@@ -59,28 +58,28 @@ def compared(
     hanger: Hanger,
     seed: int,
     progress: Callable[[str, float], None],
-    printings: Sequence[str] = tuple(thesis.PRINTINGS),
+    printings: Sequence[str] = tuple(thesis_data.PRINTINGS),
     repeats: Sequence[int] = _REPEATS,
 ) -> list[SelectionRow]:
     """All classes on the printings of the measured table, counted as often as each of `repeats`."""
     rows = []
     for printing in printings:
         for repeat in repeats:
-            models = [build(name, hanger, THESIS) for name in thesis.EVIDENCE]
-            options = UpdateOptions(samples=2000, seed=seed, repeat=repeat)
+            models = [build(name, hanger, THESIS) for name in thesis_data.EVIDENCE]
+            options = UpdateOptions(samples=2000, seed=seed)
             label = f"{printing}, N_D = {repeat},"
 
             def tell(name: str, fraction: float, label: str = label) -> None:
                 progress(f"{label} {name}", fraction)
 
-            tests = load_modes(thesis.PRINTINGS[printing])
+            tests = thesis_data.measured_tests(printing, repeat)
             selection = select(tests, models, options, tell)
             rows += _selection_rows(printing, repeat, selection)
     return rows
 
 
 def _selection_rows(printing: str, repeat: int, selection: Selection) -> list[SelectionRow]:
-    best, thesis_best = selection.selected.log_evidence, max(thesis.EVIDENCE.values())
+    best, thesis_best = selection.selected.log_evidence, max(thesis_data.EVIDENCE.values())
     return [
         _row(printing, repeat, posterior, probability, best, thesis_best)
         for posterior, probability in zip(
@@ -107,12 +106,12 @@ def _row(
         log_evidence=posterior.log_evidence,
         log_evidence_sd=posterior.log_evidence_sd,
         log_bayes_factor=posterior.log_evidence - best,
-        thesis_log_bayes_factor=thesis.EVIDENCE[posterior.model] - thesis_best,
+        thesis_log_bayes_factor=thesis_data.EVIDENCE[posterior.model] - thesis_best,
         tension_kn=mean / 1e3,
         tension_q05_kn=float(low) / 1e3,
         tension_q95_kn=float(high) / 1e3,
         deviation_from_nominal=mean / posterior.nominal_tension_n - 1,
-        thesis_deviation=thesis.DEVIATION_FROM_NOMINAL[posterior.model],
+        thesis_deviation=thesis_data.DEVIATION_FROM_NOMINAL[posterior.model],
         most_probable=dict(zip(posterior.names, map(float, posterior.most_probable), strict=True)),
         nominal_tension_kn=posterior.nominal_tension_n / 1e3,
         seconds=posterior.seconds,
@@ -141,7 +140,7 @@ def cells(row: SelectionRow) -> tuple[str, ...]:
         f"{row.thesis_deviation:+.0%}",
         row.most_probable_deviations,
         f"{row.seconds:.0f} s",
-        thesis.EVALUATION_TIME[row.model],
+        thesis_data.EVALUATION_TIME[row.model],
         ", ".join(f"{name} {value:.3g}" for name, value in row.most_probable.items()),
     )
 
@@ -152,7 +151,7 @@ def misses(rows: list[SelectionRow]) -> list[str]:
     return [
         f"{printing}, N_D = {repeat}: {fixed} beats {springs}"
         for fixed, springs in (("beam1", "beam2"), ("solid0", "solid2"))
-        for printing in thesis.PRINTINGS
+        for printing in thesis_data.PRINTINGS
         for repeat in _REPEATS
         if evidence[printing, repeat, fixed] > evidence[printing, repeat, springs] - 1
     ]

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from shm.models import THESIS, build
-from shm.modes_document import load_modes
 from shm.report.figures.specification import (
     Axis,
     Line,
@@ -27,10 +26,9 @@ from shm.report.figures.specification import (
     limits,
 )
 from shm.values import PLANES, FloatArray, Hanger, Plane
-from shm_cli import thesis
-from shm_cli.validation import frequencies
-from shm_cli.validation.frequencies import FrequencyRow
-from shm_cli.validation.thesis_figures import Figure
+from tests.benchmarks.thesis import frequencies, thesis_data
+from tests.benchmarks.thesis.frequencies import FrequencyRow
+from tests.benchmarks.thesis.thesis_figures import Figure
 
 Tell = Callable[[str, float], None]
 HUES = ("blue", "orange", "green", "purple", "red", "quiet")  # in a fixed order
@@ -66,7 +64,7 @@ class _Part:
 def convergence(hanger: Hanger, tell: Tell, number: str) -> Figure:
     """Figures 3.5, 3.7 and 3.9: frequencies over the size of the mesh, the thesis's and ours."""
     name, table = {"3.5": ("s1", "A.1"), "3.7": ("s2", "A.2"), "3.9": ("solid0", "A.3")}[number]
-    printed = tomllib.loads(thesis.TABLES_FILE.read_text(encoding="utf-8"))[name]
+    printed = tomllib.loads(thesis_data.TABLES_FILE.read_text(encoding="utf-8"))[name]
     rows = [r for r in frequencies.compared(hanger, tell, table) if np.isfinite(r.unknowns)]
     theirs = _over(np.array(printed["elements"], float), np.array(printed["meshes"]))
     ours = _over(np.array([row.unknowns for row in rows]), np.array([row.ours_hz for row in rows]))
@@ -148,7 +146,7 @@ def solid_and_beam(hanger: Hanger, tell: Tell, number: str) -> Figure:
     """Figures 3.19 and 3.20: the plain rods beside the clamped beam of their length."""
     name, table = {"3.19": ("s1", "A.6"), "3.20": ("s2", "A.7")}[number]
     beam = frequencies.compared(hanger, tell, table)[0]
-    tables = tomllib.loads(thesis.TABLES_FILE.read_text(encoding="utf-8"))
+    tables = tomllib.loads(thesis_data.TABLES_FILE.read_text(encoding="utf-8"))
     solid_hz = _held_hz(hanger, name)[0]
     shown = {
         name: (solid_hz, np.array(tables[name]["converged"])),
@@ -185,7 +183,7 @@ def _held_hz(hanger: Hanger, name: str) -> FloatArray:
 
 
 def _measured(plane: Plane) -> FloatArray:
-    (test,) = load_modes(thesis.PRINTINGS["table 1.1"])
+    (test,) = thesis_data.measured_tests("table 1.1")
     own = sorted((mode for mode in test.modes if mode.plane == plane), key=lambda mode: mode.order)
     return np.array([mode.frequency_hz for mode in own])
 

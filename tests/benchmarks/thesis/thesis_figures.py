@@ -1,4 +1,4 @@
-"""What `shm validate --figure` gives of the figures of the thesis that are no solid's frequencies.
+"""What `validate.py --figure` gives of the figures of the thesis that are no solid's frequencies.
 
 Figures B.1 to B.14 of the thesis: modes 1 to 7 of "Model 4", the solid on springs, x and y.
 
@@ -16,7 +16,7 @@ its curves; so each point is held against the thesis's own equation, the determi
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
@@ -28,7 +28,6 @@ from shm.inference import UpdateOptions, update
 from shm.models import THESIS, build
 from shm.models.solid.classes import SolidModel
 from shm.models.tensioned_beam import wave_numbers
-from shm.modes_document import load_modes
 from shm.report.contents import HangerReport
 from shm.report.figures import hanger_frequencies, parameter_pairs
 from shm.report.figures.prediction_figures import (
@@ -39,8 +38,7 @@ from shm.report.figures.prediction_figures import (
 )
 from shm.report.figures.specification import Specification
 from shm.values import PLANES, FloatArray, Hanger, Plane, Posterior, Summary
-from shm_cli import thesis
-from shm_cli.validation import frequencies
+from tests.benchmarks.thesis import frequencies, thesis_data
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,13 +172,15 @@ def _name(short: str) -> str:
 
 
 def _posterior(hanger: Hanger, model: str, tell: Tell) -> Posterior:
-    options = UpdateOptions(samples=_SAMPLES, repeat=_REPEAT)
-    tests = load_modes(thesis.PRINTINGS[_PRINTING])
-    return update(tests, build(model, hanger, THESIS), options, tell)
+    options = UpdateOptions(samples=_SAMPLES)
+    tests = thesis_data.measured_tests(_PRINTING, _REPEAT)
+    found = update(tests, build(model, hanger, THESIS), options, tell)
+    # The copies of the data have equal predictions: those of the first stand for all.
+    return replace(found, predicted=found.predicted[: len(found.predicted) // _REPEAT])
 
 
 def _frequencies(hanger: Hanger, posterior: Posterior, number: str) -> Figure:
-    tests = tuple(load_modes(thesis.PRINTINGS[_PRINTING]))
+    tests = tuple(thesis_data.measured_tests(_PRINTING))
     report = HangerReport("", hanger, tests, posterior, datetime.now(UTC), __version__)
     rows = posterior.predicted
     cells = [

@@ -11,8 +11,7 @@ from typing import Any
 
 from shm.modes_document import load_modes
 from shm.values import PLANES, Hanger, Plane
-from shm_cli import thesis
-from shm_cli.validation import selection
+from tests.benchmarks.thesis import selection, thesis_data
 
 Tell = Callable[[str, float], None]
 # As in the thesis, chapter 5: data and N_D.
@@ -32,7 +31,7 @@ def measured(hanger: Hanger, seed: int, tell: Tell) -> Shown:
     """Table 1.1 in both printings."""
     by_printing = {
         printing: {(m.plane, m.order): m.frequency_hz for m in load_modes(path)[0].modes}
-        for printing, path in thesis.PRINTINGS.items()
+        for printing, path in thesis_data.PRINTINGS.items()
     }
     document = [
         {"plane": plane, "order": order}
@@ -58,7 +57,7 @@ def evidence(hanger: Hanger, seed: int, tell: Tell) -> Shown:
             row.model,
             f"{row.log_evidence:.2f} ± {row.log_evidence_sd:.2f}",
             f"{row.log_bayes_factor:.1f}",
-            f"{thesis.EVIDENCE[row.model]:.2f}",
+            f"{thesis_data.EVIDENCE[row.model]:.2f}",
             f"{row.thesis_log_bayes_factor:.1f}",
         )
         for row in rows

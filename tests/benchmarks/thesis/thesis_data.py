@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+from shm.modes_document import load_modes
+from shm.values import ModalTest
+from shm_cli.example import MODES_FILE
+
 FOLDER = Path(__file__).parent
-HANGER_FILE = FOLDER / "hanger3.toml"
 TABLES_FILE = FOLDER / "tables.toml"
 CHECKLIST_FILE = FOLDER / "checklist.toml"
 
 PRINTINGS = {
-    "table 1.1": FOLDER / "table_1_1.modes.json",
+    "table 1.1": MODES_FILE,
     "table A.4": FOLDER / "table_a_4.modes.json",
 }
 """The same measurement, printed twice with three differing values."""
+
+CLASSES = ("beam1", "beam2", "solid0", "solid1", "solid2")
 
 EVIDENCE = {
     "beam1": 434.49,
@@ -45,6 +52,20 @@ EVALUATION_TIME = {
 
 OTHER_NOMINAL_TENSION_N = 835e3
 """Section 3.1.1: of the transverse direction; the longitudinal gave the description's 711 kN."""
+
+
+def measured_tests(printing: str, n_times: int = 1) -> list[ModalTest]:
+    """Return the tests of one of `PRINTINGS`, counted `n_times` times (N_D of the thesis)."""
+    return count_times(load_modes(PRINTINGS[printing]), n_times)
+
+
+def count_times(tests: Sequence[ModalTest], n_times: int) -> list[ModalTest]:
+    """Return equal copies of `tests`: with the thesis's priors each data set counts as new."""
+    return [
+        test if n == 0 else replace(test, id=f"{test.id}, copy {n}")
+        for n in range(n_times)
+        for test in tests
+    ]
 
 
 def checklist() -> list[dict[str, str]]:
