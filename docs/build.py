@@ -1,8 +1,8 @@
 """Makes the generated pages: commands, settings, effects, and the tables of other pages.
 
 The pages of commands, settings, effects and the thesis are built here and not kept in the
-repository: `shm VERB --help`, `shm settings`, `shm gap effects` and `shm validate --list` say the
-same.
+repository: `shm VERB --help`, `shm settings`, `shm gap effects` and
+`python tests/benchmarks/validate.py --list` say the same.
 
 python docs/build.py --quick    # what follows from the code alone; `make docs` does this first
 python docs/build.py            # the computed tables too: validation, gap
@@ -29,13 +29,12 @@ from docs.filling import fill_in
 from docs.gap_page import hanger_3_table
 from docs.house import house
 from shm.models.registry import MODELS
-from shm_cli import thesis
 from shm_cli.common import markdown
 from shm_cli.effects import effects_page
 from shm_cli.installation import settings_page
 from shm_cli.main import VERBS, cli
-from shm_cli.validate import compared
-from shm_cli.validation import frequencies, selection
+from tests.benchmarks.thesis import frequencies, selection, thesis_data
+from tests.benchmarks.validate import compared
 
 DOCS = Path(__file__).parent
 
@@ -74,14 +73,17 @@ def _prose(text: str) -> str:
 
 def thesis_page() -> str:
     """docs/thesis.md: every item of the thesis and where ours stands."""
-    said = "# The thesis, item by item\n\nMade by `make docs`; `shm validate --list` says the same."
-    rows = [(each["of"], each["what"], _linked(each["where"])) for each in thesis.checklist()]
+    said = (
+        "# The thesis, item by item\n\nMade by `make docs`; "
+        "`python tests/benchmarks/validate.py --list` says the same."
+    )
+    rows = [(each["of"], each["what"], _linked(each["where"])) for each in thesis_data.checklist()]
     return f"{said}\n\n{markdown(('of the thesis', 'what', 'ours'), rows)}\n"
 
 
 def _linked(where: str) -> str:
     """A command as code, a page as a link, a reason as it stands."""
-    if where.startswith("shm "):
+    if where.startswith(("shm ", "python ")):
         return f"`{where}`"
     page = where.removeprefix("docs/")
     return f"[{page}]({page})" if where.startswith("docs/") else where

@@ -10,7 +10,7 @@ from shm.models.effects import EFFECTS
 from shm.modes_document import load_modes
 from shm.values import Diagnosis, TensionEstimate
 from shm_cli.common import markdown
-from shm_cli.thesis import HANGER_FILE, PRINTINGS
+from shm_cli.example import HANGER_FILE, MODES_FILE
 
 _END_FLEXIBILITY = ("rotational_end_flexibility", "translational_end_flexibility")
 _ALL = f"all {len(EFFECTS)} effects"
@@ -34,7 +34,7 @@ _HEAD = (
 def hanger_3_table(seed: int = 1) -> str:
     """One row for each baseline and catalogue, as a markdown table."""
     hanger = load_hanger(HANGER_FILE)
-    tests = load_modes(PRINTINGS["table 1.1"])
+    tests = load_modes(MODES_FILE)
     rows = []
     for baseline, catalogue, without in _CASES:
         found = diagnose(tests, hanger, GapOptions(baseline, without=without, seed=seed))

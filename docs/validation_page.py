@@ -9,7 +9,7 @@ from pathlib import Path
 
 from docs.filling import fill_in, write_csv
 from shm_cli.common import markdown
-from shm_cli.validation import frequencies, selection
+from tests.benchmarks.thesis import frequencies, selection
 
 PAGE = Path(__file__).parent / "trials" / "validation.md"
 Cells = Sequence[str]

@@ -29,12 +29,10 @@ COMMANDS = {
         "window_time_constant_s": "window_time_constant_s",
     },
     ("update", "command"): {
-        "model": "model", "seed": "seed", "samples": "samples", "repeat": "repeat",
-        "method": "method",
+        "model": "model", "seed": "seed", "samples": "samples",
     },
     ("update", "select_command"): {
-        "models": "models", "seed": "seed", "samples": "samples", "repeat": "repeat",
-        "method": "method",
+        "models": "models", "seed": "seed", "samples": "samples",
     },
     ("gap", "diagnose"): {
         "baseline": "baseline", "without": "without", "hold_out": "hold_out", "seed": "seed",

@@ -25,10 +25,10 @@ SIGNATURES = {
     "identify": "(records, *, hanger=None, test_id=None, band_hz=(2.0, 100.0), identifier='ssi', "
     "cross_check='frf', estimator='h1', reference_force_n=1000.0, frequency_allowance=0.0001, "
     "mains_hz=50.0, window_time_constant_s=inf)",
-    "update": "(tests, hanger, model='beam2', *, seed=1, samples=1000, repeat=1, "
-    "method='noise-floor', priors='description', progress)",
-    "select": "(tests, hanger, models=None, *, seed=1, samples=1000, repeat=1, "
-    "method='noise-floor', priors='description', progress)",
+    "update": "(tests, hanger, model='beam2', *, seed=1, samples=1000, "
+    "priors='description', progress)",
+    "select": "(tests, hanger, models=None, *, seed=1, samples=1000, "
+    "priors='description', progress)",
     "diagnose": "(tests, hanger, baseline='beam1', *, without=(), hold_out=(), draws=1000, seed=1, "
     "progress)",
     "diagnose_simulator": "(simulator, readings, *, candidates=(), seed=1)",

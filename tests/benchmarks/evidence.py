@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,14 +24,17 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from shm.inference import NOISE_FLOOR, TEXTBOOK, BiasedEvidenceWarning, UpdateOptions, update
+from shm.inference import UpdateOptions, update
 from shm.models import THESIS, build
 from shm.values import Posterior
+from tests.benchmarks.thesis.textbook_tmcmc import update_textbook
 from tests.helpers import evidence_oracle
 from tests.helpers.evidence_oracle import ORACLE, TABLES, modal_test
 from tests.helpers.hangers import HANGER_3
 
 MODELS = ("beam1", "beam2")
+OURS, TEXTBOOK = "shm.update", "textbook"
+WAYS = {OURS: update, TEXTBOOK: update_textbook}
 MOST_SECONDS = {"beam1": 0.5, "beam2": 0.5}
 MOST_BIAS, MOST_SPREAD, MOST_BEYOND = 0.05, 0.1, 0.1
 
@@ -96,9 +98,8 @@ def runs(table: str, repeat: int, model: str, method: str, seeds: int) -> Runs:
     posteriors, seconds = [], []
     for seed in track(range(seeds), f"{method} {table} N_D {repeat} {model}", transient=True):
         started = time.process_time()
-        options = UpdateOptions(1000, seed, repeat, method)
-        built = build(model, HANGER_3, THESIS)
-        posteriors.append(update([modal_test(TABLES[table])], built, options))
+        tests, built = [modal_test(TABLES[table])] * repeat, build(model, HANGER_3, THESIS)
+        posteriors.append(WAYS[method](tests, built, UpdateOptions(1000, seed)))
         seconds.append(time.process_time() - started)
     return Runs(table, repeat, model, method, posteriors, seconds)
 
@@ -136,10 +137,9 @@ def main() -> None:
     if arguments.oracle:
         evidence_oracle.main()
         return
-    warnings.simplefilter("ignore", BiasedEvidenceWarning)
     columns = ("method", "table", "N_D", "class", "oracle", "bias", "spread", "claimed")
     shown = Table(*columns, "beyond 2", "CPU s", "evaluations", "least ESS", "right class")
-    made, faults = compare(NOISE_FLOOR, arguments.seeds, shown)
+    made, faults = compare(OURS, arguments.seeds, shown)
     compare(TEXTBOOK, arguments.textbook_seeds, shown)
     Console(width=140).print(shown)
     faults += [fault for run in made for fault in run.faults()]

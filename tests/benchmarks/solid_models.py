@@ -26,7 +26,7 @@ from shm.models.solid.geometry import Fineness
 from shm.models.solid.reduction import natural_modes
 from shm.values import FloatArray, Hanger
 
-HANGER_FILE = Path(__file__).parents[2] / "cli/shm_cli/thesis/hanger3.toml"
+HANGER_FILE = Path(__file__).parents[2] / "cli/shm_cli/example/hanger3.toml"
 MESHES = {
     "default": Fineness(),
     "12,000": Fineness(rod=60, overlap=6, bare_plate=6, wing=4),

@@ -10,6 +10,7 @@ import pytest
 from shm.bridge import load_hanger
 from shm.models import THESIS, build
 from shm.store import Workspace
+from shm_cli.example import HANGER_FILE
 from tests.cli.conftest import Shm
 
 STIFF = [part for k in range(1, 5) for part in ("--set", f"log10_k{k}=12")]
@@ -106,3 +107,13 @@ def test_a_sweep_is_drawn(shm: Shm, hanger_file: Path, tmp_path: Path) -> None:
     alone = shm("predict", "beam1", "--hanger-file", hanger_file, *drawn[2:])
     assert alone.code == 2
     assert "--sweep" in alone.err
+
+
+def test_predict_draws_a_mode_of_a_solid_and_refuses_a_beam_s(shm: Shm, tmp_path: Path) -> None:
+    path = tmp_path / "mode.png"
+    given = ("--hanger-file", HANGER_FILE, "--shape", "longitudinal:1", "--figure", path)
+    ended = shm("predict", "s1", *given)
+    assert (ended.code, ended.err) == (0, "")
+    assert f"is drawn in {path}" in ended.out.replace("\n", " ")
+    assert path.read_bytes().startswith(b"\x89PNG")
+    assert "is no solid" in shm("predict", "beam1", *given).err

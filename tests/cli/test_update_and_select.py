@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from math import pi, sqrt
 from pathlib import Path
 
@@ -55,16 +53,6 @@ def test_the_document_of_update_has_the_keys_of_the_contract_and_repeats(
     assert {**again, "seconds": 0} == {**document, "seconds": 0}
 
 
-def test_a_data_set_counted_ten_times_weighs_more(
-    shm: Shm, modes_file: Path, hanger_file: Path
-) -> None:
-    once, tenfold = (
-        shm(*call(modes_file, hanger_file, *THESIS, "--repeat", repeat)).document
-        for repeat in (1, 10)
-    )
-    assert tenfold["log_evidence"] > once["log_evidence"] + 10
-
-
 def test_the_priors_of_the_thesis_have_its_parameters(
     shm: Shm, modes_file: Path, hanger_file: Path
 ) -> None:
@@ -72,15 +60,6 @@ def test_the_priors_of_the_thesis_have_its_parameters(
     assert set(document["parameters"]) == {"theta_F", "theta_L", "sigma"}
     assert document["priors"] == "thesis"
     assert document["repeatability_sd_n"] is None
-
-
-@pytest.mark.parametrize("option", [("--repeat", 10), ("--method", "textbook")])
-def test_what_is_the_thesis_s_alone_is_refused_with_other_priors(
-    shm: Shm, modes_file: Path, hanger_file: Path, option: tuple[object, ...]
-) -> None:
-    ended = shm(*call(modes_file, hanger_file, *option))
-    assert ended.code == 2
-    assert "--priors thesis" in ended.err
 
 
 def test_the_tension_leads_with_both_intervals_and_the_limits(
@@ -268,15 +247,6 @@ def test_a_wrong_file_is_bad_input(
     assert ended.code == 3
     assert said in ended.err
     assert "wrong.modes.json" in ended.err
-
-
-def test_the_textbook_method_warns_in_plain_words(modes_file: Path, hanger_file: Path) -> None:
-    arguments = [str(a) for a in call(modes_file, hanger_file, *THESIS, "--method", "textbook")]
-    program = [sys.executable, "-c", "from shm_cli.main import main; main()"]
-    ended = subprocess.run([*program, *arguments], capture_output=True, text=True, check=True)
-    assert ended.stderr.startswith("Warning: textbook TMCMC: a bias of -1 to -7")
-    assert ".py" not in ended.stderr
-    assert json.loads(ended.stdout)["model"] == "beam1"
 
 
 @pytest.mark.parametrize(

@@ -365,7 +365,7 @@ def test_a_calibration_is_the_mean_and_covariance_of_the_deviations_drawn() -> N
 
 def log_evidence_by_quadrature(test: ModalTest) -> float:
     """Of beam1 as made, over the apparent tension and c, on a grid about the best."""
-    problem = Problem.of([test], build("beam1", ROD), 1, silent)
+    problem = Problem.of([test], build("beam1", ROD), silent)
     first = np.linspace(-0.06, 0.06, 300)
     second = np.linspace(-5, 5, 300)
     low, high = np.log((0.02, 5.0))

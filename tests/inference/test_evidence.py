@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 
@@ -11,8 +10,7 @@ import pytest
 from scipy.special import ndtri
 from scipy.stats import multivariate_normal
 
-from shm.errors import UsageError
-from shm.inference import METHODS, BiasedEvidenceWarning, UpdateOptions, update
+from shm.inference import UpdateOptions, update
 from shm.inference.likelihood import Likelihood
 from shm.inference.problem import Problem
 from shm.inference.updating import infer
@@ -49,8 +47,8 @@ def test_a_coarser_quadrature_agrees_with_the_stored_oracle(table: str, repeat: 
 
 @pytest.mark.parametrize(("table", "model", "repeat"), ORACLE)
 def test_the_evidence_is_that_of_quadrature(table: str, model: str, repeat: int) -> None:
-    options = UpdateOptions(1000, seed=11, repeat=repeat)
-    posterior = update([modal_test(TABLES[table])], build(model, HANGER_3, THESIS), options)
+    tests = [modal_test(TABLES[table])] * repeat
+    posterior = update(tests, build(model, HANGER_3, THESIS), UpdateOptions(1000, seed=11))
     error = posterior.log_evidence - ORACLE[table, model, repeat]
     assert abs(error) < 4 * posterior.log_evidence_sd
     assert posterior.log_evidence_sd < 0.08
@@ -149,45 +147,3 @@ def test_the_same_seed_gives_the_same_posterior_whatever_the_executor() -> None:
     here = run(4)
     np.testing.assert_array_equal(elsewhere.samples, here.samples)
     assert elsewhere.log_evidence == here.log_evidence
-
-
-def test_the_textbook_method_warns_and_follows_its_own_evidence() -> None:
-    """On beam1, where the likelihood is broad, it comes close; it is too low all the same."""
-    options = UpdateOptions(1000, 1, method="textbook")
-    with pytest.warns(BiasedEvidenceWarning, match="-1 to -7"):
-        posterior = update([modal_test(TABLES["1.1"])], build("beam1", HANGER_3, THESIS), options)
-    assert posterior.samples.shape == (1000, 3)
-    assert posterior.method == "textbook"
-    assert posterior.log_evidence == pytest.approx(ORACLE["1.1", "beam1", 1], abs=6)
-    assert posterior.tension_n.mean() / 711e3 == pytest.approx(1.13, abs=0.1)
-    assert 1 <= posterior.effective_sample_size <= 1000
-
-
-def test_the_textbook_method_is_refused_with_the_priors_of_a_description() -> None:
-    """It would take the field's noise for a uniform model error, and say nothing."""
-    with pytest.raises(UsageError, match="the textbook's sampler is the thesis's"):
-        update(
-            [modal_test(TABLES["1.1"])],
-            build("beam1", HANGER_3),
-            UpdateOptions(200, method="textbook"),
-        )
-
-
-def test_the_textbook_evidence_is_right_where_nothing_changes_phase() -> None:
-    """One frequency of unknown model error: a broad likelihood that any path follows."""
-    test = modal_test({"transverse": [5.8]})
-    model = build("beam1", HANGER_3, THESIS)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", BiasedEvidenceWarning)
-        found = [
-            update([test], model, UpdateOptions(2000, seed, method="textbook")).log_evidence
-            for seed in range(3)
-        ]
-    exact = update([test], model, UpdateOptions(2000)).log_evidence
-    assert np.mean(found) == pytest.approx(exact, abs=0.3)
-
-
-def test_an_unknown_method_is_refused_by_name() -> None:
-    with pytest.raises(UsageError, match=r"unknown method 'powers'.*textbook"):
-        UpdateOptions(method="powers")
-    assert METHODS[0] == UpdateOptions().method

@@ -33,7 +33,7 @@ def problem_of(theta: tuple[float, ...], sd: float) -> Problem:
         for plane, row in zip(PLANES, measured, strict=True)
         for order, frequency in enumerate(row, start=2)
     )
-    return Problem.of([ModalTest("sharp", modes, hanger=HANGER_3.id)], model, 1, silent)
+    return Problem.of([ModalTest("sharp", modes, hanger=HANGER_3.id)], model, silent)
 
 
 @pytest.mark.parametrize(("theta", "sd"), few_of([(SOFT_AND_STIFF, 1e-4), (SOFT_BELOW, 1e-5)], 1))
@@ -56,7 +56,7 @@ def test_a_needle_has_the_same_evidence_and_tension_whatever_the_seed(
 def test_a_heavy_tail_of_the_weights_is_not_taken_for_an_answer() -> None:
     """A first attempt by this seed all but misses a ridge; its evidence would be 1.0 too low."""
     model = build("beam2", HANGER_3, THESIS)
-    problem = Problem.of([sharp_test()], model, 1, silent)
+    problem = Problem.of([sharp_test()], model, silent)
     found = infer(problem, 1000, np.random.default_rng(128))
     assert found.light_tailed
     assert found.log_evidence == pytest.approx(ORACLE[1], abs=0.2)

@@ -29,8 +29,8 @@ def test_the_cells_of_the_springs_are_fine_enough() -> None:
 
 
 def updated(repeat: int, seed: int) -> Posterior:
-    options = UpdateOptions(1000, seed=seed, repeat=repeat)
-    return update([sharp_test()], build("beam2", HANGER_3, THESIS), options)
+    tests = [sharp_test()] * repeat
+    return update(tests, build("beam2", HANGER_3, THESIS), UpdateOptions(1000, seed=seed))
 
 
 def test_the_evidence_of_data_counted_ten_times_is_that_of_quadrature() -> None:

@@ -161,7 +161,7 @@ def test_a_planted_tension_is_found_however_sharp_the_data(springs: tuple[float,
 
 def test_exchangeable_ends_are_both_found() -> None:
     posterior = update(
-        [modal_test(TABLE_1_1)], build("beam2", HANGER_3, THESIS), UpdateOptions(1000, 3, 10)
+        [modal_test(TABLE_1_1)] * 10, build("beam2", HANGER_3, THESIS), UpdateOptions(1000, 3)
     )
     softer_deck = np.mean(posterior.parameter("log10_k1") < posterior.parameter("log10_k3"))
     assert 0.4 < softer_deck < 0.6
@@ -188,9 +188,9 @@ def test_the_most_probable_value_beats_every_sample() -> None:
 def test_counting_the_data_ten_times_narrows_the_tension() -> None:
     once, ten_times = (
         update(
-            [modal_test(TABLE_1_1)], build("beam1", HANGER_3, THESIS), UpdateOptions(500, 1, repeat)
+            [modal_test(TABLE_1_1)] * copies, build("beam1", HANGER_3, THESIS), UpdateOptions(500)
         )
-        for repeat in (1, 10)
+        for copies in (1, 10)
     )
     assert ten_times.tension_n.std() < once.tension_n.std() / 2
 
@@ -255,8 +255,8 @@ def test_what_cannot_be_updated_is_refused_with_a_remedy() -> None:
 
 def test_the_likelihood_is_the_thesis_product_of_normals() -> None:
     """(4.5): f_hat ~ N(f, (sigma f_hat)^2 + sd^2), N_D equal data sets."""
-    likelihood = Likelihood([modal_test({"transverse": [5.0, 12.0]}, sd_hz=0.05)], repeat=3)
-    value = likelihood.joint(np.array([[5.1, 11.8]]), np.array([0.02]))[0]
+    likelihood = Likelihood([modal_test({"transverse": [5.0, 12.0]}, sd_hz=0.05)] * 3)
+    value = likelihood.joint(np.array([[5.1, 11.8] * 3]), np.array([0.02]))[0]
     expected = 0.0
     for found, seen in ((5.1, 5.0), (11.8, 12.0)):
         variance = (0.02 * seen) ** 2 + 0.05**2
@@ -265,11 +265,11 @@ def test_the_likelihood_is_the_thesis_product_of_normals() -> None:
 
 
 @pytest.mark.parametrize("sd_hz", [np.nan, 1e-3, 0.5])
-@pytest.mark.parametrize("repeat", [1, 10])
-def test_the_model_error_is_integrated_out_exactly(sd_hz: float, repeat: int) -> None:
-    likelihood = Likelihood([modal_test(TABLE_1_1, sd_hz)], repeat)
+@pytest.mark.parametrize("copies", [1, 10])
+def test_the_model_error_is_integrated_out_exactly(sd_hz: float, copies: int) -> None:
+    likelihood = Likelihood([modal_test(TABLE_1_1, sd_hz)] * copies)
     predicted = np.array([list(TABLE_1_1["transverse"]) + list(TABLE_1_1["longitudinal"])])
-    predicted = predicted * (1 + 0.01 * np.sin(np.arange(12)))
+    predicted = np.tile(predicted * (1 + 0.01 * np.sin(np.arange(12))), (1, copies))
     sigma = np.exp(np.linspace(np.log(1e-4), 0, 20001))
     joint = likelihood.joint(np.repeat(predicted, len(sigma), axis=0), sigma)
     joint[0] += np.log1p(2 * sigma[0] / (sigma[1] - sigma[0]))

@@ -19,12 +19,12 @@ from shm.models.solid.basis import transverse_basis
 from shm.models.solid.classes import SolidModel
 from shm.models.solid.reduction import AffineSystem, Modes, Reservoir, natural_modes
 from shm.values import Hanger
-from shm_cli import thesis
+from tests.benchmarks.thesis import thesis_data
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.slow import few_of
 from tests.helpers.timoshenko import clamped_frequencies_hz
 
-TABLES = tomllib.loads(Path(thesis.TABLES_FILE).read_text(encoding="utf-8"))
+TABLES = tomllib.loads(Path(thesis_data.TABLES_FILE).read_text(encoding="utf-8"))
 
 
 def transverse_hz(model, *log10_k: float) -> np.ndarray:

@@ -13,8 +13,8 @@ import pytest
 
 from docs import validation_page
 from shm.settings import TABLE
-from shm_cli import thesis
 from shm_cli.main import run
+from tests.benchmarks.thesis import thesis_data
 from tests.helpers.command_lines import commands
 from tests.helpers.pages import BUILT, DOCS, PAGES, ROOT, links, name_of
 
@@ -33,9 +33,9 @@ def build() -> ModuleType:
 
 def test_the_page_of_the_thesis_has_every_item_and_links_its_pages(build: ModuleType) -> None:
     page = build.thesis_page()
-    assert page.count("\n| ") == len(thesis.checklist()) + 1
+    assert page.count("\n| ") == len(thesis_data.checklist()) + 1
     assert "[physics.md](physics.md)" in page
-    assert "`shm validate --table 3.1`" in page
+    assert "`python tests/benchmarks/validate.py --table 3.1`" in page
 
 
 def test_the_page_and_the_command_of_settings_name_every_one(

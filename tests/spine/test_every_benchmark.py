@@ -73,6 +73,7 @@ def test_every_benchmark_can_be_imported_and_takes_its_arguments() -> None:
         ("pass", every.HELD),
         ("raise SystemExit('the mark is missed')", every.MISSED),
         ("1 / 0", every.BROKEN),
+        ("raise SystemExit(6)", every.MISSED),
         ("raise SystemExit(2)", every.BROKEN),
         ("import time; time.sleep(60)", every.UNFINISHED),
     ],

@@ -84,10 +84,10 @@ def test_a_workspace_can_be_made_and_asked_from_the_wheel(unpacked: Path) -> Non
 
 def test_data_and_templates_are_in_the_wheel(unpacked: Path) -> None:
     code = (
-        "from shm_cli import thesis, demo; import shm.report.as_html; from shm import resources\n"
+        "from shm_cli import example, demo; import shm.report.as_html; from shm import resources\n"
         "from shm.bridge import load_hanger\n"
-        "assert all(path.is_file() for path in thesis.PRINTINGS.values())\n"
-        "assert load_hanger(thesis.HANGER_FILE).id == 3\n"
+        "assert example.MODES_FILE.is_file()\n"
+        "assert load_hanger(example.HANGER_FILE).id == 3\n"
         "assert resources.default_config().is_file() and resources.migrations_folder().is_dir()\n"
         "units = ('shm.service', 'shm-web.service', 'shm-backup.service', 'shm-backup.timer')\n"
         "assert all(resources.unit_file(name).is_file() for name in units)\n"

@@ -1,15 +1,16 @@
-"""Figures 2.3 to 2.7 of the thesis, as `shm validate --figure` shows them."""
+"""Figures 2.3 to 2.7 of the thesis, as `validate.py --figure` shows them."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shm_cli.validation.thesis_figures import LIMIT, MODES, _distance, solutions
-from shm_cli.validation.thesis_figures import SOLUTIONS as FIGURES
-from tests.cli.conftest import Shm
+from tests.benchmarks import validate
+from tests.benchmarks.thesis.thesis_figures import LIMIT, MODES, _distance, solutions
+from tests.benchmarks.thesis.thesis_figures import SOLUTIONS as FIGURES
 
 PNG = b"\x89PNG"
 
@@ -31,16 +32,15 @@ def test_large_tension_makes_a_string_and_none_a_clamped_beam() -> None:
     assert solutions(FIGURES["2.4"], 5).values[0] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_figure_is_shown_drawn_and_given_as_a_document(shm: Shm, tmp_path: Path) -> None:
+def test_a_figure_is_shown_and_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "figure.png"
-    told = shm("validate", "--figure", "2.7", "--out", path)
-    assert "phi_7" in told.out
-    assert "not how stiff" in told.out
+    assert validate.main(["--figure", "2.7", "--out", str(path)]) == 0
+    told = capsys.readouterr().out
+    assert "phi_7" in told
+    assert "not how stiff" in told
     assert path.read_bytes().startswith(PNG)
-    assert len(shm("validate", "--figure", "2.6", "--json").document["points"][0]["values"]) == 7
 
 
-def test_a_picture_without_its_figure_is_a_usage_error(shm: Shm, tmp_path: Path) -> None:
-    ended = shm("validate", "--out", tmp_path / "figure.png")
-    assert ended.code == 2
-    assert "--figure 2.4" in ended.err
+def test_a_figure_is_given_as_a_document(capsys: pytest.CaptureFixture[str]) -> None:
+    assert validate.main(["--figure", "2.6", "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["points"][0]["values"]) == 7

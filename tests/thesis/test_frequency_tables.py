@@ -1,4 +1,4 @@
-"""The thesis's tables of computed frequencies, as `shm validate` compares them."""
+"""The thesis's tables of computed frequencies, as `validate.py` compares them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from shm.bridge import load_hanger
-from shm_cli import thesis
 from shm_cli.common import markdown
-from shm_cli.validation import frequencies, selection
+from shm_cli.example import HANGER_FILE
+from tests.benchmarks.thesis import frequencies, selection, thesis_data
 
 OF_SPRINGS = {"A.4", "A.5"}
 
@@ -24,7 +24,7 @@ def rows() -> list[frequencies.FrequencyRow]:
 
 
 def compared() -> list[frequencies.FrequencyRow]:
-    return frequencies.compared(load_hanger(thesis.HANGER_FILE), lambda label, fraction: None)
+    return frequencies.compared(load_hanger(HANGER_FILE), lambda label, fraction: None)
 
 
 def test_tables_keep_their_marks(rows) -> None:
@@ -58,7 +58,7 @@ def test_fixed_ends_that_beat_springs_are_a_miss() -> None:
         selection.SelectionRow(
             printing, repeat, model, 0.2, value, 0.01, 0, 0, 711, 700, 720, 0, 0, {}, 711, 9
         )
-        for printing in thesis.PRINTINGS
+        for printing in thesis_data.PRINTINGS
         for repeat in (1, 10)
         for model, value in evidence.items()
     ]

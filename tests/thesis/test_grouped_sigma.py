@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from shm.errors import UsageError
-from shm.inference import UpdateOptions, select, sigma_by_group
-from shm.inference.likelihood import GroupedLikelihood, Likelihood
-from shm.inference.modal_groups import groups
+from shm.inference import UpdateOptions, update
+from shm.inference.likelihood import Likelihood
 from shm.models import DESCRIPTION, THESIS, build
 from shm.values import PLANES, ModalTest, Mode
+from tests.benchmarks.thesis.grouped_likelihood import GroupedLikelihood, update_grouped
+from tests.benchmarks.thesis.modal_groups import groups
+from tests.benchmarks.thesis.thesis_data import count_times
 from tests.helpers.hangers import HANGER_3
 
 HZ = np.array([5.82, 13.85, 26.17, 6.09, 14.80, 27.00])
@@ -23,10 +25,10 @@ PREDICTED = HZ * (1 + np.array([[0.01] * 3 + [0.03] * 3, [0.02, -0.01, 0.0, 0.0,
 def test_of_planes_it_is_the_product_of_both_planes_alone() -> None:
     """Problem: errors of 1 % in one plane and 3 % in the other; solution: two data sets apart."""
     alone = [
-        Likelihood([ModalTest("t", TEST.modes[own])], repeat=2).marginal(PREDICTED[:, own])
+        Likelihood([ModalTest("t", TEST.modes[own])]).marginal(PREDICTED[:, own])
         for own in (slice(0, 3), slice(3, 6))
     ]
-    grouped = GroupedLikelihood([TEST], 2, "plane")
+    grouped = GroupedLikelihood([TEST], "plane")
     assert np.allclose(grouped.marginal(PREDICTED), sum(alone))
     assert np.array_equal(grouped.joint(PREDICTED, np.ones(2)), grouped.marginal(PREDICTED))
 
@@ -38,15 +40,16 @@ def test_of_modes_each_is_integrated_by_itself() -> None:
     off = (PREDICTED[0] / HZ - 1)[:, None]
     density = np.exp(-(off**2) / variance / 2) / np.sqrt(2 * np.pi * variance) / HZ[:, None]
     exact = np.log(np.trapezoid(density, sigma, axis=1) + 1e-4 * density[:, 0]).sum()
-    found = GroupedLikelihood([TEST], 1, "mode").marginal(PREDICTED[:1])[0]
+    found = GroupedLikelihood([TEST], "mode").marginal(PREDICTED[:1])[0]
     assert found == pytest.approx(exact, abs=0.05)
 
 
 def test_sigma_stands_for_the_mean_square_of_the_groups() -> None:
-    grouped = GroupedLikelihood([TEST], 100, "plane")
-    drawn = grouped.draw_sigma(np.repeat(PREDICTED[:1], 200, axis=0), np.random.default_rng(1))
+    grouped = GroupedLikelihood(count_times([TEST], 100), "plane")
+    predicted = np.tile(PREDICTED[:1], (1, 100))
+    drawn = grouped.draw_sigma(np.repeat(predicted, 200, axis=0), np.random.default_rng(1))
     assert drawn.mean() == pytest.approx(np.sqrt((0.01**2 + 0.03**2) / 2), rel=0.05)
-    assert grouped.likeliest_sigma(PREDICTED[:1])[0] == pytest.approx(drawn.mean(), rel=0.1)
+    assert grouped.likeliest_sigma(predicted)[0] == pytest.approx(drawn.mean(), rel=0.1)
 
 
 def test_of_groups_of_orders_it_is_the_product_over_both_planes() -> None:
@@ -55,7 +58,7 @@ def test_of_groups_of_orders_it_is_the_product_over_both_planes() -> None:
         Likelihood([ModalTest("t", tuple(TEST.modes[n] for n in own))]).marginal(PREDICTED[:, own])
         for own in (low, high)
     ]
-    grouped = GroupedLikelihood([TEST], 1, "1-2,3")
+    grouped = GroupedLikelihood([TEST], "1-2,3")
     assert np.allclose(grouped.marginal(PREDICTED), sum(alone))
     assert {name: own.tolist() for name, own in grouped.by_name.items()} == {
         "orders 1 to 2": low,
@@ -68,12 +71,12 @@ def test_of_groups_of_orders_it_is_the_product_over_both_planes() -> None:
 @pytest.mark.parametrize("sigma", ["planes", "1-3,3-6", "3-1", ""])
 def test_groups_that_cannot_be_are_refused(sigma: str) -> None:
     with pytest.raises(UsageError, match="--sigma"):
-        UpdateOptions(sigma=sigma)
+        groups(TEST.modes, sigma)
 
 
 def test_an_order_in_no_group_is_refused() -> None:
     with pytest.raises(UsageError, match="order 3 is in no group"):
-        GroupedLikelihood([TEST], 1, "1-2")
+        GroupedLikelihood([TEST], "1-2")
 
 
 def test_each_group_tells_its_own_error() -> None:
@@ -86,21 +89,18 @@ def test_each_group_tells_its_own_error() -> None:
         for place, plane in enumerate(PLANES)
         for order in range(3)
     )
-    tests, options = [ModalTest("t", modes)], UpdateOptions(samples=300, sigma="plane", repeat=100)
-    posterior = select(tests, [model], options).selected
-    found = sigma_by_group(posterior, tests, model, options)
+    tests = count_times([ModalTest("t", modes)], 100)
+    _, found = update_grouped(tests, model, "plane", UpdateOptions(samples=300))
     assert found["transverse"].mean < 0.001
     assert found["longitudinal"].mean == pytest.approx(0.03, rel=0.1)
 
 
-def test_it_is_asked_for_of_a_selection_with_the_thesis_s_priors_alone() -> None:
-    one, plane = (
-        select([TEST], [build("beam1", HANGER_3, THESIS)], UpdateOptions(samples=200, sigma=sigma))
-        for sigma in ("one", "plane")
+def test_another_evidence_with_groups_and_only_with_the_thesis_s_priors() -> None:
+    model, options = build("beam1", HANGER_3, THESIS), UpdateOptions(samples=200)
+    one, (plane, _) = (
+        update([TEST], model, options),
+        update_grouped([TEST], model, "plane", options),
     )
-    assert one.selected.log_evidence != plane.selected.log_evidence
+    assert one.log_evidence != plane.log_evidence
     with pytest.raises(UsageError, match="each plane"):
-        select([TEST], [build("beam1", HANGER_3, DESCRIPTION)], UpdateOptions(sigma="plane"))
-    textbook = UpdateOptions(method="textbook", sigma="mode")
-    with pytest.raises(UsageError, match="one model error"):
-        select([TEST], [build("beam1", HANGER_3, THESIS)], textbook)
+        update_grouped([TEST], build("beam1", HANGER_3, DESCRIPTION), "plane")

@@ -1,4 +1,4 @@
-"""Figures 3.5 to 3.20 of the thesis, as `shm validate --figure` shows them."""
+"""Figures 3.5 to 3.20 of the thesis, as `validate.py --figure` shows them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import pytest
 
 from shm.bridge import load_hanger
 from shm.report.figures.specification import Line, Points, Rule
-from shm_cli import thesis
-from shm_cli.validation import frequencies, solid_figures
-from shm_cli.validation.frequencies import FrequencyRow
+from shm_cli.example import HANGER_FILE
+from tests.benchmarks.thesis import frequencies, solid_figures
+from tests.benchmarks.thesis.frequencies import FrequencyRow
 from tests.helpers.slow import few_of
 
-HANGER = load_hanger(thesis.HANGER_FILE)
+HANGER = load_hanger(HANGER_FILE)
 HZ = tuple(np.arange(1.0, 7.0))
 ROW = FrequencyRow("A.1", "s1", "", HZ, HZ, 0.0, np.nan)
 
@@ -26,7 +26,7 @@ def _quiet(label: str, fraction: float) -> None:
 
 @pytest.fixture
 def solved(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Rows at hand: the meshes themselves take half a minute, and are solved in test_validate."""
+    """Rows at hand: the meshes themselves take half a minute, and are solved in test_frequency_tables."""
     rows = [
         replace(ROW, unknowns=100.0 * size, plane=plane, spring_n_m=10.0**size)
         for plane in ("transverse", "longitudinal")

@@ -48,11 +48,11 @@ class Target:
     """Prior box and log likelihood; `evaluations` counts the parameter sets that were asked for."""
 
     def __init__(self, problem: str, repeat: int, sigma: str):
-        self.tests = [sharp_test() if problem == "sharp" else modal_test(TABLES["1.1"])]
+        test = sharp_test() if problem == "sharp" else modal_test(TABLES["1.1"])
+        self.tests = [test] * repeat
         self.model = build("beam2", HANGER_3, THESIS)
-        self.repeat = repeat
         self.evaluations = 0
-        self._likelihood = Likelihood(self.tests, repeat)
+        self._likelihood = Likelihood(self.tests)
         self._sampled = sigma == "sampled"
         prior, sampled = self.model.prior, [0.0] * self._sampled
         self.names = [*prior.names, *["sigma"] * self._sampled]

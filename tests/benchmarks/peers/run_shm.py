@@ -9,8 +9,7 @@ from shm.inference import UpdateOptions, update
 
 def run(target: Target, seed: int) -> Outcome:
     """One run."""
-    options = UpdateOptions(seed=seed, repeat=target.repeat)
-    posterior = update(target.tests, target.model, options)
+    posterior = update(target.tests, target.model, UpdateOptions(seed=seed))
     target.evaluations += posterior.evaluations
     return Outcome(
         posterior.log_evidence,

@@ -21,8 +21,6 @@ PRINTINGS = {
 }
 """The same measurement, printed twice with three differing values."""
 
-CLASSES = ("beam1", "beam2", "solid0", "solid1", "solid2")
-
 EVIDENCE = {
     "beam1": 434.49,
     "beam2": 497.11,
