@@ -9,8 +9,8 @@ packages (`make -C tests/benchmarks bench-peers`). What it prints is kept in `bu
 and the table in `build/bench/table.md`; of the short form in `build/bench/short`. What held is not
 run again as long as neither the files that git knows nor its arguments change, so an interrupted
 run goes on. A mark is missed where the exit code is 1 or 6 and nothing was traced back; any other
-fault is a broken benchmark, and makes the exit code 1. One without marks holds when it comes to its end.
-With few cases, or on a busy machine, a mark is also missed by chance.
+fault is a broken benchmark, and makes the exit code 1. One without marks holds when it comes to its
+end. With few cases, or on a busy machine, a mark is also missed by chance.
 """
 
 from __future__ import annotations
@@ -66,7 +66,8 @@ SHORT = {
     "right_signals": "--tests 2", "sharp_evidence": "--cases 2", "solid_models": "--held-out 2",
     "stream_load": "--hangers 2 --hours 0.2", "stream_oracle": "--hangers 1",
     "stream_trial": "--hangers 1 --years 0.2", "stream_windows": "--seeds 1 --hours 0.3",
-    "tension_coverage": "--cases 2", "updating_from_known": "--cases 8", "upload": "20", "validate": "--table A.6",
+    "tension_coverage": "--cases 2", "updating_from_known": "--cases 8", "upload": "20",
+    "validate": "--table A.6",
     "watch_ambient": "--scenarios quiet --structures 1", "wrong_diameter": "--hangers 1",
     "watch_worlds": "--world tied_arch --scenarios quiet --bridges 1 --years 1 --jobs 1",
     "week": "--tests 24 --hangers 2 --every 6 --samples 200", "worlds": "--hangers 1",

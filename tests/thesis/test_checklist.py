@@ -62,7 +62,7 @@ OF_THE_THESIS = [
 
 
 def covered(of: str) -> set[str]:
-    """What an item is of: "Figures 3.1 to 3.4, 3.6" are five."""
+    """Return what an item is of: "Figures 3.1 to 3.4, 3.6" are five."""
     found: set[str] = set()
     kind = ""
     for word, first, last in re.findall(

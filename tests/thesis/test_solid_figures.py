@@ -26,7 +26,7 @@ def _quiet(label: str, fraction: float) -> None:
 
 @pytest.fixture
 def solved(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Rows at hand: the meshes themselves take half a minute, and are solved in test_frequency_tables."""
+    """Replace the meshes, which take half a minute and are solved in test_frequency_tables."""
     rows = [
         replace(ROW, unknowns=100.0 * size, plane=plane, spring_n_m=10.0**size)
         for plane in ("transverse", "longitudinal")
