@@ -63,15 +63,15 @@ def test_a_default_is_that_of_the_command(verb: str, name: str, option: str, arg
 
 
 def test_a_simulated_recording_is_that_of_the_command(tmp_path: Path, hanger: shm.Hanger) -> None:
-    from shm_cli import thesis
+    from shm_cli import example
     from shm_cli.main import run
 
-    call = ["simulate", "--hanger-file", str(thesis.HANGER_FILE), "--out", str(tmp_path)]
+    call = ["simulate", "--hanger-file", str(example.HANGER_FILE), "--out", str(tmp_path)]
     assert run([*call, "--hits", "1", "--format", "npz", "--seed", "5"]) == 0
     (path,) = tmp_path.glob("*.npz")
     written, ours = (
         shm.read(path),
-        shm.simulate(shm.load_hanger(thesis.HANGER_FILE), hits=1, seed=5),
+        shm.simulate(shm.load_hanger(example.HANGER_FILE), hits=1, seed=5),
     )
     assert isinstance(written, shm.Recording)
     for theirs, own in zip(written.channels, ours.channels, strict=True):

@@ -193,6 +193,14 @@ def test_a_posterior_comes_back_complete_with_its_samples(store: Store) -> None:
     assert store.recordings.get(second.recording_id).stage is Stage.UPDATED
 
 
+def test_posterior_of_a_sampler_that_is_gone_is_read(store: Store) -> None:
+    """Earlier versions had the thesis's own sampler."""
+    (first,) = identified(store, 1)
+    posterior = replace(a_posterior("beam2", ("t1",)), method="textbook", priors="thesis")
+    store.posteriors.save_selection(3, [first], Selection((posterior,), (1.0,)), LINEAGE, NOW)
+    assert_same(store.posteriors.get(3), posterior)
+
+
 def test_updating_a_test_again_changes_nothing(store: Store) -> None:
     (first,) = identified(store, 1)
     (second,) = identified(store, 2)
