@@ -1,48 +1,27 @@
-"""What `shm simulate` plants, writes and sends: effects, campaigns, streams of sensors."""
+"""Read what `shm simulate` plants, and send streams of simulated sensors."""
 
 from __future__ import annotations
 
 import heapq
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from itertools import islice
-from pathlib import Path
-from typing import Any
 
-import numpy as np
 import rich_click as click
 
-from shm.documents import dump
 from shm.errors import NothingThere, UsageError
-from shm.modes_document import modes_document
 from shm.pipeline import utc_now
 from shm.read.chunk_document import chunk_document
-from shm.simulate import (
-    CampaignPlan,
-    CampaignTruth,
-    HangerState,
-    PlantedEffect,
-    campaign_with_truth,
-)
+from shm.simulate import PlantedEffect
 from shm.simulate.ambient import Loss, MonitoringPlan, streamed
-from shm.simulate.reality import GLOBAL
 from shm.store import Workspace
 from shm.store.ring import ring_of
 from shm.values import AddedMass, Hanger
 from shm.values.stream import Chunk, Stream
 from shm_cli import flags
 from shm_cli.common import advancing_bar, show
-
-# Of the temperatures and levels of `CampaignPlan` the usual ones are left.
-LACKS: dict[str, dict[str, Any]] = {
-    "shapes": {"shapes": False},
-    "longitudinal": {"planes": ("transverse",)},
-    "temperatures": {"temperatures_c": (10.0,)},
-    "levels": {"amplitudes": (1.0,)},
-    "mass": {"mass_share": 0.0},
-}
 
 
 def effect_of(text: str) -> PlantedEffect:
@@ -75,49 +54,6 @@ def mass_of(text: str | None) -> AddedMass | None:
             f"--added-mass {text!r} is not KG:X.", remedy="Write --added-mass 25:3.6."
         ) from None
     return AddedMass(mass_kg, x_m)
-
-
-def write_campaign(
-    hanger: Hanger,
-    state: HangerState,
-    effects: Sequence[PlantedEffect],
-    lacks: Sequence[str],
-    sensors: int | None,
-    seed: int,
-    out: Path,
-) -> tuple[Path, Path]:
-    """Writes a campaign's modal tests and, beside them, their truth."""
-    plan = CampaignPlan()
-    for each in lacks:
-        plan = replace(plan, **LACKS[each])
-    if sensors is not None:
-        plan = replace(plan, sensors=sensors)
-    made = campaign_with_truth(hanger, state, effects, plan, np.random.default_rng(seed))
-    modes = out / f"hanger{hanger.id}.modes.json"
-    truth = out / f"hanger{hanger.id}.truth.json"
-    modes.write_text(dump(modes_document(made.tests)) + "\n", encoding="utf-8")
-    truth.write_text(dump(truth_document(made.truth, seed)) + "\n", encoding="utf-8")
-    return modes, truth
-
-
-def truth_document(truth: CampaignTruth, seed: int) -> dict[str, Any]:
-    """What a campaign was made of; an infinite parameter is written as text."""
-    return {
-        "tension_n": truth.tension_n,
-        "deviations": {name: getattr(truth.deviations, name) for name in GLOBAL},
-        "effects": [
-            {
-                "effect": effect.name,
-                "at": effect.at,
-                "parameters": {
-                    name: value if np.isfinite(value) else str(value)
-                    for name, value in effect.values.items()
-                },
-            }
-            for effect in truth.effects
-        ],
-        "seed": seed,
-    }
 
 
 _DAY_S = 86400.0

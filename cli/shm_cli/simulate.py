@@ -13,33 +13,24 @@ import numpy as np
 import rich_click as click
 
 from shm.errors import UsageError
+from shm.models.base import Conditions
 from shm.read import FORMATS, write
 from shm.simulate import (
-    DISTURBANCES,
-    PLANTED,
     AmbientPlan,
     HammerPlan,
     HangerState,
-    TestConditions,
     ambient_test,
     hammer_test,
     spread_places_m,
 )
+from shm.simulate.effects import plantable_effects
 from shm.values import Hanger, Recording
 from shm_cli import flags
 from shm_cli.common import answer, counting_bar, one_hanger, open_workspace
-from shm_cli.planting import (
-    LACKS,
-    Live,
-    effect_of,
-    mass_of,
-    simulate_streams,
-    write_campaign,
-)
+from shm_cli.planting import Live, effect_of, mass_of, simulate_streams
 
 _FIRST = datetime(2026, 1, 5, 10, tzinfo=UTC)  # any: the same call gives the same files
 _SUFFIXES = sorted(known.suffixes[0].lstrip(".") for known in FORMATS if known.write)
-_WRONG = "; ".join(f"{each.name}: {each.help}" for each in DISTURBANCES.values())
 # Judgement: a hanger rings for some 20 s; 0.02 m/s^2 is a good accelerometer in calm air; two
 # places tell the orders of modes apart.
 _HAMMER_SECONDS, _HAMMER_NOISE = 20.0, 0.02
@@ -62,7 +53,6 @@ class Chosen(TypedDict):
     seconds: float | None
     rate: float
     ambient: bool
-    disturbances: tuple[str, ...]
     temperature_c: float
     effects: tuple[str, ...]
     reference_c: float
@@ -93,7 +83,7 @@ def _springs(function: flags.F) -> flags.F:
 @click.option(
     "--sensors",
     type=click.IntRange(1, 8),
-    help="Places with a biaxial accelerometer each; 2, or 4 (at most) in a campaign.",
+    help="Places with a biaxial accelerometer each; 2 if left out.",
 )
 @click.option("--hits", type=click.IntRange(1, 50), default=5)
 @click.option(
@@ -107,14 +97,6 @@ def _springs(function: flags.F) -> flags.F:
 @click.option("--rate", type=float, default=512.0, help="Samples a second.")
 @click.option("--ambient", is_flag=True, help="Wind and traffic drive the hanger, nobody hits.")
 @click.option(
-    "--disturbance",
-    "disturbances",
-    multiple=True,
-    type=click.Choice(list(DISTURBANCES)),
-    metavar="NAME",
-    help=f"What goes wrong, may be repeated. {_WRONG}.",
-)
-@click.option(
     "--effect",
     "effects",
     multiple=True,
@@ -122,7 +104,7 @@ def _springs(function: flags.F) -> flags.F:
     help="What is planted beside the springs, may be repeated: where it acts and all its "
     "parameters, as `shm gap` names them; 'point_mass:everywhere:mass_kg=12,x_m=3.4' or "
     "'rotational_end_flexibility:deck end, transverse:log10_k1=6.8' for instance. Names: "
-    f"{', '.join(PLANTED)}.",
+    f"{', '.join(plantable_effects())}.",
 )
 @click.option(
     "--amplitude",
@@ -137,19 +119,6 @@ def _springs(function: flags.F) -> flags.F:
     help="Temperature at which the tension is the planted one.",
 )
 @click.option("--added-mass", metavar="KG:X", help="A known mass, clamped on at X m.")
-@click.option(
-    "--campaign",
-    is_flag=True,
-    help="Modal tests instead of recordings: three temperatures, three levels, one with a known "
-    "mass, with noise and the scatter of manufacture; the truth beside them.",
-)
-@click.option(
-    "--lacking",
-    multiple=True,
-    type=click.Choice(list(LACKS)),
-    metavar="WHAT",
-    help=f"What a campaign does not measure, may be repeated: {', '.join(LACKS)}.",
-)
 @click.option(
     "--stream",
     "as_stream",
@@ -205,14 +174,12 @@ def command(
     form: str,
     out: Path | None,
     seed: int,
-    campaign: bool,
-    lacking: tuple[str, ...],
     **chosen: Unpack[Chosen],
 ) -> None:
     """Hammer tests of a hanger whose truth you choose.
 
-    Beam finite elements are hit in the time domain; biaxial accelerometers record. Effects of the
-    gap diagnosis can be planted, in recordings or in a whole campaign of modal tests.
+    The hanger is hit in the time domain; biaxial accelerometers record. Effects of the gap
+    diagnosis can be planted.
 
     \b
     Example: shm simulate --hanger-file H.toml --k1 1e7 --k3 1e7 --out tests
@@ -225,17 +192,10 @@ def command(
         return
     if out is None:
         raise UsageError("no folder is named for the files.", remedy="Add --out DIR.")
-    _refuse_what_does_not_go_together(campaign, lacking, chosen)
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     _refuse_other_supports(hanger)
     start = start or _FIRST
     out.mkdir(parents=True, exist_ok=True)
-    if campaign:
-        effects = [effect_of(text) for text in chosen["effects"]]
-        state = _state(hanger, chosen)
-        sensors = chosen["sensors"]
-        _tell(write_campaign(hanger, state, effects, lacking, sensors, seed, out))
-        return
     written = []
     with counting_bar() as bar:
         for week in bar.track(range(tests), description="simulating"):
@@ -251,24 +211,6 @@ def command(
 def _tell(written: Sequence[Path]) -> None:
     files = [str(path) for path in written]
     answer({"files": files}, "\n".join(files))
-
-
-def _refuse_what_does_not_go_together(
-    campaign: bool, lacking: tuple[str, ...], chosen: Chosen
-) -> None:
-    if lacking and not campaign:
-        raise UsageError("--lacking is of a campaign.", remedy="Add --campaign.")
-    of_recordings = {
-        "--ambient": chosen["ambient"],
-        "--disturbance": chosen["disturbances"],
-        "--added-mass": chosen["added_mass"],
-    }
-    for option, given in of_recordings.items():
-        if campaign and given:
-            raise UsageError(
-                f"{option} is of recordings, and a campaign makes none.",
-                remedy=f"Leave out {option} or --campaign.",
-            )
 
 
 def _refuse_other_supports(hanger: Hanger) -> None:
@@ -315,29 +257,24 @@ def _hit(hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Gene
         state,
         plan,
         rng,
-        disturbances=chosen["disturbances"],
         effects=[effect_of(text) for text in chosen["effects"]],
         conditions=_conditions(chosen),
     )
 
 
-def _conditions(chosen: Chosen) -> TestConditions:
+def _conditions(chosen: Chosen) -> Conditions:
     """What a recording is made under; an unknown temperature is the reference."""
     shift_k = chosen["temperature_c"] - chosen["reference_c"]
     mass = mass_of(chosen["added_mass"])
-    return TestConditions("", 0.0 if math.isnan(shift_k) else shift_k, chosen["amplitude"], mass)
+    return Conditions("", 0.0 if math.isnan(shift_k) else shift_k, chosen["amplitude"], mass)
 
 
 def _listened(
     hanger: Hanger, state: HangerState, chosen: Chosen, rng: np.random.Generator
 ) -> Recording:
-    if chosen["disturbances"]:
-        raise UsageError(
-            "disturbances are those of a hammer test.", remedy="Leave out --disturbance."
-        )
     if chosen["effects"] or chosen["added_mass"]:
         raise UsageError(
-            "effects and a known mass are planted in hammer tests and campaigns only.",
+            "effects and a known mass are planted in hammer tests only.",
             remedy="Leave out --ambient.",
         )
     usual, seconds, noise = AmbientPlan(), chosen["seconds"], chosen["noise"]

@@ -28,6 +28,7 @@ from shm.identify.identification import identify as identified
 from shm.inference import UpdateOptions, updating
 from shm.inference.options import silent
 from shm.models import DESCRIPTION, build, competing_names
+from shm.models.base import Conditions
 from shm.read import read as read_file
 from shm.read import registry
 from shm.settings import Settings, load_settings
@@ -35,7 +36,6 @@ from shm.simulate import (
     HammerPlan,
     HangerState,
     PlantedEffect,
-    TestConditions,
     hammer_test,
     spread_places_m,
 )
@@ -333,7 +333,6 @@ def simulate(
     hammer_x_m: float = NAN,
     acceleration_noise_m_s2: float = 0.02,
     effects: Sequence[PlantedEffect] = (),
-    disturbances: Sequence[str] = (),
     amplitude: float = 1.0,
     temperature_c: float = NAN,
     reference_c: float = 10.0,
@@ -343,18 +342,17 @@ def simulate(
 ) -> Recording:
     """The recording of a hammer test of a hanger whose truth you choose.
 
-    Beam finite elements and modal superposition, no code of `shm.models`: what is planted here and
-    found there agrees only if both are right. Left out, `tension_n` is the nominal one, the end
-    springs (k1, k3 transverse at deck and arch end; k2, k4 longitudinal) are clamped, and the
-    hammer hits at 0.16 of the length. Each of 1 to 8 `sensors` is biaxial, two channels in m/s^2.
-    Effects of the gap diagnosis are planted as `PlantedEffect(name, at, values)`; `disturbances`
-    are names of `shm.simulate.DISTURBANCES`. The level of the hits is `amplitude`; the tension is
-    the planted one at `reference_c`. The same seed gives the same recording, that of
+    The modes are those of the general model of a hanger, `shm.models.hanger`. Left out, `tension_n`
+    is the nominal one, the end springs (k1, k3 transverse at deck and arch end; k2, k4
+    longitudinal) are clamped, and the hammer hits at 0.16 of the length. Each of 1 to 8 `sensors`
+    is biaxial, two channels in m/s^2. Effects of the gap diagnosis are planted as
+    `PlantedEffect(name, at, values)`. The level of the hits is `amplitude`; the tension is the
+    planted one at `reference_c`. The same seed gives the same recording, that of
     `shm simulate --seed`.
 
     `Recording.channels` are `force`, then `acc_1`, `acc_2`, ..., each (hits x seconds x rate,).
     Raises UsageError for what cannot be, and for a hanger that is not clamped and in tension.
-    `shm.simulate` holds more: ambient records, campaigns of modal tests.
+    `shm.simulate.ambient_test` makes ambient records.
 
     Example:
         >>> recording = shm.simulate(hanger, tension_n=650e3, k1_n_m_rad=1e7, seed=1)
@@ -387,8 +385,7 @@ def simulate(
         np.random.default_rng([seed, 0]),
         time=time,
         temperature_c=temperature_c,
-        disturbances=disturbances,
         effects=effects,
-        conditions=TestConditions("", shift_k, amplitude, added_mass),
+        conditions=Conditions("", shift_k, amplitude, added_mass),
     )  # fmt: skip
     return replace(recording, added_mass=added_mass)

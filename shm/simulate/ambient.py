@@ -19,13 +19,14 @@ from datetime import datetime, timedelta
 import numpy as np
 import scipy
 
-from shm.simulate.elements import PlaneModes, modes_below, plane_modes
-from shm.simulate.response import Line, logged, poles_of
+from shm.simulate.modes import make_bar, plane_modes
+from shm.simulate.response import Line, PlaneModes, logged, poles_of
 from shm.simulate.state import HammerPlan, HangerState, check, spread_places_m
 from shm.values import NAN, PLANES, ComplexArray, FloatArray, Hanger, Recording
 from shm.values.stream import Chunk, Stream, StreamChannel
 
 _HIGHEST = 0.4  # of the sampling rate: what the logger passes
+_ALONG = 401  # places along the hanger at which the largest deflection is looked for
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,8 @@ def ambient_test(
     listening = _as_one_hit(plan)
     check(hanger, state, listening)
     places = listening.sensor_places_m(hanger)
-    moved = np.array([_moved(hanger, state, i, listening, rng) for i in range(len(PLANES))])
+    modes = plane_modes(make_bar(hanger, state), _HIGHEST * plan.sampling_rate_hz)
+    moved = np.array([_moved(hanger, state, each, listening, rng) for each in modes])
     moved *= plan.acceleration_m_s2 / np.sqrt(np.mean(moved**2, axis=2)).max()
     lines = [
         Line(f"acc_{2 * index + number + 1}", "acceleration", moved[number, index], plane, x_m,
@@ -80,11 +82,11 @@ def _as_one_hit(plan: AmbientPlan) -> HammerPlan:
 
 
 def _moved(
-    hanger: Hanger, state: HangerState, plane: int, plan: HammerPlan, rng: np.random.Generator
-) -> FloatArray:
+    hanger: Hanger, state: HangerState, modes: PlaneModes, plan: HammerPlan,
+    rng: np.random.Generator,
+) -> FloatArray:  # fmt: skip
     """Accelerations of a plane under forces of any strength, (sensors, samples)."""
     highest_hz = _HIGHEST * plan.sampling_rate_hz
-    modes = plane_modes(hanger, state, PLANES[plane], modes_below(hanger, state, highest_hz))
     seen = modes.at(np.array(plan.sensor_places_m(hanger)))
     ratio = state.damping_ratio + modes.added_damping_ratio
     poles = poles_of(modes.angular_frequency_rad_s, ratio)
@@ -230,6 +232,7 @@ class _Ringing:
         self._hour: datetime | None = None
         self._modes: dict[str, PlaneModes] = {}
         self._states: dict[str, ComplexArray] = {}
+        self._largest = 0.0
 
     def moved(self, at: datetime, count: int, weather: Weather) -> FloatArray:
         """Accelerations of all channels, (channels, samples), without the logger's noise."""
@@ -265,14 +268,17 @@ class _Ringing:
         )
         tension_n = self._hanger.nominal_tension_n * (1 + fraction)
         state = HangerState(tension_n, damping_ratio=self._plan.damping_ratio)
-        count = modes_below(self._hanger, state, _HIGHEST * self._stream.sampling_rate_hz)
-        for plane in PLANES:
+        highest_hz = _HIGHEST * self._stream.sampling_rate_hz
+        for index, plane in enumerate(PLANES):
             # No bar is round to the last digit, nor are its ends: planes lie 0.4 % apart.
             apart = 1.0 if plane == PLANES[0] else 1.008
             there = replace(state, tension_n=tension_n * apart)
-            self._modes[plane] = plane_modes(self._hanger, there, plane, count)
+            modes = plane_modes(make_bar(self._hanger, there), highest_hz)[index]
+            count, self._modes[plane] = len(modes.angular_frequency_rad_s), modes
             known = self._states.get(plane, np.zeros(0, complex))
             self._states[plane] = np.resize(np.append(known, np.zeros(count, complex)), count)
+        along_m = np.linspace(0, self._hanger.length_m, _ALONG)
+        self._largest = float(np.abs(self._modes[PLANES[0]].at(along_m)).max())
 
     def _strength(self, at: datetime, count: int, weather: Weather) -> FloatArray:
         """How strongly modes are driven at each sample, as sd of the step of modal velocity."""
@@ -281,7 +287,7 @@ class _Ringing:
         # A mode driven so has an rms acceleration of w sqrt(rate / (4 z w)) times this.
         unit = lowest * math.sqrt(rate / (4 * plan.damping_ratio * lowest))
         wind = _CALM_M_S2 * (weather.wind_m_s(at) / 5) ** 2
-        level = np.full(count, wind / unit / float(np.abs(self._modes[PLANES[0]].deflection).max()))
+        level = np.full(count, wind / unit / self._largest)
         for train in weather.trains(at, count / rate):
             first = int(train * rate)
             level[first : first + int(_TRAIN_S * rate)] *= _TRAIN_TIMES

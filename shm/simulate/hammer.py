@@ -1,31 +1,20 @@
-"""A hammer test from the planted state to the recording that the crew brings home."""
+"""A hammer test from the chosen state of a hanger to the recording that the crew brings home."""
 
 from __future__ import annotations
 
-import copy
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 
 import numpy as np
 
 from shm.errors import UsageError
-from shm.simulate.bar import Bar
-from shm.simulate.disturbances import DISTURBANCES, Channels, Disturbance, Lines, Motion, Planted
-from shm.simulate.disturbances.base import Scene, T, Verb
-from shm.simulate.effects import PlantedEffect, TestConditions
-from shm.simulate.elements import PlaneModes, modes_below, plane_modes
-from shm.simulate.planted import (
-    by_logger,
-    planted_bar,
-    planted_plane_modes,
-    seen_by_turned,
-    shifted,
-)
+from shm.models.base import Conditions
+from shm.models.hanger import PhysicalHanger
+from shm.simulate.effects import PlantedEffect, plant_effects
+from shm.simulate.modes import make_bar, plane_modes
 from shm.simulate.response import (
     Line,
-    Strike,
     accelerations,
     draw_schedule,
     force_of,
@@ -34,15 +23,6 @@ from shm.simulate.response import (
 )
 from shm.simulate.state import HammerPlan, HangerState, check
 from shm.values import NAN, PLANES, FloatArray, Hanger, Recording
-
-
-@dataclass(frozen=True, eq=False)
-class SimulatedTest:
-    """A recording and its truth: each disturbance, and the hits in seconds of the recording."""
-
-    recording: Recording
-    planted: tuple[Planted, ...]
-    strikes: tuple[Strike, ...]
 
 
 def hammer_test(
@@ -54,141 +34,81 @@ def hammer_test(
     time: datetime | None = None,
     temperature_c: float = NAN,
     source: str = "simulated",
-    disturbances: Sequence[str] = (),
     effects: Sequence[PlantedEffect] = (),
-    conditions: TestConditions | None = None,
+    conditions: Conditions | None = None,
 ) -> Recording:
-    """One continuous recording of all hits: `force`, then `acc_1` (transverse), `acc_2`
-    (longitudinal) of the first sensor, `acc_3`, `acc_4` of the second, and so on.
+    """Return one continuous recording of all hits.
 
-    The logger filters force and accelerations alike (linear phase, flat to 0.4 of the sampling
-    rate, -100 dB from 0.5), so nothing is aliased and their ratio is the true accelerance. Modes
-    up to twice the sampling rate take part; those above half of it are not excited and only add
-    their quasi-static share. The hanger is at rest before the first hit. `disturbances` are names
-    of `DISTURBANCES`. The same generator state gives the same recording, and a disturbance leaves
-    hits and noise as they are without it. `effects` are planted under the `conditions` of the test,
-    a level that stands for itself: the peak force is the plan's. Raises UsageError for a state,
-    plan or effect that cannot be.
-    """
-    made = simulated_test(
-        hanger,
-        state,
-        plan,
-        rng,
-        disturbances=disturbances,
-        effects=effects,
-        conditions=conditions,
-    )
-    return replace(made.recording, source=source, time=time, temperature_c=temperature_c)
-
-
-def simulated_test(
-    hanger: Hanger,
-    state: HangerState,
-    plan: HammerPlan,
-    rng: np.random.Generator,
-    *,
-    disturbances: Sequence[str] = (),
-    effects: Sequence[PlantedEffect] = (),
-    conditions: TestConditions | None = None,
-) -> SimulatedTest:
-    """The same with what was planted where."""
-    bar = planted_bar(hanger, state, plan, effects, conditions or TestConditions())
-    return struck(hanger, state, plan, rng, bar, disturbances=disturbances)
-
-
-def struck(
-    hanger: Hanger,
-    state: HangerState,
-    plan: HammerPlan,
-    rng: np.random.Generator,
-    bar: Bar | None,
-    *,
-    disturbances: Sequence[str] = (),
-    shifts: FloatArray | None = None,
-) -> SimulatedTest:
-    """A hammer test of a bar in which everything is planted; None is that of the state alone.
-
-    `shifts` (planes, modes) are fractions by which the lowest modes' frequencies differ in this
-    test from the bar's.
+    Its channels are `force`, then `acc_1` (transverse) and `acc_2` (longitudinal) of the first
+    sensor, `acc_3`, `acc_4` of the second, and so on. The logger filters force and accelerations
+    alike (linear phase, flat to 0.4 of the sampling rate, -100 dB from 0.5), so nothing is aliased
+    and their ratio is the true accelerance. Modes up to twice the sampling rate take part; those
+    above half of it are not excited and only add their quasi-static share. The hanger is at rest
+    before the first hit. The same generator state gives the same recording. `effects` are planted
+    under the `conditions` of the test; the peak force is the plan's whatever their level. Raises
+    UsageError for a state, plan or effect that cannot be.
     """
     check(hanger, state, plan)
-    stages = _Stages(disturbances, rng)
-    plan = by_logger(plan, bar)
-    scene = Scene(hanger, state, plan, draw_schedule(hanger, plan, rng), bar)
-    scene = replace(scene, schedule=stages.run("schedule", scene.schedule, scene))
-    modes = _modes(scene) if shifts is None else shifted(_modes(scene), shifts)
-    motion = stages.run("motion", _motion(scene, modes), scene)
-    lines = stages.run("lines", _lines(motion, scene), scene)
-    channels: Channels = tuple(logged(line, plan.adc_bits, rng) for line in lines)
-    channels = stages.run("channels", channels, scene)
-    return _kept(channels, scene, tuple(stages.planted))
-
-
-class _Stages:
-    """Runs the disturbances of each stage and collects what they planted.
-
-    Each draws from a generator of its own, seeded from a copy of the test's: the test's own draws
-    are the same with and without it.
-    """
-
-    def __init__(self, names: Sequence[str], rng: np.random.Generator):
-        _refuse_unless_hit(names)
-        root = int(copy.deepcopy(rng).integers(2**62))
-        self._disturbances = [_of_name(name) for name in names]
-        self._generators = [np.random.default_rng([root, place]) for place in range(len(names))]
-        self.planted: list[Planted] = []
-
-    def run(self, stage: str, made: T, scene: Scene) -> T:
-        for disturbance, rng in zip(self._disturbances, self._generators, strict=True):
-            verb: Verb[T] | None = getattr(disturbance, stage)
-            if verb:
-                made, planted = verb(made, scene, rng)
-                self.planted.append(planted)
-        return made
-
-
-def _of_name(name: str) -> Disturbance:
-    if name not in DISTURBANCES:
-        raise UsageError(
-            f"{name!r} is no disturbance.", remedy=f"Use one of {', '.join(DISTURBANCES)}."
-        )
-    return DISTURBANCES[name]
-
-
-def _refuse_unless_hit(names: Sequence[str]) -> None:
-    idle = [name for name in names if _of_name(name).needs_hits]
-    if "noise_only" in names and idle:
-        raise UsageError(
-            f"{idle[0]} needs hits, and noise_only has none.", remedy="Leave out one of them."
-        )
-
-
-def _motion(scene: Scene, modes: tuple[PlaneModes, ...]) -> Motion:
-    """Modes, pulses and noise-free accelerations."""
-    plan, state = scene.plan, scene.state
-    pulses = tuple(
-        pulse_of(blow, scene.rate_hz) for strike in scene.strikes for blow in strike.hits
+    bar = _plant(hanger, state, plan, effects, conditions or Conditions())
+    fast = float(bar.clock_factor[0])
+    timed = _time_by_logger(plan, fast)
+    schedule = draw_schedule(hanger, timed, rng)
+    rate_hz = timed.sampling_rate_hz
+    pulses = tuple(pulse_of(hit, rate_hz) for strike in schedule.strikes for hit in strike.hits)
+    places = plan.sensor_places_m(hanger)
+    moved = np.array([
+        accelerations(modes, plane, state.damping_ratio, pulses, places, rate_hz, plan.samples)
+        for modes, plane in zip(plane_modes(bar, 2 * rate_hz), PLANES, strict=True)
+    ])  # fmt: skip
+    moved = turn_sensors(moved, bar.sensor_turn_rad[0])
+    lines = sensor_lines(hanger, timed, force_of(pulses, plan.samples), moved)
+    channels = tuple(logged(line, plan.adc_bits, rng) for line in lines)
+    rate_said_hz = rate_hz * fast
+    return Recording(
+        source, channels, rate_said_hz, hanger.id, time=time, temperature_c=temperature_c
     )
-    places = plan.sensor_places_m(scene.hanger)
-    moved = [
-        accelerations(own, plane, state.damping_ratio, pulses, places, scene.rate_hz, plan.samples)
-        for own, plane in zip(modes, PLANES, strict=True)
-    ]
-    return Motion(modes, pulses, seen_by_turned(scene.bar, np.array(moved), places))
 
 
-def _modes(scene: Scene) -> tuple[PlaneModes, ...]:
-    hanger, state, highest_hz = scene.hanger, scene.state, 2 * scene.rate_hz
-    if scene.bar is not None:
-        return planted_plane_modes(scene.bar, hanger, state, scene.plan, highest_hz)
-    count = modes_below(hanger, state, highest_hz)
-    return tuple(plane_modes(hanger, state, plane, count) for plane in PLANES)
+def _plant(
+    hanger: Hanger,
+    state: HangerState,
+    plan: HammerPlan,
+    effects: Sequence[PlantedEffect],
+    conditions: Conditions,
+) -> PhysicalHanger:
+    """Return the bar with its effects; raises UsageError where the hammer has no bar to hit."""
+    places = plan.sensor_places_m(hanger)
+    bar = make_bar(hanger, state, len(places))
+    bar = plant_effects(bar, effects, conditions, hanger, places)
+    if not bar.deck_end_m[0] < plan.hammer_place_m(hanger) < bar.arch_end_m[0]:
+        raise UsageError(
+            "the hammer hits beyond the end of the planted bar.", remedy="Hit it farther up."
+        )
+    return bar
 
 
-def _lines(motion: Motion, scene: Scene) -> Lines:
-    plan, hanger = scene.plan, scene.hanger
-    force = force_of(motion.pulses, plan.samples)
+def _time_by_logger(plan: HammerPlan, fast: float) -> HammerPlan:
+    """Return the plan in true seconds of a logger whose clock is `fast` times as fast."""
+    return replace(
+        plan,
+        sampling_rate_hz=plan.sampling_rate_hz / fast,
+        seconds_per_hit=plan.seconds_per_hit * fast,
+    )
+
+
+def turn_sensors(moved: FloatArray, angle_rad: FloatArray) -> FloatArray:
+    """Return accelerations (planes, sensors, samples) as sensors turned by angles see them."""
+    if not np.any(angle_rad):
+        return moved
+    c, s = np.cos(angle_rad)[:, None], np.sin(angle_rad)[:, None]
+    transverse, longitudinal = moved
+    return np.array([c * transverse + s * longitudinal, c * longitudinal - s * transverse])
+
+
+def sensor_lines(
+    hanger: Hanger, plan: HammerPlan, force: FloatArray, moved: FloatArray
+) -> tuple[Line, ...]:
+    """Return the cables of the hammer and of all sensors, without the logger's noise."""
     lines = [
         Line("force", "force", force, None, plan.hammer_place_m(hanger),
              plan.force_noise_n, plan.force_range_n)
@@ -196,21 +116,7 @@ def _lines(motion: Motion, scene: Scene) -> Lines:
     for index, x_m in enumerate(plan.sensor_places_m(hanger)):
         for number, plane in enumerate(PLANES):
             lines.append(
-                Line(f"acc_{2 * index + number + 1}", "acceleration",
-                     motion.accelerations[number, index], plane, x_m,
-                     plan.acceleration_noise_m_s2, plan.acceleration_range_m_s2)
+                Line(f"acc_{2 * index + number + 1}", "acceleration", moved[number, index], plane,
+                     x_m, plan.acceleration_noise_m_s2, plan.acceleration_range_m_s2)
             )  # fmt: skip
     return tuple(lines)
-
-
-def _kept(channels: Channels, scene: Scene, planted: tuple[Planted, ...]) -> SimulatedTest:
-    """What lies within the ends of the record."""
-    schedule = scene.schedule
-    first = math.ceil(schedule.begin_s * scene.rate_hz)
-    part = slice(first, round(schedule.end_s * scene.rate_hz))
-    cut = tuple(replace(channel, values=channel.values[part]) for channel in channels)
-    fast = 1.0 if scene.bar is None else scene.bar.clock_factor
-    recording = Recording("simulated", cut, scene.rate_hz * fast, scene.hanger.id)
-    shift_s = first / scene.rate_hz
-    strikes = tuple(replace(s, start_s=(s.start_s - shift_s) / fast) for s in schedule.strikes)
-    return SimulatedTest(recording, planted, strikes)

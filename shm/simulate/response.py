@@ -18,12 +18,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import cast
+from typing import Protocol, cast
 
 import numpy as np
 import scipy
 
-from shm.simulate.elements import PlaneModes
 from shm.simulate.state import HammerPlan
 from shm.values import (
     NAN,
@@ -42,6 +41,27 @@ from shm.values import (
 _LEAST_STEPS, _STEPS_PER_PULSE = 32, 16
 _PASS, _STOP = 0.4, 0.5  # of the sampling rate
 _STOP_BAND_DB = 100.0
+
+
+class PlaneModes(Protocol):
+    """Modes of one plane, mass-normalised.
+
+    `angular_frequency_rad_s` and `added_damping_ratio`, which comes on top of the hanger's, are
+    (modes,). `other` is how these modes move in the other plane, None where they do not.
+    """
+
+    @property
+    def angular_frequency_rad_s(self) -> FloatArray: ...
+
+    @property
+    def added_damping_ratio(self) -> FloatArray: ...
+
+    @property
+    def other(self) -> PlaneModes | None: ...
+
+    def at(self, x_m: FloatArray) -> FloatArray:
+        """Return the mode shapes in kg^-1/2 at `x_m` (points,): (points, modes)."""
+        ...
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,6 @@ from shm.errors import NotIdentifiable
 from shm.identify import IdentifyOptions
 from shm.identify.identification import identify
 from shm.modes_document import modes_document
-from shm.simulate import PLANTED, UNLISTED
 from shm.values import (
     CaseScore,
     Hanger,
@@ -73,6 +72,7 @@ from shm.values import (
 from tests.benchmarks import gap_dynamics, gap_family
 from tests.helpers.struck import STRUCK, recordings
 from tests.worlds import finite_elements, struck_bar
+from tests.worlds.simulated.effects.registry import PLANTED, UNLISTED
 
 SIMULATOR, ELEMENTS, BAR = "simulator", "finite elements", "struck bar"
 TRIALS = Path(__file__).resolve().parents[2] / "docs" / "trials"

@@ -42,12 +42,19 @@ from shm.gap.observations import observed  # noqa: E402
 from shm.gap.problem import GapProblem  # noqa: E402
 from shm.inference.priors import UNKNOWN_READING_SD  # noqa: E402
 from shm.models.effects import EFFECTS  # noqa: E402
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, Reality  # noqa: E402
-from shm.simulate.campaign import _realised, identified  # noqa: E402
-from shm.simulate.reality import sd_factors  # noqa: E402
+from shm.simulate import HangerState, PlantedEffect  # noqa: E402
 from shm.values import MEASUREMENT_HOURS, PLANES, FloatArray, Hanger, ModalTest  # noqa: E402
 from tests.benchmarks.gap.outcomes import Case  # noqa: E402
 from tests.benchmarks.gap_trial import ROD, planted_to_size  # noqa: E402
+from tests.worlds.simulated.campaign import (  # noqa: E402
+    CampaignPlan,
+    _realised,
+    identified,
+)
+from tests.worlds.simulated.reality import (  # noqa: E402
+    Reality,
+    sd_factors,
+)
 
 CAUSES = (
     "rotational_end_flexibility", "effective_length", "bending_stiffness", "distributed_mass",

@@ -34,23 +34,15 @@ from shm.gap.attribution import Attribution, Explanation, attributed
 from shm.gap.contract import GapOptions
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
-from shm.simulate import (
-    PLANTED,
-    CampaignPlan,
-    HangerState,
-    PlantedEffect,
-    Reality,
-    at_share,
-    campaign_with_truth,
-    choices,
-    drawn,
-    scaled_to,
-    size_of,
-)
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import Hanger
 from tests.benchmarks.gap.outcomes import ABOUT, NONE, Case, Outcome, kept
 from tests.benchmarks.gap.table import by_effect, marks, marks_table
 from tests.benchmarks.identification.page import put
+from tests.worlds.simulated.campaign import CampaignPlan, campaign_with_truth
+from tests.worlds.simulated.detectable import at_share, scaled_to, size_of
+from tests.worlds.simulated.effects.registry import PLANTED, choices, drawn
+from tests.worlds.simulated.reality import Reality
 
 DRAWS_OF_A_CASE = 12
 WEAK = 0.02, 0.2

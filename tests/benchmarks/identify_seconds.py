@@ -23,8 +23,9 @@ from rich.table import Table
 
 import shm.identify
 from shm.identify import Identification, IdentifyOptions, identify
-from shm.simulate import HammerPlan, HangerState, hammer_test, spread_places_m
+from shm.simulate import HammerPlan, HangerState, spread_places_m
 from shm.values import Hanger, Recording
+from tests.worlds.simulated.hammer import hammer_test
 
 MOST_SECONDS = 2.0
 _ROOM = Path(shm.identify.__file__).parent

@@ -30,8 +30,8 @@ from marks import COLUMNS, alarms, flags, marks, table  # noqa: E402
 from page import DOCS, put  # noqa: E402
 from scoring import TestScore, score_number  # noqa: E402
 
-from shm.simulate import DISTURBANCES  # noqa: E402
 from shm_cli.common import markdown  # noqa: E402
+from tests.worlds.simulated.disturbances.registry import DISTURBANCES  # noqa: E402
 
 
 def run(numbers: range, seed: int, disturbance: str | None, processes: int) -> Iterator[TestScore]:

@@ -33,12 +33,13 @@ from docs.filling import fill_in
 from shm.documents import dump, format_time
 from shm.modes_document import modes_document
 from shm.read import write
-from shm.simulate import HammerPlan, HangerState, hammer_test, natural_frequencies
+from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import ENDED, Stage, Store, Workspace
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Mode
 from tests.helpers.daemons import real_daemon
 from tests.helpers.footprint import descendants, resident_mb, trend
 from tests.helpers.workspaces import START, make_workspace, put
+from tests.worlds.simulated.elements import natural_frequencies
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "trials" / "load.md"
 PLATE = """nominal_tension_n = 711e3

@@ -22,10 +22,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.identify.plausibility import apparent_mass_kg, ringing, signal_doubts
-from shm.simulate.hammer import hammer_test
 from shm.simulate.state import HammerPlan, HangerState
 from shm.values import Hanger, Recording
 from tests.benchmarks.right_hanger import interval
+from tests.worlds.simulated.hammer import hammer_test
 
 DISTURBED = (["double_hit"], ["soft_hit"], ["mains"], ["deck"], [], [])
 

@@ -18,8 +18,9 @@ from rich.progress import track
 from shm.identify import IdentifyOptions, identify
 from shm.inference import UpdateOptions, update
 from shm.models import THESIS, build
-from shm.simulate import HammerPlan, HangerState, hammer_test
+from shm.simulate import HammerPlan, HangerState
 from shm.values import Hanger, Posterior
+from tests.worlds.simulated.hammer import hammer_test
 
 DIAMETER_M = 0.130
 HANGER = Hanger(

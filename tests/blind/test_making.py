@@ -22,20 +22,13 @@ from shm.errors import UsageError
 from shm.models.effects import EFFECTS, Survey
 from shm.modes_document import load_modes
 from shm.read import read
-from shm.simulate import (
-    PLANTED,
-    UNLISTED,
-    CampaignPlan,
-    HangerState,
-    PlantedEffect,
-    campaign_with_truth,
-    choices,
-    drawn_hanger,
-)
-from shm.simulate.campaign import Campaign
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import PLANES, Hanger, PlantedKind, Recording, TrueCase, Way
 from tests.helpers.blind_workers import in_this_process
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import Campaign, CampaignPlan, campaign_with_truth
+from tests.worlds.simulated.effects.registry import PLANTED, UNLISTED, choices
+from tests.worlds.simulated.reality import drawn_hanger
 
 KINDS: tuple[PlantedKind, ...] = get_args(PlantedKind)
 

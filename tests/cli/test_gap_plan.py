@@ -9,10 +9,11 @@ import pytest
 
 from shm.documents import dump
 from shm.modes_document import modes_document
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.simulate import HangerState, PlantedEffect
 from tests.cli.conftest import Shm
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 SHORT = [
     word

@@ -10,10 +10,11 @@ import pytest
 from shm.gap import GapOptions, diagnose
 from shm.gap.noise import nodes
 from shm.gap.observations import observed
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import NAN, AddedMass, ModalTest, Mode
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 PLAIN = replace(HANGER_3, plate=None)
 SLIP = PlantedEffect("joint_softening", "both ends", {"log10_k_at_reference_level": 8.3})

@@ -12,10 +12,11 @@ from shm.gap.contract import GapOptions, Hypothesis
 from shm.gap.model_probabilities import CALIBRATION, ScoredHypothesis
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.simulate import HangerState, PlantedEffect
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.slow import few_of
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 4.0, "x_m": 3.4})
 SWING = PlantedEffect("geometric_hardening", "everywhere", {"hardening": 0.003})

@@ -12,11 +12,12 @@ from shm.gap.fit import fitted
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import Conditions, Variant
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect
-from shm.simulate import campaign as simulated
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import AddedMass
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension
+from tests.worlds.simulated.campaign import CampaignPlan
+from tests.worlds.simulated.campaign import campaign as simulated
 
 MODES = [(plane, order) for plane in (0, 1) for order in range(1, 9)]
 RIGHT = Hypothesis((("bending_stiffness", Variant()),))

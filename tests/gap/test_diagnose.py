@@ -11,10 +11,11 @@ from shm.diagnosis_document import diagnosis_document
 from shm.documents import dump
 from shm.errors import BadInput, UsageError
 from shm.gap import GapOptions, diagnose
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import NAN, Diagnosis, EffectPrior, Hanger, ModalTest
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 PLAIN = replace(HANGER_3, plate=None)
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})

@@ -10,8 +10,9 @@ from shm.gap.fit import hypotheses, invisible
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
-from shm.simulate import CampaignPlan, HangerState, campaign
+from shm.simulate import HangerState
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 SIMULATED = set(EFFECTS) - {"load_scale"}  # no simulated campaign reads a tension
 

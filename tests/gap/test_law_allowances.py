@@ -14,11 +14,12 @@ from shm.gap.law_error import allowances, exactly
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
-from shm.simulate.reality import Reality
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import ModalTest
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
+from tests.worlds.simulated.reality import Reality
 
 SWUNG = PlantedEffect("geometric_hardening", "everywhere", {"hardening": 0.006})
 

@@ -16,10 +16,11 @@ from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import predictions, predictive_p_value
 from shm.models.effects import EFFECTS
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
-from shm.simulate.reality import Reality
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import FloatArray
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
+from tests.worlds.simulated.reality import Reality
 
 WORN = PlantedEffect("section_loss", "everywhere", {"loss": 0.3, "x_m": 4.0, "extent_m": 2.0})
 TENSION_N = 711e3

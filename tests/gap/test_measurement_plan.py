@@ -21,10 +21,11 @@ from shm.gap.measurement_plan import (
 from shm.gap.next_measurement import NO_GAP
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import MEASUREMENT_HOURS
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 ROD = replace(HANGER_3, plate=None)
 ONE_PLANE = CampaignPlan(

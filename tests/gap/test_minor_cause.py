@@ -14,8 +14,9 @@ from shm.gap.model_probabilities import CALIBRATION, ScoredHypothesis, families
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import Variant
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.simulate import HangerState, PlantedEffect
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 PLAN = CampaignPlan(modes=5, amplitudes=(1.0, 2.0))
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 60.0, "x_m": 3.4})

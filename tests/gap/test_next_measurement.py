@@ -14,11 +14,12 @@ from shm.gap.next_measurement import NO_GAP, Errors, Foresight, divergence, fore
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS, Conditions, Variant
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect
-from shm.simulate import campaign as simulated
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import AddedMass
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension
+from tests.worlds.simulated.campaign import CampaignPlan
+from tests.worlds.simulated.campaign import campaign as simulated
 
 MODES = [(0, order) for order in range(1, 7)]
 ONE_TEST = (Conditions("t1"),)

@@ -14,11 +14,12 @@ from shm.gap.diagnose import diagnose
 from shm.gap.observations import observed
 from shm.gap.outlier_removal import misnumbered
 from shm.gap.problem import GapProblem
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import ModalTest
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.slow import few_of
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 4.0, "x_m": 3.4})
 KNOWN = ("point_mass", "timebase")

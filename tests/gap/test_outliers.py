@@ -24,10 +24,12 @@ from shm.gap.outliers import (
 )
 from shm.gap.problem import GapProblem
 from shm.report.diagnosis_wording import Answer, answer
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, Reality, campaign
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import Diagnosis, ModalTest
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
+from tests.worlds.simulated.reality import Reality
 
 PLAIN = replace(HANGER_3, plate=None)
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})

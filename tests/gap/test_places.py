@@ -11,10 +11,11 @@ from shm.gap.fit import fitted
 from shm.gap.observations import observed
 from shm.gap.places import Change, Misfit
 from shm.gap.problem import GapProblem
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
+from shm.simulate import HangerState, PlantedEffect
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.toy_gap import BASELINE, SD, ToyProblem, design_of, tension
 from tests.helpers.toy_gap import campaign as conditions
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 STATE = HangerState(711e3)
 SHAPES = CampaignPlan(temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, as_made=False)

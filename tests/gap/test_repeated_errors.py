@@ -20,9 +20,10 @@ from shm.gap.repeated_errors import (
 from shm.inference.systematic_errors import shared_loads
 from shm.models.composed import Baseline
 from shm.models.hanger import PhysicalHanger, Zone, solve
-from shm.simulate import CampaignPlan, HangerState, campaign
+from shm.simulate import HangerState
 from shm.values import FloatArray
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 PLAN = CampaignPlan(
     modes=5, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, as_made=False, shape_sd=1e-3

@@ -11,9 +11,10 @@ from shm.gap.fit import baseline_fit
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import sensor_remarks
-from shm.simulate import CampaignPlan, HangerState, campaign
+from shm.simulate import HangerState
 from shm.values import Hanger, ModalTest, Scatter
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 PLAIN = replace(HANGER_3, plate=None)
 PLAN = CampaignPlan(

@@ -11,9 +11,10 @@ from shm.gap.noise import nodes
 from shm.gap.observations import observed, told_apart
 from shm.gap.problem import GapProblem
 from shm.gap.repeated_errors import turn_loads
-from shm.simulate import CampaignPlan, HangerState, campaign
+from shm.simulate import HangerState
 from shm.values import ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 PLAN = CampaignPlan(
     modes=4, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, as_made=False, shape_sd=1e-3

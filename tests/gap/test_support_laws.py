@@ -11,9 +11,10 @@ from shm.gap.model_probabilities import CALIBRATION
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.models.effects import EFFECTS
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign
-from shm.simulate.reality import Reality
+from shm.simulate import HangerState, PlantedEffect
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.campaign import CampaignPlan, campaign
+from tests.worlds.simulated.reality import Reality
 
 AT = "deck end, transverse"
 DECK = PlantedEffect(

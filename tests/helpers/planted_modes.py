@@ -5,16 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from shm.simulate import (
-    HangerState,
-    PlantedEffect,
-    PlantedModes,
-    SensorError,
-    TestConditions,
-    bar_under,
-    modes_under,
-)
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import Hanger
+from tests.worlds.simulated.effects.base import TestConditions
+from tests.worlds.simulated.planted import PlantedModes, bar_under, modes_under
+from tests.worlds.simulated.reality import SensorError
 
 
 def planted_modes(

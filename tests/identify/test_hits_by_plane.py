@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from shm.identify import IdentifyOptions, identify
-from shm.simulate import HammerPlan, HangerState, hammer_test
+from shm.simulate import HammerPlan, HangerState
 from shm.values import Hanger, Plane, Recording
 from tests.identify.signals import as_recording, force_signal, hanger_modes, response
+from tests.worlds.simulated.hammer import hammer_test
 
 AREA = np.pi * 0.13**2 / 4
 HANGER = Hanger(3, 12.0, 200e9, AREA, np.pi * 0.13**4 / 64, 7800 * AREA, 711e3)

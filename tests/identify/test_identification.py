@@ -14,9 +14,11 @@ from shm.documents import dump
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify import IDENTIFIERS, Identification, IdentifyOptions, identify
 from shm.modes_document import modes_document, parse_modes
-from shm.simulate import HammerPlan, HangerState, hammer_test, natural_frequencies
+from shm.simulate import HammerPlan, HangerState
 from shm.values import PLANES, FrequencyResponse, Hanger, Recording, ResponsePoint
 from tests.identify.signals import BIAXIAL, Planted, Sensor, hanger_modes, recording
+from tests.worlds.simulated.elements import natural_frequencies
+from tests.worlds.simulated.hammer import hammer_test
 
 # A rod 60 mm thick, 12 m long: f1 about 6 Hz, twelve modes a plane below 100 Hz.
 HANGER = Hanger(3, 12.0, 200e9, 0.002827, 6.36e-7, 22.05, 450e3)

@@ -9,9 +9,10 @@ import pytest
 
 from shm.errors import NotIdentifiable
 from shm.identify import IdentifyOptions, identify
-from shm.simulate import HammerPlan, HangerState, hammer_test
+from shm.simulate import HammerPlan, HangerState
 from shm.values import Recording
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.hammer import hammer_test
 
 
 @pytest.fixture(scope="module")

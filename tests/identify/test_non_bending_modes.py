@@ -10,8 +10,8 @@ import pytest
 from shm.identify.contract import FoundMode, Tone
 from shm.identify.mode_ordering.placement import Placement, placed
 from shm.simulate import HangerState
-from shm.simulate.elements import plane_modes
 from shm.values import PLANES, Hanger, ResponsePoint
+from tests.worlds.simulated.elements import plane_modes
 
 HANGER = Hanger(1, 12.0, 200e9, 0.00283, 6.4e-7, 22.1, 300e3)
 STATE = HangerState(310e3, 3e5, 1e5, 2e5, 8e5)

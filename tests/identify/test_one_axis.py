@@ -13,10 +13,10 @@ from shm.identify.contract import FoundMode, Poles, Tone
 from shm.identify.mode_ordering.order import LEAST_MARGIN
 from shm.identify.mode_ordering.placement import Placement, placed
 from shm.report.shared_tables import headline
-from shm.simulate.elements import plane_modes
 from shm.values import NAN, PLANES, Hanger, ModalTest, ResponsePoint
 from shm.values.modes import NUMBERING
 from tests.identify.test_non_bending_modes import HANGER, PLACES, STATE, hanger_modes
+from tests.worlds.simulated.elements import plane_modes
 
 POINTS = tuple(ResponsePoint(f"{x}", "transverse", x) for x in PLACES)
 HEARD_ACROSS = np.array([0.09, -0.05, 0.03])

@@ -9,8 +9,9 @@ import pytest
 
 from shm.identify.mode_ordering.alignment import PlaneModes, log_pinned
 from shm.identify.mode_ordering.order import Expected, assign_orders
-from shm.simulate import HangerState, natural_frequencies
+from shm.simulate import HangerState
 from shm.values import Hanger
+from tests.worlds.simulated.elements import natural_frequencies
 
 HANGER = Hanger(1, 12.0, 200e9, 0.00283, 6.4e-7, 22.1, 300e3)
 # Table 1.1 of the thesis on hanger 3: end plates rotated by 90 degrees bend it off the pattern.

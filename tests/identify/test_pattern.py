@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from shm.identify.mode_ordering.alignment import HIGHEST_ORDER, Pattern, tensioned_beam_pattern
-from shm.simulate import HangerState, natural_frequencies
+from shm.simulate import HangerState
 from shm.values import FloatArray, Hanger
+from tests.worlds.simulated.elements import natural_frequencies
 
 ORDERS = np.arange(1, 9)
 

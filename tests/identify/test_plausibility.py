@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from shm.identify.plausibility import apparent_mass_kg, ringing, signal_doubts
-from shm.simulate.hammer import hammer_test
 from shm.simulate.state import HammerPlan, HangerState
 from shm.values import Recording
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.hammer import hammer_test
 
 ROD = replace(HANGER_3, plate=None)
 PLAN = HammerPlan(hits=3, seconds_per_hit=8.0)

@@ -10,10 +10,11 @@ import pytest
 
 from shm.errors import BadInput, NotIdentifiable
 from shm.identify import Identification, IdentifyOptions, identify
-from shm.simulate import HammerPlan, HangerState, hammer_test
-from shm.simulate.elements import plane_modes
+from shm.simulate import HammerPlan, HangerState
 from shm.values import PLANES, Hanger, Mode, Plane, Recording
 from tests.identify.signals import hanger_modes, recording
+from tests.worlds.simulated.elements import plane_modes
+from tests.worlds.simulated.hammer import hammer_test
 
 HANGER = Hanger(3, 12.0, 200e9, 0.002827, 6.36e-7, 22.05, 450e3)
 STATE = HangerState(450e3, 3e5, 1e5, 2e6, 5e5, damping_ratio=0.002)

@@ -13,9 +13,10 @@ from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.planes import directions
 from shm.identify.quality.of_sensors import sensor_places
 from shm.models.tensioned_beam import mode_shape
-from shm.simulate import HammerPlan, HangerState, hammer_test
+from shm.simulate import HammerPlan, HangerState
 from shm.values import NAN, PLANES, Mode, QualityCheck, Recording, ResponsePoint, ShapePoint
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.hammer import hammer_test
 
 HANGER = replace(HANGER_3, plate=None)
 PLAN = HammerPlan(

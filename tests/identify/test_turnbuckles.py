@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from shm.identify.mode_ordering.order import turnbuckle_shift
-from shm.simulate import HangerState, natural_frequencies
+from shm.simulate import HangerState
 from shm.values import Hanger, Turnbuckle
+from tests.worlds.simulated.elements import natural_frequencies
 
 BAR = Hanger(1, 12.0, 200e9, 0.00283, 6.4e-7, 22.1, 300e3)
 STATE = HangerState(300e3, 1e5, 1e5, 1e5, 1e5)

@@ -11,10 +11,11 @@ from shm.inference import UpdateOptions, update
 from shm.inference.likelihood import Likelihood
 from shm.models import THESIS, Model, build
 from shm.models.base import Conditions
-from shm.simulate import HangerState, TestConditions
+from shm.simulate import HangerState
 from shm.values import NAN, PLANES, AddedMass, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.planted_modes import planted_modes
+from tests.worlds.simulated.effects.base import TestConditions
 
 WARMTH = "beam1+temperature_tension@everywhere:reference_c=10"
 SD = 1e-3

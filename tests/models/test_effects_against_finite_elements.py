@@ -14,11 +14,12 @@ import pytest
 
 from shm.models.composed import ComposedHanger
 from shm.models.effects import EFFECTS, Conditions, Survey, Variant
-from shm.simulate import PLANTED, Deviations, HangerState, PlantedEffect, TestConditions, choices
-from shm.simulate.effects import ranges_of, where_of
-from shm.simulate.reality import GLOBAL
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import PLANES, AddedMass, FloatArray, Hanger, Turnbuckle
 from tests.helpers.planted_modes import planted_modes
+from tests.worlds.simulated.effects.base import TestConditions, where_of
+from tests.worlds.simulated.effects.registry import PLANTED, choices, ranges_of
+from tests.worlds.simulated.reality import GLOBAL, Deviations
 
 PLACES = (1.56, 3.48, 5.4, 7.92)
 MODES = 8

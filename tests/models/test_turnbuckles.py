@@ -10,10 +10,10 @@ from scipy.optimize import brentq
 
 from shm.errors import UsageError
 from shm.models import THESIS, build
-from shm.simulate import HangerState, natural_frequencies
-from shm.simulate.elements import plane_modes
+from shm.simulate import HangerState
 from shm.values import PLANES, Hanger, Turnbuckle
 from tests.helpers.hangers import HANGER_3
+from tests.worlds.simulated.elements import natural_frequencies, plane_modes
 
 EI, MASS = HANGER_3.bending_stiffness_n_m2, HANGER_3.mass_per_length_kg_m
 LOW = Turnbuckle(x_m=1.5, length_m=0.6, mass_kg=150.0, bending_stiffness_n_m2=1e7)

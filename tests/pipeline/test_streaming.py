@@ -82,8 +82,9 @@ def test_chunks_become_windows_hours_and_a_day_in_the_spool(two_hours: Workspace
 
 def test_a_day_gives_the_frequency_that_was_planted(two_hours: Workspace) -> None:
     """To a hundredth of a per cent: 1 % of tension moves it by 0.4 %."""
-    from shm.simulate import HangerState, natural_frequencies
+    from shm.simulate import HangerState
     from shm.simulate.ambient import Weather
+    from tests.worlds.simulated.elements import natural_frequencies
 
     with two_hours.store() as store:
         (day,) = hours_of(store, "day")

@@ -7,14 +7,9 @@ import pytest
 from scipy.signal import find_peaks, welch
 
 from shm.errors import UsageError
-from shm.simulate import (
-    AmbientPlan,
-    HangerState,
-    ambient_test,
-    natural_frequencies,
-    spread_places_m,
-)
+from shm.simulate import AmbientPlan, HangerState, ambient_test, spread_places_m
 from shm.values import Hanger, Recording
+from tests.worlds.simulated.elements import natural_frequencies
 
 STATE = HangerState(711e3, 1e7, 1e6, 1e7, 1e8, damping_ratio=0.01)
 PLAN = AmbientPlan(seconds=200.0)

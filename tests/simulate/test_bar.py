@@ -10,9 +10,11 @@ import pytest
 from scipy.optimize import brentq
 
 from shm.errors import UsageError
-from shm.simulate import HangerState, natural_frequencies
-from shm.simulate.bar import Bar, Mass, Spring, Stretch, bar_modes, bar_of
+from shm.simulate import HangerState
 from shm.values import FloatArray, Hanger, Turnbuckle
+from tests.worlds.simulated.bar.description import Bar, Mass, Spring, Stretch, bar_of
+from tests.worlds.simulated.bar.modes import bar_modes
+from tests.worlds.simulated.elements import natural_frequencies
 
 PLACES = (1.56, 3.48, 5.4, 7.92)
 PINNED = HangerState(711e3, 0, 0, 0, 0)

@@ -16,8 +16,8 @@ import pytest
 from shm.errors import NotIdentifiable
 from shm.identify import Identification
 from shm.identify.contract import Hit, Poles
-from shm.simulate import DISTURBANCES
 from shm.values import ForeignMode, ModalTest, Mode, QualityCheck
+from tests.worlds.simulated.disturbances.registry import DISTURBANCES
 
 FOLDER = Path(__file__).resolve().parents[1] / "benchmarks" / "identification"
 

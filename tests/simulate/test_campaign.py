@@ -13,20 +13,13 @@ from scipy.optimize import least_squares
 from shm.documents import dump
 from shm.errors import UsageError
 from shm.modes_document import modes_document, parse_modes
-from shm.simulate import (
-    CampaignPlan,
-    Deviations,
-    HangerState,
-    PlantedEffect,
-    TestConditions,
-    at_share,
-    campaign,
-    campaign_with_truth,
-    scaled_to,
-    size_of,
-)
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import AddedMass, FloatArray, Hanger, ModalTest
 from tests.helpers.planted_modes import planted_modes
+from tests.worlds.simulated.campaign import CampaignPlan, campaign, campaign_with_truth
+from tests.worlds.simulated.detectable import at_share, scaled_to, size_of
+from tests.worlds.simulated.effects.base import TestConditions
+from tests.worlds.simulated.reality import Deviations
 
 STATE = HangerState(711e3)
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})

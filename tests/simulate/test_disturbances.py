@@ -11,17 +11,13 @@ import pytest
 from scipy.signal import find_peaks
 
 from shm.errors import UsageError
-from shm.simulate import (
-    DISTURBANCES,
-    HammerPlan,
-    HangerState,
-    Planted,
-    SimulatedTest,
-    natural_frequencies,
-    simulated_test,
-)
+from shm.simulate import HammerPlan, HangerState
 from shm.values import FloatArray, Hanger
 from tests.helpers.comparing import assert_same
+from tests.worlds.simulated.disturbances.base import Planted
+from tests.worlds.simulated.disturbances.registry import DISTURBANCES
+from tests.worlds.simulated.elements import natural_frequencies
+from tests.worlds.simulated.hammer import SimulatedTest, simulated_test
 
 STATE = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
 PLAN = HammerPlan(hits=4, seconds_per_hit=5.0, acceleration_noise_m_s2=0.001)

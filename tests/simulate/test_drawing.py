@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shm.simulate import drawn_hanger
+from tests.worlds.simulated.reality import drawn_hanger
 
 
 def test_drawn_hangers_keep_their_ranges_and_scatter_about_their_nominal_tension() -> None:

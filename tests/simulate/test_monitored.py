@@ -10,9 +10,10 @@ import pytest
 import scipy
 
 from shm.bridge.hanger import hanger_of
-from shm.simulate import HangerState, natural_frequencies
+from shm.simulate import HangerState
 from shm.simulate.ambient import Loss, MonitoringPlan, Weather, described_stream, streamed
 from shm.values import Hanger
+from tests.worlds.simulated.elements import natural_frequencies
 
 START = datetime(2026, 6, 1, 12, tzinfo=UTC)
 QUIET = MonitoringPlan(trains_a_day=0.0, knocks_a_day=0.0, per_kelvin=0.0)

@@ -13,9 +13,9 @@ import pytest
 from scipy.optimize import brentq
 
 from shm.errors import UsageError
-from shm.simulate import HangerState, natural_frequencies
-from shm.simulate.elements import modes_below, plane_modes
+from shm.simulate import HangerState
 from shm.values import FloatArray, Hanger
+from tests.worlds.simulated.elements import modes_below, natural_frequencies, plane_modes
 
 MODES = 10
 

@@ -10,23 +10,14 @@ import pytest
 from scipy.linalg import eigh
 
 from shm.errors import UsageError
-from shm.simulate import (
-    PLANTED,
-    UNLISTED,
-    CampaignPlan,
-    HangerState,
-    PlantedEffect,
-    TestConditions,
-    choices,
-    drawn,
-    natural_frequencies,
-    scaled_to,
-    size_of,
-)
-from shm.simulate.effects import ranges_of
-from shm.simulate.elements import plane_modes
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import FloatArray, Hanger
 from tests.helpers.planted_modes import planted_modes
+from tests.worlds.simulated.campaign import CampaignPlan
+from tests.worlds.simulated.detectable import scaled_to, size_of
+from tests.worlds.simulated.effects.base import TestConditions
+from tests.worlds.simulated.effects.registry import PLANTED, UNLISTED, choices, drawn, ranges_of
+from tests.worlds.simulated.elements import natural_frequencies, plane_modes
 
 STATE = HangerState(711e3)
 PLACES = (1.56, 3.48, 5.4, 7.92)

@@ -9,20 +9,13 @@ import numpy as np
 import pytest
 
 from shm.errors import UsageError
-from shm.simulate import (
-    PLANTED,
-    HangerState,
-    PlantedEffect,
-    PlantedModes,
-    TestConditions,
-    choices,
-    drawn,
-    natural_frequencies,
-)
-from shm.simulate.effects import ranges_of
-from shm.simulate.elements import plane_modes
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import AddedMass, FloatArray, Hanger, Turnbuckle
 from tests.helpers.planted_modes import planted_modes
+from tests.worlds.simulated.effects.base import TestConditions
+from tests.worlds.simulated.effects.registry import PLANTED, choices, drawn, ranges_of
+from tests.worlds.simulated.elements import natural_frequencies, plane_modes
+from tests.worlds.simulated.planted import PlantedModes
 
 MODES = 8
 PLACES = (1.56, 3.48, 5.4, 7.92)

@@ -8,17 +8,12 @@ import numpy as np
 import pytest
 
 from shm.errors import UsageError
-from shm.simulate import (
-    HammerPlan,
-    HangerState,
-    PlantedEffect,
-    TestConditions,
-    hammer_test,
-    simulated_test,
-)
-from shm.simulate.planted import planted_bar, planted_plane_modes
+from shm.simulate import HammerPlan, HangerState, PlantedEffect
 from shm.values import AddedMass, FloatArray, Hanger, Recording
 from tests.helpers.planted_modes import planted_modes
+from tests.worlds.simulated.effects.base import TestConditions
+from tests.worlds.simulated.hammer import hammer_test, simulated_test
+from tests.worlds.simulated.planted import planted_bar, planted_plane_modes
 
 STATE = HangerState(711e3)
 PLAN = HammerPlan(hits=1, seconds_per_hit=16.0)

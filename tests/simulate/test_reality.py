@@ -8,25 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.simulate import (
-    CampaignPlan,
-    HangerState,
-    PlantedEffect,
-    Reality,
-    TestConditions,
-    bar_in_test,
-    campaign_with_truth,
-    choices,
-    drawn,
-    realised,
-    scaled_to,
-    size_of,
-)
-from shm.simulate.bar import bar_modes
-from shm.simulate.effects import LAWS, ranges_of
-from shm.simulate.reality import sd_factors
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import AddedMass, FloatArray, Hanger, Scatter
 from tests.helpers.planted_modes import planted_modes
+from tests.worlds.simulated.bar.modes import bar_modes
+from tests.worlds.simulated.campaign import CampaignPlan, bar_in_test, campaign_with_truth, realised
+from tests.worlds.simulated.detectable import scaled_to, size_of
+from tests.worlds.simulated.effects.base import TestConditions
+from tests.worlds.simulated.effects.registry import LAWS, choices, drawn, ranges_of
+from tests.worlds.simulated.reality import Reality, sd_factors
 
 STATE = HangerState(711e3)
 PLACES = (1.56, 3.48, 5.4, 7.92)

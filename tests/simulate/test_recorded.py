@@ -15,10 +15,11 @@ from shm.identify.options import campaign_options
 from shm.read import read
 from shm.read.registry import write_single
 from shm.settings import Settings
-from shm.simulate import CampaignPlan, HangerState, PlantedEffect, campaign_with_truth
-from shm.simulate.reality import Reality
-from shm.simulate.recorded import RecordedCampaign, Recorder, recorded
+from shm.simulate import HangerState, PlantedEffect
 from shm.values import Hanger, ModalTest, Recording, Scatter
+from tests.worlds.simulated.campaign import CampaignPlan, campaign_with_truth
+from tests.worlds.simulated.reality import Reality
+from tests.worlds.simulated.recorded import RecordedCampaign, Recorder, recorded
 
 STATE = HangerState(711e3)
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})

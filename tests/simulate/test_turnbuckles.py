@@ -9,10 +9,11 @@ import pytest
 from scipy.optimize import brentq
 
 from shm.errors import UsageError
-from shm.simulate import HammerPlan, HangerState, hammer_test, natural_frequencies
-from shm.simulate.bar.description import pieces_of
-from shm.simulate.elements import modes_below
+from shm.simulate import HammerPlan, HangerState
 from shm.values import Hanger, Turnbuckle
+from tests.worlds.simulated.bar.description import pieces_of
+from tests.worlds.simulated.elements import modes_below, natural_frequencies
+from tests.worlds.simulated.hammer import hammer_test
 
 MIDDLE = Turnbuckle(x_m=6.0, length_m=0.5, mass_kg=400.0, bending_stiffness_n_m2=5e7)
 

@@ -11,4 +11,4 @@ from shm.models.hanger.physical import (
     SupportMode,
     Zone,
 )
-from shm.models.hanger.solution import solve
+from shm.models.hanger.solution import NormalModes, normal_modes, solve

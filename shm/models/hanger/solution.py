@@ -35,11 +35,7 @@ def solve(
     with the heaviest masses and deepest changes of section of the catalogue to 3e-5 up to 15, to
     1e-4 beyond.
     """
-    asked = one_plane(physical) if planes_alike(physical) else physical
-    extra = _PLANES if asked.gives_way.any() else 0
-    bar = bar_of(asked, modes + extra)
-    parts = system(asked, bar)
-    found = motion(asked, parts, modes, shapes)
+    bar, parts, found = _solve_motion(physical, modes, shapes)
     frequency = found.omega_rad_s / (2 * np.pi) * physical.clock_factor[:, None, None]
     frequency = _both(frequency)
     for law in physical.mode_laws:
@@ -57,6 +53,60 @@ def solve(
         else np.zeros(frequency.shape)
     )
     return HangerModes(frequency, shapes_seen(physical, bar, parts, vectors, places_m), damping)
+
+
+def _solve_motion(
+    physical: PhysicalHanger, modes: int, with_vectors: bool
+) -> tuple[Bar, System, Motion]:
+    """Return the motion with the bar and the system it is of; one plane where both are alike."""
+    asked = one_plane(physical) if planes_alike(physical) else physical
+    extra = _PLANES if asked.gives_way.any() else 0
+    bar = bar_of(asked, modes + extra)
+    parts = system(asked, bar)
+    return bar, parts, motion(asked, parts, modes, with_vectors)
+
+
+@dataclass(frozen=True, eq=False)
+class NormalModes:
+    """Mass-normalised modes of one hanger.
+
+    `angular_frequency_rad_s` and `damping_ratio`, what joints and springs add, are (planes, modes).
+    """
+
+    angular_frequency_rad_s: FloatArray
+    damping_ratio: FloatArray
+    _physical: PhysicalHanger
+    _bar: Bar
+    _system: System
+    _vectors: FloatArray
+
+    def deflections(self, x_m: FloatArray) -> FloatArray:
+        """Return the deflections at `x_m` (points,) in kg^-1/2: (planes, axes, points, modes).
+
+        The modes of a plane move along the other plane's axis only where an end couples them.
+        """
+        physical = self._physical
+        mass_kg = physical.mass_per_length_kg_m * physical.length_m
+        moved = _deflected(self._bar, self._system, self._vectors, along(physical, x_m[None]))
+        return np.asarray(moved[0] / np.sqrt(mass_kg[0]))
+
+
+def normal_modes(physical: PhysicalHanger, modes: int) -> NormalModes:
+    """Return the first `modes` modes of each plane of one hanger, with true frequencies.
+
+    The logger's clock plays no part in them. Of what is accurate and what is no mode, see `solve`.
+    """
+    bar, parts, found = _solve_motion(physical, modes, with_vectors=True)
+    assert found.vectors is not None
+    both = Motion(_both(found.omega_rad_s), _both_axes(found.vectors))
+    assert both.vectors is not None
+    damping = np.zeros(both.omega_rad_s.shape)
+    if has_losses(physical):
+        damping = damping_ratios(physical, bar, parts, both, both.vectors)
+    omega = both.omega_rad_s
+    for law in physical.mode_laws:
+        omega = omega * law.factor(modes)
+    return NormalModes(omega[0], damping[0], physical, bar, parts, both.vectors)
 
 
 def _both(values: FloatArray) -> FloatArray:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import beta
 
-from shm.simulate import PLANTED
 from shm.values.leading import MIN_NO_GAP_PROBABILITY
 from tests.benchmarks.gap.outcomes import ABOUT, NONE, Outcome
+from tests.worlds.simulated.effects.registry import PLANTED
 
 NAMED, COVERED, NO_GAP, UNEXPLAINED, SECONDS = 0.90, (0.80, 0.98), 0.95, 0.80, 60.0
 ENOUGH = 20

@@ -15,18 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shm.simulate import (
-    DISTURBANCES,
-    HammerPlan,
-    HangerState,
-    Planted,
-    SimulatedTest,
-    hammer_test,
-    simulated_test,
-)
-from shm.simulate.elements import PlaneModes, plane_modes
+from shm.simulate import HammerPlan, HangerState
 from shm.simulate.response import Strike
 from shm.values import PLANES, Hanger, Plane
+from tests.worlds.simulated.disturbances.base import Planted
+from tests.worlds.simulated.disturbances.registry import DISTURBANCES
+from tests.worlds.simulated.elements import PlaneModes, plane_modes
+from tests.worlds.simulated.hammer import SimulatedTest, hammer_test, simulated_test
 
 BAND_HZ = (2.0, 100.0)
 _BEYOND_BAND = 1.02

@@ -11,8 +11,8 @@ from cases import BAND_HZ, Case, Truth, heard_db, random_case
 
 from shm.errors import NotIdentifiable
 from shm.identify import Identification, IdentifyOptions, identify
-from shm.simulate import Planted
 from shm.values import Mode
+from tests.worlds.simulated.disturbances.base import Planted
 
 LEAST_SNR_DB = 20.0
 SAME_ORDER = 0.02

@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.errors import UsageError
-from shm.simulate.bar import Bar
-from shm.simulate.campaign import CampaignPlan, CampaignTruth, bar_in_test, realised
-from shm.simulate.effects import PlantedEffect
-from shm.simulate.elements import natural_frequencies
-from shm.simulate.hammer import struck
-from shm.simulate.reality import SensorError
+from shm.simulate import PlantedEffect
 from shm.simulate.state import HammerPlan, HangerState
 from shm.values import NAN, PLANES, Channel, FloatArray, Hanger, ModalTest, Plane, Recording
+from tests.worlds.simulated.bar.description import Bar
+from tests.worlds.simulated.campaign import CampaignPlan, CampaignTruth, bar_in_test, realised
+from tests.worlds.simulated.elements import natural_frequencies
+from tests.worlds.simulated.hammer import struck
+from tests.worlds.simulated.reality import SensorError
 
 _PASSED = 0.4
 """Of the sampling rate: the highest frequency that the logger passes."""

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from shm.simulate.bar.description import Bar, BarEnd, Mass, Pair, Spring, Stretch
-from shm.simulate.effects.base import Range, Scene, Where
 from shm.values import Hanger
+from tests.worlds.simulated.bar.description import Bar, BarEnd, Mass, Pair, Spring, Stretch
+from tests.worlds.simulated.effects.base import Range, Scene, Where
 
 Values = Mapping[str, float]
 

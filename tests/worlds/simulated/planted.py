@@ -10,12 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.errors import UsageError
-from shm.simulate.bar import Bar, BarModes, bar_modes, bar_of
-from shm.simulate.effects import PlantedEffect, TestConditions, planted
-from shm.simulate.elements import PlaneModes, modes_below
-from shm.simulate.reality import Deviations, SensorError, as_made
+from shm.simulate import PlantedEffect
 from shm.simulate.state import HammerPlan, HangerState
 from shm.values import FloatArray, Hanger
+from tests.worlds.simulated.bar.description import Bar, bar_of
+from tests.worlds.simulated.bar.modes import BarModes, bar_modes
+from tests.worlds.simulated.effects.base import TestConditions
+from tests.worlds.simulated.effects.registry import planted
+from tests.worlds.simulated.elements import PlaneModes, modes_below
+from tests.worlds.simulated.reality import Deviations, SensorError, as_made
 
 _MORE = 1.25  # times as many modes, while the highest is still too low
 

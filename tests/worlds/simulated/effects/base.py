@@ -8,25 +8,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from shm.errors import UsageError
-from shm.simulate.bar.description import Bar
+from shm.simulate import PlantedEffect
 from shm.values import NAN, PLANES, AddedMass, Hanger
+from tests.worlds.simulated.bar.description import Bar
+
+__all__ = [
+    "Plantable", "PlantedEffect", "Range", "Scene", "TestConditions", "Where", "where_of",
+]  # fmt: skip
 
 _ENDS = {"deck end": (0,), "arch end": (1,), "both ends": (0, 1)}
 _SENSOR = re.compile(r"sensor at (\d+(?:\.\d+)?) m")
 _ROUNDED = 0.0051  # m: sensors are named to the centimetre
-
-
-@dataclass(frozen=True)
-class PlantedEffect:
-    """A truth to plant: an effect's name, where it acts, and all its parameters by name.
-
-    `at` is `everywhere`, `deck end`, `arch end`, `both ends`, `all sensors`, `sensor at 3.60 m`,
-    `all tests` or `test t3`; `, transverse` or `, longitudinal` appended means that plane alone.
-    """
-
-    name: str
-    at: str
-    values: Mapping[str, float]
 
 
 @dataclass(frozen=True)

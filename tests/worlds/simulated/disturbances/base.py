@@ -8,11 +8,11 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from shm.simulate.bar import Bar
-from shm.simulate.elements import PlaneModes
 from shm.simulate.response import Line, Pulse, Schedule, Strike
 from shm.simulate.state import HammerPlan, HangerState
 from shm.values import NAN, Channel, FloatArray, Hanger
+from tests.worlds.simulated.bar.description import Bar
+from tests.worlds.simulated.elements import PlaneModes
 
 T = TypeVar("T")
 Lines = tuple[Line, ...]

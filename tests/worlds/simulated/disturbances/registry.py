@@ -5,8 +5,8 @@ A disturbance is one function and one line of `DISTURBANCES`.
 
 from __future__ import annotations
 
-from shm.simulate.disturbances.base import Channels, Disturbance, Lines, Motion, Planted
-from shm.simulate.disturbances.recording import (
+from tests.worlds.simulated.disturbances.base import Channels, Disturbance, Lines, Motion, Planted
+from tests.worlds.simulated.disturbances.recording import (
     cable,
     clipping,
     cut_off,
@@ -18,7 +18,7 @@ from shm.simulate.disturbances.recording import (
     overload,
     soft_hit,
 )
-from shm.simulate.disturbances.spurious_vibration import deck, harmonic, machine, mains
+from tests.worlds.simulated.disturbances.spurious_vibration import deck, harmonic, machine, mains
 
 __all__ = ["DISTURBANCES", "Channels", "Disturbance", "Lines", "Motion", "Planted"]
 

@@ -15,10 +15,10 @@ import numpy as np
 import scipy
 
 from shm.errors import UsageError
-from shm.simulate.bar.description import Piece, pieces_of
-from shm.simulate.bar.mesh import assembled, interpolation, mass_of, stiffness_of
 from shm.simulate.state import HangerState
 from shm.values import PLANES, FloatArray, Hanger, Plane
+from tests.worlds.simulated.bar.description import Piece, pieces_of
+from tests.worlds.simulated.bar.mesh import assembled, interpolation, mass_of, stiffness_of
 
 # A frequency errs by (wave number x element size)^4/1440: 4e-7 in mode 10 of 320 elements. In the
 # time domain the highest modes only add their quasi-static share, so few elements are enough.

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shm.simulate.bar import bar_modes, bar_of
-from shm.simulate.bar.description import Bar, Pair, Profile
 from shm.simulate.state import HangerState
 from shm.values import FloatArray, Hanger
+from tests.worlds.simulated.bar.description import Bar, Pair, Profile, bar_of
+from tests.worlds.simulated.bar.modes import bar_modes
 
 if TYPE_CHECKING:
-    from shm.simulate.campaign import CampaignPlan
+    from tests.worlds.simulated.campaign import CampaignPlan
 
 _HIT = 0.16  # of the length, where a hammer reaches
 _LEAST_SD, _MOST_SD = 0.5, 4.0
@@ -38,7 +38,7 @@ _DAMPING = (0.0005, 0.002)
 class Reality:
     """What no description of a hanger and no textbook effect holds.
 
-    - `own_laws`: effects follow laws of their own (`shm.simulate.effects.alternative_laws`), not
+    - `own_laws`: effects follow laws of their own (`effects.alternative_laws`), not
       the catalogue's, with parameters that mean the same.
     - `section_sd`: the bar's area varies along it, rms as a fraction: hot-rolled rounds of 100 mm
       may be off by 1.3 mm of diameter (EN 10060), mostly the same all along a bar; 0.1 % of the

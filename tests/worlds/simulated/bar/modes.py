@@ -11,10 +11,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from shm.simulate.bar.description import Bar, BarEnd, Beyond, Pair, Ringing, Spring
-from shm.simulate.bar.mesh import interpolation, mesh_of
-from shm.simulate.bar.problem import Solved, solved
 from shm.values import BoolArray, FloatArray, IntArray
+from tests.worlds.simulated.bar.description import Bar, BarEnd, Beyond, Pair, Ringing, Spring
+from tests.worlds.simulated.bar.mesh import interpolation, mesh_of
+from tests.worlds.simulated.bar.problem import Solved, solved
 
 # The frequency of a Hermite element errs by (wave number x size)^4/1440, 2e-6 in the highest mode;
 # with shear by (frequency x size / speed of shear waves)^2/24, so that needs more.

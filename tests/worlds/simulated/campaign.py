@@ -12,17 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.errors import UsageError
-from shm.simulate.bar import Bar
-from shm.simulate.effects import PlantedEffect, TestConditions
-from shm.simulate.planted import PlantedModes, bar_under, modes_under
-from shm.simulate.reality import (
-    Deviations,
-    Reality,
-    SensorError,
-    drawn_sensors,
-    drawn_waves,
-    sd_factors,
-)
+from shm.simulate import PlantedEffect
 from shm.simulate.state import HangerState
 from shm.values import (
     NAN,
@@ -35,6 +25,17 @@ from shm.values import (
     Plane,
     ShapePoint,
     TrueFrequency,
+)
+from tests.worlds.simulated.bar.description import Bar
+from tests.worlds.simulated.effects.base import TestConditions
+from tests.worlds.simulated.planted import PlantedModes, bar_under, modes_under
+from tests.worlds.simulated.reality import (
+    Deviations,
+    Reality,
+    SensorError,
+    drawn_sensors,
+    drawn_waves,
+    sd_factors,
 )
 
 # Fractions of the length, from the deck and from a lift, near no node of the lowest eight modes.

@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.simulate.bar.description import Bar, Mass, PartTime, Profile, Ringing
-from shm.simulate.effects import catalogue_laws as laws
-from shm.simulate.effects.base import Scene
-from shm.simulate.effects.catalogue_laws import in_planes
 from shm.values import FloatArray
+from tests.worlds.simulated.bar.description import Bar, Mass, PartTime, Profile, Ringing
+from tests.worlds.simulated.effects import catalogue_laws as laws
+from tests.worlds.simulated.effects.base import Scene
+from tests.worlds.simulated.effects.catalogue_laws import in_planes
 
 Values = Mapping[str, float]
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import scipy
 
-from shm.simulate.bar.description import Bar
 from shm.values import FloatArray, IntArray
+from tests.worlds.simulated.bar.description import Bar
 
 _SAME = 1e-7  # of the length: edges so close are one
 # Elements much shorter than the rest would drown the tension in the rounding of their stiffness.

@@ -9,9 +9,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from shm.simulate.disturbances.base import Channels, Lines, Planted, Scene
 from shm.simulate.response import Schedule, Strike
 from shm.values import NAN, FloatArray
+from tests.worlds.simulated.disturbances.base import Channels, Lines, Planted, Scene
 
 _LEAST_GAP_S = 0.6  # blows closer than half a second are one swing of the hammer
 

@@ -9,20 +9,20 @@ from dataclasses import replace
 import numpy as np
 
 from shm.errors import UsageError
-from shm.simulate.bar.description import Bar
-from shm.simulate.effects import catalogue_laws as laws
-from shm.simulate.effects.alternative_laws import LAWS
-from shm.simulate.effects.base import (
+from shm.simulate import PlantedEffect
+from shm.values import PLANES, Hanger
+from tests.worlds.simulated.bar.description import Bar
+from tests.worlds.simulated.effects import catalogue_laws as laws
+from tests.worlds.simulated.effects.alternative_laws import LAWS
+from tests.worlds.simulated.effects.base import (
     Plantable,
-    PlantedEffect,
     Range,
     Scene,
     TestConditions,
     Where,
     where_of,
 )
-from shm.simulate.off_catalogue import UNLISTED
-from shm.values import PLANES, Hanger
+from tests.worlds.simulated.off_catalogue import UNLISTED
 
 __all__ = [
     "LAWS",

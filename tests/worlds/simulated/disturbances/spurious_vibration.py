@@ -10,8 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.simulate.disturbances.base import Lines, Motion, Planted, Scene
-from shm.simulate.elements import PlaneModes
 from shm.simulate.response import (
     Line,
     Stretch,
@@ -21,6 +19,8 @@ from shm.simulate.response import (
     state_of,
 )
 from shm.values import NAN, PLANES, ComplexArray, FloatArray
+from tests.worlds.simulated.disturbances.base import Lines, Motion, Planted, Scene
+from tests.worlds.simulated.elements import PlaneModes
 
 _HIGHEST = 0.4  # of the sampling rate: what the logger passes
 _DECK_CLEARANCE = 0.03

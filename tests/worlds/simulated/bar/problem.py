@@ -14,8 +14,9 @@ import numpy as np
 import scipy
 
 from shm.errors import UsageError
-from shm.simulate.bar.description import Attached, Bar, BarEnd
-from shm.simulate.bar.mesh import (
+from shm.values import FloatArray
+from tests.worlds.simulated.bar.description import Attached, Bar, BarEnd
+from tests.worlds.simulated.bar.mesh import (
     Mesh,
     assembled,
     interpolation,
@@ -24,7 +25,6 @@ from shm.simulate.bar.mesh import (
     slopes,
     stiffness_of,
 )
-from shm.values import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

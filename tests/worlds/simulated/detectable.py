@@ -10,11 +10,12 @@ from functools import lru_cache
 import numpy as np
 
 from shm.errors import UsageError
-from shm.simulate.campaign import CampaignPlan, CampaignTruth, noiseless
-from shm.simulate.effects import PlantedEffect, ranges_of
-from shm.simulate.reality import GLOBAL, Deviations, SensorError, sd_factors, wave_sd
+from shm.simulate import PlantedEffect
 from shm.simulate.state import HangerState
 from shm.values import PLANES, FloatArray, Hanger
+from tests.worlds.simulated.campaign import CampaignPlan, CampaignTruth, noiseless
+from tests.worlds.simulated.effects.registry import ranges_of
+from tests.worlds.simulated.reality import GLOBAL, Deviations, SensorError, sd_factors, wave_sd
 
 _DIFFERENCE = 1e-4  # of tension and deviations
 _STEPS, _LONGEST_STEP = 4, np.array([0.3, 6.0, 6.0, 6.0, 6.0])

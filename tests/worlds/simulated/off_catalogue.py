@@ -11,11 +11,19 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import replace
 
-from shm.simulate.bar.description import Attached, Bar, Beyond, Mass, PartTime, Spring, Stretch
-from shm.simulate.bar.modes import bar_modes
-from shm.simulate.effects.base import Plantable, Range, Scene, Where
-from shm.simulate.effects.catalogue_laws import in_planes
 from shm.values import Hanger
+from tests.worlds.simulated.bar.description import (
+    Attached,
+    Bar,
+    Beyond,
+    Mass,
+    PartTime,
+    Spring,
+    Stretch,
+)
+from tests.worlds.simulated.bar.modes import bar_modes
+from tests.worlds.simulated.effects.base import Plantable, Range, Scene, Where
+from tests.worlds.simulated.effects.catalogue_laws import in_planes
 
 Values = Mapping[str, float]
 
