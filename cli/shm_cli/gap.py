@@ -19,14 +19,12 @@ from shm.gap import diagnose as diagnosed
 from shm.gap.diagnose import examined
 from shm.gap.measurement_plan import PlannedMeasurement, Race, nothing_planned, planned
 from shm.gap.shared_causes import LEAST
-from shm.models.effects import EFFECTS
 from shm.pipeline import utc_now
 from shm.pipeline.lineage import diagnosis_lineage
 from shm.report.as_html import as_html
 from shm.report.as_text import as_text
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_json, bridge_diagnosis_paper
 from shm.report.contents import BridgeDiagnosisSheet, DiagnosisSheet
-from shm.report.diagnosis_remainder import effect_file
 from shm.report.diagnosis_report import diagnosis_json, diagnosis_paper
 from shm.report.figures.every_figure import bridge_diagnosis_figures, diagnosis_figures
 from shm.report.figures.specification import Illustration
@@ -36,7 +34,6 @@ from shm.values import Diagnosis, Hanger, ModalTest, ResponsePoint
 from shm.values.bar_description import describe_bar, list_sensors
 from shm_cli import completion, flags
 from shm_cli.adopt import adopt, adopted, drop
-from shm_cli.blind import blind
 from shm_cli.common import (
     advancing_bar,
     answer,
@@ -191,12 +188,6 @@ def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:
 @click.option(
     "--html", type=flags.NewFile(), metavar="FILE", help="Write a page with all figures here."
 )
-@click.option(
-    "--write-effect",
-    type=flags.NewFile(),
-    metavar="FILE.py",
-    help="Write the law of something unknown here, as the module of a new effect.",
-)
 @flags.figures
 @flags.json
 @click.pass_context
@@ -212,7 +203,6 @@ def diagnose(
     count: int,
     seed: int,
     html: Path | None,
-    write_effect: Path | None,
     figures: Path | None,
 ) -> None:
     """Where the gap lies, which effect causes it, how far it shrinks, what would tell.
@@ -230,12 +220,7 @@ def diagnose(
     Example: shm --workspace arch gap diagnose --bridge --html bridge.html
     """
     options = GapOptions(baseline, without, hold_out, seed=seed)
-    effect = _effect_name(write_effect) if write_effect is not None else ""
     if bridge or len(files) > 1:
-        if effect:
-            raise UsageError(
-                "--write-effect writes what one hanger leaves open.", remedy="Diagnose it alone."
-            )
         joint = _jointly(ctx, files, bridge, (hanger_id, hanger_file), count, options)
         draw = partial(bridge_diagnosis_figures, joint.diagnosis)
         _show(bridge_diagnosis_paper(joint), bridge_diagnosis_json(joint), draw, html, figures)
@@ -248,12 +233,9 @@ def diagnose(
         sheet = DiagnosisSheet(found, hanger, sensors=_sensors(tests))
     draw = partial(diagnosis_figures, sheet)
     _show(diagnosis_paper(sheet), diagnosis_json(sheet), draw, html, figures)
-    if write_effect is not None:
-        text = effect_file(sheet.diagnosis, sheet.hanger, effect)
-        write_effect.write_text(text, encoding="utf-8")
 
 
-for _verb in (adopt, adopted, drop, blind, effects):
+for _verb in (adopt, adopted, drop, effects):
     command.add_command(_verb)
 
 
@@ -346,17 +328,6 @@ def _of_bridge(ctx: click.Context, count: int, options: GapOptions) -> BridgeDia
             describe_bar(hanger, _stored_sensors(store, tests)) for hanger, tests in stored.items()
         )
     return BridgeDiagnosisSheet(found, workspace.bridge.name, bars)
-
-
-def _effect_name(file: Path) -> str:
-    """The name of the effect that a file holds, which the catalogue must not have yet."""
-    name = file.stem.lower()
-    if not name.isidentifier() or name in EFFECTS:
-        raise UsageError(
-            f"{file.name} names no new effect: the part before .py is its name.",
-            remedy="Take letters, digits and underscores, such as play_of_guide.py.",
-        )
-    return name
 
 
 def _show(

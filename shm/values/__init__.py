@@ -119,19 +119,3 @@ from shm.values.recording import (
     Recording,
     ResponsePoint,
 )
-from shm.values.trial import (
-    MIX,
-    Answer,
-    Bin,
-    CaseScore,
-    Mark,
-    MarkName,
-    PlantedKind,
-    Richness,
-    Score,
-    TrialScore,
-    TrueCase,
-    TrueEffect,
-    TrueFrequency,
-    Way,
-)

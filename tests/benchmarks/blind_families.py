@@ -1,4 +1,4 @@
-"""Families of hangers with one shared cause, sealed and solved as the second blind trial.
+"""Families of hangers with one shared cause, sealed and solved as the blind trial.
 
 python tests/benchmarks/blind_families.py make DIR --families 4 --seed 20261126
 python tests/benchmarks/blind_families.py solve DIR --until 16:25
@@ -19,21 +19,27 @@ from typing import Any, cast
 import numpy as np
 
 from docs.filling import fill_in
-from shm.blind.layout import TRIAL_SCHEMA, Trial, answers_sha256, key_beside, read_trial
-from shm.blind.making import of_one_instant
-from shm.blind.sealing import key_of, write_key
-from shm.blind.solving import guard
-from shm.blind.workers import workers
 from shm.bridge import load_hanger
 from shm.diagnosis_document import bridge_diagnosis_document
 from shm.documents import dump
 from shm.gap import GapOptions, diagnose_bridge
 from shm.modes_document import load_modes
 from shm.read.atomic import replace_text
-from shm.values import TrueCase
 from shm.values.leading import MIN_NO_GAP_PROBABILITY
 from tests.benchmarks import gap_family
-from tests.benchmarks.blind_trial_2 import TRIALS, Plan, moment, share, true_case, write_case
+from tests.benchmarks.blind.layout import (
+    TRIAL_SCHEMA,
+    Trial,
+    answers_sha256,
+    key_beside,
+    read_trial,
+)
+from tests.benchmarks.blind.making import give_one_time
+from tests.benchmarks.blind.sealing import key_of, write_key
+from tests.benchmarks.blind.solving import guard
+from tests.benchmarks.blind.truth import TrueCase
+from tests.benchmarks.blind.workers import workers
+from tests.benchmarks.blind_trial import TRIALS, Plan, moment, share, true_case, write_case
 
 HANGERS = 3  # one more than the least that can share a cause: 20 s of a core each
 
@@ -54,7 +60,7 @@ def make(directory: Path, families: int, seed: int) -> None:
     names = [f"f{number + 1}" for number in range(families)]
     document = {"schema": TRIAL_SCHEMA, "cases": names, "key_sha256": sha256}
     (directory / "trial.json").write_text(dump(document) + "\n", encoding="utf-8")
-    of_one_instant(directory)
+    give_one_time(directory)
     print(f"SHA-256 of the key {sha256}")
 
 

@@ -30,10 +30,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy.special import logsumexp
 
-from shm.blind.layout import CASE_FILE, CASE_SCHEMA, HANGER_FILE, MODES_FILE, read_document
-from shm.blind.making import WAYS, make_trial
-from shm.blind.scoring.marks import LARGE
-from shm.blind.solving import identify_tests
 from shm.bridge import load_hanger
 from shm.errors import ShmError
 from shm.gap.attribution import Attribution
@@ -45,7 +41,16 @@ from shm.gap.observations import observed
 from shm.gap.outlier_removal import Cleared, exclude_outliers, search_further
 from shm.gap.problem import GapProblem
 from shm.modes_document import load_modes
-from shm.values import TrueCase
+from tests.benchmarks.blind.layout import (
+    CASE_FILE,
+    CASE_SCHEMA,
+    HANGER_FILE,
+    MODES_FILE,
+    read_document,
+)
+from tests.benchmarks.blind.making import make_trial
+from tests.benchmarks.blind.scores import LARGE
+from tests.benchmarks.blind.truth import TrueCase
 
 FEWEST = 10
 FITS = 0.05
@@ -94,8 +99,7 @@ def lesson(directory: Path, truth: TrueCase) -> Lesson:
 
 def diagnosed(directory: Path, without: tuple[str, ...]) -> Cleared:
     told = read_document(directory / CASE_FILE, CASE_SCHEMA)
-    hanger, modes = load_hanger(directory / HANGER_FILE), directory / MODES_FILE
-    tests = load_modes(modes) if modes.exists() else identify_tests(directory, hanger).tests
+    hanger, tests = load_hanger(directory / HANGER_FILE), load_modes(directory / MODES_FILE)
     options = GapOptions(str(told["baseline"]), without, seed=int(told["seed"]))
     problem = GapProblem(hanger, options.baseline, observed(usable(tests, hanger).tests, hanger))
     return search_further(exclude_outliers(problem, options, np.random.default_rng(options.seed)))
@@ -324,7 +328,6 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=24)
     parser.add_argument("--seed", type=int, default=131)
-    parser.add_argument("--way", choices=["both", *WAYS], default="both")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--keep", type=Path, default=Path(os.devnull))
     parser.add_argument("--write", action="store_true", help=f"writes {FILE.name}")
@@ -334,16 +337,13 @@ def arguments() -> argparse.Namespace:
 def main() -> int:
     given = arguments()
     lines = given.keep.read_text().splitlines() if given.keep.exists() else []
-    name = f"{given.cases} of seed {given.seed}, {given.way}: "
+    name = f"{given.cases} of seed {given.seed}: "
     lessons = [each for each in map(_kept, lines) if each.case.startswith(name)]
     with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(given.jobs) as pool:
         trial = Path(folder) / "trial"
-        ways = WAYS if given.way == "both" else (given.way,)
-        made = make_trial(
-            trial, Path(folder) / "key", given.cases, seed=given.seed, ways=ways, jobs=given.jobs
-        )
+        made = make_trial(trial, given.cases, given.seed, given.jobs)
         known = {each.case for each in lessons}
-        missing = [each for each in made.cases if name + each.case not in known]
+        missing = [each for each in made if name + each.case not in known]
         places = [trial / "cases" / each.case for each in missing]
         with given.keep.open("a") as kept:
             for each in pool.map(lesson, places, missing):
@@ -351,7 +351,7 @@ def main() -> int:
                 print(json.dumps(asdict(lessons[-1])), file=kept, flush=True)
     command = (
         f"python tests/benchmarks/gap_calibration.py --cases {given.cases} --seed {given.seed} "
-        f"--way {given.way} --write"
+        "--write"
     )
     today = datetime.now(UTC).date()
     about = Provenance("simulated hangers", str(given.seed), str(given.cases), "", today, command)

@@ -22,15 +22,7 @@ from shm.report.figures.modal_test_response import FIGURE as RESPONSE
 from shm.report.figures.modal_test_response import Shown
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
 from shm.report.figures.specification import Illustration, Member, drawn
-from shm.report.figures.trial_answers import CONFUSION, DETECTION, LEFT_OUT
-from shm.report.figures.trial_errors import (
-    COVERAGE,
-    HELD_OUT,
-    LOG_SCORE,
-    RELIABILITY,
-    TENSION_ERRORS,
-)
-from shm.values import BridgeDiagnosis, TrialScore
+from shm.values import BridgeDiagnosis
 
 OF_HANGER: tuple[Member[HangerReport], ...] = (
     TREND, STATES, TENSION, FREQUENCIES, RESPONSE_OF_LATEST, STIFFNESS
@@ -40,9 +32,6 @@ OF_MODAL_TEST: tuple[Member[Shown], ...] = (
 )  # fmt: skip
 OF_DIAGNOSIS: tuple[Member[DiagnosisSheet], ...] = (CAUSES, GAP_MAP, BEFORE_AND_AFTER, GAP_TENSION)
 OF_BRIDGE_DIAGNOSIS: tuple[Member[BridgeDiagnosis], ...] = (SHARED,)
-OF_TRIAL: tuple[Member[TrialScore], ...] = (
-    DETECTION, CONFUSION, RELIABILITY, LOG_SCORE, LEFT_OUT, TENSION_ERRORS, COVERAGE, HELD_OUT
-)  # fmt: skip
 OF_HANGER_NAMES = frozenset(each.name for each in OF_HANGER)
 
 
@@ -72,8 +61,3 @@ def diagnosis_figures(sheet: DiagnosisSheet) -> tuple[Illustration, ...]:
 def bridge_diagnosis_figures(diagnosis: BridgeDiagnosis) -> tuple[Illustration, ...]:
     """Those of a joint diagnosis."""
     return drawn(OF_BRIDGE_DIAGNOSIS, diagnosis)
-
-
-def trial_figures(score: TrialScore) -> tuple[Illustration, ...]:
-    """Those of a blind trial."""
-    return drawn(OF_TRIAL, score)

@@ -24,7 +24,6 @@ from shm.values import (
     Mode,
     Plane,
     ShapePoint,
-    TrueFrequency,
 )
 from tests.worlds.simulated.bar.description import Bar
 from tests.worlds.simulated.effects.base import TestConditions
@@ -111,6 +110,16 @@ def _refuse_unless_possible(plan: CampaignPlan) -> None:
             f"{plan.sensors} sensors have no usual places.",
             remedy=f"Take 1 to {len(_PLACES)}, or give their places.",
         )
+
+
+@dataclass(frozen=True)
+class TrueFrequency:
+    """The frequency that a test would have shown without any error."""
+
+    test: str
+    plane: Plane
+    order: int
+    frequency_hz: float
 
 
 @dataclass(frozen=True)

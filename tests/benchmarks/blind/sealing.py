@@ -14,10 +14,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from shm.blind.layout import Trial, read_document
 from shm.documents import dump, value_of
 from shm.errors import BadInput
-from shm.values import TrueCase
+from tests.benchmarks.blind.layout import Trial, read_document
+from tests.benchmarks.blind.truth import TrueCase
 
 KEY_SCHEMA = "shm.blind_key/1"
 
@@ -42,7 +42,7 @@ def read_key(path: Path) -> tuple[tuple[TrueCase, ...], int]:
     if not path.is_file():
         raise BadInput(
             f"there is no key at {path}.",
-            remedy="Name it with --key: `shm gap blind make` wrote it beside the trial's folder.",
+            remedy="Move it there: `blind_trial.py make` wrote it beside the trial's folder.",
         )
     document = read_document(path, KEY_SCHEMA)
     try:

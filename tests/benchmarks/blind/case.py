@@ -10,48 +10,26 @@ Which cases a trial consists of: fixed proportions, shuffled.
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 
-from shm.blind.layout import CASE_FILE, CASE_SCHEMA, HANGER_FILE, MODES_FILE
 from shm.bridge import load_hanger
 from shm.documents import dump
 from shm.errors import UsageError
 from shm.modes_document import modes_document
-from shm.read.registry import write_single
-from shm.simulate import (
-    PLANTED,
-    CampaignPlan,
-    CampaignTruth,
-    HangerState,
-    PlantedEffect,
-    Reality,
-    at_share,
-    campaign_with_truth,
-    choices,
-    drawn,
-    drawn_hanger,
-    scaled_to,
-    size_of,
-)
-from shm.simulate.recorded import Recorder, recorded
-from shm.values import (
-    MIX,
-    FloatArray,
-    Hanger,
-    IntArray,
-    PlantedKind,
-    Richness,
-    TrueCase,
-    TrueEffect,
-    Way,
-)
+from shm.simulate import HangerState, PlantedEffect
+from shm.values import FloatArray, Hanger, IntArray
+from tests.benchmarks.blind.layout import CASE_FILE, CASE_SCHEMA, HANGER_FILE, MODES_FILE
+from tests.benchmarks.blind.truth import MIX, PlantedKind, Richness, TrueCase, TrueEffect
+from tests.worlds.simulated.campaign import CampaignPlan, CampaignTruth, campaign_with_truth
+from tests.worlds.simulated.detectable import at_share, scaled_to, size_of
+from tests.worlds.simulated.effects.registry import PLANTED, choices, drawn
+from tests.worlds.simulated.reality import Reality, drawn_hanger
 
 # Judgement: most of what campaigns measure as a rule (frequencies, shapes, everything), some of
 # what lies between; a twelfth of 480 cases is 40, whose shares are known to 0.13.
@@ -63,7 +41,6 @@ RICHNESSES: dict[Richness, float] = {
     "conditions": 1 / 12,
     "everything": 1 / 4,
 }
-WAYS: tuple[Way, ...] = get_args(Way)
 
 
 @dataclass(frozen=True)
@@ -77,14 +54,12 @@ class Draft:
     case: str
     kind: PlantedKind
     richness: Richness
-    way: Way
     share: float
     effects: tuple[str, ...]
 
 
 def drafts(
     cases: int,
-    ways: Sequence[Way],
     effects: Sequence[str],
     unlisted: Sequence[str],
     rng: np.random.Generator,
@@ -95,19 +70,14 @@ def drafts(
     its turn at being tried first.
     """
     kinds, richnesses = tuple(MIX), tuple(RICHNESSES)
-    wanted = np.multiply.outer(
-        np.outer(list(MIX.values()), list(RICHNESSES.values())), np.full(len(ways), 1 / len(ways))
-    )
-    groups = defaultdict(list)
-    for kind, richness, way in balanced(wanted, cases):
-        groups[kinds[kind], richnesses[richness]].append(ways[way])
+    wanted = np.outer(list(MIX.values()), list(RICHNESSES.values()))
     found = []
-    for (name, rich), members in groups.items():
+    for (kind, richness), count in Counter(balanced(wanted, cases)).items():
+        name = kinds[kind]
         known = unlisted if name == "unknown" else effects
-        shares = (rng.permutation(len(members)) + rng.uniform(size=len(members))) / len(members)
-        orders = _turns(known, len(members), rng)
-        for place, share, order in zip(rng.permutation(len(members)), shares, orders, strict=True):
-            found.append((name, rich, members[place], float(share), order))
+        shares = (rng.permutation(count) + rng.uniform(size=count)) / count
+        for share, order in zip(shares, _turns(known, count, rng), strict=True):
+            found.append((name, richnesses[richness], float(share), order))
     shuffled = [found[place] for place in rng.permutation(len(found))]
     return tuple(Draft(f"c{i + 1:04d}", *each) for i, each in enumerate(shuffled))
 
@@ -162,11 +132,9 @@ def make_case(directory: Path, draft: Draft, seed: np.random.SeedSequence) -> Tr
         draft.case,
         draft.kind,
         draft.richness,
-        draft.way,
         tuple(TrueEffect(each.name, each.at, each.values, site.size((each,))) for each in effects),
         site.size(effects),
         truth.tension_n,
-        truth.frequencies,
         _left_out(draft, effects, chosen),
     )
 
@@ -195,14 +163,13 @@ def _planted(
 
     The one described may stand what that one does not.
     """
-    measure = _write_recordings if draft.way == "recordings" else _write_modes
     effects = planted_effects(draft, site, planted)
     for _ in range(_DRAWS):
         try:
-            return effects, measure(directory, site, effects, measured)
+            return effects, _write_modes(directory, site, effects, measured)
         except UsageError:
             effects = planted_effects(draft, site, planted)
-    return effects, measure(directory, site, effects, measured)
+    return effects, _write_modes(directory, site, effects, measured)
 
 
 def _write_modes(
@@ -211,17 +178,6 @@ def _write_modes(
     made = campaign_with_truth(site.hanger, site.state, effects, site.plan, rng)
     text = dump(modes_document(made.tests)) + "\n"
     (directory / MODES_FILE).write_text(text, encoding="utf-8")
-    return made.truth
-
-
-def _write_recordings(
-    directory: Path, site: Site, effects: Sequence[PlantedEffect], rng: np.random.Generator
-) -> CampaignTruth:
-    """Files t1_1.npz, t1_2.npz, ...: each test, and in it each plane that was hit."""
-    made = recorded(site.hanger, site.state, effects, site.plan, Recorder(), rng)
-    for test in made.tests:
-        for number, recording in enumerate(test.recordings, 1):
-            write_single(recording, directory / f"{test.id}_{number}.npz")
     return made.truth
 
 
@@ -239,6 +195,7 @@ _ALL = CampaignPlan(tension_spread=0.0, reality=Reality())
 _ONE_TEST = replace(_ALL, shapes=False, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0)
 PLANS: dict[Richness, CampaignPlan] = {
     "one plane": replace(_ONE_TEST, planes=("transverse",)),
+    "three modes": replace(_ONE_TEST, planes=("transverse",), modes=3),
     "two planes": _ONE_TEST,
     "known mass": replace(_ONE_TEST, mass_share=_ALL.mass_share),
     "shapes": replace(_ONE_TEST, shapes=True),

@@ -3,7 +3,7 @@
     DIR/trial.json                the cases, and the SHA-256 of the key
     DIR/cases/c0001/hanger.toml   the description of the hanger, as its owner has it
     DIR/cases/c0001/case.json     what the diagnosis is told: baseline and seed
-    DIR/cases/c0001/tests.modes.json, or recordings t1_1.npz (test 1, first plane), ...
+    DIR/cases/c0001/tests.modes.json
     DIR/answers/c0001.json        what the diagnosis said, and DIR/answers.sha256 over all of them
     DIR/left_out/c0001.json       the same without the planted effects, and DIR/left_out.sha256
 
@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -25,21 +24,14 @@ from shm.diagnosis_document import diagnosis_document, diagnosis_of
 from shm.documents import dump
 from shm.errors import BadInput, NothingThere
 from shm.read.atomic import replace_text
-from shm.values import Answer
+from tests.benchmarks.blind.truth import Answer
 
 TRIAL_SCHEMA = "shm.blind_trial/1"
 CASE_SCHEMA = "shm.blind_case/1"
 HANGER_FILE, CASE_FILE, MODES_FILE = "hanger.toml", "case.json", "tests.modes.json"
 
-Told = Callable[[int, int], None]
-"""Hears how many cases are done, and of how many."""
-
 Round = Literal["answers", "left_out"]
 """The folder of a round's answers: with the whole catalogue, then without the planted effects."""
-
-
-def nobody(done: int, of: int) -> None:
-    """No progress is shown."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +50,6 @@ class Trial:
         """Where a round's answers lie."""
         return self.directory / which
 
-    def identified(self, case: str) -> Path:
-        """Where the modal tests stand that the first round identified in a case's recordings."""
-        return self.directory / "answers" / f"{case}.modes.json"
-
     def seal(self, which: Round) -> Path:
         """The file with the SHA-256 over a round's answers."""
         return self.directory / f"{which}.sha256"
@@ -72,7 +60,7 @@ def read_trial(directory: Path) -> Trial:
     path = directory / "trial.json"
     if not path.is_file():
         raise BadInput(
-            f"{directory} holds no blind trial.", remedy="Make one with `shm gap blind make DIR`."
+            f"{directory} holds no blind trial.", remedy="Make one with `blind_trial.py make DIR`."
         )
     document = read_document(path, TRIAL_SCHEMA)
     try:
@@ -140,12 +128,12 @@ def read_answer(path: Path) -> Answer:
 
 def read_answers(directory: Path) -> tuple[Answer, ...]:
     """All answers in a folder, in the order of their cases; raises BadInput for a broken one."""
-    return tuple(read_answer(path) for path in _answers_in(directory))
+    return tuple(read_answer(path) for path in _files_in(directory))
 
 
 def answered(directory: Path) -> set[str]:
     """The cases whose answers lie in a folder."""
-    return {path.stem for path in _answers_in(directory)}
+    return {path.stem for path in _files_in(directory)}
 
 
 def answers_sha256(directory: Path) -> str:
@@ -175,7 +163,7 @@ def verified_sha256(trial: Trial, which: Round) -> str:
         done, of = len(answered(trial.answers(which))), len(trial.cases)
         raise NothingThere(
             f"the answers in {trial.answers(which)} are not complete: {done} of {of} cases.",
-            remedy="Run `shm gap blind solve` once more; it goes on where it stopped.",
+            remedy="Run `blind_trial.py solve` once more; it goes on where it stopped.",
         )
     sealed, found = seal.read_text(encoding="utf-8").strip(), answers_sha256(trial.answers(which))
     if sealed != found:
@@ -191,7 +179,3 @@ def verified_sha256(trial: Trial, which: Round) -> str:
 def _files_in(directory: Path) -> list[Path]:
     found = directory.glob("*.json") if directory.is_dir() else ()
     return sorted(path for path in found if not path.name.startswith("."))
-
-
-def _answers_in(directory: Path) -> list[Path]:
-    return [path for path in _files_in(directory) if not path.name.endswith(".modes.json")]

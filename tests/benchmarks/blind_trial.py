@@ -1,15 +1,16 @@
-"""A second blind trial: three worlds, both baselines, from everything down to three modes.
+"""Try the gap diagnosis blind: three worlds, both baselines, from everything to three modes.
 
-python tests/benchmarks/blind_trial_2.py make DIR --cases 96 --seed 20261126
-python tests/benchmarks/blind_trial_2.py solve DIR --until 16:10
-python tests/benchmarks/blind_trial_2.py solve DIR --left-out --until 16:25
-python tests/benchmarks/blind_trial_2.py score DIR --write-docs
+python tests/benchmarks/blind_trial.py make DIR --cases 96 --seed 20261126
+python tests/benchmarks/blind_trial.py solve DIR --until 16:10
+python tests/benchmarks/blind_trial.py solve DIR --left-out --until 16:25
+python tests/benchmarks/blind_trial.py score DIR --write-docs
 
-Layout, sealing, guarded solving and scores of single cases are those of `shm gap blind`. `solve`
-takes cases in the order of their names, which says nothing, and goes on where it stopped; `score`
-takes those that were solved. Sound hangers, one effect each, and what the catalogue lacks:
+Layout, sealing, guarded solving and scores of single cases stand in `tests/benchmarks/blind`;
+`make -C tests/benchmarks blind-trial` does all four. `solve` takes cases in the order of their
+names, which says nothing, and goes on where it stopped; `score` takes those that were solved.
+Sound hangers, one effect each, and what the catalogue lacks:
 
-- our simulator: every effect that it can plant, as in the first trial;
+- `tests/worlds/simulated`: every effect that it can plant;
 - `tests/worlds/finite_elements.py`: frequencies, with its nuisances of the field;
 - `tests/worlds/struck_bar.py`: hammer records in time of two levels and three places, identified.
 
@@ -35,12 +36,19 @@ import numpy as np
 from scipy.stats import beta
 
 from docs.filling import fill_in, write_csv
-from shm.blind.layout import (
+from shm.documents import dump
+from shm.errors import NotIdentifiable
+from shm.identify import IdentifyOptions
+from shm.identify.identification import identify
+from shm.modes_document import modes_document
+from shm.values import Hanger, ModalTest
+from tests.benchmarks import gap_dynamics, gap_family
+from tests.benchmarks.blind.case import Draft, make_case
+from tests.benchmarks.blind.layout import (
     CASE_FILE,
     CASE_SCHEMA,
     HANGER_FILE,
     MODES_FILE,
-    TRIAL_SCHEMA,
     Round,
     Trial,
     answered,
@@ -49,34 +57,28 @@ from shm.blind.layout import (
     read_trial,
     verified_sha256,
 )
-from shm.blind.making import of_one_instant, padded
-from shm.blind.making.case import PLANS, Draft, make_case
-from shm.blind.scoring.cases import NO_GAP, SURE, case_scores, left_out_scores
-from shm.blind.scoring.marks import FEWEST, LARGE
-from shm.blind.scoring.scores import bins_of, corrected, leading
-from shm.blind.sealing import key_of, write_key
-from shm.blind.solving import solve_left_out, solve_trial
-from shm.documents import dump
-from shm.errors import NotIdentifiable
-from shm.identify import IdentifyOptions
-from shm.identify.identification import identify
-from shm.modes_document import modes_document
-from shm.values import (
-    CaseScore,
-    Hanger,
-    ModalTest,
-    Richness,
-    TrueCase,
-    TrueEffect,
+from tests.benchmarks.blind.making import seal
+from tests.benchmarks.blind.scores import (
+    FEWEST,
+    LARGE,
+    NO_GAP,
+    SURE,
+    bins_of,
+    case_scores,
+    corrected_calibration_error,
+    leading,
+    left_out_scores,
 )
-from tests.benchmarks import gap_dynamics, gap_family
+from tests.benchmarks.blind.sealing import key_of
+from tests.benchmarks.blind.solving import solve_left_out, solve_trial
+from tests.benchmarks.blind.truth import CaseScore, Richness, TrueCase, TrueEffect
 from tests.helpers.struck import STRUCK, recordings
 from tests.worlds import finite_elements, struck_bar
 from tests.worlds.simulated.effects.registry import PLANTED, UNLISTED
 
 SIMULATOR, ELEMENTS, BAR = "simulator", "finite elements", "struck bar"
 TRIALS = Path(__file__).resolve().parents[2] / "docs" / "trials"
-THREE = cast("Richness", "three modes")
+THREE: Richness = "three modes"
 RICHNESSES: dict[str, tuple[Richness, ...]] = {
     SIMULATOR: ("everything", "two planes", "one plane", THREE),
     ELEMENTS: ("two planes", "one plane", THREE),
@@ -141,32 +143,23 @@ def plans(cases: int, seed: int) -> list[Plan]:
 
 def make(directory: Path, cases: int, seed: int) -> None:
     """The cases and, beside them, the key."""
-    PLANS[THREE] = replace(PLANS["one plane"], modes=3)
     seeds = np.random.SeedSequence([seed, 3]).spawn(cases)
     truths = []
     for plan, own in zip(plans(cases, seed), seeds, strict=True):
         truths.append(MAKERS[plan.world](directory / "cases" / plan.case, plan, own))
         print(f"made {plan.case} of {cases}", flush=True)
-    sha256 = write_key(key_beside(directory), truths, seed)
-    document = {
-        "schema": TRIAL_SCHEMA,
-        "cases": [truth.case for truth in truths],
-        "key_sha256": sha256,
-    }
-    (directory / "trial.json").write_text(dump(document) + "\n", encoding="utf-8")
-    padded(directory / "cases" / truth.case for truth in truths)
-    of_one_instant(directory)
+    sha256 = seal(directory, key_beside(directory), truths, seed)
     print(f"SHA-256 of the key {sha256}")
 
 
 def by_simulator(directory: Path, plan: Plan, seed: np.random.SeedSequence) -> TrueCase:
     share = float(np.random.default_rng(seed.spawn(1)[0]).uniform())
-    draft = Draft(plan.case, cast(Any, plan.kind), plan.richness, "modes", share, plan.effects)
+    draft = Draft(plan.case, cast(Any, plan.kind), plan.richness, share, plan.effects)
     truth = make_case(directory, draft, seed)
     told = json.loads((directory / CASE_FILE).read_text(encoding="utf-8"))
     _write_told(directory, plan, told["seed"])
     left_out = truth.left_out if plan.kind == "one" else ()
-    return replace(truth, richness=in_key(plan), left_out=left_out)
+    return replace(truth, left_out=left_out)
 
 
 def by_elements(directory: Path, plan: Plan, seed: np.random.SeedSequence) -> TrueCase:
@@ -262,20 +255,14 @@ MAKERS: dict[str, Callable[[Path, Plan, np.random.SeedSequence], TrueCase]] = {
 }
 
 
-def in_key(plan: Plan) -> Richness:
-    """Keys know no three modes, which are of one plane; the plan does."""
-    return "one plane" if plan.richness == THREE else plan.richness
-
-
 def true_case(plan: Plan, effect: str, size: float, tension_n: float) -> TrueCase:
     """A line of the key; where it acts and how much is not scored."""
     kind = "none" if not effect else "one" if effect in PLANTED else "unknown"
     effects = (TrueEffect(effect, "", {}, size),) if effect else ()
-    way = "recordings" if plan.world == BAR else "modes"
     left_out = (effect,) if kind == "one" else ()
     return TrueCase(
-        plan.case, cast(Any, kind), in_key(plan), cast(Any, way), effects,
-        size if effect else 0.0, float(tension_n), (), left_out,
+        plan.case, cast(Any, kind), plan.richness, effects, size if effect else 0.0,
+        float(tension_n), left_out,
     )  # fmt: skip
 
 
@@ -326,11 +313,11 @@ def solve(directory: Path, left_out: bool, until: datetime, at_once: int) -> Non
             break
         some = {case: wanted[case] for case in wanted if case in have or case in missing}
         if left_out:
-            found = solve_left_out(trial, some)
+            sha256 = solve_left_out(trial, some)
         else:
-            found = solve_trial(Trial(directory, tuple(some), trial.key_sha256))
+            sha256 = solve_trial(Trial(directory, tuple(some), trial.key_sha256))
         now = datetime.now(UTC)
-        print(f"{now:%H:%M:%S} {which}: {len(some)} of {len(wanted)} {found.sha256}", flush=True)
+        print(f"{now:%H:%M:%S} {which}: {len(some)} of {len(wanted)} {sha256}", flush=True)
 
 
 @dataclass(frozen=True)
@@ -428,13 +415,11 @@ def marks(cases: Sequence[Scored]) -> list[Row]:
         ("The same with three modes", few, 0.9, 0.98),
     ]  # fmt: skip
     rows = [(what, *share(flags, low, high)) for what, flags, low, high in asked]
-    samples = (
+    off, ends = corrected_calibration_error(
         np.array([leading(c.first) for c in cases]),
         np.array([float(c.first.right) for c in cases]),
+        np.random.default_rng(0),
     )
-    found = corrected(samples, np.random.default_rng(0))
-    ends = [float(each) for each in np.quantile(found.draws, [0.025, 0.975])]
-    off = found.score.value
     verdict = "met" if off <= 0.05 else "met by the better end" if ends[0] <= 0.05 else "missed"
     said = f"{off:.3f} ({ends[0]:.3f} to {ends[1]:.3f}), {len(cases)} cases"
     if bins_of(len(cases)) < 2:

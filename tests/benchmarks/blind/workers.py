@@ -32,7 +32,7 @@ def workers(
         except BrokenProcessPool:
             raise ShmError(
                 "a process that worked at a case was ended from outside.",
-                remedy="Run the command again, with fewer --jobs if memory ran out.",
+                remedy="Run it again; it goes on where it stopped.",
             ) from None
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
