@@ -9,5 +9,4 @@ from __future__ import annotations
 from shm.simulate.ambient import AmbientPlan, ambient_test
 from shm.simulate.effects import PlantedEffect
 from shm.simulate.hammer import hammer_test
-from shm.simulate.modes import natural_frequencies
 from shm.simulate.state import HammerPlan, HangerState, spread_places_m

@@ -39,8 +39,8 @@ def plant_effects(
 
     Raises UsageError for an effect, place or parameter that does not exist.
     """
-    survey = _survey_everything(conditions, places_m)
     for planted in effects:
+        survey = _survey_everything(planted.at, places_m)
         effect = _find_effect(planted.name)
         variant = _find_variant(effect, planted.at, hanger, survey)
         values = _order_values(planted, effect, hanger, variant)
@@ -58,9 +58,9 @@ def plantable_effects() -> tuple[str, ...]:
     return tuple(name for name in EFFECTS if name not in _OF_READINGS)
 
 
-def _survey_everything(conditions: Conditions, places_m: Sequence[float]) -> Survey:
-    """Return a survey in which every effect can be seen, with these sensors and this test."""
-    tests = tuple(sorted({"", conditions.test}))
+def _survey_everything(at: str, places_m: Sequence[float]) -> Survey:
+    """Return a survey in which every effect can be seen, with these sensors and the named test."""
+    tests = ("", at.removeprefix("test ")) if at.startswith("test ") else ("",)
     return Survey(tests, PLANES, tuple(places_m), True, (0.0, 20.0), (0.5, 1.0), ())
 
 

@@ -50,16 +50,6 @@ class ModelModes:
         return np.asarray(np.concatenate(list(moved), axis=-1) * self.sign)
 
 
-def natural_frequencies(hanger: Hanger, state: HangerState, modes: int) -> FloatArray:
-    """Return the natural frequencies in Hz, (2, modes): transverse, longitudinal.
-
-    Raises UsageError where a compression buckles the hanger.
-    """
-    solved = normal_modes(make_bar(hanger, state), modes)
-    _refuse_buckled(solved, make_bar(hanger, state))
-    return np.asarray(solved.angular_frequency_rad_s / (2 * np.pi))
-
-
 def make_bar(hanger: Hanger, state: HangerState, sensors: int = 0) -> PhysicalHanger:
     """Return the bar of a hanger in a state, with its turnbuckles and no effect."""
     tension_n = np.array([state.tension_n])

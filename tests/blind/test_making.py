@@ -12,19 +12,18 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from shm.blind.layout import read_trial
-from shm.blind.making import case as one_case
-from shm.blind.making import make_trial, of_one_instant, padded
-from shm.blind.making.case import PLANS, WAYS, Draft, Site, make_case, planted_effects
-from shm.blind.sealing import key_of
 from shm.bridge import load_hanger
 from shm.errors import UsageError
 from shm.models.effects import EFFECTS, Survey
 from shm.modes_document import load_modes
-from shm.read import read
 from shm.simulate import HangerState, PlantedEffect
-from shm.values import PLANES, Hanger, PlantedKind, Recording, TrueCase, Way
-from tests.helpers.blind_workers import in_this_process
+from shm.values import PLANES, Hanger
+from tests.benchmarks.blind import case as one_case
+from tests.benchmarks.blind.case import PLANS, Draft, Site, make_case, planted_effects
+from tests.benchmarks.blind.layout import read_trial
+from tests.benchmarks.blind.making import give_one_time, make_trial, pad, seal
+from tests.benchmarks.blind.sealing import key_of
+from tests.benchmarks.blind.truth import PlantedKind, TrueCase
 from tests.helpers.hangers import HANGER_3
 from tests.worlds.simulated.campaign import Campaign, CampaignPlan, campaign_with_truth
 from tests.worlds.simulated.effects.registry import PLANTED, UNLISTED, choices
@@ -33,48 +32,36 @@ from tests.worlds.simulated.reality import drawn_hanger
 KINDS: tuple[PlantedKind, ...] = get_args(PlantedKind)
 
 
-def draft_of(kind: PlantedKind, way: Way = "modes", effects: tuple[str, ...] = ()) -> Draft:
+def draft_of(kind: PlantedKind, effects: tuple[str, ...] = ()) -> Draft:
     usual = ("loose_guide",) if kind == "unknown" else ("point_mass", "bending_stiffness")
-    return Draft(f"{way}-{KINDS.index(kind)}", kind, "two planes", way, 0.6, effects or usual)
+    return Draft(f"c{KINDS.index(kind)}", kind, "two planes", 0.6, effects or usual)
 
 
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, TrueCase]]:
-    """One case of each kind and way, with two planes, as a trial holds them."""
+    """One case of each kind, with two planes, as a trial holds them."""
     folder = tmp_path_factory.mktemp("cases")
-    seeds = np.random.SeedSequence(11).spawn(8)
-    drafts = [draft_of(kind, way) for way in WAYS for kind in KINDS]
+    seeds = np.random.SeedSequence(11).spawn(4)
     truths = {
-        draft.case: make_case(folder / draft.case, draft, seed)
-        for draft, seed in zip(drafts, seeds, strict=True)
+        f"c{number}": make_case(folder / f"c{number}", draft_of(kind), seed)
+        for number, (kind, seed) in enumerate(zip(KINDS, seeds, strict=True))
     }
-    for way in WAYS:
-        padded(folder / case for case, truth in truths.items() if truth.way == way)
-    of_one_instant(folder)
+    pad(folder / case for case in truths)
+    give_one_time(folder)
     return folder, truths
 
 
-@pytest.fixture(scope="module")
-def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A whole trial of two cases, seed 5, made in this process."""
-    folder = tmp_path_factory.mktemp("made") / "trial"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("shm.blind.making.workers", in_this_process)
-        make_trial(folder, folder.with_name("trial.key.json"), 2, seed=5)
-    return folder
-
-
-@pytest.mark.parametrize("way", WAYS)
 def test_whatever_is_planted_files_have_the_same_names_sizes_and_times(
-    cases: tuple[Path, dict[str, TrueCase]], way: Way
+    cases: tuple[Path, dict[str, TrueCase]],
 ) -> None:
     folder, truths = cases
     seen = {
-        tuple((path.name, path.stat().st_size, path.stat().st_mtime) for path in sorted(
-            (folder / case).iterdir()
-        ))
-        for case, truth in truths.items() if truth.way == way
-    }  # fmt: skip
+        tuple(
+            (path.name, path.stat().st_size, path.stat().st_mtime)
+            for path in sorted((folder / case).iterdir())
+        )
+        for case in truths
+    }
     assert len(seen) == 1
 
 
@@ -85,8 +72,7 @@ def test_whatever_is_planted_modal_tests_have_the_same_fields(
     folder, truths = cases
     forms = {
         json.dumps(form_of(json.loads((folder / case / "tests.modes.json").read_text())))
-        for case, truth in truths.items()
-        if truth.way == "modes"
+        for case in truths
     }
     assert len(forms) == 1
 
@@ -98,19 +84,6 @@ def form_of(node: object) -> object:
     if isinstance(node, list):
         return [form_of(each) for each in node]
     return "number" if isinstance(node, float) else node
-
-
-def test_whatever_is_planted_recordings_say_the_same_beside_their_samples(
-    cases: tuple[Path, dict[str, TrueCase]],
-) -> None:
-    folder, truths = cases
-    said = set()
-    for case in (case for case, truth in truths.items() if truth.way == "recordings"):
-        recording = read(folder / case / "t1_2.npz")
-        assert isinstance(recording, Recording)
-        channels = [(c.name, c.plane, math.isnan(c.x_m)) for c in recording.channels[1:]]
-        said.add((str(channels), recording.samples, recording.time, recording.hanger))
-    assert len(said) == 1
 
 
 def test_no_file_holds_a_cause_or_a_true_figure(
@@ -133,7 +106,6 @@ def test_the_key_says_what_was_planted_and_what_is_left_out(
         wanted = {"none": 1, "unknown": 0}.get(truth.kind, len(names))
         assert len(truth.left_out) == wanted
         assert truth.kind in ("none", "unknown") or truth.left_out == names
-        assert len(truth.frequencies) == 16
         assert (truth.size == 0) == (truth.kind == "none")
         if truth.kind == "two":
             assert truth.size >= 8
@@ -143,7 +115,7 @@ def test_the_key_says_what_was_planted_and_what_is_left_out(
 
 def test_sizes_lie_where_the_draft_says(cases: tuple[Path, dict[str, TrueCase]]) -> None:
     """Log-uniform from 1 to 1000: at 0.6 of the range 1000 to the power of 0.6."""
-    one = next(t for t in cases[1].values() if t.kind == "one" and t.way == "modes")
+    one = next(t for t in cases[1].values() if t.kind == "one")
     assert one.size == pytest.approx(1000**0.6, rel=0.1)
 
 
@@ -157,7 +129,7 @@ def test_the_diagnosis_is_given_what_the_owner_knows(
         assert 0.6 < hanger.nominal_tension_n / truth.tension_n < 1.6
         told = json.loads((folder / case / "case.json").read_text())
         assert set(told) == {"schema", "baseline", "seed"}
-    assert len(load_modes(folder / "modes-0" / "tests.modes.json")[0].modes) == 16
+    assert len(load_modes(folder / "c0" / "tests.modes.json")[0].modes) == 16
 
 
 def test_neither_errors_of_sensors_without_shapes_nor_hardening_without_levels_are_planted() -> (
@@ -196,7 +168,7 @@ def test_where_the_bar_as_it_was_made_buckles_other_effects_are_planted(
             raise UsageError("the compression buckles the hanger.")
         return campaign_with_truth(hanger, state, effects, plan, rng)
 
-    monkeypatch.setattr("shm.blind.making.case.campaign_with_truth", buckles_once)
+    monkeypatch.setattr("tests.benchmarks.blind.case.campaign_with_truth", buckles_once)
     truth = make_case(tmp_path / "case", draft_of("one"), np.random.SeedSequence(4))
     (planted,) = truth.effects
     ((before,),) = refused
@@ -256,12 +228,11 @@ def test_any_place_where_an_effect_may_act_is_drawn(
 
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_cases_whatever_the_number_of_processes(
-    trial: Path, tmp_path: Path
+    tmp_path: Path,
 ) -> None:
-    make_trial(tmp_path / "again", tmp_path / "again.key.json", 2, seed=5, jobs=2)
-    assert contents(trial / "cases") == contents(tmp_path / "again" / "cases")
-    first = key_of(read_trial(trial), trial.with_name("trial.key.json"))
-    assert first == key_of(read_trial(tmp_path / "again"), tmp_path / "again.key.json")
+    first, second = (make_trial(tmp_path / str(jobs), 2, seed=5, jobs=jobs) for jobs in (1, 2))
+    assert first == second
+    assert contents(tmp_path / "1") == contents(tmp_path / "2")
 
 
 def contents(folder: Path) -> dict[str, str]:
@@ -272,35 +243,18 @@ def contents(folder: Path) -> dict[str, str]:
     }
 
 
-def test_the_trial_says_nothing_of_its_seed_and_has_no_time_of_making(trial: Path) -> None:
-    assert set(json.loads((trial / "trial.json").read_text())) == {
-        "schema",
-        "cases",
-        "key_sha256",
-    }
-    salt = json.loads(trial.with_name("trial.key.json").read_text())["salt"]
-    everything = [*trial.rglob("*"), trial]
+def test_the_trial_says_nothing_of_its_seed_and_has_no_time_of_making(tmp_path: Path) -> None:
+    truth = make_case(
+        tmp_path / "trial" / "cases" / "c1", draft_of("one"), np.random.SeedSequence(5)
+    )
+    truth = replace(truth, case="c1")
+    sha256 = seal(tmp_path / "trial", tmp_path / "trial.key.json", [truth], 5)
+    trial = read_trial(tmp_path / "trial")
+    assert (trial.cases, trial.key_sha256) == (("c1",), sha256)
+    assert key_of(trial, tmp_path / "trial.key.json") == ((truth,), 5)
+    document = json.loads((tmp_path / "trial" / "trial.json").read_text())
+    assert set(document) == {"schema", "cases", "key_sha256"}
+    salt = json.loads((tmp_path / "trial.key.json").read_text())["salt"]
+    everything = [*(tmp_path / "trial").rglob("*"), tmp_path / "trial"]
     assert len({path.stat().st_mtime for path in everything}) == 1
     assert not [p for p in everything if p.is_file() and salt.encode() in p.read_bytes()]
-
-
-def test_a_trial_is_never_made_over_something(trial: Path, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="not empty"):
-        make_trial(trial, tmp_path / "k.json", 1)
-    (tmp_path / "k.json").write_text("")
-    with pytest.raises(UsageError, match="there is a key"):
-        make_trial(tmp_path / "new", tmp_path / "k.json", 1)
-    with pytest.raises(UsageError, match="Keep it apart"):
-        make_trial(tmp_path / "new", tmp_path / "new" / "deep" / "k.json", 1)
-    assert not (tmp_path / "new").exists()
-
-
-def test_a_stop_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("shm.blind.making.workers", in_this_process)
-
-    def stopped(done: int, of: int) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        make_trial(tmp_path / "new", tmp_path / "k.json", 1, seed=5, ways=["modes"], told=stopped)
-    assert list(tmp_path.iterdir()) == []

@@ -6,5 +6,5 @@ from concurrent.futures import ThreadPoolExecutor
 
 
 def in_this_process(*_: object) -> ThreadPoolExecutor:
-    """In place of `shm.blind.workers.workers`: one thread, and no guard."""
+    """In place of `tests.benchmarks.blind.workers.workers`: one thread, and no guard."""
     return ThreadPoolExecutor(1)

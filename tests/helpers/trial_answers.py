@@ -1,4 +1,4 @@
-"""Truths and answers of a blind trial made by hand: of an oracle, a liar, somebody plausible."""
+"""Truths and answers of a blind trial made by hand."""
 
 from __future__ import annotations
 
@@ -8,21 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from shm.values import (
-    PLANES,
-    Answer,
-    Cause,
-    Diagnosis,
-    EffectEstimate,
-    PlantedKind,
-    Residual,
-    Richness,
-    TensionEstimate,
-    TrueCase,
-    TrueEffect,
-    TrueFrequency,
-    Way,
-)
+from shm.values import Cause, Diagnosis, EffectEstimate, TensionEstimate
+from tests.benchmarks.blind.truth import Answer, PlantedKind, Richness, TrueCase, TrueEffect
 from tests.helpers.diagnoses import a_diagnosis
 
 TENSION_N = 700e3
@@ -32,9 +19,6 @@ RICHNESS: tuple[Richness, ...] = (
     "two planes", "shapes", "everything", "one plane", "known mass", "conditions",
 )  # fmt: skip
 KINDS: tuple[PlantedKind, ...] = ("none", "none", "one", "one", "one", "one", "two", "unknown")
-FREQUENCIES = tuple(
-    TrueFrequency("t1", plane, order, 6.0 * order) for plane in PLANES for order in (1, 2, 3, 4)
-)
 
 
 def a_truth(
@@ -43,7 +27,6 @@ def a_truth(
     size: float = 10.0,
     case: str = "c0001",
     richness: Richness = "everything",
-    way: Way = "modes",
 ) -> TrueCase:
     """`effects` are planted with a mass of 12 kg; nothing is where the kind is `none`."""
     planted = () if kind == "none" else tuple(effects)
@@ -51,11 +34,9 @@ def a_truth(
         case=case,
         kind=kind,
         richness=richness,
-        way=way,
         effects=tuple(TrueEffect(name, "everywhere", {"mass_kg": 12.0}, size) for name in planted),
         size=size if planted else 0.0,
         tension_n=TENSION_N,
-        frequencies=FREQUENCIES,
         left_out={"none": ("sag",), "unknown": ()}.get(kind, planted),
     )
 
@@ -69,15 +50,13 @@ def an_answer(
     groups: Sequence[Sequence[str]] = (),
     left_out: Sequence[str] = (),
     tension: tuple[float, float] = (1.05, 1.0),
-    held_out: tuple[float, float] = (2.0, 0.5),
 ) -> Answer:
-    """Causes with their probabilities; `tension` and `held_out` errors before and after.
+    """Causes with their probabilities.
 
-    `tension` is over the true one with a standard deviation of 1 %, `held_out` in percent.
+    `tension` is over the true one, before and after, with a standard deviation of 1 %.
     """
-    return Answer(case, tuple(left_out), _diagnosis(
-        causes, no_gap, unexplained, groups, left_out, tension, held_out
-    ))  # fmt: skip
+    diagnosis = _diagnosis(causes, no_gap, unexplained, groups, left_out, tension)
+    return Answer(case, tuple(left_out), diagnosis)
 
 
 def _diagnosis(
@@ -87,7 +66,6 @@ def _diagnosis(
     groups: Sequence[Sequence[str]],
     left_out: Sequence[str],
     tension: tuple[float, float],
-    held_out: tuple[float, float],
 ) -> Diagnosis:
     group_of = {name: number for number, group in enumerate(groups) for name in group}
     before, after = (_tension(factor) for factor in tension)
@@ -100,7 +78,6 @@ def _diagnosis(
         no_gap_probability=no_gap,
         unexplained_probability=unexplained,
         left_out=tuple(left_out),
-        where=residuals(*held_out),
         tension_before_n=before,
         tension_after_n=after,
     )
@@ -111,19 +88,6 @@ def a_cause(name: str, probability: float, group: int | None = None) -> Cause:
     return Cause(name, "everywhere", probability, 9.0, 12.0, -3.0, (size,), "normal", group)
 
 
-def residuals(before_percent: float, after_percent: float) -> tuple[Residual, ...]:
-    """Measured 0.1 % too high; held-out predictions that are so many percent too low."""
-    return tuple(
-        Residual(
-            each.plane, each.order, each.test, 1.001 * each.frequency_hz, each.frequency_hz,
-            0.1, 1.0, 0.1,
-            held_out_before_percent=100 * (1.001 / (1 - before_percent / 100) - 1),
-            held_out_after_percent=100 * (1.001 / (1 - after_percent / 100) - 1),
-        )
-        for each in FREQUENCIES
-    )  # fmt: skip
-
-
 def _tension(factor: float) -> TensionEstimate:
     mean, sd = TENSION_N * factor, 0.01 * TENSION_N
     return TensionEstimate(
@@ -132,7 +96,7 @@ def _tension(factor: float) -> TensionEstimate:
 
 
 def some_truths(cases: int = 384, seed: int = 1) -> tuple[TrueCase, ...]:
-    """Every kind and richness in the mix of a trial, both ways, sizes from 1 to 64."""
+    """Every kind and richness in the mix of a trial, sizes from 1 to 64."""
     rng = np.random.default_rng(seed)
     return tuple(_some_truth(number, rng) for number in range(cases))
 
@@ -146,30 +110,7 @@ def _some_truth(number: int, rng: np.random.Generator) -> TrueCase:
         size=float(64 ** rng.random()),
         case=f"c{number + 1:04d}",
         richness=RICHNESS[number // len(KINDS) % len(RICHNESS)],
-        way=("modes", "recordings")[number // (len(KINDS) * len(RICHNESS)) % 2],
     )
-
-
-def oracle(truth: TrueCase, *, left_out: bool = False) -> Answer:
-    """Says the truth and is 0.99 sure of it; one tension interval in twenty is off."""
-    off = 1.03 if int(truth.case[1:]) % 20 == 0 else 1.001
-    answered = partial(
-        an_answer, case=truth.case, left_out=truth.left_out if left_out else (), tension=(1.05, off)
-    )
-    if truth.kind == "none":
-        return answered({"stiff_end_zones": 0.005}, 0.99, 0.005)
-    if truth.kind == "unknown" or left_out:
-        return answered({"stiff_end_zones": 0.005}, 0.005, 0.99)
-    right = " + ".join(effect.name for effect in truth.effects)
-    return answered({right: 0.99, "stiff_end_zones": 0.004}, 0.003, 0.003)
-
-
-def liar(truth: TrueCase, *, left_out: bool = False) -> Answer:
-    """Is sure of what is not so, and the tension goes astray with it."""
-    return an_answer(
-        {"skewed_principal_axes": 0.98}, 0.01, 0.01, case=truth.case, tension=(1.01, 1.2),
-        held_out=(1.0, 3.0), left_out=truth.left_out if left_out else (),
-    )  # fmt: skip
 
 
 def plausible(truth: TrueCase, rng: np.random.Generator, *, left_out: bool = False) -> Answer:
@@ -185,7 +126,6 @@ def plausible(truth: TrueCase, rng: np.random.Generator, *, left_out: bool = Fal
     answered = partial(
         an_answer, case=truth.case, left_out=without,
         tension=(1 + before, 1 + 0.009 * rng.standard_normal()),
-        held_out=(0.5 * truth.size, 0.5 * truth.size * rng.uniform(0.1, 1.02)),
     )  # fmt: skip
     if truth.kind == "none" or rng.random() > 1 / (1 + np.exp(-1.2 * (truth.size - 2.5))):
         return answered({wrong: low}, high, 0.0)

@@ -1,17 +1,14 @@
-"""`shm simulate` writes its formats, with what goes wrong, and listens where nobody hits."""
+"""`shm simulate` writes its formats, plants effects, and listens where nobody hits."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from shm.modes_document import load_modes
 from shm.read import FORMATS, read
-from shm.values import ModalTest, Recording
+from shm.values import Recording
 from shm_cli.main import run
 
 HANGER = """
@@ -54,32 +51,10 @@ def test_sensors_hammer_and_rate_are_those_that_were_asked_for(tmp_path: Path) -
     assert recording.force.x_m == 1.5
 
 
-def test_disturbances_are_planted(tmp_path: Path) -> None:
-    usual = simulated(tmp_path / "a")
-    both = simulated(tmp_path / "b", "--disturbance", "machine", "--disturbance", "no_pre_trigger")
-    assert both.samples < usual.samples
-
-
 def test_nobody_hits_in_wind_and_traffic(tmp_path: Path) -> None:
     recording = simulated(tmp_path, "--ambient", "--seconds", "10")
     assert recording.force is None
     assert recording.duration_s == 10.0
-
-
-def test_a_disturbance_of_hits_does_not_go_with_ambient(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "H.toml").write_text(HANGER)
-    call = ["simulate", "--hanger-file", str(tmp_path / "H.toml"), "--out", str(tmp_path)]
-    assert run([*call, "--ambient", "--disturbance", "mains"]) == 2
-    assert "hammer test" in capsys.readouterr().err
-
-
-def test_the_help_tells_every_disturbance(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["simulate", "--help"]) == 0
-    said = capsys.readouterr().out
-    assert "double_hit" in said
-    assert "outlier_hit" in said
 
 
 def test_an_effect_is_planted_in_a_recording(tmp_path: Path) -> None:
@@ -108,39 +83,6 @@ def test_effects_follow_temperature_and_level(tmp_path: Path) -> None:
     assert hard.force.values.max() == pytest.approx(2 * plain.force.values.max(), rel=1e-2)
 
 
-def campaign(tmp_path: Path, *more: str) -> tuple[tuple[ModalTest, ...], dict[str, Any]]:
-    (tmp_path / "H.toml").write_text(HANGER)
-    out = tmp_path / "out"
-    call = ["simulate", "--hanger-file", str(tmp_path / "H.toml"), "--campaign"]
-    assert run([*call, *more, "--out", str(out)]) == 0
-    truth = json.loads((out / "hanger3.truth.json").read_text())
-    return load_modes(out / "hanger3.modes.json"), truth
-
-
-def test_a_campaign_is_written_with_its_truth_beside_it(tmp_path: Path) -> None:
-    springs = "rotational_end_flexibility:deck end, transverse:log10_k1=6.8"
-    tests, truth = campaign(tmp_path, "--effect", springs, "--tension-n", "650e3", "--seed", "3")
-    assert len(tests) == 6
-    assert len(tests[0].modes) == 16
-    assert truth["effects"] == [
-        {
-            "effect": "rotational_end_flexibility",
-            "at": "deck end, transverse",
-            "parameters": {"log10_k1": 6.8},
-        }
-    ]
-    assert truth["seed"] == 3
-    assert 450e3 < truth["tension_n"] < 900e3
-    assert set(truth["deviations"]) == {"section", "density", "length", "modulus"}
-
-
-def test_a_campaign_may_lack_measurements(tmp_path: Path) -> None:
-    lacking = [word for what in ("shapes", "levels", "mass") for word in ("--lacking", what)]
-    tests, _ = campaign(tmp_path, *lacking, "--lacking", "longitudinal")
-    assert len(tests) == 3
-    assert all(mode.plane == "transverse" and not mode.shape for mode in tests[0].modes)
-
-
 @pytest.mark.parametrize(
     ("more", "said"),
     [
@@ -149,9 +91,6 @@ def test_a_campaign_may_lack_measurements(tmp_path: Path) -> None:
         (("--effect", "point_mass:everywhere:mass_kg=1"), "x_m"),
         (("--effect", "ghost:everywhere:x=1"), "no effect"),
         (("--added-mass", "25"), "KG:X"),
-        (("--lacking", "mass"), "--campaign"),
-        (("--campaign", "--ambient"), "--ambient"),
-        (("--campaign", "--sensors", "6"), "usual places"),
         (("--ambient", "--effect", "point_mass:everywhere:mass_kg=1,x_m=1"), "--ambient"),
     ],
 )

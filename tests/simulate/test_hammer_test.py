@@ -9,10 +9,9 @@ import pytest
 from scipy.signal import find_peaks, hilbert
 
 from shm.errors import UsageError
-from shm.simulate import HammerPlan, HangerState
+from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.values import ComplexArray, FloatArray, Hanger, Recording, Turnbuckle
 from tests.worlds.simulated.elements import natural_frequencies, plane_modes
-from tests.worlds.simulated.hammer import hammer_test
 
 STATE = HangerState(711e3, 1e7, 1e6, 1e7, 1e8)
 QUIET = HammerPlan(

@@ -1,4 +1,4 @@
-"""The second blind trial: what it makes, and how it judges."""
+"""The blind trial: what it makes, and how it judges."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shm.blind.layout import HANGER_FILE, MODES_FILE, key_beside, read_trial
-from shm.blind.scoring.cases import case_scores
-from shm.blind.sealing import key_of
 from shm.bridge import load_hanger
 from shm.modes_document import load_modes
 from tests.benchmarks import blind_families
-from tests.benchmarks import blind_trial_2 as trial
+from tests.benchmarks import blind_trial as trial
+from tests.benchmarks.blind.layout import HANGER_FILE, MODES_FILE, key_beside, read_trial
+from tests.benchmarks.blind.scores import case_scores
+from tests.benchmarks.blind.sealing import key_of
 from tests.helpers.trial_answers import plausible, some_truths
 
 
