@@ -1,13 +1,10 @@
 """Why do model and measurement differ? A lamp of 60 kg hangs on the bar, and nobody noted it.
 
-Modal tests of a campaign are simulated with the lamp. The diagnosis weighs every effect of its
-catalogue, no gap at all, and something that the catalogue lacks.
+The frequencies are those of a bar with the lamp 3.4 m from an end, right to 1e-4. The diagnosis
+weighs every effect of its catalogue, no gap at all, and something that the catalogue lacks.
 """
 
-import numpy as np
-
 import shm
-from shm.simulate import CampaignPlan, HangerState, campaign
 
 hanger = shm.round_bar(
     3,
@@ -17,17 +14,25 @@ hanger = shm.round_bar(
     density_kg_m3=7800,
     nominal_tension_n=711e3,
 )
-lamp = shm.PlantedEffect("point_mass", "everywhere", {"mass_kg": 60.0, "x_m": 3.4})
-plan, rng = CampaignPlan(modes=6), np.random.default_rng(1)
-tests = campaign(hanger, HangerState(711e3), [lamp], plan, rng)
+MEASURED_HZ = {
+    "transverse": (5.437, 12.801, 24.034, 39.080, 55.530, 76.231),
+    "longitudinal": (5.437, 12.801, 24.034, 39.086, 55.526, 76.231),
+}
+modes = tuple(
+    shm.Mode(plane, order, frequency_hz, frequency_sd_hz=2e-4 * frequency_hz)
+    for plane, measured in MEASURED_HZ.items()
+    for order, frequency_hz in enumerate(measured, 1)
+)
 
-diagnosis = shm.diagnose(tests[:1], hanger, draws=200, seed=1)
+diagnosis = shm.diagnose(shm.ModalTest("t1", modes, hanger=3), hanger, draws=200, seed=1)
 cause = diagnosis.leading
 assert cause is not None
 print(diagnosis.summary())
 
 found = {estimate.name: estimate for estimate in cause.parameters}
 assert cause.effect == "point_mass"
-assert abs(found["mass_kg"].mean - 60.0) < 4 * found["mass_kg"].sd
-assert abs(found["x_m"].mean - 3.4) < 0.05
+assert abs(found["mass_kg"].mean - 60.0) < 2 * found["mass_kg"].sd
+# Frequencies of a bar that is held alike at both ends cannot tell one end from the other.
+from_the_nearer_end_m = min(found["x_m"].mean, hanger.length_m - found["x_m"].mean)
+assert abs(from_the_nearer_end_m - 3.4) < 0.05
 assert diagnosis.shrinkage.rms_after_percent < diagnosis.shrinkage.rms_before_percent / 5

@@ -9,12 +9,9 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
-
 import shm
 from shm.documents import dump
 from shm.modes_document import modes_document
-from shm.simulate import CampaignPlan, HangerState, campaign
 from shm_cli.main import run
 
 BRIDGE = """
@@ -34,16 +31,13 @@ elastic_modulus_pa = 200e9
 density_kg_m3 = 7800
 nominal_tension_n = 711e3
 """
-PLAN = CampaignPlan(temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, shapes=False)
 
 
 def measured(hanger: shm.Hanger, tension_n: float, day: int) -> shm.ModalTest:
-    """A modal test of one day, as an identification would give it."""
-    rng = np.random.default_rng(day)
-    plan = replace(PLAN, tension_spread=0.0, as_made=False)
-    (test,) = campaign(hanger, HangerState(tension_n), [], plan, rng)
+    """Simulate and identify the hammer test of one day."""
     time = datetime(2026, 5, 1, 10, tzinfo=UTC) + timedelta(days=day)
-    return replace(test, id=f"day {day}", time=time)
+    recording = shm.simulate(hanger, tension_n=tension_n, time=time, seed=day)
+    return replace(shm.identify(recording, hanger=hanger).test, id=f"day {day}")
 
 
 def main() -> None:

@@ -1,5 +1,6 @@
-"""A hanger in wind and traffic, where nobody hits and no force is recorded: one test, or a bridge
-whose sensors stay for days of wind, traffic, trains and knocks, chunk by chunk.
+"""Simulate hangers in wind and traffic, where nobody hits and no force is recorded.
+
+One test, or a bridge whose sensors stay for days of wind, traffic, trains and knocks, in chunks.
 
 Each mode is driven by independent impulses at the samples, in a test equally strong in all modes:
 white, spatially uncorrelated forces. Sampled so, a mode is an autoregression with the exact pole.
@@ -49,7 +50,7 @@ class AmbientPlan:
 def ambient_test(
     hanger: Hanger, state: HangerState, plan: AmbientPlan, rng: np.random.Generator
 ) -> Recording:
-    """A recording of `acc_1` (transverse), `acc_2` (longitudinal) and so on, without force.
+    """Return a recording of `acc_1` (transverse), `acc_2` (longitudinal) and so on, without force.
 
     Modes up to 0.4 of the sampling rate take part, in steady state from the first sample on.
     Raises UsageError for a state or plan that cannot be.
@@ -71,7 +72,7 @@ def ambient_test(
 
 
 def _as_one_hit(plan: AmbientPlan) -> HammerPlan:
-    """The same sensors and logger over one slot, for what both kinds of test share."""
+    """Return the same sensors and logger over one slot, for what both kinds of test share."""
     return replace(
         HammerPlan(hits=1, sensors_x_m=plan.sensors_x_m, adc_bits=plan.adc_bits),
         seconds_per_hit=plan.seconds,
@@ -85,7 +86,7 @@ def _moved(
     hanger: Hanger, state: HangerState, modes: PlaneModes, plan: HammerPlan,
     rng: np.random.Generator,
 ) -> FloatArray:  # fmt: skip
-    """Accelerations of a plane under forces of any strength, (sensors, samples)."""
+    """Return accelerations of a plane under forces of any strength, (sensors, samples)."""
     highest_hz = _HIGHEST * plan.sampling_rate_hz
     seen = modes.at(np.array(plan.sensor_places_m(hanger)))
     ratio = state.damping_ratio + modes.added_damping_ratio
@@ -155,7 +156,7 @@ class Weather:
         self._seed, self._plan = seed, plan
 
     def temperature_c(self, at: datetime) -> float:
-        """A year of 20 K, a day of 8 K that is warmest at three, and weather of 3 K."""
+        """Return a year of 20 K, a day of 8 K that is warmest at three, and weather of 3 K."""
         day, hour = at.timetuple().tm_yday, at.hour + at.minute / 60
         of_year = -10 * math.cos(2 * math.pi * (day - 20) / 365.25)
         of_day = 4 * math.cos(2 * math.pi * (hour - 15) / 24)
@@ -172,7 +173,7 @@ class Weather:
         return self._events(start, seconds, self._plan.knocks_a_day, 100 + hanger, at_night=True)
 
     def _wander(self, at: datetime, hours: float, kind: int) -> float:
-        """A smooth course of unit variance with knots of chance each so many hours."""
+        """Return a smooth course of unit variance with random knots each so many hours."""
         place = at.timestamp() / (3600 * hours)
         knot, share = int(place // 1), place % 1
         before, after = (self._rng(kind, knot + n).standard_normal() for n in (0, 1))
@@ -200,7 +201,7 @@ def streamed(
     seconds: float,
     seed: int,
 ) -> Iterator[Chunk]:
-    """The chunks that a logger sends from `start` on for so long; the same seed, the same bridge.
+    """Yield the chunks that a logger sends from `start` on; the same seed, the same bridge.
 
     Raises UsageError where the hanger cannot be simulated.
     """
@@ -255,7 +256,7 @@ class _Ringing:
         return out
 
     def _follow(self, at: datetime, weather: Weather) -> None:
-        """The modes of this hour's tension."""
+        """Solve the modes of this hour's tension."""
         hour = at.replace(minute=0, second=0, microsecond=0)
         if hour == self._hour:
             return
@@ -294,7 +295,7 @@ class _Ringing:
         return level
 
     def _rung(self, plane: str, mode: int, pole: complex, pushed: FloatArray) -> FloatArray:
-        """The modal acceleration at each sample; the state goes on with the next chunk."""
+        """Return the modal acceleration at each sample; the state goes on with the next chunk."""
         factor = np.exp(pole / self._stream.sampling_rate_hz)
         before = self._states[plane][mode]
         states, _ = scipy.signal.lfilter(

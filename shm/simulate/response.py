@@ -106,7 +106,7 @@ class Schedule:
 
 
 def draw_schedule(hanger: Hanger, plan: HammerPlan, rng: np.random.Generator) -> Schedule:
-    """The hits of a plan with their scatter of time and level, one a slot."""
+    """Draw the hits of a plan with their scatter of time and level, one a slot."""
     late = rng.uniform(0, 1, plan.hits) * plan.hit_time_scatter_s
     level = plan.peak_force_n * np.exp(plan.peak_force_scatter * rng.standard_normal(plan.hits))
     slots = np.arange(plan.hits) * plan.samples_per_hit / plan.sampling_rate_hz
@@ -121,9 +121,9 @@ def draw_schedule(hanger: Hanger, plan: HammerPlan, rng: np.random.Generator) ->
 
 @dataclass(frozen=True, eq=False)
 class Pulse:
-    """A blow in the record: `fine_n` (samples, steps + 1) holds its force at the steps of each
-    sample interval.
+    """A hit in the record.
 
+    `fine_n` (samples, steps + 1) holds its force at the steps of each sample interval.
     `first` is the sample of the recording at which the first row begins; it may lie before 0.
     """
 
@@ -133,7 +133,7 @@ class Pulse:
 
 
 def pulse_of(strike: Strike, sampling_rate_hz: float) -> Pulse:
-    """The force of a blow, low-passed by the logger."""
+    """Return the force of a hit, low-passed by the logger."""
     steps = _steps(strike.seconds * sampling_rate_hz)
     taps = _filter(steps)
     half = len(taps) // 2
@@ -157,7 +157,7 @@ def samples_of(pulse: Pulse, samples: int) -> tuple[IntArray, FloatArray]:
 
 
 def force_of(pulses: Sequence[Pulse], samples: int) -> FloatArray:
-    """The force over time, (samples,)."""
+    """Return the force over time, (samples,)."""
     force = np.zeros(samples)
     for pulse in pulses:
         places, values = samples_of(pulse, samples)
@@ -233,7 +233,7 @@ def accelerations(
 
 
 def stretches(pulses: Sequence[Pulse], damping_ratio: float, samples: int) -> Sequence[Stretch]:
-    """The recording cut where the damping ratio changes: at the first sample of a pulse."""
+    """Cut the recording where the damping ratio changes: at the first sample of a pulse."""
     begin = min([0, *(pulse.first for pulse in pulses)])
     found: list[Stretch] = [Stretch(begin, samples, damping_ratio, ())]
     for pulse in pulses:
@@ -257,12 +257,12 @@ def poles_of(angular_frequency: FloatArray, damping_ratio: float | FloatArray) -
 def driven_states(
     poles: ComplexArray, modes: PlaneModes, plane: Plane, pulse: Pulse, sampling_rate_hz: float
 ) -> ComplexArray:
-    """What a pulse adds to each mode's state within each sample interval, (samples, modes)."""
+    """Return what a pulse adds to each mode's state within each sample interval, (samples, modes)."""
     return driven_unit_states(poles, pulse, sampling_rate_hz) * _pushed(modes, plane, pulse)
 
 
 def driven_unit_states(poles: ComplexArray, pulse: Pulse, sampling_rate_hz: float) -> ComplexArray:
-    """The same for modes that take the whole force, (samples, modes)."""
+    """Return the same for modes that take the whole force, (samples, modes)."""
     steps = pulse.fine_n.shape[1] - 1
     step_s = 1 / (sampling_rate_hz * steps)
     weights = np.full(steps + 1, 2 * step_s / 3)
@@ -279,7 +279,7 @@ def state_of(
     sampling_rate_hz: float,
     carried: complex = 0j,
 ) -> ComplexArray:
-    """The complex state of one mode over a stretch; `carried` is that just before it.
+    """Return the complex state of one mode over a stretch; `carried` is that just before it.
 
     `driven` holds what each pulse adds to it, (samples of the pulse,).
     """
@@ -321,7 +321,7 @@ class Line:
 
 
 def logged(line: Line, bits: int, rng: np.random.Generator) -> Channel:
-    """A line with white noise, quantised to `bits` over plus and minus its range, clipped."""
+    """Return a line with white noise, quantised to `bits` over plus and minus its range, clipped."""
     codes = 2 ** (bits - 1)
     step = line.full_range / codes
     noisy = line.values + line.noise_sd * rng.standard_normal(len(line.values))

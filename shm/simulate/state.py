@@ -92,7 +92,7 @@ class HammerPlan:
 
 
 def check(hanger: Hanger, state: HangerState, plan: HammerPlan) -> None:
-    """Raises UsageError where a figure of the state or of the plan cannot be."""
+    """Check the figures of a state and of a plan; raises UsageError where one cannot be."""
     _refuse_unless(math.isfinite(state.tension_n), "the tension must be a finite number")
     _refuse_unless(0 <= state.damping_ratio < 1, "the damping ratio must lie from 0 to below 1")
     springs = (state.k1_n_m_rad, state.k2_n_m_rad, state.k3_n_m_rad, state.k4_n_m_rad)

@@ -42,7 +42,6 @@ COMMANDS = {
         "tension_n": "tension_n", "damping": "damping_ratio", "hits": "hits",
         "rate": "sampling_rate_hz", "hammer_x": "hammer_x_m", "amplitude": "amplitude",
         "temperature_c": "temperature_c", "reference_c": "reference_c", "seed": "seed",
-        "disturbances": "disturbances",
     },
 }  # fmt: skip
 FOLLOWED = [

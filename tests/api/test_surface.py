@@ -34,7 +34,7 @@ SIGNATURES = {
     "diagnose_simulator": "(simulator, readings, *, candidates=(), seed=1)",
     "simulate": "(hanger, *, tension_n=None, k1_n_m_rad=inf, k2_n_m_rad=inf, k3_n_m_rad=inf, "
     "k4_n_m_rad=inf, damping_ratio=0.001, hits=5, seconds_per_hit=20.0, sampling_rate_hz=512.0, "
-    "sensors=2, hammer_x_m=nan, acceleration_noise_m_s2=0.02, effects=(), disturbances=(), "
+    "sensors=2, hammer_x_m=nan, acceleration_noise_m_s2=0.02, effects=(), "
     "amplitude=1.0, temperature_c=nan, reference_c=10.0, added_mass=None, time=None, seed=1)",
     "Store": "(workspace)",
     "plot.tension": "(posterior, hanger, baseline=None)",

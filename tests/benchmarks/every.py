@@ -39,14 +39,14 @@ ELSEWHERE = ("every", "peers", "identify_peers")
 # semicolons; FOLDER is one of its own, not there at the first.
 WHOLE = {
     "blind_families": "make FOLDER; solve FOLDER; score FOLDER",
-    "blind_trial_2": "make FOLDER; solve FOLDER; solve FOLDER --left-out; score FOLDER",
+    "blind_trial": "make FOLDER; solve FOLDER; solve FOLDER --left-out; score FOLDER",
     "gap_dynamics": "--seed 300",
 }
 SHORT = {
     "adopted_classes": "100", "alert_delivery": "--alerts 12 --kills 2",
     "any_simulator": "--cases 2", "beam_frequencies": "--repeats 5 --checked 20",
     "blind_families": "make FOLDER --families 1; solve FOLDER; score FOLDER",
-    "blind_trial_2": "make FOLDER --cases 2; solve FOLDER --at-once 1; score FOLDER",
+    "blind_trial": "make FOLDER --cases 2; solve FOLDER --at-once 1; score FOLDER",
     "calibration": "--draws 20 --samples 300", "clock_faults": "1", "copies": "3",
     "damage": "--minutes 0.5", "dashboard": "--hangers 4 --tests 10 --rounds 1 --warm-only",
     "durations": "--repeats 1",

@@ -34,10 +34,14 @@ sys.path[:0] = [str(ROOT)]
 import numpy as np  # noqa: E402
 import sqlalchemy as sa  # noqa: E402
 
+from shm.documents import dump  # noqa: E402
+from shm.modes_document import modes_document  # noqa: E402
+from shm.simulate import HangerState  # noqa: E402
 from shm.store import Workspace  # noqa: E402
 from shm_cli.main import run  # noqa: E402
 from tests.helpers.web_servers import served  # noqa: E402
 from tests.helpers.workspaces import make_workspace, write_test  # noqa: E402
+from tests.worlds.simulated.campaign import CampaignPlan, campaign  # noqa: E402
 
 NEARLY = 1e-9
 SETTINGS = {"models": "beam1,beam2", "samples": 400}
@@ -55,7 +59,7 @@ _OF_THE_CLOCK = {"seconds", "evaluations_per_s", "disk_free_bytes", "duration_s"
 
 def commands(files: Path) -> dict[str, tuple[object, ...]]:
     """What is asked of the bridge, by the name of the answer; all of it once as JSON, too."""
-    modes, hanger = files / "campaign" / "hanger3.modes.json", files / "H.toml"
+    modes, hanger = files / "campaign.modes.json", files / "H.toml"
     (recording,) = (files / "simulated").glob("*.csv")
     return {
         "status": ("status",),
@@ -85,11 +89,14 @@ def answers(folder: Path) -> Iterator[tuple[str, str]]:
     """Name and content of everything that is compared."""
     workspace = make_workspace(folder / "bridge", hangers=(3, 4), settings=SETTINGS)
     hanger = folder / "H.toml"
-    described = (folder / "bridge" / "bridge.toml").read_text()
-    hanger.write_text(re.search(r"\[\[hanger\]\].*?(?=\n\[|\Z)", described, re.S)[0])  # type: ignore[index]
+    bridge = (folder / "bridge" / "bridge.toml").read_text()
+    hanger.write_text(re.search(r"\[\[hanger\]\].*?(?=\n\[|\Z)", bridge, re.S)[0])  # type: ignore[index]
     simulated = ("simulate", "--hanger-file", hanger, "--seed", 7)
     _said(*simulated, "--out", folder / "simulated", "--first", "2026-04-01")
-    _said(*simulated, "--campaign", "--out", folder / "campaign", "--first", "2026-04-01")
+    described = workspace.bridge.hanger(3)
+    state, rng = HangerState(described.nominal_tension_n), np.random.default_rng(7)
+    tests = campaign(described, state, (), CampaignPlan(), rng)
+    (folder / "campaign.modes.json").write_text(dump(modes_document(tests)) + "\n")
     for number, tension in enumerate((1.0, 0.8, 0.8)):
         write_test(workspace.spool / f"t{number}.modes.json", workspace, day=30.0 * number,
                    tension=tension)  # fmt: skip
@@ -103,7 +110,6 @@ def answers(folder: Path) -> Iterator[tuple[str, str]]:
     yield "report.html", _BYTES_OF_PICTURES.sub("<picture>", out.read_text())
     yield from _pages(workspace)
     yield "schema.txt", _schema(workspace)
-    yield from _trial(folder / "trial")
 
 
 def _pages(workspace: Workspace) -> Iterator[tuple[str, str]]:
@@ -126,13 +132,6 @@ def _schema(workspace: Workspace) -> str:
         lines = [line for sql in connection.scalars(query) for line in sql.splitlines()]
     # A table that was made anew has its keys in another order each time.
     return "\n".join(sorted(line.strip().removesuffix(",") for line in lines))
-
-
-def _trial(folder: Path) -> Iterator[tuple[str, str]]:
-    _said("gap", "blind", "make", "--cases", 2, "--seed", 5, folder)
-    _said("gap", "blind", "solve", folder)
-    for path in sorted(folder.rglob("*.json")):
-        yield f"trial-{path.relative_to(folder).as_posix().replace('/', '-')}", path.read_text()
 
 
 def _said(*words: object) -> str:

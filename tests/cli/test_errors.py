@@ -19,7 +19,6 @@ from tests.helpers.command_lines import commands, examples, words_of
 
 NEEDS_NO_WORKSPACE = {
     "init", "demo", "completion", "notices", "settings", "gap effects",
-    "gap blind make",
 }  # fmt: skip
 """They make one, or do without; `doctor` ends with a finding, which is its answer."""
 FINDS = {"doctor"}

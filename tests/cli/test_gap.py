@@ -176,20 +176,3 @@ def test_weak_data_are_answered_first_and_their_weakness_said_next(
     assert lines[0].startswith("Gap diagnosis, Hanger 3: ")
     assert max(map(len, lines)) <= 100
     assert ended.out.index("\n! ") < ended.out.index("CAUSES, LIKELIEST FIRST")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("file", "words"),
-    [("2nd-try.py", "no new effect"), ("sag.py", "no new effect"), ("play.py", "no law")],
-)
-def test_an_effect_is_written_only_of_a_law_and_under_a_name_of_its_own(
-    shm: Shm, modes: Path, hanger_file: Path, tmp_path: Path, file: str, words: str
-) -> None:
-    ended = shm(
-        "gap", "diagnose", modes, "--hanger-file", hanger_file, *SHORT,
-        "--write-effect", tmp_path / file,
-    )  # fmt: skip
-    assert ended.code != 0
-    assert words in ended.err
-    assert not (tmp_path / file).exists()

@@ -106,22 +106,10 @@ def test_writing_commands_say_what_they_did(
     assert of("token", "revoke", "logger") == {"name": "logger", "revoked": True}
     assert of("db", "upgrade")["upgraded"] is True
     simulated = of(
-        "simulate", "--hanger-file", hanger_file, "--campaign", "--out", tmp_path / "made"
+        "simulate", "--hanger-file", hanger_file, "--hits", 1, "--out", tmp_path / "made"
     )
     assert all(Path(file).is_file() for file in simulated["files"])
     write_test(tmp_path / "t1.modes.json", empty)
     of("ingest", tmp_path / "t1.modes.json")
     fetched = of("archive", "fetch", 1)
     assert fetched == {"recording": 1, "file": "t1.modes.json", "from": None}
-
-
-@pytest.mark.slow
-def test_a_blind_trial_is_told_as_json(shm: Shm, tmp_path: Path) -> None:
-    key = tmp_path / "keys" / "trial.json"
-    key.parent.mkdir()
-    ended = shm("gap", "blind", "make", tmp_path / "trial", "--cases", 4, "--way", "modes",
-                "--key", key, "--jobs", 1, "--json")  # fmt: skip
-    assert ended.code == 0, ended.err
-    told = parsed(ended.out)
-    assert told["cases"] == 4
-    assert set(told) == {"directory", "cases", "key", "key_sha256"}

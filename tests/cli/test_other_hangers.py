@@ -103,7 +103,6 @@ def test_a_simulated_bar_with_a_turnbuckle_is_identified_at_its_exact_frequencie
         assert mode["frequency_hz"] == pytest.approx(expected, rel=1e-3)
 
 
-@pytest.mark.parametrize("campaign", [(), ("--campaign",)])
 @pytest.mark.parametrize(
     ("tension", "supports", "said"),
     [
@@ -113,7 +112,7 @@ def test_a_simulated_bar_with_a_turnbuckle_is_identified_at_its_exact_frequencie
     ],
 )
 def test_simulate_refuses_a_bar_that_is_held_otherwise_or_slack(
-    shm: Shm, tmp_path: Path, tension: str, supports: str, said: str, campaign: tuple[str, ...]
+    shm: Shm, tmp_path: Path, tension: str, supports: str, said: str
 ) -> None:
     path = tmp_path / "H.toml"
     path.write_text(
@@ -121,7 +120,7 @@ def test_simulate_refuses_a_bar_that_is_held_otherwise_or_slack(
         f"density_kg_m3 = 7850\nnominal_tension_n = {tension}\n[hanger.supports]\n{supports}\n"
     )
     out = tmp_path / "tests"
-    ended = shm("simulate", "--hanger-file", path, *campaign, "--out", out)
+    ended = shm("simulate", "--hanger-file", path, "--out", out)
     assert ended.code == 2
     assert said in " ".join(ended.err.split())
     assert "[hanger.supports]" in ended.err

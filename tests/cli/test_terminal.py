@@ -51,8 +51,8 @@ LINES = (
 )  # fmt: skip
 # They serve or work for long, or print nobody's words but ours.
 OTHERS = {
-    "daemon", "demo", "web", "gap blind make", "gap blind score", "gap blind solve",
-    "simulate", "completion", "db restore", "gap effects", "notices", "settings",
+    "daemon", "demo", "web", "simulate", "completion", "db restore", "gap effects",
+    "notices", "settings",
 }  # fmt: skip
 
 

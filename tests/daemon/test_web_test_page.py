@@ -21,7 +21,7 @@ import plotly.graph_objects as go  # type: ignore[import-untyped]
 import pytest
 
 from shm.read import write
-from shm.simulate import HammerPlan, HangerState, hammer_test
+from shm.simulate import HammerPlan, HangerState
 from shm.store import Stage, Workspace
 from shm.values import Channel
 from shm_daemon.web.address import name_in
@@ -32,6 +32,7 @@ from shm_daemon.web.modal_test_view import FIGURES, FROM_RECORDS
 from tests.helpers.flows import ingest
 from tests.helpers.web_servers import Served, a_thread, served
 from tests.helpers.workspaces import START, make_workspace, write_test
+from tests.worlds.simulated.hammer import hammer_test
 
 ODD = "odd #1 50% <b>Hänger?"
 MODES_ALONE = "modes/alone"

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from shm.blind.making import make_trial
+
 from shm.errors import BadInput
 from shm.gap.contract import Hypothesis
 from shm.gap.fit import baseline_fit, fitted

@@ -98,7 +98,7 @@ def test_a_name_that_is_taken_is_an_error_that_names_both(
 def test_a_module_that_imports_the_catalogue_is_in_it_from_the_first_import(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As `shm gap diagnose --write-effect` writes it; the catalogue is half made when it loads."""
+    """The catalogue is half made when such a module loads."""
     installed(tmp_path, monkeypatch, "[shm.effects]\nfound = written_of_a_test:EFFECT\n")
     (tmp_path / "written_of_a_test.py").write_text(WRITTEN)
     path = os.pathsep.join(sys.path)

@@ -10,13 +10,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from tests.report.test_trial_page import make_score
+
 from shm.report.contents import HangerReport
 from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_MODAL_TEST, OF_TRIAL
 from shm.report.figures.modal_test_response import Shown
 from tests.report.conftest import bare, hanger, season
 from tests.report.diagnoses import sheet
 from tests.report.test_modal_test_figures import CASES as SHEETS
-from tests.report.test_trial_page import make_score
 
 KEPT = Path(__file__).parent / "data" / "captions.txt"
 

@@ -1,18 +1,13 @@
-"""What a diagnosis leaves open, in words; the law of the unknown as an effect's module."""
+"""What a diagnosis leaves open, in words."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from shm.diagnosis_document import diagnosis_document, diagnosis_of
-from shm.errors import NothingThere
-from shm.models.composed import ComposedHanger
-from shm.models.effects import EFFECTS, Conditions, Effect, Survey, Variant
 from shm.report.contents import DiagnosisSheet
-from shm.report.diagnosis_remainder import effect_file
 from shm.report.diagnosis_report import causes
 from shm.report.diagnosis_summary import consequences, verdict
 from shm.values import Compatibility, LawTerm, Remainder, TensionEstimate
@@ -28,7 +23,6 @@ ABOVE = LawTerm(
 WARM = LawTerm("even", "temperature", ("transverse",), 0.4, 0.1, 5.0, coefficient=2e-4)
 LEFT = Remainder(0.8, 0.3, -2.3, (LONGITUDINAL, ABOVE, WARM), 1.1, 0.4)
 WITH_LAW = replace(UNEXPLAINED, remainder=LEFT)
-ONE_TEST = Survey(("t1",), ("transverse",), (), False, (), (), ())
 KEPT = Compatibility(("no gap", "point_mass"), ("section_loss",), 0.17, 80)
 
 
@@ -75,29 +69,3 @@ def test_the_document_holds_all_of_it() -> None:
     for key in ("not_falsified", "compatibility", "remainder"):
         del document[key]
     assert diagnosis_of(document).remainder is None
-
-
-def test_the_written_effect_does_what_was_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At the sizes found, mode n changes by the sum of the terms; at zero by nothing."""
-    module: dict[str, object] = {}
-    exec(effect_file(WITH_LAW, HANGER, "found_play"), module)
-    effect = module["EFFECT"]
-    assert isinstance(effect, Effect)
-    monkeypatch.setitem(EFFECTS, effect.name, effect)
-    hanger = ComposedHanger(HANGER, "beam1", ((effect.name, Variant()),), ())
-    sizes = [3e-4, 6e-3, 2e-4]
-    own = hanger.parameters[-3:]
-    assert all(e.lower < size < e.upper for e, size in zip(own, sizes, strict=True))
-    rest = [1.0, 0.0, 0.0, 0.0, 0.0]
-    theta = np.array([[*rest, 0.0, 0.0, 0.0], [*rest, 3e-4, -6e-3, 2e-4]])
-    found = hanger.modes(theta, Conditions("t1", 5.0, 1.0), 6, shapes=False).frequency_hz
-    order = np.arange(1.0, 7.0)
-    local = -6e-3 * np.sin(order * np.pi * 3.6 / HANGER.length_m) ** 2
-    change = np.stack([local + 1e-3, local + 3e-4 * order**2])
-    assert np.log(found[1] / found[0]) == pytest.approx(change, abs=1e-9)
-    assert effect.invisible(HANGER, ONE_TEST).startswith("It takes tests at two known temp")
-
-
-def test_without_a_law_no_effect_is_written() -> None:
-    with pytest.raises(NothingThere, match="no law"):
-        effect_file(UNEXPLAINED, HANGER, "nothing")

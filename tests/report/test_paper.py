@@ -20,7 +20,6 @@ from shm.report.hanger_report import hanger_paper
 from shm.report.hanger_status import Status
 from shm.report.modal_test_report import modal_test_paper
 from shm.report.paper import Paper, Part, Table
-from shm.report.trial_report import trial_paper
 from shm.watch.neighbours import HangerShift, bridge_pattern
 from tests.helpers.nouns import a_message
 from tests.helpers.pdf_words import Pdf
@@ -28,7 +27,6 @@ from tests.report.conftest import START
 from tests.report.diagnoses import CASES, sheet
 from tests.report.outline import Outline
 from tests.report.sheets import make_sheet, warned
-from tests.report.test_trial_page import make_score
 
 pytestmark = pytest.mark.usefixtures("unpainted", "drawn_once")
 RENDERERS = ("as_text", "as_html", "as_pdf")
@@ -59,7 +57,6 @@ KINDS: dict[str, Callable[[HangerReport], Paper]] = {
     "bridge": of_bridge,
     "diagnosis": lambda _: diagnosis_paper(sheet("led")),
     "sheet": lambda _: modal_test_paper(warned(make_sheet(hits=6, dropped={2: "double hit"}))),
-    "trial": lambda _: trial_paper(make_score("plausible")),
 }
 
 
