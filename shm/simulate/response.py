@@ -257,7 +257,7 @@ def poles_of(angular_frequency: FloatArray, damping_ratio: float | FloatArray) -
 def driven_states(
     poles: ComplexArray, modes: PlaneModes, plane: Plane, pulse: Pulse, sampling_rate_hz: float
 ) -> ComplexArray:
-    """Return what a pulse adds to each mode's state within each sample interval, (samples, modes)."""
+    """Return what a pulse adds to each mode's state in each sample interval, (samples, modes)."""
     return driven_unit_states(poles, pulse, sampling_rate_hz) * _pushed(modes, plane, pulse)
 
 
@@ -321,7 +321,7 @@ class Line:
 
 
 def logged(line: Line, bits: int, rng: np.random.Generator) -> Channel:
-    """Return a line with white noise, quantised to `bits` over plus and minus its range, clipped."""
+    """Return a line with noise, quantised to `bits` over plus and minus its range, clipped."""
     codes = 2 ** (bits - 1)
     step = line.full_range / codes
     noisy = line.values + line.noise_sd * rng.standard_normal(len(line.values))

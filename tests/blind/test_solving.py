@@ -13,12 +13,14 @@ import pytest
 
 from shm.errors import BadInput, NothingThere, ShmError
 from shm.modes_document import load_modes
+from tests.benchmarks.blind import layout
 from tests.benchmarks.blind.case import Draft, make_case
 from tests.benchmarks.blind.layout import Trial, read_answers, write_answer
 from tests.benchmarks.blind.solving import Refused, guard, solve_left_out, solve_trial, solved
 from tests.benchmarks.blind.truth import Answer
 from tests.benchmarks.blind.workers import workers
 from tests.helpers.blind_workers import in_this_process
+from tests.helpers.imports import imported_names
 
 FAILED = "no test has a mode."
 
@@ -175,3 +177,12 @@ def test_the_second_round_waits_for_the_first_to_be_sealed(trial: Trial) -> None
     again = read_answers(trial.answers("left_out"))
     assert [(each.case, each.left_out) for each in again] == [("c0001", ("sag",))]
     assert len(read_answers(trial.answers("answers"))) == 2
+
+
+def test_who_solves_imports_nothing_of_who_made_it_nor_its_key() -> None:
+    folder = Path(layout.__file__).parent
+    known = tuple(f"tests.benchmarks.blind.{name}." for name in ("layout", "truth", "workers"))
+    for name in ("layout", "solving", "truth", "workers"):
+        found = imported_names(folder / f"{name}.py")
+        foreign = {each for each in found if each.startswith(("tests", "shm.simulate"))}
+        assert not {each for each in foreign if not each.startswith(known)}, name
