@@ -84,11 +84,11 @@ def _estimate_count(bar: PhysicalHanger, frequency_hz: float) -> int:
 
     f_n = n/(2L) sqrt(T/m) sqrt(1 + n^2 pi^2 EI/(T L^2)); end springs only raise it.
     """
-    bending, tension = bar.bending_stiffness_n_m2.min(), bar.tension_n[0]
-    sought = bar.mass_per_length_kg_m[0] * (2 * math.pi * frequency_hz) ** 2
+    bending, tension = float(bar.bending_stiffness_n_m2.min()), float(bar.tension_n[0])
+    sought = float(bar.mass_per_length_kg_m[0]) * (2 * math.pi * frequency_hz) ** 2
     root = math.sqrt(tension**2 + 4 * bending * sought)
     wave_number = math.sqrt((root - tension) / (2 * bending))
-    return math.ceil(wave_number * bar.length_m[0] / math.pi) + 1
+    return math.ceil(wave_number * float(bar.length_m[0]) / math.pi) + 1
 
 
 def _signs(solved: NormalModes, bar: PhysicalHanger, count: int) -> FloatArray:

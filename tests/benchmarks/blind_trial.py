@@ -301,7 +301,7 @@ def solve(directory: Path, left_out: bool, until: datetime, at_once: int) -> Non
     """Few cases at a time, sealed each time, until the clock says."""
     trial = read_trial(directory)
     which: Round = "left_out" if left_out else "answers"
-    wanted = dict.fromkeys(trial.cases, ())
+    wanted: dict[str, tuple[str, ...]] = dict.fromkeys(trial.cases, ())
     if left_out:
         done = answered(trial.answers("answers"))
         truths, _ = key_of(trial, key_beside(directory))

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shm.blind.making import make_trial
 
 from shm.errors import BadInput
 from shm.gap.contract import Hypothesis
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.model_probabilities import CALIBRATION, FILE, Calibration, Provenance, read_calibration
 from shm.models.effects import EFFECTS, Variant
+from tests.benchmarks.blind.making import make_trial
 from tests.benchmarks.gap_calibration import (
     Lesson,
     Ways,
@@ -117,8 +117,8 @@ def _read_back(lessons: list[Lesson], folder: Path) -> Calibration:
 @pytest.mark.trial
 def test_a_trial_teaches_what_the_file_holds(tmp_path: Path) -> None:
     """Two cases, each taken for ten: the file written of them reads back as it was."""
-    made = make_trial(tmp_path / "trial", tmp_path / "key", 2, seed=7, ways=("modes",))
-    lessons = [lesson(tmp_path / "trial" / "cases" / each.case, each) for each in made.cases]
+    made = make_trial(tmp_path / "trial", 2, seed=7)
+    lessons = [lesson(tmp_path / "trial" / "cases" / each.case, each) for each in made]
     assert any(each.own for each in lessons)
     read = _read_back(lessons * 10, tmp_path)
     assert set(read.in_mimicking_pairs) <= set(EFFECTS)

@@ -10,10 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tests.report.test_trial_page import make_score
-
 from shm.report.contents import HangerReport
-from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_MODAL_TEST, OF_TRIAL
+from shm.report.figures.every_figure import OF_DIAGNOSIS, OF_HANGER, OF_MODAL_TEST
 from shm.report.figures.modal_test_response import Shown
 from tests.report.conftest import bare, hanger, season
 from tests.report.diagnoses import sheet
@@ -25,7 +23,6 @@ KEPT = Path(__file__).parent / "data" / "captions.txt"
 def written(season: HangerReport, bare: HangerReport) -> str:
     """Caption and description of each figure of each report, for data that have it."""
     warned, ambient = (Shown.of(SHEETS[case]()) for case in ("warned", "ambient"))
-    score = make_score("plausible")
     shown: list[tuple[str, Any, Any]] = [
         *(("test", each, warned) for each in OF_MODAL_TEST),
         *(("ambient test", each, ambient) for each in OF_MODAL_TEST),
@@ -33,7 +30,6 @@ def written(season: HangerReport, bare: HangerReport) -> str:
           for each in OF_DIAGNOSIS),
         *(("season", each, season) for each in OF_HANGER),
         *(("first test", each, bare) for each in OF_HANGER),
-        *(("trial", each, score) for each in OF_TRIAL),
     ]  # fmt: skip
     return "\n".join(
         line
