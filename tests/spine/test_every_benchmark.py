@@ -9,9 +9,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from shm_cli.main import cli
 from tests.benchmarks import every
 from tests.helpers.makefiles import make_targets
 
@@ -85,7 +83,7 @@ def test_a_missed_mark_is_no_broken_benchmark(program: str, verdict: str, tmp_pa
 
 def test_every_command_of_the_proof_exists() -> None:
     """Scripts take their arguments by the test above."""
-    assert set(PROOF) == {"make", "shm", "python"}
+    assert set(PROOF) == {"make", "python"}
     at_root, here = make_targets(every.ROOT), make_targets(every.HERE)
     for command in PROOF["make"]:
         *options, target = command.split()[1:]
@@ -96,9 +94,6 @@ def test_every_command_of_the_proof_exists() -> None:
     # Of several commands one after the other, `every.py --only NAME` is the one.
     named = {each[3] if "every.py" in each[1] else Path(each[1]).stem for each in words}
     assert named <= set(every.benchmarks())
-    for command in PROOF["shm"]:
-        helped = CliRunner().invoke(cli, [*command.split()[1:], "--help"])
-        assert helped.exit_code == 0, helped.output
 
 
 def test_the_table_of_arguments_names_benchmarks_andmake_targets() -> None:
