@@ -31,7 +31,6 @@ from shm.gap.remainder import remainder_of
 from shm.gap.residuals import compatibility, residuals, sensor_remarks, trends
 from shm.inference.options import Progress, silent
 from shm.models import check_baseline
-from shm.models.as_made import TENSION_RATIO
 from shm.models.effects import check_effect_priors
 from shm.plausibility.bars import Known, doubt_of
 from shm.values import (
@@ -203,14 +202,14 @@ def _states(
                 f"{ENOUGH_EFFECTIVE} are needed. Its probability and its tension are uncertain."
             )
     nominal_n = problem.hanger.nominal_tension_n
+    least, most = problem.hanger.assumptions.tension_ratio.bounds
     if nominal_n and any(
-        each.q95 > 0.98 * TENSION_RATIO[1] * nominal_n
-        or each.q05 < 1.02 * TENSION_RATIO[0] * nominal_n
+        each.q95 > 0.98 * most * nominal_n or each.q05 < 1.02 * least * nominal_n
         for each in tensions_n
     ):
         found.append(
-            f"The tension lies at the bound of its prior ({TENSION_RATIO[0]:g} to "
-            f"{TENSION_RATIO[1]:g} times nominal): check nominal_tension_n and the description."
+            f"The tension lies at the bound of its prior ({least:g} to "
+            f"{most:g} times nominal): check nominal_tension_n and the description."
         )
     best = after or before
     misfit_percent = problem.misfit_percent(best)

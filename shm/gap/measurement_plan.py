@@ -31,7 +31,6 @@ from shm.gap.noise import (
     smooth_over_orders,
 )
 from shm.gap.problem import GapProblem
-from shm.inference.priors import UNKNOWN_READING_SD
 from shm.values import MEASUREMENT_HOURS, NAN, FloatArray, IntArray
 from shm.values.diagnosis import joined, parted
 
@@ -172,7 +171,8 @@ class Race:
             np.append(own, design.size) if each.kind == "lift-off" else own
             for each, own in zip(offered, rows, strict=True)
         ]
-        reading_sd = UNKNOWN_READING_SD if lift_off(problem.design, problem.hanger) else NAN
+        unstated = problem.hanger.assumptions.tension_reading_sd.value
+        reading_sd = unstated if lift_off(problem.design, problem.hanger) else NAN
         errors = Errors.of(problem, fits[0][2][0][1])
         errors = replace(errors, sensors=problem.sensors_of(design))
         first: Foresight | None = None

@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
+from shm.assumptions import Assumptions
 from shm.errors import BadInput
 from shm.gap.contract import Design, Observations
 from shm.inference.priors import reading_sd_n
@@ -65,7 +66,7 @@ def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
     survey = survey_of(tests)
     design = Design(
         survey=survey,
-        conditions=_conditions(tests),
+        conditions=_conditions(tests, hanger.assumptions),
         places_m=survey.sensor_places_m,
         frequency_test=np.array([t for t, _ in modes]),
         frequency_plane=np.array([PLANES.index(mode.plane) for _, mode in modes]),
@@ -132,12 +133,12 @@ def _by_level(test: ModalTest) -> Iterator[ModalTest]:
         yield replace(test, modes=tuple(changing), amplitude=level)
 
 
-def _conditions(tests: Sequence[ModalTest]) -> tuple[Conditions, ...]:
+def _conditions(tests: Sequence[ModalTest], assumed: Assumptions) -> tuple[Conditions, ...]:
     temperature = np.array([test.temperature_c for test in tests], dtype=float)
     known = np.isfinite(temperature)
     reference = temperature[known].mean() if known.any() else 0.0
     shift = np.where(known, temperature - reference, 0.0)
-    shift_read = _tension_shifts(tests)
+    shift_read = _tension_shifts(tests, assumed)
     amplitude = [test.amplitude if np.isfinite(test.amplitude) else 1.0 for test in tests]
     return tuple(
         Conditions(
@@ -147,13 +148,13 @@ def _conditions(tests: Sequence[ModalTest]) -> tuple[Conditions, ...]:
     )
 
 
-def _tension_shifts(tests: Sequence[ModalTest]) -> FloatArray:
+def _tension_shifts(tests: Sequence[ModalTest], assumed: Assumptions) -> FloatArray:
     """Tension read less the mean of all readings, and its standard deviation (tests, 2).
 
     The level of all readings is left open, as is an error that they share. A test without a reading
     is taken at the mean, and where fewer than two tests have one it says nothing.
     """
-    read = np.array([(test.tension_read_n, reading_sd_n(test)) for test in tests])
+    read = np.array([(test.tension_read_n, reading_sd_n(test, assumed)) for test in tests])
     known = np.isfinite(read).all(axis=1)
     if known.sum() < _FEWEST_READINGS:
         return np.zeros((len(tests), 2))

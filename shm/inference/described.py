@@ -30,7 +30,6 @@ from shm.inference.priors import (
 )
 from shm.models.as_made import (
     BENDING,
-    BENDING_FACTOR,
     DENSITY,
     LENGTH,
     MODULUS,
@@ -47,8 +46,8 @@ _C = {SECTION: 0.5, DENSITY: -0.5, MODULUS: 0.5, LENGTH: -2.0, BENDING: 0.5}
 _MASS = {SECTION: 1.0, DENSITY: 1.0, LENGTH: 2.0}
 """ln c and ln(mu l^2) by the deviations."""
 
-_EFFECTIVE_FACTOR = (0.27, 1.15)
-"""Of a strand: the range of the factor, widened by what tolerances and length do to c."""
+_WIDER = (0.9, 1.15)
+"""Numerical: the range of a strand's factor, widened by what tolerances and length do to c."""
 
 _MOST_REDRAWN = 20  # a factor that is inside in half of its draws is left outside by 1e-6 of them
 
@@ -80,9 +79,12 @@ class DescribedCoordinates:
         swaps = [pair for pair in model.swaps if set(pair) <= set(self._felt)]
         self._inner = Coordinates(self.box, swaps, wave_stiffness_n_m_rad)
         round_ = isinstance(model.model, Beam) and self._hanger.plate is None
-        self._details = EndDetails(self.box.names, model.springs, round_, bool(model.swaps))
-        self._tension = TensionPrior(model.bounds[TENSION])
-        self._reading = reading_of(tests)
+        assumed = model.hanger.assumptions
+        self._details = EndDetails(
+            self.box.names, model.springs, round_, bool(model.swaps), assumed
+        )
+        self._tension = TensionPrior(model.bounds[TENSION], assumed)
+        self._reading = reading_of(tests, assumed)
         others = []
         if isinstance(model.model, Beam3) and not model.is_strand:
             others.append(own.row(section=1.0))
@@ -98,7 +100,8 @@ class DescribedCoordinates:
             bounds[LENGTH] = self.model.bounds[LENGTH]
         bounds |= {name: self.model.bounds[name] for name in self._felt}
         if self._slips:
-            bounds[BENDING] = _EFFECTIVE_FACTOR
+            low, high = self.model.bounds[BENDING]
+            bounds[BENDING] = (_WIDER[0] * low, _WIDER[1] * high)
         if SHEAR in self.names:
             bounds[SHEAR] = self.model.bounds[SHEAR]
         lower, upper = np.array(list(bounds.values()), dtype=float).T
@@ -166,7 +169,7 @@ class DescribedCoordinates:
         inner = self._inner.unfold(inner, rng)
         theta = self._assembled(inner, self._drawn(inner, deviates, rng), rng)
         if self._slips:
-            column, (low, high) = self.names.index(BENDING), BENDING_FACTOR
+            column, (low, high) = self.names.index(BENDING), self.model.bounds[BENDING]
             for _ in range(_MOST_REDRAWN):
                 out = np.flatnonzero((theta[:, column] < low) | (theta[:, column] > high))
                 if not len(out):

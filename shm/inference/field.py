@@ -7,7 +7,7 @@
   Log-uniform from 1e-5 to 3e-3 with probability 0.95 (sound hangers that others measured had up to
   5e-4), and up to 0.3 with the rest: a class that does not fit gets a wide posterior, not a sharp
   one at a wrong place. Half of its variance is each mode's own, half goes together in neighbouring
-  orders (`_ALONG_ORDERS`): what a model lacks is seldom of one mode alone, and many modes that lack
+  orders: what a model lacks is seldom of one mode alone, and many modes that lack
   the same thing teach less than as many that err by themselves.
 - A measured tension errs by its own standard deviation and by what frequencies do not see of the
   bar's mass and length.
@@ -26,21 +26,12 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
+from shm.assumptions import Assumptions
 from shm.inference.likelihood import conditions_of, measured, predicted_hz
 from shm.inference.systematic_errors import errors_of_bar, felt_by, loads_of_ends, mean_of_ends
 from shm.models import Model
 from shm.models.as_made import TENSION
 from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
-
-# Assumed of tau (judgement, held against the coverage in tests/benchmarks/worlds.py): from the
-# error of a quartz, by six times what sound hangers showed, to where no tension is given any more.
-# The smaller the usual share, the wider the intervals of hangers that fit.
-TAU_LOWER, TAU_USUAL, TAU_UPPER = 1e-5, 3e-3, 0.3
-_USUAL_SHARE = 0.95
-
-# Assumed: 0.2 is 1/sqrt(2 (n - 1)) of a standard deviation found in n = 13 hits; with 4 degrees of
-# freedom one in a hundred is off by a factor of 2.5 (judgement: bias that hits share).
-_SD_SPREAD, _SD_FREEDOM = 0.2, 4.0
 
 # Numerical: the trapezoidal rule of a bell in steps of h sd is off by 2 exp(-2 pi^2/h^2), 9e-4; a
 # draw is spread over its step, which adds h^2/12 to the variance, 1 %.
@@ -49,22 +40,11 @@ _STEP_IN_SD, _STEP_IN_SD_TO_DRAW = 1.6, 0.4
 # Numerical: log likelihoods within 0.06 of those by 25 nodes where data miss by their own standard
 # deviation; where they miss by more tau takes it up. Cost is in proportion.
 _PHI_NODES = 3
-_TOGETHER = 0.5
-"""Of the variance tau^2, what neighbouring orders share, and half of that in the other plane.
-Judgement: halfway between errors of each mode alone and one error of all."""
-
-_ALONG_ORDERS = 0.7
-"""How far it goes together, in ln of the order: about an octave, ln 2 (correlation 0.6)."""
-
 _BLOCK = 400
 """Misfits taken together, so that intermediate results stay in the processor's cache."""
 
 _UNFELT = 0.1
 """Of the least standard deviation of a datum: loads and tau below that change nothing."""
-
-_UNSTATED_SD = 1e-4
-"""Of a frequency whose error nobody states and no second test shows, as a fraction of it: what a
-hammer test reaches (docs/trials/identification_benchmarks.md)."""
 
 
 class FieldLikelihood:
@@ -79,6 +59,7 @@ class FieldLikelihood:
         self, tests: Sequence[ModalTest], model: Model, reading: tuple[float, float] | None = None
     ):
         self.tests = tuple(tests)
+        self._assumed = model.hanger.assumptions
         self.modes = measured(tests)
         conditions = conditions_of(tests, model)
         keys = [(m.plane, m.order, c) for m, c in zip(self.modes, conditions, strict=True)]
@@ -87,7 +68,7 @@ class FieldLikelihood:
         self._plane = np.array([PLANES.index(plane) for plane, _, _ in distinct])
         self._order = np.array([order - 1 for _, order, _ in distinct])
         self._conditions = [each for _, _, each in distinct]
-        value, sd = _values(self.modes, self.of_mode)
+        value, sd = _values(self.modes, self.of_mode, self._assumed)
         weight = 1 / sd**2
         total = np.bincount(self.of_mode, weight)
         mean = np.bincount(self.of_mode, weight * value) / total
@@ -99,7 +80,7 @@ class FieldLikelihood:
         self.identification_error: FloatArray = np.append(
             total**-0.5, [tension_sd] * self.has_reading
         )
-        self._phi, self._log_phi = _sd_factors(scatter, len(keys) - len(distinct))
+        self._phi, self._log_phi = _sd_factors(scatter, len(keys) - len(distinct), self._assumed)
         jacobian = -float(value.sum()) - len(keys) / 2 * np.log(2 * np.pi)
         of_means = np.log(total**-0.5).sum() - np.log(sd).sum()
         self._constant = jacobian + float(of_means)
@@ -108,6 +89,10 @@ class FieldLikelihood:
         self._together = self._goes_together()
         self._ways: dict[float, tuple[FloatArray, FloatArray]] = {}
         self._shift, self._loads = self._systematic(model, self._typical(model))
+
+    @property
+    def _tau_range(self) -> tuple[float, float]:
+        return self._assumed.model_error.lower, self._assumed.largest_model_error.value
 
     @property
     def highest_order(self) -> int:
@@ -120,7 +105,7 @@ class FieldLikelihood:
         """
         bare = predicted_hz(model, theta, self._conditions, self._plane, self._order)
         ends = model.end_waves(theta, bare, self._plane)
-        return bare * np.exp(mean_of_ends(ends, model.stiff_ends_m))
+        return bare * np.exp(mean_of_ends(ends, model.stiff_ends_m, self._assumed))
 
     def settle(self, model: Model, theta: FloatArray) -> None:
         """Takes what is systematic from `theta` (parameters,): one covariance judges all draws."""
@@ -142,10 +127,10 @@ class FieldLikelihood:
         ends = model.end_waves(theta[None], measured, self._plane)
         places = tuple(sorted({point.x_m for mode in self.modes for point in mode.shape}))
         mean, loads = errors_of_bar(model.hanger, self._order + 1, felt_by(ends[0]), places)
-        loads = np.hstack(
-            [loads, loads_of_ends(ends, model.stiff_ends_m, self._plane, self._order)]
-        )
-        least = max(self.identification_error[: self.frequencies].min(), TAU_LOWER)
+        of_ends = loads_of_ends(ends, model.stiff_ends_m, self._plane, self._order, self._assumed)
+        loads = np.hstack([loads, of_ends])
+        smallest = self._assumed.model_error.lower
+        least = max(self.identification_error[: self.frequencies].min(), smallest)
         left, size, _ = np.linalg.svd(loads, full_matrices=False)
         kept = size > _UNFELT * least
         return np.append(mean, np.zeros(int(self.has_reading))), left[:, kept] * size[kept]
@@ -191,7 +176,7 @@ class FieldLikelihood:
         share = np.exp(joint - scipy.special.logsumexp(joint, axis=1, keepdims=True)).cumsum(axis=1)
         node = (share < rng.random((len(joint), 1))).sum(axis=1).clip(0, len(tau) - 1)
         jitter = np.log(tau[1] / tau[0]) * (rng.random(len(node)) - 0.5)
-        return np.asarray((tau[node] * np.exp(jitter)).clip(TAU_LOWER, TAU_UPPER))
+        return np.asarray((tau[node] * np.exp(jitter)).clip(*self._tau_range))
 
     def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
         """The node of the grid with the largest joint likelihood, shape (n,)."""
@@ -202,7 +187,7 @@ class FieldLikelihood:
         """The misfit's mean square beyond the identification's own, as a tau (n,)."""
         beyond = self.misfit(predicted) ** 2 - self.fit_error**2
         beyond = beyond[:, : self.frequencies]
-        return np.asarray(np.sqrt(beyond.mean(axis=1).clip(TAU_LOWER**2)))
+        return np.asarray(np.sqrt(beyond.mean(axis=1).clip(self._assumed.model_error.lower**2)))
 
     def explained(self, predicted: FloatArray) -> FloatArray:
         """Predictions (n, frequencies) from those of the data (n, data), with the sensors,
@@ -263,33 +248,36 @@ class FieldLikelihood:
     def _goes_together(self) -> FloatArray:
         """Correlation (F, F) of the errors that repeat."""
         log = np.log(self._order + 1.0)
-        apart = np.subtract.outer(log, log) / _ALONG_ORDERS
+        apart = np.subtract.outer(log, log) / self._assumed.model_error_reach.value
         plane = np.equal.outer(self._plane, self._plane)
         own = plane & np.equal.outer(self._order, self._order)
         shared = np.exp(-0.5 * apart**2) * np.where(plane, 1.0, 0.5)
-        return np.asarray((1 - _TOGETHER) * own + _TOGETHER * shared)
+        together = self._assumed.model_error_shared.value
+        return np.asarray((1 - together) * own + together * shared)
 
     def _grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
         """Nodes (k,) of tau, and the log of each one's share of the prior (k, 1)."""
         step = step_in_sd / np.sqrt(2 * self.frequencies)
         least = 2 * _UNFELT * float(self.identification_error[: self.frequencies].min())
-        lowest = np.log(np.clip(least, TAU_LOWER, TAU_USUAL / 10))
-        top, usual = np.log(TAU_UPPER), np.log(TAU_USUAL)
+        smallest, usual = np.log(self._assumed.model_error.bounds)
+        likely = self._assumed.usual_model_error_share.value
+        lowest = np.clip(np.log(least), smallest, max(smallest, usual - np.log(10)))
+        top = np.log(self._assumed.largest_model_error.value)
         nodes = np.linspace(lowest, top, int((top - lowest) / step) + 2)
         density = np.where(
             nodes <= usual,
-            _USUAL_SHARE / (usual - np.log(TAU_LOWER)),
-            (1 - _USUAL_SHARE) / (top - usual),
+            likely / (usual - smallest),
+            (1 - likely) / (top - usual),
         )
         share = density * (nodes[1] - nodes[0])
         # The first stands for all that is too small to be felt.
-        share[0] = share[0] / 2 + _USUAL_SHARE * (lowest - np.log(TAU_LOWER)) / (
-            usual - np.log(TAU_LOWER)
-        )
+        share[0] = share[0] / 2 + likely * (lowest - smallest) / (usual - smallest)
         return np.exp(nodes), np.log(share / share.sum())[:, None]
 
 
-def _values(modes: Sequence[Mode], of_mode: IntArray) -> tuple[FloatArray, FloatArray]:
+def _values(
+    modes: Sequence[Mode], of_mode: IntArray, assumed: Assumptions
+) -> tuple[FloatArray, FloatArray]:
     """Logarithms of frequencies (modes,) and their fractional standard deviations.
 
     Where none is stated, the scatter between tests of one mode stands in, if there are several.
@@ -302,16 +290,20 @@ def _values(modes: Sequence[Mode], of_mode: IntArray) -> tuple[FloatArray, Float
     count = np.bincount(of_mode)
     mean = np.bincount(of_mode, value) / count
     free = len(modes) - len(count)
-    scatter = np.sqrt(((value - mean[of_mode]) ** 2).sum() / free) if free > 1 else _UNSTATED_SD
-    return value, np.where(known, sd, max(float(scatter), TAU_LOWER))
+    unstated = assumed.unstated_frequency_sd.value
+    scatter = np.sqrt(((value - mean[of_mode]) ** 2).sum() / free) if free > 1 else unstated
+    return value, np.where(known, sd, max(float(scatter), assumed.model_error.lower))
 
 
-def _sd_factors(scatter: float, freedom: int) -> tuple[FloatArray, FloatArray]:
+def _sd_factors(
+    scatter: float, freedom: int, assumed: Assumptions
+) -> tuple[FloatArray, FloatArray]:
     """Equally probable values of phi (k,), and log weights (k,) that hold what the tests' scatter
     about their means, `scatter` in stated variances with its degrees of `freedom`, says of them.
     """
     grid = np.linspace(-1.5, 2.5, 401)
-    log = -(_SD_FREEDOM + 1) / 2 * np.log1p((grid / _SD_SPREAD) ** 2 / _SD_FREEDOM)
+    spread, tails = assumed.stated_sd_log_sd.value, assumed.stated_sd_freedom.value
+    log = -(tails + 1) / 2 * np.log1p((grid / spread) ** 2 / tails)
     prior = log - scipy.special.logsumexp(log)
     joint = prior - freedom * grid - 0.5 * scatter * np.exp(-2 * grid)
     total = float(scipy.special.logsumexp(joint))

@@ -13,24 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, RESTRAINT, SECTION, AsMade
+from shm.assumptions import DEFAULTS, Assumptions
+from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, SECTION, AsMade
 from shm.values import FloatArray, Hanger, IntArray, ModalTest
 
 DEVIATIONS = (SECTION, DENSITY, MODULUS)
 
-DECADES = math.log10(RESTRAINT[1] / RESTRAINT[0])
-"""Of end stiffness, over which its prior is even."""
-_STIFFEST = 1 / DECADES
-
-# Assumed (judgement), as shares of these decades: 0.4 decades, a factor of 2.5, between two joints
-# of one drawing, and 0.02, 5 %, between the two axes of a round end.
-_ALIKE_WITHIN = 0.09
-_SAME_WITHIN = 0.02 / DECADES
-
-_UNSTATED_BENDING_SD = 0.3  # of the logarithm of a factor anywhere from 0.3 to 1: 0.2 of 0.65
-
-# Numerical: steps of 0.35 `_ALIKE_WITHIN`, for which sums over bells of four springs are exact.
-_MIDDLES = 32
+# Numerical: steps in widths of the bell, for which sums over bells of four springs are exact.
+_STEP_OF_MIDDLES = 0.35
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,15 +45,12 @@ class TensionReading:
     """As a fraction of it."""
 
 
-UNKNOWN_READING_SD = 0.03
-"""Of a reading whose standard deviation is not stated: lift-offs repeat within 2 to 5 % (fib
-Bulletin 30, Acceptance of stay cable systems)."""
-
-
-def reading_of(tests: Sequence[ModalTest]) -> TensionReading | None:
+def reading_of(
+    tests: Sequence[ModalTest], assumed: Assumptions = DEFAULTS
+) -> TensionReading | None:
     """The readings of all tests as one, weighted by their precision; None where there is none."""
     values = [
-        (test.tension_read_n, reading_sd_n(test))
+        (test.tension_read_n, reading_sd_n(test, assumed))
         for test in tests
         if math.isfinite(test.tension_read_n)
     ]
@@ -75,10 +62,11 @@ def reading_of(tests: Sequence[ModalTest]) -> TensionReading | None:
     return TensionReading(mean, float(weight.sum() ** -0.5) / mean)
 
 
-def reading_sd_n(test: ModalTest) -> float:
+def reading_sd_n(test: ModalTest, assumed: Assumptions = DEFAULTS) -> float:
     """Standard deviation of a test's reading (N): as stated, else that of an ordinary lift-off."""
     known = math.isfinite(test.tension_read_sd_n) and test.tension_read_sd_n > 0
-    return test.tension_read_sd_n if known else UNKNOWN_READING_SD * test.tension_read_n
+    unstated_n = assumed.tension_reading_sd.value * test.tension_read_n
+    return test.tension_read_sd_n if known else unstated_n
 
 
 class Deviations:
@@ -96,7 +84,8 @@ class Deviations:
         stated = model.is_strand and math.isfinite(scatter.bending_factor)
         taught = calibration is not None and BENDING in calibration.names
         if stated or (model.is_strand and taught):
-            sds[BENDING] = scatter.bending_factor if stated else _UNSTATED_BENDING_SD
+            unstated = model.hanger.assumptions.strand_bending_log_sd.value
+            sds[BENDING] = scatter.bending_factor if stated else unstated
         self.names = tuple(sds)
         self.mean: FloatArray = np.zeros(len(self.names))
         covariance = np.diag(np.array(list(sds.values())) ** 2)
@@ -128,31 +117,27 @@ def _root(covariance: FloatArray) -> FloatArray:
     return np.asarray(vectors * np.sqrt(values.clip(0)))
 
 
-# Assumed: nine of ten hangers about as designed, a factor of 1.4 either way (judgement: lift-offs
-# differ from the drawings by 5 to 30 %); of the tenth nothing is known. Where few modes of a short
-# stiff bar hardly tell the tension, a uniform logarithm alone crowds its posterior at a slack bar.
-_AS_DESIGNED, _DESIGN_SD = 0.9, math.log(1.4)
-
-
 class TensionPrior:
     """ln of the tension over the nominal one, between `bounds`: about as designed, or anything."""
 
-    def __init__(self, bounds: tuple[float, float]):
+    def __init__(self, bounds: tuple[float, float], assumed: Assumptions = DEFAULTS):
         self._low, self._high = (math.log(each) for each in bounds)
+        self._designed = assumed.as_designed_share.value
+        self._sd = assumed.as_designed_log_sd.value
 
     def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Logarithms (n,)."""
         found = rng.uniform(self._low, self._high, n)
-        designed = _DESIGN_SD * rng.standard_normal(n)
-        kept = (rng.random(n) < _AS_DESIGNED) & (designed > self._low) & (designed < self._high)
+        designed = self._sd * rng.standard_normal(n)
+        kept = (rng.random(n) < self._designed) & (designed > self._low) & (designed < self._high)
         return np.where(kept, designed, found)
 
     def log_density(self, log_ratio: FloatArray) -> FloatArray:
         """Log density (n,) of logarithms (n,), over that of a uniform one."""
-        normal = np.exp(-0.5 * (log_ratio / _DESIGN_SD) ** 2) / (_DESIGN_SD * math.sqrt(2 * np.pi))
-        inside = np.diff(scipy.special.ndtr(np.array([self._low, self._high]) / _DESIGN_SD))
-        anything = 1 - _AS_DESIGNED * float(inside[0])
-        return np.log(anything + _AS_DESIGNED * (self._high - self._low) * normal)
+        normal = np.exp(-0.5 * (log_ratio / self._sd) ** 2) / (self._sd * math.sqrt(2 * np.pi))
+        inside = np.diff(scipy.special.ndtr(np.array([self._low, self._high]) / self._sd))
+        anything = 1 - self._designed * float(inside[0])
+        return np.log(anything + self._designed * (self._high - self._low) * normal)
 
 
 class EndDetails:
@@ -162,7 +147,7 @@ class EndDetails:
     made to clamp (welded, or a nut on a thick plate): all in the stiffest decade; or round (a nut,
     a socket, a weld all around), the same in both planes, each end by itself or both alike. As
     probable each, every spring's log10 k uniform over its range, or over that decade; alike is
-    within `_ALIKE_WITHIN` of the range, 0.4 decades, the same within `_SAME_WITHIN`, 0.02 decades.
+    within `similar_ends_decades`, the same within `round_end_decades`.
     `columns` are those of the box's `names`. Where the ends are `exchanged`, frequencies do not
     tell which spring of a plane stands at which end: `round_ends` holds then either way.
     """
@@ -173,7 +158,12 @@ class EndDetails:
         springs: Sequence[str],
         may_be_round: bool = True,
         exchanged: bool = True,
+        assumed: Assumptions = DEFAULTS,
     ):
+        decades = assumed.end_restraint.decades
+        self._stiffest = 1 / decades
+        self._similar_within = assumed.similar_ends_decades.value / decades
+        self._same_within = assumed.round_end_decades.value / decades
         self.columns: IntArray = np.array(
             [k for k, name in enumerate(names) if name in springs], dtype=int
         )
@@ -202,63 +192,64 @@ class EndDetails:
         shares = rng.random((n, len(self.columns)))
         kind = rng.integers(self._count, size=n)
         stiff = kind == len(self._kinds)
-        shares[stiff] = 1 - _STIFFEST * shares[stiff]
+        shares[stiff] = 1 - self._stiffest * shares[stiff]
         for index, groups in enumerate(self._kinds[1:], start=1):
             rows = np.flatnonzero(kind == index)
             for group in groups:
-                shares[np.ix_(rows, group)] = _about(rng.random((len(rows), 1)), len(group), rng)
+                middles = rng.random((len(rows), 1))
+                similar = _about(middles, len(group), rng, self._similar_within)
+                shares[np.ix_(rows, group)] = similar
         for alike in (False, True):
             rows = np.flatnonzero(kind == len(self._kinds) + 1 + alike)
             middles = rng.random((len(rows), 2))
             if alike:
-                middles = _about(middles[:, :1], 2, rng)
+                middles = _about(middles[:, :1], 2, rng, self._similar_within)
             way = rng.integers(max(len(self._ends), 1), size=len(rows))
             for index, ends in enumerate(self._ends):
                 own = way == index
                 for end, middle in zip(ends, middles[own].T, strict=True):
-                    found = _about(middle[:, None], len(end), rng, _SAME_WITHIN)
+                    found = _about(middle[:, None], len(end), rng, self._same_within)
                     shares[np.ix_(rows[own], end)] = found
         return shares
 
     def log_density(self, shares: FloatArray) -> FloatArray:
         """Log density (n,) of shares (n, springs), over that of independent springs."""
-        own = _of_middles(shares)
+        own = _of_middles(shares, self._similar_within)
         total = np.ones(len(shares))
         for groups in self._kinds[1:]:
             parts = [own[:, group].prod(axis=1).mean(axis=1) for group in groups]
             total = total + np.prod(parts, axis=0)
-        stiff = (shares > 1 - _STIFFEST).all(axis=1)
-        total = total + stiff * _STIFFEST ** -float(shares.shape[1])
+        stiff = (shares > 1 - self._stiffest).all(axis=1)
+        total = total + stiff * self._stiffest ** -float(shares.shape[1])
         for ends in self._ends:
-            same = np.prod([_same(shares[:, end]) for end in ends], axis=0)
+            same = np.prod([_same(shares[:, end], self._same_within) for end in ends], axis=0)
             middles = np.stack([shares[:, end].mean(axis=1) for end in ends], axis=1)
-            alike = _of_middles(middles).prod(axis=1).mean(axis=1)
+            alike = _of_middles(middles, self._similar_within).prod(axis=1).mean(axis=1)
             total = total + same * (1 + alike) / len(self._ends)
         return np.asarray(np.log(total / self._count))
 
 
-def _about(
-    middle: FloatArray, count: int, rng: np.random.Generator, within: float = _ALIKE_WITHIN
-) -> FloatArray:
+def _about(middle: FloatArray, count: int, rng: np.random.Generator, within: float) -> FloatArray:
     """Shares (n, count) about a middle (n, 1), reflected at the ends of the range."""
     shares = middle + within * rng.standard_normal((len(middle), count))
     folded = np.abs(shares) % 2
     return np.where(folded > 1, 2 - folded, folded)
 
 
-def _of_middles(shares: FloatArray) -> FloatArray:
-    """Density of shares (n, k) about each of `_MIDDLES` middles (n, k, middles)."""
-    middles = (np.arange(_MIDDLES) + 0.5) / _MIDDLES
+def _of_middles(shares: FloatArray, within: float) -> FloatArray:
+    """Density of shares (n, k) about each of evenly spread middles (n, k, middles)."""
+    count = math.ceil(1 / (_STEP_OF_MIDDLES * within))
+    middles = (np.arange(count) + 0.5) / count
     images = np.stack([shares, -shares, 2 - shares])
-    away = (images[..., None] - middles) / _ALIKE_WITHIN
-    return np.asarray(np.exp(-0.5 * away**2).sum(axis=0) / (_ALIKE_WITHIN * math.sqrt(2 * math.pi)))
+    away = (images[..., None] - middles) / within
+    return np.asarray(np.exp(-0.5 * away**2).sum(axis=0) / (within * math.sqrt(2 * math.pi)))
 
 
-def _same(pair: FloatArray) -> FloatArray:
+def _same(pair: FloatArray, within: float) -> FloatArray:
     """Density (n,) of two shares (n, 2) that are the same, whatever they are."""
     one, other = pair.T
-    away = np.stack([one - other, one + other, 2 - one - other]) / (math.sqrt(2) * _SAME_WITHIN)
-    return np.asarray(np.exp(-0.5 * away**2).sum(axis=0) / (_SAME_WITHIN * math.sqrt(4 * math.pi)))
+    away = np.stack([one - other, one + other, 2 - one - other]) / (math.sqrt(2) * within)
+    return np.asarray(np.exp(-0.5 * away**2).sum(axis=0) / (within * math.sqrt(4 * math.pi)))
 
 
 def calibration_of(names: Sequence[str], samples: FloatArray, hanger: Hanger) -> Calibration:

@@ -122,7 +122,7 @@ def _likelihood(
 ) -> Likelihood | FieldLikelihood:
     if model.priors == THESIS:
         return Likelihood(tests)
-    reading = reading_of(tests)
+    reading = reading_of(tests, model.hanger.assumptions)
     if reading is None:
         return FieldLikelihood(tests, model)
     sd = reading.sd

@@ -25,7 +25,7 @@ from shm.inference.mixture import normalised
 from shm.inference.options import Progress, UpdateOptions, silent
 from shm.inference.other_answers import reading_off_sd
 from shm.inference.outcome import posterior_of
-from shm.inference.priors import DECADES, reading_of
+from shm.inference.priors import reading_of
 from shm.inference.problem import Problem
 from shm.inference.search import Anchors, WarmStart, carried, search, warm_start_from
 from shm.inference.tmcmc import sample
@@ -77,7 +77,7 @@ def _off_the_reading(
     tests: Sequence[ModalTest], model: Model, options: UpdateOptions, rng: np.random.Generator
 ) -> float:
     """How far a tension that was read is off what the frequencies alone say; NaN without one."""
-    reading = reading_of(tests)
+    reading = reading_of(tests, model.hanger.assumptions)
     if reading is None or model.priors == THESIS:
         return NAN
     unread = [replace(each, tension_read_n=NAN, tension_read_sd_n=NAN) for each in tests]
@@ -189,13 +189,13 @@ def _check_priors(class_priors: Mapping[str, float], names: Sequence[str]) -> No
 def _log_prior(model: Model, tests: Sequence[ModalTest]) -> float:
     """Log of how probable a class is before any data, beside one of springs.
 
-    No end is perfectly clamped: a rigid end stands for springs in the decade beyond `RESTRAINT`, as
+    No end is perfectly clamped: a rigid end stands for springs in the decade beyond the range, as
     probable as any decade within it.
     """
     if not isinstance(model, AsMade) or model.springs:
         return 0.0
     planes = {mode.plane for test in tests for mode in test.regular_modes}
-    one = 1 / (1 + DECADES)
+    one = 1 / (1 + model.hanger.assumptions.end_restraint.decades)
     # Springs each by itself, all alike, alike in each plane, or made to clamp (`EndDetails`): as
     # many of these are beyond the stiffest decade as are in it. Round ends each by itself or alike.
     shares = [one ** (2 * len(planes)), one, one ** len(planes), 0.5]

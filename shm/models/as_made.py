@@ -31,19 +31,6 @@ TENSION, LENGTH = "theta_F", "theta_L"
 SECTION, DENSITY, MODULUS = "section", "density", "modulus"
 BENDING, SHEAR = "bending_factor", "shear_share"
 
-TENSION_RATIO = (0.02, 5.0)
-"""Of the nominal tension: from slack to what no hanger was designed for."""
-
-RESTRAINT = (0.03, 1000.0)
-"""k L/EI of an end spring: from a pin to a clamp. Below 0.03 a first frequency is within 0.3 % of
-the pinned bar's; above 1000 within 0.2 % of the clamped one's."""
-
-BENDING_FACTOR = (0.3, 1.0)
-"""Of a strand at the small amplitudes of a test (Papailiou 1997, IEEE Trans. Power Delivery 12)."""
-
-SHEAR_SHARE = (0.0, 1.5)
-"""Of a strand, over a solid bar's shear: none, as of wires that each bend alone, to more."""
-
 _MOST_SD = 6.0  # a normal distribution has 2e-9 beyond
 
 
@@ -64,7 +51,7 @@ class AsMade(Model):
         if TENSION in model.bounds and not isinstance(model, Beam):
             # A reduced basis is made for the tensions that its class considers.
             model = copy(model)
-            model.bounds = {**model.bounds, TENSION: TENSION_RATIO}
+            model.bounds = {**model.bounds, TENSION: model.hanger.assumptions.tension_ratio.bounds}
         self.model = model
         self.name, self.title, self.units = model.name, model.title, model.units
         hanger = self.hanger
@@ -73,15 +60,16 @@ class AsMade(Model):
         own = [name for name in model.parameter_names if name not in (TENSION, LENGTH)]
         self.springs = tuple(own)
         self.length_is_open = hanger.plate is not None and isinstance(model, Beam)
-        bounds = {TENSION: TENSION_RATIO, LENGTH: self._length_range()}
+        assumed = hanger.assumptions
+        bounds = {TENSION: assumed.tension_ratio.bounds, LENGTH: self._length_range()}
         bounds |= {name: self.spring_range(name) for name in own}
         scatter = hanger.scatter
         deviations = {SECTION: scatter.section, DENSITY: scatter.density, MODULUS: scatter.modulus}
         bounds |= {name: (-_MOST_SD * sd, _MOST_SD * sd) for name, sd in deviations.items()}
         if self.is_strand:
-            bounds[BENDING] = BENDING_FACTOR
+            bounds[BENDING] = assumed.strand_bending_factor.bounds
             if isinstance(model, Beam3):
-                bounds[SHEAR] = SHEAR_SHARE
+                bounds[SHEAR] = assumed.strand_shear_share.bounds
         self.bounds = bounds
 
     @property
@@ -98,7 +86,8 @@ class AsMade(Model):
         if not isinstance(self.model, Beam):
             return self.model.bounds[name]  # per node of the face: data of hanger 3's plates
         unit = self.hanger.bending_stiffness_n_m2 / self.hanger.length_m
-        return math.log10(RESTRAINT[0] * unit), math.log10(RESTRAINT[1] * unit)
+        pinned, clamped = self.hanger.assumptions.end_restraint.bounds
+        return math.log10(pinned * unit), math.log10(clamped * unit)
 
     def _length_range(self) -> tuple[float, float]:
         plate = self.hanger.plate

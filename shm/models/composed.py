@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from shm.errors import UsageError
-from shm.models.as_made import TENSION_RATIO, AsMade
+from shm.models.as_made import AsMade
 from shm.models.base import Model
 from shm.models.beam import Beam, Beam3
 from shm.models.effects import EFFECTS, Conditions, Parameter, Variant, parameters_of
@@ -220,7 +220,8 @@ class Baseline:
             return Deviation(key, "1", 1 - known, 1 + known, NAN, reason)
         reason = "the prior of the hanger's description"
         if key == _TENSION:
-            return Parameter(key, "1", *TENSION_RATIO, NAN, reason, spread="logarithmic")
+            lower, upper = self.hanger.assumptions.tension_ratio.bounds
+            return Parameter(key, "1", lower, upper, NAN, reason, spread="logarithmic")
         return Parameter(key, self._model.units.get(key, ""), lower, upper, NAN, reason)
 
     def _whole(self, theta: FloatArray) -> FloatArray:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import Literal, TypeAlias
 
+from shm.assumptions import DEFAULTS, Assumptions
 from shm.values.kinds import NAN
 from shm.values.showing import Shown
 
@@ -62,37 +63,44 @@ class Turnbuckle:
 class Scatter:
     """Standard deviations, as fractions, by which a bar as made differs from its description.
 
-    Defaults: `section` (area) 1 %: EN 10060 allows a hot-rolled round of 50 mm +-0.8 mm, 3.2 % of
-    the area, which three standard deviations make 1.1 %. `density` 0.3 %: by their composition
-    carbon steels lie between 7,830 and 7,870 kg/m3 (ASM Handbook 1). `length` 0.05 %: a tape of
-    class II (OIML R 35) and its reading between two ends, 5 mm in 10 m. `modulus` 1.5 %: between
-    heats of one kind of steel, half of the 3 % that the JCSS Probabilistic Model Code (3.2) gives
-    with the tests' own scatter. `along` is by which the section varies along the bar about its own
-    mean.
+    The defaults and their reasons are rows of `shm.assumptions`. `section` is that of the area;
+    `along` is by which the section varies along the bar about its own mean.
     `tension` is how far the tension may be from the nominal one where that was weighed or measured;
     infinite where the nominal one says next to nothing. `bending_factor` is that of a strand's
-    stated `bending_stiffness_factor`; NaN: anything from 0.3 to 1 (Papailiou 1997).
+    stated `bending_stiffness_factor`; NaN: anything in the assumed range.
     `sensor_gain` (a fraction), `sensor_place_m` and `sensor_turn_deg` are what sensors err by in
-    all tests: three to five times what care gives (0.5 % by ISO 16063-21, a tape, a bubble level),
-    for with less, careless mounting passes for skewed axes or a mass, and with more these hide.
-    `sensor_cross_axis` is what of one axis another reads, each axis on its own: about half of the
-    3 to 5 % that data sheets give as the most (PCB 352C33: 5 %).
+    all tests. `sensor_cross_axis` is what of one axis another reads, each axis on its own.
     `effective_length` is by which the length that swings may differ from the taped one; NaN: by
     the tape's own error, and what `Hanger.fittings_m` leave open.
     """
 
-    section: float = 0.01
-    density: float = 0.003
-    length: float = 0.0005
-    modulus: float = 0.015
-    along: float = 0.001
+    section: float = DEFAULTS.section_sd.value
+    density: float = DEFAULTS.density_sd.value
+    length: float = DEFAULTS.length_sd.value
+    modulus: float = DEFAULTS.modulus_sd.value
+    along: float = DEFAULTS.section_along_sd.value
     tension: float = math.inf
     bending_factor: float = NAN
     effective_length: float = NAN
-    sensor_gain: float = 0.015
-    sensor_place_m: float = 0.01
-    sensor_turn_deg: float = 1.5
-    sensor_cross_axis: float = 0.02
+    sensor_gain: float = DEFAULTS.sensor_gain_sd.value
+    sensor_place_m: float = DEFAULTS.sensor_place_sd_m.value
+    sensor_turn_deg: float = DEFAULTS.sensor_turn_sd_deg.value
+    sensor_cross_axis: float = DEFAULTS.sensor_cross_axis_sd.value
+
+    @classmethod
+    def of(cls, assumed: Assumptions) -> Scatter:
+        """Return the scatter of a bar and of sensors of which the description states none."""
+        return cls(
+            section=assumed.section_sd.value,
+            density=assumed.density_sd.value,
+            length=assumed.length_sd.value,
+            modulus=assumed.modulus_sd.value,
+            along=assumed.section_along_sd.value,
+            sensor_gain=assumed.sensor_gain_sd.value,
+            sensor_place_m=assumed.sensor_place_sd_m.value,
+            sensor_turn_deg=assumed.sensor_turn_sd_deg.value,
+            sensor_cross_axis=assumed.sensor_cross_axis_sd.value,
+        )
 
     @property
     def sensor_turn(self) -> float:
@@ -189,6 +197,7 @@ class Hanger(Shown):
     the arch end: so far the length that swings is open. `models` names the model classes that
     the owner admits; empty: all that the settings name. `effect_priors` replace ranges of the
     catalogue of effects. A bar with a nominal tension of 0 carries none. `survey` is for reports.
+    `assumptions` is what is taken of it, of sensors and of measurements before any data.
     """
 
     id: int
@@ -201,7 +210,7 @@ class Hanger(Shown):
     name: str = ""
     thresholds: Thresholds = field(default_factory=Thresholds)
     diameter_m: float = NAN
-    poissons_ratio: float = 0.3
+    poissons_ratio: float = DEFAULTS.poissons_ratio.value
     bending_stiffness_factor: float = 1.0
     plate: EndPlate | None = None
     turnbuckles: tuple[Turnbuckle, ...] = ()
@@ -214,6 +223,7 @@ class Hanger(Shown):
     limits: Limits = field(default_factory=Limits)
     fittings_m: tuple[float, float] = (0.0, 0.0)
     survey: Survey = field(default_factory=Survey)
+    assumptions: Assumptions = DEFAULTS
 
     @property
     def bending_stiffness_n_m2(self) -> float:

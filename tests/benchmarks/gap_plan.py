@@ -26,6 +26,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from shm.assumptions import DEFAULTS  # noqa: E402
 from shm.gap.attribution import Attribution, attributed  # noqa: E402
 from shm.gap.contract import Design, GapOptions  # noqa: E402
 from shm.gap.experiment_design import Proposal  # noqa: E402
@@ -40,7 +41,6 @@ from shm.gap.measurement_plan import (  # noqa: E402
 )
 from shm.gap.observations import observed  # noqa: E402
 from shm.gap.problem import GapProblem  # noqa: E402
-from shm.inference.priors import UNKNOWN_READING_SD  # noqa: E402
 from shm.models.effects import EFFECTS  # noqa: E402
 from shm.simulate import HangerState, PlantedEffect  # noqa: E402
 from shm.values import MEASUREMENT_HOURS, PLANES, FloatArray, Hanger, ModalTest  # noqa: E402
@@ -127,8 +127,8 @@ class Known:
         if proposal.kind != "lift-off":
             return replace(self, tests=tests)
         error = np.random.default_rng((bridge.seed, 3)).standard_normal()
-        read_n = tension_n * (1 + UNKNOWN_READING_SD * error)
-        scatter = replace(self.hanger.scatter, tension=UNKNOWN_READING_SD)
+        read_n = tension_n * (1 + DEFAULTS.tension_reading_sd.value * error)
+        scatter = replace(self.hanger.scatter, tension=DEFAULTS.tension_reading_sd.value)
         weighed = replace(self.hanger, nominal_tension_n=read_n, scatter=scatter)
         return replace(self, hanger=weighed, tests=tests)
 

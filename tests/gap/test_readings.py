@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shm.assumptions import DEFAULTS
 from shm.documents import dump
 from shm.errors import BadInput
 from shm.gap import GapOptions, diagnose
 from shm.gap.contract import Hypothesis
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
-from shm.inference.priors import UNKNOWN_READING_SD, reading_of
+from shm.inference.priors import reading_of
 from shm.models.effects import EFFECTS
 from shm.models.hanger import PhysicalHanger, solve
 from shm.modes_document import modes_document, parse_modes
@@ -160,7 +161,8 @@ def test_a_reading_without_a_standard_deviation_is_taken_as_an_ordinary_lift_off
     assert np.isnan(test.tension_read_sd_n)
     reading = reading_of([test])
     assert reading is not None
-    assert reading == reading_of([replace(test, tension_read_sd_n=UNKNOWN_READING_SD * 6e5)])
+    usual_n = DEFAULTS.tension_reading_sd.value * 6e5
+    assert reading == reading_of([replace(test, tension_read_sd_n=usual_n)])
 
 
 def test_readings_without_a_standard_deviation_shift_the_diagnosed_tension_too() -> None:

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, norm
 
+from shm.assumptions import DEFAULTS
 from shm.inference import UpdateOptions, refresh, select, update
 from shm.inference.described import DescribedCoordinates
 from shm.inference.options import silent
 from shm.inference.priors import Calibration, EndDetails, TensionPrior, calibration_of, reading_of
 from shm.inference.problem import Problem
 from shm.models import AsMade, build
-from shm.models.as_made import RESTRAINT, TENSION_RATIO
 from shm.models.base import Conditions
 from shm.values import (
     NAN,
@@ -35,7 +35,7 @@ STRAND = replace(ROD, kind="strand", bending_stiffness_factor=0.7)
 STATED = replace(STRAND, scatter=Scatter(bending_factor=0.1))
 FITTED = replace(ROD, fittings_m=(0.3, 0.2))
 CLAMP = AddedMass(25.0, 3.6)
-STIFFEST = 1 / np.log10(RESTRAINT[1] / RESTRAINT[0])
+STIFFEST = 1 / DEFAULTS.end_restraint.decades
 SPRINGS = ("log10_k1", "log10_k2", "log10_k3", "log10_k4")
 
 
@@ -165,7 +165,8 @@ def test_the_prior_of_ends_integrates_to_one_and_is_that_of_its_draws(
 
 
 def test_the_prior_of_the_tension_integrates_to_one_and_is_that_of_its_draws() -> None:
-    prior, bounds = TensionPrior(TENSION_RATIO), np.log(TENSION_RATIO)
+    ratio = DEFAULTS.tension_ratio.bounds
+    prior, bounds = TensionPrior(ratio), np.log(ratio)
     x = np.linspace(*bounds, 20001)
     density = np.exp(prior.log_density(x)) / (bounds[1] - bounds[0])
     cumulative = np.append(0.0, np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(x)))

@@ -7,8 +7,9 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import t
 
+from shm.assumptions import DEFAULTS
 from shm.errors import BadInput
-from shm.inference.field import TAU_LOWER, TAU_UPPER, TAU_USUAL, FieldLikelihood
+from shm.inference.field import FieldLikelihood
 from shm.inference.systematic_errors import errors_of_bar, felt_by, loads_of_ends, mean_of_ends
 from shm.models import build
 from shm.models.base import Conditions
@@ -17,6 +18,8 @@ from tests.helpers.hangers import HANGER_3
 
 MODEL = build("beam2", HANGER_3)
 SPRINGS = {"log10_k1": 6.6, "log10_k2": 7.0, "log10_k3": 6.9, "log10_k4": 7.4}
+TAU_LOWER, TAU_USUAL = DEFAULTS.model_error.bounds
+TAU_UPPER = DEFAULTS.largest_model_error.value
 THETA = MODEL.pack(
     {"theta_F": 1.0, "theta_L": 0.9, "section": 0.0, "density": 0.0, "modulus": 0.0, **SPRINGS}
 )[None]
@@ -124,8 +127,9 @@ def test_a_bias_that_both_conditions_have_is_likelier_than_two_of_opposite_sign(
     assert found[1.0] > found[-1.0] + 3
 
 
-def test_frequencies_of_unstated_error_have_that_of_a_hammer_test() -> None:
-    stated = FieldLikelihood([measured("a", sd=1e-4, off=0.0)], MODEL)
+def test_frequencies_of_unstated_error_have_the_assumed_one() -> None:
+    sd = DEFAULTS.unstated_frequency_sd.value
+    stated = FieldLikelihood([measured("a", sd=sd, off=0.0)], MODEL)
     unstated = FieldLikelihood([measured("a", sd=NAN, off=0.0)], MODEL)
     np.testing.assert_allclose(unstated.identification_error, stated.identification_error)
     at = stated.predict(MODEL, THETA) * (1 + 3e-4 * np.linspace(-1, 1, 5))[:, None]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.inference.priors import DECADES
+from shm.assumptions import DEFAULTS
 from shm.inference.updating import _log_prior
 from shm.models import THESIS, build
 from shm.values import Hanger, Mode
@@ -15,7 +15,7 @@ from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_test
 
 ROUND = replace(HANGER_3, plate=None)
-ONE = 1 / (1 + DECADES)
+ONE = 1 / (1 + DEFAULTS.end_restraint.decades)
 """A rigid end stands for the decade beyond the stiffest: one of so many and one more."""
 
 

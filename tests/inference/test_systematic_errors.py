@@ -8,12 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from shm.assumptions import DEFAULTS
 from shm.gap.repeated_errors import STRETCHES, section_loads
 from shm.inference.systematic_errors import (
-    _GIVE_M_N,
-    _GIVE_SD_M_N,
-    _SENSOR_KG,
-    _SENSOR_SD_KG,
     errors_of_bar,
     felt_by,
     loads_of_ends,
@@ -27,6 +24,7 @@ from tests.helpers.hangers import HANGER_3
 from tests.helpers.physical_hangers import frequencies_hz
 
 ORDERS = np.arange(1, 7)
+GIVE, SENSOR = DEFAULTS.support_compliance_m_n, DEFAULTS.accelerometer_mass_kg
 SLIM = replace(
     HANGER_3,
     area_m2=HANGER_3.area_m2 / 25,
@@ -70,7 +68,7 @@ def test_a_sensor_where_it_is_known_to_sit_lowers_each_mode_as_the_general_model
 ) -> None:
     """Its mean mass, and by one standard deviation of that what the load says."""
     mean, loads = found(SLIM, (x_m,))
-    for kg, size in ((_SENSOR_KG, mean), (_SENSOR_SD_KG, loads[:, 0])):
+    for kg, size in ((SENSOR.value, mean), (SENSOR.sd, loads[:, 0])):
         mass = PointMass(np.array([x_m]), np.array([kg]))
         shift, _ = lowered(SLIM, replace(pinned(SLIM), masses=(mass,)))
         np.testing.assert_allclose(size, shift, atol=0.05 * np.abs(shift).max())
@@ -81,7 +79,7 @@ def sensors_anywhere(hanger: Hanger, draws: int = 40_000) -> FloatArray:
     """What masses as uncertain, where a person reaches, lower modes by (draws, orders)."""
     rng = np.random.default_rng(1)
     x_m = rng.uniform(0.8, 2.5, (draws, 1))
-    kg = _SENSOR_KG + _SENSOR_SD_KG * rng.standard_normal((draws, 1))
+    kg = SENSOR.value + SENSOR.sd * rng.standard_normal((draws, 1))
     whole_kg = hanger.mass_per_length_kg_m * hanger.length_m
     return np.asarray(-kg / whole_kg * np.sin(np.pi * ORDERS * x_m / hanger.length_m) ** 2)
 
@@ -98,7 +96,7 @@ def test_a_sensor_that_may_sit_anywhere_in_reach_has_the_moments_of_draws() -> N
 @pytest.mark.parametrize("hanger", [HANGER_3, SLIM], ids=["thick", "slim"])
 def test_supports_that_give_way_lower_each_mode_as_the_general_model_does(hanger: Hanger) -> None:
     mean = mean_of_ends(ends(hanger), (0.0, 0.0))[0]
-    give = np.full((1, 2, 2), _GIVE_M_N)
+    give = np.full((1, 2, 2), GIVE.value)
     shift, _ = lowered(hanger, replace(pinned(hanger), translational_compliance_m_n=give))
     np.testing.assert_allclose(mean, shift, rtol=0.05, atol=1e-9)
     assert np.abs(mean).max() > 1e-5
@@ -134,7 +132,7 @@ def test_planes_share_half_of_what_is_unsure_of_an_end() -> None:
         np.testing.assert_allclose(covariance[0, 1] / covariance[0, 0], 0.5, rtol=0.05)
     give = one.give()[0, 0]
     bare = loads_of_ends((one, one), (0.0, 0.0), both, orders)
-    np.testing.assert_allclose((bare @ bare.T)[0, 0], 2 * (_GIVE_SD_M_N * give) ** 2, rtol=0.05)
+    np.testing.assert_allclose((bare @ bare.T)[0, 0], 2 * (GIVE.sd * give) ** 2, rtol=0.05)
 
 
 def test_a_section_that_wanders_moves_modes_as_much_as_the_general_models() -> None:
@@ -163,7 +161,7 @@ def test_a_diagnosis_has_the_same_errors_about_none_whatever_its_data() -> None:
     np.testing.assert_allclose(few, loads[:2])
     drawn = sensors_anywhere(SLIM)
     whole_kg = SLIM.mass_per_length_kg_m * SLIM.length_m
-    give = np.sqrt(2) * _GIVE_SD_M_N * 4 * whole_kg * (bare / ORDERS) ** 2
+    give = np.sqrt(2) * GIVE.sd * 4 * whole_kg * (bare / ORDERS) ** 2
     exact = (drawn**2).mean(axis=0) + give**2
     np.testing.assert_allclose(np.diag(loads @ loads.T), exact, rtol=0.15)
 
@@ -173,5 +171,5 @@ def test_a_short_bar_has_its_sensor_not_beyond_its_middle() -> None:
     mean, _ = found(short)
     kg = short.mass_per_length_kg_m * short.length_m
     x = np.linspace(0.1, 0.5, 2001)
-    expected = -_SENSOR_KG / kg * np.mean(np.sin(np.pi * np.outer(ORDERS, x)) ** 2, axis=1)
+    expected = -SENSOR.value / kg * np.mean(np.sin(np.pi * np.outer(ORDERS, x)) ** 2, axis=1)
     np.testing.assert_allclose(mean, expected, rtol=0.02)

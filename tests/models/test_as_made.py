@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shm.assumptions import DEFAULTS
 from shm.models import THESIS, AsMade, build, described
-from shm.models.as_made import BENDING_FACTOR, RESTRAINT, SHEAR_SHARE, TENSION_RATIO
 from shm.models.base import Conditions
 from shm.values import AddedMass, FloatArray, Hanger, Scatter, Turnbuckle
 from tests.helpers.hangers import HANGER_3
@@ -142,18 +142,22 @@ def test_ranges_are_those_of_the_world_whatever_the_diameter() -> None:
     thin = replace(ROD, second_moment_m4=ROD.second_moment_m4 / 1e4)
     for hanger in (ROD, thin):
         bounds = as_made("beam2", hanger).bounds
-        assert bounds["theta_F"] == TENSION_RATIO
+        assert bounds["theta_F"] == DEFAULTS.tension_ratio.bounds
         unit = hanger.bending_stiffness_n_m2 / hanger.length_m
-        assert 10 ** np.array(bounds["log10_k3"]) / unit == pytest.approx(RESTRAINT)
+        assert 10 ** np.array(bounds["log10_k3"]) / unit == pytest.approx(
+            DEFAULTS.end_restraint.bounds
+        )
         assert bounds["theta_L"] == pytest.approx((1 - 6 * 0.0005, 1 + 6 * 0.0005))
     assert described("beam2", ROD).bounds["theta_L"] == (0.5, 1.5)
     assert build("beam2", ROD, THESIS).parameter_names == described("beam2", ROD).parameter_names
 
 
 def test_a_strand_has_what_its_wires_leave_open_and_a_rod_has_not() -> None:
-    assert as_made("beam2", STRAND).bounds["bending_factor"] == BENDING_FACTOR
+    assert (
+        as_made("beam2", STRAND).bounds["bending_factor"] == DEFAULTS.strand_bending_factor.bounds
+    )
     assert "shear_share" not in as_made("beam2", STRAND).bounds
-    assert as_made("beam3", STRAND).bounds["shear_share"] == SHEAR_SHARE
+    assert as_made("beam3", STRAND).bounds["shear_share"] == DEFAULTS.strand_shear_share.bounds
     assert not {"bending_factor", "shear_share"} & set(as_made("beam3", ROD).bounds)
 
 

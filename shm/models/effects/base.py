@@ -14,7 +14,6 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from shm.models.as_made import RESTRAINT
 from shm.models.base import Conditions, Model
 from shm.models.hanger.physical import PhysicalHanger, Zone
 from shm.values import NAN, PLANES, AddedMass, FloatArray, Hanger, Plane
@@ -285,12 +284,13 @@ def rotational_stiffness(name: str, hanger: Hanger, hinge: bool = False) -> Para
     No effect is an infinite stiffness, or none at all where the description has a `hinge`.
     """
     own = Model(hanger).wave_stiffness_n_m_rad(_MIDDLE_ORDER)
+    pinned, clamped = hanger.assumptions.end_restraint.bounds
     return Parameter(
         name,
         "N m/rad",
-        math.log10(RESTRAINT[0] * own),
-        math.log10(RESTRAINT[1] * own),
+        math.log10(pinned * own),
+        math.log10(clamped * own),
         -np.inf if hinge else np.inf,
-        "0.03 to 1000 times EI p, what the bar itself resists with in mode 4: softer is a hinge, "
-        "stiffer a clamp; nobody knows the order of magnitude.",
+        f"{pinned:g} to {clamped:g} times EI p, what the bar itself resists with in mode 4: "
+        "softer is a hinge, stiffer a clamp; nobody knows the order of magnitude.",
     )

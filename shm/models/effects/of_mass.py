@@ -57,9 +57,6 @@ class DistributedMass(Effect):
         return replace(physical, mass_per_length_kg_m=mass)
 
 
-GYRATION_M = 0.1  # judgement: a clamp or coupler some 0.35 m long, whose length is sqrt(12) of it
-
-
 class UnknownPointMass(Effect):
     """Something heavy sits at one place: a clamp, a coupler, a lamp, a bracket left behind.
 
@@ -111,7 +108,8 @@ class UnknownPointMass(Effect):
         mass_kg, x_m = values.T
         if not variant.law:
             return replace(physical, masses=(*physical.masses, PointMass(x_m, mass_kg)))
-        halves = [PointMass(x_m + side * GYRATION_M, mass_kg / 2) for side in (-1, 1)]
+        gyration_m = hanger.assumptions.clamp_gyration_m.value
+        halves = [PointMass(x_m + side * gyration_m, mass_kg / 2) for side in (-1, 1)]
         return replace(physical, masses=(*physical.masses, *halves))
 
 

@@ -12,8 +12,6 @@ from shm.models.effects.base import Effect, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import FloatArray, Hanger
 
-_STEEL_EXPANSION_1_K = 1.2e-5  # EN 1993-1-1, 3.2.6
-
 # Judgement: by less, thermometers at one spot (0.5 K) and hits (10 %) scatter themselves.
 _LEAST_RANGE_K = 1.0
 _LEAST_RATIO = 1.2
@@ -54,15 +52,16 @@ class TemperatureTension(Effect):
         return "It takes tests at two known temperatures at least 1 K apart."
 
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-        restrained = hanger.elastic_modulus_pa * hanger.area_m2 * _STEEL_EXPANSION_1_K
+        expansion_1_k = hanger.assumptions.thermal_expansion_1_k.value
+        restrained = hanger.elastic_modulus_pa * hanger.area_m2 * expansion_1_k
         size = Parameter(
             "tension_per_kelvin_n_k",
             "N/K",
             1e-5 * restrained,
             restrained,
             0.0,
-            "Either way, up to E A times 1.2e-5 per kelvin, a steel bar that cannot expand at all; "
-            "a hanger whose bridge warms with it has a small share of that.",
+            f"Either way, up to E A times {expansion_1_k * 1e6:g}e-6 per kelvin, a steel bar that "
+            "cannot expand at all; a hanger whose bridge warms with it has a small share of that.",
             spread="logarithmic",
             signed=True,
         )

@@ -29,7 +29,6 @@ from shm.values import PLANES, FloatArray, Hanger, ModalTest, Plane
 _SPRING_BOUNDS = (5.0, 12.0)  # thesis 5.2
 _CELLS_A_WAVE = 12  # layout: a half wave of a drawn mode looks smooth
 _BLOCK = 500  # technical: matrices of some 10 MB at once
-_ROUND_WITHIN = 0.01  # tolerance of a rolled bar's area (EN 10060), as the default scatter
 
 # The two plates are alike but for a quarter turn. Seen from the arch end and with the planes
 # exchanged, the hanger is the same, so that one basis serves both planes.
@@ -189,7 +188,7 @@ def _not_a_round_rod(hanger: Hanger) -> str:
     if math.isnan(hanger.diameter_m):
         return "it models a round rod: give diameter_m."
     disc = math.pi * hanger.diameter_m**2 / 4
-    if abs(hanger.area_m2 / disc - 1) > _ROUND_WITHIN:
+    if abs(hanger.area_m2 / disc - 1) > hanger.assumptions.section_sd.value:
         return (
             f"it models a solid round rod, and area_m2 is not that of diameter_m ({disc:.4g} m2)."
         )

@@ -1,0 +1,577 @@
+"""One table of what is assumed of hangers, sensors and measurements before any data.
+
+Every physical default, prior and scatter is a row: `DEFAULTS` holds the product's, and a hanger has
+those of its bridge (`Hanger.assumptions`), where `[assumptions]` of `bridge.toml` may replace rows.
+Steps, tolerances and counts of draws are no assumptions and stay with the code that needs them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+JUDGEMENT = "judgement"
+DEFAULT = "default"
+FILE = "bridge.toml"
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """One row: a value with its standard deviation, or a range of values.
+
+    A row has a `value`, or a range from `lower` to `upper`, or both; `sd` is the standard deviation
+    of the value, and NaN where the value itself is one. What a row does not have is NaN. `least`
+    and `most` bound what an owner may write. `origin` says who stated it.
+    """
+
+    name: str
+    value: float
+    unit: str
+    source: str
+    reason: str
+    sd: float = math.nan
+    lower: float = math.nan
+    upper: float = math.nan
+    least: float = 0.0
+    most: float = math.inf
+    origin: str = DEFAULT
+
+    @property
+    def has_value(self) -> bool:
+        """Return True where the row is a number, not only a range."""
+        return not math.isnan(self.value)
+
+    @property
+    def has_sd(self) -> bool:
+        """Return True where the value has a standard deviation."""
+        return not math.isnan(self.sd)
+
+    @property
+    def has_range(self) -> bool:
+        """Return True where the row has a lower and an upper end."""
+        return not math.isnan(self.lower)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Return the lower and the upper end of the range."""
+        return self.lower, self.upper
+
+    @property
+    def rms(self) -> float:
+        """Return the root mean square of what the value may be."""
+        return math.hypot(self.value, self.sd)
+
+    @property
+    def decades(self) -> float:
+        """Return the width of the range in powers of ten."""
+        return math.log10(self.upper / self.lower)
+
+
+@dataclass(frozen=True, repr=False)
+class Assumptions(Mapping[str, Assumption]):
+    """The table, frozen: rows by name (`table["poissons_ratio"]`) or as attributes.
+
+    `overridden` are the rows that differ from the defaults, in the table's order.
+    """
+
+    overridden: tuple[Assumption, ...] = ()
+
+    def __getitem__(self, name: str) -> Assumption:
+        return _table(self.overridden)[name]
+
+    def __getattr__(self, name: str) -> Assumption:
+        if name in _NAMES:
+            return self[name]
+        raise AttributeError(f"there is no assumption {name!r}")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_NAMES)
+
+    def __len__(self) -> int:
+        return len(_NAMES)
+
+    def __repr__(self) -> str:
+        stated = ", ".join(f"{row.name}={number_text(row)}" for row in self.overridden)
+        return f"<Assumptions: {stated or 'the defaults'}>"
+
+    def with_rows(self, *rows: Assumption) -> Assumptions:
+        """Return the table with rows replaced by those of the same name.
+
+        A row that is equal to the default but for its reason still counts as overridden.
+        Raises KeyError for a name that the table does not have.
+        """
+        stated = {row.name: row for row in (*self.overridden, *rows)}
+        for name in stated:
+            _table(())[name]
+        return Assumptions(tuple(stated[name] for name in _NAMES if name in stated))
+
+    def with_numbers(self, origin: str = "code", **numbers: Any) -> Assumptions:
+        """Return the table with values (a number) or ranges (a pair) replaced, by name.
+
+        Example:
+            >>> DEFAULTS.with_numbers(accelerometer_mass_kg=0.2).accelerometer_mass_kg.value
+            0.2
+        """
+        rows = []
+        for name, number in numbers.items():
+            if isinstance(number, tuple):
+                lower, upper = number
+                rows.append(replace(self[name], lower=lower, upper=upper, origin=origin))
+            else:
+                rows.append(replace(self[name], value=float(number), origin=origin))
+        return self.with_rows(*rows)
+
+    def document(self) -> dict[str, dict[str, Any]]:
+        """Return the overridden rows as a JSON document holds them, by name; often empty."""
+        return {row.name: row_document(row) for row in self.overridden}
+
+
+def row_document(row: Assumption) -> dict[str, Any]:
+    """Return what a JSON document says of a row; numbers that it does not have are absent."""
+    numbers = {"value": row.value, "sd": row.sd, "lower": row.lower, "upper": row.upper}
+    return {
+        **{key: number for key, number in numbers.items() if not math.isnan(number)},
+        "unit": row.unit,
+        "from": row.origin,
+        "source": row.source,
+        "reason": row.reason,
+    }
+
+
+def number_text(row: Assumption) -> str:
+    """Return the numbers of a row in words: `0.05 ± 0.05`, `0.03 to 1000`."""
+    words = []
+    if row.has_value:
+        words.append(f"{row.value:g}" + (f" ± {row.sd:g}" if row.has_sd else ""))
+    if row.has_range:
+        words.append(f"{row.lower:g} to {row.upper:g}")
+    return ", ".join(words)
+
+
+# The bar as it was made. What a hanger's `[hanger.scatter]` states goes before these.
+_BAR = (
+    Assumption(
+        "section_sd",
+        0.01,
+        "fraction",
+        "EN 10060",
+        "Area of a bar as made over described. A hot-rolled round of 50 mm may be off by 0.8 mm, "
+        "3.2 % of the area, which three standard deviations make 1.1 %.",
+        most=0.5,
+    ),
+    Assumption(
+        "section_along_sd",
+        0.001,
+        "fraction",
+        "EN 10060",
+        "By which the area varies along one bar about its mean: 0.05 mm of a diameter of 100 mm.",
+        most=0.5,
+    ),
+    Assumption(
+        "section_reach_m",
+        1.0,
+        "m",
+        JUDGEMENT,
+        "Distance over which the section of a rolled bar is alike.",
+        least=1e-3,
+        most=1000.0,
+    ),
+    Assumption(
+        "density_sd",
+        0.003,
+        "fraction",
+        "ASM Handbook 1",
+        "By their composition carbon steels lie between 7,830 and 7,870 kg/m3.",
+        most=0.5,
+    ),
+    Assumption(
+        "modulus_sd",
+        0.015,
+        "fraction",
+        "JCSS Probabilistic Model Code 3.2",
+        "Between heats of one kind of steel, half of the 3 % that the code gives with the scatter "
+        "of the tests.",
+        most=0.5,
+    ),
+    Assumption(
+        "length_sd",
+        0.0005,
+        "fraction",
+        "OIML R 35",
+        "A tape of class II and its reading between two ends: 5 mm in 10 m.",
+        most=0.5,
+    ),
+    Assumption(
+        "poissons_ratio",
+        0.3,
+        "1",
+        "EN 1993-1-1, 3.2.6",
+        "Structural steel. The key poissons_ratio of a hanger goes before it.",
+        most=0.499,
+    ),
+    Assumption(
+        "thermal_expansion_1_k",
+        1.2e-5,
+        "1/K",
+        "EN 1993-1-1, 3.2.6",
+        "Steel: what a held bar would gain or lose in strain with a kelvin.",
+        most=1e-3,
+    ),
+    Assumption(
+        "modulus_per_kelvin",
+        -3e-4,
+        "1/K",
+        "Ledbetter and Reed (1973), Elastic properties of metals and alloys, I",
+        "By which steel softens; bending frequencies go with half of it.",
+        least=-1e-2,
+        most=1e-2,
+    ),
+)
+
+_TENSION = (
+    Assumption(
+        "tension_ratio",
+        math.nan,
+        "times nominal",
+        JUDGEMENT,
+        "Where a tension may lie at all: from slack to what no hanger was designed for.",
+        lower=0.02,
+        upper=5.0,
+        least=1e-4,
+        most=1e3,
+    ),
+    Assumption(
+        "as_designed_share",
+        0.9,
+        "probability",
+        JUDGEMENT,
+        "Of hangers whose tension is about as designed; of the rest nothing is known. Where few "
+        "modes of a short stiff bar hardly tell the tension, a uniform logarithm alone crowds its "
+        "posterior at a slack bar.",
+        most=0.999,
+    ),
+    Assumption(
+        "as_designed_log_sd",
+        math.log(1.4),
+        "of the logarithm",
+        JUDGEMENT,
+        "Tension over nominal of those: a factor of 1.4. Lift-offs differ from the drawings by 5 "
+        "to 30 %.",
+        least=1e-3,
+        most=5.0,
+    ),
+    Assumption(
+        "tension_reading_sd",
+        0.03,
+        "fraction",
+        "fib Bulletin 30, Acceptance of stay cable systems",
+        "Of a load cell, lift-off or weight without a stated error: lift-offs repeat within 2 to "
+        "5 %.",
+        least=1e-6,
+        most=0.5,
+    ),
+)
+
+_ENDS = (
+    Assumption(
+        "end_restraint",
+        math.nan,
+        "k L/EI",
+        JUDGEMENT,
+        "Rotational spring of an end, its logarithm uniform: below 0.03 a first frequency is "
+        "within 0.3 % of the pinned bar's, above 1000 within 0.2 % of the clamped one's.",
+        lower=0.03,
+        upper=1000.0,
+        least=1e-6,
+        most=1e9,
+    ),
+    Assumption(
+        "similar_ends_decades",
+        0.407,
+        "decades",
+        JUDGEMENT,
+        "Between the springs of two joints of one drawing: a factor of 2.5.",
+        least=0.03,
+        most=5.0,
+    ),
+    Assumption(
+        "round_end_decades",
+        0.02,
+        "decades",
+        JUDGEMENT,
+        "Between the springs of the two axes of a round end: 5 %.",
+        least=1e-4,
+        most=5.0,
+    ),
+    Assumption(
+        "support_compliance_m_n",
+        3.5e-9,
+        "m/N",
+        JUDGEMENT,
+        "Of one support, sideways: gussets and chords of 1e8 to 1e9 N/m, or next to nothing.",
+        sd=4e-9,
+        most=1e-3,
+    ),
+    Assumption(
+        "fitting_rigidity",
+        0.6,
+        "of a rigid one",
+        JUDGEMENT,
+        "What a fitting stiffens, over what one without curvature would: a thread in a nut has a "
+        "fifth of it, a socket or a fork nearly all.",
+        sd=0.3,
+        most=2.0,
+    ),
+    Assumption(
+        "fitting_mass",
+        0.7,
+        "of the bar's",
+        JUDGEMENT,
+        "Mass of a fitting beyond the bar's over its length: from threads to sockets.",
+        sd=0.6,
+        most=100.0,
+    ),
+    Assumption(
+        "end_details_shared",
+        0.5,
+        "of the variance",
+        JUDGEMENT,
+        "What the details of one end have alike in both planes: a fork or a gusset has two faces.",
+        most=1.0,
+    ),
+    Assumption(
+        "end_details_model_error",
+        0.1,
+        "of the effect",
+        "shm.models.end_effects compared with exact solutions",
+        "By which the first order of an end's detail is wrong for each mode: 0.03 in the middle, "
+        "0.2 at the worst.",
+        most=1.0,
+    ),
+    Assumption(
+        "fork_length",
+        4.0,
+        "diameters",
+        JUDGEMENT,
+        "Of a fork from pin to bar at most; how much of it swings is open (length_by = pins).",
+        most=100.0,
+    ),
+    Assumption(
+        "node_length",
+        0.03,
+        "of the length",
+        JUDGEMENT,
+        "Of a node plate with half a chord at most (length_by = nodes).",
+        most=0.5,
+    ),
+)
+
+_STRANDS = (
+    Assumption(
+        "strand_bending_factor",
+        math.nan,
+        "of the solid section",
+        "Papailiou (1997), IEEE Trans. Power Delivery 12",
+        "Bending stiffness of a strand at the small amplitudes of a test, where none is stated.",
+        lower=0.3,
+        upper=1.0,
+        least=1e-3,
+        most=1.0,
+    ),
+    Assumption(
+        "strand_bending_log_sd",
+        0.3,
+        "of the logarithm",
+        "Papailiou (1997), IEEE Trans. Power Delivery 12",
+        "Of the bending factor of a strand from its siblings' or its own that was learnt: 0.2 of "
+        "0.65, the spread of a factor anywhere from 0.3 to 1.",
+        least=1e-3,
+        most=5.0,
+    ),
+    Assumption(
+        "strand_shear_share",
+        math.nan,
+        "of a solid bar's",
+        JUDGEMENT,
+        "Shear of a strand: none, as of wires that each bend alone, to more than a bar's.",
+        lower=0.0,
+        upper=1.5,
+        most=10.0,
+    ),
+)
+
+_SENSORS = (
+    Assumption(
+        "accelerometer_mass_kg",
+        0.05,
+        "kg",
+        "data sheets of makers",
+        "Of one accelerometer with its magnet, base and the end of its cable: 20 to 90 g, seismic "
+        "ones more, none where a laser looks on.",
+        sd=0.05,
+        most=50.0,
+    ),
+    Assumption(
+        "accelerometer_most_of_bar",
+        0.03,
+        "of the bar's mass",
+        JUDGEMENT,
+        "Heavier accelerometers are not put on a bar: what is lighter is measured without touch.",
+        least=1e-6,
+        most=1.0,
+    ),
+    Assumption(
+        "sensor_place_m",
+        math.nan,
+        "m",
+        JUDGEMENT,
+        "Of sensors whose places are not stated, from the deck: where a person mounts them, but "
+        "never beyond the middle of the hanger.",
+        lower=0.8,
+        upper=2.5,
+        most=1000.0,
+    ),
+    Assumption(
+        "sensor_gain_sd",
+        0.015,
+        "fraction",
+        "ISO 16063-21",
+        "Three times what a calibration gives: with less, careless mounting passes for skewed axes "
+        "or a mass, and with more these hide.",
+        most=0.5,
+    ),
+    Assumption(
+        "sensor_place_sd_m",
+        0.01,
+        "m",
+        JUDGEMENT,
+        "Of a stated place: three to five times what a tape gives.",
+        most=0.5,
+    ),
+    Assumption(
+        "sensor_turn_sd_deg",
+        1.5,
+        "deg",
+        JUDGEMENT,
+        "About the axis of the hanger: three to five times what a bubble level gives.",
+        most=45.0,
+    ),
+    Assumption(
+        "sensor_cross_axis_sd",
+        0.02,
+        "fraction",
+        "PCB 352C33 (5 % at most) and similar data sheets",
+        "What of one axis another reads, each axis on its own: about half of the 3 to 5 % that "
+        "data sheets give as the most.",
+        most=0.5,
+    ),
+    Assumption(
+        "clamp_gyration_m",
+        0.1,
+        "m",
+        JUDGEMENT,
+        "Radius of gyration of a clamp or coupler some 0.35 m long, whose length is sqrt(12) of "
+        "it.",
+        most=10.0,
+    ),
+)
+
+_ERRORS = (
+    Assumption(
+        "unstated_frequency_sd",
+        3e-4,
+        "fraction",
+        "docs/trials/identification_benchmarks.md for the lower end",
+        "Of a frequency whose error nobody states and no second test shows: a hammer test reaches "
+        "1e-4, usual identifications 1e-3, and the value lies midway. Where it is learnt from the "
+        "data, the range goes on to peaks that are read off a plot by eye.",
+        lower=1e-4,
+        upper=3e-2,
+        least=1e-7,
+        most=0.3,
+    ),
+    Assumption(
+        "stated_sd_log_sd",
+        0.2,
+        "of the logarithm",
+        JUDGEMENT,
+        "Of true over stated standard deviations of frequencies: 1/sqrt(2 (n - 1)) of one found in "
+        "n = 13 hits.",
+        least=1e-3,
+        most=3.0,
+    ),
+    Assumption(
+        "stated_sd_freedom",
+        4.0,
+        "degrees of freedom",
+        JUDGEMENT,
+        "Of the tails of the same: one in a hundred is off by a factor of 2.5, by a bias that hits "
+        "share.",
+        least=1.0,
+        most=1e6,
+    ),
+    Assumption(
+        "model_error",
+        math.nan,
+        "fraction",
+        "tests/benchmarks/worlds.py",
+        "Of each mode, the same in all tests: what no model has. From the error of a quartz to six "
+        "times what sound hangers of others showed; the smaller, the wider the intervals of "
+        "hangers that fit.",
+        lower=1e-5,
+        upper=3e-3,
+        least=1e-7,
+        most=0.1,
+    ),
+    Assumption(
+        "largest_model_error",
+        0.3,
+        "fraction",
+        JUDGEMENT,
+        "To where the model error may go beyond its usual range: no tension is given any more.",
+        least=0.15,
+        most=1.0,
+    ),
+    Assumption(
+        "usual_model_error_share",
+        0.95,
+        "probability",
+        JUDGEMENT,
+        "Of hangers whose model error lies in its usual range; a class that does not fit gets a "
+        "wide posterior, not a sharp one at a wrong place.",
+        least=0.01,
+        most=0.999,
+    ),
+    Assumption(
+        "model_error_shared",
+        0.5,
+        "of the variance",
+        JUDGEMENT,
+        "What neighbouring orders have alike, and half of that in the other plane: halfway between "
+        "errors of each mode alone and one error of all.",
+        most=0.99,
+    ),
+    Assumption(
+        "model_error_reach",
+        0.7,
+        "of ln(order)",
+        JUDGEMENT,
+        "How far it goes together: about an octave, ln 2 (correlation 0.6).",
+        least=0.01,
+        most=100.0,
+    ),
+)
+
+_ROWS = (*_BAR, *_TENSION, *_ENDS, *_STRANDS, *_SENSORS, *_ERRORS)
+_NAMES = tuple(row.name for row in _ROWS)
+
+
+@cache
+def _table(overridden: tuple[Assumption, ...]) -> dict[str, Assumption]:
+    return {row.name: row for row in (*_ROWS, *overridden)}
+
+
+DEFAULTS = Assumptions()
