@@ -6,28 +6,51 @@ import re
 from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
 from importlib import metadata
+from pathlib import Path
 
 import rich_click as click
 
+from shm.errors import UsageError
 from shm.settings import TABLE, Setting
 from shm_cli import flags
+from shm_cli.assumed import assumptions_section, show_assumptions
 from shm_cli.common import markdown, show, show_rows
 
 _HEADS = ("setting", "default", "unit", "range", "meaning")
 
 
 @click.command("settings")
+@click.option(
+    "--assumptions",
+    is_flag=True,
+    help="Instead the physical assumptions: mass of a sensor, stiffness of ends, tolerances ...",
+)
+@flags.hanger()
+@flags.hanger_file
 @flags.json
-def settings_command() -> None:
+@click.pass_context
+def settings_command(
+    ctx: click.Context, assumptions: bool, hanger_id: int | None, hanger_file: Path | None
+) -> None:
     """Every setting: its default, its range, what it means.
 
     A value comes from the flag, else the environment (`workers` from SHM_WORKERS), else
-    `[settings]` of `bridge.toml`, else the default.
+    `[settings]` of `bridge.toml`, else the default. With --assumptions: what is taken of hangers,
+    sensors and measurements before any data, from `[assumptions]` of `bridge.toml`, else the
+    default; of a hanger with --hanger or --hanger-file.
 
     \b
     Example: shm settings
+    Example: shm settings --assumptions
     """
-    if flags.wants_json():
+    if assumptions:
+        show_assumptions(ctx, hanger_file, hanger_id, flags.wants_json())
+    elif hanger_file is not None or hanger_id is not None:
+        raise UsageError(
+            "settings are those of the bridge, not of one hanger.",
+            remedy="Add --assumptions, or leave the hanger out.",
+        )
+    elif flags.wants_json():
         show({"settings": [_document(row) for row in TABLE]})
     else:
         show_rows("", _HEADS, [(row.name, *_cells(row)) for row in TABLE])
@@ -40,7 +63,8 @@ def settings_page() -> str:
         "A value comes from the flag, else the environment (`workers` from `SHM_WORKERS`), else "
         "`[settings]` of `bridge.toml`, else the default. `shm settings` says the same.\n\n"
     )
-    return head + markdown(_HEADS, [(f"`{row.name}`", *_cells(row)) for row in TABLE]) + "\n"
+    rows = [(f"`{row.name}`", *_cells(row)) for row in TABLE]
+    return f"{head}{markdown(_HEADS, rows)}\n\n{assumptions_section()}"
 
 
 def _cells(row: Setting) -> tuple[str, ...]:

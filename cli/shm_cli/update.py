@@ -16,6 +16,7 @@ from shm.inference import Progress, UpdateOptions, select, update
 from shm.models import DESCRIPTION, Model, applicable, build, competing_names
 from shm.modes_document import load_modes
 from shm.pipeline.lineage import Taught
+from shm.report.assumed import assumptions_line, with_assumptions
 from shm.settings import load_settings
 from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior, Selection
 from shm.values.rounding import force_unit
@@ -136,9 +137,16 @@ def command(
         posterior = update(tests, chosen, options, progress)
     tell_poor_fit(posterior)
     if flags.wants_json():
-        show({**posterior_document(posterior), "doubts": doubts})
+        show(with_assumptions({**posterior_document(posterior), "doubts": doubts}, hanger))
         return
     show_posterior(posterior, hanger.limits)
+    tell_assumptions(hanger)
+
+
+def tell_assumptions(hanger: Hanger) -> None:
+    """Print which physical assumptions the owner has overridden, if any."""
+    if hanger.assumptions.overridden:
+        click.echo(paragraph(assumptions_line(hanger)))
 
 
 def tell_irregular(tests: Sequence[ModalTest]) -> None:
@@ -264,9 +272,11 @@ def select_command(
     tell_poor_fit(selection.selected)
     if flags.wants_json():
         document = selection_document(selection, hanger.limits)
-        show({**document, "not_applicable": not_applicable, "doubts": doubts})
+        complete = {**document, "not_applicable": not_applicable, "doubts": doubts}
+        show(with_assumptions(complete, hanger))
         return
     show_selection(selection, hanger.limits)
+    tell_assumptions(hanger)
     for name, reason in not_applicable.items():
         click.echo(f"{name} does not apply: {reason}")
 

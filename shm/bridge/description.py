@@ -17,6 +17,8 @@ from types import MappingProxyType
 from typing import Any
 from urllib.parse import urlsplit
 
+from shm.assumptions import DEFAULTS, Assumptions
+from shm.bridge.assumed import assumptions_of
 from shm.bridge.changes import overlaid
 from shm.bridge.hanger import hanger_of, structure_of
 from shm.bridge.hooks import Hook, escalations_s, hook_of, zone_of
@@ -181,6 +183,7 @@ class Bridge:
     measurement_hours: Mapping[str, float] = field(default_factory=lambda: dict(MEASUREMENT_HOURS))
     as_in_file: Bridge | None = None
     single_sign_on: SingleSignOn | None = None
+    assumptions: Assumptions = DEFAULTS
 
     @property
     def escalation_s(self) -> dict[str, float]:
@@ -233,7 +236,8 @@ def load_bridge(path: Path, changed: Mapping[str, object] = MappingProxyType({})
 
 
 def _described(document: dict[str, Any], path: Path) -> Bridge:
-    hangers = tuple(hanger_of(table, path) for table in _tables(document, "hanger", path))
+    assumed = assumptions_of(_table(document, "assumptions", path), DEFAULTS)
+    hangers = tuple(hanger_of(table, path, assumed) for table in _tables(document, "hanger", path))
     structures = tuple(structure_of(table, path) for table in _tables(document, "structure", path))
     _refuse_doubles([each.id for each in (*hangers, *structures)], "hanger id", path)
     zone = zone_of(document.get("bridge", {}), path)
@@ -261,6 +265,7 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
         other_bridges=others,
         measurement_hours=_hours(document, path),
         single_sign_on=single_sign_on_of(document, path),
+        assumptions=assumed,
     )
 
 

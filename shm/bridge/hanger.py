@@ -12,6 +12,8 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
+from shm.assumptions import DEFAULTS, FILE, Assumptions
+from shm.bridge.assumed import assumptions_of
 from shm.bridge.table import Table
 from shm.values import (
     NAN,
@@ -34,7 +36,7 @@ _SECTION = ("area_m2", "second_moment_m4", "mass_per_length_kg_m")
 _OPTIONAL = (
     "name", "diameter_m", "density_kg_m3", "poissons_ratio", "bending_stiffness_factor", "models",
     "plate", "turnbuckle", "thresholds", "scatter", "effects", "supports", "kind", "family",
-    "limits", "fittings_m", "length_by", "length_measured", "measured_by",
+    "limits", "fittings_m", "length_by", "length_measured", "measured_by", "assumptions",
 )  # fmt: skip
 _KNOWN = {*_REQUIRED, *_SECTION, *_OPTIONAL}
 _LARGEST_POISSONS_RATIO = 0.499
@@ -45,17 +47,16 @@ _SOFTEST_PA, _STIFFEST_PA = 1e6, 2e12
 _LIGHTEST_KG_M3, _DENSEST_KG_M3, _STRONGEST_PA = 300.0, 23000.0, 7e9
 _LONGEST_M = 1000.0  # judgement: the longest stays have 580 m; of 4000 m and more no mode is solved
 
-_FORK_DIAMETERS, _NODE_SHARE = 4.0, 0.03
-"""Judgement: a fork, from pin to bar, takes up to four diameters, a node plate with half a chord
-up to 3 % of the length; how much of it swings is open."""
-
 # Judgement: from ten false calls a year, which nobody reads, to none in the life of all bridges.
 _FALSE_CALL_YEARS = (0.1, 1e6)
 _MOST_DECADES = 4.0  # judgement: from a hinge to a clamp
 
 
-def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
-    """The hanger of a `[[hanger]]` table; raises BadInput naming table and key at fault."""
+def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULTS) -> Hanger:
+    """Return the hanger of a `[[hanger]]` table; raises BadInput naming table and key at fault.
+
+    `assumed` are the assumptions of the bridge, which the hanger's own table goes before.
+    """
     table = Table(values, f"[[hanger]] id {values.get('id', '?')}", path)
     table.refuse_unknown(_KNOWN)
     length_m, elastic_modulus = table.positive("length_m"), _elastic_modulus(table)
@@ -72,6 +73,9 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
             "Give lengths and diameters in m, areas in m2.",
         )
     nominal_tension_n = table.not_negative("nominal_tension_n")
+    origin = f"{FILE}, hanger {values.get('id', '?')}"
+    assumed = assumptions_of(table.table("assumptions"), assumed, origin)
+    usual_ratio = assumed.poissons_ratio.value
     _refuse_other_units(table, mass / area, nominal_tension_n / area)
     fittings_m, plate = _fittings(table, length_m), _plate(table.table("plate"), length_m, diameter)
     open_ends = plate is None and not any(fittings_m)
@@ -88,12 +92,12 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         name=str(values.get("name", "")),
         thresholds=_thresholds(table.table("thresholds")),
         diameter_m=diameter,
-        poissons_ratio=table.fraction("poissons_ratio", 0.3, 0.0, _LARGEST_POISSONS_RATIO),
+        poissons_ratio=table.fraction("poissons_ratio", usual_ratio, 0.0, _LARGEST_POISSONS_RATIO),
         bending_stiffness_factor=table.fraction("bending_stiffness_factor", 1.0, _LEAST_FACTOR, 1),
         plate=plate,
         turnbuckles=_turnbuckles(table.tables("turnbuckle"), length_m),
         models=_models(table),
-        scatter=_scatter(table, length_m, area, open_ends),
+        scatter=_scatter(table, length_m, area, open_ends, assumed),
         effect_priors=effect_priors_of(table.table("effects")),
         supports=supports_of(table.table("supports")),
         kind=_kind(table),
@@ -101,6 +105,7 @@ def hanger_of(values: dict[str, Any], path: Path) -> Hanger:
         limits=_limits(table.table("limits")),
         fittings_m=fittings_m,
         survey=_survey(table),
+        assumptions=assumed,
     )
 
 
@@ -128,15 +133,17 @@ def _refuse_other_units(table: Table, density_kg_m3: float, stress_pa: float) ->
         )
 
 
-def _scatter(table: Table, length_m: float, area_m2: float, open_ends: bool) -> Scatter:
+def _scatter(
+    table: Table, length_m: float, area_m2: float, open_ends: bool, assumed: Assumptions
+) -> Scatter:
     """As stated; where nothing is said of ends, the way of taping tells how well the length that
     swings is known."""
-    scatter = scatter_of(table.table("scatter"))
+    scatter = scatter_of(table.table("scatter"), assumed)
     by = _length_by(table) or "faces"
     if by == "faces" or not open_ends or math.isfinite(scatter.effective_length):
         return scatter
-    fork_m = _FORK_DIAMETERS * math.sqrt(4 * area_m2 / math.pi)
-    takes = fork_m / length_m if by == "pins" else _NODE_SHARE
+    fork_m = assumed.fork_length.value * math.sqrt(4 * area_m2 / math.pi)
+    takes = fork_m / length_m if by == "pins" else assumed.node_length.value
     # Root mean square of what two ends take, each evenly from nothing to all.
     return replace(scatter, effective_length=math.sqrt(7 / 6) * takes)
 
@@ -350,11 +357,12 @@ _LARGEST_SCATTER = 0.5  # judgement: who is half off wrote another unit
 _LARGEST_TURN_DEG = 45.0  # nothing is farther from the nearer of two axes
 
 
-def scatter_of(table: Table | None) -> Scatter:
+def scatter_of(table: Table | None, assumed: Assumptions = DEFAULTS) -> Scatter:
     """The `[hanger.scatter]` table; raises BadInput naming the key at fault."""
+    usual_scatter = Scatter.of(assumed)
     if table is None:
-        return Scatter()
-    known = {field.name: getattr(Scatter(), field.name) for field in fields(Scatter)}
+        return usual_scatter
+    known = {field.name: getattr(usual_scatter, field.name) for field in fields(Scatter)}
     table.refuse_unknown(known)
     most = dict.fromkeys(known, _LARGEST_SCATTER) | {"sensor_turn_deg": _LARGEST_TURN_DEG}
     return Scatter(

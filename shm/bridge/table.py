@@ -157,19 +157,24 @@ def is_loopback(host: str) -> bool:
 
 _LABEL = re.compile(r"(?:\[\[)?(\w+)(?:\]\] id)? (\S+)")
 """`[[hanger]] id 3 thresholds` or `hook mail`: which table, and the key or name that tells it."""
+_PLAIN_LABEL = re.compile(r"\[(\w+)\]")
+"""`[report]`: a table that a file has once."""
 
 
 def _line_of(path: Path, label: str, problem: str) -> int | None:
     """The line of a table's key that a problem names, else that of the table; None where neither
     is found. The parser of TOML tells no places of what it has read.
     """
-    named = _LABEL.match(label)
-    if named is None:
+    named, plain = _LABEL.match(label), _PLAIN_LABEL.fullmatch(label)
+    if named is None and plain is None:
         return None
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError):
         return None
+    if plain is not None:
+        return _line_of_plain_table(lines, plain[1], problem)
+    assert named is not None
     kind, key = named.groups()
     tells = re.compile(rf"\s*(id|name)\s*=\s*[\"']?{re.escape(key)}[\"']?\s*(#.*)?$")
     begins = [n for n, line in enumerate(lines) if line.strip().startswith(f"[[{kind}]]")]
@@ -178,6 +183,19 @@ def _line_of(path: Path, label: str, problem: str) -> int | None:
         if any(tells.match(line) for line in lines[begin:end]):
             return _line_within(lines, range(begin, end), f"{label} {problem}") + 1
     return begins[0] + 1 if len(begins) == 1 else None
+
+
+def _line_of_plain_table(lines: Sequence[str], name: str, problem: str) -> int | None:
+    """Return the line in `[name]` that a problem names, else that of its header."""
+    header = re.compile(rf"\s*\[\s*{re.escape(name)}\s*\]")
+    begin = next((n for n, line in enumerate(lines) if header.match(line)), None)
+    if begin is None:
+        return None
+    after = range(begin + 1, len(lines))
+    end = next((n for n in after if _other(lines[n], name)), len(lines))
+    words = set(re.findall(r"\w+", problem))
+    keys = {n: re.match(r"\s*(\w+)\s*=", lines[n]) for n in range(begin, end)}
+    return next((n for n, key in keys.items() if key and key[1] in words), begin) + 1
 
 
 def _other(line: str, kind: str) -> bool:

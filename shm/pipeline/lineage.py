@@ -10,15 +10,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import platform
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass
+from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass, replace
 from datetime import datetime
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from shm.assumptions import DEFAULTS, number_text
 from shm.documents import dump
 from shm.errors import BadInput, ShmError
 from shm.models import Model, build, competing_names
@@ -186,6 +188,8 @@ MOVES_NOTHING = frozenset(
     {"id", "name", "thresholds", "limits", "models", "effect_priors", "survey"}
     | {"scatter.sensor_gain", "scatter.sensor_place_m", "scatter.sensor_turn_deg"}
     | {"scatter.sensor_cross_axis"}
+    | {f"assumptions.{name}" for name in ("sensor_gain_sd", "sensor_place_sd_m")}
+    | {f"assumptions.{name}" for name in ("sensor_turn_sd_deg", "sensor_cross_axis_sd")}
 )
 """What no posterior depends on: names, what an owner calls much, which classes may compete, and
 what is of the gap diagnosis alone."""
@@ -219,6 +223,9 @@ def _comparable(described: Mapping[str, Any]) -> dict[str, Any]:
         default = each.default_factory() if each.default_factory is not MISSING else each.default
         if each.name in MOVES_NOTHING:
             continue
+        if each.name == "assumptions":
+            told[each.name] = _assumed(described.get(each.name, {}))
+            continue
         if is_dataclass(default) and not isinstance(default, type):
             default = asdict(default)
         stated = described.get(each.name, default)
@@ -228,6 +235,17 @@ def _comparable(described: Mapping[str, Any]) -> dict[str, Any]:
             told[each.name] = stated
     plain: dict[str, Any] = json.loads(dump(told))
     return plain
+
+
+def _assumed(described: Mapping[str, Any]) -> dict[str, str]:
+    """Return the numbers of every assumption in words, of a description as it was stored."""
+    numbers = {name: number_text(row) for name, row in DEFAULTS.items()}
+    for row in described.get("overridden", ()):
+        if row["name"] in numbers:
+            stated = {key: row[key] for key in ("value", "sd", "lower", "upper")}
+            known = {key: math.nan if each is None else each for key, each in stated.items()}
+            numbers[row["name"]] = number_text(replace(DEFAULTS[row["name"]], **known))
+    return numbers
 
 
 def _changes(before: Mapping[str, Any], now: Mapping[str, Any], within: str = "") -> Iterator[str]:

@@ -46,7 +46,6 @@ from shm.watch.frequency_watch import measured_levels, watch_newest_frequencies
 
 _CHECKED_BY = "beam2"  # fast, and any bar is such a beam as far as a mistaken mode goes
 _SHARE_WITHIN_A_FAMILY = 1 / 3  # judgement: one bar of a delivery from another, to one delivery
-_UNSTATED_BENDING_SD = 0.3  # judgement: a strand's wires slip by layers (DESIGN: 0.3 to 1)
 
 
 def options_of(terms: Terms, hanger: Hanger) -> UpdateOptions:
@@ -77,11 +76,12 @@ def of_sibling(learnt: Calibration, hanger: Hanger) -> Calibration:
     """The same for a hanger of the same family, whose length was taped on its own."""
     scatter = hanger.scatter
     bending = scatter.bending_factor
+    unstated = hanger.assumptions.strand_bending_log_sd.value
     sds = {
         SECTION: scatter.section,
         DENSITY: scatter.density,
         MODULUS: scatter.modulus,
-        BENDING: bending if np.isfinite(bending) else _UNSTATED_BENDING_SD,
+        BENDING: bending if np.isfinite(bending) else unstated,
     }
     kept = [index for index, name in enumerate(learnt.names) if name != LENGTH]
     names = tuple(learnt.names[index] for index in kept)

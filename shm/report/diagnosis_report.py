@@ -9,6 +9,7 @@ from typing import Any
 
 from shm.diagnosis_document import diagnosis_document
 from shm.report import formatting
+from shm.report.assumed import assumptions_line, assumptions_table, with_assumptions
 from shm.report.bar_table import bar_document, bar_table
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_summary import (
@@ -60,7 +61,11 @@ def diagnosis_paper(sheet: DiagnosisSheet) -> Paper:
             replace(part, figures=tuple, tables=(bar_table(sheet.bar),), status=""),
             Part("Figures", figures=part.figures),
             Part("The answer in numbers", tables=answers(sheet)),
-            Part("What it rests on", tables=evidence(sheet)),
+            Part(
+                "What it rests on",
+                paragraphs=[assumptions_line(sheet.hanger)],
+                tables=(*evidence(sheet), *filled(assumptions_table(sheet.hanger))),
+            ),
         ),
         closing=f"From {_origin(sheet)}. {CREDIBLE}; places count from the deck end.",
     )
@@ -371,9 +376,10 @@ def invisible(sheet: DiagnosisSheet) -> Table:
 
 def diagnosis_json(sheet: DiagnosisSheet) -> dict[str, Any]:
     """A document for `shm.documents.dump`; unknown numbers become null there."""
-    return {
+    document = {
         **diagnosis_document(sheet.diagnosis),
         "answer": answer(sheet.diagnosis).name.lower(),
         "summary": summary(sheet),
         "bar": bar_document(sheet.bar),
     }
+    return with_assumptions(document, sheet.hanger)

@@ -9,6 +9,7 @@ from typing import Any
 from shm import documents, modes_document
 from shm.documents import alert_document, drift_document
 from shm.report import formatting
+from shm.report.assumed import assumptions_line, with_assumptions
 from shm.report.bar_table import bar_document, bar_table
 from shm.report.bridge_report import pattern_json
 from shm.report.contents import DiagnosisSheet, HangerReport, message, of_nominal, status
@@ -49,7 +50,7 @@ def hanger_paper(data: HangerReport) -> Paper:
                 Part("Figures", figures=lambda: hanger_figures(data, FURTHER)),
                 Part("Numbers", tables=numbers(data)),
                 gap_part(data),
-                Part("Origin", tables=origins(data)),
+                Part("Origin", paragraphs=[assumptions_line(data.hanger)], tables=origins(data)),
             ),
         ),
         is_signed=True,
@@ -163,7 +164,7 @@ REPORT_SCHEMA = "shm.report/1"
 
 def hanger_json(data: HangerReport) -> dict[str, Any]:
     """A document for `shm.documents.dump`; unknown numbers become null there."""
-    return {
+    document = {
         "schema": REPORT_SCHEMA,
         "bridge": data.bridge,
         "hanger": asdict(data.hanger),
@@ -204,6 +205,7 @@ def hanger_json(data: HangerReport) -> dict[str, Any]:
         "version": data.version,
         "generated_at": data.generated_at,
     }
+    return with_assumptions(document, data.hanger)
 
 
 def _response(response: FrequencyResponse | None) -> dict[str, Any] | None:

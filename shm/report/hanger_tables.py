@@ -11,6 +11,7 @@ import numpy as np
 from shm.models import equal_springs
 from shm.models.practice_formulas import FORMULAS
 from shm.report import formatting
+from shm.report.assumed import assumptions_table
 from shm.report.contents import HangerReport, TrendRow
 from shm.report.formatting import Interval
 from shm.report.hanger_summary import counted_tests, misfits_percent
@@ -31,7 +32,7 @@ def numbers(data: HangerReport) -> tuple[Table, ...]:
 
 def origins(data: HangerReport) -> tuple[Table, ...]:
     """What it was found from."""
-    return filled(origin(data), settings(data.settings))
+    return filled(origin(data), settings(data.settings), assumptions_table(data.hanger))
 
 
 def results(data: HangerReport) -> Table:
