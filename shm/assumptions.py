@@ -415,6 +415,15 @@ _SENSORS = (
         most=50.0,
     ),
     Assumption(
+        "accelerometers_on_bar",
+        2.0,
+        "accelerometers",
+        JUDGEMENT,
+        "In a test whose sensors' places are not stated: what they may do to a mode in the watch, "
+        "where each test has them elsewhere.",
+        most=20.0,
+    ),
+    Assumption(
         "accelerometer_most_of_bar",
         0.03,
         "of the bar's mass",
@@ -565,7 +574,203 @@ _ERRORS = (
     ),
 )
 
-_ROWS = (*_BAR, *_TENSION, *_ENDS, *_STRANDS, *_SENSORS, *_ERRORS)
+_DIAGNOSIS = (
+    Assumption(
+        "unstated_shape_sd",
+        0.01,
+        "of a unit shape",
+        JUDGEMENT,
+        "Of a mode shape that is still to be measured: twice that of simulated campaigns.",
+        least=1e-5,
+        most=1.0,
+    ),
+    Assumption(
+        "gross_error_share",
+        0.01,
+        "probability",
+        "Hampel, Ronchetti, Rousseeuw and Stahel (1986), 1.2c",
+        "Of a frequency to be a gross error. Of routine data 1 to 10 % are; modes that were chosen "
+        "with care are taken to be the better end of that.",
+        least=1e-6,
+        most=0.5,
+    ),
+    Assumption(
+        "field_noise_share",
+        0.5,
+        "probability",
+        JUDGEMENT,
+        "Of a diagnosis, that a bar is as rough as in the field, not as clean as in a simulator: "
+        "even odds.",
+        most=1.0,
+    ),
+    Assumption(
+        "overlap_of_peaks",
+        0.004,
+        "of the frequency",
+        JUDGEMENT,
+        "Frequencies of one order that are closer have peaks that overlap: twice the bandwidth at "
+        "0.1 % of damping.",
+        most=0.1,
+    ),
+    Assumption(
+        "overlap_correlation",
+        0.4,
+        "correlation",
+        JUDGEMENT,
+        "Of the errors of such peaks, as likely as none: an identification of both planes together "
+        "leaves none, that of each by itself shares what both sensors heard.",
+        most=0.99,
+    ),
+)
+
+_CHANGES = (
+    Assumption(
+        "change_rate_per_year",
+        0.02,
+        "1/year",
+        JUDGEMENT,
+        "How often a hanger changes for good.",
+        least=1e-6,
+        most=100.0,
+    ),
+    Assumption(
+        "outlier_probability",
+        0.01,
+        "probability",
+        JUDGEMENT,
+        "Of a test to say nothing of its hanger.",
+        least=1e-6,
+        most=0.5,
+    ),
+    Assumption(
+        "tension_scatter",
+        0.005,
+        "fraction",
+        JUDGEMENT,
+        "Of the tension from test to test of an unchanged hanger, beyond identification.",
+        least=1e-6,
+        most=0.5,
+    ),
+    Assumption(
+        "spring_scatter_of_step",
+        0.1,
+        "of the step",
+        JUDGEMENT,
+        "Of an end spring from test to test, as a share of the change that is looked for.",
+        least=1e-6,
+        most=10.0,
+    ),
+    Assumption(
+        "bending_scatter",
+        0.003,
+        "fraction",
+        JUDGEMENT,
+        "Of the bending stiffness from test to test.",
+        least=1e-6,
+        most=0.5,
+    ),
+    Assumption(
+        "clock_scatter",
+        1e-4,
+        "fraction",
+        JUDGEMENT,
+        "Of a logger's time base from test to test.",
+        least=1e-9,
+        most=0.1,
+    ),
+    Assumption(
+        "mode_scatter",
+        5e-4,
+        "fraction",
+        JUDGEMENT,
+        "Of each frequency by itself from test to test: a joint that gives, sensors elsewhere.",
+        least=1e-7,
+        most=0.1,
+    ),
+    Assumption(
+        "tension_per_kelvin_sd",
+        0.001,
+        "1/K",
+        JUDGEMENT,
+        "Of the tension's temperature coefficient, about 0: a hanger whose bridge warms with it "
+        "has a small share of what a held bar would have.",
+        least=1e-7,
+        most=0.1,
+    ),
+    Assumption(
+        "spring_per_kelvin_sd_of_step",
+        0.1,
+        "of the step / K",
+        JUDGEMENT,
+        "Of an end spring's temperature coefficient, about 0.",
+        least=1e-6,
+        most=10.0,
+    ),
+    Assumption(
+        "unknown_temperature_sd_k",
+        10.0,
+        "K",
+        JUDGEMENT,
+        "Of a temperature that was not measured, from the mean of those that were.",
+        least=0.1,
+        most=60.0,
+    ),
+    Assumption(
+        "thermometer_sd_k",
+        1.5,
+        "K",
+        JUDGEMENT,
+        "A thermometer tells the air's temperature, which the steel follows in its own time.",
+        most=60.0,
+    ),
+    Assumption(
+        "tension_per_amplitude_sd",
+        0.002,
+        "1/ln(amplitude)",
+        JUDGEMENT,
+        "Of the tension's dependence on the level of motion, about 0.",
+        least=1e-7,
+        most=1.0,
+    ),
+    Assumption(
+        "spring_per_amplitude_sd_of_step",
+        0.1,
+        "of the step / ln(amplitude)",
+        JUDGEMENT,
+        "Of an end spring's dependence on the level of motion, about 0: joints slip.",
+        least=1e-6,
+        most=10.0,
+    ),
+    Assumption(
+        "bending_per_amplitude_sd",
+        0.05,
+        "1/ln(amplitude)",
+        JUDGEMENT,
+        "Of the bending stiffness's dependence on the level of motion, about 0: wires slip.",
+        least=1e-6,
+        most=10.0,
+    ),
+    Assumption(
+        "unknown_log_amplitude_sd",
+        0.5,
+        "of the logarithm",
+        JUDGEMENT,
+        "Of a level of motion that was not measured.",
+        least=1e-3,
+        most=10.0,
+    ),
+    Assumption(
+        "creep_per_year_sd",
+        0.002,
+        "1/year",
+        JUDGEMENT,
+        "Of the steady change of a tension, about 0.",
+        least=1e-7,
+        most=1.0,
+    ),
+)
+
+_ROWS = (*_BAR, *_TENSION, *_ENDS, *_STRANDS, *_SENSORS, *_ERRORS, *_DIAGNOSIS, *_CHANGES)
 _NAMES = tuple(row.name for row in _ROWS)
 
 

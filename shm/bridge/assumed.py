@@ -51,7 +51,7 @@ def _row(table: Table, key: str, base: Assumptions, origin: str) -> Assumption:
     return found
 
 
-def _numbers(table: Table, row: Assumption, raw: Any) -> dict[str, float]:
+def _numbers(table: Table, row: Assumption, raw: Any) -> dict[str, Any]:
     """Return what a key states, by the field of the row; raises BadInput for what the row lacks."""
     if isinstance(raw, dict):
         given = {key: value for key, value in raw.items() if key != "reason"}

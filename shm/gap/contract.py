@@ -13,6 +13,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from shm.assumptions import DEFAULTS, Assumptions
 from shm.models.effects import Conditions, Survey, Variant
 from shm.values import FloatArray, IntArray
 from shm.values.diagnosis import joined
@@ -90,6 +91,7 @@ class Observations:
     does to a component of a shape; all of a mode turn together. `known_damping` (F, 2)
     holds the logarithm of each mode's damping ratio and its standard deviation; NaN where unknown.
     `rounding` (F,), None for none, is the standard deviation that rounding adds to frequencies.
+    `assumed` is what the hanger's description assumes of errors.
     """
 
     design: Design
@@ -98,6 +100,7 @@ class Observations:
     turned: FloatArray | None = None
     known_damping: FloatArray | None = None
     rounding: FloatArray | None = None
+    assumed: Assumptions = DEFAULTS
 
     @property
     def damping(self) -> FloatArray:
@@ -121,7 +124,9 @@ class Observations:
         turned = None if self.turned is None else self.turned[data]
         rounding = None if self.rounding is None else self.rounding[frequencies]
         damping = self.damping[frequencies]
-        return Observations(part, self.value[data], self.sd[data], turned, damping, rounding)
+        return Observations(
+            part, self.value[data], self.sd[data], turned, damping, rounding, self.assumed
+        )
 
 
 @dataclass(frozen=True, eq=False)

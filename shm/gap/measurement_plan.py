@@ -298,7 +298,9 @@ def _unknown_ways(problem: GapProblem, fit: Fit, usual: Errors) -> list[tuple[fl
         sd=np.append(usual.sd[:count], np.maximum(usual.sd[count:], np.sqrt(fit.noise.shape))),
         unseen_shape=float(np.sqrt(usual.unseen_shape * LARGEST_SHAPE)),
     )
-    sizes = sizes_of(usual.sd[:count], LARGEST_FREQUENCY, FREQUENCY_SIZES)
+    sizes = sizes_of(
+        usual.sd[:count], LARGEST_FREQUENCY, FREQUENCY_SIZES, problem.hanger.assumptions
+    )
     ways = []
     for size, pattern, by_test in product(sizes, _PATTERNS, (False, True)):
         own = replace(usual, remainder=Remainder(float(size), pattern, by_test))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from shm.assumptions import DEFAULTS
 from shm.gap.contract import Design, Fit
 from shm.gap.experiment_design import Proposal, proposals, sensors_wanted, with_sensors
 from shm.gap.noise import same_mode
@@ -133,7 +134,6 @@ def _differences(problem: GapProblem, pair: tuple[Fit, Fit], design: Design) -> 
     )
 
 
-_USUAL_SHAPE_SD = 0.01  # judgement: of a unit shape, twice that of our simulated campaigns
 _STEP_IN_SDS = 0.1  # technical: far from rounding, near enough for slopes to hold
 
 
@@ -165,13 +165,17 @@ class Errors:
     sd: FloatArray
     repeated: float
     remainder: Remainder | None = None
-    unseen_shape: float = _USUAL_SHAPE_SD
+    unseen_shape: float = DEFAULTS.unstated_shape_sd.value
     sensors: FloatArray | None = None
 
     @classmethod
     def of(cls, problem: GapProblem, fit: Fit) -> Errors:
         known = np.isfinite(problem.observations.sd[: problem.design.frequencies])
-        return cls(identification_sd(problem, fit), fit.model_error if known.any() else 0.0)
+        return cls(
+            identification_sd(problem, fit),
+            fit.model_error if known.any() else 0.0,
+            unseen_shape=problem.hanger.assumptions.unstated_shape_sd.value,
+        )
 
     def between(self, one: Design, other: Design, *, same: bool) -> FloatArray:
         """The covariance (F of one, F of the other) by what repeats; of the `same` tests or not."""

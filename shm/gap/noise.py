@@ -30,6 +30,7 @@ from itertools import product
 
 import numpy as np
 
+from shm.assumptions import DEFAULTS, Assumptions
 from shm.gap.contract import Covariance, Design, NoiseNode, Observations
 from shm.gap.observations import rounding_covariance
 from shm.gap.repeated_errors import Repeated, turned_modes
@@ -38,25 +39,8 @@ from shm.values import FloatArray, IntArray
 # As the general model and other finite elements differ at most (docs/gap.md, what is compared).
 MODEL_ERROR_SCALE = 2e-5
 MEAN_MODEL_ERROR = MODEL_ERROR_SCALE * float(np.sqrt(2 / np.pi))  # of a half-normal
-# Judgement: from the best identification (1e-4 in docs/trials/gap_trial.md) to peaks that are read
-# off a plot by eye.
-SD_LOWER, SD_UPPER = 1e-4, 3e-2
-FACTOR_SPREAD = 0.2
-"""Of the logarithm of true over stated standard deviations, common to all frequencies."""
-
-OVERLAP = 0.004
-"""Frequencies of one order that are closer, as a fraction, have peaks that overlap: twice the
-bandwidth at 0.1 % of damping."""
-CORRELATIONS = (0.0, 0.4)
-"""Of the errors of such peaks, one as likely as the other: our identification of both planes
-together leaves none, that of each by itself shares what both sensors heard."""
-
-# Judgement: below 3e-6 nothing shows; 3e-3 is six times the most that sound hangers of others had,
-# and more would take gaps for noise. Technical: ten steps of a factor of 2.
-_SIGMA_LOWER, _SIGMA_UPPER, _SIGMAS = 3e-6, 3e-3, 10
-# Judgement: whether a bar is as clean as in our simulator or as in the field: even odds.
-_FIELD_SHARE = 0.5
-_SHAPES_SPREAD = FACTOR_SPREAD  # as little is known of shapes' standard deviations
+# Technical: below 3e-6 nothing shows; ten steps of a factor of 2 to the usual model error's end.
+_SIGMA_LOWER, _SIGMAS = 3e-6, 10
 _CHANCE = 1 / 40  # variance of the logarithm of a standard deviation that has 20 degrees of freedom
 _SDS, _SDS_OF_SOME = 32, 12  # technical: steps of a fifth and a half in the logarithm
 # Judgement: three standard deviations are wild; data that scatter by less than half of what they
@@ -98,9 +82,9 @@ def _of_frequencies(
             float(sigma if known.any() else common),
         )
         for errors, of_errors in correlations
-        for common, of_common in zip(*_unknown_sds(known), strict=True)
-        for factor, of_factor in zip(*_factors(known), strict=True)
-        for sigma, of_sigma in zip(*_model_errors(known), strict=True)
+        for common, of_common in zip(*_unknown_sds(known, observations.assumed), strict=True)
+        for factor, of_factor in zip(*_factors(known, observations.assumed), strict=True)
+        for sigma, of_sigma in zip(*_model_errors(known, observations.assumed), strict=True)
         for own in [np.where(known, factor * sd, common)]
     ]
 
@@ -111,6 +95,7 @@ def _correlations(observations: Observations) -> list[tuple[FloatArray, float]]:
     None where a standard deviation is unknown: that outweighs it.
     """
     design, sd = observations.design, observations.sd[: observations.design.frequencies]
+    assumed = observations.assumed
     names = np.array([each.test for each in design.conditions])[design.frequency_test]
     same_test = np.equal.outer(names, names)
     same_mode_of_test = same_test * same_mode(design)
@@ -120,7 +105,7 @@ def _correlations(observations: Observations) -> list[tuple[FloatArray, float]]:
     alone = np.diag(1 - shared**2) + np.outer(shared, shared) * same_mode_of_test
     log_frequency = observations.value[first]
     overlap = (
-        (np.abs(np.subtract.outer(log_frequency, log_frequency)) < OVERLAP)
+        (np.abs(np.subtract.outer(log_frequency, log_frequency)) < assumed.overlap_of_peaks.value)
         & same_test
         & np.equal.outer(design.frequency_order, design.frequency_order)
         & np.not_equal.outer(design.frequency_plane, design.frequency_plane)
@@ -128,7 +113,7 @@ def _correlations(observations: Observations) -> list[tuple[FloatArray, float]]:
     if not overlap.any() or np.isnan(sd).any():
         return [(alone, 1.0)]
     both = np.outer(shared, shared) * overlap
-    return [(alone + each * both, 1 / len(CORRELATIONS)) for each in CORRELATIONS]
+    return [(alone + each * both, 0.5) for each in (0.0, assumed.overlap_correlation.value)]
 
 
 def drawn_together(observations: Observations) -> FloatArray:
@@ -168,20 +153,22 @@ def same_mode(one: Design, other: Design | None = None) -> FloatArray:
     return np.asarray(planes & orders, dtype=float)
 
 
-def _unknown_sds(known: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _unknown_sds(known: FloatArray, assumed: Assumptions) -> tuple[FloatArray, FloatArray]:
     """Values of the common unknown standard deviation and their weights."""
     if known.all():
         return np.zeros(1), np.ones(1)
-    values = np.geomspace(SD_LOWER, SD_UPPER, _SDS_OF_SOME if known.any() else _SDS)
+    values = np.geomspace(
+        *assumed.unstated_frequency_sd.bounds, _SDS_OF_SOME if known.any() else _SDS
+    )
     return values, _trapezoidal(np.ones(len(values)))
 
 
-def _factors(known: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _factors(known: FloatArray, assumed: Assumptions) -> tuple[FloatArray, FloatArray]:
     """Values of true over stated standard deviations of frequencies, and their weights."""
     if not known.any():
         return np.ones(1), np.ones(1)
     away, share = np.array(_HERMITE).T
-    return np.exp(FACTOR_SPREAD * away), share
+    return np.exp(assumed.stated_sd_log_sd.value * away), share
 
 
 def _factors_of_shapes(observations: Observations) -> list[tuple[float, float]]:
@@ -191,7 +178,8 @@ def _factors_of_shapes(observations: Observations) -> list[tuple[float, float]]:
     standard deviations counts as three, lest a shape that changes from test to test pass for it.
     """
     scatter, freedom = _between_tests(observations)
-    precision = _SHAPES_SPREAD**-2 + 2 * freedom
+    # As little is known of the standard deviations of shapes as of those of frequencies.
+    precision = observations.assumed.stated_sd_log_sd.value**-2 + 2 * freedom
     centre = 2 * freedom * np.log(scatter) / precision if freedom else 0.0
     spread = precision**-0.5
     if len(observations.design.shape_mode) == 0 or spread < _SETTLED:
@@ -221,16 +209,17 @@ def _between_tests(observations: Observations) -> tuple[float, float]:
     return max(scatter, _LEAST_SCATTER), freedom
 
 
-def _model_errors(known: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _model_errors(known: FloatArray, assumed: Assumptions) -> tuple[FloatArray, FloatArray]:
     """Values of sigma and their weights; no sigma where all standard deviations are unknown."""
     if not known.any():
         return np.zeros(1), np.ones(1)
-    values = np.geomspace(_SIGMA_LOWER, _SIGMA_UPPER, _SIGMAS)
+    values = np.geomspace(_SIGMA_LOWER, assumed.model_error.upper, _SIGMAS)
     density = values * np.exp(-((values / MODEL_ERROR_SCALE) ** 2) / 2)
     # Below its smallest value the prior is flat: its integral there is the density by logarithm.
     own = _trapezoidal(density, below=density[0] / np.log(values[1] / values[0]))
     field = _trapezoidal((values >= MODEL_ERROR_SCALE).astype(float))
-    return values, np.asarray((1 - _FIELD_SHARE) * own + _FIELD_SHARE * field)
+    share = assumed.field_noise_share.value
+    return values, np.asarray((1 - share) * own + share * field)
 
 
 def _trapezoidal(density: FloatArray, below: float = 0.0) -> FloatArray:
@@ -254,7 +243,6 @@ SMALLEST_SDS = 1.0  # a smaller one drowns in the errors
 FREQUENCY_SIZES, SHAPE_SIZES, PLAIN_NODES = 6, 4, 3
 # Judgement: causes act on neighbouring modes alike (a spring, a mass near an end), not on far ones.
 SMOOTH_ORDERS = 2.0
-SD_UNKNOWN = 1e-3  # judgement, of what states none: a hammer test of fair quality
 
 
 def flexible_nodes(
@@ -286,7 +274,8 @@ def flexible_nodes(
 def _kinds(observations: Observations) -> list[list[tuple[FloatArray, FloatArray]]]:
     """For each kind of remainder the variances that it may add to frequencies and shapes."""
     design = observations.design
-    sizes = sizes_of(observations.sd[: design.frequencies], LARGEST_FREQUENCY, FREQUENCY_SIZES)
+    frequency_sd, assumed = observations.sd[: design.frequencies], observations.assumed
+    sizes = sizes_of(frequency_sd, LARGEST_FREQUENCY, FREQUENCY_SIZES, assumed)
     shapes = _shape_remainders(observations)
     none = np.zeros((design.frequencies, design.frequencies)), np.zeros(len(design.shape_mode))
     in_frequencies, in_both = [], []
@@ -321,10 +310,12 @@ def _shape_remainders(observations: Observations) -> list[FloatArray]:
     ]
 
 
-def sizes_of(sd: FloatArray, largest: float, count: int) -> FloatArray:
+def sizes_of(
+    sd: FloatArray, largest: float, count: int, assumed: Assumptions = DEFAULTS
+) -> FloatArray:
     """Sizes that a remainder may have, from what drowns in the errors."""
     known = sd[np.isfinite(sd)]
-    typical = float(np.median(known)) if known.size else SD_UNKNOWN
+    typical = float(np.median(known)) if known.size else assumed.unstated_frequency_sd.value
     return np.geomspace(min(SMALLEST_SDS * typical, largest / 2), largest, count)
 
 

@@ -85,6 +85,7 @@ def observed(tests: Sequence[ModalTest], hanger: Hanger) -> Observations:
         np.concatenate([np.zeros_like(sd), turned]) if turned.any() else None,
         np.array([_damping(mode) for _, mode in modes]),
         rounding_sds(tests),
+        hanger.assumptions,
     )
 
 

@@ -22,8 +22,6 @@ from shm.gap.outliers import (
     acts_alone,
     at,
     gross_errors,
-    log_gross,
-    log_ordinary,
 )
 from shm.gap.problem import GapProblem
 from shm.inference.options import Progress, silent
@@ -106,7 +104,8 @@ def search_further(found: Cleared) -> Cleared:
 
 def _alone(found: Cleared, error: GrossError, fit: Fit) -> float:
     deviation, _ = found.expected(error, fit)
-    return acts_alone(found.whole.design, found.problem.design, error.row, deviation)
+    share = found.problem.hanger.assumptions.gross_error_share.value
+    return acts_alone(found.whole.design, found.problem.design, error.row, deviation, share)
 
 
 def _led_before(first: Attribution, last: Attribution) -> str:
@@ -123,8 +122,8 @@ def _led_before(first: Attribution, last: Attribution) -> str:
 def _stands(found: Cleared, error: GrossError) -> bool:
     """Whether the attribution without it still does not expect the frequency."""
     seen = found.seen(error, answered(found.attribution)[0][1])
-    gross = seen.given_rest(log_gross(seen.deviation))
-    return bool(gross[0] > seen.given_rest(log_ordinary(seen.deviation, seen.sd))[0])
+    gross = seen.gross_given_rest
+    return bool(gross[0] > seen.ordinary_given_rest[0])
 
 
 def outliers(found: Cleared, errors: Sequence[GrossError], fit: Fit) -> tuple[Outlier, ...]:

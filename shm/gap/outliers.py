@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from shm.assumptions import DEFAULTS
 from shm.gap.attribution import Attribution
 from shm.gap.contract import Design, Fit, Hypothesis
 from shm.gap.detectability import HOPELESS_SHARE
@@ -42,19 +43,13 @@ Judgement: of ten that go, one may be sound, which costs little data and a remar
 
 LARGEST_SHARE = 0.1
 """Never more of the frequencies than this are set aside (one at least may be): the upper end of
-what is usual (`GROSS_ERROR`)."""
+what is usual (`gross_error_share` of `shm.assumptions`)."""
 
 _FEWEST_LEFT = 4  # judgement: tension, stiffness, and two that can disagree with them
 # Judgement: linear odds of up to 12 to 1 against are worth two fits, more where the gap is large.
 _REACH = 2.5
 # Judgement: a datum ten standard deviations out has pulled the fit out of where it is linear.
 _DRAGGED = 10.0
-GROSS_ERROR = 0.01
-"""The prior probability of a frequency to be a gross error.
-
-Of routine data 1 to 10 % are (Hampel, Ronchetti, Rousseeuw and Stahel 1986, 1.2c); modes that were
-chosen with care are taken to be the better end of that.
-"""
 WIDE_FROM, WIDE_TO = 1e-4, 3.0
 """Sizes of gross errors, of the logarithm of the frequency: log-uniform, up or down."""
 FREEDOM = 20.0
@@ -168,8 +163,8 @@ def _judged(
         seen = at(whole, without.fit, row)
         kept.append(without)
         gain = _gain(rest, base, without.fit, rng)
-        gross.append(without.log_weight + gain + seen.given_rest(log_gross(seen.deviation))[0])
-        tails = without.fit.log_evidence + seen.given_rest(log_ordinary(seen.deviation, seen.sd))[0]
+        gross.append(without.log_weight + gain + seen.gross_given_rest[0])
+        tails = without.fit.log_evidence + seen.ordinary_given_rest[0]
         full = (
             each.fit
             if whole is problem
@@ -234,6 +229,7 @@ class LeftOut:
     deviation: FloatArray
     sd: FloatArray
     log_all: FloatArray
+    gross_share: float = DEFAULTS.gross_error_share.value
 
     @property
     def log_rest(self) -> FloatArray:
@@ -245,12 +241,12 @@ class LeftOut:
     @property
     def gross(self) -> FloatArray:
         """Log evidence (r,) relative to that of all data, were each frequency a gross error."""
-        return self._relative(log_gross(self.deviation))
+        return self._relative(log_gross(self.deviation, self.gross_share))
 
     @property
     def ordinary(self) -> FloatArray:
         """The same (r,) were it an ordinary datum, whose error has the tails of Student's t."""
-        return self._relative(log_ordinary(self.deviation, self.sd))
+        return self._relative(log_ordinary(self.deviation, self.sd, self.gross_share))
 
     @property
     def expected(self) -> tuple[FloatArray, FloatArray]:
@@ -259,6 +255,16 @@ class LeftOut:
         mean = (weight * self.deviation).sum(axis=0)
         square = (weight * (self.sd**2 + self.deviation**2)).sum(axis=0)
         return mean, np.sqrt(square - mean**2)
+
+    @property
+    def gross_given_rest(self) -> FloatArray:
+        """Return the log density (r,) given all other data, were each a gross error."""
+        return self.given_rest(log_gross(self.deviation, self.gross_share))
+
+    @property
+    def ordinary_given_rest(self) -> FloatArray:
+        """Return the log density (r,) given all other data, were each an ordinary datum."""
+        return self.given_rest(log_ordinary(self.deviation, self.sd, self.gross_share))
 
     def given_rest(self, log_density: FloatArray) -> FloatArray:
         """Log of the mean density (r,), the possibilities weighed by all other data."""
@@ -273,15 +279,15 @@ class LeftOut:
         return np.asarray(scipy.special.logsumexp(self.log_rest + log_density, axis=0) - whole)
 
 
-def log_gross(deviation: FloatArray) -> FloatArray:
+def log_gross(deviation: FloatArray, share: float) -> FloatArray:
     """Log of prior probability times density of a gross error of this size."""
     size = np.abs(deviation).clip(WIDE_FROM, WIDE_TO)
-    return np.asarray(np.log(GROSS_ERROR) - np.log(2 * size * np.log(WIDE_TO / WIDE_FROM)))
+    return np.asarray(np.log(share) - np.log(2 * size * np.log(WIDE_TO / WIDE_FROM)))
 
 
-def log_ordinary(deviation: FloatArray, sd: FloatArray) -> FloatArray:
+def log_ordinary(deviation: FloatArray, sd: FloatArray, share: float) -> FloatArray:
     """Log of probability times density of an ordinary error."""
-    return np.asarray(np.log1p(-GROSS_ERROR) + scipy.stats.t.logpdf(deviation, FREEDOM, scale=sd))
+    return np.asarray(np.log1p(-share) + scipy.stats.t.logpdf(deviation, FREEDOM, scale=sd))
 
 
 def left_out(
@@ -314,6 +320,7 @@ def left_out(
         deviation=pull[:, 1:] / precision,
         sd=1 / np.sqrt(precision),
         log_all=height - (pull[:, 0] + z @ z) / 2,
+        gross_share=problem.hanger.assumptions.gross_error_share.value,
     )
 
 
@@ -334,7 +341,9 @@ _LARGEST = 0.3
 _SAME_LEVEL = 1.1  # as `shm.gap.data_checks` says: no hand hits more alike
 
 
-def acts_alone(design: Design, kept: Design, row: int, deviation: float) -> float:
+def acts_alone(
+    design: Design, kept: Design, row: int, deviation: float, gross_share: float
+) -> float:
     """The probability that the frequency `row` of `design`, off by `deviation` of its logarithm,
     is no slip but moved by something unknown that acts on this mode alone.
 
@@ -343,7 +352,7 @@ def acts_alone(design: Design, kept: Design, row: int, deviation: float) -> floa
     if abs(deviation) > _LARGEST or _right_elsewhere(design, kept, row):
         return 0.0
     modes = len(np.unique(design.mode))
-    slip = GROSS_ERROR / np.log(WIDE_TO / WIDE_FROM)
+    slip = gross_share / np.log(WIDE_TO / WIDE_FROM)
     acts = UNKNOWN / NO_GAP * _SHARE / modes / np.log(_LARGEST / WIDE_FROM)
     return float(acts / (acts + slip))
 

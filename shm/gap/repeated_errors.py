@@ -21,9 +21,6 @@ from shm.gap.contract import Design, Observations
 from shm.models.hanger import PhysicalHanger, Zone, solve
 from shm.values import BoolArray, FloatArray, Hanger, IntArray
 
-SECTION_REACH_M = 1.0
-"""The standard deviation of the distance, in which the covariance of the section is normal."""
-
 # Technical: four stretches within the reach of 1 m at 12 m; differences where all is linear; loads
 # that no datum feels, and ways that hold less than 1e-4 of the variance, are left out.
 STRETCHES = 48
@@ -79,18 +76,20 @@ def section_loads(design: Design, physical: PhysicalHanger, hanger: Hanger) -> F
     """
     edges_m = np.linspace(0.0, hanger.length_m, STRETCHES + 1)
     influence = _influence(physical, edges_m, int(design.frequency_order.max()))
-    ways = section_ways(hanger.length_m, hanger.scatter.along)
+    reach_m = hanger.assumptions.section_reach_m.value
+    ways = section_ways(hanger.length_m, hanger.scatter.along, reach_m)
     return np.asarray((influence @ ways)[design.frequency_plane, design.frequency_order - 1])
 
 
-def section_ways(length_m: float, sd: float) -> FloatArray:
+def section_ways(length_m: float, sd: float, reach_m: float) -> FloatArray:
     """The independent ways (STRETCHES, k) in which a section varies, as fractions of its mean.
 
     One standard deviation of each (Karhunen and Loeve); `sd` is that of all together, the root mean
-    square along the bar. The mean is one of the bar's deviations and no business of this.
+    square along the bar. `reach_m` is the standard deviation of the distance, in which the
+    covariance is normal. The mean is one of the bar's deviations and no business of this.
     """
     place_m = np.arange(STRETCHES) * length_m / STRETCHES
-    apart = np.subtract.outer(place_m, place_m) / SECTION_REACH_M
+    apart = np.subtract.outer(place_m, place_m) / reach_m
     centring = np.eye(STRETCHES) - 1 / STRETCHES
     covariance = centring @ np.exp(-(apart**2) / 2) @ centring
     variance, ways = np.linalg.eigh(covariance * STRETCHES / np.trace(covariance))

@@ -24,7 +24,6 @@ import scipy
 from shm.gap.contract import Covariance, Design, Fit, Hypothesis, Observations
 from shm.gap.cross_validation import HeldOut
 from shm.gap.likelihood import Likelihood, ShapeErrors
-from shm.gap.noise import SD_LOWER
 from shm.gap.problem import GapProblem
 from shm.gap.repeated_errors import SensorError
 from shm.values import NAN, PLANES, Compatibility, FloatArray, IntArray, Residual, Scatter, Trend
@@ -306,7 +305,8 @@ def error_bounds(problem: GapProblem) -> Bounds:
     """Of the field's noise, whose size is one of several possibilities, each with its weight."""
     nodes, repeated = problem.likelihood(Hypothesis()).nodes, problem.repeated
     # Where no standard deviation is stated, `model_error` is the one that all errors have.
-    stated = any(node.model_error < SD_LOWER for node in nodes)
+    least = problem.hanger.assumptions.unstated_frequency_sd.lower
+    stated = any(node.model_error < least for node in nodes)
     some = [node for node in nodes if not stated or node.model_error <= _MODEL_ERROR]
     shared = np.diag(repeated.frequency)
     variance = np.array(

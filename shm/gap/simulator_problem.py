@@ -17,9 +17,9 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import scipy
 
+from shm.assumptions import DEFAULTS
 from shm.errors import BadInput, UsageError
 from shm.gap.contract import Covariance, Hypothesis, NoiseNode
-from shm.gap.noise import FACTOR_SPREAD, SD_LOWER, SD_UPPER
 from shm.values import FloatArray
 
 Condition: TypeAlias = Mapping[str, float]
@@ -240,13 +240,14 @@ class SimulatorProblem:
     def nodes(self) -> tuple[NoiseNode, ...]:
         """The unknown errors: stated deviations times a common factor, unstated ones by a share."""
         known = np.isfinite(self.sd)
-        shares = np.zeros(1) if known.all() else np.geomspace(SD_LOWER, SD_UPPER, _UNKNOWN_SDS)
+        bounds, spread = DEFAULTS.unstated_frequency_sd.bounds, DEFAULTS.stated_sd_log_sd.value
+        shares = np.zeros(1) if known.all() else np.geomspace(*bounds, _UNKNOWN_SDS)
         factors = _HERMITE if known.any() else ((0.0, 1.0),)
         return tuple(
             _node(np.diag(own**2), np.log(weight / len(shares)))
             for share in shares
             for away, weight in factors
-            for own in [np.where(known, np.exp(FACTOR_SPREAD * away) * self.sd, share * self.scale)]
+            for own in [np.where(known, np.exp(spread * away) * self.sd, share * self.scale)]
         )
 
     def flexible_nodes(self) -> tuple[NoiseNode, ...]:

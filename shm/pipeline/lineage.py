@@ -243,7 +243,9 @@ def _assumed(described: Mapping[str, Any]) -> dict[str, str]:
     for row in described.get("overridden", ()):
         if row["name"] in numbers:
             stated = {key: row[key] for key in ("value", "sd", "lower", "upper")}
-            known = {key: math.nan if each is None else each for key, each in stated.items()}
+            known: dict[str, Any] = {
+                key: math.nan if each is None else each for key, each in stated.items()
+            }
             numbers[row["name"]] = number_text(replace(DEFAULTS[row["name"]], **known))
     return numbers
 

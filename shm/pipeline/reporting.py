@@ -227,7 +227,8 @@ def hanger_states(
     if baseline is None:
         return NOTHING_WATCHED
     since_baseline, later = dated_tests(store, baseline)
-    options = WatchOptions(limit_years=workspace.settings.false_call_years)
+    years = workspace.settings.false_call_years
+    options = WatchOptions.of(hanger.assumptions, limit_years=years)
     known = {
         each.watched.test: each.watched for each in store.watch.list_all(hanger.id, baseline.id)
     }

@@ -222,7 +222,7 @@ def watch_test(
     tests `beside` it are those that it may agree with, whatever the clocks say.
     """
     since_baseline, later = tests
-    options = WatchOptions(limit_years=limit_years)
+    options = WatchOptions.of(hanger.assumptions, limit_years=limit_years)
     try:
         found = (
             watch_newest(baseline.posterior, since_baseline, later, hanger, options, kept, beside)

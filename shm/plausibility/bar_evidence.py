@@ -35,20 +35,14 @@ _STARTS = (-1.0, 0.75, 2.5)
 _STEPS, _WIDE, _NARROWS, _FIT_SD = 14, 0.1, 0.5, 2e-3
 """Of fits: misfits of 10 % count at first, those of 0.2 % in the end."""
 
-_ENDS = (0.75, 1.3)
-"""Mean and standard deviation of log10 k L/EI uniform from 0.03 to 1000 (as_made.RESTRAINT)."""
-
 _TENSION = (math.log(0.6), 1.0)
-"""Of ln(tension over nominal): 2 % to 5 times (as_made.TENSION_RATIO), mostly a third to 1.5."""
+"""Of ln(tension over nominal): of the assumed `tension_ratio`, mostly a third to 1.5."""
 
 _MODEL_C = 0.005
 """Of ln c: what end zones and sensors do to a bar that is taken as uniform."""
 
-_SHEAR = {"rod": (1.0, 0.02), "strand": (0.75, 0.4)}
-"""Of the share of shear: that of theory, and of wires that slip anything from 0 to 1.5."""
-
-_SLIP = (math.log(0.6), 0.35)
-"""Of ln(bending factor) of a strand, uniform from 0.3 to 1 (as_made.BENDING_FACTOR)."""
+_ROD_SHEAR = (1.0, 0.02)
+"""Of the share of shear of a rod: that of theory."""
 
 _ANY_BAR = (2.0, 0.7)
 """Standard deviations of ln tension and ln c of a bar that nobody described: c from a quarter to
@@ -71,9 +65,6 @@ another (0.03: a change of no known kind), and of a bar against its description.
 _TOGETHER, _ALONG_ORDERS = 0.9, 0.7
 """Of the variance of a bar's errors, what goes together in neighbouring orders, and how far in ln
 of the order: fittings, end zones and sensors raise or lower many modes alike."""
-
-_UNSTATED_SD = 3e-4
-"""Of ln f where no standard deviation is stated."""
 
 _OFF_SHIFT = 0.01
 """Share by which a fitted bar mistakes the shift of a frequency."""
@@ -122,16 +113,16 @@ class Seen:
 
 def seen_in(tests: Sequence[ModalTest], hanger: Hanger) -> Seen:
     """The modes of tests of a hanger, the mean of several, without masses clamped on for a test."""
-    shape = len(tests), len(PLANES), _MOST_ORDER
+    shape, assumed = (len(tests), len(PLANES), _MOST_ORDER), hanger.assumptions
     log_f, variance = np.full(shape, NAN), np.zeros(shape)
     for row, test in enumerate(tests):
         for mode in test.regular_modes:
             if mode.order > _MOST_ORDER:
                 continue
             at = row, PLANES.index(mode.plane), mode.order - 1
-            sd = mode.frequency_sd_hz / mode.frequency_hz
+            sd, unstated = mode.frequency_sd_hz / mode.frequency_hz, assumed.unstated_frequency_sd
             log_f[at] = math.log(mode.frequency_hz)
-            variance[at] = (sd if math.isfinite(sd) else _UNSTATED_SD) ** 2
+            variance[at] = (sd if math.isfinite(sd) else unstated.value) ** 2
         if test.added_mass is not None:
             whole = hanger.mass_per_length_kg_m * hanger.length_m
             place = test.added_mass.x_m / hanger.length_m
@@ -348,12 +339,20 @@ class Fits:
         return Evidence(Seen(off, variance), way, changes, masses=True)
 
 
+def _uniform(lower: float, upper: float) -> tuple[float, float]:
+    """Return mean and standard deviation of a uniform distribution."""
+    return (lower + upper) / 2, (upper - lower) / math.sqrt(12)
+
+
 def _prior(hanger: Hanger) -> tuple[FloatArray, FloatArray]:
     """Means and standard deviations (7,) of the parameters by the description."""
-    scatter = hanger.scatter
-    shear, shear_sd = _SHEAR[hanger.kind]
-    mean = np.array([_TENSION[0], 0.0, *(_ENDS[0],) * 4, shear])
-    sd = np.array([_TENSION[1], _MODEL_C, *(_ENDS[1],) * 4, shear_sd])
+    scatter, assumed = hanger.scatter, hanger.assumptions
+    shear, shear_sd = _ROD_SHEAR
+    if hanger.kind == "strand":
+        shear, shear_sd = _uniform(*assumed.strand_shear_share.bounds)
+    end, end_sd = _uniform(*(math.log10(each) for each in assumed.end_restraint.bounds))
+    mean = np.array([_TENSION[0], 0.0, *(end,) * 4, shear])
+    sd = np.array([_TENSION[1], _MODEL_C, *(end_sd,) * 4, shear_sd])
     if math.isfinite(scatter.tension):
         mean[0], sd[0] = 0.0, math.hypot(scatter.tension, scatter.section)
     own = [scatter.section / 2, scatter.density / 2, scatter.modulus / 2, 2 * scatter.length]
@@ -368,7 +367,8 @@ def _prior(hanger: Hanger) -> tuple[FloatArray, FloatArray]:
         if math.isfinite(scatter.bending_factor):
             own.append(scatter.bending_factor / 2)
         else:
-            mean[1] += (_SLIP[0] - math.log(hanger.bending_stiffness_factor)) / 2
-            own.append(_SLIP[1] / 2)
+            slip, slip_sd = _uniform(*map(math.log, assumed.strand_bending_factor.bounds))
+            mean[1] += (slip - math.log(hanger.bending_stiffness_factor)) / 2
+            own.append(slip_sd / 2)
     sd[1] = math.hypot(sd[1], *own)
     return mean, sd

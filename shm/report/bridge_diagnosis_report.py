@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from shm.assumptions import DEFAULTS
 from shm.diagnosis_document import bridge_diagnosis_document
 from shm.report import formatting
 from shm.report.bar_table import bar_document, bars_table
@@ -23,8 +24,6 @@ _STATES = {
     "shared unknown": ("Shared, not explained", "alert"),
 }
 _WORTH_A_ROW = 0.001  # of a probability: what the three decimals show
-_SENSOR_KG = 0.2
-"""Judgement: heavier than an accelerometer with its magnet and the end of its cable."""
 _MOST_ALIKE = 3  # what a sentence bears
 
 
@@ -106,6 +105,12 @@ def _hangers(numbers: Sequence[int]) -> str:
     return formatting.listed([str(each) for each in numbers]) if numbers else "none for sure"
 
 
+def _heaviest_sensor_kg() -> float:
+    """Return what hardly any accelerometer exceeds: a joint diagnosis is of many hangers."""
+    mass_kg = DEFAULTS.accelerometer_mass_kg
+    return mass_kg.value + 3 * mass_kg.sd
+
+
 def _consequences(diagnosis: BridgeDiagnosis) -> str:
     leading = diagnosis.leading
     if leading is None:
@@ -115,7 +120,7 @@ def _consequences(diagnosis: BridgeDiagnosis) -> str:
     told += f", from hanger to hanger within some {100 * leading.scatter:.0f} %."
     if leading.also_at:
         told += f" About as likely: {formatting.listed(list(leading.also_at[:_MOST_ALIKE]))}."
-    if leading.effect == "point_mass" and leading.size.q05 < _SENSOR_KG:
+    if leading.effect == "point_mass" and leading.size.q05 < _heaviest_sensor_kg():
         told += " So small a mass may be that of the sensors: it is then no cause in the hangers."
     if others:
         told += f" Without it: {_hangers(others)}."

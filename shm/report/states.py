@@ -178,7 +178,8 @@ def states_over_time(watched: Watched, hanger: Hanger) -> StatesOverTime:
     outlier = np.array([each.change.outlier_probability for each in watched.watch.tests])
     explained = np.array([not off_the_baseline(each).any() for each in watched.readings])
     calls = [call.change for call in watched.watch.calls]
-    options = StateOptions(reference_temperature_c=watched.reader.reference_temperature_c)
+    reference_c = watched.reader.reference_temperature_c
+    options = StateOptions.of(hanger.assumptions, reference_temperature_c=reference_c)
     changes = set_free(calls, watched.readings)
     weights = np.where(explained, outlier, 1.0)
     history = states(watched.readings, watched.reader.quantities, weights, changes, options)

@@ -226,7 +226,8 @@ def drifts_of(
 ) -> tuple[Drift, ...]:
     """What tests of one state show by themselves, whatever was known before: how far each quantity
     is off the baseline of `reader`."""
-    read = [read_alone(reader, test, WatchOptions()) for test, _ in tests]
+    options = WatchOptions.of(hanger.assumptions)
+    read = [read_alone(reader, test, options) for test, _ in tests]
     return tuple(
         _drift(quantity, tests[-1], shown, hanger)
         for quantity, shown in zip(reader.quantities, zip(*read, strict=True), strict=True)

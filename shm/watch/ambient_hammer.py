@@ -14,6 +14,7 @@ from datetime import timedelta
 
 import numpy as np
 
+from shm.assumptions import DEFAULTS
 from shm.values import FloatArray, ModalTest, Mode
 from shm.values.rounding import NINETY_PERCENT, rounded_percent
 from shm.values.stream import PooledReading
@@ -21,7 +22,6 @@ from shm.watch.quantities import MeasuredMode
 
 TOGETHER = timedelta(hours=3)
 """Judgement: so long temperature and traffic are alike, and a stream that ran has shown a mode."""
-_UNKNOWN_SD = 1e-3  # of a frequency without a stated error, as in `readings`
 # Of ln f, from one test to the next of a mode: what conditions differ by within TOGETHER, and how
 # a crew mounts its sensors (`WatchOptions.mode_scatter`).
 _TEST_SCATTER = 5e-4
@@ -137,4 +137,4 @@ def _pairs(
 
 def _variance(mode: Mode) -> float:
     sd = mode.frequency_sd_hz / mode.frequency_hz
-    return sd**2 if sd > 0 else _UNKNOWN_SD**2
+    return sd**2 if sd > 0 else DEFAULTS.unstated_frequency_sd.value**2

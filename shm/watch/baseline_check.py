@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shm.assumptions import Assumptions
 from shm.models import Model
 from shm.models.base import Conditions
 from shm.values import (
@@ -39,7 +40,6 @@ _ROUNDS = 3  # technical: of "what is mistaken" and "where the others lie"
 _MAD = 1.4826  # of a normal law
 # Mode by mode two tests of one state differ by more than is stated: judgement, as in readings.
 _SCATTER = 1e-3
-_UNKNOWN_SD = 1e-3  # of a frequency without a stated error: the worse end of usual ones
 # Of a log frequency: what a mode of its own may do from test to test (a joint, a sensor) is less.
 _LEAST = 0.006
 _FAR = 6.0  # robust standard deviations
@@ -49,9 +49,7 @@ _LEVEL_SD, _HEAVY = 0.02, 2.0
 # Judgement, standard deviations of what tests of one baseline differ by: seasons and traffic move
 # a tension by less, a joint that settles an end by less than a factor of two.
 _TENSION_SD, _DECADES_SD = 0.1, 0.3
-# What all frequencies have in common: sensors and clock; and half of what a kelvin softens steel by
-# (0.03 % of its modulus), where temperatures are not known that of ten.
-_COMMON_SD, _PER_KELVIN, _UNKNOWN_KELVIN = 1e-3, 1.5e-4, 10.0
+_COMMON_SD = 1e-3  # judgement: what sensors and the clock do to all frequencies alike
 # A whole test is another hanger's, or by a wrong clock: by this all its modes may be off alike.
 _WRONG_CLOCK_SD = 0.05
 _LEAST_TENSION_SD, _LEAST_DECADES_SD = 0.01, 0.03  # judgement: a day's traffic and warmth do it
@@ -124,15 +122,18 @@ class Comparison:
         self.counts = np.array([counts[key] for key in self.keys])
         kelvin = np.array([test.temperature_c for test in tests])
         kelvin = np.abs(kelvin - np.nanmedian(kelvin)) if np.isfinite(kelvin).any() else kelvin
-        kelvin = np.where(np.isfinite(kelvin), kelvin, _UNKNOWN_KELVIN)
-        self.common_sd = np.hypot(_COMMON_SD, _PER_KELVIN * kelvin)
+        assumed = model.hanger.assumptions
+        kelvin = np.where(np.isfinite(kelvin), kelvin, assumed.unknown_temperature_sd_k.value)
+        # A frequency goes with the root of the modulus.
+        per_kelvin = assumed.modulus_per_kelvin.value / 2
+        self.common_sd = np.hypot(_COMMON_SD, per_kelvin * kelvin)
         self.table = np.full((len(tests), len(self.keys)), np.nan)
         self.variance = np.full_like(self.table, np.nan)
         for row, errors, test in zip(self.table, self.variance, tests, strict=True):
             for mode in known_modes(test):
                 if (mode.plane, mode.order) in self.keys:
                     at = self.keys.index((mode.plane, mode.order))
-                    row[at], errors[at] = math.log(mode.frequency_hz), _variance_of(mode)
+                    row[at], errors[at] = math.log(mode.frequency_hz), _variance_of(mode, assumed)
 
     def fitted(self) -> list[Fitted]:
         """Each test, what all have in common being the median of what they differ by."""
@@ -227,9 +228,9 @@ def spread_of(states: FloatArray) -> FloatArray:
     return np.asarray(np.clip(3 * found, least, most))
 
 
-def _variance_of(mode: Mode) -> float:
+def _variance_of(mode: Mode, assumed: Assumptions) -> float:
     sd = mode.frequency_sd_hz / mode.frequency_hz
-    return sd**2 if sd > 0 and math.isfinite(sd) else _UNKNOWN_SD**2
+    return sd**2 if sd > 0 and math.isfinite(sd) else assumed.unstated_frequency_sd.value**2
 
 
 def _median_or_0(row: FloatArray) -> float:

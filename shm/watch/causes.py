@@ -104,7 +104,6 @@ _LAMP_UNITS = 3.0  # judgement: lamps and cables are a few per cent of a hanger,
 _STRETCHES = ((0.08, 0.15), (0.25, 0.15), (0.5, 0.15), (0.3, 0.4))
 # One unit of each cause: what there is as a rule; six times as much is looked for, too.
 _MASS_SHARE = 0.01
-_SENSOR_KG = 0.3
 _SENSOR_PLACES = np.linspace(0.1, 0.9, 17)
 _LOSS = 0.05
 _STIFFER = 0.03
@@ -124,7 +123,7 @@ class Columns:
     """What causes do to the log frequencies of the baseline's `modes` (n,), one unit or one sd of
     each: (places, r, n) by name.
 
-    `sensors` (n, n) is the covariance that sensors of 0.3 kg, put elsewhere each time, give,
+    `sensors` (n, n) is the covariance that a test's sensors, put elsewhere each time, give,
     `loosening` the patterns (r, n) of each watched quantity that its step may have beside its mean.
     """
 
@@ -132,6 +131,12 @@ class Columns:
     by_cause: dict[str, FloatArray]
     sensors: FloatArray
     loosening: tuple[FloatArray, ...] = ()
+
+
+def mounted_kg(hanger: Hanger) -> float:
+    """Return the mass of all sensors of one test, where nothing is stated of them."""
+    assumed = hanger.assumptions
+    return assumed.accelerometers_on_bar.value * assumed.accelerometer_mass_kg.rms
 
 
 def columns_of(
@@ -192,7 +197,7 @@ def _columns_on(
 
     stiffer = replace(bar, bending_stiffness_n_m2=bar.bending_stiffness_n_m2 * (1 + _STIFFER))
     sensors = np.array([by_mass(place) for place in _SENSOR_PLACES])
-    sensors = sensors * _SENSOR_KG / (_MASS_SHARE * mass_kg)
+    sensors = sensors * mounted_kg(hanger) / (_MASS_SHARE * mass_kg)
     spread = sensors - sensors.mean(axis=0)
     return Columns(
         tuple(modes),

@@ -20,6 +20,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
+from shm.assumptions import DEFAULTS
 from shm.errors import BadInput
 from shm.values import FREQUENCY, FloatArray, ModalTest, ModeReading, Reading, WatchedQuantity
 from shm.watch.causes import UNEXPLAINED, Columns, Direction, Layout, Structure
@@ -35,13 +36,12 @@ POOLED_DAYS = 3.0  # judgement: short beside three weeks in which an owner wants
 _PER_KELVIN_SD = 5e-4
 # Below 0 C: bridge Z24 gained 1e-2 / K as its asphalt stiffened (Peeters and De Roeck 2001).
 _PER_KELVIN_OF_FROST_SD = 5e-3
-_PER_AMPLITUDE_SD = 2e-3  # as of a hanger's tension
 _CREEP_PER_YEAR_SD = 1e-3  # judgement: concrete stiffens, settlement goes on
 _STEP = 0.01  # judgement: of a frequency, what may not be missed
 _WANDER, _WANDER_OF_A_MODE = 1e-3, 5e-4  # judgement: moisture; Magalhaes et al. 2012 leave 1e-3
 _WANDER_DAYS = 45.0  # judgement: as long as a deck takes to dry
 _SCATTER, _SCATTER_OF_A_MODE = 5e-4, 5e-4  # before any test: traffic; the identification
-_UNKNOWN_SD, _ALLOWANCE = 1e-3, 1e-4  # as of a hanger's tests (`readings`)
+_ALLOWANCE = 1e-4  # as of a hanger's tests (`readings`)
 _FROST_SPREAD_K = 2.0  # of frost where no thermometer was read: judgement, a mild winter's days
 # Judgement: of what lasts, loads, stiffness of the whole and clocks are half; a local damage moves
 # several modes, each by its own amount, more often than one alone.
@@ -126,11 +126,12 @@ class FrequencyReader:
 
 def _frequencies(test: ModalTest) -> dict[MeasuredMode, tuple[float, float]]:
     """Frequency and its relative sd of each mode that was measured; the first of a name counts."""
+    unstated = DEFAULTS.unstated_frequency_sd.value  # a structure has no assumptions of its own
     found: dict[MeasuredMode, tuple[float, float]] = {}
     for mode in test.modes:
         hz, sd = mode.frequency_hz, mode.frequency_sd_hz
         if math.isfinite(hz) and hz > 0 and not math.isinf(sd):
-            found.setdefault((mode.plane, mode.order), (hz, sd / hz if sd > 0 else _UNKNOWN_SD))
+            found.setdefault((mode.plane, mode.order), (hz, sd / hz if sd > 0 else unstated))
     return found
 
 
@@ -152,7 +153,7 @@ def structure_of_frequencies(n: int, options: WatchOptions) -> Structure:
             _STEP * ones,
             _PER_KELVIN_SD * ones,
             _PER_KELVIN_OF_FROST_SD * ones,
-            _PER_AMPLITUDE_SD * ones,
+            options.tension_per_amplitude_sd * ones,
             [1.0, _CREEP_PER_YEAR_SD],  # nothing stiffens with the excitation beside the modes
         ]
     )

@@ -225,7 +225,9 @@ def watch_frequencies(
             remedy="Give more tests, or a smaller baseline_tests.",
         )
     hanger = Hanger.without_model(tests[0].hanger or 0, name)
-    watch = FrequencyWatch(dated[:baseline_tests], hanger, options or WatchOptions())
+    watch = FrequencyWatch(
+        dated[:baseline_tests], hanger, options or WatchOptions.of(hanger.assumptions)
+    )
     now, found, alerts = watch.begin(), [], []
     for each in dated[baseline_tests:]:
         now, alert = watch.after(now, each)

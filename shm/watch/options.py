@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import datetime
+from typing import Any
 
 import numpy as np
 
+from shm.assumptions import DEFAULTS, Assumptions
 from shm.errors import UsageError
 from shm.values import NAN, FloatArray
 from shm.values.drift import OF_ONE_VISIT
@@ -29,27 +31,33 @@ class WatchOptions:
     """
 
     limit_years: float = 100.0
-    change_rate_per_year: float = 0.02
-    outlier_probability: float = 0.01
-    tension_scatter: float = 0.005
-    spring_scatter_of_step: float = 0.1
-    bending_scatter: float = 0.003
-    clock_scatter: float = 1e-4
-    mode_scatter: float = 5e-4
+    change_rate_per_year: float = DEFAULTS.change_rate_per_year.value
+    outlier_probability: float = DEFAULTS.outlier_probability.value
+    tension_scatter: float = DEFAULTS.tension_scatter.value
+    spring_scatter_of_step: float = DEFAULTS.spring_scatter_of_step.value
+    bending_scatter: float = DEFAULTS.bending_scatter.value
+    clock_scatter: float = DEFAULTS.clock_scatter.value
+    mode_scatter: float = DEFAULTS.mode_scatter.value
     scatter_scales: tuple[float, ...] = (0.6, 1.0, 1.6, 2.6)
-    tension_per_kelvin_sd: float = 0.001
-    spring_per_kelvin_sd_of_step: float = 0.1
-    tension_per_amplitude_sd: float = 0.002
-    spring_per_amplitude_sd_of_step: float = 0.1
-    bending_per_amplitude_sd: float = 0.05
-    creep_per_year_sd: float = 0.002
-    unknown_temperature_sd_k: float = 10.0
-    thermometer_sd_k: float = 1.5
-    unknown_log_amplitude_sd: float = 0.5
+    tension_per_kelvin_sd: float = DEFAULTS.tension_per_kelvin_sd.value
+    spring_per_kelvin_sd_of_step: float = DEFAULTS.spring_per_kelvin_sd_of_step.value
+    tension_per_amplitude_sd: float = DEFAULTS.tension_per_amplitude_sd.value
+    spring_per_amplitude_sd_of_step: float = DEFAULTS.spring_per_amplitude_sd_of_step.value
+    bending_per_amplitude_sd: float = DEFAULTS.bending_per_amplitude_sd.value
+    creep_per_year_sd: float = DEFAULTS.creep_per_year_sd.value
+    unknown_temperature_sd_k: float = DEFAULTS.unknown_temperature_sd_k.value
+    thermometer_sd_k: float = DEFAULTS.thermometer_sd_k.value
+    unknown_log_amplitude_sd: float = DEFAULTS.unknown_log_amplitude_sd.value
     least_frequency_shift: float = 0.006
     most_of_one_test: float = 0.2
     baseline_tests: int = 1
     beginnings: int = 60
+
+    @classmethod
+    def of(cls, assumed: Assumptions, **given: Any) -> WatchOptions:
+        """Return options with what is assumed of a hanger, but for those that are given."""
+        rows = {each.name: assumed[each.name].value for each in fields(cls) if each.name in assumed}
+        return cls(**{**rows, **given})
 
     def __post_init__(self) -> None:
         if not self.scatter_scales:

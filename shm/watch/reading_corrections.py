@@ -34,8 +34,6 @@ from shm.values import (
 )
 from shm.watch.quantities import MeasuredMode, log_frequencies, moved
 
-# Of steel's modulus: Ledbetter and Reed (1973), Elastic properties of metals and alloys, I.
-MODULUS_PER_KELVIN = -3e-4
 _STIFFER = 0.01
 _CLAMPED = "beam1"
 
@@ -62,7 +60,7 @@ def softening(
     stiff = described(model.name, stiffer, model.priors)
     change = log_frequencies(stiff, base[None], modes)
     change = change - log_frequencies(model, base[None], modes)
-    return np.asarray(MODULUS_PER_KELVIN * change[0] / _STIFFER)
+    return np.asarray(hanger.assumptions.modulus_per_kelvin.value * change[0] / _STIFFER)
 
 
 # Of the slope, in a frequency that is not of small amplitude. The mean weighted with the energy of

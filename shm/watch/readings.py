@@ -43,21 +43,17 @@ from shm.values import (
     Posterior,
     Reading,
 )
-from shm.watch.causes import columns_of
+from shm.watch.causes import columns_of, mounted_kg
 from shm.watch.linear_reading import Likelihood, LinearReading, SeenModes
 from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, sound_modes
 from shm.watch.quantities import MeasuredMode, base_point, watched_quantities
 from shm.watch.reading_corrections import AmplitudeSlopes, loosening_of, softening
 
-# A frequency without a stated error is as good as a usual identification: its errors go from 1e-4
-# to 1e-3 of a frequency, and who states none is given the worse.
-_UNKNOWN_SD = 1e-3
 _FREQUENCY_ALLOWANCE = 1e-4
 
 # Mode by mode two tests of one state differ by more than is stated: the sensors' mass and place, a
 # joint that gives. Judgement, the better end of what repeated tests of real hangers show.
 _MODE_SCATTER = 1e-3
-_SENSOR_KG = 0.3  # judgement: two accelerometers with magnets and cable
 _LOOSENED_STEPS = 6.0  # judgement: of the largest change of an end that is looked for
 _LOOSENED = 0.5  # of tests with a mode that seems mistaken, judgement: an end has loosened
 # Of a log frequency: a mode that is off by less may be so by its joint or its sensor.
@@ -106,7 +102,9 @@ class Reader:
         self._per_kelvin = softening(self._model, self._base, hanger, self.modes)
         self._per_amplitude = AmplitudeSlopes.of(usable, self.modes)
         mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
-        self._scatter = math.hypot(_MODE_SCATTER, _SENSOR_KG / mass_kg / math.sqrt(8))
+        self._unstated_sd = hanger.assumptions.unstated_frequency_sd.value
+        sensors_kg = mounted_kg(hanger)
+        self._scatter = math.hypot(_MODE_SCATTER, sensors_kg / mass_kg / math.sqrt(8))
         self._loosening = np.vstack(self.columns.loosening).T
         self._residual = np.zeros(len(self.modes))
         self._residual = self._own_residual([self._seen(test) for test in usable])
@@ -231,7 +229,7 @@ class Reader:
         own = np.array([self.modes.index(_key(mode)) for mode in modes], dtype=int)
         frequency_hz = np.array([mode.frequency_hz for mode in modes], dtype=float)
         sd_hz = np.array([mode.frequency_sd_hz for mode in modes], dtype=float)
-        sd = np.where(sd_hz > 0, sd_hz / frequency_hz, _UNKNOWN_SD)
+        sd = np.where(sd_hz > 0, sd_hz / frequency_hz, self._unstated_sd)
         swing = (
             (test.temperature_c - self.reference_temperature_c) * self._per_kelvin[own]
             if self._is_warmth_known(test)

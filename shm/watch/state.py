@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from datetime import datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shm.assumptions import DEFAULTS, Assumptions
 from shm.errors import NothingThere, UsageError
 from shm.values import FloatArray
 from shm.values.drift import TENSION, Change, Reading, TemperatureCoefficient, WatchedQuantity
@@ -184,11 +185,17 @@ class StateOptions:
     rate_log_sd: float = 1.5
     scatter_of_step: float = 0.04
     scatter_log_sd: float = 1.0
-    tension_per_kelvin_sd: float = 0.004
-    spring_per_kelvin_sd_of_step: float = 0.1
-    unknown_temperature_sd_k: float = 10.0
+    tension_per_kelvin_sd: float = DEFAULTS.tension_per_kelvin_sd.value
+    spring_per_kelvin_sd_of_step: float = DEFAULTS.spring_per_kelvin_sd_of_step.value
+    unknown_temperature_sd_k: float = DEFAULTS.unknown_temperature_sd_k.value
     jump_of_step: float = 3.0
     largest_inflation: float = 1e4
+
+    @classmethod
+    def of(cls, assumed: Assumptions, **given: Any) -> StateOptions:
+        """Return options with what is assumed of a hanger, but for those that are given."""
+        rows = {each.name: assumed[each.name].value for each in fields(cls) if each.name in assumed}
+        return cls(**{**rows, **given})
 
 
 def states(

@@ -18,16 +18,15 @@ from typing import Any
 
 import numpy as np
 
+from shm.assumptions import DEFAULTS, Assumptions
 from shm.models import class_of
 from shm.models.tensioned_beam import frequencies_hz
 from shm.values import PLANES, BoolArray, FloatArray, Hanger, Mode, Posterior
 from shm.values.stream import PooledReading
 from shm.watch.quantities import MeasuredMode, base_point, log_frequencies, moved
-from shm.watch.reading_corrections import MODULUS_PER_KELVIN
 
 LEAST_SD = 3e-5
 """Of an hourly log frequency: 1 Hz is read to 1/30 mHz at best, and clocks wander by as much."""
-_UNKNOWN_SD = 1e-3  # as of a hammer test without stated errors (`readings`)
 _MEMORY_READINGS = 120.0  # judgement: five days of what modes differ by, ten times a night's
 _DEGREES = 4.0  # judgement: of Student's t, as robust regressions take (Lange et al. 1989)
 _ROUNDS = 4  # technical: of reweighting, from the weighted median on
@@ -39,10 +38,9 @@ _DECADES = 0.1  # technical: of the springs, likewise
 # What is tried where there is no baseline: xi = L sqrt(T/EI) from slack to a slender cable, springs
 # k L/EI from pinned to clamped, and the share of the solid stiffness that a strand may have.
 _XI = np.geomspace(0.5, 300.0, 240)
-_SPRINGS = np.geomspace(0.03, 1000.0, 10)
+_N_SPRINGS, _N_SHARES = 10, 4
 # Of a sum of misfits: modes fit a beam to 0.3 % each, nominal tensions are good to 15 %. Judgement.
 _NOMINAL = 0.003 * 3 / 0.15
-_STRAND_SHARES = np.array([0.3, 0.45, 0.65, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +82,10 @@ def _of_beam(hanger: Hanger, keys: Sequence[MeasuredMode], log_hz: FloatArray) -
     """By the least sum of absolute misfits, springs by plane: a mode with a wrong order counts for
     little. The nominal tension tells a slack bar on stiff springs from a taut one on soft ones."""
     order = np.array([each for _, each in keys]) - 1
-    shares = _STRAND_SHARES if hanger.kind == "strand" else np.ones(1)
+    assumed = hanger.assumptions
+    stiffness = np.geomspace(*assumed.end_restraint.bounds, _N_SPRINGS)
+    factors = np.geomspace(*assumed.strand_bending_factor.bounds, _N_SHARES)
+    shares = factors if hanger.kind == "strand" else np.ones(1)
     length_m, mass = np.asarray(hanger.length_m), np.asarray(hanger.mass_per_length_kg_m)
 
     def log_f(xi: FloatArray, k: FloatArray, share: FloatArray) -> FloatArray:
@@ -94,7 +95,7 @@ def _of_beam(hanger: Hanger, keys: Sequence[MeasuredMode], log_hz: FloatArray) -
         found = frequencies_hz(length_m, tension, bending, mass, spring, spring, order.max() + 1)
         return np.asarray(np.log(found[..., order]))
 
-    xi, k, share = np.meshgrid(_XI, _SPRINGS, shares, indexing="ij")
+    xi, k, share = np.meshgrid(_XI, stiffness, shares, indexing="ij")
     misfit, planes = np.abs(log_f(xi, k, share) - log_hz), planes_of(keys).values()
     by_plane = [misfit[..., own].sum(axis=-1) for own in planes]
     tension_n = hanger.bending_stiffness_n_m2 * share * (xi / length_m) ** 2
@@ -104,7 +105,7 @@ def _of_beam(hanger: Hanger, keys: Sequence[MeasuredMode], log_hz: FloatArray) -
     at, of = np.unravel_index(int(np.argmin(total)), total.shape)
     springs = np.zeros(len(keys))
     for own, each in zip(planes, by_plane, strict=True):
-        springs[own] = _SPRINGS[each[at, :, of].argmin()]
+        springs[own] = stiffness[each[at, :, of].argmin()]
     mode = np.arange(len(keys))
 
     def each_mode(xi_by: float, k_by: float) -> FloatArray:
@@ -136,7 +137,7 @@ class ModeTable:
     def of(cls, baseline: Posterior | None, hanger: Hanger, modes: Sequence[Mode]) -> ModeTable:
         found = sensitivities(baseline, hanger, modes)
         keys = tuple((mode.plane, mode.order) for mode in modes)
-        level, sd = _measured(modes)
+        level, sd = _measured(modes, hanger.assumptions)
         zero = np.zeros(len(keys))
         return cls(keys, found.tension, found.ends, level, sd**2, zero, found.tension_n)
 
@@ -174,17 +175,18 @@ class ModeTable:
             return None
         return float(np.mean(nearer)) > 0.5
 
-    @property
-    def softer(self) -> FloatArray:
-        """By what ln f goes with a kelvin, as steel softens."""
-        return np.asarray(MODULUS_PER_KELVIN * (0.5 - self.tension))
+    def softer(self, assumed: Assumptions) -> FloatArray:
+        """Return by what ln f goes with a kelvin, as steel softens."""
+        return np.asarray(assumed.modulus_per_kelvin.value * (0.5 - self.tension))
 
-    def seen(self, modes: Sequence[Mode], warmth_k: float) -> SeenReading:
+    def seen(
+        self, modes: Sequence[Mode], warmth_k: float, assumed: Assumptions = DEFAULTS
+    ) -> SeenReading:
         """A reading in the places of the table's modes, NaN where it lacks one."""
         off, variance = np.full(len(self.modes), np.nan), np.full(len(self.modes), np.inf)
         own = [self.modes.index((mode.plane, mode.order)) for mode in modes]
-        log_hz, sd = _measured(modes)
-        off[own] = log_hz - self.level[own] - warmth_k * self.softer[own]
+        log_hz, sd = _measured(modes, assumed)
+        off[own] = log_hz - self.level[own] - warmth_k * self.softer(assumed)[own]
         variance[own] = np.maximum(sd**2, self.spread[own])
         return _read(off, variance, self.tension)
 
@@ -240,10 +242,13 @@ def _other(mode: Mode) -> Mode:
     return replace(mode, plane=PLANES[PLANES[0] == mode.plane])
 
 
-def _measured(modes: Sequence[Mode]) -> tuple[FloatArray, FloatArray]:
+def _measured(
+    modes: Sequence[Mode], assumed: Assumptions = DEFAULTS
+) -> tuple[FloatArray, FloatArray]:
+    unstated = assumed.unstated_frequency_sd.value
     hz = np.array([mode.frequency_hz for mode in modes])
     sd = np.array([mode.frequency_sd_hz for mode in modes]) / hz
-    return np.log(hz), np.where(sd > 0, np.maximum(sd, LEAST_SD), _UNKNOWN_SD)
+    return np.log(hz), np.where(sd > 0, np.maximum(sd, LEAST_SD), unstated)
 
 
 def _read(off: FloatArray, variance: FloatArray, slope: FloatArray) -> SeenReading:

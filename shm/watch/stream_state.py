@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from shm.assumptions import DEFAULTS, Assumptions
 from shm.errors import BadInput
 from shm.values import NAN, FloatArray, Mode
 from shm.values.stream import PooledReading, WindowReading
@@ -25,12 +26,8 @@ from shm.watch.stream_reading import ModeTable, SeenReading, exchanged
 from shm.watch.stream_thermometer import Believed, Thermometer, believed
 
 HOURS_A_DAY = 24.0  # by definition
-# Prior sds of what the conditions do to ln T: a kelvin now, over 3 hours' mean, over a day's, over
-# ten days' (1e-3 each: `WatchOptions.tension_per_kelvin_sd`), that of its square (judgement: 0.2 %
-# at 10 K), an e-fold of the excitation (`tension_per_amplitude_sd`), a m/s of wind (judgement: a
-# storm of 20 m/s moves a deck's loads by 0.4 %), and the sun's round (judgement).
+# Of the temperature: 3 hours' mean, a day's, ten days'.
 _LAGS_DAYS = np.array([2.0, 14.0, 240.0]) / HOURS_A_DAY
-CONDITION_SD = np.array([1e-3] * 4 + [2e-5, 2e-3, 2e-4] + [1e-3] * 6)
 # Judgement: by what an hour's temperature differs from ten days' mean, and that the errors of some
 # ten hours without a thermometer are one error: an hour counts for a third of what it would.
 _UNKNOWN_K, TOGETHER = 4.0, 3.0
@@ -38,6 +35,17 @@ HOURS_EXCHANGED, _SURELY_EXCHANGED = 3, 8
 """Judgement: until it is told, as mistaken modes look like it for an hour; and until it is over."""
 _RING = 24  # readings: a change is told within a day or is slow
 OLD_READINGS = 120.0  # judgement: five days, as what a mode differs by is learnt over
+
+
+def condition_sd(assumed: Assumptions) -> FloatArray:
+    """Return the prior sds of what the conditions do to ln T.
+
+    A kelvin now, of 3 hours', a day's and ten days' mean; the square of a kelvin (judgement: 0.2 %
+    at 10 K); an e-fold of the excitation; a m/s of wind (judgement: a storm of 20 m/s moves a
+    deck's loads by 0.4 %); and the sun's round (judgement).
+    """
+    kelvin, e_fold = assumed.tension_per_kelvin_sd.value, assumed.tension_per_amplitude_sd.value
+    return np.array([kelvin] * 4 + [2e-5, e_fold, 2e-4] + [1e-3] * 6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +86,15 @@ class StreamState:
     thermometer: Thermometer = field(default_factory=Thermometer)
 
     @classmethod
-    def begun(cls, key: str, start: datetime, table: ModeTable) -> StreamState:
+    def begun(
+        cls, key: str, start: datetime, table: ModeTable, assumed: Assumptions = DEFAULTS
+    ) -> StreamState:
         n = len(table.modes)
         return cls(
             key,
             start,
             table,
-            Bank.begun(0.0, CONDITION_SD),
+            Bank.begun(0.0, condition_sd(assumed)),
             lagged_c=np.full(3, NAN),
             reference=np.full(3, NAN),
             ring=np.zeros((0, n)),

@@ -39,13 +39,13 @@ from shm.watch.stream_cause import EXCHANGED, MODEL_OFF, SWAPPED, TIME_BASE, Cau
 from shm.watch.stream_filter import FAST, LEVEL, NOTHING, SLOW, Bank, Evidence
 from shm.watch.stream_reading import ModeTable, SeenReading, exchanged, usable
 from shm.watch.stream_state import (
-    CONDITION_SD,
     HOURS_A_DAY,
     HOURS_EXCHANGED,
     OLD_READINGS,
     TOGETHER,
     StreamState,
     as_mounted,
+    condition_sd,
     warmth,
     with_conditions,
     with_ring,
@@ -146,7 +146,7 @@ class StreamWatch:
         end = reading.start + PERIODS[reading.period]
         if state is None and modes:
             table = ModeTable.of(self.baseline, self.hanger, modes)
-            state = StreamState.begun(key, reading.start, table)
+            state = StreamState.begun(key, reading.start, table, self.hanger.assumptions)
         if (
             state is None
             or not modes
@@ -155,11 +155,11 @@ class StreamWatch:
             return _nothing(), state
         day = (end - state.start).total_seconds() / 86400
         state, conditions, extra = with_conditions(state, reading, day)
-        bank = state.bank.advanced(day, CONDITION_SD)
+        bank = state.bank.advanced(day, condition_sd(self.hanger.assumptions))
         expected = bank.along(bank.design(conditions))[0]
         state, modes = as_mounted(state, modes, expected)
         table = state.table.with_new(self.baseline, self.hanger, modes, expected)
-        seen = table.seen(modes, warmth(state))
+        seen = table.seen(modes, warmth(state), self.hanger.assumptions)
         if not state.is_learning:
             bank = bank.with_beginning(state.bank.day)
         bank = bank.seen(seen.shift, seen.variance + extra, conditions)

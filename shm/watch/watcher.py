@@ -352,7 +352,7 @@ def watched(
     The same as a Watcher finds test by test. Raises BadInput where readings are not in the order of
     time or not of these quantities.
     """
-    watcher = Watcher(quantities, columns, hanger, options or WatchOptions())
+    watcher = Watcher(quantities, columns, hanger, options or WatchOptions.of(hanger.assumptions))
     if not readings:
         return Watch((), ())
     count = watcher.options.baseline_tests

@@ -9,15 +9,12 @@ import pytest
 from scipy import integrate, stats
 from scipy.special import logsumexp
 
+from shm.assumptions import DEFAULTS
 from shm.gap.contract import Covariance, NoiseNode, Observations
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import (
-    CORRELATIONS,
-    FACTOR_SPREAD,
     MEAN_MODEL_ERROR,
     MODEL_ERROR_SCALE,
-    SD_LOWER,
-    SD_UPPER,
     drawn_together,
     nodes,
     same_mode,
@@ -28,6 +25,8 @@ from tests.gap import linear_toy as toy
 
 SIGMA_UPPER = 3e-3
 """The largest error of a mode that repeats in all tests, as the module's docstring has it."""
+FACTOR_SPREAD = DEFAULTS.stated_sd_log_sd.value
+SD_LOWER, SD_UPPER = DEFAULTS.unstated_frequency_sd.bounds
 
 
 def _observations(sd: float | None = 2e-4) -> Observations:
@@ -83,7 +82,7 @@ def test_peaks_that_overlap_may_err_together() -> None:
     design = found.design
     apart = replace(found, value=found.value + 0.0)
     apart.value[: design.frequencies] += 0.01 * design.frequency_plane
-    assert len(nodes(found)) == len(CORRELATIONS) * len(nodes(apart))
+    assert len(nodes(found)) == 2 * len(nodes(apart))
     residual = np.random.default_rng(3).standard_normal(design.frequencies)
     alike = np.where(design.frequency_plane == 0, residual, np.roll(residual, toy.MODES))
     log_odds = []

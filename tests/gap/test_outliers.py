@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from shm.assumptions import DEFAULTS
 from shm.gap import GapOptions, diagnose, outliers
 from shm.gap.fit import baseline_fit
 from shm.gap.observations import observed
 from shm.gap.outliers import (
     FREEDOM,
-    GROSS_ERROR,
     SURE,
     acts_alone,
     left_out,
@@ -30,6 +30,8 @@ from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 from tests.worlds.simulated.reality import Reality
+
+SHARE = DEFAULTS.gross_error_share.value
 
 PLAIN = replace(HANGER_3, plate=None)
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
@@ -124,17 +126,17 @@ def test_an_effect_whose_law_is_off_at_one_mode_is_no_gross_error_there() -> Non
 
 def test_a_residual_of_four_and_a_half_standard_deviations_is_no_proof() -> None:
     sd = np.array([1e-4])
-    assert log_gross(4.5 * sd) < log_ordinary(4.5 * sd, sd)
-    assert log_gross(8 * sd) > log_ordinary(8 * sd, sd) + np.log(SURE / (1 - SURE))
+    assert log_gross(4.5 * sd, SHARE) < log_ordinary(4.5 * sd, sd, SHARE)
+    assert log_gross(8 * sd, SHARE) > log_ordinary(8 * sd, sd, SHARE) + np.log(SURE / (1 - SURE))
     assert FREEDOM == 20
 
 
 def test_both_densities_are_the_prior_of_theirs_in_all() -> None:
     size = np.geomspace(1e-9, 60, 200_001)
-    both = [np.exp(log_gross(size)), np.exp(log_ordinary(size, np.array(1e-3)))]
+    both = [np.exp(log_gross(size, SHARE)), np.exp(log_ordinary(size, np.array(1e-3), SHARE))]
     inside = (size >= 1e-4) & (size <= 3)
-    assert 2 * np.trapezoid(both[0][inside], size[inside]) == pytest.approx(GROSS_ERROR, rel=1e-3)
-    assert 2 * np.trapezoid(both[1], size) == pytest.approx(1 - GROSS_ERROR, rel=1e-3)
+    assert 2 * np.trapezoid(both[0][inside], size[inside]) == pytest.approx(SHARE, rel=1e-3)
+    assert 2 * np.trapezoid(both[1], size) == pytest.approx(1 - SHARE, rel=1e-3)
 
 
 def test_a_frequency_left_out_is_what_conditioning_on_all_others_says() -> None:
@@ -197,8 +199,10 @@ def test_what_another_test_hit_as_hard_shows_in_its_place_was_a_slip(
     design = observed(tests, PLAIN).design
     every = np.arange(design.frequencies)
     kept = observed([replace(test, modes=test.modes[1:]), tests[1]], PLAIN).design
-    assert (acts_alone(design, kept, int(every[0]), 0.1) > 0) == possible
-    assert acts_alone(design, kept, int(every[0]), 0.5) == 0.0  # farther than any guide moves one
+    assert (acts_alone(design, kept, int(every[0]), 0.1, SHARE) > 0) == possible
+    assert (
+        acts_alone(design, kept, int(every[0]), 0.5, SHARE) == 0.0
+    )  # farther than any guide moves one
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shm.assumptions import DEFAULTS
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
@@ -143,7 +144,7 @@ def test_a_thicker_middle_shifts_frequencies_as_the_sections_loads_say(
 
 @pytest.mark.parametrize("length_m", [3.0, 12.0])
 def test_the_section_varies_about_its_mean_by_what_the_description_says(length_m: float) -> None:
-    ways = section_ways(length_m, 0.001)
+    ways = section_ways(length_m, 0.001, DEFAULTS.section_reach_m.value)
     assert np.sqrt(np.mean((ways**2).sum(axis=1))) == pytest.approx(0.001, rel=1e-3)
     np.testing.assert_allclose(ways.mean(axis=0), 0.0, atol=1e-12)
 

@@ -306,11 +306,9 @@ def skew(bar: Bar, values: Values, scene: Scene) -> Bar:
     return bar
 
 
-_STEEL_1_K = 1.2e-5  # EN 1993-1-1, 3.2.6
-
-
 def warmth_ranges(hanger: Hanger, where: Where) -> dict[str, Range]:
-    held = hanger.elastic_modulus_pa * hanger.area_m2 * _STEEL_1_K
+    expansion_1_k = hanger.assumptions.thermal_expansion_1_k.value
+    held = hanger.elastic_modulus_pa * hanger.area_m2 * expansion_1_k
     return {"tension_per_kelvin_n_k": Range(1e-5 * held, held, 0.0, logarithmic=True, signed=True)}
 
 
