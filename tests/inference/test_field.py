@@ -147,7 +147,8 @@ def test_several_tests_say_an_error_that_nobody_stated() -> None:
 def test_where_some_are_stated_they_keep_their_own() -> None:
     one, other = measured("a", FEW[:1], 5e-4, 0.0), measured("b", FEW[1:], NAN)
     likelihood = FieldLikelihood([one, other], MODEL)
-    np.testing.assert_allclose(likelihood.identification_error, [5e-4, 1e-4, 1e-4], rtol=1e-6)
+    sd = DEFAULTS.unstated_frequency_sd.value
+    np.testing.assert_allclose(likelihood.identification_error, [5e-4, sd, sd], rtol=1e-6)
 
 
 def everything(sd: float = 1e-4) -> ModalTest:

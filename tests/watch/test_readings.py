@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from shm.assumptions import DEFAULTS
 from shm.errors import BadInput
 from shm.models import described
 from shm.models.base import Conditions
@@ -252,13 +253,14 @@ def test_an_adopted_swing_with_the_temperature_is_no_change() -> None:
     assert np.isnan(unknown.temperature_c)
 
 
-def test_an_error_that_is_not_stated_counts_as_a_thousandth(reader: Reader) -> None:
+def test_an_error_that_is_not_stated_is_the_assumed_one(reader: Reader) -> None:
     frequency_hz = frequencies(SPRUNG)
     unstated = measured(frequency_hz)
     unstated = replace(
         unstated, modes=tuple(replace(mode, frequency_sd_hz=NAN) for mode in unstated.modes)
     )
-    stated = reader.reading(measured(frequency_hz, sd=1e-3), WHEN)
+    sd = DEFAULTS.unstated_frequency_sd.value
+    stated = reader.reading(measured(frequency_hz, sd=sd), WHEN)
     np.testing.assert_allclose(
         reader.reading(unstated, WHEN).information, stated.information, rtol=1e-6
     )
