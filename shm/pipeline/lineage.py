@@ -237,8 +237,13 @@ def _comparable(described: Mapping[str, Any]) -> dict[str, Any]:
     return plain
 
 
-def _assumed(described: Mapping[str, Any]) -> dict[str, str]:
-    """Return the numbers of every assumption in words, of a description as it was stored."""
+def _assumed(described: object) -> object:
+    """Return the numbers of every assumption in words, of a description as it was stored.
+
+    What is no table of assumptions is returned as it is: it differs from any.
+    """
+    if not isinstance(described, Mapping):
+        return described
     numbers = {name: number_text(row) for name, row in DEFAULTS.items()}
     for row in described.get("overridden", ()):
         if row["name"] in numbers:
