@@ -63,11 +63,11 @@ def diagnosis_paper(sheet: DiagnosisSheet) -> Paper:
             Part("The answer in numbers", tables=answers(sheet)),
             Part(
                 "What it rests on",
-                paragraphs=[assumptions_line(sheet.hanger)],
                 tables=(*evidence(sheet), *filled(assumptions_table(sheet.hanger))),
             ),
         ),
-        closing=f"From {_origin(sheet)}. {CREDIBLE}; places count from the deck end.",
+        closing=f"From {_origin(sheet)}. {CREDIBLE}; places count from the deck end. "
+        + assumptions_line(sheet.hanger),
     )
 
 
