@@ -100,7 +100,7 @@ def write_loss(folder: Path, workspace: Workspace, lost: int = 2) -> None:
         write_test(path, workspace, day=day, tension=0.8 if number else 1.0)
 
 
-SLOW_LOSS = (1.0, 1.0, 1.0, 1.0, 0.96, 0.92, 0.92)
+SLOW_LOSS = (1.0, 1.0, 1.0, 1.0, 0.96, 0.93, 0.92)
 
 
 def write_slow_loss(folder: Path, workspace: Workspace) -> None:
