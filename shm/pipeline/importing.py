@@ -30,7 +30,7 @@ from shm.read.header import CHANNEL_KEYS, Entry, Header
 from shm.read.profiles import Profile, completed, profile_for, save_profile, with_day_order
 from shm.read.sandbox import survey
 from shm.read.sidecar import Described, document_beside
-from shm.read.stamps import DAY_ORDERS, DayOrder, order_of_choice
+from shm.read.stamps import DayOrder, order_of_choice
 from shm.store import Workspace
 from shm.values import NAN, Channel, Plane, Quantity, Recording
 
@@ -160,7 +160,7 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     rate, uneven = rate_told(found, described)
     questions = _questions(found, described, hanger, rate)
     if found.layout.possible_times and "time" not in described and not answers.is_time_unknown:
-        questions.append(_of_time(found.layout.possible_times))
+        questions.append(_of_time([each.time for each in found.layout.possible_times]))
     problems = (
         *_hanger_problem(hanger, workspace),
         *_place_problems(found, described, hanger, workspace),
@@ -191,13 +191,14 @@ def keep_profile(found: Import, workspace: Workspace, *, each_time: bool = False
 def _with_chosen_time(own: dict[str, Any], found: Survey) -> tuple[dict[str, Any], DayOrder | None]:
     """Return the sidecar with the complete time, and the order of day and month that is known now.
 
-    A person may name one of two possible times by its day alone.
+    A person may name one of the possible times by its day alone.
     """
     possible, time = found.layout.possible_times, own.get("time")
-    order = order_of_choice(time, possible) if isinstance(time, datetime) else None
-    if order is None or time is None or time.time() != clock_time.min:
-        return own, order or found.layout.day_order
-    return {**own, "time": possible[DAY_ORDERS.index(order)]}, order
+    if not isinstance(time, datetime):
+        return own, found.layout.day_order
+    order = order_of_choice(time, possible) or found.layout.day_order
+    same = [each.time for each in possible if each.time.date() == time.date()]
+    return {**own, "time": same[0]} if same and time.time() == clock_time.min else own, order
 
 
 def _joined(first: Described, then: Described) -> dict[str, Any]:
@@ -267,9 +268,9 @@ def _questions(found: Survey, described: Described, hanger: object, rate: float)
 
 
 def _of_time(possible: Sequence[datetime]) -> Question:
-    first, second = (f"{each:%Y-%m-%d}" for each in possible)
-    text = f"Was the test on {first} or on {second} (or 'unknown')?"
-    return Question("time", "", text, f"--time {first}|{second}", needed=False)
+    days = tuple(dict.fromkeys(f"{each:%Y-%m-%d}" for each in possible))
+    text = f"Was the test on {' or on '.join(days)} (or 'unknown')?"
+    return Question("time", "", text, f"--time {'|'.join(days)}", needed=False)
 
 
 def _holds_nothing(found: Survey, described: Described, questions: Sequence[Question]) -> bool:

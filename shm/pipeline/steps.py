@@ -155,7 +155,7 @@ def _test_in(path: Path, bridge: Bridge, settings: Settings) -> IdentifiedTest:
 
 
 def _possible_times(test: ModalTest, records: Sequence[Recording]) -> tuple[datetime, ...]:
-    """Return both times of a test whose day can be read in both orders; empty for others."""
+    """Return the times of a test whose day can be read in several orders; empty for others."""
     if test.time is not None:
         return ()
     return next((each.possible_times for each in records if each.possible_times), ())

@@ -27,7 +27,7 @@ from shm.values.messages import TODAY, WEEK
 class Candidate:
     """An identified test before it counts, and what is known to judge it by.
 
-    `possible_times` are two where the day of its time can be read day first or month first.
+    `possible_times` are several where the day of its time can be read in several orders.
     `file_times` are those of all files or records of this one test, `neighbours` those of other
     tests in the same file, `same_time` are tests of the same hanger in other recordings with the
     very same time. `modified_at` is when the file was last written, which copying resets.

@@ -64,15 +64,15 @@ def ahead(candidate: Candidate) -> Doubt | None:
 
 
 def ambiguous(candidate: Candidate) -> Doubt | None:
-    """Doubt a time whose day can be read day first or month first."""
+    """Doubt a time whose day can be read in several orders."""
     if not candidate.possible_times:
         return None
-    first, second = (f"{each:%Y-%m-%d}" for each in candidate.possible_times)
+    days = " or ".join(f"{each:%Y-%m-%d}" for each in candidate.possible_times)
     why = (
-        "Its file writes the day in figures that can be read day first or month first, and its "
+        "Its file writes the day in figures that can be read in several orders, and its "
         "logger's profile does not say which: your answer is kept there."
     )
-    state = f"its day may be {first} or {second}"
+    state = f"its day may be {days}"
     return Doubt("clock ambiguous", state, _SET_RIGHT, why, time_unknown=True)
 
 

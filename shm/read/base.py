@@ -13,7 +13,7 @@ from datetime import datetime
 from pathlib import Path
 
 from shm.read.logger_words import Sensitivity
-from shm.read.stamps import DayOrder
+from shm.read.stamps import DayOrder, PossibleTime
 from shm.values import NAN, AddedMass, FloatArray, FrequencyResponse, Plane, Quantity, Recording
 
 
@@ -37,8 +37,8 @@ class LoggerTable:
     `said_rate_hz` is what its heading says, `times_rate_hz` what a column of times tells, NaN
     without. `layout` are the words by which files of one logger are known. `is_text` is False of a
     format that has a reader of its own; `title` is that of a text with one signal. `day_order` is
-    what its days prove of their order; `possible_times` are two where nothing does and `time` can
-    be read in both orders.
+    what its days prove of their order; `possible_times` are several where nothing does
+    and `time` can be read in several.
     """
 
     columns: tuple[LoggerColumn, ...]
@@ -52,7 +52,7 @@ class LoggerTable:
     remarks: tuple[str, ...]
     is_text: bool = True
     title: str = ""
-    possible_times: tuple[datetime, ...] = ()
+    possible_times: tuple[PossibleTime, ...] = ()
     day_order: DayOrder | None = None
 
     @property
@@ -81,8 +81,8 @@ class Peek:
     """The headers of a file; `problems` are what a reader would refuse.
 
     A time record has `samples` and a rate, a frequency response `lines` and their step.
-    `left_out` names what the file holds besides. `possible_times` are two where `time` is None
-    because its day can be read day first or month first.
+    `left_out` names what the file holds besides. `possible_times` are several where `time` is None
+    because its day can be read in several orders.
     """
 
     source: str
@@ -190,4 +190,4 @@ class Layout:
     hanger: int | None = None
     says_rate: bool = False
     day_order: DayOrder | None = None
-    possible_times: tuple[datetime, ...] = ()
+    possible_times: tuple[PossibleTime, ...] = ()

@@ -42,7 +42,7 @@ from shm.read.logger_rows import (
 from shm.read.logger_times import Clock, clock_of, day_order_of
 from shm.read.logger_words import UNSAID
 from shm.read.sidecar import channels_described, with_sidecar
-from shm.read.stamps import DayOrder, moment, parsed, possible_times
+from shm.read.stamps import DayOrder, PossibleTime, moment, parsed, possible_times
 from shm.values import NAN, FloatArray, Recording
 
 _PLAIN_NAME = set("abcdefghijklmnopqrstuvwxyz0123456789_")
@@ -234,11 +234,11 @@ def _time(heading: Heading, order: DayOrder | None) -> datetime | None:
     return moment(days[0], clocks[0] if clocks else "", order) if days else None
 
 
-def _possible_times(heading: Heading) -> tuple[datetime, ...]:
-    """Return both times of a heading whose day can be read in both orders; empty for others."""
+def _possible_times(heading: Heading) -> tuple[PossibleTime, ...]:
+    """Return the times of a heading whose day can be read in several orders; empty for others."""
     days, clocks = _dates(heading), _moments(heading)
     texts = [*clocks, *(f"{day} {clock}" for day in days for clock in clocks), *days]
-    return next((both for text in texts if (both := possible_times(text))), ())
+    return next((each for text in texts if (each := possible_times(text))), ())
 
 
 def _temperature(heading: Heading, decimal: str) -> float:
@@ -330,7 +330,7 @@ def recording(table: LoggerTable, path: Path) -> Recording:
     header, used, _ = header_of(table, path)
     rate = told_rate(table, header, path)
     found = assemble.recording(header, _values(table, used), path, rate)
-    return found if found.time else replace(found, possible_times=table.possible_times)
+    return found if found.time else replace(found, possible_times=_distinct_times(table))
 
 
 def peeked(table: LoggerTable, file_format: str, path: Path) -> Peek:
@@ -340,7 +340,12 @@ def peeked(table: LoggerTable, file_format: str, path: Path) -> Peek:
         header, file_format, table.samples, lambda: told_rate(table, header, path), path,
         left_out=out,
     )  # fmt: skip
-    return look if look.time else replace(look, possible_times=table.possible_times)
+    return look if look.time else replace(look, possible_times=_distinct_times(table))
+
+
+def _distinct_times(table: LoggerTable) -> tuple[datetime, ...]:
+    """Return the possible times of a table, each once: two orders may have the same day."""
+    return tuple(dict.fromkeys(each.time for each in table.possible_times))
 
 
 def _values(table: LoggerTable, used: Sequence[int]) -> FloatArray:

@@ -17,6 +17,7 @@ from shm.read.logger_heading import Heading
 from shm.read.logger_rows import Block, second_record, values_of
 from shm.read.stamps import (
     DayOrder,
+    PossibleTime,
     find_day_order,
     follow_days,
     parsed,
@@ -38,13 +39,13 @@ _FINE = 1e-4  # judgement: of the span; times rounded more coarsely do not give 
 class Clock:
     """Rate and start by the columns of times; `used` are the columns without a measurement.
 
-    `possible_starts` are two where the day of the start can be read in both orders.
+    `possible_starts` are several where the day of the start can be read in several orders.
     """
 
     used: frozenset[int]
     rate_hz: float = NAN
     start: datetime | None = None
-    possible_starts: tuple[datetime, ...] = ()
+    possible_starts: tuple[PossibleTime, ...] = ()
     evened: Callable[[FloatArray], FloatArray] = lambda values: values
     remarks: tuple[str, ...] = ()
 
@@ -183,7 +184,7 @@ def _factor(values: FloatArray, said_hz: float) -> float | None:
 
 
 def _started(clock: Clock, stamps: Sequence[str], order: DayOrder | None) -> Clock:
-    """Return a clock with the start that its first stamp tells, or both where its day is unsure."""
+    """Return a clock with the start that its first stamp tells, or all where its day is unsure."""
     found = parsed(stamps[0], order)
     if found is not None and found[1]:
         return replace(clock, start=found[0])

@@ -85,8 +85,9 @@ def completed(
     """The sidecar of one file: what its own says, and what its name and the profile add to that."""
     added = {key: profile[key] for key in _OF_PROFILE if key in profile}
     order = added.pop(DAY_ORDER, MIXED)
-    if layout.possible_times and order in DAY_ORDERS:
-        added["time"] = layout.possible_times[DAY_ORDERS.index(order)]
+    for each in layout.possible_times:
+        if each.order == order:
+            added["time"] = each.time
     named = hanger_numbered(file_name)
     if named is not None:
         added["hanger"] = named

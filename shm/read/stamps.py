@@ -1,13 +1,16 @@
 """The clock times that loggers write, as text: 2026-05-01T10:00:00.5Z, 01.05.2026 10:00:00,5, ...
 
-A day written 05/01/2026 is the first of May or the fifth of January. The other days of the file
-tell which, or another file of its logger; else the time stays unknown and both times are given.
+A day written 05/01/2026 is the first of May or the fifth of January, and 26/02/03 is one of 2003 or
+of 2026. The other days of the file tell which, or another file of its logger; else the time stays
+unknown and all possible times are given.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Literal
@@ -32,10 +35,18 @@ _MONTH = re.compile("jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec", re.IGNORE
 _DAY_S = 86400.0
 _CLOCK_ONLY = datetime(1, 1, 1, tzinfo=UTC)
 
-DayOrder = Literal["day first", "month first"]
-"""Which of the two comes first in a day written as figures, such as 05/01/2026."""
+DayOrder = Literal["day first", "month first", "year first"]
+"""What comes first in a day written as figures, such as 05/01/2026; the month follows a year."""
 
-DAY_ORDERS: tuple[DayOrder, DayOrder] = ("day first", "month first")
+DAY_ORDERS: tuple[DayOrder, ...] = ("day first", "month first", "year first")
+
+
+@dataclass(frozen=True)
+class PossibleTime:
+    """A time as one of the orders in which its day can be read gives it."""
+
+    order: DayOrder
+    time: datetime
 
 
 def is_stamp(text: str) -> bool:
@@ -46,8 +57,9 @@ def is_stamp(text: str) -> bool:
 def parsed(text: str, order: DayOrder | None = None) -> tuple[datetime, bool] | None:
     """Return a time in UTC (taken as such where no zone is said) and whether its day is certain.
 
-    A day that can be read in both orders is read in `order` where that is known, else day first. A
-    clock time without a day is one of the first of January of the year 1, its day not certain.
+    A day that can be read in several orders is read in `order` where that is one of them, else in
+    the first of them. A clock time without a day is one of the first of January of the year 1, its
+    day not certain.
     """
     found = _STAMP.fullmatch(text.strip())
     if found is None:
@@ -60,25 +72,21 @@ def parsed(text: str, order: DayOrder | None = None) -> tuple[datetime, bool] | 
         return None
 
 
-def possible_times(text: str) -> tuple[datetime, ...]:
-    """Return both times of a text whose day can be read in both orders, in those of `DAY_ORDERS`.
+def possible_times(text: str) -> tuple[PossibleTime, ...]:
+    """Return the times of a text whose day can be read in several orders.
 
     Empty where its day is certain, or where it has none.
     """
     found = parsed(text)
     if found is None or found[1] or found[0].year == 1:
         return ()
-    both = (parsed(text, order) for order in DAY_ORDERS)
-    return tuple(each[0] for each in both if each is not None)
+    each_way = [(order, parsed(text, order)) for order in _orders_of(text)]
+    return tuple(PossibleTime(order, each[0]) for order, each in each_way if each is not None)
 
 
-def order_of_choice(time: datetime, possible: Sequence[datetime]) -> DayOrder | None:
-    """Return the order in which one of two possible times has the day of `time`, else None."""
-    chosen = [
-        order
-        for order, each in zip(DAY_ORDERS, possible, strict=False)
-        if each.date() == time.date()
-    ]
+def order_of_choice(time: datetime, possible: Iterable[PossibleTime]) -> DayOrder | None:
+    """Return the only order in which a possible time has the day of `time`, else None."""
+    chosen = [each.order for each in possible if each.time.date() == time.date()]
     return chosen[0] if len(chosen) == 1 else None
 
 
@@ -90,22 +98,36 @@ def find_day_order(texts: Iterable[str]) -> DayOrder | None:
 
 def _proven_order(text: str) -> DayOrder | None:
     """Return the only order in which a day in figures is one; None of all other texts."""
-    found = _STAMP.fullmatch(text.strip())
-    if found is None or parsed(text) is None:
-        return None
-    a, mark, b, _ = _parts(found, "" if found["da"] is None else "d")
-    if a is None or mark == "." or len(a) == 4:
-        return None  # those are always written in one order
-    orders = _orders(mark, int(a), int(b))
+    orders = _orders_of(text)
     return orders[0] if len(orders) == 1 else None
 
 
-def _orders(mark: str, first: int, second: int) -> tuple[DayOrder, ...]:
-    """Return the orders in which two figures are day and month."""
-    day_first, month_first = DAY_ORDERS
-    if mark == "." or first > 12:
-        return (day_first,)
-    return (month_first,) if second > 12 else DAY_ORDERS
+def _orders_of(text: str) -> tuple[DayOrder, ...]:
+    """Return the orders in which a text's day is one; empty where it is always written in one."""
+    found = _STAMP.fullmatch(text.strip())
+    if found is None or parsed(text) is None:
+        return ()
+    a, mark, b, c = _parts(found, "" if found["da"] is None else "d")
+    return () if a is None or mark == "." or len(a) == 4 else tuple(_days(a, mark, b, c))
+
+
+def _days(a: str, mark: str, b: str, c: str) -> dict[DayOrder, datetime]:
+    """Return the days that three figures can be, by the order in which they are written."""
+    day_first, month_first, year_first = DAY_ORDERS
+    if len(a) == 4:
+        ways = {year_first: (a, b, c)}
+    elif mark == ".":
+        ways = {day_first: (c, b, a)}
+    else:
+        ways = {day_first: (c, b, a), month_first: (c, a, b), year_first: (a, b, c)}
+    days = {}
+    for order, (year, month, day) in ways.items():
+        if len(year) not in (2, 4) or len(day) > 2:
+            continue
+        number = int(year) + 2000 if len(year) == 2 else int(year)
+        with suppress(ValueError):  # no day of the calendar
+            days[order] = datetime(number, int(month), int(day), tzinfo=UTC)
+    return days
 
 
 def _parts(found: re.Match[str], prefix: str) -> tuple[str, str, str, str]:
@@ -117,15 +139,12 @@ def _day(found: re.Match[str], prefix: str, order: DayOrder | None) -> tuple[dat
     a, mark, b, c = _parts(found, prefix)
     if a is None:
         return _CLOCK_ONLY, False
-    first, second, third = int(a), int(b), int(c)
-    if len(a) == 4:
-        return datetime(first, second, third, tzinfo=UTC), True
-    year = third + 2000 if third < 100 else third
-    orders = _orders(mark, first, second)  # AM and PM tell nothing: they do not stay in America
-    chosen = order if order in orders else orders[0]
-    day, month = (first, second) if chosen == DAY_ORDERS[0] else (second, first)
-    certain = len(orders) == 1 or order is not None or first == second
-    return datetime(year, month, day, tzinfo=UTC), certain
+    days = _days(a, mark, b, c)  # AM and PM tell nothing: they do not stay in America
+    if not days:
+        raise ValueError("no such day")
+    if order in days:
+        return days[order], True
+    return next(iter(days.values())), len(set(days.values())) == 1
 
 
 def _clocked(day: datetime, found: re.Match[str]) -> datetime:
@@ -160,11 +179,12 @@ def _named(text: str) -> tuple[datetime, bool] | None:
 
 def follow_days(texts: Sequence[str]) -> DayOrder | None:
     """Return the order in which stamps that pass midnight follow each other; None where none do."""
-    first, last = (possible_times(text) for text in (texts[0], texts[-1]))
-    spans = [abs(end - start) for start, end in zip(first, last, strict=False)]
-    if len(spans) < len(DAY_ORDERS) or spans[0] == spans[1]:
-        return None
-    return DAY_ORDERS[spans.index(min(spans))]
+    first, last = (
+        {each.order: each.time for each in possible_times(text)} for text in (texts[0], texts[-1])
+    )
+    spans = {order: abs(last[order] - first[order]) for order in first.keys() & last.keys()}
+    least = [order for order in spans if spans[order] == min(spans.values())]
+    return least[0] if len(least) == 1 < len(spans) else None
 
 
 def may_hold_days(path: Path, head_bytes: int = 20_000) -> bool:
@@ -182,7 +202,7 @@ def may_hold_days(path: Path, head_bytes: int = 20_000) -> bool:
 def seconds_of_stamps(texts: Sequence[str], order: DayOrder | None = None) -> FloatArray | None:
     """Return seconds since the first of the stamps, midnights passed; None where one is no stamp.
 
-    Days that can be read in both orders are read in `order`.
+    Days that can be read in several orders are read in `order`.
     """
     first = parsed(texts[0], order) if texts else None
     if first is None:
@@ -202,7 +222,7 @@ def seconds_of_stamps(texts: Sequence[str], order: DayOrder | None = None) -> Fl
 def moment(day: str, clock: str, order: DayOrder | None = None) -> datetime | None:
     """Return the time of a day and a clock time, of which either may hold both; None if unsure.
 
-    A day that can be read in both orders is read in `order`.
+    A day that can be read in several orders is read in `order`.
     """
     for text in (f"{day} {clock}".strip(), day, clock):
         found = parsed(text, order) if text else None

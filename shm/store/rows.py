@@ -119,8 +119,8 @@ class IdentifiedTest:
 
     `quality` and `set_aside` are empty where a file gave the modes. `times` are those of all files
     of the test, `fingerprint` is that of their samples, None where the modes were given; `signals`
-    says which channels are doubtful. `possible_times` are two where the test has no time because
-    the day in its file can be read day first or month first.
+    says which channels are doubtful. `possible_times` are several where the test has no time
+    because the day in its file can be read in several orders.
     """
 
     test: ModalTest

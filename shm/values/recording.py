@@ -41,8 +41,8 @@ class Recording:
     """Accelerations over time, as received, with the hammer's force unless nobody hit.
 
     One file, one or many hits. The force channel's `x_m` and `plane` say where and in which
-    direction the hammer hit. `possible_times` are two where `time` is None because its day can be
-    read day first or month first; empty otherwise.
+    direction the hammer hit. `possible_times` are several where `time` is None because its day can
+    be read in several orders; empty otherwise.
     """
 
     source: str

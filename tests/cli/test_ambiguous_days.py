@@ -169,3 +169,49 @@ def test_undated_tests_are_named(shm: Shm, workspace: Workspace, tmp_path: Path)
         assert line in " ".join(shm(*in_place, *verb).out.split())
     report = shm(*in_place, "report", "--hanger", 3, "--json").document
     assert report["dated_by_receipt"] == ["undated"]
+
+
+@pytest.mark.parametrize(
+    ("day", "possible"),
+    [
+        ("26/02/03", ["2003-02-26", "2026-02-03"]),
+        ("04/05/06", ["2006-05-04", "2006-04-05", "2004-05-06"]),
+        ("14-05-26", ["2026-05-14", "2014-05-26"]),
+    ],
+)
+def test_ingest_holds_two_digit_years(
+    shm: Shm, workspace: Workspace, tmp_path: Path, day: str, possible: list[str]
+) -> None:
+    """The year may come first or last: no such day proves an order for the logger's others."""
+    in_place = ("--workspace", workspace.folder)
+    file = write_described_export(tmp_path / "a.csv", f"{day} 9:12:31")
+    (row,) = shm(*in_place, "ingest", file, "--json").document["files"]
+    assert row["outcome"] == "held"
+    assert f"its day may be {' or '.join(possible)}" in row["reason"]
+    for each in possible:
+        assert f"`shm ingest --confirm 1 --time {each}T09:12:31Z`" in row["reason"]
+    later = write_described_export(tmp_path / "b.csv", "9/10/2025 9:12:31", seed=2)
+    (look,) = shm(*in_place, "ingest", "--peek", later, "--json").document["files"]
+    assert look["missing"] == ["which day, 2025-10-09 or 2025-09-10"]
+
+
+def test_confirm_teaches_year_first(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
+    in_place = ("--workspace", workspace.folder)
+    shm(*in_place, "ingest", write_described_export(tmp_path / "a.csv", "25/02/03 9:12:31"))
+    said = ("--confirm", 1, "--time", "2025-02-03T09:12:31Z")
+    assert shm(*in_place, "ingest", *said).code == 0
+    assert times_of(workspace) == [at(2, 3)]
+    later = write_described_export(tmp_path / "b.csv", "25/04/05 9:12:31", seed=2)
+    (look,) = shm(*in_place, "ingest", "--peek", later, "--json").document["files"]
+    assert (look["time"], look["missing"]) == ("2025-04-05T09:12:31Z", [])
+    other = write_described_export(tmp_path / "c.csv", "4/5/2025 9:12:31", seed=3)
+    (look,) = shm(*in_place, "ingest", "--peek", other, "--json").document["files"]
+    assert look["missing"] == ["which day, 2025-05-04 or 2025-04-05"]
+
+
+def test_ingest_reads_short_days_as_learnt(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
+    in_place = ("--workspace", workspace.folder)
+    shm(*in_place, "ingest", write_described_export(tmp_path / "a.csv", "14/05/2025 9:12:31"))
+    later = write_described_export(tmp_path / "b.csv", "04/05/06 9:12:31", seed=2)
+    (look,) = shm(*in_place, "ingest", "--peek", later, "--json").document["files"]
+    assert (look["time"], look["missing"]) == ("2006-05-04T09:12:31Z", [])

@@ -214,7 +214,7 @@ def test_survey_day_in_both_orders(tmp_path: Path, day: str) -> None:
     path.write_text(f"Start,{day}\nRate,500 Hz\nHammer (N),a1x (g)\n{body}")
     found = survey(path)
     assert found.time is None
-    assert [each.date() for each in found.layout.possible_times] == [
+    assert [each.time.date() for each in found.layout.possible_times] == [
         date(2026, 5, 4),
         date(2026, 4, 5),
     ]
