@@ -43,7 +43,7 @@ from shm.store import (
     TrendPoint,
     Workspace,
 )
-from shm.store.checksums import of_readable
+from shm.store.checksums import note_damage, of_readable
 from shm.store.stored_alerts import said_of, silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint, WatchedTest
 from shm.values.bar_description import list_sensors
@@ -133,11 +133,7 @@ def bridge_report(
     return BridgeReport(
         workspace.bridge.name,
         tuple(
-            replace(
-                line,
-                course=courses.get(line.hanger.id),
-                sensors=_sensors(workspace, store, line),
-            )
+            replace(_with_sensors(workspace, store, line), course=courses.get(line.hanger.id))
             for line in lines
         ),
         pattern,
@@ -148,6 +144,21 @@ def bridge_report(
         {"software": software()},
         settings_words(workspace.settings),
     )
+
+
+def _with_sensors(workspace: Workspace, store: Store, line: HangerLine) -> HangerLine:
+    """Return the line with its sensors; the line of a damaged hanger where they cannot be read."""
+    try:
+        return replace(line, sensors=_sensors(workspace, store, line))
+    except DamagedRow as error:
+        note_damage(error)
+        return _damaged_line(line.hanger, error, line.open_alerts)
+
+
+def _damaged_line(hanger: Hanger, damage: DamagedRow, open_alerts: int) -> HangerLine:
+    """Return a line without a status: what would be said of the hanger cannot be read."""
+    message = hanger_message(Known(hanger, damage=str(damage)))
+    return HangerLine(hanger, message, called=str(damage), open_alerts=open_alerts)
 
 
 def _sensors(workspace: Workspace, store: Store, line: HangerLine) -> tuple[ResponsePoint, ...]:
@@ -247,10 +258,9 @@ class HangersNow:
 
     def line(self, hanger: Hanger) -> HangerLine:
         opened, point = self.open_alerts.get(hanger.id, 0), self.latest.get(hanger.id)
+        if hanger.id in self.damaged:
+            return _damaged_line(hanger, self.damaged[hanger.id], opened)
         message = hanger_message(self.known(hanger))
-        if hanger.id in self.damaged:  # no status: what would be said of it cannot be read
-            said = str(self.damaged[hanger.id])
-            return HangerLine(hanger, message, called=said, open_alerts=opened)
         baseline, watched = self.baselines.get(hanger.id), self._watched(hanger)
         called = self.called.get(hanger.id, ())
         if point is None:

@@ -16,7 +16,7 @@ import sqlalchemy as sa
 
 import shm_daemon
 from shm.pipeline import utc_now
-from shm.pipeline.bridge_reporting import hanger_lines
+from shm.pipeline.bridge_reporting import bridge_report, hanger_lines
 from shm.pipeline.reporting import hanger_report
 from shm.report.hanger_status import Status
 from shm.store import Stage, Store, Workspace
@@ -159,6 +159,18 @@ def test_what_all_hangers_are_asked_for_answers_without_the_damaged_one(bridge: 
             assert run(["--workspace", str(bridge.folder), "status"]) == 0
             assert run(["--workspace", str(bridge.folder), "report", "--bridge"]) == 0
             assert run(["--workspace", str(bridge.folder), "db", "check"]) == 5
+
+
+def test_a_bridge_report_names_a_damaged_test_and_shows_the_other_hangers(
+    bridge: Workspace,
+) -> None:
+    """One whose row is read for its sensors alone: until then nothing finds the damage."""
+    with values_changed(bridge, "tests", "time", 2), bridge.store() as store:
+        lines = bridge_report(bridge, store, utc_now()).hangers
+    assert lines[0].status is None
+    assert "row 2 of tests of hanger 3 is damaged" in lines[0].called
+    assert lines[1].status is Status.ALERT
+    assert not lines[1].called.startswith("row")
 
 
 def test_a_damaged_watch_shows_no_green_hanger(bridge: Workspace) -> None:
