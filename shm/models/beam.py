@@ -119,8 +119,7 @@ class Beam2(Beam):
 class Beam3(Beam2):
     """Beam 2 that shears and whose sections resist turning: Timoshenko's beam.
 
-    Shear stiffness is kappa G A with kappa = 6 (1 + nu) / (7 + 6 nu) of a round section (Cowper
-    1966, J. Appl. Mech. 33, 335).
+    Shear stiffness is kappa G A with Cowper's kappa of a round section, solid or hollow.
     """
 
     name = "beam3"
@@ -129,13 +128,6 @@ class Beam3(Beam2):
     @classmethod
     def unfit(cls, hanger: Hanger) -> str:
         return "it does not model turnbuckles." if hanger.turnbuckles else super().unfit(hanger)
-
-    @property
-    def shear_stiffness_n(self) -> float:
-        """Kappa G A of the described bar."""
-        hanger, nu = self.hanger, self.hanger.poissons_ratio
-        shear_modulus_pa = hanger.elastic_modulus_pa / (2 * (1 + nu))
-        return 6 * (1 + nu) / (7 + 6 * nu) * shear_modulus_pa * hanger.area_m2
 
     def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
         one = np.ones(len(theta))
@@ -148,7 +140,7 @@ class Beam3(Beam2):
         is `section` (n,) times the described one, which changes shear and rotary inertia alone, and
         whose shear is `shear` (n,) times the theory's.
         """
-        hanger, rigid_n = self.hanger, self.shear_stiffness_n
+        hanger, rigid_n = self.hanger, self.hanger.shear_stiffness_n
         deck, arch = self.springs_n_m_rad(theta)
         return tensioned_beam.timoshenko_frequencies_hz(
             self._length_m(theta)[:, None],

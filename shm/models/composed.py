@@ -198,7 +198,7 @@ class Baseline:
         turning = hanger.mass_per_length_kg_m * hanger.second_moment_m4 / hanger.area_m2
         return replace(
             bar,
-            shear_compliance_1_n=one / self._model.shear_stiffness_n,
+            shear_compliance_1_n=one / hanger.shear_stiffness_n,
             rotary_inertia_kg_m=turning * one,
         )
 

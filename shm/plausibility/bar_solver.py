@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.models import tensioned_beam
-from shm.models.beam import Beam3
 from shm.values import FloatArray, Hanger
 
 SPRINGS, SHARE = slice(2, 6), 6
@@ -24,7 +23,7 @@ class Solver:
         self._nominal = np.array([h.nominal_tension_n for h in hangers])
         self._stiffness = np.array([h.bending_stiffness_n_m2 for h in hangers])
         self._mass = np.array([h.mass_per_length_kg_m for h in hangers])
-        self._shear = np.array([Beam3(h).shear_stiffness_n for h in hangers])
+        self._shear = np.array([h.shear_stiffness_n for h in hangers])
         self._gyration = np.sqrt([h.second_moment_m4 / h.area_m2 for h in hangers])
 
     def string_tension(self, log_f: FloatArray) -> FloatArray:

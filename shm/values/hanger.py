@@ -226,6 +226,23 @@ class Hanger(Shown):
     assumptions: Assumptions = DEFAULTS
 
     @property
+    def shear_coefficient(self) -> float:
+        """Return the coefficient of a round section, solid or hollow (Cowper 1966, table 1).
+
+        The second moment over that of a solid section of the same area tells how hollow it is.
+        """
+        nu, ratio = self.poissons_ratio, 4 * math.pi * self.second_moment_m4 / self.area_m2**2
+        hollow = max(ratio - 1, 0.0) / (ratio + 1)  # square of inner over outer diameter
+        both = (1 + hollow) ** 2
+        return 6 * (1 + nu) * both / ((7 + 6 * nu) * both + (20 + 12 * nu) * hollow)
+
+    @property
+    def shear_stiffness_n(self) -> float:
+        """Return shear coefficient times shear modulus times area."""
+        modulus_pa = self.elastic_modulus_pa / (2 * (1 + self.poissons_ratio))
+        return self.shear_coefficient * modulus_pa * self.area_m2
+
+    @property
     def bending_stiffness_n_m2(self) -> float:
         return self.elastic_modulus_pa * self.second_moment_m4 * self.bending_stiffness_factor
 

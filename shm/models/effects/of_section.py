@@ -228,13 +228,6 @@ class ShearAndRotaryInertia(Effect):
         share = values[:, 0]
         return replace(
             physical,
-            shear_compliance_1_n=physical.shear_compliance_1_n + share / _shear_stiffness_n(hanger),
+            shear_compliance_1_n=physical.shear_compliance_1_n + share / hanger.shear_stiffness_n,
             rotary_inertia_kg_m=physical.rotary_inertia_kg_m + share * inertia_kg_m,
         )
-
-
-def _shear_stiffness_n(hanger: Hanger) -> float:
-    """Kappa G A of a round section (Cowper 1966, table 1)."""
-    ratio = hanger.poissons_ratio
-    coefficient = 6 * (1 + ratio) / (7 + 6 * ratio)
-    return coefficient * hanger.elastic_modulus_pa / (2 * (1 + ratio)) * hanger.area_m2

@@ -1,0 +1,235 @@
+"""Frequencies of many hangers of one description, each term of their energy by its own factor.
+
+A hanger's stiffness and mass are sums of matrices (`bar_elements`) times numbers: bending, tension,
+end springs, zones, shear, sag, clamped-on masses. Modes of sixty hangers of the prior span a
+reduced basis in which all others are solved (proper orthogonal decomposition: Quarteroni, Manzoni
+and Negri 2016, Reduced Basis Methods, chapter 6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from shm.values import FloatArray
+from tests.worlds.bar_of_terms.bar_elements import BarElements, bar_elements
+
+STIFFEST = 1e6
+"""Of an end spring, in EI/L: one that is stiffer clamps as well, and rounding would be seen."""
+
+_SNAPSHOTS = 60
+_LEFT_OUT = 1e-10  # numerical: of the snapshots' energy, which leaves 1e-6 of a frequency
+_BLOCK = 512
+
+
+@dataclass(frozen=True, eq=False)
+class BarTerms:
+    """Factors of `n` hangers in units of their own length, bending stiffness and mass.
+
+    `tension` (n,) is T L2/EI; `springs` (n, 2 ends, 2 planes) k L/EI; `stiffness` and `mass`
+    (n, zones) those of zones over the bar's; `sag` (n,) the stiffness that a cable's sag adds in
+    the longitudinal plane, EA L4/EI (q/T)2; `shear` (n,) kappa G A L2/EI, `turning` (n,) I/(A L2);
+    `point_masses` (n, places) over the bar's.
+    """
+
+    tension: FloatArray
+    springs: FloatArray
+    stiffness: FloatArray
+    mass: FloatArray
+    sag: FloatArray
+    shear: FloatArray
+    turning: FloatArray
+    point_masses: FloatArray
+
+    def take(self, rows: slice) -> BarTerms:
+        """Return some of the hangers."""
+        return BarTerms(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
+
+
+class ReducedBar:
+    """A reduced basis for hangers like those of `usual`, with `zones` (start, end) of 0 to 1."""
+
+    def __init__(
+        self,
+        zones: Sequence[tuple[float, float]],
+        usual: BarTerms,
+        modes: int,
+        point_masses: Sequence[float] = (),
+    ):
+        self.modes = modes
+        self.shears = usual.shear.size > 0 and bool(np.isfinite(usual.shear).any())
+        decay = float(np.sqrt(np.median(usual.tension)))
+        elements = bar_elements(list(zones), decay, modes, self.shears, point_masses)
+        self._elements = elements
+        self._masses_at = np.asarray(point_masses, dtype=float)
+        whole = _Matrices.of(elements, self._masses_at)
+        self.basis = _basis(whole, usual.take(slice(0, _SNAPSHOTS)), modes)
+        self._reduced = whole.projected(self.basis)
+
+    def frequencies(self, terms: BarTerms) -> FloatArray:
+        """Return circular frequencies (n, 2, modes) in units of sqrt(EI/m)/L2."""
+        found = np.empty((len(terms.tension), 2, self.modes))
+        for first in range(0, len(found), _BLOCK):
+            block = slice(first, first + _BLOCK)
+            found[block] = self._reduced.frequencies(terms.take(block), self.modes)
+        return found
+
+    def frequencies_about(
+        self, terms: BarTerms, shifted: Sequence[BarTerms]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return frequencies (n, 2, modes) and, to first order, those of near hangers (s, ...)."""
+        found = np.empty((len(terms.tension), 2, self.modes))
+        near = np.empty((len(shifted), *found.shape))
+        for first in range(0, len(found), _BLOCK):
+            block = slice(first, first + _BLOCK)
+            found[block], near[:, block] = self._reduced.frequencies_about(
+                terms.take(block), [each.take(block) for each in shifted], self.modes
+            )
+        return found, near
+
+    def shapes(self, terms: BarTerms, x: FloatArray) -> FloatArray:
+        """Return deflections (n, 2, modes, points) at places `x` from 0 to 1, largest value 1."""
+        fine = np.linspace(0, 1, 20 * self.modes + 1)
+        table = self._elements.deflection(np.append(x, fine)) @ self.basis
+        found = np.empty((len(terms.tension), 2, self.modes, len(x)))
+        for row in range(len(found)):
+            for plane in (0, 1):
+                stiffness, mass = self._reduced.assembled(terms.take(slice(row, row + 1)), plane)
+                _, vectors = scipy.linalg.eigh(stiffness[0], mass[0])
+                w = (table @ vectors[:, : self.modes]).T
+                along = w[:, len(x) :]
+                largest = np.abs(along).max(axis=1)
+                risen = np.abs(along) > 0.01 * largest[:, None]
+                sign = np.sign(along[np.arange(len(along)), risen.argmax(axis=1)])
+                found[row, plane] = w[:, : len(x)] * (sign / largest)[:, None]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Matrices:
+    """Matrices (terms, d, d) of stiffness and mass, in the order in which factors are given."""
+
+    stiffness: FloatArray
+    mass: FloatArray
+    zones: int
+    shears: bool
+
+    @classmethod
+    def of(cls, elements: BarElements, masses_at: FloatArray) -> _Matrices:
+        springs = np.einsum("ei,ej->eij", elements.end_rotation, elements.end_rotation)
+        sag = np.outer(elements.area, elements.area)
+        stiffness = [*elements.bending, elements.tension, *springs, sag]
+        mass = [*elements.mass]
+        shears = elements.shear.size > 0
+        if shears:
+            stiffness.append(elements.shear)
+            mass += [*elements.turning]
+        at = elements.deflection(masses_at)
+        mass += [np.outer(row, row) for row in at]
+        zones = len(elements.bending) - 1
+        return cls(np.array(stiffness), np.array(mass), zones, shears)
+
+    def projected(self, basis: FloatArray) -> _Matrices:
+        """Return the same in a reduced basis (d, r)."""
+        stiffness, mass = (basis.T @ each @ basis for each in (self.stiffness, self.mass))
+        return _Matrices(stiffness, mass, self.zones, self.shears)
+
+    def factors(self, terms: BarTerms, plane: int) -> tuple[FloatArray, FloatArray]:
+        """Return the factors (n, terms) of stiffness and mass in one plane."""
+        one = np.ones((len(terms.tension), 1))
+        springs = terms.springs[:, :, plane].clip(max=STIFFEST)
+        columns = [
+            one,
+            terms.stiffness,
+            terms.tension[:, None],
+            springs,
+            plane * terms.sag[:, None],
+        ]
+        weights = [one, terms.mass]
+        if self.shears:
+            columns.append(terms.shear[:, None])
+            # A zone's rotary inertia goes with its mass.
+            weights += [terms.turning[:, None] * np.hstack([one, terms.mass])]
+        weights.append(terms.point_masses)
+        return np.hstack(columns), np.hstack(weights)
+
+    def assembled(self, terms: BarTerms, plane: int) -> tuple[FloatArray, FloatArray]:
+        """Return stiffness and mass (n, d, d) in one plane."""
+        stiffness, mass = self.factors(terms, plane)
+        return _sum(stiffness, self.stiffness), _sum(mass, self.mass)
+
+    def frequencies(self, terms: BarTerms, modes: int) -> FloatArray:
+        """Return circular frequencies (n, 2, modes)."""
+        found = np.empty((len(terms.tension), 2, modes))
+        for plane in (0, 1):
+            whitened, _ = self._whitened(terms, plane)
+            square = np.linalg.eigvalsh(whitened)[:, :modes]
+            found[:, plane] = np.sqrt(square.clip(min=0.0))
+        return found
+
+    def frequencies_about(
+        self, terms: BarTerms, shifted: Sequence[BarTerms], modes: int
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the same, and those of near hangers (s, n, 2, modes) by Rayleigh's quotient."""
+        found = np.empty((len(terms.tension), 2, modes))
+        near = np.empty((len(shifted), *found.shape))
+        for plane in (0, 1):
+            whitened, inverse = self._whitened(terms, plane)
+            square, vectors = np.linalg.eigh(whitened)
+            square, shape = square[:, :modes], vectors[:, :, :modes]
+            shape = shape if inverse is None else inverse.swapaxes(1, 2) @ shape
+            stiff = _energies(self.stiffness, shape)
+            heavy = _energies(self.mass, shape)
+            own = self.factors(terms, plane)
+            found[:, plane] = np.sqrt(square.clip(min=0.0))
+            for index, each in enumerate(shifted):
+                stiffer, heavier = self.factors(each, plane)
+                change = np.einsum("nt,ntk->nk", stiffer - own[0], stiff)
+                change -= square * np.einsum("nt,ntk->nk", heavier - own[1], heavy)
+                near[index, :, plane] = np.sqrt((square + change).clip(min=0.0))
+        return found, near
+
+    def _whitened(self, terms: BarTerms, plane: int) -> tuple[FloatArray, FloatArray | None]:
+        """Return L^-1 K L^-T (n, d, d) with the mass L L^T, and L^-1, None where the mass is 1."""
+        stiffness, mass = self.assembled(terms, plane)
+        if self.unit_mass:
+            return stiffness, None
+        inverse = np.linalg.inv(np.linalg.cholesky(mass))
+        return inverse @ stiffness @ inverse.swapaxes(1, 2), inverse
+
+    @cached_property
+    def unit_mass(self) -> bool:
+        """Whether the mass is that of the bar alone, whose basis is orthonormal."""
+        return len(self.mass) == 1 and bool(np.allclose(self.mass[0], np.eye(len(self.mass[0]))))
+
+
+def _energies(matrices: FloatArray, shapes: FloatArray) -> FloatArray:
+    """Return x' A x (n, terms, modes) of matrices (terms, d, d) and shapes (n, d, modes)."""
+    moved = np.einsum("tij,njk->ntik", matrices, shapes, optimize=True)
+    return np.asarray((moved * shapes[:, None]).sum(axis=2))
+
+
+def _sum(factors: FloatArray, matrices: FloatArray) -> FloatArray:
+    """Return the sums (n, d, d) of matrices (terms, d, d), each by its factors (n, terms)."""
+    size = matrices.shape[1]
+    return np.asarray(factors @ matrices.reshape(len(matrices), -1)).reshape(-1, size, size)
+
+
+def _basis(whole: _Matrices, usual: BarTerms, modes: int) -> FloatArray:
+    """Return the basis (d, r), orthonormal in the mean mass, of modes of `usual`."""
+    _, mean = whole.assembled(usual, 0)
+    root = np.linalg.cholesky(mean.mean(axis=0))
+    found = []
+    for row in range(len(usual.tension)):
+        for plane in (0, 1):
+            stiffness, mass = whole.assembled(usual.take(slice(row, row + 1)), plane)
+            _, vectors = scipy.linalg.eigh(stiffness[0], mass[0], subset_by_index=[0, modes])
+            size = root.T @ vectors
+            found.append(size / np.linalg.norm(size, axis=0))
+    left, values, _ = np.linalg.svd(np.hstack(found), full_matrices=False)
+    kept = values**2 > _LEFT_OUT * np.sum(values**2)
+    return np.asarray(scipy.linalg.solve_triangular(root.T, left[:, kept]))
