@@ -9,6 +9,7 @@ ends are zones of that stiffness and length. A per cent of a frequency is two of
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 from pathlib import Path
@@ -55,6 +56,7 @@ def first_order(xi: float, share: float, stiffer: float, spring: float) -> np.nd
 
 def main() -> None:
     """Print the table; raise SystemExit where thin soft fittings are off, which are first order."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     print("L sqrt(T/EI)  fitting/L  stiffer by  ends     worst mode off")
     for xi in (5.0, 30.0, 100.0):
         for share in (0.01, 0.03):
