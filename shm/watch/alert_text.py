@@ -300,7 +300,7 @@ def _tension_now(drift: Drift) -> str:
     unit = force_unit(drift.value, drift.baseline)
     places = max(0, 2 - math.floor(math.log10(unit.of(drift.baseline))))
     now, then = (f"{unit.of(n):.{places}f} {unit.name}" for n in (drift.value, drift.baseline))
-    return f"Tension is now {now}, {then} at the baseline."
+    return f"At equal temperature the tension is {now} now, {then} at the baseline."
 
 
 def _details(*parts: str) -> str:
