@@ -236,7 +236,8 @@ def test_a_sudden_loss_says_the_state_then_what_to_do_then_why() -> None:
         "stays, inspect its anchorages and the rod, and compare the hangers beside it (`shm drift "
         "bridge`). It came suddenly, between 2026-04-30 and 2026-05-03. At equal temperature the "
         "tension is 654 kN now, 711 kN at the baseline. Details: ± is half the 90 % interval; "
-        "probability 0.97 that tension changed, 0.90 that anything changed, 0.98 that it came suddenly, 0.30 that "
+        "probability 0.97 that tension changed, 0.90 that anything changed, 0.98 that it came "
+        "suddenly, 0.30 that "
         "tension is beyond its threshold of 5 %; mean time between false alarms at least 200 years."
     )
 
