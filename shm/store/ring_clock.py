@@ -1,11 +1,14 @@
 """Find samples of a logger whose clock was ahead by whole hours, and exclude them from the ring.
 
 They are dated later than they were recorded, after a pause that is whole hours too long. Once the
-clock is right again, true samples come for the same times, and differ. Then these count.
+clock is right again, true samples come for the same times, and differ. Then these count. Where the
+clock was ahead for less than an hour, the right samples that follow cut the pause: then the order
+in which the samples came shows it, ahead by whole hours and back by as many.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -29,13 +32,14 @@ _HOUR = PERIODS["hour"]
 class HourStep:
     """A clock that was `hours` ahead in what is dated from `start` on and before `end`.
 
-    `last_end` is when the last of these samples ends.
+    `last_end` is when the last of these samples ends; they came before `before_us`.
     """
 
     start: datetime
     end: datetime
     hours: int
     last_end: datetime
+    before_us: int
 
     @property
     def words(self) -> str:
@@ -43,20 +47,28 @@ class HourStep:
         return f"the clock was {hours} ahead (daylight saving?)"
 
 
+@dataclass(frozen=True)
+class Arrival:
+    """When a chunk begins, ends and came, in microseconds since 1970."""
+
+    start_us: int
+    end_us: int
+    arrived_us: int
+
+
 def find_hour_step(
-    spans: Iterable[tuple[int, int]],
-    chunk: tuple[int, int],
+    spans: Sequence[Arrival],
+    chunk: Arrival,
     known: Collection[datetime],
     tolerance: timedelta = timedelta(seconds=2),
 ) -> HourStep | None:
-    """Return the step of a clock that was ahead before a chunk came; None where none shows.
+    """Return the step of a clock that was ahead before a chunk came; None where no pause shows it.
 
-    `spans` are when the chunks that came earlier begin and end, and `chunk` the same of one that
-    contradicts them, in microseconds. The last pause of an hour or more before it must be whole
-    hours longer than usual, with no sample from that much after it on. `known` are the beginnings
-    of former steps.
+    `spans` are the chunks that came earlier, and `chunk` is one that contradicts them. The last
+    pause of an hour or more before it must be whole hours longer than usual, with no sample from
+    that much after it on. `known` are the beginnings of former steps.
     """
-    by_time = sorted(spans)
+    by_time = sorted((each.start_us, each.end_us) for each in spans)
     pauses, until_us = [], None
     for start_us, end_us in by_time:
         if until_us is not None and start_us > until_us:
@@ -67,7 +79,7 @@ def find_hour_step(
     )
     hour_us = long_us + slack_us
     usual = [b - a for a, b in pauses if slack_us < b - a < long_us]
-    long = [(a, b) for a, b in pauses if b - a >= long_us and b < chunk[1]]
+    long = [(a, b) for a, b in pauses if b - a >= long_us and b < chunk.end_us]
     if until_us is None or not long:
         return None
     if any(abs(time_of(long[-1][1]) - each) < _HOUR for each in known):
@@ -77,10 +89,56 @@ def find_hour_step(
         hours = round((pause_us - usual_us) / hour_us)
         step_us = hours * hour_us
         is_whole = hours > 0 and abs(pause_us - usual_us - step_us) <= slack_us
-        if is_whole and by_time[-1][0] < chunk[0] + step_us:
-            start, end = time_of(long[-1][1]), time_of(chunk[0] + step_us)
-            return HourStep(start, end, hours, time_of(until_us))
+        if is_whole and by_time[-1][0] < chunk.start_us + step_us:
+            start, end = time_of(long[-1][1]), time_of(chunk.start_us + step_us)
+            return HourStep(start, end, hours, time_of(until_us), chunk.arrived_us)
     return None
+
+
+def find_return(
+    spans: Sequence[Arrival],
+    chunk: Arrival,
+    known: Collection[datetime],
+    tolerance: timedelta = timedelta(seconds=2),
+) -> HourStep | None:
+    """Return the step of a clock that was ahead and set back again before a chunk came, else None.
+
+    In the order in which they came, samples must begin whole hours later than usual after those
+    before them, and end that much, give or take half of it, after those that came next begin. Their
+    true time must be free. `chunk` contradicts some of them; the rest is as in `find_hour_step`.
+    """
+    hour_us, slack_us = (each // timedelta(microseconds=1) for each in (_HOUR, tolerance))
+    by_arrival = sorted((each.arrived_us, each.start_us, each.end_us) for each in spans)
+    starts = [start_us for _, start_us, _ in by_arrival]
+    jumps = [start_us - before[2] for before, start_us in zip(by_arrival, starts[1:], strict=False)]
+    usual_us = median([each for each in jumps if slack_us < each < hour_us - slack_us] or [0])
+    for first, jump_us in reversed(list(enumerate(jumps, start=1))):
+        later = range(first + 1, len(starts))
+        back = next((place for place in later if starts[place] < starts[first]), None)
+        if back is None:
+            continue
+        last_us = max(end_us for _, _, end_us in by_arrival[first:back])
+        is_known = any(abs(time_of(starts[first]) - each) < _HOUR for each in known)
+        if is_known or not starts[first] - slack_us <= chunk.start_us < last_us:
+            continue
+        for extra_us in (jump_us, jump_us - usual_us):
+            hours = round(extra_us / hour_us)
+            step_us = hours * hour_us
+            is_whole = hours > 0 and abs(extra_us - step_us) <= slack_us
+            returns = abs(last_us - starts[back] - step_us) <= step_us / 2
+            true_span = starts[first] - step_us, last_us - step_us
+            if is_whole and returns and not _is_covered(true_span, spans):
+                start, end = time_of(starts[first]), time_of(last_us)
+                return HourStep(start, end, hours, end, by_arrival[back][0])
+    return None
+
+
+def _is_covered(span: tuple[int, int], others: Iterable[Arrival]) -> bool:
+    """Return True if one of others has half of its length within a span."""
+    return any(
+        2 * (min(span[1], each.end_us) - max(span[0], each.start_us)) > each.end_us - each.start_us
+        for each in others
+    )
 
 
 def was_ahead(
@@ -92,9 +150,12 @@ def was_ahead(
     """Return True if an earlier chunk of the same number and time was dated by a clock ahead."""
     if came_early(*earlier):
         return True
-    span = microseconds(chunk.start), microseconds(chunk.end)
-    spans = [(key.start_us, end_us) for key, end_us in _list_spans(folder, folder.waiting(), span)]
-    return find_hour_step(spans, span, known) is not None
+    arrival = Arrival(microseconds(chunk.start), microseconds(chunk.end), sys.maxsize)
+    spans = [_arrival(*each) for each in _list_spans(folder, folder.waiting(), arrival.start_us)]
+    if find_hour_step(spans, arrival, known) is not None:
+        return True
+    step = find_return(spans, arrival, known)
+    return step is not None and earlier[0].arrived_us < step.before_us
 
 
 def exclude_ahead(
@@ -124,7 +185,7 @@ def exclude_ahead(
             if step is None:
                 break
             steps.add(step.start)
-            leaving = _list_excluded(folder, waiting, step, key.arrived_us)
+            leaving = _list_excluded(folder, waiting, step)
             count = sum(len(keys) for keys in leaving.values())
             chunks = "1 chunk is" if count == 1 else f"{count} chunks are"
             said = f"{step.words}: {chunks} set aside; the samples that came later count"
@@ -147,27 +208,31 @@ def _find_step(
 
     Its clock was set back by the step, give or take half of it: no correction of seconds.
     """
-    span = microseconds(chunk.start), microseconds(chunk.end)
+    arrival = _arrival(key, microseconds(chunk.end))
     spans = [
-        (each.start_us, end_us)
-        for each, end_us in _list_spans(folder, waiting, span)
+        _arrival(each, end_us)
+        for each, end_us in _list_spans(folder, waiting, arrival.start_us)
         if each.arrived_us < key.arrived_us
     ]
-    step = find_hour_step(spans, span, known)
-    if step is None or step.last_end - chunk.start < step.hours * _HOUR / 2:
-        return None
-    return step
+    step = find_hour_step(spans, arrival, known)
+    if step is not None and step.last_end - chunk.start >= step.hours * _HOUR / 2:
+        return step
+    return find_return(spans, arrival, known)
+
+
+def _arrival(key: ChunkKey, end_us: int) -> Arrival:
+    return Arrival(key.start_us, end_us, key.arrived_us)
 
 
 def _list_spans(
     folder: StreamFolder,
     waiting: Sequence[WaitingChunk],
-    span: tuple[int, int],
+    start_us: int,
     reach: timedelta = timedelta(hours=96),
 ) -> list[tuple[ChunkKey, int]]:
-    """Return chunks around a span, each with its end: from `reach` before it on."""
+    """Return chunks around a time, each with its end: from `reach` before it on."""
     found: list[tuple[ChunkKey, int]] = []
-    for segment in folder.segments(time_of(span[0]) - reach):
+    for segment in folder.segments(time_of(start_us) - reach):
         found += folder.spans(segment.path).items()
     for each in waiting:
         with suppress(FileNotFoundError):  # it has been sealed
@@ -176,9 +241,9 @@ def _list_spans(
 
 
 def _list_excluded(
-    folder: StreamFolder, waiting: Sequence[WaitingChunk], step: HourStep, before_us: int
+    folder: StreamFolder, waiting: Sequence[WaitingChunk], step: HourStep
 ) -> dict[datetime, list[ChunkKey]]:
-    """Return the chunks that a step dates wrongly, by ten minutes: those that came before."""
+    """Return the chunks that a step dates wrongly, by ten minutes."""
     since_us, until_us = microseconds(step.start), microseconds(step.end)
     keys = [each.arrived_key for each in waiting]
     for segment in folder.segments(period_of(since_us)):
@@ -186,7 +251,7 @@ def _list_excluded(
             keys += folder.spans(segment.path)
     found: dict[datetime, list[ChunkKey]] = {}
     for key in sorted(set(keys)):
-        if since_us <= key.start_us < until_us and key.arrived_us < before_us:
+        if since_us <= key.start_us < until_us and key.arrived_us < step.before_us:
             found.setdefault(period_of(key.start_us), []).append(key)
     return found
 

@@ -117,6 +117,37 @@ def test_take_true_files_after_clock_ahead(
     assert np.array_equal(again.values, pieces[0].values)
 
 
+@pytest.mark.parametrize("together", [True, False])
+def test_take_true_files_after_short_step(
+    bridge: Workspace, keeper: StreamKeeper, clock: Clock, together: bool
+) -> None:
+    """An hour ahead for half an hour: right files follow, and only then the true ones come."""
+    clock.now = BEGIN + timedelta(days=1)
+    for number in range(18):
+        recorded = BEGIN + number * 10 * MINUTE
+        write_file(bridge, recorded + HOUR if 6 <= number < 9 else recorded, number)
+        if not (together and 12 < number < 15):
+            keeper.turn()
+        clock.pass_by(60)
+    clock.pass_by(600)
+    keeper.turn()
+    assert not list(bridge.quarantine.folder.glob("*"))
+    pieces = ring_of(bridge).read("h3", BEGIN, BEGIN + 3 * HOUR)
+    right = [number for number in range(18) if not 6 <= number < 9]
+    assert [piece.start for piece in pieces] == [BEGIN + n * 10 * MINUTE for n in right]
+    for number, piece in zip(right, pieces, strict=True):
+        assert np.allclose(piece.values, make_values(number), atol=1e-3)
+    assert list_events(bridge, "doubled") == []
+    (step,) = list_events(bridge, "clock step")
+    assert step.detail.startswith("the clock was 1 hour ahead (daylight saving?): 3 chunks")
+    assert step.start == BEGIN + 2 * HOUR
+    assert len(list((bridge.folder / "ring/h3/aside").glob("*.chunk"))) == 3
+    write_file(bridge, BEGIN + 2 * HOUR, 6)  # a wrong one comes again: the true one stays
+    keeper.turn()
+    (again, *_) = ring_of(bridge).read("h3", BEGIN + 2 * HOUR, BEGIN + 3 * HOUR)
+    assert np.allclose(again.values, make_values(12), atol=1e-3)
+
+
 def test_seal_reports_periods_of_excluded_samples(
     bridge: Workspace,
     keeper: StreamKeeper,
@@ -205,6 +236,39 @@ def test_seal_keeps_samples_after_true_pause(ring: Ring, clock: Clock, back: tim
     pieces = ring.read("h3", BEGIN, BEGIN + 110 * MINUTE)
     found = np.concatenate([piece.values for piece in pieces], axis=1)
     assert np.array_equal(found, join_values([*before, *after]))
+    assert not list(ring.folder.glob("h3/aside/*.chunk"))
+
+
+@pytest.mark.parametrize("hours", [1, 2])
+@pytest.mark.parametrize("off", [timedelta(0), timedelta(seconds=20)])
+def test_seal_excludes_numbered_chunks_short_step(
+    ring: Ring, clock: Clock, hours: int, off: timedelta
+) -> None:
+    """The clock is ahead for 25 minutes; right samples come up to where it was set back."""
+    wrong = make_minutes(range(20, 45), hours * HOUR)
+    true = [*make_minutes(range(20)), *make_minutes(range(45, 60 * hours + 90), off)]
+    events: list[StreamEvent] = []
+    ring = Ring(ring.folder, [STREAM], clock, note=events.append)
+    send(ring, clock, [*true[:20], *wrong])
+    send(ring, clock, true[20:])
+    pieces = ring.read("h3", BEGIN, BEGIN + 12 * HOUR)
+    assert np.array_equal(np.concatenate([p.values for p in pieces], axis=1), join_values(true))
+    assert len(list(ring.folder.glob("h3/aside/*.chunk"))) == len(wrong)
+    assert any("daylight saving?" in each.detail for each in events if each.kind == "clock step")
+
+
+def test_seal_keeps_live_samples_before_backlog(ring: Ring, clock: Clock) -> None:
+    """After an hour without a line, live samples come before those of the hour itself.
+
+    The same times come again with other samples: what came first stays, as no clock was ahead.
+    """
+    before, late, live = (make_minutes(range(*each)) for each in ((0, 20), (20, 80), (80, 100)))
+    send(ring, clock, [*before, *live, *late])
+    other = [replace(each, sequence=each.sequence + 500, values=-each.values) for each in live]
+    send(ring, clock, other)
+    pieces = ring.read("h3", BEGIN, BEGIN + 12 * HOUR)
+    found = np.concatenate([piece.values for piece in pieces], axis=1)
+    assert np.array_equal(found, join_values([*before, *late, *live]))
     assert not list(ring.folder.glob("h3/aside/*.chunk"))
 
 
