@@ -19,6 +19,7 @@ import rich_click as click
 
 from shm.errors import BadInput, UsageError
 from shm.pipeline.import_answers import (
+    answer_time,
     answer_to,
     channel_answer,
     import_document,
@@ -156,7 +157,11 @@ UFF_SUFFIXES = (".uff", ".unv", ".uf")
 )
 @click.option("--leave-out", multiple=True, metavar="NAME", help="A column that is no channel.")
 @click.option("--rate", type=float, metavar="HZ", help="Samples a second, if the file says none.")
-@click.option("--time", type=flags.Time(), help="When the test was, if the file does not say.")
+@click.option(
+    "--time",
+    type=flags.Words(),
+    help="When the test was, if the file does not say; or 'unknown'.",
+)
 @click.option("--temperature", type=float, metavar="C", help="Degrees Celsius of the steel.")
 @click.option("--dry-run", is_flag=True, help="Only show what is understood; keep nothing.")
 @flags.json
@@ -224,14 +229,13 @@ def _whole_file(said: dict[str, Any]) -> Answers:
         raise UsageError(
             f"--rate {rate:g} is no rate.", remedy="Give samples a second: --rate 512."
         )
-    time: datetime | None = said["time"]
-    return Answers(
+    answers = Answers(
         said["hanger"],
         math.nan if rate is None else rate,
-        time,
-        math.nan if temperature is None else temperature,
+        temperature_c=math.nan if temperature is None else temperature,
         each_time=said["each_time"],
     )
+    return answers if said["time"] is None else answer_time(said["time"], answers)
 
 
 def _answers(said: dict[str, Any], found: Import) -> Answers:

@@ -215,3 +215,13 @@ def test_ingest_reads_short_days_as_learnt(shm: Shm, workspace: Workspace, tmp_p
     later = write_described_export(tmp_path / "b.csv", "04/05/06 9:12:31", seed=2)
     (look,) = shm(*in_place, "ingest", "--peek", later, "--json").document["files"]
     assert (look["time"], look["missing"]) == ("2006-05-04T09:12:31Z", [])
+
+
+def test_import_takes_unknown_time(shm: Shm, workspace: Workspace, tmp_path: Path) -> None:
+    """What the question offers, the option takes."""
+    file = write_export(tmp_path / "a.csv", "9/10/2025 9:12:31 AM")
+    command = ("--workspace", workspace.folder, "import", file, *DESCRIBED, "--dry-run", "--json")
+    answered = shm(*command, "--time", "unknown")
+    assert answered.code == 0
+    assert answered.document["time"] is None
+    assert not [each for each in answered.document["questions"] if each["about"] == "time"]
