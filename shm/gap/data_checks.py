@@ -182,7 +182,19 @@ def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
         _amplitude(tests),
         _rattling(tests),
     ]
+    remarks.append(_equal_readings(tests))
     return [remark for remark in remarks if remark] + _contradictions(tests)
+
+
+def _equal_readings(tests: Sequence[ModalTest]) -> str:
+    """Return a remark where all tensions that were read are equal; empty for others."""
+    read_n = [test.tension_read_n for test in tests if math.isfinite(test.tension_read_n)]
+    if len(read_n) < 2 or len(set(read_n)) > 1:
+        return ""
+    return (
+        f"The tensions read at {len(read_n)} tests are all {read_n[0] / 1e3:.4g} kN: only their "
+        "differences are used, so that equal readings tell nothing."
+    )
 
 
 def _irregular(tests: Sequence[ModalTest]) -> str:

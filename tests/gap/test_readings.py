@@ -13,6 +13,7 @@ from shm.documents import dump
 from shm.errors import BadInput
 from shm.gap import GapOptions, diagnose
 from shm.gap.contract import Hypothesis
+from shm.gap.data_checks import usable
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.inference.priors import reading_of
@@ -57,6 +58,16 @@ def test_shifts_count_from_the_mean_of_all_readings_and_are_zero_without_one() -
     conditions = observed(tests, HANGER_3).design.conditions
     assert [each.tension_shift_n for each in conditions] == [-100e3, 0.0, 100e3]
     assert [each.tension_shift_sd_n for each in conditions] == [SD_N, 0.0, SD_N]
+
+
+@pytest.mark.parametrize(
+    ("read_n", "is_said"),
+    [((6e5, 6e5, NAN), True), ((6e5, 7e5, NAN), False), ((6e5, NAN, NAN), False)],
+)
+def test_usable_remarks_equal_readings(read_n: tuple[float, ...], is_said: bool) -> None:
+    hz = frequencies_hz(np.array([7e5, 7.1e5, 7.2e5]))
+    remarks = " ".join(usable(loadings(hz, read_n, SD_N), HANGER_3).remarks)
+    assert ("The tensions read at 2 tests are all 600 kN" in remarks) == is_said
 
 
 def test_one_reading_alone_says_nothing() -> None:
