@@ -166,30 +166,12 @@ def _refuse_incomplete(record: Recording, hammered: bool, options: IdentifyOptio
             file=record.source,
             remedy="State the unit of each column: N for the hammer, m/s^2 for accelerometers.",
         )
-    _refuse_underflow(record)
     if record.sampling_rate_hz < 2 * options.band_high_hz:
         raise BadInput(
             f"sampled at {record.sampling_rate_hz:g} Hz, too slow for modes up to "
             f"{options.band_high_hz:g} Hz.",
             file=record.source,
             remedy="Sample faster, or lower band_high_hz to less than half the sampling rate.",
-        )
-
-
-def _refuse_underflow(record: Recording) -> None:
-    """Raise BadInput for a force so small that the squares of its spectrum underflow."""
-    if record.force is None:
-        return
-    peak_n = float(
-        np.max(np.abs(record.force.values), initial=0.0, where=np.isfinite(record.force.values))
-    )
-    precision = np.finfo(float)
-    if 0 < peak_n < np.sqrt(precision.tiny) / precision.eps:
-        raise BadInput(
-            f"the force is at most {peak_n:.1e} N: that is no hit.",
-            file=record.source,
-            channel=record.force.name,
-            remedy="Correct the unit or the calibration of the hammer.",
         )
 
 
