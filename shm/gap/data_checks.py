@@ -181,19 +181,20 @@ def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
         _without_shape_sd(tests),
         _amplitude(tests),
         _rattling(tests),
+        _unused_readings(tests),
     ]
-    remarks.append(_equal_readings(tests))
     return [remark for remark in remarks if remark] + _contradictions(tests)
 
 
-def _equal_readings(tests: Sequence[ModalTest]) -> str:
-    """Return a remark where all tensions that were read are equal; empty for others."""
-    read_n = [test.tension_read_n for test in tests if math.isfinite(test.tension_read_n)]
-    if len(read_n) < 2 or len(set(read_n)) > 1:
+def _unused_readings(tests: Sequence[ModalTest]) -> str:
+    """Return a remark where a tension was read, but no two readings differ; empty for others."""
+    read_n = {test.tension_read_n for test in tests if math.isfinite(test.tension_read_n)}
+    if len(read_n) != 1:
         return ""
     return (
-        f"The tensions read at {len(read_n)} tests are all {read_n[0] / 1e3:.4g} kN: only their "
-        "differences are used, so that equal readings tell nothing."
+        f"The tension read, {read_n.pop() / 1e3:.4g} kN, is not used: only differences between "
+        "readings of several tests are. To use its level give it as nominal_tension_n, with "
+        "`tension` in [hanger.scatter]."
     )
 
 
