@@ -68,7 +68,7 @@ class ReducedBar:
         self._masses_at = np.asarray(point_masses, dtype=float)
         whole = _Matrices.of(elements, self._masses_at)
         self.basis = _basis(whole, usual.take(slice(0, _SNAPSHOTS)), modes)
-        self._reduced = whole.projected(self.basis)
+        self._whole, self._reduced = whole, whole.projected(self.basis)
 
     def frequencies(self, terms: BarTerms) -> FloatArray:
         """Return circular frequencies (n, 2, modes) in units of sqrt(EI/m)/L2."""
@@ -77,6 +77,10 @@ class ReducedBar:
             block = slice(first, first + _BLOCK)
             found[block] = self._reduced.frequencies(terms.take(block), self.modes)
         return found
+
+    def full_frequencies(self, terms: BarTerms) -> FloatArray:
+        """Return the same by all elements."""
+        return self._whole.frequencies(terms, self.modes)
 
     def frequencies_about(
         self, terms: BarTerms, shifted: Sequence[BarTerms]
