@@ -62,7 +62,7 @@ def diagnose(
     options: GapOptions | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
-    """Where the baseline and the tests of a hanger differ, which effect causes it, what it changes.
+    """Return where baseline and tests of a hanger differ, which effect causes it, what it changes.
 
     The same tests, options and seed give the same answer. Raises BadInput where the tests cannot
     be used (what can be used in spite of a fault is used, and `Diagnosis.remarks` says so) or where

@@ -16,7 +16,7 @@ def silent(label: str, fraction: float) -> None:
 
 @dataclass(frozen=True)
 class UpdateOptions:
-    """How to update: posterior samples to keep, and seed.
+    """Options of an update: posterior samples to keep, and seed.
 
     `calibration` is what an earlier measured tension taught of the bar (`calibration_of`).
     """

@@ -1,4 +1,4 @@
-"""What a report says of physical assumptions: which rows were overridden, and how to see all."""
+"""Report which physical assumptions were overridden, and how to see all."""
 
 from __future__ import annotations
 

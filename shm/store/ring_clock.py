@@ -49,7 +49,7 @@ class HourStep:
 
 @dataclass(frozen=True)
 class Arrival:
-    """When a chunk begins, ends and came, in microseconds since 1970."""
+    """Begin, end and arrival of a chunk, in microseconds since 1970."""
 
     start_us: int
     end_us: int

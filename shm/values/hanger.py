@@ -164,7 +164,7 @@ LengthBy: TypeAlias = Literal["faces", "pins", "nodes"]
 
 @dataclass(frozen=True)
 class Survey:
-    """What the owner wrote of how the bar was measured; no result rests on it. Empty: not stated.
+    """Statements on how the bar was measured, for reports; no result rests on them. "": not stated.
 
     `length_measured` is with what and when the length was taped, `measured_by` who measured the
     bar, `stated_keys` the keys of its description, which tell a default from a statement.

@@ -1,4 +1,4 @@
-"""How far the first-order correction for fittings is off exact zones (`tests/worlds/bar_of_terms`).
+"""Compare the first-order correction for fittings with exact zones (`tests/worlds/bar_of_terms`).
 
 python tests/benchmarks/fittings.py
 
