@@ -281,30 +281,13 @@ _ENDS = (
         math.nan,
         "k L/EI",
         JUDGEMENT,
-        "Rotational spring of an end, its logarithm uniform: below 0.03 a first frequency is "
-        "within 0.3 % of the pinned bar's, above 1000 within 0.2 % of the clamped one's.",
+        "Rotational spring of an end, its logarithm uniform, in diagnosis and watch (an update has "
+        "the fixity of each kind of end): below 0.03 a first frequency is within 0.3 % of the "
+        "pinned bar's, above 1000 within 0.2 % of the clamped one's.",
         lower=0.03,
         upper=1000.0,
         least=1e-6,
         most=1e9,
-    ),
-    Assumption(
-        "similar_ends_decades",
-        0.407,
-        "decades",
-        JUDGEMENT,
-        "Between the springs of two joints of one drawing: a factor of 2.5.",
-        least=0.03,
-        most=5.0,
-    ),
-    Assumption(
-        "round_end_decades",
-        0.02,
-        "decades",
-        JUDGEMENT,
-        "Between the springs of the two axes of a round end: 5 %.",
-        least=1e-4,
-        most=5.0,
     ),
     Assumption(
         "support_compliance_m_n",
@@ -366,6 +349,149 @@ _ENDS = (
         JUDGEMENT,
         "Of a node plate with half a chord at most (length_by = nodes).",
         most=0.5,
+    ),
+)
+
+
+def _rows_of_ends(
+    kind: str,
+    reason: str,
+    fixity: tuple[float, float],
+    clamped: float,
+    stiffness: tuple[float, float],
+    mass: tuple[float, float],
+) -> tuple[Assumption, ...]:
+    """Return the rows of one kind of end, each pair a value and its standard deviation."""
+    return (
+        Assumption(
+            f"{kind}_fixity",
+            fixity[0],
+            "of the clamped moment",
+            JUDGEMENT,
+            f"{reason} Part of the moment of a clamped end that the end takes, k/(k + EI/L + "
+            "sqrt(EI T)/2) of a spring k; Beta distributed.",
+            sd=fixity[1],
+            least=0.01,
+            most=0.99,
+        ),
+        Assumption(
+            f"{kind}_clamped",
+            clamped,
+            "probability",
+            JUDGEMENT,
+            "That both ends hold so fast that no test would tell them from clamped ones.",
+            least=1e-3,
+            most=0.999,
+        ),
+        Assumption(
+            f"{kind}_stiffness_log",
+            stiffness[0],
+            "ln of times the bar's",
+            JUDGEMENT,
+            f"Bending stiffness over `fittings_m`: {math.exp(stiffness[0]):.1f} times the bar's.",
+            sd=stiffness[1],
+            least=-10.0,
+            most=10.0,
+        ),
+        Assumption(
+            f"{kind}_mass_log",
+            mass[0],
+            "ln of times the bar's",
+            JUDGEMENT,
+            f"Mass over `fittings_m`: {math.exp(mass[0]):.1f} times the bar's.",
+            sd=mass[1],
+            least=-5.0,
+            most=5.0,
+        ),
+    )
+
+
+_KINDS_OF_ENDS = (
+    *_rows_of_ends(
+        "socket",
+        "A cast or swaged socket is bolted or sits on its bearing.",
+        *((0.833, 0.141), 0.3, (2.0, 0.7), (1.2, 0.4)),
+    ),
+    *_rows_of_ends(
+        "welded",
+        "A weld to a gusset holds fast.",
+        *((0.833, 0.141), 0.4, (1.2, 0.9), (0.7, 0.5)),
+    ),
+    *_rows_of_ends(
+        "plate",
+        "An end plate is stiff in its plane and weaker across it.",
+        *((0.75, 0.194), 0.3, (1.2, 0.9), (0.7, 0.5)),
+    ),
+    *_rows_of_ends(
+        "threaded",
+        "A nut on a thick plate holds nearly fast.",
+        *((0.75, 0.194), 0.2, (0.5, 0.5), (0.4, 0.3)),
+    ),
+    *_rows_of_ends(
+        "fork",
+        "A fork turns about its pin in one plane and hardly in the other.",
+        *((0.5, 0.323), 0.1, (1.5, 0.8), (0.8, 0.4)),
+    ),
+    *_rows_of_ends(
+        "unstated",
+        "Anything from a hinge to a clamp alike.",
+        *((0.5, 0.2887), 0.15, (1.2, 0.9), (0.7, 0.5)),
+    ),
+    Assumption(
+        "similarity_of_ends",
+        0.5,
+        "correlation",
+        JUDGEMENT,
+        "Between the fixities of the ends and planes of one hanger, as normal scores: ends of one "
+        "drawing are rarely each of another kind.",
+        most=0.99,
+    ),
+    Assumption(
+        "turnbuckle_stiffness_log_sd",
+        0.25,
+        "of the logarithm",
+        JUDGEMENT,
+        "Bending stiffness of a turnbuckle over the described one.",
+        most=3.0,
+    ),
+    Assumption(
+        "turnbuckle_mass_log_sd",
+        0.15,
+        "of the logarithm",
+        JUDGEMENT,
+        "Mass of a turnbuckle over the described one.",
+        most=3.0,
+    ),
+)
+
+_WEIGHT = (
+    Assumption(
+        "inclination_sd_deg",
+        1.0,
+        "deg",
+        JUDGEMENT,
+        "Of a stated `inclination_deg`: a level on a bar, and out of plumb.",
+        most=20.0,
+    ),
+    Assumption(
+        "usual_lean_deg",
+        4.0,
+        "deg",
+        JUDGEMENT,
+        "Lean from the vertical of a hanger without `inclination_deg`: half lean less, one in "
+        "twenty more than four times as much.",
+        least=0.1,
+        most=45.0,
+    ),
+    Assumption(
+        "sag_stiffness_log",
+        -0.2,
+        "ln of times EA/L",
+        JUDGEMENT,
+        "Axial stiffness against which sag changes: the bar's, and the supports' in series.",
+        sd=0.3,
+        least=-10.0,
+        most=1.0,
     ),
 )
 
@@ -770,7 +896,18 @@ _CHANGES = (
     ),
 )
 
-_ROWS = (*_BAR, *_TENSION, *_ENDS, *_STRANDS, *_SENSORS, *_ERRORS, *_DIAGNOSIS, *_CHANGES)
+_ROWS = (
+    *_BAR,
+    *_TENSION,
+    *_ENDS,
+    *_KINDS_OF_ENDS,
+    *_WEIGHT,
+    *_STRANDS,
+    *_SENSORS,
+    *_ERRORS,
+    *_DIAGNOSIS,
+    *_CHANGES,
+)
 _NAMES = tuple(row.name for row in _ROWS)
 
 

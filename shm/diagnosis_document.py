@@ -20,6 +20,7 @@ BRIDGE_DIAGNOSIS_SCHEMA = "shm.bridge_diagnosis/1"
 _PLAIN = (
     "hanger", "baseline", "no_gap_probability", "unexplained_probability", "fit_p_value",
     "model_error_percent", "seed", "seconds", "widest_swing_m",
+    "slenderness",
 )  # fmt: skip
 
 

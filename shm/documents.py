@@ -265,6 +265,9 @@ def posterior_document(posterior: Posterior, probability: float = NAN) -> dict[s
         "at_bounds": list(posterior.at_bounds),
         **of("misfit_percent", "log_occam", "tension_of_other_ends_n"),
         **of("tension_of_other_orders_n", "description_off_sd", "reading_off_sd"),
+        **of("taut_string_tension_n", "stated_error_percent"),
+        **of("sampler", "inclination_share_of_variance", "ends_share_of_variance"),
+        "remarks": list(posterior.remarks),
         "caveats": list(posterior.caveats),
         "baseline_check": posterior.baseline_check and asdict(posterior.baseline_check),
     }

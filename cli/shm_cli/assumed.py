@@ -45,7 +45,7 @@ def assumptions_section() -> str:
         "```toml\n"
         "[assumptions]\n"
         "accelerometer_mass_kg = 0.2\n"
-        "end_restraint = [3, 1000]                # sockets and welds alone\n"
+        "strand_bending_factor = [0.5, 1]         # compacted strands\n"
         'tension_reading_sd = {value = 0.01, reason = "jack calibrated in 2026"}\n'
         "```\n\n"
     )

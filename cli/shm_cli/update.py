@@ -13,6 +13,7 @@ import rich_click as click
 from shm.documents import posterior_document, selection_document, summary
 from shm.errors import BadInput, UsageError
 from shm.inference import Progress, UpdateOptions, select, update
+from shm.inference.options import IMPORTANCE, SAMPLERS
 from shm.models import DESCRIPTION, Model, applicable, build, competing_names
 from shm.modes_document import load_modes
 from shm.pipeline.lineage import Taught
@@ -40,9 +41,17 @@ _calibrated_by = click.option(
 )
 
 
+_sampler = click.option(
+    "--sampler",
+    type=click.Choice(SAMPLERS),
+    default=IMPORTANCE,
+    help="How draws are made; emcee is slower, an independent check of the usual one.",
+)
+
+
 def _updating(function: flags.F) -> flags.F:
     """The options that both have."""
-    updating = (flags.seed, flags.samples, flags.priors, _calibrated_by)
+    updating = (flags.seed, flags.samples, flags.priors, _sampler, _calibrated_by)
     for option in reversed((flags.hanger(), flags.hanger_file, *updating, flags.json)):
         function = option(function)
     return function
@@ -118,6 +127,7 @@ def command(
     seed: int,
     samples: int,
     priors: str,
+    sampler: str,
     calibrated_by: Path | None,
 ) -> None:
     """Posterior of tension and end stiffness.
@@ -127,7 +137,7 @@ def command(
     \b
     Example: shm update hanger3.modes.json --hanger-file H.toml --model beam2
     """
-    options = UpdateOptions(samples, seed)
+    options = UpdateOptions(samples, seed, sampler=sampler)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
     doubts = told_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
@@ -246,19 +256,21 @@ def select_command(
     seed: int,
     samples: int,
     priors: str,
+    sampler: str,
     calibrated_by: Path | None,
 ) -> None:
     """Compare model classes by their evidence.
 
-    The classes are equally probable beforehand, but for clamped ones, which weigh 0.15 to 0.22
-    beside one with springs; --priors thesis has all equal, and --prior says otherwise. Those that
+    The classes are equally probable beforehand, but for clamped ones, which are as probable as the
+    kind of ends makes them (0.1 to 0.4: shm settings --assumptions); --priors thesis has all equal,
+    and --prior says otherwise. Those that
     do not apply to the hanger are left out and say why. The tests come from MODES.json, or are the
     latest of a hanger of the workspace, which brings the classes that it has adopted.
 
     \b
     Example: shm select hanger3.modes.json --hanger-file H.toml --models beam1,beam2
     """
-    options = UpdateOptions(samples, seed)
+    options = UpdateOptions(samples, seed, sampler=sampler)
     stated = None if class_priors is None else _stated_priors(class_priors)
     tests, hanger = tests_and_hanger(ctx, modes_file, hanger_file, hanger_id)
     names = _names(ctx, models, None if hanger_file else hanger.id)

@@ -18,6 +18,7 @@ from shm.bridge.table import Table
 from shm.values import (
     NAN,
     EffectPrior,
+    EndKind,
     EndPlate,
     Hanger,
     Kind,
@@ -36,7 +37,8 @@ _SECTION = ("area_m2", "second_moment_m4", "mass_per_length_kg_m")
 _OPTIONAL = (
     "name", "diameter_m", "density_kg_m3", "poissons_ratio", "bending_stiffness_factor", "models",
     "plate", "turnbuckle", "thresholds", "scatter", "effects", "supports", "kind", "family",
-    "limits", "fittings_m", "length_by", "length_measured", "measured_by", "assumptions",
+    "limits", "fittings_m", "ends", "inclination_deg", "length_by", "length_measured",
+    "measured_by", "assumptions",
 )  # fmt: skip
 _KNOWN = {*_REQUIRED, *_SECTION, *_OPTIONAL}
 _LARGEST_POISSONS_RATIO = 0.499
@@ -45,6 +47,7 @@ _SOFTEST_PA, _STIFFEST_PA = 1e6, 2e12
 """Rubber, and twice a diamond: what lies beyond was written in another unit."""
 # Light timber and osmium; the strongest carbon fibre.
 _LIGHTEST_KG_M3, _DENSEST_KG_M3, _STRONGEST_PA = 300.0, 23000.0, 7e9
+_FLATTEST_DEG, _VERTICAL_DEG = 10.0, 90.0  # judgement: a flatter one is no hanger
 _LONGEST_M = 1000.0  # judgement: the longest stays have 580 m; of 4000 m and more no mode is solved
 
 # Judgement: from ten false calls a year, which nobody reads, to none in the life of all bridges.
@@ -62,16 +65,7 @@ def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULT
     length_m, elastic_modulus = table.positive("length_m"), _elastic_modulus(table)
     area, second_moment, mass = _section(table)
     diameter = table.positive("diameter_m") if "diameter_m" in table else NAN
-    if length_m > _LONGEST_M:
-        raise table.refusal(
-            f"length_m = {length_m:g} is longer than any hanger",
-            f"Give it in m, at most {_LONGEST_M:g}.",
-        )
-    if max(diameter, math.sqrt(area)) >= length_m:
-        raise table.refusal(
-            f"a section of {max(diameter, math.sqrt(area)):g} m is no hanger of {length_m:g} m",
-            "Give lengths and diameters in m, areas in m2.",
-        )
+    _refuse_length(table, length_m, max(diameter, math.sqrt(area)))
     nominal_tension_n = table.not_negative("nominal_tension_n")
     origin = f"{FILE}, hanger {values.get('id', '?')}"
     assumed = assumptions_of(table.table("assumptions"), assumed, origin)
@@ -104,9 +98,25 @@ def hanger_of(values: dict[str, Any], path: Path, assumed: Assumptions = DEFAULT
         family=str(values.get("family", "")),
         limits=_limits(table.table("limits")),
         fittings_m=fittings_m,
+        ends=_ends(table),
+        inclination_deg=_inclination_deg(table),
         survey=_survey(table),
         assumptions=assumed,
     )
+
+
+def _refuse_length(table: Table, length_m: float, widest_m: float) -> None:
+    """Refuse a length that is no hanger's, or that a section `widest_m` across cannot have."""
+    if length_m > _LONGEST_M:
+        raise table.refusal(
+            f"length_m = {length_m:g} is longer than any hanger",
+            f"Give it in m, at most {_LONGEST_M:g}.",
+        )
+    if widest_m >= length_m:
+        raise table.refusal(
+            f"a section of {widest_m:g} m is no hanger of {length_m:g} m",
+            "Give lengths and diameters in m, areas in m2.",
+        )
 
 
 def _elastic_modulus(table: Table) -> float:
@@ -202,6 +212,28 @@ def _fittings(table: Table, length_m: float) -> tuple[float, float]:
         holds=lambda both: min(both) >= 0 and sum(both) < length_m / 2,
     )
     return deck_m, arch_m
+
+
+def _ends(table: Table) -> EndKind | Literal[""]:
+    """Return how the ends are made; empty where the table does not say."""
+    if "ends" not in table:
+        return ""
+    remedy = 'Write "socket", "fork", "plate", "threaded" or "welded", or leave the key out.'
+    return cast(EndKind, table.value("ends", EndKind, "is no kind of end", remedy))
+
+
+def _inclination_deg(table: Table) -> float:
+    """Return the angle from the horizontal in degrees; NaN where the table does not say."""
+    if "inclination_deg" not in table:
+        return NAN
+    angle: float = table.value(
+        "inclination_deg",
+        float,
+        "is not between 10 and 90 degrees",
+        "Give the angle from the horizontal: 90 is vertical.",
+        holds=lambda angle: _FLATTEST_DEG <= angle <= _VERTICAL_DEG,
+    )
+    return angle
 
 
 def _positive(table: Table, kind: Any) -> dict[str, float]:

@@ -1,4 +1,6 @@
-"""What is wrong with the tests of a diagnosis, in words, and what that does to the answer.
+"""What keeps the tests of a diagnosis from showing more, in words.
+
+The data themselves are checked by `shm.inference.data_checks`, as for every tension.
 
 A tension alone can follow fewer than four frequencies, whatever the ends are. The baseline's ends
 hold it far too closely; what `shm update` finds with ends of any stiffness, averaged over its
@@ -10,65 +12,31 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations, pairwise
-from statistics import median
+from dataclasses import replace
 
 from shm.errors import BadInput
 from shm.gap.observations import told_of_rounding
 from shm.inference import UpdateOptions, select
+from shm.inference.data_checks import CheckedData, check_data, mode_name
 from shm.models import applicable, build
-from shm.values import FEW_MODES, PLANES, FloatArray, Hanger, ModalTest, Mode
+from shm.values import FEW_MODES, FloatArray, Hanger, ModalTest
 from shm.values.modes import MOST_SLOPE
 
-# Judgement: 4.5 are rare and no proof (`shm.gap.outliers`); among some hundred pairs six never are.
-_CONTRADICTION_SD = 6.0
-# Judgement: no thermometer on a bar, and no hand with a hammer, is more alike from test to test.
 SURE_COMMON_SDS = 3.0  # judgement: by chance one test in 370
-_SAME_TEMPERATURE_K, _SAME_LEVEL = 2.0, 1.1
-_OF_A_MODE = ("plane", "order", "frequency_hz", "frequency_sd_hz", "damping_ratio", "shape")
-_OF_A_TEST = ("temperature_c", "amplitude", "added_mass", "tension_read_n")
-_UNITS = {2 * math.pi: "rad/s", 60.0: "rpm", 1e-3: "kHz"}
-_SAME_UNIT = 1.8
-"""Factor. Judgement: a tension of a third to three times the nominal one; ends do less. What is as
-near to another unit calls for a tension beyond the prior."""
 
 
-@dataclass(frozen=True)
-class Usable:
-    """The tests that a diagnosis uses, and what was found on the way to them.
-
-    `other_unit` is the one of `remarks` that the frequencies look given in another unit, if any.
-    """
-
-    tests: tuple[ModalTest, ...]
-    remarks: tuple[str, ...]
-    other_unit: tuple[str, ...] = ()
-
-
-def usable(tests: Sequence[ModalTest], hanger: Hanger) -> Usable:
-    """Tests without the modes that cannot be what they are called, with a remark for each fault.
+def usable(tests: Sequence[ModalTest], hanger: Hanger) -> CheckedData:
+    """Return the tests that a diagnosis uses, with a remark for each fault.
 
     Raises BadInput where nothing is left, where two tests have one name, belong to another hanger
     or have masses or sensors beyond its ends.
     """
     _refuse(tests, hanger)
-    unit = _other_unit(tests, hanger)
-    tests, copied = _without_copies(tests)
-    kept, remarks = [], [each for each in (unit, copied) if each]
-    for test in tests:
-        doubtful = _doubtful(test)
-        remarks += [f"Test {test.id}: {reason}" for reason in doubtful.values()]
-        modes = tuple(mode for mode in test.modes if _name(mode) not in doubtful)
-        if modes:
-            kept.append(replace(test, modes=modes))
-    if not kept:
-        raise BadInput(
-            "no test holds a mode that can be used. " + " ".join(remarks),
-            remedy="Give tests with modes whose orders rise with their frequencies.",
-        )
-    remarks = [*remarks, *_said_of_all(kept, hanger)]
-    return Usable(tuple(kept), tuple(remarks), (unit,) if unit else ())
+    checked = check_data(tests, hanger)
+    used = tuple(test for test in checked.tests if test.modes)
+    if not used:
+        raise BadInput("no test holds a mode that can be used.", remedy="Give tests with modes.")
+    return replace(checked, tests=used, remarks=(*checked.remarks, *_said_of_all(used, hanger)))
 
 
 def _refuse(tests: Sequence[ModalTest], hanger: Hanger) -> None:
@@ -90,85 +58,12 @@ def _refuse(tests: Sequence[ModalTest], hanger: Hanger) -> None:
                 )
 
 
-def _other_unit(tests: Sequence[ModalTest], hanger: Hanger) -> str:
-    """What the frequencies look like where they are not in Hz, by a bar half pinned, half clamped
-    at the nominal tension."""
-    pairs = []
-    for mode in (mode for test in tests for mode in test.modes if mode.frequency_hz > 0):
-        wave = math.pi * (mode.order + 0.25) / hanger.length_m
-        pull_n = hanger.nominal_tension_n + hanger.bending_stiffness_n_m2 * wave**2
-        expected_hz = wave / (2 * math.pi) * math.sqrt(pull_n / hanger.mass_per_length_kg_m)
-        pairs.append((math.log(mode.frequency_hz), math.log(expected_hz)))
-    if not pairs:
-        return ""
-    away = {
-        unit: median(abs(f - e - math.log(by)) for f, e in pairs) for by, unit in _UNITS.items()
-    }
-    away["s (periods)"] = median(abs(f + e) for f, e in pairs)
-    unit = min(away, key=lambda each: away[each])
-    ratio = math.exp(median(f - e for f, e in pairs))
-    if away[unit] > math.log(_SAME_UNIT) or abs(math.log(ratio)) < 2 * math.log(_SAME_UNIT):
-        return ""
-    return (
-        f"The frequencies look given in {unit}, not in Hz: they are {ratio:.2g} times those of the "
-        "description at its nominal tension. Give them in Hz and diagnose again."
-    )
-
-
-def _without_copies(tests: Sequence[ModalTest]) -> tuple[list[ModalTest], str]:
-    """The tests, of those that hold the same numbers the first only, with a remark."""
-    kept: dict[str, ModalTest] = {}
-    copies: list[str] = []
-    for test in tests:
-        # As text, for unknown numbers are no equal numbers.
-        numbers = repr([*map(_numbers, test.modes), *_numbers(test)])
-        if numbers in kept:
-            copies.append(f"{test.id} (as {kept[numbers].id})")
-        kept.setdefault(numbers, test)
-    if not copies:
-        return list(tests), ""
-    return list(kept.values()), (
-        f"The same numbers to the last digit as another test: {', '.join(copies)}. Copies say "
-        "nothing new; each is counted once."
-    )
-
-
-def _numbers(of: ModalTest | Mode) -> list[object]:
-    names = _OF_A_MODE if isinstance(of, Mode) else _OF_A_TEST
-    return [getattr(of, name) for name in names]
-
-
 def _places(test: ModalTest) -> Iterator[tuple[str, float]]:
     if test.added_mass is not None:
         yield "the added mass", test.added_mass.x_m
     for mode in test.modes:
         for point in mode.shape:
-            yield f"a sensor of {_name(mode)}", point.x_m
-
-
-def _name(mode: Mode) -> str:
-    return f"{mode.plane} {mode.order}"
-
-
-def _doubtful(test: ModalTest) -> dict[str, str]:
-    """The modes of a test whose order cannot be right, and why."""
-    found: dict[str, str] = {}
-    for plane in PLANES:
-        modes = sorted((m for m in test.modes if m.plane == plane), key=lambda m: m.order)
-        for one, other in pairwise(modes):
-            if one.order == other.order:
-                found[_name(one)] = (
-                    f"{_name(one)} is given twice ({one.frequency_hz:g} and "
-                    f"{other.frequency_hz:g} Hz); it is left out."
-                )
-            elif one.frequency_hz >= other.frequency_hz:
-                reason = (
-                    f"{_name(other)} ({other.frequency_hz:g} Hz) does not lie above {_name(one)} "
-                    f"({one.frequency_hz:g} Hz); both are left out, since a wrong order would look "
-                    f"like a large gap."
-                )
-                found[_name(one)] = found[_name(other)] = reason
-    return found
+            yield f"a sensor of {mode_name(mode)}", point.x_m
 
 
 def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
@@ -183,7 +78,7 @@ def _said_of_all(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
         _rattling(tests),
         _unused_readings(tests),
     ]
-    return [remark for remark in remarks if remark] + _contradictions(tests)
+    return [remark for remark in remarks if remark]
 
 
 def _unused_readings(tests: Sequence[ModalTest]) -> str:
@@ -201,7 +96,7 @@ def _unused_readings(tests: Sequence[ModalTest]) -> str:
 def _irregular(tests: Sequence[ModalTest]) -> str:
     """The baseline's tension is then another one than that inferred elsewhere."""
     found = [
-        f"{_name(mode)} of test {test.id} ({mode.frequency_hz:g} Hz)"
+        f"{mode_name(mode)} of test {test.id} ({mode.frequency_hz:g} Hz)"
         for test in tests
         for mode in test.modes
         if mode.irregular
@@ -305,55 +200,6 @@ def _whose(tests: Sequence[ModalTest]) -> str:
     if all(test.amplitude <= test.rattles_above for test in tests):
         return "The frequencies are those of smaller swings."
     return "The frequencies are means over ring-downs: test again with softer hits."
-
-
-def _contradictions(tests: Sequence[ModalTest]) -> list[str]:
-    """Pairs of tests under like conditions whose frequencies differ beyond their errors."""
-    found = []
-    for one, other in combinations(tests, 2):
-        worst = _worst_difference(one, other) if _alike(one, other) else None
-        if worst is not None and worst[1] > _CONTRADICTION_SD:
-            mode, ratio_sd, percent = worst
-            found.append(
-                f"Tests {one.id} and {other.id} contradict each other: made under the same "
-                f"conditions, {mode} differs by {percent:.2f} % ({ratio_sd:.0f} standard "
-                f"deviations). No steady effect can explain both, so that something unexplained "
-                f"becomes likely; if the hanger changed in between, diagnose them one by one."
-            )
-    return found
-
-
-def _alike(one: ModalTest, other: ModalTest) -> bool:
-    """Return True if the tests were made under the same conditions, as far as these are known.
-
-    A temperature must be known of both; what else is unknown of both counts as the same.
-    """
-    if one.added_mass != other.added_mass:
-        return False
-    if not abs(one.temperature_c - other.temperature_c) <= _SAME_TEMPERATURE_K:
-        return False
-    pairs = [(one.tension_read_n, other.tension_read_n), (one.amplitude, other.amplitude)]
-    if any(math.isnan(first) != math.isnan(second) for first, second in pairs):
-        return False
-    if abs(one.tension_read_n - other.tension_read_n) > 0:
-        return False
-    levels = one.amplitude, other.amplitude
-    return not max(levels) > _SAME_LEVEL * min(levels)
-
-
-def _worst_difference(one: ModalTest, other: ModalTest) -> tuple[str, float, float] | None:
-    """The mode that differs most, in standard deviations and in percent; None without these."""
-    theirs = {_name(mode): mode for mode in other.modes}
-    differences = []
-    for mode in one.modes:
-        match = theirs.get(_name(mode))
-        if match is None:
-            continue
-        sd = math.hypot(mode.frequency_sd_hz, match.frequency_sd_hz)
-        apart = abs(mode.frequency_hz - match.frequency_hz)
-        if sd > 0:
-            differences.append((_name(mode), apart / sd, 100 * apart / mode.frequency_hz))
-    return max(differences, key=lambda found: found[1], default=None)
 
 
 def _listed(names: Sequence[str]) -> str:

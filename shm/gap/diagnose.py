@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 
@@ -11,7 +12,7 @@ from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.contract import Fit, GapOptions, Hypothesis
 from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
 from shm.gap.damping import acting
-from shm.gap.data_checks import Usable, tension_of_any_ends_n, usable
+from shm.gap.data_checks import tension_of_any_ends_n, usable
 from shm.gap.law_error import mixed
 from shm.gap.misfit import refuse_misfit
 from shm.gap.next_measurement import ranked
@@ -29,6 +30,7 @@ from shm.gap.places import places
 from shm.gap.problem import GapProblem
 from shm.gap.remainder import remainder_of
 from shm.gap.residuals import compatibility, residuals, sensor_remarks, trends
+from shm.inference.data_checks import CheckedData
 from shm.inference.options import Progress, silent
 from shm.models import check_baseline
 from shm.models.effects import check_effect_priors
@@ -98,7 +100,7 @@ def examined(
     any_ends_n = tension_of_any_ends_n(found.tests, hanger, options.seed)
     after_n = _tension(problem, possible(attribution), rng, any_ends_n)
     before_n = _tension(problem, [(1.0, before)], rng)
-    diagnosis = Diagnosis(
+    return Diagnosis(
         hanger=hanger.id,
         baseline=options.baseline,
         tests=tuple(test.id for test in found.tests),
@@ -129,13 +131,13 @@ def examined(
         compatibility=compatible,
         remainder=remainder_of(problem, attribution, compatible),
         widest_swing_m=_widest_swing_m(found.tests),
-    )
-    return diagnosis, attribution
+        slenderness=_slenderness(hanger, before_n.mean),
+    ), attribution
 
 
 def _to_explain(
     tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions
-) -> tuple[Usable, GapProblem]:
+) -> tuple[CheckedData, GapProblem]:
     check_effect_priors(hanger)
     check_baseline(options.baseline, hanger)
     found = usable(tests, hanger)
@@ -164,6 +166,13 @@ def _widest_swing_m(tests: Sequence[ModalTest]) -> float:
     return max((each for each in swings if each > 0), default=NAN)
 
 
+def _slenderness(hanger: Hanger, tension_n: float) -> float:
+    """Return L sqrt(T/EI), about 10 of a bar and above 100 of a string; NaN without a tension."""
+    if not (tension_n > 0 and hanger.bending_stiffness_n_m2 > 0):
+        return NAN
+    return hanger.length_m * math.sqrt(tension_n / hanger.bending_stiffness_n_m2)
+
+
 def _following(
     problem: GapProblem, attribution: Attribution, progress: Progress
 ) -> tuple[NextMeasurement, ...]:
@@ -174,7 +183,11 @@ def _following(
 
 
 def _on_the_way(
-    found: Usable, clear: Cleared, aside: Sequence[Outlier], doubted: Sequence[Outlier], best: Fit
+    found: CheckedData,
+    clear: Cleared,
+    aside: Sequence[Outlier],
+    doubted: Sequence[Outlier],
+    best: Fit,
 ) -> tuple[str, ...]:
     """What was found on the way to data that can be used and hold no gross errors, and what the
     measurement errs by."""
@@ -213,7 +226,7 @@ def _states(
         )
     best = after or before
     misfit_percent = problem.misfit_percent(best)
-    if misfit_percent > MOST_MISFIT_PERCENT:
+    if misfit_percent > max(MOST_MISFIT_PERCENT, problem.stated_error_percent):
         found.append(
             f"The leading explanation misses the frequencies by {misfit_percent:.1f} % (root mean "
             "square): it does not fit this hanger."

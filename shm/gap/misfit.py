@@ -13,6 +13,7 @@ from shm.errors import BadInput
 from shm.gap.fit import BASELINE
 from shm.gap.outlier_removal import Cleared
 from shm.gap.problem import GapProblem
+from shm.inference.data_checks import taut_string_tension_n
 from shm.values.posterior import NO_TENSION_PERCENT
 from shm.values.rounding import force_unit
 
@@ -66,8 +67,9 @@ def _compare_with_string(problem: GapProblem) -> tuple[str, ...]:
     if not hanger.nominal_tension_n:
         return ()
     frequency_hz = np.exp(problem.observations.value[: design.frequencies])
-    speed_m_s = 2 * hanger.length_m * np.median(frequency_hz / design.frequency_order)
-    tension_n = float(hanger.mass_per_length_kg_m * speed_m_s**2)
+    tension_n = taut_string_tension_n(
+        frequency_hz.tolist(), design.frequency_order.tolist(), hanger
+    )
     return (
         f"A taut string with these frequencies carries {force_unit(tension_n).told(tension_n)}, "
         f"{tension_n / hanger.nominal_tension_n:.2g} times the nominal tension.",

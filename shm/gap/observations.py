@@ -29,6 +29,7 @@ import scipy
 from shm.assumptions import Assumptions
 from shm.errors import BadInput
 from shm.gap.contract import Design, Observations
+from shm.inference.data_checks import is_bare, step_hz
 from shm.inference.priors import reading_sd_n
 from shm.models.effects import Conditions, Survey
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode
@@ -270,26 +271,11 @@ def told_apart(sd: FloatArray, size: FloatArray, least: float) -> tuple[FloatArr
     return np.full_like(sd, np.sqrt(max(own, least**2))), float(np.sqrt(turn))
 
 
-# Six digits are more than anybody rounds to; a number of full precision is a multiple, to so much
-# of it, by chance of one in 500.
-_FINEST_HZ, _TO = 1e-6, 1e-3
-_COARSEST_HZ = 1.0  # judgement: what is coarser was not rounded; a step is a part of this
-_FEWEST_TO_ROUND = 3  # distinct ones: chance makes the step of three twice as coarse in 1 of 8
-
-
-def step_hz(test: ModalTest) -> float:
-    """What all frequencies of a test without a standard deviation are multiples of; 0 for none."""
-    finest = {mode.frequency_hz / _FINEST_HZ for mode in test.modes if _is_bare(mode)}
-    if len(finest) < _FEWEST_TO_ROUND or any(abs(each - round(each)) > _TO for each in finest):
-        return 0.0
-    return _FINEST_HZ * math.gcd(*map(round, finest), round(_COARSEST_HZ / _FINEST_HZ))
-
-
 def rounding_sds(tests: Sequence[ModalTest]) -> FloatArray:
     """Of the logarithm of each frequency (F,) in the tests' order: step / sqrt(12) over it."""
     return np.array(
         [
-            step / math.sqrt(12) / mode.frequency_hz if _is_bare(mode) else 0.0
+            step / math.sqrt(12) / mode.frequency_hz if is_bare(mode) else 0.0
             for test in tests
             for step in [step_hz(test)]
             for mode in test.modes
@@ -318,13 +304,9 @@ def told_of_rounding(tests: Sequence[ModalTest]) -> str:
     step, test = max(steps, key=lambda pair: pair[0])
     if not step:
         return ""
-    lowest = min(mode.frequency_hz for mode in test.modes if _is_bare(mode))
+    lowest = min(mode.frequency_hz for mode in test.modes if is_bare(mode))
     return (
         f"The frequencies of test {test.id} are rounded to {step:g} Hz: errors of "
         f"{100 * step / math.sqrt(12) / lowest:.2g} % of the lowest are expected from that alone. "
         "Give them with more digits."
     )
-
-
-def _is_bare(mode: Mode) -> bool:
-    return not mode.frequency_sd_hz > 0

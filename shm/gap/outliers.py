@@ -33,6 +33,7 @@ from shm.gap.model_probabilities import NO_GAP, UNKNOWN, log_prior
 from shm.gap.optimiser import Landscape
 from shm.gap.problem import GapProblem
 from shm.gap.search import LEADERS
+from shm.inference.data_checks import SAME_LEVEL
 from shm.values import BoolArray, FloatArray, IntArray
 
 SURE = 0.9
@@ -338,7 +339,6 @@ _SHARE = 3 / 48
 """Of unknown effects in docs/trials/blind_trial.md those, guides with play, that moved one mode."""
 _LARGEST = 0.3
 """Judgement: of the logarithm of the frequency. A stiff guide raises a first mode by so much."""
-_SAME_LEVEL = 1.1  # as `shm.gap.data_checks` says: no hand hits more alike
 
 
 def acts_alone(
@@ -361,4 +361,4 @@ def _right_elsewhere(design: Design, kept: Design, row: int) -> bool:
     same = (kept.frequency_plane == design.frequency_plane[row]) & (
         kept.frequency_order == design.frequency_order[row]
     )
-    return bool((kept.amplitude[same] * _SAME_LEVEL >= design.amplitude[row]).any())
+    return bool((kept.amplitude[same] * SAME_LEVEL >= design.amplitude[row]).any())

@@ -190,6 +190,12 @@ class GapProblem:
         return 100 * float(np.sqrt(np.mean(apart**2)))
 
     @property
+    def stated_error_percent(self) -> float:
+        """Return the errors stated of frequencies, root mean square; NaN where one has none."""
+        sd = self.observations.sd[: self.design.frequencies]
+        return 100 * float(np.sqrt(np.mean(sd**2)))
+
+    @property
     def near_misfit(self) -> float:
         """By how much the baseline near the data misses the frequencies, root mean square."""
         return self._nearest[1]

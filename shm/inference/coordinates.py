@@ -1,51 +1,84 @@
-"""The space that the sampler works in: there the prior is nearly standard normal.
+"""The space of the sampler: every parameter's prior is a standard normal distribution there.
 
-Parameters map to z by the normal quantile of their uniform priors, so that no proposal leaves the
-box. Two end springs that can be exchanged without changing any frequency are another matter. An end
-gives way like 1/(k + EI p), with p the wave number of a mode, and frequencies tell, nearly, how
-much both ends give together: the posterior of the two is a hook along a curve where that sum is
-constant. Such a pair is folded to k_one >= k_other, where the prior is twice as dense, and has as
-coordinates log k_one and a mean of two logs: mostly of the stiffness that two springs alike would
-have to give as much, a little of k_other. The first straightens the hook, so that a normal or t
-distribution can follow it; the second keeps apart what is soft and hardly felt. Samples are
-unfolded again.
+A parameter with a uniform prior has the normal quantile of its place in its range as coordinate, so
+that no proposal leaves the range.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 import scipy
 
 from shm.values import FloatArray, Prior
 
-_EDGE = 1e-9  # z is finite: within 6 standard deviations
+_EDGE = 1e-9  # numerical: coordinates are finite, within 6 standard deviations
 
-# Judgement: enough that Newton's slope never vanishes where the weaker spring is not felt, and
-# little enough that the hook stays straight. It moves proposals only; weights correct for it.
-_SHARE = 0.1
-
-# Newton doubles the digits: over 7 decades of both springs four steps leave 1e-4, five 4e-9.
-_STEPS = 5
 _FELT = (-0.7, 1.3)
 """log10 of how stiff a spring is that a mode feels, to EI p."""
-_LOG_10 = np.log(10)  # the exponential is much quicker than a power of ten
 
 
 def quantile(share: FloatArray) -> FloatArray:
-    """Standard normal z of shares of a prior's range, kept off its ends."""
+    """Return standard normal quantiles of shares, kept off 0 and 1."""
     return np.asarray(scipy.special.ndtri(share.clip(_EDGE, 1 - _EDGE)))
 
 
 def log_normal(z: FloatArray) -> FloatArray:
-    """Log of the standard normal density (n,) at `z` (n, d)."""
+    """Return the log of the standard normal density (n,) at `z` (n, d)."""
     return np.asarray(-0.5 * (z**2).sum(axis=1) - 0.5 * z.shape[1] * np.log(2 * np.pi))
 
 
-class Coordinates:
-    """Places z (n, d) of parameters theta (n, d), with pairs of springs (log10) straightened.
+Pairs: TypeAlias = list[tuple[int, int]]
+"""Columns of springs that can be exchanged."""
 
+_NEAR, _MANY = 0.3, 0.1
+"""Of the spread of two springs' difference, where points are near the fold; of all points."""
+
+
+def fold_pairs(z: FloatArray, pairs: Pairs) -> FloatArray:
+    """Return `z` (n, d) with the larger column of each pair first."""
+    folded = z.copy()
+    for one, other in pairs:
+        folded[:, one] = np.maximum(z[:, one], z[:, other])
+        folded[:, other] = np.minimum(z[:, one], z[:, other])
+    return folded
+
+
+def log_folded(z: FloatArray, pairs: Pairs) -> FloatArray:
+    """Return by how much folding raises a log density (n,) at `z`; -inf outside of the fold."""
+    found = np.zeros(len(z))
+    for one, other in pairs:
+        found = np.where(z[:, one] >= z[:, other], found + np.log(2), -np.inf)
+    return found
+
+
+def exchange(z: FloatArray, pairs: Pairs, rng: np.random.Generator) -> FloatArray:
+    """Return `z` (n, d) with each pair of columns exchanged or not by chance."""
+    exchanged = z.copy()
+    for one, other in pairs:
+        rows = np.flatnonzero(rng.random(len(z)) < 0.5)[:, None]
+        exchanged[rows, [one, other]] = z[rows, [other, one]]
+    return exchanged
+
+
+def split_pairs(z: FloatArray, pairs: Pairs) -> tuple[Pairs, Pairs]:
+    """Return the pairs of which few points `z` (n, d) are near the fold, and the others."""
+    far: Pairs = []
+    near: Pairs = []
+    for one, other in pairs:
+        apart = z[:, one] - z[:, other]
+        close = np.mean(apart < _NEAR * np.sqrt(np.mean(apart**2)))
+        (near if close > _MANY else far).append((one, other))
+    return far, near
+
+
+class Coordinates:
+    """Coordinates z (n, d) of parameters theta (n, d) with uniform priors.
+
+    `swaps` are pairs of springs (log10) that can be exchanged without changing any frequency: only
+    one of the two ways round is sampled, the first spring the stiffer, its prior twice as dense.
     `wave_stiffness_n_m_rad` is EI p of a mode in the middle of those measured.
     """
 
@@ -54,93 +87,51 @@ class Coordinates:
     ):
         self.prior = prior
         self.dimension = len(prior.names)
-        self._own = wave_stiffness_n_m_rad
+        self._wave_stiffness = wave_stiffness_n_m_rad
         self._width: FloatArray = prior.upper - prior.lower
         self._pairs = [(prior.names.index(one), prior.names.index(other)) for one, other in swaps]
+        self._folded = self._pairs
 
     def theta(self, z: FloatArray) -> FloatArray:
-        """Parameters (n, d) of places (n, d); a place outside of the prior gets a near one's."""
-        share = scipy.special.ndtr(z)
-        theta = np.asarray(self.prior.lower + self._width * share)
-        for one, other in self._pairs:
-            weaker = self._weaker(theta[:, one], theta[:, other])
-            theta[:, other] = weaker.clip(self.prior.lower[other], self.prior.upper[other])
-        return theta
+        """Return parameters (n, d) of coordinates (n, d)."""
+        return np.asarray(self.prior.lower + self._width * scipy.special.ndtr(z))
 
     def places(self, theta: FloatArray) -> FloatArray:
-        """Places (n, d), inside the fold, of parameters (n, d)."""
-        share = (theta - self.prior.lower) / self._width
-        for one, other in self._pairs:
-            pair = np.sort(theta[:, [one, other]], axis=1)
-            share[:, one] = (pair[:, 1] - self.prior.lower[one]) / self._width[one]
-            mixed, _ = self._mixed(pair[:, 1], pair[:, 0])
-            share[:, other] = (mixed - self.prior.lower[other]) / self._width[other]
-        return quantile(share)
+        """Return coordinates (n, d) of parameters (n, d)."""
+        return quantile((theta - self.prior.lower) / self._width)
 
     def fold(self, z: FloatArray) -> FloatArray:
-        """`z` (n, d) with each point replaced by its copy inside the fold."""
-        folded = z.copy()
-        columns = [column for pair in self._pairs for column in pair]
-        folded[:, columns] = self.places(self.theta(z))[:, columns]
-        return folded
+        """Return `z` (n, d) with the stiffer spring of each pair first."""
+        return fold_pairs(z, self._folded)
 
-    def unfold(self, theta: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """`theta` with each pair exchanged or not by chance: both copies are equally likely."""
-        theta = theta.copy()
-        for one, other in self._pairs:
-            rows = np.flatnonzero(rng.random(len(theta)) < 0.5)[:, None]
-            theta[rows, [one, other]] = theta[rows, [other, one]]
-        return theta
+    def connect(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Fold no pair whose posterior, that of points `z` (n, d), goes on beyond the fold.
+
+        Returns the points with these pairs exchanged or not by chance.
+        """
+        self._folded, open_ = split_pairs(z, self._folded)
+        return exchange(z, open_, rng)
 
     def finished(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Draws of the parameters (n, d) at `z` (n, d), unfolded."""
-        return self.unfold(self.theta(z), rng)
+        """Return parameters (n, d) at `z`, each pair of springs exchanged or not by chance."""
+        return exchange(self.theta(z), self._pairs, rng)
 
     def log_prior(self, z: FloatArray) -> FloatArray:
-        """Log density (n,) of the folded prior at `z` (n, d); -inf outside of it."""
-        density = log_normal(z)
-        for one, other in self._pairs:
-            stronger = self.prior.lower[one] + self._width[one] * scipy.special.ndtr(z[:, one])
-            mixed = self.prior.lower[other] + self._width[other] * scipy.special.ndtr(z[:, other])
-            weaker = self._weaker(stronger, mixed)
-            inside = (weaker <= stronger) & (weaker >= self.prior.lower[other])
-            stretch = -np.log(self._mixed(stronger, weaker)[1])
-            density = np.where(inside, density + np.log(2) + stretch, -np.inf)
-        return density
+        """Return the log density (n,) of the folded prior at `z` (n, d); -inf outside of it."""
+        return np.asarray(log_normal(z) + log_folded(z, self._folded))
 
     def draw_prior(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """Places (n, d) from the folded prior."""
-        return self.places(rng.uniform(self.prior.lower, self.prior.upper, (n, len(self._width))))
+        """Draw coordinates (n, d) from the folded prior."""
+        return self.fold(rng.standard_normal((n, self.dimension)))
 
     def draw_felt(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """The same with the springs of each pair as stiff as the bar, within a few times.
+        """Draw the same with the springs of each pair as stiff as the bar, within a few times.
 
         There a frequency tells how stiff they are. Of springs that are much stiffer or softer it
         tells nothing, nor which way to go.
         """
-        theta = rng.uniform(self.prior.lower, self.prior.upper, (n, len(self._width)))
+        theta = self.theta(self.draw_prior(n, rng))
         columns = [column for pair in self._pairs for column in pair]
-        felt = np.log10(self._own) + rng.uniform(*_FELT, (n, len(columns)))
+        felt = np.log10(self._wave_stiffness) + rng.uniform(*_FELT, (n, len(columns)))
         theta[:, columns] = felt.clip(self.prior.lower[columns], self.prior.upper[columns])
-        return self.places(theta)
-
-    def _weaker(self, stronger: FloatArray, mixed: FloatArray) -> FloatArray:
-        """log10 of the weaker spring, by Newton's steps."""
-        weaker = mixed.copy()
-        for _ in range(_STEPS):
-            found, slope = self._mixed(stronger, weaker)
-            weaker = weaker - (found - mixed) / slope
-        return weaker
-
-    def _mixed(self, stronger: FloatArray, weaker: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The weaker spring's coordinate before it becomes a quantile, and its slope.
-
-        From log10 of both springs; the slope is by that of the weaker one.
-        """
-        stiffness = np.exp(_LOG_10 * weaker)
-        give = 1 / (stiffness + self._own)
-        both = give + 1 / (np.exp(_LOG_10 * stronger) + self._own)
-        alike = 2 / both - self._own
-        mixed = (1 - _SHARE) / _LOG_10 * np.log(alike) + _SHARE * weaker
-        slope = (1 - _SHARE) * 2 * stiffness * (give / both) ** 2 / alike + _SHARE
-        return mixed, slope
+        return self.fold(self.places(theta))

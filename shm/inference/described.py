@@ -3,13 +3,9 @@
 Of the parameters of `shm.models.as_made` frequencies see the apparent tension a = T/(mu l^2) and a
 few combinations of the deviations: c = sqrt(e/mu)/l^2 always, the area where the class shears, the
 mass per length where a known mass was clamped on. Only these are sampled. What is left of the
-deviations, and springs of planes that were not measured, is drawn from the prior afterwards, given
-what a measured tension says of it: exactly, at no cost. That draw is what makes the tension's
+deviations, and ends and terms of planes that were not measured, is drawn from the prior afterwards,
+given what a measured tension says of it: exactly, at no cost. That draw is what makes the tension's
 interval absolute.
-
-Priors: the tension is about as designed, or its logarithm is uniform, as are log10 k L/EI;
-deviations are normal with the standard deviations of the description, or as an earlier measured
-tension has calibrated them.
 """
 
 from __future__ import annotations
@@ -18,13 +14,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 
 from shm.inference.coordinates import Coordinates, log_normal
 from shm.inference.priors import (
     DEVIATIONS,
     Calibration,
     Deviations,
-    EndDetails,
+    Ends,
     TensionPrior,
     reading_of,
 )
@@ -39,7 +36,7 @@ from shm.models.as_made import (
     AsMade,
 )
 from shm.models.beam import Beam, Beam3
-from shm.values import PLANES, FloatArray, IntArray, ModalTest, Plane, Prior
+from shm.values import PLANES, FloatArray, ModalTest, Plane, Prior
 
 # c = sqrt(e/mu)/l^2 with e ~ modulus section^2 and mu ~ density section.
 _C = {SECTION: 0.5, DENSITY: -0.5, MODULUS: 0.5, LENGTH: -2.0, BENDING: 0.5}
@@ -53,12 +50,13 @@ _MOST_REDRAWN = 20  # a factor that is inside in half of its draws is left outsi
 
 
 class DescribedCoordinates:
-    """Places z (n, d) of parameters theta (n, parameters) of a bar as made.
+    """Coordinates z (n, d) of parameters theta (n, parameters) of a bar as made.
 
-    First those of a box (`shm.inference.coordinates`): log tension, a length that plates leave
-    open, springs of the planes measured, a strand's bending factor and shear; then the deviations
-    as far as they are seen, the last of them ln c. `wave_stiffness_n_m_rad` is EI p of a mode in
-    the middle of those measured. Of a strand whose factor is open, the factor takes all of c.
+    The columns are those of `names` (tension, a length that plates leave open, springs of a solid,
+    a strand's bending factor and shear), the scores of the ends that are felt, those of the terms
+    that are felt, and the deviations as far as they are seen, the last of them ln c.
+    `wave_stiffness_n_m_rad` is EI p of a mode in the middle of those measured. Of a strand whose
+    factor is open, the factor takes all of c.
     """
 
     def __init__(
@@ -69,22 +67,24 @@ class DescribedCoordinates:
         calibration: Calibration | None = None,
     ):
         self.model, self._hanger = model, model.hanger
-        self.names = model.parameter_names
+        self.parameters = model.parameter_names
         self.deviations = own = Deviations(model, calibration)
         self._slips = model.is_strand and BENDING not in own.names
         self._open = model.length_is_open
         planes = {mode.plane for test in tests for mode in test.regular_modes}
-        self._felt = tuple(n for n in model.springs if _is_felt(model, n, planes))
-        self.box = self._box()
-        swaps = [pair for pair in model.swaps if set(pair) <= set(self._felt)]
-        self._inner = Coordinates(self.box, swaps, wave_stiffness_n_m_rad)
-        round_ = isinstance(model.model, Beam) and self._hanger.plate is None
-        assumed = model.hanger.assumptions
-        self._details = EndDetails(
-            self.box.names, model.springs, round_, bool(model.swaps), assumed
+        beam = isinstance(model.model, Beam)
+        felt = tuple(n for n in model.springs if not beam or _plane_of(n) in planes)
+        self.ends = Ends(self._hanger, felt if beam else (), model.swaps)
+        self.terms = [t for t in model.terms.values() if not t.plane or t.plane in planes]
+        box = self._box(() if beam else felt)
+        self.names = (TENSION, *box)
+        self._tension = TensionPrior(model.bounds[TENSION], self._hanger.assumptions)
+        lower, upper = np.array(list(box.values()), dtype=float).reshape(-1, 2).T
+        swaps = [pair for pair in model.swaps if set(pair) <= set(box)]
+        self._box_coordinates = Coordinates(
+            Prior(tuple(box), lower, upper), swaps, wave_stiffness_n_m_rad
         )
-        self._tension = TensionPrior(model.bounds[TENSION], assumed)
-        self._reading = reading_of(tests, assumed)
+        self._reading = reading_of(tests, self._hanger.assumptions)
         others = []
         if isinstance(model.model, Beam3) and not model.is_strand:
             others.append(own.row(section=1.0))
@@ -92,30 +92,22 @@ class DescribedCoordinates:
             others.append(own.row(section=1.0, density=1.0, theta_L=1.0))
         seen = [] if self._slips else [own.row(**_C)]
         self._seen = _basis(np.array([*others, *seen]).reshape(-1, len(own.names)))
-        self.dimension = len(self.box.names) + self._seen.shape[1]
+        sizes = [len(self.names), len(felt) if beam else 0, len(self.terms), self._seen.shape[1]]
+        self._cuts = np.cumsum(sizes)[:-1]
+        self.dimension = sum(sizes)
 
-    def _box(self) -> Prior:
-        bounds = {TENSION: tuple(np.log(self.model.bounds[TENSION]))}
+    def _box(self, springs: tuple[str, ...]) -> dict[str, tuple[float, float]]:
+        """Return the ranges of the parameters with uniform priors, but for the tension."""
+        bounds = {}
         if self._open:
             bounds[LENGTH] = self.model.bounds[LENGTH]
-        bounds |= {name: self.model.bounds[name] for name in self._felt}
+        bounds |= {name: self.model.bounds[name] for name in springs}
         if self._slips:
             low, high = self.model.bounds[BENDING]
             bounds[BENDING] = (_WIDER[0] * low, _WIDER[1] * high)
-        if SHEAR in self.names:
+        if SHEAR in self.parameters:
             bounds[SHEAR] = self.model.bounds[SHEAR]
-        lower, upper = np.array(list(bounds.values()), dtype=float).T
-        return Prior(tuple(bounds), lower, upper)
-
-    @property
-    def felt_springs(self) -> tuple[str, ...]:
-        """End springs of a beam in the planes measured."""
-        return self._felt if isinstance(self.model.model, Beam) else ()
-
-    def springs_alike(self, restraint: float) -> dict[str, float]:
-        """The springs felt where k L/EI of all ends is `restraint`."""
-        unit = self._hanger.bending_stiffness_n_m2 / self._hanger.length_m
-        return dict.fromkeys(self.felt_springs, math.log10(restraint * unit))
+        return bounds
 
     # ------------------------------------------------ what is seen, and what is not
 
@@ -135,10 +127,10 @@ class DescribedCoordinates:
         return math.hypot(self._reading.sd, unseen) if self._reading else math.nan
 
     def _drawn(
-        self, inner: FloatArray, deviates: FloatArray, rng: np.random.Generator
+        self, log_tension: FloatArray, deviates: FloatArray, rng: np.random.Generator
     ) -> FloatArray:
-        """n (n, k) given what is seen of it (n, r), and the reading along the mass."""
-        rest = rng.standard_normal((len(inner), len(self._row_mass)))
+        """Draw n (n, k) given what is seen of it (n, r), and the reading along the mass."""
+        rest = rng.standard_normal((len(deviates), len(self._row_mass)))
         n = (deviates - rest @ self._seen) @ self._seen.T + rest
         along = self._unseen_mass
         size = float(np.linalg.norm(along))
@@ -146,7 +138,7 @@ class DescribedCoordinates:
             return np.asarray(n)
         along = along / size
         nominal = math.log(self._hanger.nominal_tension_n) + self._mean_mass
-        off = math.log(self._reading.tension_n) - nominal - inner[:, 0] - n @ self._row_mass
+        off = math.log(self._reading.tension_n) - nominal - log_tension - n @ self._row_mass
         off = off - self._reading.sd * rng.standard_normal(len(n))
         # Matheron's rule: the prior draw moved by what the noisy reading misses it by.
         gain = size / (size**2 + self._reading.sd**2)
@@ -156,41 +148,60 @@ class DescribedCoordinates:
     def _mean_mass(self) -> float:
         return float(sum(self.deviations.mean_of(name) * share for name, share in _MASS.items()))
 
-    # ------------------------------------------------ places and parameters
+    # ------------------------------------------------ coordinates and parameters
 
     def theta(self, z: FloatArray) -> FloatArray:
-        """Parameters (n, parameters), what is not seen at its middle."""
-        inner, deviates = self._split(z)
-        return self._assembled(inner, deviates @ self._seen.T, None)
+        """Return parameters (n, parameters), what is not seen at its middle."""
+        box, ends, terms, deviates = np.split(z, self._cuts, axis=1)
+        return self._assembled(self._values(box), ends, terms, deviates @ self._seen.T, None)
 
     def finished(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Draws of all parameters (n, parameters): what is not seen is drawn."""
-        inner, deviates = self._split(z)
-        inner = self._inner.unfold(inner, rng)
-        theta = self._assembled(inner, self._drawn(inner, deviates, rng), rng)
+        """Return draws of all parameters (n, parameters): what is not seen is drawn."""
+        box, ends, terms, deviates = np.split(z, self._cuts, axis=1)
+        values, ends = self._values(box, rng), self.ends.exchanged(ends, rng)
+        log_tension = values[TENSION]
+        n = self._drawn(log_tension, deviates, rng)
+        theta = self._assembled(values, ends, terms, n, rng)
         if self._slips:
-            column, (low, high) = self.names.index(BENDING), self.model.bounds[BENDING]
+            column, (low, high) = self.parameters.index(BENDING), self.model.bounds[BENDING]
             for _ in range(_MOST_REDRAWN):
                 out = np.flatnonzero((theta[:, column] < low) | (theta[:, column] > high))
                 if not len(out):
                     break
-                again = self._drawn(inner[out], deviates[out], rng)
-                theta[out] = self._assembled(inner[out], again, rng)
+                again = self._drawn(log_tension[out], deviates[out], rng)
+                part = {name: value[out] for name, value in values.items()}
+                theta[out] = self._assembled(part, ends[out], terms[out], again, rng)
         return theta
 
     def tension_n(self, z: FloatArray) -> FloatArray:
-        """The tension (n,) with what is not seen at its middle."""
+        """Return the tension (n,) with what is not seen at its middle."""
         return self.theta(z)[:, 0] * self._hanger.nominal_tension_n
 
+    def _values(
+        self, box: FloatArray, rng: np.random.Generator | None = None
+    ) -> dict[str, FloatArray]:
+        """Return ln of the apparent tension's ratio, and the box's parameters, each (n,).
+
+        With `rng`, springs that can be exchanged are, by chance.
+        """
+        of = self._box_coordinates
+        others = of.theta(box[:, 1:]) if rng is None else of.finished(box[:, 1:], rng)
+        columns = dict(zip(of.prior.names, others.T, strict=True))
+        return {TENSION: self._tension.value(box[:, 0]), **columns}
+
     def _assembled(
-        self, inner: FloatArray, n: FloatArray, rng: np.random.Generator | None
+        self,
+        box: dict[str, FloatArray],
+        ends: FloatArray,
+        terms: FloatArray,
+        n: FloatArray,
+        rng: np.random.Generator | None,
     ) -> FloatArray:
-        """Parameters (n, parameters) of the box's and of deviates n (n, k)."""
+        """Return parameters (n, parameters) of these and of deviates n (n, k)."""
         own, stated = self.deviations, self._hanger.bending_stiffness_factor
         deviations = own.mean + n @ own.factor.T
         section, density, modulus = (own.column(deviations, name) for name in DEVIATIONS)
         taped = np.exp(own.column(deviations, LENGTH))
-        box = dict(zip(self.box.names, inner.T, strict=True))
         if self._slips:
             log_c = (section - density + modulus) / 2 - 2 * np.log(taped)
             slip = box[BENDING] * np.exp(-2 * log_c)
@@ -198,7 +209,7 @@ class DescribedCoordinates:
             slip = stated * np.exp(own.column(deviations, BENDING))
         stiffness = np.exp(2 * section + modulus) * slip / stated
         columns = {
-            TENSION: np.exp(inner[:, 0] + section + density) * taped**2,
+            TENSION: np.exp(box[TENSION] + section + density) * taped**2,
             LENGTH: box.get(LENGTH, taped),
             SECTION: section,
             DENSITY: density,
@@ -206,17 +217,28 @@ class DescribedCoordinates:
             BENDING: slip,
             SHEAR: box.get(SHEAR, slip),
         }
-        for name in self.model.springs:
-            low, high = self.model.bounds[name]
-            known = box.get(name)
-            if known is None:
-                known = np.full(len(n), high) if rng is None else rng.uniform(low, high, len(n))
-            columns[name] = known + np.log10(stiffness / taped)
-        return np.column_stack([columns[name] for name in self.names])
+        springs = {name: box[name] for name in self.model.springs if name in box}
+        if isinstance(self.model.model, Beam) and self.model.springs:
+            springs = self.ends.log10_springs(ends, self._slenderness(box), rng)
+        columns |= {name: log + np.log10(stiffness / taped) for name, log in springs.items()}
+        of_term = dict(zip((t.name for t in self.terms), terms.T, strict=True))
+        for name, term in self.model.terms.items():
+            unfelt = np.zeros(len(n)) if rng is None else rng.standard_normal(len(n))
+            columns[name] = term.value(of_term.get(name, unfelt))
+        return np.column_stack([columns[name] for name in self.parameters])
+
+    def _slenderness(self, box: dict[str, FloatArray]) -> FloatArray:
+        """Return L sqrt(T/EI) (n,)."""
+        hanger = self._hanger
+        nominal = hanger.nominal_tension_n * hanger.length_m**2 / hanger.bending_stiffness_n_m2
+        square = nominal * np.exp(box[TENSION])
+        if self._slips:
+            square = square * hanger.bending_stiffness_factor / box[BENDING]
+        return np.asarray(np.sqrt(square))
 
     def places(self, theta: FloatArray) -> FloatArray:
-        """Places (n, d), inside the fold, of parameters (n, parameters)."""
-        values = dict(zip(self.names, theta.T, strict=True))
+        """Return coordinates (n, d) of parameters (n, parameters)."""
+        values = dict(zip(self.parameters, theta.T, strict=True))
         own, stated = self.deviations, self._hanger.bending_stiffness_factor
         taped = np.ones(len(theta)) if self._open else values[LENGTH]
         slip = values.get(BENDING, np.full(len(theta), stated))
@@ -230,86 +252,83 @@ class DescribedCoordinates:
         log_c = np.log(stiffness / mass) / 2 - 2 * np.log(taped)
         box = {TENSION: np.log(values[TENSION] / (mass * taped**2)), LENGTH: values[LENGTH]}
         box |= {BENDING: stated * np.exp(2 * log_c), SHEAR: values.get(SHEAR, slip)}
-        box |= {name: values[name] - np.log10(stiffness / taped) for name in self._felt}
-        inner = np.column_stack([box[name] for name in self.box.names])
-        inner = inner.clip(self.box.lower, self.box.upper)
+        springs = {n: values[n] - np.log10(stiffness / taped) for n in self.model.springs}
+        of = self._box_coordinates
+        inner = np.array([{**box, **springs}[name] for name in of.prior.names])
+        inner = inner.reshape(len(of.prior.names), len(theta)).T.clip(
+            of.prior.lower, of.prior.upper
+        )
+        ends = self.ends.scores(springs, self._slenderness(box), len(theta))
+        terms = [term.score(values[term.name]).clip(-_SCORES, _SCORES) for term in self.terms]
         deviates = (deviations - own.mean) @ np.linalg.pinv(own.factor).T @ self._seen
-        return np.hstack([self._inner.places(inner), deviates])
-
-    def shared(self, names: Sequence[str], samples: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The columns of z that draws (n, parameters) of any class know, and their places there:
-        the apparent tension's, and those of the deviations.
-        """
-        known = dict(zip(names, samples.T, strict=True))
-        columns = []
-        for name in self.names:
-            usual = np.full(len(samples), sum(self.model.bounds[name]) / 2)
-            columns.append(usual if name in self.model.springs else known.get(name, usual))
-        z = self.places(np.column_stack(columns))
-        kept = np.append(0, np.arange(len(self.box.names), self.dimension))
-        return kept, z[:, kept]
+        return np.column_stack(
+            [self._tension.score(box[TENSION]), of.places(inner), ends, *terms, deviates]
+        )
 
     def fold(self, z: FloatArray) -> FloatArray:
-        """`z` (n, d) with each point replaced by its copy inside the fold."""
-        count = len(self.box.names)
-        return np.hstack([self._inner.fold(z[:, :count]), z[:, count:]])
+        """Return `z` (n, d) with the stiffer spring of each exchangeable pair first."""
+        box, ends, terms, deviates = np.split(z, self._cuts, axis=1)
+        box = np.column_stack([box[:, :1], self._box_coordinates.fold(box[:, 1:])])
+        return np.hstack([box, self.ends.fold(ends), terms, deviates])
+
+    def connect(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Fold no pair whose posterior, that of points `z` (n, d), goes on beyond the fold.
+
+        Returns the points with these pairs exchanged or not by chance.
+        """
+        box, ends, terms, deviates = np.split(z, self._cuts, axis=1)
+        box = np.column_stack([box[:, :1], self._box_coordinates.connect(box[:, 1:], rng)])
+        return np.hstack([box, self.ends.connect(ends, rng), terms, deviates])
 
     def log_prior(self, z: FloatArray) -> FloatArray:
-        """Log density (n,) of the folded prior at `z` (n, d); -inf outside of it."""
-        count = len(self.box.names)
-        log = self._inner.log_prior(z[:, :count]) + log_normal(z[:, count:])
-        inside = np.isfinite(log)
-        inner = self._inner.theta(z[inside, :count])
-        log[inside] += self._tension.log_density(inner[:, 0])
-        if len(self._details.columns) and inside.any():
-            log[inside] += self._details.log_density(self._shares_of_springs(inner))
-        return np.asarray(log)
+        """Return the log density (n,) of the folded prior at `z` (n, d); -inf outside of it."""
+        box, ends, _, _ = np.split(z, self._cuts, axis=1)
+        once = self._box_coordinates.log_prior(box[:, 1:]) - log_normal(box[:, 1:])
+        return np.asarray(log_normal(z) + once + self.ends.log_folded(ends))
 
     def draw_prior(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """Places (n, d) from the folded prior."""
-        inner = rng.uniform(self.box.lower, self.box.upper, (n, len(self.box.names)))
-        inner[:, 0] = self._tension.draw(n, rng)
-        columns = self._details.columns
-        width = self.box.upper[columns] - self.box.lower[columns]
-        inner[:, columns] = self.box.lower[columns] + width * self._details.draw(n, rng)
-        return np.hstack([self._inner.places(inner), self._deviates(n, rng)])
-
-    def _shares_of_springs(self, inner: FloatArray) -> FloatArray:
-        columns = self._details.columns
-        width = self.box.upper[columns] - self.box.lower[columns]
-        return np.asarray((inner[:, columns] - self.box.lower[columns]) / width)
+        """Draw coordinates (n, d) from the folded prior."""
+        return self.fold(rng.standard_normal((n, self.dimension)))
 
     def draw_felt(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """The same with springs as stiff as the bar, within a few times."""
-        return np.hstack([self._inner.draw_felt(n, rng), self._deviates(n, rng)])
+        """Draw the same with ends neither loose nor fast, where frequencies tell how stiff."""
+        z = self.draw_prior(n, rng)
+        box, ends, terms, deviates = np.split(z, self._cuts, axis=1)
+        felt = self._box_coordinates.draw_felt(n, rng)
+        box = np.column_stack([box[:, :1], felt])
+        return self.fold(np.hstack([box, _FELT * ends, terms, deviates]))
 
-    def smooth(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Shares of the box's ranges (n, b), in which the prior is flat, and deviates (n, s)."""
-        inner, deviates = self._split(z)
-        return (inner - self.box.lower) / (self.box.upper - self.box.lower), deviates
+    @property
+    def ends_at(self) -> slice:
+        """Return the columns of the ends' scores."""
+        return slice(self._cuts[0], self._cuts[1])
 
-    def of_smooth(self, shares: FloatArray, deviates: FloatArray) -> FloatArray:
-        """Parameters (n, parameters) of these, what is not seen at its middle."""
-        inner = self.box.lower + (self.box.upper - self.box.lower) * shares
-        return self._assembled(inner, deviates @ self._seen.T, None)
+    def asked_of_description(self, z: FloatArray) -> FloatArray:
+        """Return the scores (n, k) of terms and deviations: what the description is off by."""
+        return np.asarray(z[:, self._cuts[1] :])
 
-    def _deviates(self, n: int, rng: np.random.Generator) -> FloatArray:
-        return rng.standard_normal((n, self.dimension - len(self.box.names)))
+    def seen_deviates(self, z: FloatArray) -> FloatArray:
+        """Return the deviations (n, r) as far as they are seen, in standard deviations."""
+        return np.split(z, self._cuts, axis=1)[3]
 
-    def _split(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        count = len(self.box.names)
-        return self._inner.theta(z[:, :count]), z[:, count:]
+    def fractions_of_ranges(self, z: FloatArray) -> FloatArray:
+        """Return where in their ranges (0 to 1) the parameters of `names` are (n, names)."""
+        box = np.split(z, self._cuts, axis=1)[0]
+        low, high = np.log(self.model.bounds[TENSION])
+        tension = (self._tension.value(box[:, 0]) - low) / (high - low)
+        return np.column_stack([tension, scipy.special.ndtr(box[:, 1:])])
+
+
+_SCORES = 6.0  # standard deviations: no draw lies beyond
+_FELT = 0.5
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Orthonormal columns (k, r) that span rows (r, k), less those that vanish."""
+    """Return orthonormal columns (k, r) that span rows (r, k), less those that vanish."""
     left, size, _ = np.linalg.svd(rows.T, full_matrices=False)
     return np.asarray(left[:, size > 1e-9 * max(size.max(initial=0.0), 1e-300)])
 
 
-def _is_felt(model: AsMade, spring: str, planes: set[Plane]) -> bool:
-    """Whether a spring moves a mode of a measured plane."""
-    if not isinstance(model.model, Beam):
-        return True
-    plane = PLANES[0] if spring in ("log10_k1", "log10_k3") else PLANES[1]
-    return plane in planes
+def _plane_of(spring: str) -> Plane:
+    """Return the plane of an end spring of a beam."""
+    return PLANES[0] if spring in ("log10_k1", "log10_k3") else PLANES[1]

@@ -16,7 +16,7 @@ Both unknowns are integrated out on a grid: tau in steps of 1.6 standard deviati
 can tell, phi at equally probable values.
 What physics says of errors that tests share (`shm.inference.systematic_errors`) adds a mean and
 loads U: the covariance is phi^2 S + tau^2 R + U U' with S = diag(s^2). The eigenvectors of
-S^-1/2 (tau^2 R + U U') S^-1/2 serve all phi, and all floors, which are taken as shares of S.
+S^-1/2 (tau^2 R + U U') S^-1/2 serve all phi.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ import scipy
 from shm.assumptions import Assumptions
 from shm.inference.likelihood import conditions_of, measured, predicted_hz
 from shm.inference.systematic_errors import errors_of_bar, felt_by, loads_of_ends, mean_of_ends
-from shm.models import Model
+from shm.models import AsMade, Model
 from shm.models.as_made import TENSION
 from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
 
@@ -107,6 +107,21 @@ class FieldLikelihood:
         ends = model.end_waves(theta, bare, self._plane)
         return bare * np.exp(mean_of_ends(ends, model.stiff_ends_m, self._assumed))
 
+    @property
+    def alike_conditions(self) -> bool:
+        """Return True where no test has conditions that change the bar."""
+        return len(set(self._conditions)) == 1 and self._conditions[0].added_mass is None
+
+    def changes(self, model: AsMade, theta: FloatArray, others: Sequence[FloatArray]) -> FloatArray:
+        """Return changes (n, frequencies, others) of ln of frequencies to near parameter sets.
+
+        To first order, and those of supports and sensors left out.
+        """
+        found, near = model.frequencies_near(theta, others, self.highest_order)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = np.log(near / found)[:, :, self._plane, self._order]
+        return np.moveaxis(change, 0, -1)
+
     def settle(self, model: Model, theta: FloatArray) -> None:
         """Takes what is systematic from `theta` (parameters,): one covariance judges all draws."""
         self._shift, self._loads = self._systematic(model, theta)
@@ -144,8 +159,9 @@ class FieldLikelihood:
         return own
 
     def whitening(self, sigma: float) -> FloatArray:
-        """What makes misfits (data,) independent with standard deviations of 1 (data, data), with
-        errors of `sigma` that repeat."""
+        """Return the matrix (data, data) that makes misfits independent with standard deviations
+        of 1, for a model error of `sigma`.
+        """
         covariance = np.diag(self.identification_error**2)
         shared = self._loads @ self._loads.T
         covariance[: self.frequencies, : self.frequencies] += sigma**2 * self._together + shared
@@ -156,10 +172,10 @@ class FieldLikelihood:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.log(predicted / self.frequency_hz) + self._shift
 
-    def marginal(self, predicted: FloatArray, floor: float = 0.0) -> FloatArray:
+    def marginal(self, predicted: FloatArray) -> FloatArray:
         """Log likelihood (n,) of predictions (n, data), tau and phi integrated out."""
         _, log_share = self._grid(_STEP_IN_SD)
-        joint = self._nodes(predicted, _STEP_IN_SD, floor) + log_share
+        joint = self._nodes(predicted, _STEP_IN_SD) + log_share
         return _log_sum(joint.reshape(len(predicted), -1))
 
     def joint(self, predicted: FloatArray, sigma: FloatArray) -> FloatArray:
@@ -207,12 +223,11 @@ class FieldLikelihood:
         """Predictions (n, modes) of every mode of every test, `explained`."""
         return self.explained(predicted)[:, self.of_mode]
 
-    def _nodes(self, predicted: FloatArray, step_in_sd: float, floor: float = 0.0) -> FloatArray:
+    def _nodes(self, predicted: FloatArray, step_in_sd: float) -> FloatArray:
         """Log likelihood and log weight of phi (n, nodes of tau, nodes of phi)."""
         own = self.identification_error[: self.frequencies]
         ways, size = self._directions(step_in_sd)
-        usual = np.exp(2 * np.log(own).mean())
-        variance = size[:, None] + (self._phi**2 + floor**2 / usual)[:, None]
+        variance = size[:, None] + (self._phi**2)[:, None]
         constant = self._log_phi - 0.5 * np.log(variance).sum(axis=2) - np.log(own).sum()
         rest = self.misfit(predicted)[:, : self.frequencies] / own
         precision = np.swapaxes(1 / variance, 1, 2)
@@ -222,7 +237,7 @@ class FieldLikelihood:
             # (nodes, block, F) by (nodes, F, phi)
             along = (rest[block] @ ways) ** 2
             found[block] = np.moveaxis(-0.5 * along @ precision, 0, 1)
-        reading = self._of_reading(predicted, floor)[:, None, None]
+        reading = self._of_reading(predicted)[:, None, None]
         return np.asarray(found + constant + self._constant + reading)
 
     def _directions(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
@@ -238,10 +253,10 @@ class FieldLikelihood:
             self._ways[step_in_sd] = ways, size.clip(0)
         return self._ways[step_in_sd]
 
-    def _of_reading(self, predicted: FloatArray, floor: float) -> FloatArray:
+    def _of_reading(self, predicted: FloatArray) -> FloatArray:
         if not self.has_reading:
             return np.zeros(len(predicted))
-        variance = self.identification_error[-1] ** 2 + floor**2
+        variance = self.identification_error[-1] ** 2
         off = self.misfit(predicted)[:, -1]
         return np.asarray(-0.5 * (off**2 / variance + np.log(variance)))
 

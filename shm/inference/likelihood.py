@@ -1,8 +1,7 @@
 """The likelihood of modal tests: f_hat ~ N(f(theta), (sigma f_hat)^2 + sd^2), thesis (4.5).
 
 sigma is the unknown fractional model error, uniform on [0, 1]; sd is the standard deviation of the
-identification where it is known. A fictitious error `floor`, a fraction of f_hat like sigma, may be
-added to the variance: it is what the sampler lowers from infinity to 0.
+identification where it is known.
 
 sigma is integrated out on a grid that is even in log sigma. The integrand is a bell there, of
 standard deviation 1/sqrt(2 N) for N data: to the sampler the model error costs no dimension.
@@ -74,13 +73,19 @@ class Likelihood:
         """Predictions (n, modes) of every mode of every test: each is a datum of its own."""
         return self.explained(predicted)
 
+    def whitening(self, sigma: float) -> FloatArray:
+        """Return the matrix (measurements, measurements) that makes misfits independent with
+        standard deviations of 1, for a model error of `sigma`.
+        """
+        return np.diag(1 / np.hypot(sigma, self.identification_error))
+
     def misfit(self, predicted: FloatArray) -> FloatArray:
         """Fractional differences (n, measurements) of predictions from the measurements."""
         return predicted / self.frequency_hz - 1
 
-    def marginal(self, predicted: FloatArray, floor: float = 0.0) -> FloatArray:
+    def marginal(self, predicted: FloatArray) -> FloatArray:
         """Log likelihood (n,) of predictions (n, measurements), sigma integrated out."""
-        joint = self._joint(predicted, np.exp(self._log_sigma), floor) + self._log_share
+        joint = self._joint(predicted, np.exp(self._log_sigma)) + self._log_share
         highest = joint.max(axis=1)
         return np.asarray(highest + np.log(np.exp(joint - highest[:, None]).sum(axis=1)))
 
@@ -93,7 +98,7 @@ class Likelihood:
     def draw_sigma(self, predicted: FloatArray, rng: np.random.Generator) -> FloatArray:
         """sigma (n,) from its posterior given each prediction (n, measurements)."""
         log_sigma, log_share = self._grid(_STEP_IN_SD_TO_DRAW)
-        joint = self._joint(predicted, np.exp(log_sigma), 0.0) + log_share
+        joint = self._joint(predicted, np.exp(log_sigma)) + log_share
         total = scipy.special.logsumexp(joint, axis=1, keepdims=True)
         shares = np.exp(joint - total).cumsum(axis=1)
         node = (shares < rng.random((len(joint), 1))).sum(axis=1).clip(0, len(log_sigma) - 1)
@@ -103,16 +108,16 @@ class Likelihood:
     def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
         """The node of the grid with the largest joint likelihood, shape (n,)."""
         sigma = np.exp(self._log_sigma)
-        return np.asarray(sigma[self._joint(predicted, sigma, 0.0).argmax(axis=1)])
+        return np.asarray(sigma[self._joint(predicted, sigma).argmax(axis=1)])
 
     def model_error(self, predicted: FloatArray) -> FloatArray:
         """The misfit's mean square beyond the identification's own, as a sigma (n,)."""
         beyond = self.misfit(predicted) ** 2 - self.identification_error**2
         return np.asarray(np.sqrt(beyond.mean(axis=1).clip(_SMALLEST_SIGMA**2)))
 
-    def _joint(self, predicted: FloatArray, sigma: FloatArray, floor: float) -> FloatArray:
+    def _joint(self, predicted: FloatArray, sigma: FloatArray) -> FloatArray:
         """Log likelihood (n, nodes) for all nodes of `sigma` (nodes,)."""
-        variance = sigma**2 + floor**2 + self.identification_error[:, None] ** 2
+        variance = sigma**2 + self.identification_error[:, None] ** 2
         quadratic = self.misfit(predicted) ** 2 @ (1 / variance)
         constant = self._constant - 0.5 * np.log(variance).sum(axis=0)
         return np.asarray(constant - 0.5 * quadratic)

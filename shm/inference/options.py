@@ -14,13 +14,20 @@ def silent(label: str, fraction: float) -> None:
     """No progress is shown."""
 
 
+IMPORTANCE, EMCEE = "importance", "emcee"
+SAMPLERS = (IMPORTANCE, EMCEE)
+
+
 @dataclass(frozen=True)
 class UpdateOptions:
     """Options of an update: posterior samples to keep, and seed.
 
-    `calibration` is what an earlier measured tension taught of the bar (`calibration_of`).
+    `sampler` is one of `SAMPLERS`: importance sampling, which emcee continues where it has to, or
+    emcee at once, as an independent check. `calibration` is what an earlier measured tension taught
+    of the bar (`calibration_of`).
     """
 
     samples: int = 1000
     seed: int = 1
     calibration: Calibration | None = None
+    sampler: str = IMPORTANCE

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from shm.inference.described import DescribedCoordinates
 from shm.inference.field import FieldLikelihood
-from shm.inference.importance import Weighted
-from shm.inference.mixture import Normal
+from shm.inference.importance import Inferred
 from shm.inference.options import UpdateOptions
-from shm.inference.other_answers import Outcome, climbed, fitted, other_answers
+from shm.inference.other_answers import Outcome, other_answers
 from shm.inference.problem import DIFFERENCE, Problem
-from shm.inference.tmcmc import Mover
+from shm.inference.search import descend
+from shm.inference.shares_of_variance import with_shares
 from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency
 
 SIGMA = "sigma"
-_FINAL_STEPS = 5  # technical: parts equal copies of resampled draws; the posterior is kept by each
+_LAST_STEPS = 15  # numerical: a climb from the best draw has converged
+
+# Forward difference: root of the 1e-12 to which frequencies are exact (docs/trials/validation.md).
+_FORWARD, _MOST_ROUNDS = 1e-6, 30
 
 _EDGE, _MANY = 0.02, 5.0
 """A parameter is at its bound where the outermost 2 % of its range hold five times the draws that
@@ -29,25 +33,28 @@ a posterior as flat as the prior puts there."""
 
 def posterior_of(
     problem: Problem,
-    weighted: Weighted,
+    inferred: Inferred,
     tests: Sequence[ModalTest],
     options: UpdateOptions,
     rng: np.random.Generator,
     started: float,
-    method: str = "tmcmc",
 ) -> Posterior:
-    """The posterior that weighted draws make; `started` is the clock's reading at the begin."""
-    samples, predicted = _draws(problem, weighted, options.samples, rng)
+    """Return the posterior that equal draws make; `started` is the clock's reading at the begin."""
+    points = inferred.points
+    sigma = problem.likelihood.draw_sigma(points.predicted, rng)
+    theta = problem.coordinates.finished(points.z, rng)
     outcome = Outcome(
-        samples,
-        predicted,
-        weighted.log_evidence,
-        weighted.log_evidence_sd,
-        min(weighted.effective_sample_size, options.samples),
-        weighted.r_hat,
-        method,
+        np.column_stack([theta, sigma]),
+        points.predicted,
+        inferred.log_evidence,
+        inferred.log_evidence_sd,
+        inferred.effective_sample_size,
+        inferred.r_hat,
+        inferred.method,
     )
-    return assembled(problem, outcome, tests, options, started)
+    found = assembled(problem, outcome, tests, options, started)
+    found = with_shares(problem, found)
+    return replace(found, **other_answers(problem, inferred, outcome, tests, rng))
 
 
 def assembled(
@@ -67,7 +74,7 @@ def assembled(
         # What is kept can be computed again from the posterior alone.
         likelihood.settle(model, most_probable[:-1])
         log_likelihood = likelihood.joint(outcome.predicted, samples[:, -1])
-    posterior = Posterior(
+    return Posterior(
         model=model.name,
         hanger=tests[0].hanger,
         names=(*problem.prior.names, SIGMA),
@@ -86,25 +93,13 @@ def assembled(
         seed=options.seed,
         seconds=time.perf_counter() - started,
         method=outcome.method,
+        sampler=options.sampler,
         priors=model.priors,
         repeatability_sd_n=repeatability_sd_n(problem, outcome),
         at_bounds=_at_bounds(problem, samples),
         misfit_percent=_misfit_percent(problem, outcome.predicted),
         log_occam=log_occam,
     )
-    return replace(posterior, **other_answers(problem, outcome, tests))
-
-
-def _draws(
-    problem: Problem, weighted: Weighted, n: int, rng: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
-    """Posterior samples with sigma (n, d + 1) and what they predict (n, measurements)."""
-    points = weighted.resampled(n, rng)
-    points = Mover(problem, 0.0, Normal.of(points.z), step=0.5).walk(points, _FINAL_STEPS, rng)
-    points = points.take(rng.permutation(n))
-    sigma = problem.likelihood.draw_sigma(points.predicted, rng)
-    theta = problem.coordinates.finished(points.z, rng)
-    return np.column_stack([theta, sigma]), points.predicted
 
 
 def _most_probable(problem: Problem, samples: FloatArray, log_likelihood: FloatArray) -> FloatArray:
@@ -112,13 +107,11 @@ def _most_probable(problem: Problem, samples: FloatArray, log_likelihood: FloatA
     coordinates = problem.coordinates
     if not isinstance(coordinates, DescribedCoordinates):
         return _highest_in_box(problem, samples[int(log_likelihood.argmax())])
-    # Of flat and normal priors: the squares of the deviates seen belong to the fit.
     z = coordinates.places(samples[:, :-1])
-    _, seen = coordinates.smooth(z)
-    at = int((log_likelihood - 0.5 * (seen**2).sum(axis=1)).argmax())
-    theta, _ = climbed(problem, coordinates, z[at], samples[at, -1])
-    tau = problem.likelihood.likeliest_sigma(problem.run(theta[None]))
-    return np.append(theta, tau)
+    at = int((log_likelihood + coordinates.log_prior(coordinates.fold(z))).argmax())
+    z, _ = descend(problem, z[[at]], samples[[at], -1], _LAST_STEPS)
+    theta = coordinates.theta(z)
+    return np.append(theta[0], problem.likelihood.likeliest_sigma(problem.run(theta)))
 
 
 def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
@@ -151,8 +144,8 @@ def _at_bounds(problem: Problem, samples: FloatArray) -> tuple[str, ...]:
     """Parameters with many more draws at an end of their prior than a flat posterior has."""
     coordinates = problem.coordinates
     if isinstance(coordinates, DescribedCoordinates):
-        shares = coordinates.smooth(coordinates.places(samples[:, :-1]))[0]
-        names = coordinates.box.names
+        shares = coordinates.fractions_of_ranges(coordinates.places(samples[:, :-1]))
+        names = coordinates.names
     else:
         prior = problem.prior
         shares = (samples[:, :-1] - prior.lower) / (prior.upper - prior.lower)
@@ -178,7 +171,7 @@ def _highest_in_box(problem: Problem, best: FloatArray) -> FloatArray:
     noise = np.hypot(best[-1], likelihood.identification_error)
 
     def scaled(shares: FloatArray) -> FloatArray:
-        return np.asarray(likelihood.misfit(problem.run(prior.lower + width * shares)) / noise)
+        return np.asarray(problem.misfit_of(prior.lower + width * shares) / noise)
 
     start = ((best[:-1] - prior.lower) / width).clip(0, 1)
     theta = prior.lower + width * fitted(scaled, start, np.zeros_like(start), np.ones_like(start))
@@ -186,6 +179,30 @@ def _highest_in_box(problem: Problem, best: FloatArray) -> FloatArray:
     candidates = np.array([best, np.append(theta, best[-1]), climbed])
     predicted = problem.run(candidates[:, :-1])
     return np.asarray(candidates[likelihood.joint(predicted, candidates[:, -1]).argmax()])
+
+
+def fitted(
+    scaled: Callable[[FloatArray], FloatArray],
+    start: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> FloatArray:
+    """Return the point (k,) within its bounds with the least squares of `scaled`, which gives the
+    misfits (n, data) of points (n, k).
+    """
+
+    def one(point: FloatArray) -> FloatArray:
+        return np.asarray(scaled(point[None])[0])
+
+    def slopes(point: FloatArray) -> FloatArray:
+        steps = np.where(point < 0.5, _FORWARD, -_FORWARD)
+        found = scaled(np.vstack([point, point + np.diag(steps)]))
+        return np.asarray(((found[1:] - found[0]) / steps[:, None]).T)
+
+    fit = scipy.optimize.least_squares(
+        one, start, slopes, bounds=(lower, upper), max_nfev=_MOST_ROUNDS
+    )
+    return np.asarray(fit.x)
 
 
 def _predicted(problem: Problem, predicted: FloatArray) -> tuple[PredictedFrequency, ...]:

@@ -7,20 +7,18 @@ stiffness (`calibration_of`) is the prior of later tests of the hanger and of it
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
-from shm.assumptions import DEFAULTS, Assumptions
+from shm.assumptions import DEFAULTS, Assumption, Assumptions
+from shm.inference.coordinates import exchange, fold_pairs, log_folded, split_pairs
 from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, SECTION, AsMade
-from shm.values import FloatArray, Hanger, IntArray, ModalTest
+from shm.values import FloatArray, Hanger, ModalTest
 
 DEVIATIONS = (SECTION, DENSITY, MODULUS)
-
-# Numerical: steps in widths of the bell, for which sums over bells of four springs are exact.
-_STEP_OF_MIDDLES = 0.35
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,135 +119,145 @@ class TensionPrior:
     """ln of the tension over the nominal one, between `bounds`: about as designed, or anything."""
 
     def __init__(self, bounds: tuple[float, float], assumed: Assumptions = DEFAULTS):
-        self._low, self._high = (math.log(each) for each in bounds)
-        self._designed = assumed.as_designed_share.value
-        self._sd = assumed.as_designed_log_sd.value
+        low, high = (math.log(each) for each in bounds)
+        designed, sd = assumed.as_designed_share.value, assumed.as_designed_log_sd.value
+        self._logs = np.linspace(low, high, _NODES)
+        normal = scipy.special.ndtr(self._logs / sd)
+        # What the normal distribution has beyond the bounds is anything within them.
+        anything = 1 - designed * (normal[-1] - normal[0])
+        flat = np.linspace(0, 1, _NODES)
+        below = designed * (normal - normal[0]) + anything * flat
+        self._scores = scipy.special.ndtri(below.clip(_EDGE, 1 - _EDGE))
 
-    def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """Logarithms (n,)."""
-        found = rng.uniform(self._low, self._high, n)
-        designed = self._sd * rng.standard_normal(n)
-        kept = (rng.random(n) < self._designed) & (designed > self._low) & (designed < self._high)
-        return np.where(kept, designed, found)
+    def value(self, scores: FloatArray) -> FloatArray:
+        """Return logarithms (n,) of normal scores."""
+        return np.asarray(np.interp(scores, self._scores, self._logs))
 
-    def log_density(self, log_ratio: FloatArray) -> FloatArray:
-        """Log density (n,) of logarithms (n,), over that of a uniform one."""
-        normal = np.exp(-0.5 * (log_ratio / self._sd) ** 2) / (self._sd * math.sqrt(2 * np.pi))
-        inside = np.diff(scipy.special.ndtr(np.array([self._low, self._high]) / self._sd))
-        anything = 1 - self._designed * float(inside[0])
-        return np.log(anything + self._designed * (self._high - self._low) * normal)
+    def score(self, logarithms: FloatArray) -> FloatArray:
+        """Return normal scores (n,) of logarithms."""
+        return np.asarray(np.interp(logarithms, self._logs, self._scores))
 
 
-class EndDetails:
-    """The prior of springs together: the ends of one hanger are rarely each of another kind.
+class Ends:
+    """The prior of the end springs of a beam: that of their fixity, by kind of end.
 
-    They are independent, or all alike, or alike in each plane (a fork turns about one axis), or
-    made to clamp (welded, or a nut on a thick plate): all in the stiffest decade; or round (a nut,
-    a socket, a weld all around), the same in both planes, each end by itself or both alike. As
-    probable each, every spring's log10 k uniform over its range, or over that decade; alike is
-    within `similar_ends_decades`, the same within `round_end_decades`.
-    `columns` are those of the box's `names`. Where the ends are `exchanged`, frequencies do not
-    tell which spring of a plane stands at which end: `round_ends` holds then either way.
+    The fixity of an end, k/(k + EI/L + sqrt(EI T)/2), is the part of a clamped end's moment that it
+    takes. It is Beta distributed, and those of all ends and planes are correlated as normal scores.
+    `springs` are those that are felt; in each pair of `swaps` they can be exchanged.
     """
 
-    def __init__(
-        self,
-        names: Sequence[str],
-        springs: Sequence[str],
-        may_be_round: bool = True,
-        exchanged: bool = True,
-        assumed: Assumptions = DEFAULTS,
-    ):
-        decades = assumed.end_restraint.decades
-        self._stiffest = 1 / decades
-        self._similar_within = assumed.similar_ends_decades.value / decades
-        self._same_within = assumed.round_end_decades.value / decades
-        self.columns: IntArray = np.array(
-            [k for k, name in enumerate(names) if name in springs], dtype=int
-        )
-        own = [names[k] for k in self.columns]
-        planes = [name in ("log10_k1", "log10_k3") for name in own]
-        whole = np.arange(len(planes))
-        by_plane = [whole[np.equal(planes, side)] for side in (True, False)]
-        self._kinds: list[list[IntArray]] = [
-            [whole[[k]] for k in whole],
-            [whole],
-            [group for group in by_plane if len(group)],
+    def __init__(self, hanger: Hanger, springs: Sequence[str], swaps: Sequence[tuple[str, str]]):
+        assumed = hanger.assumptions
+        self._springs = tuple(springs)
+        self._pairs = [
+            (springs.index(one), springs.index(other))
+            for one, other in swaps
+            if {one, other} <= set(springs)
         ]
-        self._ends: list[list[IntArray]] = []
-        if may_be_round and own == ["log10_k1", "log10_k2", "log10_k3", "log10_k4"]:
-            self._ends.append([whole[[0, 1]], whole[[2, 3]]])
-            if exchanged:
-                self._ends.append([whole[[0, 3]], whole[[2, 1]]])
+        self._folded = self._pairs
+        self._unit = hanger.bending_stiffness_n_m2 / hanger.length_m
+        alike = assumed.similarity_of_ends.value
+        correlation = (1 - alike) * np.eye(_ALL) + alike
+        self._factor = np.linalg.cholesky(correlation)
+        own = self._factor[: len(springs), : len(springs)]
+        self._inverse = np.linalg.inv(own)
+        fixity = fixity_of(hanger.end_kind, assumed)
+        freedom = fixity.value * (1 - fixity.value) / fixity.sd**2 - 1
+        shape = fixity.value * freedom, (1 - fixity.value) * freedom
+        self._nodes = np.linspace(-_WIDEST, _WIDEST, _NODES)
+        held = scipy.special.betaincinv(*shape, scipy.special.ndtr(self._nodes))
+        loose = scipy.special.betaincinv(*shape[::-1], scipy.special.ndtr(-self._nodes))
+        self._logit = np.log(held.clip(_EDGE) / loose.clip(_EDGE))
 
     @property
-    def _count(self) -> int:
-        """Of kinds: those of `_kinds`, made to clamp, and round ends each by itself or alike."""
-        return len(self._kinds) + 1 + 2 * bool(self._ends)
+    def felt(self) -> bool:
+        """Return True where a measured frequency depends on an end spring."""
+        return bool(self._springs)
 
-    def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """Shares of the springs' ranges (n, springs)."""
-        shares = rng.random((n, len(self.columns)))
-        kind = rng.integers(self._count, size=n)
-        stiff = kind == len(self._kinds)
-        shares[stiff] = 1 - self._stiffest * shares[stiff]
-        for index, groups in enumerate(self._kinds[1:], start=1):
-            rows = np.flatnonzero(kind == index)
-            for group in groups:
-                middles = rng.random((len(rows), 1))
-                similar = _about(middles, len(group), rng, self._similar_within)
-                shares[np.ix_(rows, group)] = similar
-        for alike in (False, True):
-            rows = np.flatnonzero(kind == len(self._kinds) + 1 + alike)
-            middles = rng.random((len(rows), 2))
-            if alike:
-                middles = _about(middles[:, :1], 2, rng, self._similar_within)
-            way = rng.integers(max(len(self._ends), 1), size=len(rows))
-            for index, ends in enumerate(self._ends):
-                own = way == index
-                for end, middle in zip(ends, middles[own].T, strict=True):
-                    found = _about(middle[:, None], len(end), rng, self._same_within)
-                    shares[np.ix_(rows[own], end)] = found
-        return shares
+    def log10_springs(
+        self, scores: FloatArray, slenderness: FloatArray, rng: np.random.Generator | None
+    ) -> dict[str, FloatArray]:
+        """Return log10 of all springs in N m/rad, by name, at independent normal `scores`
+        (n, springs).
 
-    def log_density(self, shares: FloatArray) -> FloatArray:
-        """Log density (n,) of shares (n, springs), over that of independent springs."""
-        own = _of_middles(shares, self._similar_within)
-        total = np.ones(len(shares))
-        for groups in self._kinds[1:]:
-            parts = [own[:, group].prod(axis=1).mean(axis=1) for group in groups]
-            total = total + np.prod(parts, axis=0)
-        stiff = (shares > 1 - self._stiffest).all(axis=1)
-        total = total + stiff * self._stiffest ** -float(shares.shape[1])
-        for ends in self._ends:
-            same = np.prod([_same(shares[:, end], self._same_within) for end in ends], axis=0)
-            middles = np.stack([shares[:, end].mean(axis=1) for end in ends], axis=1)
-            alike = _of_middles(middles, self._similar_within).prod(axis=1).mean(axis=1)
-            total = total + same * (1 + alike) / len(self._ends)
-        return np.asarray(np.log(total / self._count))
+        Springs that are not felt are drawn, or without `rng` in the middle of their distribution.
+        """
+        n, felt = len(slenderness), len(self._springs)
+        rest = np.zeros((n, _ALL - felt)) if rng is None else rng.standard_normal((n, _ALL - felt))
+        correlated = np.hstack([scores, rest]) @ self._factor.T
+        logit = np.interp(correlated, self._nodes, self._logit)
+        log10 = logit / _LOG_10 + np.log10(self._unit * (1 + slenderness / 2))[:, None]
+        order = [*self._springs, *(name for name in SPRINGS if name not in self._springs)]
+        return dict(zip(order, log10.T, strict=True))
 
+    def scores(
+        self, log10_springs: Mapping[str, FloatArray], slenderness: FloatArray, n: int
+    ) -> FloatArray:
+        """Return the scores (n, springs) of log10 of the springs that are felt."""
+        if not self._springs:
+            return np.empty((n, 0))
+        log10 = np.column_stack([log10_springs[name] for name in self._springs])
+        logit = _LOG_10 * (log10 - np.log10(self._unit * (1 + slenderness / 2))[:, None])
+        return np.asarray(np.interp(logit, self._logit, self._nodes) @ self._inverse.T)
 
-def _about(middle: FloatArray, count: int, rng: np.random.Generator, within: float) -> FloatArray:
-    """Shares (n, count) about a middle (n, 1), reflected at the ends of the range."""
-    shares = middle + within * rng.standard_normal((len(middle), count))
-    folded = np.abs(shares) % 2
-    return np.where(folded > 1, 2 - folded, folded)
+    def fold(self, scores: FloatArray) -> FloatArray:
+        """Return scores (n, springs) with the stiffer spring of each pair first."""
+        return self._independent(fold_pairs(self._correlated(scores), self._folded))
 
+    def exchanged(self, scores: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return scores (n, springs) with each pair exchanged or not by chance."""
+        return self._independent(exchange(self._correlated(scores), self._pairs, rng))
 
-def _of_middles(shares: FloatArray, within: float) -> FloatArray:
-    """Density of shares (n, k) about each of evenly spread middles (n, k, middles)."""
-    count = math.ceil(1 / (_STEP_OF_MIDDLES * within))
-    middles = (np.arange(count) + 0.5) / count
-    images = np.stack([shares, -shares, 2 - shares])
-    away = (images[..., None] - middles) / within
-    return np.asarray(np.exp(-0.5 * away**2).sum(axis=0) / (within * math.sqrt(2 * math.pi)))
+    def connect(self, scores: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Fold no pair whose posterior, that of `scores` (n, springs), goes on beyond the fold.
+
+        Returns the scores with these pairs exchanged or not by chance.
+        """
+        correlated = self._correlated(scores)
+        self._folded, open_ = split_pairs(correlated, self._folded)
+        return self._independent(exchange(correlated, open_, rng))
+
+    def log_folded(self, scores: FloatArray) -> FloatArray:
+        """Return by how much folding raises the log density (n,); -inf outside of the fold."""
+        return log_folded(self._correlated(scores), self._folded)
+
+    def _correlated(self, scores: FloatArray) -> FloatArray:
+        count = len(self._springs)
+        return np.asarray(scores @ self._factor[:count, :count].T)
+
+    def _independent(self, correlated: FloatArray) -> FloatArray:
+        return np.asarray(correlated @ self._inverse.T)
 
 
-def _same(pair: FloatArray, within: float) -> FloatArray:
-    """Density (n,) of two shares (n, 2) that are the same, whatever they are."""
-    one, other = pair.T
-    away = np.stack([one - other, one + other, 2 - one - other]) / (math.sqrt(2) * within)
-    return np.asarray(np.exp(-0.5 * away**2).sum(axis=0) / (within * math.sqrt(4 * math.pi)))
+SPRINGS = ("log10_k1", "log10_k2", "log10_k3", "log10_k4")
+_ALL = len(SPRINGS)
+_NODES = 4001  # numerical: of tables of quantiles, in steps far below what is felt
+_WIDEST, _EDGE = 6.0, 1e-12
+_LOG_10 = math.log(10)
+
+
+def fixity_of(kind: str, assumed: Assumptions) -> Assumption:
+    """Return the fixity of one kind of end."""
+    return {
+        "socket": assumed.socket_fixity,
+        "welded": assumed.welded_fixity,
+        "plate": assumed.plate_fixity,
+        "threaded": assumed.threaded_fixity,
+        "fork": assumed.fork_fixity,
+        "unstated": assumed.unstated_fixity,
+    }[kind]
+
+
+def clamped_probability(kind: str, assumed: Assumptions) -> float:
+    """Return how probable clamped ends are beforehand, for one kind of end."""
+    return {
+        "socket": assumed.socket_clamped,
+        "welded": assumed.welded_clamped,
+        "plate": assumed.plate_clamped,
+        "threaded": assumed.threaded_clamped,
+        "fork": assumed.fork_clamped,
+        "unstated": assumed.unstated_clamped,
+    }[kind].value
 
 
 def calibration_of(names: Sequence[str], samples: FloatArray, hanger: Hanger) -> Calibration:

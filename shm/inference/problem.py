@@ -1,9 +1,10 @@
-"""One updating problem: what a point predicts, and how probable it is."""
+"""One updating problem: the prior and the likelihood of a model class and of tests."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -25,7 +26,7 @@ proposals, which weights correct, and is as exact as a first-order repeatability
 
 @dataclass(frozen=True, eq=False)
 class Points(Rows):
-    """Points `z` (n, d) with what they predict, `predicted` (n, measurements)."""
+    """Points `z` (n, d) with their predictions `predicted` (n, measurements)."""
 
     z: FloatArray
     predicted: FloatArray
@@ -66,7 +67,7 @@ class Problem:
         progress: Progress,
         calibration: Calibration | None = None,
     ) -> Problem:
-        """The problem of `tests`, each of which the model can describe, the model made ready.
+        """Return the problem of `tests`, the model made ready.
 
         Raises BadInput where a test has no modes or conditions that the class cannot describe.
         """
@@ -78,11 +79,11 @@ class Problem:
         return problem
 
     def predict(self, z: FloatArray) -> FloatArray:
-        """Predicted frequencies (n, measurements) at `z` (n, d)."""
+        """Return predicted frequencies (n, measurements) at `z` (n, d)."""
         return self.run(self.coordinates.theta(z))
 
     def run(self, theta: FloatArray) -> FloatArray:
-        """Predicted frequencies (n, measurements) of parameter sets (n, d)."""
+        """Return predicted frequencies (n, measurements) of parameter sets (n, d)."""
         self.evaluations += len(theta)
         found = self.likelihood.predict(self.model, theta)
         if isinstance(self.likelihood, FieldLikelihood) and self.likelihood.has_reading:
@@ -92,29 +93,78 @@ class Problem:
         return found
 
     def evaluate(self, z: FloatArray) -> Points:
-        """Runs the model at `z` (n, d)."""
+        """Run the model at `z` (n, d)."""
         return Points(z, self.predict(z))
 
     def settle(self, z: FloatArray) -> None:
-        """Takes what the covariance of the noise has of the model from `z` (d,), the first time:
-        near the optimum.
+        """Take the model's part of the noise's covariance from `z` (d,), the first time: near the
+        optimum.
         """
         if isinstance(self.likelihood, FieldLikelihood) and not self._settled:
             self.likelihood.settle(self.model, self.coordinates.theta(z[None])[0])
         self._settled = True
 
-    def slopes(self, z: FloatArray) -> FloatArray:
-        """Derivatives of the fractional misfit by z (m, d): (m, measurements, d)."""
-        steps = DIFFERENCE * np.eye(z.shape[1])
+    def misfit(self, z: FloatArray) -> FloatArray:
+        """Return fractional misfits (n, measurements) at `z` (n, d); a large one where there is no
+        such mode.
+        """
+        return self.misfit_of(self.coordinates.theta(z))
+
+    def misfit_of(self, theta: FloatArray) -> FloatArray:
+        """Return the same (n, measurements) of parameter sets (n, parameters)."""
+        found = self.likelihood.misfit(self.run(theta))
+        return np.nan_to_num(found, nan=_NO_MODE, posinf=_NO_MODE, neginf=-_NO_MODE)
+
+    def slopes(self, z: FloatArray, directions: FloatArray | None = None) -> FloatArray:
+        """Return derivatives (m, measurements, k) of the misfit at `z` (m, d).
+
+        They are along the columns of `directions` (d, k), or by all coordinates.
+        """
+        steps = DIFFERENCE * (np.eye(z.shape[1]) if directions is None else directions.T)
+        if self._has_slopes:
+            return self._near(z, steps) / DIFFERENCE
         shifted = np.vstack([z, *(z + step for step in steps)])
-        misfit = self.likelihood.misfit(self.predict(shifted)).reshape(len(steps) + 1, len(z), -1)
+        misfit = self.misfit(shifted).reshape(len(steps) + 1, len(z), -1)
         return np.asarray(np.moveaxis(misfit[1:] - misfit[0], 0, -1) / DIFFERENCE)
 
-    def log_posterior(self, points: Points, floor: float = 0.0) -> FloatArray:
-        """Log of prior times likelihood (n,) with the fictitious error `floor`."""
-        return self.coordinates.log_prior(points.z) + self.likelihood.marginal(
-            points.predicted, floor
-        )
+    @property
+    def is_costly(self) -> bool:
+        """Return True where an evaluation costs much more than the closed form of a beam."""
+        return self.model.expensive or (isinstance(self.model, AsMade) and self.model.has_terms)
+
+    @property
+    def _has_slopes(self) -> bool:
+        """Return True where the class gives the frequencies of near parameter sets at once."""
+        likelihood = self.likelihood
+        terms = isinstance(self.model, AsMade) and self.model.has_terms
+        return terms and isinstance(likelihood, FieldLikelihood) and likelihood.alike_conditions
+
+    def _near(self, z: FloatArray, steps: FloatArray) -> FloatArray:
+        """Return changes (m, measurements, steps) of the misfit by `steps` (k, d) from `z`."""
+        if not len(steps):
+            return np.empty((len(z), len(self.likelihood.frequency_hz), 0))
+        self.evaluations += len(z)
+        theta = self.coordinates.theta(z)
+        others = [self.coordinates.theta(z + step) for step in steps]
+        model, likelihood = cast(AsMade, self.model), cast(FieldLikelihood, self.likelihood)
+        found = likelihood.changes(model, theta, others)
+        if likelihood.has_reading:
+            column = self.model.parameter_names.index(TENSION)
+            ratio = np.stack([each[:, column] / theta[:, column] for each in others], axis=1)
+            found = np.concatenate([found, np.log(ratio)[:, None]], axis=1)
+        return np.nan_to_num(found)
+
+    def log_posterior(self, points: Points) -> FloatArray:
+        """Return the log of prior times likelihood (n,); -inf without a prediction."""
+        found = self.coordinates.log_prior(points.z)
+        known = np.isfinite(self.likelihood.misfit(points.predicted)).all(axis=1)
+        found[~known] = -np.inf
+        if known.any():
+            found[known] += self.likelihood.marginal(points.predicted[known])
+        return np.where(np.isnan(found), -np.inf, found)
+
+
+_NO_MODE = 10.0  # of ln f: beyond any data
 
 
 def _likelihood(

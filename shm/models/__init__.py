@@ -142,24 +142,41 @@ __all__ = [
     "competing_names",
     "described",
     "is_adopted",
+    "parameter_sets",
 ]
 
 
-def end_stiffness(posterior: Posterior, hanger: Hanger) -> dict[str, FloatArray]:
-    """log10 of the two ends' common stiffness in N m/rad (samples,), for planes with springs.
+def parameter_sets(posterior: Posterior, model: Model) -> FloatArray:
+    """Return the draws of a posterior as parameter sets (n, parameters) of `model`.
 
-    It is 2/(1/k_deck + 1/k_arch), because frequencies alone cannot tell the ends apart. Raises
-    UsageError where the class has other parameters by now than the posterior was made with.
+    Parameters that older posteriors do not have are at their usual value. Raises UsageError where
+    the class has other parameters by now than the posterior was made with.
     """
-    model = class_of(posterior, hanger)
-    lacking = [name for name in model.parameter_names if name not in posterior.names]
+    columns, lacking = [], []
+    for name in model.parameter_names:
+        if name in posterior.names:
+            columns.append(posterior.parameter(name))
+            continue
+        try:
+            columns.append(np.full(len(posterior.samples), model.usual(name)))
+        except KeyError:
+            lacking.append(name)
     if lacking:
         raise UsageError(
             f"the posterior of {posterior.model} was made without {', '.join(lacking)}.",
             remedy=f"Make it again: `shm ingest --again {quote(posterior.tests[-1])}`.",
         )
-    theta = np.column_stack([posterior.parameter(name) for name in model.parameter_names])
-    deck, arch = model.springs_n_m_rad(theta)
+    return np.column_stack(columns)
+
+
+def end_stiffness(posterior: Posterior, hanger: Hanger) -> dict[str, FloatArray]:
+    """Return log10 of both ends' common stiffness in N m/rad (samples,), for planes with springs.
+
+    It is 2/(1/k_deck + 1/k_arch), because frequencies alone cannot tell the ends apart. Raises
+    UsageError where the class has other parameters by now than the posterior was made with.
+    """
+    model = class_of(posterior, hanger)
+    deck, arch = model.springs_n_m_rad(parameter_sets(posterior, model))
     flexibility = 1 / deck + 1 / arch
     return {
         f"{plane}_end_stiffness": np.log10(2 / values)

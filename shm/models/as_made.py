@@ -6,8 +6,8 @@ and l the ratios of bending stiffness, mass per length and length to the describ
 
     f(T, k) = c f_described(T l^2/e, k l/e),    c = sqrt(e/mu) / l^2,
 
-exactly for a uniform bar on rotational springs. (What stands at a place of its own, a turnbuckle or
-a known mass, keeps its share of the length; plates are as much thicker as the rod is.) So
+exactly for a uniform bar on rotational springs. (Fittings, turnbuckles and known masses keep their
+part of the length; plates are as much thicker as the rod is.) So
 frequencies alone see the *apparent tension* a = T/(mu l^2) and c, and nothing tells whether mass
 and length or the tension made a. That part of the uncertainty, some 1 to 2 %, no number of modes
 takes away; a measured tension does.
@@ -16,20 +16,28 @@ takes away; a measured tension does.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 
+from shm.assumptions import Assumption, Assumptions
+from shm.models.bar_of_terms import BarValues, bar_of_terms
 from shm.models.base import DESCRIPTION, Conditions, Model, silent
 from shm.models.beam import Beam, Beam3
-from shm.values import AddedMass, FloatArray, ModalTest, Plane
+from shm.values import PLANES, AddedMass, FloatArray, Hanger, ModalTest, Plane
 
 TENSION, LENGTH = "theta_F", "theta_L"
 SECTION, DENSITY, MODULUS = "section", "density", "modulus"
 BENDING, SHEAR = "bending_factor", "shear_share"
+FITTING_STIFFNESS = ("fitting_stiffness_transverse", "fitting_stiffness_longitudinal")
+FITTING_MASS = "fitting_mass"
+TURNBUCKLE_STIFFNESS, TURNBUCKLE_MASS = "turnbuckle_stiffness", "turnbuckle_mass"
+INCLINATION, SAG_SHAPE, SAG_STIFFNESS = "inclination", "sag_shape", "sag_stiffness"
+FLATTEST_DEG = 10.0
 
 _MOST_SD = 6.0  # a normal distribution has 2e-9 beyond
 
@@ -41,7 +49,10 @@ class AsMade(Model):
     length; where end plates leave the effective length open, effective over described), springs in
     N m/rad, then `section`, `density` and `modulus` (logarithms of true over described area,
     density and elastic modulus) and of a strand its `bending_factor` and, in beam3, its
-    `shear_share`.
+    `shear_share`. A beam with fittings, turnbuckles or a stated inclination has their stiffness and
+    mass (over the bar's, a turnbuckle's over the described ones), its `inclination` in degrees from
+    the horizontal, `sag_shape` (0 held up by bending, 1 like a cable) and, where the inclination is
+    stated, `sag_stiffness`, that against sag over EA/L.
     """
 
     priors = DESCRIPTION
@@ -55,8 +66,10 @@ class AsMade(Model):
         self.model = model
         self.name, self.title, self.units = model.name, model.title, model.units
         hanger = self.hanger
-        deck_m, arch_m = self.stiff_ends_m
+        deck_m, arch_m = self.fittings_m = super().stiff_ends_m
         self.swaps = model.swaps if deck_m == arch_m else ()
+        stated = any(self.fittings_m) or hanger.turnbuckles or math.isfinite(hanger.inclination_deg)
+        self.has_terms = isinstance(model, Beam) and bool(stated)
         own = [name for name in model.parameter_names if name not in (TENSION, LENGTH)]
         self.springs = tuple(own)
         self.length_is_open = hanger.plate is not None and isinstance(model, Beam)
@@ -70,7 +83,19 @@ class AsMade(Model):
             bounds[BENDING] = assumed.strand_bending_factor.bounds
             if isinstance(model, Beam3):
                 bounds[SHEAR] = assumed.strand_shear_share.bounds
+        self.terms = {term.name: term for term in terms_of(hanger, self.fittings_m)}
+        self.terms = self.terms if self.has_terms else {}
+        bounds |= {name: term.bounds for name, term in self.terms.items()}
+        self.units = {**model.units, **{name: term.unit for name, term in self.terms.items()}}
         self.bounds = bounds
+
+    @property
+    def stiff_ends_m(self) -> tuple[float, float]:
+        """Lengths of fittings that the class has no term for."""
+        return (0.0, 0.0) if self.has_terms else self.fittings_m
+
+    def usual(self, name: str) -> float:
+        return float(self.terms[name].value(np.zeros(1))[0])
 
     @property
     def expensive(self) -> bool:  # type: ignore[override]
@@ -82,12 +107,15 @@ class AsMade(Model):
         return self.hanger.kind == "strand"
 
     def spring_range(self, name: str) -> tuple[float, float]:
-        """log10 of the least and the largest stiffness of an end spring."""
+        """Return log10 of the least and the largest stiffness of an end spring."""
         if not isinstance(self.model, Beam):
             return self.model.bounds[name]  # per node of the face: data of hanger 3's plates
-        unit = self.hanger.bending_stiffness_n_m2 / self.hanger.length_m
-        pinned, clamped = self.hanger.assumptions.end_restraint.bounds
-        return math.log10(pinned * unit), math.log10(clamped * unit)
+        hanger = self.hanger
+        pinned, clamped = hanger.assumptions.end_restraint.bounds
+        unit = hanger.bending_stiffness_n_m2 / hanger.length_m
+        # A taut bar resists an end's rotation with sqrt(EI T), not with EI/L.
+        taut = math.sqrt(hanger.bending_stiffness_n_m2 * hanger.nominal_tension_n)
+        return math.log10(pinned * unit), math.log10(clamped * (unit + taut))
 
     def _length_range(self) -> tuple[float, float]:
         plate = self.hanger.plate
@@ -131,13 +159,60 @@ class AsMade(Model):
             _, per_length, length = self.stiffness_mass_length(theta)
             kg: Any = mass.mass_kg / (per_length * (1.0 if self.length_is_open else length))
             conditions = replace(conditions, added_mass=AddedMass(kg, mass.x_m))
-        if isinstance(self.model, Beam3) and mass is None:
+        if self.has_terms:
+            places = () if mass is None else (mass.x_m,)
+            bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes, places)
+            kilograms = None if mass is None else np.asarray(kg)[:, None]
+            found = bar.frequencies_hz(self._values(theta), kilograms)
+        elif isinstance(self.model, Beam3) and mass is None:
             section = np.exp(self._column(theta, SECTION))
             shear = self._column(theta, SHEAR) if self.is_strand else np.ones(len(theta))
             found = self.model.frequencies_of_section(own, section, shear, modes)
         else:
             found = self.model.frequencies_at(own, modes, conditions)
         return found * factor[:, None, None]
+
+    def frequencies_near(
+        self, theta: FloatArray, others: Sequence[FloatArray], modes: int
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return frequencies (n, 2, modes) and, to first order, those of near parameter sets.
+
+        `others` are (n, parameters) each, the second answer is (others, n, 2, modes). Only for a
+        class with terms.
+        """
+        bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes)
+        found, near = bar.frequencies_about(
+            self._values(theta), [self._values(each) for each in others]
+        )
+        factors = [self.as_described(each)[1][:, None, None] for each in (theta, *others)]
+        return found * factors[0], near * np.array(factors[1:])
+
+    @property
+    def _shears(self) -> bool:
+        return isinstance(self.model, Beam3)
+
+    def _values(self, theta: FloatArray) -> BarValues:
+        """Return what the described bar with these frequencies is, but for the factor."""
+        stiffness, _, length = self.stiffness_mass_length(theta)
+        one = np.ones(len(theta))
+        terms = {name: self._column(theta, name) for name in self.terms}
+        own = [terms.get(name, one) for name in FITTING_STIFFNESS]
+        tension = self._column(theta, TENSION) * length**2 / stiffness
+        unit = self.hanger.bending_stiffness_n_m2 / self.hanger.length_m
+        springs = np.stack(self.springs_n_m_rad(theta), axis=1)
+        return BarValues(
+            tension_n=tension * self.hanger.nominal_tension_n,
+            springs=springs * (length / stiffness)[:, None, None] / unit,
+            fitting_stiffness=np.stack(own, axis=1),
+            fitting_mass=terms.get(FITTING_MASS, one),
+            turnbuckle_stiffness=terms.get(TURNBUCKLE_STIFFNESS, one),
+            turnbuckle_mass=terms.get(TURNBUCKLE_MASS, one),
+            lean=np.radians(90 - terms[INCLINATION]),
+            sag_shape=terms[SAG_SHAPE],
+            axial=terms.get(SAG_STIFFNESS, one),
+            section=np.exp(self._column(theta, SECTION)),
+            shear=self._column(theta, SHEAR) if SHEAR in self.bounds else one,
+        )
 
     def conditions(self, test: ModalTest) -> Conditions:
         return self.model.conditions(test)
@@ -150,6 +225,11 @@ class AsMade(Model):
         self.model.prepare(modes, progress)
 
     def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
+        if self.has_terms:
+            bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, order)
+            length = self.stiffness_mass_length(theta[None])[2]
+            shapes = bar.shapes(self._values(theta[None]), x_m / length)
+            return np.asarray(shapes[0, PLANES.index(plane), order - 1])
         return self.model.shape(self.as_described(theta[None])[0][0], plane, order, x_m)
 
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -162,3 +242,101 @@ class AsMade(Model):
 
     def _column(self, theta: FloatArray, name: str) -> FloatArray:
         return np.asarray(theta[:, self.parameter_names.index(name)])
+
+
+@dataclass(frozen=True)
+class Term:
+    """One uncertain quantity of the bar: `value` of its normal scores (n,), and their inverse.
+
+    `plane` is where it is felt, "" in both.
+    """
+
+    name: str
+    unit: str
+    value: Callable[[FloatArray], FloatArray]
+    score: Callable[[FloatArray], FloatArray]
+    plane: str = ""
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Return the least and the largest value."""
+        low, high = self.value(np.array([-_MOST_SD, _MOST_SD]))
+        return float(min(low, high)), float(max(low, high))
+
+
+def terms_of(hanger: Hanger, fittings_m: tuple[float, float]) -> list[Term]:
+    """Return the terms of a described hanger with fittings of these lengths."""
+    assumed, found = hanger.assumptions, []
+    if any(fittings_m):
+        stiffness, mass = fittings_of(hanger.end_kind, assumed)
+        for name, plane in zip(FITTING_STIFFNESS, PLANES, strict=True):
+            found.append(_log_normal(name, stiffness.value, stiffness.sd, plane))
+        found.append(_log_normal(FITTING_MASS, mass.value, mass.sd))
+    if hanger.turnbuckles:
+        stiff, heavy = assumed.turnbuckle_stiffness_log_sd, assumed.turnbuckle_mass_log_sd
+        found.append(_log_normal(TURNBUCKLE_STIFFNESS, 0.0, stiff.value))
+        found.append(_log_normal(TURNBUCKLE_MASS, 0.0, heavy.value))
+    found += [_inclination(hanger), Term(SAG_SHAPE, "1", scipy.special.ndtr, quantile, PLANES[1])]
+    if math.isfinite(hanger.inclination_deg):  # else what leans is open by as much
+        sag = assumed.sag_stiffness_log
+        found.append(_log_normal(SAG_STIFFNESS, sag.value, sag.sd, PLANES[1]))
+    return found
+
+
+def quantile(share: FloatArray) -> FloatArray:
+    """Return normal scores (n,) of a uniform quantity."""
+    return np.asarray(scipy.special.ndtri(share.clip(_LEAST_SHARE, 1 - _LEAST_SHARE)))
+
+
+def _log_normal(name: str, mean: float, sd: float, plane: str = "") -> Term:
+    return Term(
+        name,
+        "1",
+        lambda score: np.exp(mean + sd * score.clip(-_MOST_SD, _MOST_SD)),
+        lambda value: (np.log(value) - mean) / sd,
+        plane,
+    )
+
+
+def _inclination(hanger: Hanger) -> Term:
+    """Return the inclination: a stated one, or that of a hanger that leans a little at most."""
+    lean_deg, most = 90 - hanger.inclination_deg, 90 - FLATTEST_DEG
+    sd = hanger.assumptions.inclination_sd_deg.value
+    if lean_deg > _LEANS * sd:
+        return Term(
+            INCLINATION,
+            "deg",
+            lambda score: 90 - (lean_deg + sd * score).clip(0, most),
+            lambda value: (90 - value - lean_deg) / sd,
+            PLANES[1],
+        )
+    if math.isfinite(lean_deg):
+        usual = math.hypot(sd, lean_deg)
+        sign = 2.0
+    else:
+        usual, sign = hanger.assumptions.usual_lean_deg.value, 1.0
+    # Exponential with the usual lean as median; of half that where it is stated vertical.
+    scale = usual / sign / math.log(2)
+    return Term(
+        INCLINATION,
+        "deg",
+        lambda score: 90 - (-scale * scipy.special.log_ndtr(-score)).clip(0, most),
+        lambda value: -scipy.special.ndtri_exp(-((90 - value).clip(_UPRIGHT, most)) / scale),
+        PLANES[1],
+    )
+
+
+_LEANS = 3.0  # standard deviations, from which a stated lean is known to be one
+_UPRIGHT, _LEAST_SHARE = 1e-6, 1e-9
+
+
+def fittings_of(kind: str, assumed: Assumptions) -> tuple[Assumption, Assumption]:
+    """Return ln of the stiffness and of the mass of fittings of one kind of end."""
+    return {
+        "socket": (assumed.socket_stiffness_log, assumed.socket_mass_log),
+        "welded": (assumed.welded_stiffness_log, assumed.welded_mass_log),
+        "plate": (assumed.plate_stiffness_log, assumed.plate_mass_log),
+        "threaded": (assumed.threaded_stiffness_log, assumed.threaded_mass_log),
+        "fork": (assumed.fork_stiffness_log, assumed.fork_mass_log),
+        "unstated": (assumed.unstated_stiffness_log, assumed.unstated_mass_log),
+    }[kind]

@@ -76,6 +76,13 @@ class Model:
     def __init__(self, hanger: Hanger):
         self.hanger = hanger
 
+    def usual(self, name: str) -> float:
+        """Return the value of a parameter that older posteriors of this class do not have.
+
+        Raises KeyError for a parameter that all have.
+        """
+        raise KeyError(name)
+
     def of_the_thesis(self) -> Model:
         """The class with the thesis's reading of the description, where that is another."""
         return self

@@ -9,7 +9,7 @@ from typing import Any
 
 from shm.report import formatting
 from shm.report.paper import Table
-from shm.values import PLANES, ResponsePoint, Supports
+from shm.values import PLANES, ResponsePoint
 from shm.values.bar_description import BarDescription
 
 NOT_STATED = "not stated"
@@ -26,12 +26,12 @@ def bar_rows(bar: BarDescription) -> tuple[tuple[str, str], ...]:
         return (("Bar", "not described"), ("Sensors", _sensors(bar.sensors)))
     return (
         ("Section", _section(bar)),
-        ("Length", f"{bar.length_m:g} m"),
+        ("Length", _length(bar)),
         ("Length taped", _taped(bar)),
         ("Elastic modulus", f"{formatting.plain(bar.elastic_modulus_pa / 1e9, 4)} GPa"),
         ("Density", _density(bar)),
         ("Fittings", _fittings(bar)),
-        ("Ends", _ends(bar.ends)),
+        ("Ends", _ends(bar)),
         ("Sensors", _sensors(bar.sensors)),
         ("Bar measured by", bar.measured_by or NOT_STATED),
     )
@@ -75,6 +75,13 @@ def _section(bar: BarDescription) -> str:
     return f"diameter {formatting.plain(1e3 * bar.diameter_m, 4)} mm, {area}"
 
 
+def _length(bar: BarDescription) -> str:
+    """Return `12 m`, or `12 m, 60° from the horizontal` where the inclination is stated."""
+    if math.isnan(bar.inclination_deg):
+        return f"{bar.length_m:g} m"
+    return f"{bar.length_m:g} m, {bar.inclination_deg:g}° from the horizontal"
+
+
 def _taped(bar: BarDescription) -> str:
     how = (_TAPED.get(bar.length_by, ""), bar.length_measured)
     return ", ".join(each for each in how if each) or NOT_STATED
@@ -99,11 +106,14 @@ def _fittings(bar: BarDescription) -> str:
     return "; ".join(found) or NOT_STATED
 
 
-def _ends(ends: Supports | None) -> str:
-    if ends is None:
-        return NOT_STATED
-    mass = f", {ends.hanging_mass_kg:g} kg hang from the free end" if ends.hanging_mass_kg else ""
-    return f"{ends.deck} (deck), {ends.arch} (arch){mass}"
+def _ends(bar: BarDescription) -> str:
+    """Return how the ends are made and how they are held, as far as it is stated."""
+    found = [bar.end_kind] if bar.end_kind else []
+    if bar.ends is not None:
+        kg = bar.ends.hanging_mass_kg
+        mass = f", {kg:g} kg hang from the free end" if kg else ""
+        found.append(f"{bar.ends.deck} (deck), {bar.ends.arch} (arch){mass}")
+    return "; ".join(found) or NOT_STATED
 
 
 def _sensors(sensors: Sequence[ResponsePoint]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
@@ -37,6 +38,7 @@ _SHRUNK = 0.8
 _SURE_TREND_SD = 2.0
 _TREND_SHARE = 0.2
 _MOST_NAMED = 3
+_STRING_FROM = 100.0  # judgement: of L sqrt(T/EI); bending moves its low modes by 2 % at most
 _CONDITIONS = {
     "amplitude": "the level of the hits",
     "order": "the order of the mode",
@@ -102,8 +104,8 @@ def _verdict(diagnosis: Diagnosis, claim: Claim | None) -> str:
             if diagnosis.shrinkage.rms_before_percent > MOST_MISFIT_PERCENT:
                 return (
                     f"No gap can be shown, though the baseline {diagnosis.baseline} misses the "
-                    "frequencies by more than a sound model does: on so stiff a bar what supports "
-                    f"and sensors give may be as large (no gap, probability {chance})."
+                    f"frequencies by more than a sound model does: {_possible_misfit(diagnosis)} "
+                    f"(no gap, probability {chance})."
                 )
             return (
                 f"{'No gap' if sure else 'Most likely no gap'}: the baseline {diagnosis.baseline} "
@@ -119,6 +121,21 @@ def _verdict(diagnosis: Diagnosis, claim: Claim | None) -> str:
         case Answer.EXPLAINED | Answer.ALIKE:
             assert claim is not None
             return _explained(claim)
+
+
+def _possible_misfit(diagnosis: Diagnosis) -> str:
+    """Return what may move the frequencies of a bar, or of a string, as far as the misfit."""
+    if diagnosis.slenderness <= _STRING_FROM:
+        return "on so stiff a bar what supports and sensors give may be as large"
+    percent = [each.residual_percent for each in diagnosis.where]
+    middle = statistics.median(percent)
+    worst = max(diagnosis.where, key=lambda each: abs(each.residual_percent - middle))
+    off = worst.residual_percent - middle
+    side = "below" if off < 0 else "above"
+    return (
+        "what sensors weigh on a light string may do as much; "
+        f"{worst.plane} {worst.order} lies {abs(off):.1f} % {side} the other modes"
+    )
 
 
 def _none_explains(diagnosis: Diagnosis) -> str:

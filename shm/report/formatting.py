@@ -131,6 +131,16 @@ _MEANINGS = {
     "density": "density as made over the description's, less 1",
     "length": "length as made over the description's, less 1",
     "modulus": "elastic modulus as made over the description's, less 1",
+    "bending_factor": "bending stiffness over the solid section's",
+    "shear_share": "shear over a solid bar's",
+    "fitting_stiffness_transverse": "bending stiffness of fittings over the bar's, transverse",
+    "fitting_stiffness_longitudinal": "bending stiffness of fittings over the bar's, longitudinal",
+    "fitting_mass": "mass of fittings over the bar's, per length",
+    "turnbuckle_stiffness": "bending stiffness of turnbuckles over the described one",
+    "turnbuckle_mass": "mass of turnbuckles over the described one",
+    "inclination": "inclination from the horizontal in degrees (90 is vertical)",
+    "sag_shape": "shape in which the bar sags (0 held up by bending, 1 like a cable)",
+    "sag_stiffness": "stiffness against a change of sag over EA/L",
 }
 
 

@@ -57,6 +57,7 @@ from shm.values.drift import (
 )
 from shm.values.hanger import (
     EffectPrior,
+    EndKind,
     EndPlate,
     Hanger,
     Kind,
@@ -96,7 +97,9 @@ from shm.values.modes import (
     printable,
 )
 from shm.values.posterior import (
+    COUNTED_ONCE,
     ENOUGH_EFFECTIVE,
+    LEFT_OUT,
     MOST_MISFIT_PERCENT,
     WITHOUT_MODEL,
     Averaged,

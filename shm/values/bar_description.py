@@ -17,7 +17,8 @@ class BarDescription:
 
     `density_kg_m3` is mass over area. `length_by` and `length_measured` say how the length was
     taped, `measured_by` who measured the bar. `sensors` are those of the test that the report is
-    about; with a roving hammer they are the places that it hit.
+    about; with a roving hammer they are the places that it hit. `ends` is how the ends are held,
+    `end_kind` how they are made; `inclination_deg` is counted from the horizontal.
     """
 
     hanger: int | None = None
@@ -34,6 +35,8 @@ class BarDescription:
     plate: EndPlate | None = None
     turnbuckles: tuple[Turnbuckle, ...] = ()
     ends: Supports | None = None
+    end_kind: str = ""
+    inclination_deg: float = NAN
     sensors: tuple[ResponsePoint, ...] = ()
     measured_by: str = ""
 
@@ -63,6 +66,8 @@ def describe_bar(hanger: Hanger | None, sensors: Sequence[ResponsePoint] = ()) -
         plate=hanger.plate,
         turnbuckles=hanger.turnbuckles,
         ends=hanger.supports if has_ends else None,
+        end_kind=hanger.ends,
+        inclination_deg=hanger.inclination_deg,
         sensors=tuple(sensors),
         measured_by=survey.measured_by,
     )

@@ -292,7 +292,8 @@ class Diagnosis(Shown):
     catalogue. `remarks` say in words what is wrong with the data and what it does to the answer.
     `outliers` are frequencies that were set aside. Hits moved the sensors by `widest_swing_m` at
     most; what acts only beyond, such as a guide with more play, is not visible. `remainder` is
-    None where nothing unknown is worth a description.
+    None where nothing unknown is worth a description. `slenderness` is L sqrt(T/EI) of the
+    baseline: about 10 of a bar, above 100 of a string; NaN in documents of former versions.
     """
 
     hanger: int | None
@@ -320,6 +321,7 @@ class Diagnosis(Shown):
     compatibility: Compatibility | None = None
     remainder: Remainder | None = None
     widest_swing_m: float = NAN
+    slenderness: float = NAN
 
     def claim(self, cause: Cause) -> float:
         """Return the probability of a cause and of those that the data cannot tell from it."""

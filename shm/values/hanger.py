@@ -162,6 +162,10 @@ LengthBy: TypeAlias = Literal["faces", "pins", "nodes"]
 """Between which points a hanger was taped: its fittings' faces, its pins, the system lines."""
 
 
+EndKind: TypeAlias = Literal["socket", "fork", "plate", "threaded", "welded"]
+"""How the ends of a hanger are made: both alike."""
+
+
 @dataclass(frozen=True)
 class Survey:
     """Statements on how the bar was measured, for reports; no result rests on them. "": not stated.
@@ -197,6 +201,8 @@ class Hanger(Shown):
     the arch end: so far the length that swings is open. `models` names the model classes that
     the owner admits; empty: all that the settings name. `effect_priors` replace ranges of the
     catalogue of effects. A bar with a nominal tension of 0 carries none. `survey` is for reports.
+    `ends` is how its ends are made, "" where it is not stated. `inclination_deg` is counted from
+    the horizontal, 90 is vertical; NaN where it is not stated.
     `assumptions` is what is taken of it, of sensors and of measurements before any data.
     """
 
@@ -222,6 +228,8 @@ class Hanger(Shown):
     family: str = ""
     limits: Limits = field(default_factory=Limits)
     fittings_m: tuple[float, float] = (0.0, 0.0)
+    ends: EndKind | Literal[""] = ""
+    inclination_deg: float = NAN
     survey: Survey = field(default_factory=Survey)
     assumptions: Assumptions = DEFAULTS
 
@@ -245,6 +253,11 @@ class Hanger(Shown):
     @property
     def bending_stiffness_n_m2(self) -> float:
         return self.elastic_modulus_pa * self.second_moment_m4 * self.bending_stiffness_factor
+
+    @property
+    def end_kind(self) -> str:
+        """Return how its ends are made: as stated, a strand's are sockets, else "unstated"."""
+        return self.ends or ("socket" if self.kind == "strand" else "unstated")
 
     @classmethod
     def without_model(

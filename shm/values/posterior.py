@@ -98,11 +98,24 @@ NO_TENSION_PERCENT = 10.0
 CONTRADICTS_FROM_SD = 3.0
 """Of sound hangers one in some hundred comes so far off."""
 
+EMCEE = "emcee"
+"""The sampler of Foreman-Mackey et al. (2013), as `Posterior.method` names it."""
+
+DECIDING_SHARE, _NARROW = 0.5, 0.05
+"""Judgement: of the variance of ln tension, what matters more than all else; and a half width of
+the interval that asks for nothing more."""
+
+FAR_FROM_NOMINAL = 2.0
+"""Factor (judgement): lift-offs differ from drawings by 5 to 30 %."""
+
 WITHOUT_MODEL = "frequencies"
 """Stands for the class of a posterior of a structure without a model: frequencies as measured."""
 
 _DO_NOT_USE, _SAMPLER_FAILED = "Do not use this tension.", "The sampler failed"
 _ENDS_DECIDE, _ORDERS_DECIDE = "The ends decide", "The orders decide"
+_INCLINATION_DECIDES, _SAMPLED_BY_EMCEE = "The inclination decides", "Sampled by emcee"
+COUNTED_ONCE, LEFT_OUT = "Counted once", "Left out"
+_NO_FAULTS = (_ENDS_DECIDE, _INCLINATION_DECIDES, _SAMPLED_BY_EMCEE, COUNTED_ONCE, LEFT_OUT)
 _SAID_ONCE = (
     _ENDS_DECIDE,
     _ORDERS_DECIDE,
@@ -163,9 +176,10 @@ class Posterior(Shown):
 
     `samples` (samples, parameters) are equally weighted draws; `log_likelihood` (samples,).
     `most_probable` (parameters,) has the largest posterior density. `r_hat` compares independent
-    batches of draws, the worst parameter (1 is converged). `method` is the way it was sampled:
-    `tmcmc` from scratch, or from a known posterior `re-weighted` or by an `ensemble`; of an earlier
-    version also `textbook`.
+    batches of draws, the worst parameter (1 is converged). `sampler` is what was asked for, empty
+    where it is not known, and `method` what gave the draws: `importance`, or `emcee` where it was
+    asked for or importance sampling failed; of earlier versions `tmcmc`, `re-weighted`, `ensemble`
+    or `textbook`.
     `priors` are those of the `thesis` or of the hanger's `description`. The tension's draws are
     absolute: they hold the uncertainty of the description. `repeatability_sd_n` is the standard
     deviation, in N, with which the same test repeats it, description held: what counts in shifts.
@@ -177,6 +191,13 @@ class Posterior(Shown):
     modes that are all numbered one higher or one lower, nearer to the nominal tension.
     `description_off_sd` is by how many of its standard deviations the description would be off,
     `reading_off_sd` by how many a tension that was read is off what the frequencies say.
+    `remarks` say in words what `shm.inference.data_checks` changed in the tests, or doubts.
+    `taut_string_tension_n` is what a string without bending stiffness with these frequencies would
+    carry, `stated_error_percent` the root mean square of the errors stated of frequencies; NaN
+    where unknown.
+    `inclination_share_of_variance` is the part of the variance of ln tension that the inclination
+    explains where it is a parameter but not stated, `ends_share_of_variance` the part that the
+    stiffness and mass of ends explain where `ends` is not stated; NaN where they are.
     `units` (parameters,) are those of the parameters, of the quantity itself where a parameter is
     its log10, and `1` of a ratio; empty where they are not known.
     `baseline_check` is what was found of the tests of a baseline before it was made of them; None
@@ -211,16 +232,29 @@ class Posterior(Shown):
     reading_off_sd: float = NAN
     baseline_check: BaselineCheck | None = None
     units: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    taut_string_tension_n: float = NAN
+    stated_error_percent: float = NAN
+    sampler: str = ""
+    inclination_share_of_variance: float = NAN
+    ends_share_of_variance: float = NAN
 
     @property
     def caveats(self) -> tuple[str, ...]:
         """What keeps this posterior from being taken at its word, worst first; empty: nothing."""
-        return (*self.faults, *self._other_ends)
+        faults = self.faults
+        failed = [each for each in faults if each.startswith(_SAMPLER_FAILED)]
+        # What was not used of the data comes before what the rest of them says.
+        changed = [each for each in self.remarks if each.startswith(_NO_FAULTS)]
+        asked = (*self._statements_that_would_help, *self._emcee_reason)
+        return tuple(dict.fromkeys((*failed, *changed, *faults, *self._other_ends, *asked)))
 
     @property
     def faults(self) -> tuple[str, ...]:
         """What says that something is wrong, not only that the data leave more open."""
         found = []
+        string = self._compare_with_string()
+        by_far = self.misfit_percent > NO_TENSION_PERCENT
         if self.effective_sample_size < min(ENOUGH_EFFECTIVE, len(self.samples)):
             found.append(
                 f"{_SAMPLER_FAILED}: {self.effective_sample_size:.0f} effective draws of "
@@ -237,13 +271,14 @@ class Posterior(Shown):
             names = ", ".join(cut_off)
             found.append(
                 f"At the bound of its prior: {names}. The interval is cut off there. Check the "
-                "description, its units and the orders of the modes."
+                f"description, its units and the orders of the modes.{string}"
             )
-        if self.misfit_percent > MOST_MISFIT_PERCENT:
+        if self.misfit_percent > max(MOST_MISFIT_PERCENT, self.stated_error_percent):
             found.append(
                 f"{self.model} misses the measured frequencies by {self.misfit_percent:.1f} % "
                 "(root mean square): the description or the model class does not fit this hanger."
-                + (f" {_DO_NOT_USE}" if self.misfit_percent > NO_TENSION_PERCENT else "")
+                + (f" {_DO_NOT_USE}" if by_far else "")
+                + (string if by_far and not cut_off else "")
             )
         if self.reading_off_sd > CONTRADICTS_FROM_SD:
             found.append(
@@ -264,7 +299,21 @@ class Posterior(Shown):
                 f"tension of {force_unit(other_n).told(other_n)}, nearer to the nominal one. "
                 "Find the first mode of each plane."
             )
+        found += [each for each in self.remarks if not each.startswith(_NO_FAULTS)]
         return tuple(found)
+
+    def _compare_with_string(self) -> str:
+        """Return what a taut string would carry, where that is far from the nominal tension."""
+        string_n, nominal_n = self.taut_string_tension_n, self.nominal_tension_n
+        if not (math.isfinite(string_n) and nominal_n > 0):
+            return ""
+        ratio = string_n / nominal_n
+        if 1 / FAR_FROM_NOMINAL < ratio < FAR_FROM_NOMINAL:
+            return ""
+        return (
+            f" A taut string would need {force_unit(string_n).told(string_n)}, {ratio:.2g} times "
+            "the nominal: check nominal_tension_n, its unit, the orders."
+        )
 
     @property
     def _other_ends(self) -> tuple[str, ...]:
@@ -276,6 +325,42 @@ class Posterior(Shown):
         return (
             f"{_ENDS_DECIDE}: with ends of another stiffness all {way} to {told} fits as "
             "well. A test with a known mass, or a mode shape, tells which.",
+        )
+
+    @property
+    def _statements_that_would_help(self) -> tuple[str, ...]:
+        """Return which keys of the description would narrow the tension's interval most."""
+        if self.model == WITHOUT_MODEL or self._half_width < _NARROW:
+            return ()
+        found = []
+        if self.inclination_share_of_variance > DECIDING_SHARE:
+            found.append(
+                f"{_INCLINATION_DECIDES} more than half of the interval. State "
+                "`inclination_deg` of this hanger (90 is vertical)."
+            )
+        if self.ends_share_of_variance > DECIDING_SHARE:
+            found.append(
+                f"{_ENDS_DECIDE} more than half of the interval. State `ends` of this hanger "
+                "(socket, fork, plate, threaded or welded)."
+            )
+        return tuple(found)
+
+    @property
+    def _half_width(self) -> float:
+        """Return half of the 90 % interval of the tension over its median."""
+        low, middle, high = np.quantile(self.tension_n, [0.05, 0.5, 0.95])
+        return float((high - low) / (2 * middle)) if middle > 0 else math.inf
+
+    @property
+    def _emcee_reason(self) -> tuple[str, ...]:
+        """Return why emcee gave the draws, where it did."""
+        if self.method != EMCEE:
+            return ()
+        if self.sampler == EMCEE:
+            return (f"{_SAMPLED_BY_EMCEE}, because it was asked for.",)
+        return (
+            f"{_SAMPLED_BY_EMCEE}, because importance sampling was not reliable here: a few draws "
+            "had most of the weight. Trust the evidence of this class less than its error says.",
         )
 
     def parameter(self, name: str) -> FloatArray:
@@ -334,7 +419,7 @@ class Averaged:
     @property
     def faults(self) -> tuple[str, ...]:
         """Return the caveats that say that something is wrong, as `Posterior.faults` does."""
-        return tuple(each for each in self.caveats if not each.startswith(_ENDS_DECIDE))
+        return tuple(each for each in self.caveats if not each.startswith(_NO_FAULTS))
 
     @property
     def is_usable(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Sequence
 
@@ -18,6 +19,7 @@ _TENSION_STEP, _DECADES_STEP = 0.02, 0.1  # technical: of finite differences
 _FARTHEST_TENSION, _FARTHEST_DECADES = 0.4, 1.0  # technical: beyond it nothing is linearised
 _DRAWS = 4000  # of the description: technical, refined below
 _NARROWER = (0.3, 0.1, 0.03)  # technical: of the prior's range, about the best draw
+_HELD = 1e-9  # of a parameter that is not drawn
 # Where slopes are taken: a tension near the nominal one, the length as taped with its fittings, and
 # springs that bend with the bar. Judgement; what differs from test to test is the same anywhere.
 _PLAUSIBLE = {"theta_F": (1.0, 0.3), "theta_L": (1.0, 0.02)}
@@ -73,6 +75,9 @@ def plausible(model: Model, level: FloatArray, planes: IntArray, orders: IntArra
     for name, (usual, sd) in _PLAUSIBLE.items():
         if name in names:
             best[names.index(name)], width[names.index(name)] = usual, sd
+    for column, name in enumerate(names):
+        with contextlib.suppress(KeyError):
+            best[column], width[column] = model.usual(name), 0.0
     springs = [n for n, name in enumerate(names) if name.startswith(_SPRING)]
     best[springs] = math.log10(_FELT * model.wave_stiffness_n_m_rad(1))
     width[springs] = _FELT_SD
@@ -81,7 +86,7 @@ def plausible(model: Model, level: FloatArray, planes: IntArray, orders: IntArra
         draws = share * width * rng.standard_normal((_DRAWS // 4, len(names)))
         draws[:, springs] = _alike_ends(draws[:, springs], [names[n] for n in springs])
         theta = np.clip(np.vstack([best, best + draws]), *bounds)
-        held = -(((theta - centre) / width) ** 2).sum(axis=1) / 2
+        held = -(((theta - centre) / np.maximum(width, _HELD)) ** 2).sum(axis=1) / 2
         best, _ = _best(model, theta, level, planes, orders, Conditions(), held)
     return best
 

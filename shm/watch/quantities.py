@@ -133,7 +133,13 @@ def base_point(baseline: Posterior, model: Model) -> FloatArray:
     for name, lower, upper in zip(prior.names, prior.lower, prior.upper, strict=True):
         if name in springs:
             known[name] = float(np.clip(known[name], lower, upper))
-    lacking = [name for name in model.parameter_names if name not in known]
+    lacking = []
+    for name in model.parameter_names:
+        if name not in known:
+            try:
+                known[name] = model.usual(name)
+            except KeyError:
+                lacking.append(name)
     if lacking:
         raise UsageError(
             f"the baseline in {model.name} was made by a former shm, without {', '.join(lacking)}.",

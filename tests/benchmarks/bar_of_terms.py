@@ -23,7 +23,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.worlds.bar_of_terms.reduced_bar import BarTerms, ReducedBar  # noqa: E402
+from shm.models.reduced_bar import BarTerms, ReducedBar  # noqa: E402
 
 BARS, MOST_OFF = 300, 2e-4
 ZONES = [(0.0, 0.04), (0.96, 1.0)]

@@ -1,4 +1,4 @@
-"""Compare the first-order correction for fittings with exact zones (`tests/worlds/bar_of_terms`).
+"""Compare the first-order correction for fittings with exact zones (`shm/models/reduced_bar.py`).
 
 python tests/benchmarks/fittings.py
 
@@ -23,8 +23,8 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from shm.models import tensioned_beam  # noqa: E402
+from shm.models.bar_elements import bar_elements  # noqa: E402
 from shm.models.end_effects import EndWaves  # noqa: E402
-from tests.worlds.bar_of_terms.bar_elements import bar_elements  # noqa: E402
 
 MODES = 6
 CLAMPED = 1e6

@@ -86,6 +86,7 @@ def selected(task: tuple[str, int, int, int, bool]) -> dict[str, Any]:
         "fewest_effective": min(p.effective_sample_size for p in found.posteriors),
         "largest_occam": max(p.log_occam for p in found.posteriors),
         "caveats": list(found.averaged().caveats),
+        "faults": list(found.averaged().faults),
     }
 
 

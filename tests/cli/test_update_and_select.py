@@ -53,6 +53,21 @@ def test_the_document_of_update_has_the_keys_of_the_contract_and_repeats(
     assert {**again, "seconds": 0} == {**document, "seconds": 0}
 
 
+def test_sampler_emcee_says_so_and_agrees(shm: Shm, modes_file: Path, hanger_file: Path) -> None:
+    usual, other = (
+        shm(*call(modes_file, hanger_file, *words)).document
+        for words in ((), ("--sampler", "emcee"))
+    )
+    assert (usual["sampler"], usual["method"]) == ("importance", "importance")
+    assert (other["sampler"], other["method"]) == ("emcee", "emcee")
+    assert "Sampled by emcee, because it was asked for." in other["caveats"]
+    assert not any("emcee" in caveat for caveat in usual["caveats"])
+    found = other["tension_n"]["q50"]
+    assert found == pytest.approx(usual["tension_n"]["q50"], abs=usual["tension_n"]["sd"])
+    refused = shm("select", modes_file, "--hanger-file", hanger_file, "--sampler", "tmcmc")
+    assert refused.code == 2
+
+
 def test_the_priors_of_the_thesis_have_its_parameters(
     shm: Shm, modes_file: Path, hanger_file: Path
 ) -> None:

@@ -127,7 +127,7 @@ def test_modes_out_of_order_are_left_out_and_named() -> None:
         (plane, order) for plane in ("transverse", "longitudinal") for order in (1, 4, 5, 6)
     ]
     assert (
-        "Test t1: transverse 3 (13.5 Hz) does not lie above transverse 2 (24.6 Hz)"
+        "Left out: test t1, transverse 3 (13.5 Hz) does not lie above transverse 2 (24.6 Hz)"
         in (found.remarks[0])
     )
 

@@ -9,8 +9,9 @@ import pytest
 
 from shm.gap.contract import Hypothesis
 from shm.gap.fit import baseline_fit, fitted, hypotheses
-from shm.gap.observations import observed, rounding_covariance, step_hz, told_of_rounding
+from shm.gap.observations import observed, rounding_covariance, told_of_rounding
 from shm.gap.problem import GapProblem
+from shm.inference.data_checks import step_hz
 from shm.values import NAN, ModalTest
 from tests.helpers.effects import all_but
 from tests.helpers.gap_campaigns import campaign

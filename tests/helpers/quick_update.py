@@ -7,7 +7,6 @@ parameters stay in the middle of their priors.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -68,7 +67,7 @@ def refresh(
     tests: Sequence[ModalTest], model: Model, known: Posterior, options: UpdateOptions
 ) -> Posterior:
     assert known.model == model.name
-    return replace(update(tests, model, options), method="re-weighted")
+    return update(tests, model, options)
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Evidences against exact ones: quadrature on hanger 3, a conjugate Gaussian, two unequal modes."""
+"""Compare evidences with quadrature, a conjugate Gaussian and two unequal modes."""
 
 from __future__ import annotations
 
@@ -52,20 +52,23 @@ def test_the_evidence_is_that_of_quadrature(table: str, model: str, repeat: int)
     error = posterior.log_evidence - ORACLE[table, model, repeat]
     assert abs(error) < 4 * posterior.log_evidence_sd
     assert posterior.log_evidence_sd < 0.08
-    assert posterior.evaluations < 75_000
+    assert posterior.evaluations < 150_000
 
 
 class KnownNoise(Likelihood):
-    """Normal errors of known standard deviation and no model error."""
+    """Take normal errors of known standard deviation and no model error."""
 
-    def marginal(self, predicted: FloatArray, floor: float = 0.0) -> FloatArray:
-        variance = self.identification_error**2 + floor**2
+    def whitening(self, sigma: float) -> FloatArray:
+        return np.diag(1 / self.identification_error)
+
+    def marginal(self, predicted: FloatArray) -> FloatArray:
+        variance = self.identification_error**2
         terms = self.misfit(predicted) ** 2 / variance + np.log(2 * np.pi * variance)
         return np.asarray(-0.5 * terms.sum(axis=1))
 
 
 def linear(dimension: int, slopes: FloatArray) -> Model:
-    """A model whose predictions are linear in parameters of standard normal prior.
+    """Return a model whose predictions are linear in parameters of standard normal prior.
 
     `slopes` (2 modes, dimension). The uniform parameters are the priors' quantiles.
     """
@@ -83,7 +86,7 @@ def linear(dimension: int, slopes: FloatArray) -> Model:
 
 @pytest.mark.parametrize("dimension", [2, 8, 20])
 def test_the_evidence_of_a_conjugate_gaussian_is_exact(dimension: int) -> None:
-    """y = 1 + A z + e, z ~ N(0, I), e ~ N(0, s^2): y ~ N(1, A A' + s^2 I). Measured: y = 1."""
+    """Measure y = 1 of y = 1 + A z + e, z ~ N(0, I), e ~ N(0, s^2): y ~ N(1, A A' + s^2 I)."""
     count, noise = dimension + 4, 0.05
     slopes = np.random.default_rng(dimension).standard_normal((count, dimension)) / 4
     half = [1.0] * (count // 2)
@@ -91,16 +94,17 @@ def test_the_evidence_of_a_conjugate_gaussian_is_exact(dimension: int) -> None:
     problem = Problem(linear(dimension, slopes), likelihood)
     covariance = slopes @ slopes.T + noise**2 * np.eye(count)
     exact = multivariate_normal(np.zeros(count), covariance).logpdf(np.zeros(count))
-    weighted = infer(problem, 1000, np.random.default_rng(1))
-    assert abs(weighted.log_evidence - exact) < 4 * weighted.log_evidence_sd
-    assert weighted.log_evidence_sd < 0.1
+    found = infer(problem, UpdateOptions(1000), np.random.default_rng(1))
+    assert found.method == "importance"
+    assert found.log_evidence == pytest.approx(exact, abs=0.03)
+    assert found.log_evidence_sd < 0.06
     posterior = np.linalg.inv(np.eye(dimension) + slopes.T @ slopes / noise**2)
-    drawn = np.cov(weighted.resampled(4000, np.random.default_rng(2)).z.T)
-    assert np.diag(drawn) == pytest.approx(np.diag(posterior), rel=0.4)
+    drawn = np.diag(np.cov(found.points.z.T))
+    np.testing.assert_allclose(drawn, np.diag(posterior), rtol=0.25)
 
 
 class TwoEnds(Model):
-    """Two springs whose ends are nearly, but not quite, alike: two modes of unequal mass.
+    """Give two springs that can nearly be exchanged: two modes of unequal mass.
 
     One plane sees a + b and a b, the other a tilt that tells the ends apart a little.
     """
@@ -127,12 +131,12 @@ def test_two_modes_of_unequal_mass_get_their_shares() -> None:
     weights = np.exp(values - values.max())
     share = weights[theta[:, 0] > theta[:, 1]].sum() / weights.sum()
     assert 0.55 < share < 0.95
-    weighted = infer(Problem(model, likelihood), 2000, np.random.default_rng(3))
-    z = weighted.resampled(4000, np.random.default_rng(4)).z
-    error = np.sqrt(share * (1 - share) / weighted.effective_sample_size)
+    found = infer(Problem(model, likelihood), UpdateOptions(2000), np.random.default_rng(3))
+    z = found.points.z
+    error = np.sqrt(share * (1 - share) / found.effective_sample_size)
     assert np.mean(z[:, 0] > z[:, 1]) == pytest.approx(share, abs=4 * error)
-    assert weighted.log_evidence == pytest.approx(
-        values.max() + np.log(weights.mean()), abs=4 * weighted.log_evidence_sd
+    assert found.log_evidence == pytest.approx(
+        values.max() + np.log(weights.mean()), abs=4 * found.log_evidence_sd
     )
 
 

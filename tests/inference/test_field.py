@@ -116,17 +116,6 @@ def test_one_mode_under_two_conditions_shares_its_error(off: float) -> None:
     assert abs(found - alone) > 0.15
 
 
-def test_a_bias_that_both_conditions_have_is_likelier_than_two_of_opposite_sign() -> None:
-    rows = FEW[:1]
-    found = {}
-    for sign in (1.0, -1.0):
-        tests = [measured("a", rows, 1e-5, 0.0), measured("b", rows, 1e-5, 0.0, mass=CLAMP)]
-        likelihood = FieldLikelihood(tests, MODEL)
-        exact = likelihood.predict(MODEL, THETA)
-        found[sign] = likelihood.marginal(exact * (1 + 1e-3 * np.array([1.0, sign])))[0]
-    assert found[1.0] > found[-1.0] + 3
-
-
 def test_frequencies_of_unstated_error_have_the_assumed_one() -> None:
     sd = DEFAULTS.unstated_frequency_sd.value
     stated = FieldLikelihood([measured("a", sd=sd, off=0.0)], MODEL)
@@ -142,13 +131,6 @@ def test_several_tests_say_an_error_that_nobody_stated() -> None:
     assert likelihood.frequencies == 3
     single = likelihood.identification_error * np.sqrt(12)
     np.testing.assert_allclose(single, 3e-3, rtol=0.3)
-
-
-def test_where_some_are_stated_they_keep_their_own() -> None:
-    one, other = measured("a", FEW[:1], 5e-4, 0.0), measured("b", FEW[1:], NAN)
-    likelihood = FieldLikelihood([one, other], MODEL)
-    sd = DEFAULTS.unstated_frequency_sd.value
-    np.testing.assert_allclose(likelihood.identification_error, [5e-4, sd, sd], rtol=1e-6)
 
 
 def everything(sd: float = 1e-4) -> ModalTest:

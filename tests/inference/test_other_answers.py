@@ -1,4 +1,4 @@
-"""What a posterior alone does not show: other orders, a wrong reading, a wrong description."""
+"""Check warnings of other ends and orders, of a wrong reading and of a wrong description."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def a_test(
     sd: float = 1e-4,
     **about: float,
 ) -> ModalTest:
-    """Exact modes of both planes, ends of k L/EI of `springs`, known to `sd` (fraction)."""
+    """Return exact modes of both planes, ends of k L/EI of `springs`, known to `sd`."""
     model = build(CLASS, hanger, THESIS)
     unit = hanger.bending_stiffness_n_m2 / hanger.length_m
     theta = np.array(
@@ -68,20 +68,17 @@ def test_right_orders_are_left_alone(orders: range) -> None:
     assert found.faults == ()
 
 
-def test_a_slack_bar_that_looks_as_designed_is_told() -> None:
-    """A stiff bar at a fifth of its design: with other ends the design fits as well."""
-    stiff = shm.round_bar(
-        3, diameter_m=0.113, length_m=12.4, **STEEL | {"nominal_tension_n": 187e3}
-    )
-    test = a_test(range(1, 7), stiff, 40e3, springs=(11, 10, 15, 80), sd=1e-3)
-    found = posterior(test, stiff)
-    assert np.quantile(found.tension_n, 0.05) > 80e3
-    assert found.tension_of_other_ends_n < 60e3
+def test_few_modes_of_a_short_stiff_bar_allow_another_tension() -> None:
+    """Fit stiffer ends with next to no tension as well as soft ends with all of it."""
+    stiff = shm.round_bar(3, diameter_m=0.113, length_m=5.0, **STEEL | {"nominal_tension_n": 187e3})
+    found = posterior(a_test(range(1, 3), stiff, 187e3, (3, 3, 3, 3), sd=1e-3), stiff)
+    low, high = np.quantile(found.tension_n, [0.05, 0.95])
+    assert not low < found.tension_of_other_ends_n < high
     assert any(each.startswith("The ends decide") for each in found.caveats)
 
 
 def test_modes_that_a_class_meets_are_not_missed_by_it() -> None:
-    """A short thick bar: that its supports give is expected, and no misfit where they do not."""
+    """Expect a short thick bar's supports to give way, without a misfit where they do not."""
     thick = shm.round_bar(3, diameter_m=0.08, length_m=5.0, **STEEL | {"nominal_tension_n": 277e3})
     found = posterior(a_test(range(1, 9), thick, tension_n=264e3), thick)
     assert found.misfit_percent < 0.1
@@ -121,7 +118,7 @@ def test_a_reading_is_held_against_the_frequencies(read: float, says: bool) -> N
 
 
 def test_the_description_is_off_by_what_a_sound_bar_would_scatter() -> None:
-    """Of normal prior and data: the mean, over the square root of what the data take off 1."""
+    """Compare with the mean over the root of the variance that normal data take off 1."""
     rng = np.random.default_rng(1)
     # Two deviates, seen through errors of 0.5 and 1; the bar is off by 4 and by 0.
     left = np.array([0.5, 1.0]) ** 2 / (1 + np.array([0.5, 1.0]) ** 2)

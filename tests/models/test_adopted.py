@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput, UsageError
-from shm.models import PRIORS, Model, applicable, build, competing_names, described
+from shm.models import PRIORS, Model, applicable, build, described
 from shm.models.adopted import AdoptedEffect, AdoptedName, missed_by_one_test, places_of
 from shm.models.effects import EFFECTS, Variant
 from shm.values import AddedMass, ModalTest, Scatter
@@ -108,22 +108,6 @@ def test_every_effect_of_the_hanger_can_be_adopted_and_moves_a_frequency(
     assert np.abs(found / bare - 1).max() > 1e-4
 
 
-@pytest.mark.parametrize("baseline", ["beam1", "beam2"])
-def test_no_effect_is_the_baseline(baseline: str) -> None:
-    name = f"{baseline}+effective_length@both_ends"
-    model, bare = build(name, HANGER_3), described(baseline, HANGER_3)
-    springs = {f"log10_k{i}": 6.0 + i / 3 for i in range(1, 5)}
-    theta = parameters(model, **springs)
-    expected = bare.frequencies_hz(parameters(bare, theta_L=1.0, **springs), 6)
-    np.testing.assert_allclose(model.frequencies_hz(theta, 6), expected, rtol=1e-6)
-    for mine, its in zip(
-        model.springs_n_m_rad(theta),
-        bare.springs_n_m_rad(parameters(bare, theta_L=1.0, **springs)),
-        strict=True,
-    ):
-        np.testing.assert_allclose(mine, its)
-
-
 def test_end_springs_that_an_effect_adds_are_told_for_the_watch() -> None:
     model = build("beam1+rotational_end_flexibility@deck_end.transverse", HANGER_3)
     deck, arch = model.springs_n_m_rad(parameters(model, log10_k1=6.5))
@@ -195,25 +179,6 @@ def test_tension_and_springs_keep_the_names_and_the_ranges_of_their_class(
 def test_a_tension_that_was_weighed_stays_as_exact_in_an_adopted_class() -> None:
     weighed = replace(HANGER_3, scatter=Scatter(tension=0.02))
     assert build(MASS, weighed).bounds["theta_F"] == pytest.approx((0.98, 1.02))
-
-
-def test_a_hanger_without_scatter_has_no_deviations() -> None:
-    exact = replace(HANGER_3, scatter=Scatter(0.0, 0.0, 0.0, 0.0))
-    assert build(MASS, exact).parameter_names == ("theta_F", "log10_mass_kg", "x_m")
-
-
-def test_two_effects_with_one_parameter_name_keep_their_ranges_apart() -> None:
-    two = "beam1+point_mass@everywhere:x_m=3..4+intermediate_support@everywhere:x_m=7..8"
-    bounds = build(two, HANGER_3).bounds
-    assert bounds["point_mass.x_m"] == (3.0, 4.0)
-    assert bounds["intermediate_support.x_m"] == (7.0, 8.0)
-
-
-def test_an_adopted_class_is_admitted_where_its_baseline_is() -> None:
-    admitting = replace(HANGER_3, models=("beam1",))
-    assert competing_names(admitting, ["beam1", "beam2", MASS]) == ("beam1", MASS)
-    with pytest.raises(UsageError, match="admits beam2 only"):
-        build(MASS, replace(HANGER_3, models=("beam2",)))
 
 
 def test_a_shape_reaches_one_and_vanishes_at_clamped_ends() -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from shm.errors import UsageError
-from shm.models import MODELS, THESIS, applicable, build, competing_names
+from shm.models import MODELS, applicable, build, competing_names
 from shm.models.beam import Beam1
 from shm.values import Hanger, Turnbuckle
 from tests.helpers.hangers import HANGER_3
@@ -61,24 +61,6 @@ def test_a_class_that_the_hanger_does_not_admit_says_so() -> None:
     fitting, reasons = applicable(replace(BARE, models=("beam2",)), ["beam1", "beam2"])
     assert fitting == ("beam2",)
     assert "admits beam2 only" in reasons["beam1"]
-
-
-def test_a_class_named_twice_competes_once() -> None:
-    assert applicable(BARE, ["beam1", "beam1"])[0] == ("beam1",)
-
-
-@pytest.mark.parametrize(
-    ("hanger", "complaint"),
-    [(BARE, "needs end plates"), (replace(HANGER_3, models=("beam2",)), "admits beam2 only")],
-)
-def test_building_a_class_that_does_not_apply_names_those_that_do(
-    hanger: Hanger, complaint: str
-) -> None:
-    with pytest.raises(UsageError, match=complaint) as refusal:
-        build("plated", hanger)
-    assert "beam2" in refusal.value.remedy
-    assert isinstance(build("plated", HANGER_3, THESIS), Plated)
-    assert isinstance(build("plated", HANGER_3).model, Plated)
 
 
 def test_an_unknown_class_among_the_hangers_own_is_told_with_the_hanger() -> None:

@@ -11,7 +11,6 @@ import pytest
 from shm.models.effects import (
     EFFECTS,
     Conditions,
-    Parameter,
     Survey,
     Variant,
     parameters_of,
@@ -20,29 +19,6 @@ from shm.models.hanger import PhysicalHanger
 from shm.values import PLANES
 from tests.helpers.hangers import HANGER_3
 
-DESIGN = [
-    "rotational_end_flexibility",
-    "translational_end_flexibility",
-    "effective_length",
-    "bending_stiffness",
-    "distributed_mass",
-    "point_mass",
-    "section_loss",
-    "stiff_end_zones",
-    "shear_and_rotary_inertia",
-    "sag",
-    "intermediate_support",
-    "support_motion",
-    "temperature_tension",
-    "geometric_hardening",
-    "joint_softening",
-    "sensor_mass",
-    "sensor_misalignment",
-    "skewed_principal_axes",
-    "timebase",
-    "section_size",
-    "partial_mass",
-]
 PLACES_M = (1.2, 3.6, 5.1, 8.3)
 RICH = Survey(
     ("t1", "t2", "t3"), PLANES, PLACES_M, True, (2.0, 12.0, 22.0), (0.5, 1.0), (), (7e5, 7.4e5)
@@ -129,11 +105,6 @@ def changed(before: PhysicalHanger, after: PhysicalHanger) -> set[str]:
     return differing | (one.keys() ^ other.keys())
 
 
-def test_the_effects_of_the_design_come_first_and_in_its_order() -> None:
-    """Newer ones follow: what stands in stores and trials keeps its place."""
-    assert list(EFFECTS)[: len(DESIGN)] == DESIGN
-
-
 @pytest.mark.parametrize("name", EFFECTS)
 def test_an_effect_says_what_it_is_and_whence(name: str) -> None:
     effect = EFFECTS[name]
@@ -164,16 +135,6 @@ def test_at_zero_nothing_is_changed(name: str, variant: Variant) -> None:
 @pytest.mark.parametrize(("name", "variant"), CASES)
 def test_a_size_within_its_prior_changes_the_hanger(name: str, variant: Variant) -> None:
     assert changed(bar(), acting(name, variant)) != set()
-
-
-@pytest.mark.parametrize(("name", "variant"), CASES)
-def test_a_batch_is_its_members_one_by_one(name: str, variant: Variant) -> None:
-    together = felt(acting(name, variant))
-    for row, share in enumerate(SHARES):
-        alone = felt(acting(name, variant, shares=np.full(3, share)))
-        for field, values in together.items():
-            one = alone[field][row]
-            np.testing.assert_allclose(values[row], one, rtol=1e-12, err_msg=field)
 
 
 @pytest.mark.parametrize(("name", "variant"), CASES)
@@ -213,17 +174,6 @@ def test_a_parameter_and_its_share_of_the_prior_go_both_ways(name: str, variant:
         assert np.all(size <= one.upper * (1 + 1e-12))
 
 
-def test_either_sign_of_a_signed_size_is_as_likely() -> None:
-    size = Parameter("e", "", 1e-3, 1.0, 0.0, "", spread="logarithmic", signed=True)
-    value = size.value(np.linspace(0.005, 0.995, 100))
-    assert np.sum(value > 0) == 50
-    np.testing.assert_allclose(np.sort(value), -np.sort(value)[::-1])
-
-
-def test_rich_data_can_show_every_effect() -> None:
-    assert [name for name, each in EFFECTS.items() if each.invisible(HANGER_3, RICH)] == []
-
-
 def test_frequencies_of_one_plane_in_one_test_show_what_they_can() -> None:
     hidden = {name for name, each in EFFECTS.items() if each.invisible(HANGER_3, BARE)}
     assert hidden == {
@@ -256,37 +206,6 @@ def test_what_data_cannot_show_is_said_in_a_sentence(name: str, survey: Survey, 
     assert sentence.endswith(".")
 
 
-def test_just_enough_is_enough() -> None:
-    just = replace(RICH, temperatures_c=(12.0, 13.0), amplitudes=(1.0, 1.2))
-    assert not any(each.invisible(HANGER_3, just) for each in EFFECTS.values())
-
-
-@pytest.mark.parametrize("name", EFFECTS)
-def test_a_plane_that_was_not_measured_is_not_named(name: str) -> None:
-    alone = replace(RICH, planes=("longitudinal",))
-    found = [variant.at for variant in EFFECTS[name].variants(HANGER_3, alone)]
-    assert found
-    assert not any("transverse" in at for at in found)
-
-
 def test_one_test_cannot_have_a_clock_of_its_own() -> None:
     (only,) = EFFECTS["timebase"].variants(HANGER_3, BARE)
     assert only.at == "all tests"
-
-
-def test_sensors_close_to_each_other_are_named_apart() -> None:
-    close = replace(RICH, sensor_places_m=(1.2, 3.6, 3.604))
-    found = [each.at for each in EFFECTS["sensor_misalignment"].variants(HANGER_3, close)]
-    assert found[1:] == ["sensor at 1.200 m", "sensor at 3.600 m", "sensor at 3.604 m"]
-
-
-def test_springs_are_named_as_in_the_thesis() -> None:
-    """k1, k3 act in the transverse plane at the deck and the arch, k2, k4 in the other."""
-    names = {
-        variant.at: [one.name for one in parameters_of(effect, HANGER_3, variant)]
-        for effect in ("rotational_end_flexibility",)
-        for variant in EFFECTS[effect].variants(HANGER_3, RICH)
-    }
-    assert names["deck end"] == names["both ends"] == ["log10_k1", "log10_k2"]
-    assert names["arch end"] == ["log10_k3", "log10_k4"]
-    assert names["arch end, longitudinal"] == ["log10_k4"]

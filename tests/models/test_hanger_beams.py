@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shm.models import tensioned_beam
-from shm.models.hanger import PhysicalHanger, Zone, solve
+from shm.models.hanger import PhysicalHanger, Zone
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.physical_hangers import (
     EI,
@@ -76,35 +76,6 @@ def test_shear_and_rotary_inertia_are_timoshenkos() -> None:
     np.testing.assert_allclose(frequencies_hz(bar, 10)[0, 0], expected, rtol=2e-6)
 
 
-def test_a_pinned_bar_that_shears_has_timoshenkos_closed_form() -> None:
-    """w ~ sin k x, k = n pi/L, without tension: Omega = omega^2 is the lower root of
-    rI m Omega^2 - (EI m k^2 + rI S k^2 + S m) Omega + EI S k^4 = 0 with S = kappa G A."""
-    stubby, inertia = 9e7, 1.0
-    k = np.arange(1, 9) * np.pi / LENGTH
-    a, b, c = (
-        inertia * MASS,
-        EI * MASS * k**2 + inertia * stubby * k**2 + stubby * MASS,
-        EI * stubby * k**4,
-    )
-    expected = np.sqrt(2 * c / (b + np.sqrt(b**2 - 4 * a * c))) / (2 * np.pi)
-    loose = np.zeros((1, 2))
-    bar = replace(
-        on_springs(of_slenderness(np.zeros(1)), loose, loose),
-        shear_compliance_1_n=np.array([1 / stubby]),
-        rotary_inertia_kg_m=np.array([inertia]),
-    )
-    found = frequencies_hz(bar, 8)[0, 0]
-    np.testing.assert_allclose(found[:4], expected[:4], rtol=1e-5)
-    np.testing.assert_allclose(found, expected, rtol=1e-3)
-
-
-def test_a_bar_without_shear_is_not_changed_by_one_that_shears_beside_it() -> None:
-    both = replace(clamped(2), shear_compliance_1_n=np.array([0.0, 1e-9]))
-    found = frequencies_hz(both, 8)
-    np.testing.assert_allclose(found[0], frequencies_hz(clamped(), 8)[0], rtol=1e-6)
-    assert np.all(found[1] < found[0])
-
-
 ZONES = [
     (0.0, 0.006, 100.0, 1.0),
     (0.0, 0.8, 5.0, 1.0),
@@ -127,44 +98,6 @@ def test_a_zone_agrees_with_fine_elements(start, end, stiffness, mass) -> None:
     zone = Zone(*(np.array([value]) for value in (start, end, stiffness, mass)))
     found = frequencies_hz(replace(clamped(), zones=(zone,)), 8)[0, 0]
     np.testing.assert_allclose(found, expected, rtol=5e-5)
-
-
-def test_overlapping_zones_multiply() -> None:
-    def zone(*values: float) -> Zone:
-        return Zone(*(np.array([value]) for value in values))
-
-    apart = (zone(2, 4, 2, 3), zone(4, 6, 1.0, 1.5), zone(6, 8, 0.5, 0.5))
-    across = (zone(2, 6, 2, 3), zone(4, 8, 0.5, 0.5))
-    one, other = (frequencies_hz(replace(clamped(), zones=zones), 8) for zones in (apart, across))
-    np.testing.assert_allclose(one, other, rtol=1e-6)
-
-
-def test_zones_of_no_length_of_no_change_and_in_one_place_change_nothing() -> None:
-    one, rng = np.ones(6), np.random.default_rng(0)
-    empty = Zone(5 * one, 5 * one, 3 * one, 2 * one)
-    behind = Zone(7 * one, 4 * one, 3 * one, 2 * one)
-    neutral = Zone(rng.uniform(-1, 6, 6), rng.uniform(6, 13, 6), one, one)
-    for zones in ((empty,), (behind,), (neutral,), (neutral, neutral, empty)):
-        found = frequencies_hz(replace(clamped(6), zones=zones), 8)
-        np.testing.assert_allclose(found, frequencies_hz(clamped(6), 8), rtol=1e-6)
-
-
-def test_rows_are_solved_together_as_one_by_one() -> None:
-    rng, n = np.random.default_rng(2), 12
-    factor, one = rng.uniform(0.3, 3, n), np.ones(n)
-    zone = Zone(rng.uniform(-1, 6, n), rng.uniform(6, 13, n), factor, one)
-    deck, arch = 10 ** rng.uniform(4, 9, (2, n, 2))
-    many = replace(on_springs(clamped(n), deck, arch), zones=(zone,))
-    together = solve(many, 6, np.array([1.0, 5.0]))
-    for row in range(n):
-        part = slice(row, row + 1)
-        single = replace(
-            on_springs(clamped(), deck[part], arch[part]),
-            zones=(Zone(*(value[part] for value in vars(zone).values())),),
-        )
-        alone = solve(single, 6, np.array([1.0, 5.0]))
-        np.testing.assert_allclose(alone.frequency_hz[0], together.frequency_hz[row], rtol=1e-8)
-        np.testing.assert_allclose(alone.shape[0], together.shape[row], atol=1e-5)
 
 
 def test_a_bar_that_buckles_gets_a_first_frequency_next_to_nothing() -> None:

@@ -14,7 +14,7 @@ from shm.models.effects import Conditions, Variant
 from shm.models.hanger import PhysicalHanger, solve
 from shm.values import AddedMass, Scatter, Turnbuckle
 from tests.helpers.hangers import HANGER_3
-from tests.helpers.physical_hangers import LENGTH, MASS, NOWHERE, TENSION, clamped, frequencies_hz
+from tests.helpers.physical_hangers import MASS, NOWHERE, TENSION, clamped, frequencies_hz
 from tests.helpers.slow import few_of
 
 PLACES = (1.2, 3.6, 6.0, 9.0)
@@ -67,19 +67,6 @@ def test_scatter_changes_stiffness_and_mass(column: int, stiffness: float, mass:
     np.testing.assert_allclose(made.mass_per_length_kg_m, MASS * mass)
 
 
-def test_a_longer_bar_ends_farther_from_the_deck() -> None:
-    made = scattered(clamped(), np.array([[0, 0, np.log(1.01), 0]]), HANGER_3)
-    np.testing.assert_allclose((made.deck_end_m[0], made.arch_end_m[0]), (0, 1.01 * LENGTH))
-
-
-def test_turnbuckles_keep_their_own_stiffness_and_mass() -> None:
-    bar = PhysicalHanger.clamped(COUPLED, np.array([TENSION]))
-    made = scattered(bar, np.array([[0.02, 0.03, 0, 0.01]]), COUPLED)
-    own = made.zones[0].stiffness_factor.ravel()[:1] * made.bending_stiffness_n_m2[:, 0]
-    np.testing.assert_allclose(own, 1e7)
-    np.testing.assert_allclose(made.zones[0].mass_factor * made.mass_per_length_kg_m, 250.0)
-
-
 def test_deviations_have_normal_priors_of_the_hangers_scatter() -> None:
     hanger = replace(HANGER_3, scatter=Scatter(0.01, 0.02, 0.0, 0.005))
     section, density, length, modulus = deviations_of(hanger)
@@ -87,16 +74,6 @@ def test_deviations_have_normal_priors_of_the_hangers_scatter() -> None:
     np.testing.assert_allclose(modulus.share(modulus.value(np.array([0.1, 0.7]))), [0.1, 0.7])
     np.testing.assert_array_equal(length.value(np.array([0.1, 0.9])), 0)
     assert section.upper == 0.01
-
-
-def test_parameters_stand_in_order_and_have_names_of_their_own() -> None:
-    everywhere = Variant()
-    composed = ComposedHanger(
-        HANGER_3, "beam1", [("point_mass", everywhere), ("section_loss", everywhere)], PLACES
-    )
-    assert composed.names[:5] == ("theta_F", "section", "density", "length", "modulus")
-    assert {"point_mass.x_m", "section_loss.x_m", "mass_kg", "loss"} < set(composed.names)
-    assert len(set(composed.names)) == len(composed.names)
 
 
 def test_an_effect_is_applied_and_a_known_mass_too() -> None:

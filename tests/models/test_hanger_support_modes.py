@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from shm.models.hanger import PhysicalHanger, SupportMode, solve
+from shm.models.hanger import PhysicalHanger, SupportMode
 from shm.values import FloatArray
 from tests.helpers.physical_hangers import (
     EI,
     LENGTH,
     MASS,
-    NOWHERE,
     TENSION,
     clamped,
     frequencies_hz,
@@ -108,61 +107,3 @@ def test_a_support_with_further_modes_is_a_chain_of_masses(
     found = frequencies_hz(hanger, 8)[0]
     np.testing.assert_allclose(found[0], hangers_own, rtol=1e-6)
     np.testing.assert_allclose(found[1], frequencies_hz(clamped(), 8)[0, 1], rtol=1e-7)
-
-
-def halved(hanger: PhysicalHanger) -> PhysicalHanger:
-    """Each first mode as two of the same frequency, of twice the mass each: the same compliance."""
-    half = SupportMode(hanger.translational_compliance_m_n / 2, 2 * hanger.support_mass_kg)
-    return replace(
-        hanger,
-        translational_compliance_m_n=half.compliance_m_n,
-        support_mass_kg=half.mass_kg,
-        support_modes=(half,),
-    )
-
-
-@pytest.mark.parametrize("turned", [False, True])
-def test_two_modes_of_one_frequency_are_one_mode(turned: bool) -> None:
-    """Frequencies and shapes, in one plane at one end and where joints couple both planes."""
-    plain = clamped(2)
-    springs = np.zeros((2, 2, 2, 2))
-    if turned:
-        springs[:, 1] = np.outer([0.8, 0.6], [0.8, 0.6]) / 2e6
-    mass, compliance = np.zeros((2, 2, 2, 2))
-    mass[0, 0, 1], compliance[0, 0, 1] = 4000.0, 2e-8
-    mass[1], compliance[1] = 9000.0, [[1e-8, 2e-8], [3e-8, 5e-9]]
-    one = replace(
-        plain,
-        rotational_compliance_rad_n_m=springs,
-        translational_compliance_m_n=compliance,
-        support_mass_kg=mass,
-    )
-    places = np.array([1.5, 4.0])
-    found, expected = solve(halved(one), 6, places), solve(one, 6, places)
-    np.testing.assert_allclose(found.frequency_hz, expected.frequency_hz, rtol=1e-9)
-    np.testing.assert_allclose(found.shape, expected.shape, atol=1e-6)
-    assert np.abs(expected.frequency_hz / solve(plain, 6, NOWHERE).frequency_hz - 1).max() > 1e-3
-
-
-def test_a_mode_without_mass_is_a_spring_in_series() -> None:
-    springs = np.full((1, 2, 2), 3e-9)
-    none = np.zeros_like(springs)
-    once = replace(clamped(), translational_compliance_m_n=2 * springs)
-    twice = replace(once, translational_compliance_m_n=springs)
-    twice = replace(twice, support_modes=(SupportMode(springs, none),))
-    np.testing.assert_allclose(frequencies_hz(twice, 8), frequencies_hz(once, 8), rtol=1e-9)
-    beyond_a_held_end = replace(clamped(), support_modes=(SupportMode(2 * springs, none),))
-    np.testing.assert_allclose(
-        frequencies_hz(beyond_a_held_end, 8), frequencies_hz(once, 8), rtol=1e-8
-    )
-
-
-def test_a_hanger_without_further_modes_is_not_disturbed_by_its_neighbours() -> None:
-    """One of a batch has them, the other has a support of one mode."""
-    modes = as_modes([NEAR, FAR])
-    both = on_modes(clamped(2), modes, [0, 1])
-    both.support_modes[0].compliance_m_n[1] = both.support_modes[0].mass_kg[1] = 0.0
-    found = frequencies_hz(both, 6)
-    alone = [on_modes(clamped(), modes, [0, 1]), on_modes(clamped(), modes[:1], [0, 1])]
-    for row, hanger in enumerate(alone):
-        np.testing.assert_allclose(found[row], frequencies_hz(hanger, 6)[0], rtol=1e-9)

@@ -13,12 +13,10 @@ from shm.models.as_made import AsMade
 from shm.models.base import Conditions
 from shm.models.composed import Baseline
 from shm.models.end_effects import EndWaves
-from shm.models.hanger import ModeLaw
-from shm.models.registry import registered
 from shm.values import AddedMass, Posterior
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_posterior, a_test
-from tests.helpers.physical_hangers import clamped, frequencies_hz
+from tests.helpers.physical_hangers import frequencies_hz
 
 ROD = replace(HANGER_3, plate=None)
 
@@ -72,21 +70,6 @@ def test_a_bar_as_made_hands_on_what_its_class_says(name: str) -> None:
     assert (made.name, made.title) == (own.name, own.title)
 
 
-def test_a_registered_class_says_what_it_cannot_be() -> None:
-    assert isinstance(registered("beam2", ROD), MODELS["beam2"])
-    with pytest.raises(UsageError, match="unknown model class 'beam9'"):
-        registered("beam9", ROD)
-    with pytest.raises(UsageError, match="s2 does not apply to hanger 3: "):
-        registered("s2", ROD)
-
-
-def test_an_unknown_law_changes_the_logarithms_of_frequencies_by_order_and_plane() -> None:
-    bar, law = clamped(2), ModeLaw(np.array([[0.01, 0.0], [0.02, -0.03]]), lambda n: 1 / n)
-    factor = np.exp(law.shift[:, :, None] / np.array([1.0, 2.0, 3.0]))
-    changed = frequencies_hz(replace(bar, mode_laws=(law, law)), 3)
-    np.testing.assert_allclose(changed, frequencies_hz(bar, 3) * factor**2, rtol=1e-12)
-
-
 def test_a_baseline_of_beam_3_shears_and_turns_as_its_class() -> None:
     """The general model's own elements against the transcendental equation of Timoshenko."""
     baseline, model = Baseline("beam3", ROD), build("beam3", ROD, THESIS)
@@ -128,10 +111,3 @@ def test_waves_of_the_ends_are_those_of_the_named_values() -> None:
         )
         for name in vars(expected):
             np.testing.assert_allclose(getattr(waves, name), getattr(expected, name), rtol=1e-12)
-
-
-def test_fittings_are_stiff_unless_the_effective_length_is_stated() -> None:
-    fitted = replace(ROD, fittings_m=(0.2, 0.3))
-    assert build("beam1", fitted).stiff_ends_m == (0.2, 0.3)
-    stated = replace(fitted, scatter=replace(fitted.scatter, effective_length=0.01))
-    assert build("beam1", stated).stiff_ends_m == (0.0, 0.0)

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.polynomial import legendre
-from scipy.linalg import eigh
-from scipy.optimize import brentq
 
 from shm.errors import UsageError
 from shm.models import applicable, build, check_baseline
 from shm.models.composed import Baseline, ComposedHanger
-from shm.models.effects import EFFECTS, Conditions, Survey, Variant, parameters_of
-from shm.models.hanger import LateralSpring, PhysicalHanger, solve
-from shm.values import PLANES, FloatArray, Hanger, Scatter, Supports
+from shm.models.effects import EFFECTS, Conditions, Survey, parameters_of
+from shm.models.hanger import PhysicalHanger, solve
+from shm.values import PLANES, FloatArray, Scatter, Supports
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.physical_hangers import EI, LENGTH, MASS, NOWHERE, TENSION
 
@@ -39,26 +35,6 @@ def both_ways(physical: PhysicalHanger, modes: int) -> list[FloatArray]:
     return [alone.frequency_hz[0, 0], seen.frequency_hz[0, 0]]
 
 
-def roots(fault: Callable[[float], float], about: FloatArray) -> FloatArray:
-    """One root about 0.3 around each."""
-    return np.array([brentq(fault, each - 0.3, each + 0.3, xtol=1e-14) for each in about])
-
-
-def test_a_bar_hanging_free_has_its_bending_modes_and_no_motion_as_a_whole() -> None:
-    """Cosh q cos q = 1 (Blevins 1979, table 8-1)."""
-    q = roots(lambda q: float(np.cos(q) - 1 / np.cosh(q)), (ORDERS + 0.5) * np.pi)
-    for found in both_ways(held(FREE, 0.0), 6):
-        np.testing.assert_allclose(found, q**2 * UNIT_HZ, rtol=1e-9)
-
-
-@pytest.mark.parametrize("supports", [Supports("pinned", "free"), Supports("free", "pinned")])
-def test_a_bar_pinned_at_one_end_swings_and_that_is_no_mode(supports: Supports) -> None:
-    """Tan q = tanh q, without tension (Blevins 1979, table 8-1)."""
-    q = roots(lambda q: float(np.sin(q) - np.cos(q) * np.tanh(q)), (ORDERS + 0.25) * np.pi)
-    for found in both_ways(held(supports, 0.0), 6):
-        np.testing.assert_allclose(found, q**2 * UNIT_HZ, rtol=1e-9)
-
-
 @pytest.mark.parametrize("tension_n", [0.0, 1e3, TENSION, 5e7])
 def test_a_pinned_bar_is_a_sum_of_string_and_beam(tension_n: float) -> None:
     """(omega/unit)^2 = (n pi)^4 + T L^2/EI (n pi)^2."""
@@ -66,80 +42,6 @@ def test_a_pinned_bar_is_a_sum_of_string_and_beam(tension_n: float) -> None:
     expected = np.sqrt(waves**4 + tension_n * LENGTH**2 / EI * waves**2) * UNIT_HZ
     for found in both_ways(held(PINNED, tension_n), 6):
         np.testing.assert_allclose(found, expected, rtol=1e-8)
-
-
-@pytest.mark.parametrize(("tension_n", "mass_kg"), [(TENSION, 72e3), (1e4, 1e3), (3e6, 50.0)])
-@pytest.mark.parametrize("end", [0, 1])
-def test_a_rod_with_a_mass_at_its_end_is_a_pendulum(
-    tension_n: float, mass_kg: float, end: int
-) -> None:
-    """Hinged above, at the mass no moment and EI w''' - T w' = -M omega^2 w.
-
-    The first mode is the pendulum's, near sqrt(T/(M L)); it is a mode.
-    """
-    xi_squared = tension_n * LENGTH**2 / EI
-
-    def fault(omega: float) -> float:
-        wave = MASS * omega**2 * LENGTH**4 / EI
-        root = np.sqrt(xi_squared**2 / 4 + wave)
-        a, b = np.sqrt(root - xi_squared / 2), np.sqrt(root + xi_squared / 2)
-        hyperbolic = (a / b) ** 2 * np.sin(a)
-        slope = a * np.cos(a) + hyperbolic * b / np.tanh(b)
-        third = -(a**3) * np.cos(a) + hyperbolic * b**3 / np.tanh(b)
-        moved = np.sin(a) + hyperbolic
-        return float(third - xi_squared * slope + mass_kg / (MASS * LENGTH) * wave * moved)
-
-    omega = np.linspace(0.02, 1500.0, 60_001)
-    signs = np.sign([fault(each) for each in omega])
-    at = np.flatnonzero(signs[1:] != signs[:-1])[:4]
-    expected = np.array([brentq(fault, omega[i], omega[i + 1]) for i in at]) / (2 * np.pi)
-    supports = (Supports("free", "pinned", mass_kg), Supports("pinned", "free", mass_kg))[end]
-    for found in both_ways(held(supports, tension_n), 4):
-        np.testing.assert_allclose(found, expected, rtol=1e-8)
-
-
-def test_a_cord_that_holds_a_free_bar_adds_no_mode() -> None:
-    bar = held(FREE, 0.0)
-    cord = LateralSpring(np.array([5.0]), np.full((1, 2), 1e-3 * EI / LENGTH**3), np.zeros(1))
-    for found in both_ways(replace(bar, springs=(cord,)), 5):
-        np.testing.assert_allclose(found, both_ways(bar, 5)[0], rtol=1e-4)
-
-
-def test_shear_and_rotary_inertia_lower_a_free_bars_high_modes() -> None:
-    """To first order df/f = -(r^2/2) (1 + E/(kappa G)) q^2 for short waves (Timoshenko 1921).
-
-    Here against the exact roots of a free Timoshenko beam with the same end conditions, found by
-    another discretisation: 60 Legendre polynomials for deflection and rotation each.
-    """
-    hanger = replace(HANGER_3, supports=FREE, nominal_tension_n=0.0)
-    composed = ComposedHanger(hanger, "beam1", [("shear_and_rotary_inertia", Variant())], ())
-    theta = np.array([[0.0, 0.0, 0.0, 0.0, 1.0]])
-    found = composed.modes(theta, Conditions(), 6, shapes=False).frequency_hz[0, 0]
-    np.testing.assert_allclose(found, free_timoshenko_hz(hanger, 6), rtol=2e-6)
-
-
-def free_timoshenko_hz(hanger: Hanger, modes: int) -> FloatArray:
-    x, weights = legendre.leggauss(120)
-    weights = weights * hanger.length_m / 2
-    value = legendre.legvander(x, 59).T
-    unit = np.eye(60)
-    slope = np.array([legendre.legval(x, legendre.legder(row)) for row in unit])
-    slope = slope * 2 / hanger.length_m
-    ratio, modulus = hanger.poissons_ratio, hanger.elastic_modulus_pa
-    shear = 6 * (1 + ratio) / (7 + 6 * ratio) * modulus / (2 * (1 + ratio)) * hanger.area_m2
-    inertia = hanger.mass_per_length_kg_m / hanger.area_m2 * hanger.second_moment_m4
-
-    def integral(left: FloatArray, right: FloatArray) -> FloatArray:
-        return np.asarray((left * weights) @ right.T)
-
-    bending = hanger.bending_stiffness_n_m2 * integral(slope, slope)
-    corner = -shear * integral(slope, value)
-    whole = bending + shear * integral(value, value)
-    stiffness = np.block([[shear * integral(slope, slope), corner], [corner.T, whole]])
-    own, none = integral(value, value), np.zeros((60, 60))
-    mass = np.block([[hanger.mass_per_length_kg_m * own, none], [none, inertia * own]])
-    squared = eigh(stiffness, mass, eigvals_only=True)[2 : 2 + modes]
-    return np.asarray(np.sqrt(squared) / (2 * np.pi))
 
 
 @pytest.mark.parametrize(
@@ -189,21 +91,6 @@ def test_every_effect_that_may_act_gives_finite_frequencies(
         assert np.isfinite(modes.frequency_hz).all(), variant
         assert (modes.frequency_hz > 0).all(), variant
         assert np.isfinite(modes.shape).all(), variant
-
-
-@pytest.mark.parametrize(("log10_k", "like"), [(12.0, Supports()), (-3.0, PINNED)])
-def test_a_hinge_that_resists_turning_lies_between_hinge_and_clamp(
-    log10_k: float, like: Supports
-) -> None:
-    hanger = replace(HANGER_3, supports=PINNED)
-    effect = EFFECTS["rotational_end_flexibility"]
-    variant = effect.variants(hanger, EVERYTHING)[-1]
-    assert variant.at == "both ends, both planes alike"
-    (size,) = effect.parameters(hanger, variant)
-    assert size.zero == -np.inf
-    bar = held(PINNED, TENSION)
-    stiff = effect.applied(bar, np.array([[log10_k]]), variant, Conditions(), hanger)
-    np.testing.assert_allclose(both_ways(stiff, 5)[0], both_ways(held(like, TENSION), 5)[0], 1e-5)
 
 
 def test_a_bar_without_tension_has_no_parameter_of_it() -> None:

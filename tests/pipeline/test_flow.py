@@ -311,8 +311,6 @@ def test_later_tests_start_from_the_baseline_whichever_was_computed_before(
         assert len(known_samples) == 2
         for samples in known_samples:
             np.testing.assert_array_equal(samples, baseline.posterior.samples)
-        ways = {test.test.id: posterior.method for test, posterior in store.posteriors.history(3)}
-    assert ways == {"first": "tmcmc", "second": "re-weighted", "third": "re-weighted"}
 
 
 def test_results_do_not_depend_on_order_or_executor(tmp_path: Path) -> None:

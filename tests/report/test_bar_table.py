@@ -53,17 +53,18 @@ SURVEY = Survey("pins", "steel tape, 2026-04", "Bridge office, A. Berg")
 DESCRIBED = Hanger(
     3, 12.0, 200e9, 0.013273, 1.4019e-5, 103.5, 711e3, diameter_m=0.130,
     supports=Supports("pinned", "clamped"), fittings_m=(0.6, 0.55), survey=SURVEY,
+    ends="fork", inclination_deg=72.5,
 )  # fmt: skip
 BARE = Hanger(8, 21.5, 160e9, 2.96e-3, 9.07e-7, 24.5, 850e3, name="strand")
 SENSORS = make_points()
 ROWS = (
     ("Section", "diameter 130 mm, area 13273 mm²"),
-    ("Length", "12 m"),
+    ("Length", "12 m, 72.5° from the horizontal"),
     ("Length taped", "pin to pin, steel tape, 2026-04"),
     ("Elastic modulus", "200 GPa"),
     ("Density", "7798 kg/m³ (103.5 kg/m)"),
     ("Fittings", "0.6 m (deck), 0.55 m (arch)"),
-    ("Ends", "pinned (deck), clamped (arch)"),
+    ("Ends", "fork; pinned (deck), clamped (arch)"),
     ("Sensors", "both planes at 2.5 and 4.4 m"),
     ("Bar measured by", "Bridge office, A. Berg"),
 )
@@ -82,6 +83,8 @@ DOCUMENT = {
     "plate": None,
     "turnbuckles": [],
     "ends": {"deck": "pinned", "arch": "clamped", "hanging_mass_kg": 0.0},
+    "end_kind": "fork",
+    "inclination_deg": 72.5,
     "sensors": [
         {"name": f"acc_{number}", "plane": plane, "x_m": x_m}
         for number, (plane, x_m) in enumerate(
@@ -206,7 +209,8 @@ def test_what_is_not_stated_is_said_never_invented() -> None:
     document = json.loads(documents.dump(bar_document(describe_bar(BARE))))
     unknown = {key for key, value in document.items() if value is None}
     assert unknown == {
-        "diameter_m", "length_by", "length_measured", "fittings_m", "plate", "ends", "measured_by",
+        "diameter_m", "length_by", "length_measured", "fittings_m", "plate", "ends", "end_kind",
+        "inclination_deg", "measured_by",
     }  # fmt: skip
 
 
@@ -268,7 +272,8 @@ def test_bars_table_names_once_what_all_bars_share() -> None:
     bars = [describe_bar(replace(DESCRIBED, id=n, length_m=10.0 + n)) for n in (1, 2)]
     table = bars_table(bars)
     assert table.headings == ("hanger", "length")
-    assert table.rows == (("1", "11 m"), ("2", "12 m"))
+    lean = ", 72.5° from the horizontal"
+    assert table.rows == (("1", f"11 m{lean}"), ("2", f"12 m{lean}"))
     assert "All bars: section diameter 130 mm" in table.note
     assert "bar measured by Bridge office, A. Berg." in table.note
     (only,) = bars_table(bars[:1]).rows

@@ -49,29 +49,10 @@ def test_a_mode_falls_off_with_its_own_damping(hanger: Hanger) -> None:
     assert rate / (2 * np.pi * own) == pytest.approx(0.01, rel=0.35)
 
 
-def test_the_record_is_as_strong_at_its_beginning_as_at_its_end(hanger: Hanger) -> None:
-    """It does not start from rest: light damping would take minutes to build up."""
-    state = HangerState(711e3, damping_ratio=0.0005)
-    rng = np.random.default_rng(5)
-    first, last = [], []
-    for _ in range(8):
-        values = ambient_test(hanger, state, AmbientPlan(seconds=20.0), rng).channels[0].values
-        parts = np.split(values, 10)
-        first.append(np.mean(parts[0] ** 2))
-        last.append(np.mean(parts[-1] ** 2))
-    assert np.mean(first) == pytest.approx(np.mean(last), rel=0.3)
-
-
 def test_the_sensor_that_moves_most_has_the_level_that_was_asked_for(hanger: Hanger) -> None:
     plan = AmbientPlan(seconds=100.0, acceleration_m_s2=0.3, acceleration_noise_m_s2=0.0)
     levels = [np.std(channel.values) for channel in simulate(hanger, plan).channels]
     assert max(levels) == pytest.approx(0.3, rel=0.01)
-
-
-def test_the_same_seed_gives_the_same_wind(hanger: Hanger) -> None:
-    first, again, other = (simulate(hanger, seed=seed).channels[0].values for seed in (3, 3, 4))
-    np.testing.assert_array_equal(first, again)
-    assert not np.array_equal(first, other)
 
 
 def test_a_plan_that_cannot_be_is_refused(hanger: Hanger) -> None:

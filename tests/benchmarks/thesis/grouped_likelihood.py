@@ -35,9 +35,9 @@ class GroupedLikelihood(Likelihood):
             for own in self.by_name.values()
         ]
 
-    def marginal(self, predicted: FloatArray, floor: float = 0.0) -> FloatArray:
+    def marginal(self, predicted: FloatArray) -> FloatArray:
         parts = zip(self._parts, self.by_name.values(), strict=True)
-        terms = [part.marginal(predicted[:, own], floor) for part, own in parts]
+        terms = [part.marginal(predicted[:, own]) for part, own in parts]
         return np.asarray(np.sum(terms, axis=0))
 
     def joint(self, predicted: FloatArray, sigma: FloatArray) -> FloatArray:
@@ -82,8 +82,8 @@ def update_grouped(
     likelihood = GroupedLikelihood(tests, sigma)
     model.prepare(likelihood.highest_order, lambda done: progress(model.name, done))
     problem, rng = Problem(model, likelihood), np.random.default_rng(options.seed)
-    weighted = infer(problem, options.samples, rng, progress)
-    posterior = posterior_of(problem, weighted, tests, options, rng, started)
+    inferred = infer(problem, options, rng, progress)
+    posterior = posterior_of(problem, inferred, tests, options, rng, started)
     theta = np.column_stack([posterior.parameter(name) for name in model.parameter_names])
     drawn = likelihood.draw_each(
         likelihood.predict(model, theta), np.random.default_rng(options.seed)

@@ -30,10 +30,12 @@ class BarElements:
     `bending`, `mass` and `turning` have a matrix for each zone: 0 is the bar itself, then the
     zones in order. `shear` is empty for a bar that does not shear. `end_rotation` (2, d) are the
     rotations of the deck's and the arch's section, `area` (d,) the integral of the deflection.
+    `gradient` is that of a tension x - 1/2, which grows along the bar.
     """
 
     bending: FloatArray
     tension: FloatArray
+    gradient: FloatArray
     mass: FloatArray
     turning: FloatArray
     shear: FloatArray
@@ -81,7 +83,7 @@ def bar_elements(
     strains = _strain_columns(degrees, w_count) if shears else [[] for _ in degrees]
     count = w_count + (1 + max(max(own) for own in strains) - w_count if shears else 0)
     bending, mass, turning = (np.zeros((len(zones) + 1, count, count)) for _ in range(3))
-    tension, shear = np.zeros((count, count)), np.zeros((count, count))
+    tension, gradient, shear = (np.zeros((count, count)) for _ in range(3))
     area, rotation = np.zeros(count), np.zeros((2, count))
     for index, (start, length, degree) in enumerate(zip(edges[:-1], lengths, degrees, strict=True)):
         points, weights = np.polynomial.legendre.leggauss(degree + 5)
@@ -105,6 +107,7 @@ def bar_elements(
         mass[zone][place] += _energy(w[kept], weight)
         turning[zone][place] += _energy(turn[kept], weight)
         tension[place] += _energy(slope[kept], weight)
+        gradient[place] += _energy(slope[kept], weight * (start + x * length - 0.5))
         shear[place] += _energy(strain[kept], weight)
         area[own[kept]] += w[kept] @ weight
     first, last = np.array(columns[0]), np.array(columns[-1])
@@ -112,8 +115,8 @@ def bar_elements(
     if shears:
         rotation[0, strains[0][0]], rotation[1, strains[-1][1]] = -1.0, -1.0
     return BarElements(
-        bending, tension, mass, turning, shear if shears else np.empty((0, 0)), rotation, area,
-        edges, degrees,
+        bending, tension, gradient, mass, turning, shear if shears else np.empty((0, 0)),
+        rotation, area, edges, degrees,
     )  # fmt: skip
 
 

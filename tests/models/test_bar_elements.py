@@ -1,4 +1,4 @@
-"""Elements of high degree against the closed forms of the tensioned bar and a hinged rigid link."""
+"""Compare elements of high degree with closed forms, a rigid link and a hanging string."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 from shm.models import tensioned_beam
+from shm.models.bar_elements import BarElements, bar_elements
 from shm.values import FloatArray
-from tests.worlds.bar_of_terms.bar_elements import BarElements, bar_elements
 
 SLENDERNESS = (0.5, 3.0, 20.0, 150.0)
 ENDS = ((0.0, 0.0), (0.3, 40.0), (0.0, 1e6), (1e6, 1e6))
@@ -56,7 +56,7 @@ def test_a_bar_on_springs_has_the_frequencies_of_its_closed_form(
 def test_a_bar_that_shears_has_the_frequencies_of_its_closed_form(
     xi: float, ends: tuple[float, float], gyration: float
 ) -> None:
-    """The shear stiffness is a third of E A, about that of steel."""
+    """Take a third of E A as shear stiffness, about that of steel."""
     shear, turning = 1 / (3 * gyration**2), gyration**2
     elements = bar_elements([], xi, MODES, True)
     found = circular_frequencies(elements, xi**2, ends, shear=shear, turning=turning)
@@ -109,7 +109,7 @@ def test_a_nearly_rigid_zone_at_a_hinge_is_a_rigid_link(tension: float) -> None:
 
 
 def test_a_deflection_is_that_of_its_mode() -> None:
-    """Of a hinged bar: sines, whatever the edges of the elements."""
+    """Find sines of a hinged bar, whatever the edges of the elements."""
     elements = bar_elements([(0.4, 0.5)], 4.0, MODES, False)
     stiffness, mass = elements.bending.sum(axis=0), elements.mass.sum(axis=0)
     _, vectors = eigh(stiffness, mass)
@@ -119,3 +119,30 @@ def test_a_deflection_is_that_of_its_mode() -> None:
     np.testing.assert_allclose(np.abs(shapes), np.abs(sines), atol=1e-6)
     means = np.abs(elements.area @ vectors[:, :3])
     np.testing.assert_allclose(means, 2 * np.sqrt(2) / np.pi * np.array([1, 0, 1 / 3]), atol=1e-6)
+
+
+def test_a_gradient_moves_tension_from_one_half_to_the_other() -> None:
+    """Integrate (x - 1/2) w_m' w_n' of sines, which vanishes unless m + n is odd."""
+    elements = bar_elements([], 4.0, MODES, False)
+    _, vectors = eigh(elements.bending.sum(axis=0), elements.mass.sum(axis=0))
+    vectors = vectors[:, :3] * np.sign(elements.end_rotation[0] @ vectors[:, :3])
+    found = vectors.T @ elements.gradient @ vectors
+    x, n = np.linspace(0, 1, 20_001), np.arange(1, 4)[:, None] * np.pi
+    slopes = np.sqrt(2) * n * np.cos(n * x)
+    expected = np.trapezoid(slopes[:, None] * slopes * (x - 0.5), x, axis=-1)
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("gradient", [0.0, 150.0, -300.0])
+def test_a_hanging_string_has_the_frequencies_of_its_equation(gradient: float) -> None:
+    """(T w')' = - omega2 w of T = T0 + g (x - 1/2), by finite differences of the second order."""
+    tension, count = 1e5, 600
+    steep = 400 * gradient  # bending is felt by 3e-3
+    elements = bar_elements([], np.sqrt(tension), 4, False)
+    stiffness = elements.bending[0] + tension * elements.tension + steep * elements.gradient
+    found = np.sqrt(eigh(stiffness, elements.mass[0], eigvals_only=True)[:3])
+    middles = (np.arange(count) + 0.5) / count
+    pull = (tension + steep * (middles - 0.5)) * count**2
+    difference = np.diag(pull[1:] + pull[:-1]) - np.diag(pull[1:-1], 1) - np.diag(pull[1:-1], -1)
+    expected = np.sqrt(eigh(difference, eigvals_only=True, subset_by_index=[0, 2]))
+    np.testing.assert_allclose(found, expected, rtol=2e-3)

@@ -8,15 +8,14 @@ and Negri 2016, Reduced Basis Methods, chapter 6).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import scipy
 
+from shm.models.bar_elements import BarElements, bar_elements
 from shm.values import FloatArray
-from tests.worlds.bar_of_terms.bar_elements import BarElements, bar_elements
 
 STIFFEST = 1e6
 """Of an end spring, in EI/L: one that is stiffer clamps as well, and rounding would be seen."""
@@ -30,13 +29,15 @@ _BLOCK = 512
 class BarTerms:
     """Factors of `n` hangers in units of their own length, bending stiffness and mass.
 
-    `tension` (n,) is T L2/EI; `springs` (n, 2 ends, 2 planes) k L/EI; `stiffness` and `mass`
-    (n, zones) those of zones over the bar's; `sag` (n,) the stiffness that a cable's sag adds in
-    the longitudinal plane, EA L4/EI (q/T)2; `shear` (n,) kappa G A L2/EI, `turning` (n,) I/(A L2);
+    `tension` (n,) is T L2/EI, `gradient` (n,) by how much it grows from the deck to the arch;
+    `springs` (n, 2 ends, 2 planes) k L/EI; `stiffness` (n, zones, 2 planes) and `mass` (n, zones)
+    those of zones over the bar's; `sag` (n,) the stiffness that sag under its own weight adds in
+    the longitudinal plane; `shear` (n,) kappa G A L2/EI, `turning` (n,) I/(A L2);
     `point_masses` (n, places) over the bar's.
     """
 
     tension: FloatArray
+    gradient: FloatArray
     springs: FloatArray
     stiffness: FloatArray
     mass: FloatArray
@@ -67,8 +68,10 @@ class ReducedBar:
         self._elements = elements
         self._masses_at = np.asarray(point_masses, dtype=float)
         whole = _Matrices.of(elements, self._masses_at)
-        self.basis = _basis(whole, usual.take(slice(0, _SNAPSHOTS)), modes)
-        self._whole, self._reduced = whole, whole.projected(self.basis)
+        usual = usual.take(slice(0, _SNAPSHOTS))
+        basis = _basis(whole, usual, modes)
+        self.basis = basis @ whole.projected(basis).diagonalised(usual)
+        self._whole, self._reduced = whole, whole.projected(self.basis).with_masses_of(usual)
 
     def frequencies(self, terms: BarTerms) -> FloatArray:
         """Return circular frequencies (n, 2, modes) in units of sqrt(EI/m)/L2."""
@@ -121,12 +124,13 @@ class _Matrices:
     mass: FloatArray
     zones: int
     shears: bool
+    diagonal_mass: bool = False
 
     @classmethod
     def of(cls, elements: BarElements, masses_at: FloatArray) -> _Matrices:
         springs = np.einsum("ei,ej->eij", elements.end_rotation, elements.end_rotation)
         sag = np.outer(elements.area, elements.area)
-        stiffness = [*elements.bending, elements.tension, *springs, sag]
+        stiffness = [*elements.bending, elements.tension, elements.gradient, *springs, sag]
         mass = [*elements.mass]
         shears = elements.shear.size > 0
         if shears:
@@ -142,14 +146,33 @@ class _Matrices:
         stiffness, mass = (basis.T @ each @ basis for each in (self.stiffness, self.mass))
         return _Matrices(stiffness, mass, self.zones, self.shears)
 
+    def diagonalised(self, usual: BarTerms) -> FloatArray:
+        """Return a change of basis (d, d) in which all masses like `usual` are diagonal.
+
+        The identity where they are combinations of more than two matrices.
+        """
+        factors = self.factors(usual, 0)[1]
+        if _rank(factors) > _TWO:
+            return np.eye(self.mass.shape[1])
+        mean, spread = factors.mean(axis=0), factors.std(axis=0)
+        _, vectors = scipy.linalg.eigh(
+            np.tensordot(spread, self.mass, 1), np.tensordot(mean, self.mass, 1)
+        )
+        return np.asarray(vectors)
+
+    def with_masses_of(self, usual: BarTerms) -> _Matrices:
+        """Return the same, with the note whether masses like `usual` are diagonal."""
+        return replace(self, diagonal_mass=_rank(self.factors(usual, 0)[1]) <= _TWO)
+
     def factors(self, terms: BarTerms, plane: int) -> tuple[FloatArray, FloatArray]:
         """Return the factors (n, terms) of stiffness and mass in one plane."""
         one = np.ones((len(terms.tension), 1))
         springs = terms.springs[:, :, plane].clip(max=STIFFEST)
         columns = [
             one,
-            terms.stiffness,
+            terms.stiffness[..., plane],
             terms.tension[:, None],
+            terms.gradient[:, None],
             springs,
             plane * terms.sag[:, None],
         ]
@@ -170,7 +193,7 @@ class _Matrices:
         """Return circular frequencies (n, 2, modes)."""
         found = np.empty((len(terms.tension), 2, modes))
         for plane in (0, 1):
-            whitened, _ = self._whitened(terms, plane)
+            whitened, _ = self._whitened(*self.factors(terms, plane))
             square = np.linalg.eigvalsh(whitened)[:, :modes]
             found[:, plane] = np.sqrt(square.clip(min=0.0))
         return found
@@ -182,33 +205,46 @@ class _Matrices:
         found = np.empty((len(terms.tension), 2, modes))
         near = np.empty((len(shifted), *found.shape))
         for plane in (0, 1):
-            whitened, inverse = self._whitened(terms, plane)
+            stiff, heavy = self.factors(terms, plane)
+            whitened, back = self._whitened(stiff, heavy)
             square, vectors = np.linalg.eigh(whitened)
-            square, shape = square[:, :modes], vectors[:, :, :modes]
-            shape = shape if inverse is None else inverse.swapaxes(1, 2) @ shape
-            stiff = _energies(self.stiffness, shape)
-            heavy = _energies(self.mass, shape)
-            own = self.factors(terms, plane)
+            square, shape = square[:, :modes], back(vectors[:, :, :modes])
+            stiffness = _energies(self.stiffness, shape)
+            mass = _energies(self.mass, shape)
             found[:, plane] = np.sqrt(square.clip(min=0.0))
             for index, each in enumerate(shifted):
                 stiffer, heavier = self.factors(each, plane)
-                change = np.einsum("nt,ntk->nk", stiffer - own[0], stiff)
-                change -= square * np.einsum("nt,ntk->nk", heavier - own[1], heavy)
+                change = np.einsum("nt,ntk->nk", stiffer - stiff, stiffness)
+                change -= square * np.einsum("nt,ntk->nk", heavier - heavy, mass)
                 near[index, :, plane] = np.sqrt((square + change).clip(min=0.0))
         return found, near
 
-    def _whitened(self, terms: BarTerms, plane: int) -> tuple[FloatArray, FloatArray | None]:
-        """Return L^-1 K L^-T (n, d, d) with the mass L L^T, and L^-1, None where the mass is 1."""
-        stiffness, mass = self.assembled(terms, plane)
-        if self.unit_mass:
-            return stiffness, None
-        inverse = np.linalg.inv(np.linalg.cholesky(mass))
-        return inverse @ stiffness @ inverse.swapaxes(1, 2), inverse
+    def _whitened(
+        self, stiff: FloatArray, heavy: FloatArray
+    ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
+        """Return L^-1 K L^-T (n, d, d) with the mass L L^T, and what takes its vectors back."""
+        wrong = ~(np.isfinite(stiff).all(axis=1) & np.isfinite(heavy).all(axis=1))
+        if wrong.any():  # no eigenvalue of it would converge; its frequencies are 0
+            stiff, heavy = stiff.copy(), heavy.copy()
+            stiff[wrong], heavy[wrong] = 0.0, 1.0
+        stiffness = _sum(stiff, self.stiffness)
+        if self.diagonal_mass:
+            diagonal = np.einsum("tii->ti", self.mass)
+            scale = 1 / np.sqrt(heavy @ diagonal)
+            whitened = stiffness * scale[:, :, None] * scale[:, None, :]
+            return whitened, lambda vectors: vectors * scale[:, :, None]
+        inverse = np.linalg.inv(np.linalg.cholesky(_sum(heavy, self.mass)))
+        across = inverse.swapaxes(1, 2)
+        return inverse @ stiffness @ across, lambda vectors: across @ vectors
 
-    @cached_property
-    def unit_mass(self) -> bool:
-        """Whether the mass is that of the bar alone, whose basis is orthonormal."""
-        return len(self.mass) == 1 and bool(np.allclose(self.mass[0], np.eye(len(self.mass[0]))))
+
+def _rank(factors: FloatArray) -> int:
+    """Return of how many combinations of columns all rows of factors (n, terms) are made."""
+    size = np.linalg.svd(factors, compute_uv=False)
+    return int(np.sum(size > _SMALL * size[0]))
+
+
+_TWO, _SMALL = 2, 1e-9
 
 
 def _energies(matrices: FloatArray, shapes: FloatArray) -> FloatArray:
@@ -231,7 +267,11 @@ def _basis(whole: _Matrices, usual: BarTerms, modes: int) -> FloatArray:
     for row in range(len(usual.tension)):
         for plane in (0, 1):
             stiffness, mass = whole.assembled(usual.take(slice(row, row + 1)), plane)
-            _, vectors = scipy.linalg.eigh(stiffness[0], mass[0], subset_by_index=[0, modes])
+            # Of the inverse the lowest modes have the largest values, which no short zone rounds.
+            last = len(root) - 1
+            _, vectors = scipy.linalg.eigh(
+                mass[0], stiffness[0], subset_by_index=[last - modes, last]
+            )
             size = root.T @ vectors
             found.append(size / np.linalg.norm(size, axis=0))
     left, values, _ = np.linalg.svd(np.hstack(found), full_matrices=False)

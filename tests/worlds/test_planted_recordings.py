@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,9 +14,17 @@ from shm.simulate import HammerPlan, HangerState, PlantedEffect, hammer_test
 from shm.simulate.effects import plant_effects
 from shm.simulate.modes import make_bar, plane_modes
 from shm.values import AddedMass, FloatArray, Hanger, Recording
+from tests.helpers.hangers import HANGER_3
 from tests.helpers.planted_modes import planted_modes
 from tests.worlds.simulated.effects.base import TestConditions
 from tests.worlds.simulated.hammer import hammer_test as hit_elements
+
+
+@pytest.fixture
+def hanger() -> Hanger:
+    """Return a round bar like hanger 3 of the thesis."""
+    return replace(HANGER_3, plate=None)
+
 
 STATE = HangerState(711e3)
 PLAN = HammerPlan(hits=1, seconds_per_hit=16.0)

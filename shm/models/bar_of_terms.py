@@ -1,0 +1,178 @@
+"""Frequencies of a described bar with all that its description makes it of.
+
+Bending, tension and its gradient, end springs, fittings and turnbuckles as zones with a stiffness
+and a mass of their own, shear, and the sag of its own weight. All is relative to the described bar:
+lengths to its length, stiffness to its EI, mass to its m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from shm.models.reduced_bar import STIFFEST, BarTerms, ReducedBar
+from shm.values import FloatArray, Hanger
+
+GRAVITY_M_S2 = 9.81
+
+_SNAPSHOTS = 60
+_STIFF_SNAPSHOTS = (-2.0, 4.0)
+"""log10 of k L/EI of the springs that the basis is made for."""
+
+
+@dataclass(frozen=True, eq=False)
+class BarValues:
+    """What `n` bars are, each (n,) over the described one, but for what is said.
+
+    `springs` (n, 2 ends, 2 planes) are k L/EI; `fitting_stiffness` (n, 2 planes); `lean` is the
+    angle from the vertical in rad; `sag_shape` 0 of a bar whose sag its bending holds up, and 1 of
+    one that hangs like a cable; `axial` the stiffness against sag over EA/L; `section` the area,
+    which changes shear alone (a hundredth of the rotary inertia is below 1e-4 of a frequency), and
+    `shear` the flexibility in shear over the theory's.
+    """
+
+    tension_n: FloatArray
+    springs: FloatArray
+    fitting_stiffness: FloatArray
+    fitting_mass: FloatArray
+    turnbuckle_stiffness: FloatArray
+    turnbuckle_mass: FloatArray
+    lean: FloatArray
+    sag_shape: FloatArray
+    axial: FloatArray
+    section: FloatArray
+    shear: FloatArray
+
+
+class BarOfTerms:
+    """The frequencies of bars like `hanger`, with or without shear, for `modes` modes a plane.
+
+    `fittings_m` are the lengths of the deck's and the arch's fitting.
+    """
+
+    def __init__(
+        self,
+        hanger: Hanger,
+        fittings_m: tuple[float, float],
+        shears: bool,
+        modes: int,
+        masses_at_m: Sequence[float] = (),
+    ):
+        self.hanger, self.shears, self.modes = hanger, shears, modes
+        length = hanger.length_m
+        self._fittings = sum(1 for each in fittings_m if each > 0)
+        zones = [(0.0, fittings_m[0] / length)] if fittings_m[0] > 0 else []
+        zones += [(1 - fittings_m[1] / length, 1.0)] if fittings_m[1] > 0 else []
+        for each in hanger.turnbuckles:
+            middle, half = each.x_m / length, each.length_m / length / 2
+            zones.append((middle - half, middle + half))
+        self._unit_hz = math.sqrt(hanger.bending_stiffness_n_m2 / hanger.mass_per_length_kg_m)
+        self._unit_hz /= 2 * math.pi * length**2
+        places = [each / length for each in masses_at_m]
+        self._bar = ReducedBar(zones, self._snapshots(len(places)), modes, places)
+
+    def frequencies_hz(self, values: BarValues, masses_kg: FloatArray | None = None) -> FloatArray:
+        """Return frequencies (n, 2, modes), with known masses (n, places) on the bar."""
+        return self._unit_hz * self._bar.frequencies(self._terms(values, masses_kg))
+
+    def frequencies_about(
+        self, values: BarValues, near: Sequence[BarValues]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return frequencies (n, 2, modes) and, to first order, those of near bars (s, ...)."""
+        terms, others = self._terms(values, None), [self._terms(each, None) for each in near]
+        found, moved = self._bar.frequencies_about(terms, others)
+        return self._unit_hz * found, self._unit_hz * moved
+
+    def shapes(self, values: BarValues, x_m: FloatArray) -> FloatArray:
+        """Return shapes (n, 2, modes, points) at `x_m`, the largest value of each 1."""
+        return self._bar.shapes(self._terms(values, None), x_m / self.hanger.length_m)
+
+    def _terms(self, values: BarValues, masses_kg: FloatArray | None) -> BarTerms:
+        hanger = self.hanger
+        stiffness_n_m2, length_m = hanger.bending_stiffness_n_m2, hanger.length_m
+        mass_kg = hanger.mass_per_length_kg_m * length_m
+        one = np.ones(len(values.tension_n))
+        tension = values.tension_n * length_m**2 / stiffness_n_m2
+        weight = mass_kg * GRAVITY_M_S2 * length_m**2 / stiffness_n_m2
+        fittings = values.fitting_stiffness[:, None, :].repeat(self._fittings, axis=1)
+        ratios = [each.bending_stiffness_n_m2 / stiffness_n_m2 for each in hanger.turnbuckles]
+        couplers = values.turnbuckle_stiffness[:, None] * np.array(ratios)
+        heavier = [each.mass_kg / hanger.mass_per_length_kg_m / each.length_m
+                   for each in hanger.turnbuckles]  # fmt: skip
+        masses = [values.fitting_mass[:, None].repeat(self._fittings, axis=1)]
+        masses.append(values.turnbuckle_mass[:, None] * np.array(heavier))
+        shear = np.full(len(one), np.nan)
+        if self.shears:
+            flexible = (values.section * values.shear).clip(min=_LEAST_FLEXIBLE)
+            shear = hanger.shear_stiffness_n * length_m**2 / stiffness_n_m2 / flexible
+        return BarTerms(
+            tension=tension,
+            gradient=weight * np.cos(values.lean),
+            springs=values.springs.clip(max=STIFFEST),
+            stiffness=np.concatenate([fittings, couplers[..., None].repeat(2, axis=2)], axis=1),
+            mass=np.hstack(masses),
+            sag=self._sag(tension, weight * np.sin(values.lean), values),
+            shear=shear,
+            turning=hanger.second_moment_m4 / hanger.area_m2 / length_m**2 * one,
+            point_masses=np.empty((len(one), 0)) if masses_kg is None else masses_kg / mass_kg,
+        )
+
+    def _sag(self, tension: FloatArray, across: FloatArray, values: BarValues) -> FloatArray:
+        """Return the stiffness of sag, EA L4/EI (y'')^2, of the bar's static curvature y''.
+
+        The load q across is carried by the tension, and by bending as if the bar had the mean
+        curvature all along: y'' = q/(T + c EI/L2), c = 9.87 between hinges and 39.5 between clamps
+        (the buckling loads). One that was made crooked hangs more like a cable, y'' = q/T.
+        """
+        hanger = self.hanger
+        springs = values.springs[:, :, 1].clip(max=STIFFEST)
+        held = (springs / (springs + _HALF_HELD)).mean(axis=1)
+        buckling = np.pi**2 * (1 + 3 * held)
+        held_up = (tension / (tension + buckling)) ** (1 - values.sag_shape)
+        curvature = across / tension * held_up
+        slender = hanger.elastic_modulus_pa * hanger.area_m2 * hanger.length_m**2
+        slender /= hanger.bending_stiffness_n_m2
+        return np.asarray(slender * values.axial * curvature**2)
+
+    def _snapshots(self, places: int) -> BarTerms:
+        """Return bars spread over all that is assumed of them."""
+        hanger, rng = self.hanger, np.random.default_rng(0)
+        low, high = np.log(hanger.assumptions.tension_ratio.bounds)
+        n = _SNAPSHOTS
+        # Every other one near the nominal tension, the others anywhere.
+        log_ratio = np.where(np.arange(n) % 2, rng.uniform(low, high, n), rng.normal(0, 0.4, n))
+        values = BarValues(
+            tension_n=np.exp(log_ratio) * hanger.nominal_tension_n,
+            springs=10 ** rng.uniform(*_STIFF_SNAPSHOTS, (n, 2, 2)),
+            fitting_stiffness=np.exp(rng.normal(1.3, 1.0, (n, 2))),
+            fitting_mass=np.exp(rng.normal(0.8, 0.5, n)),
+            turnbuckle_stiffness=np.exp(rng.normal(0, 0.4, n)),
+            turnbuckle_mass=np.exp(rng.normal(0, 0.3, n)),
+            lean=rng.uniform(0, 0.5, n),
+            sag_shape=rng.random(n),
+            axial=np.ones(n),
+            section=np.ones(n),
+            shear=np.ones(n),
+        )
+        mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
+        return self._terms(values, mass_kg * rng.uniform(0, 0.2, (n, places)))
+
+
+@lru_cache(maxsize=32)
+def bar_of_terms(
+    hanger: Hanger,
+    fittings_m: tuple[float, float],
+    shears: bool,
+    modes: int,
+    masses_at_m: tuple[float, ...] = (),
+) -> BarOfTerms:
+    """Return the bar of a hanger; its reduced basis is made once."""
+    return BarOfTerms(hanger, fittings_m, shears, modes, masses_at_m)
+
+
+_LEAST_FLEXIBLE = 1e-3  # a thousandth of the theory's flexibility changes no frequency
+_HALF_HELD = 6.0  # k L/EI of an end half way from a hinge's buckling load to a clamp's

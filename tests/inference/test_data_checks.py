@@ -1,0 +1,264 @@
+"""What the checks on data leave out, count once and say, and that every answer says it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from shm.documents import posterior_document
+from shm.errors import BadInput
+from shm.gap import GapOptions, diagnose
+from shm.gap.data_checks import usable
+from shm.inference import UpdateOptions, refresh, update
+from shm.inference.data_checks import check_data, check_for_update, find_line_hz
+from shm.models import DESCRIPTION, THESIS, build
+from shm.report.diagnosis_summary import verdict
+from shm.store.blobs import pack_samples, posterior_from
+from shm.values import NAN, Hanger, ModalTest, Mode, Posterior, Scatter, Selection
+from tests.helpers.effects import all_but
+from tests.helpers.hangers import HANGER_3
+
+FEW = UpdateOptions(samples=300, seed=1)
+
+
+def described(length_m: float, diameter_m: float, tension_n: float, section: float = 0.0) -> Hanger:
+    """Return a round steel bar or string."""
+    area_m2 = math.pi * diameter_m**2 / 4
+    scatter = Scatter(section=section) if section else Scatter()
+    return Hanger(
+        1,
+        length_m,
+        200e9,
+        area_m2,
+        math.pi * diameter_m**4 / 64,
+        7850 * area_m2,
+        tension_n,
+        scatter=scatter,
+    )
+
+
+STRING = described(0.65, 0.0004, 14.0, section=0.05)
+BAR = described(0.9, 0.022, 8000.0)
+STAY = replace(
+    STRING,
+    length_m=14.0,
+    elastic_modulus_pa=120e9,
+    area_m2=5.2e-5,
+    second_moment_m4=2.6e-10,
+    mass_per_length_kg_m=0.42,
+    nominal_tension_n=200.0,
+    scatter=Scatter(),
+)
+
+
+def first(name: str, frequency_hz: float, sd_hz: float = NAN, read_n: float = NAN) -> ModalTest:
+    """Return a test of one mode at 20 degrees."""
+    modes = (Mode("transverse", 1, frequency_hz, sd_hz),)
+    return ModalTest(name, modes, hanger=1, temperature_c=20.0, tension_read_n=read_n)
+
+
+def modes_of(name: str, frequencies: tuple[float, ...], sd_hz: float = NAN) -> ModalTest:
+    """Return a test of several modes of one plane."""
+    modes = tuple(Mode("transverse", n, hz, sd_hz) for n, hz in enumerate(frequencies, 1))
+    return ModalTest(name, modes, hanger=1, temperature_c=18.0)
+
+
+# The tension read of nine weights, and the frequency; the last is low by sqrt 2.
+READ = (
+    (28.2, 128.824),
+    (14.6, 92.265),
+    (7.4, 65.375),
+    (18.9, 104.494),
+    (9.8, 75.925),
+    (5.1, 53.512),
+    (9.8, 75.444),
+    (5.1, 54.917),
+    (2.7, 27.473),
+)
+NINE = [
+    replace(first(f"w{number}", hz, 0.2, read_n), tension_read_sd_n=0.05)
+    for number, (read_n, hz) in enumerate(READ, 1)
+]
+TEN = [modes_of(f"hit{number}", (129.19921875, 344.53125)) for number in range(10)]
+SLIP = modes_of("t1", (4.339, 8.678), 0.02)
+EIGHT = (122.797, 246.603, 371.604, 495.329, 620.92, 745.741, 871.094, 997.801)
+
+
+def test_one_gross_error_among_nine_is_named_and_left_out() -> None:
+    checked = check_data(NINE, STRING)
+    assert [test.id for test in checked.tests] == [f"w{number}" for number in range(1, 9)]
+    (remark,) = checked.remarks
+    assert remark.startswith("Left out: test w9. Its transverse 1, 27.473 Hz, is 31 % lower")
+    assert usable(NINE, STRING).tests == checked.tests
+
+
+def test_a_posterior_says_first_what_it_left_out() -> None:
+    posterior = update(NINE, build("beam1", STRING), FEW)
+    assert "w9" not in posterior.tests
+    assert posterior.caveats[0].startswith("Left out: test w9")
+    assert Selection((posterior,), (1.0,)).averaged().caveats[0].startswith("Left out: test w9")
+    assert not any("w9" in each for each in posterior.faults)
+
+
+def test_ten_equal_readings_count_as_one_of_a_line() -> None:
+    checked = check_data(TEN, BAR)
+    (test,) = checked.tests
+    line_hz = 44100 / 4096
+    assert [mode.frequency_sd_hz for mode in test.modes] == pytest.approx(2 * [line_hz / 12**0.5])
+    (remark,) = checked.remarks
+    assert remark.startswith("Counted once: 2 frequencies are the same to the last digit in 10 tes")
+    assert "10.77 Hz apart give a standard deviation of 3.1 Hz, 2.4 %" in remark
+    assert check_data([replace(each, hanger=None) for each in TEN], BAR).remarks == checked.remarks
+
+
+def test_a_repeatability_is_not_below_the_line() -> None:
+    ten, one = (update(tests, build("beam1", BAR), FEW) for tests in (TEN, TEN[:1]))
+    assert ten.repeatability_sd_n > 2 * 0.024 * ten.tension_n.mean()
+    assert ten.repeatability_sd_n > 20 * one.repeatability_sd_n
+    assert ten.caveats[0].startswith("Counted once")
+    assert not any("misses" in each for each in ten.faults)  # by less than a line
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "line_hz"),
+    [
+        ((129.19921875, 344.53125), 44100 / 4096),
+        ((129.199, 344.531), 44100 / 4096),
+        ((28.125, 53.125, 90.625), 3.125),  # 12800 Hz, 4096 samples
+        ((5.6, 13.5, 24.6), 0.1),
+        ((5.6123, 13.51), 0.0),
+        ((129.1993417, 344.5390221), 0.0),
+    ],
+)
+def test_the_line_is_inferred_where_it_can_be(
+    frequencies: tuple[float, ...], line_hz: float
+) -> None:
+    assert find_line_hz(frequencies) == pytest.approx(line_hz)
+
+
+def test_what_differs_in_one_test_or_has_an_error_is_no_line() -> None:
+    tests = [first("a", 10.25), replace(first("b", 10.25), temperature_c=21.0), first("c", 10.5)]
+    assert check_data(tests, STAY).tests == tuple(tests)
+    stated = [modes_of("a", (10.25, 20.5), 0.1), modes_of("b", (10.25, 20.75), 0.1)]
+    assert check_data(stated, replace(STAY, nominal_tension_n=34e3)).tests == tuple(stated)
+
+
+BRIDGE = Hanger(3, 12.0, 200e9, 0.01327, 1.402e-5, 103.5, 711e3)
+FOUR = (5.6, 13.5, 24.6, 39.1)
+
+
+def several(*factors: float, of: int | None = None) -> list[ModalTest]:
+    """Return tests whose frequencies, or the one of an order, are those of a bar times a factor."""
+    return [
+        modes_of(
+            f"t{number}",
+            tuple(
+                hz * (factor if of in (None, order) else 1.0) * (1 + 1e-5 * number)
+                for order, hz in enumerate(FOUR, 1)
+            ),
+            0.001,
+        )
+        for number, factor in enumerate(factors)
+    ]
+
+
+def test_only_the_wrong_mode_of_a_test_is_left_out() -> None:
+    checked = check_data(several(1.0, 1.0, 1.0, 1.05, of=2), BRIDGE)
+    assert [len(test.modes) for test in checked.tests] == [4, 4, 4, 3]
+    assert checked.remarks[0].startswith("Left out: transverse 2 of test t3. It, 14.17")
+
+
+@pytest.mark.parametrize(
+    "factors", [(1.0, 0.9), (1.0, 1.0, 0.9, 0.9)], ids=["two tests", "half of four"]
+)
+def test_without_a_majority_the_contradiction_is_named(factors: tuple[float, ...]) -> None:
+    tests = several(*factors)
+    checked = check_data(tests, BRIDGE)
+    assert checked.tests == tuple(tests)
+    (remark,) = checked.remarks
+    assert remark.startswith("Tests t")
+    assert "contradict each other: transverse" in remark
+    posterior = update(tests, build("beam1", BRIDGE), FEW)
+    assert remark in posterior.faults
+
+
+def test_scatter_and_temperature_are_no_gross_errors() -> None:
+    tests = several(1.0, 1.001, 0.999, 1.002)
+    assert check_data(tests, BRIDGE).remarks == ()
+    cold = several(1.0, 1.0, 1.0, 1.04)
+    cold[3] = replace(cold[3], temperature_c=-10.0)
+    assert check_data(cold, BRIDGE).remarks == ()
+
+
+def test_a_nominal_tension_that_slipped_is_named_with_what_a_taut_string_carries() -> None:
+    posterior = update([SLIP], build("beam1", STAY), FEW)
+    assert posterior.caveats[0].startswith("At the bound of its prior: theta_F")
+    said = "A taut string would need 6.199 kN, 31 times the nominal: check nominal_tension_n, its u"
+    assert said in posterior.caveats[0]
+    assert sum("taut string" in each for each in posterior.caveats) == 1
+    nominal = replace(STAY, nominal_tension_n=6.2e3)
+    assert not any("taut" in each for each in update([SLIP], build("beam1", nominal), FEW).caveats)
+
+
+def test_a_slender_string_is_not_called_a_stiff_bar() -> None:
+    hanger = replace(STRING, nominal_tension_n=26.0)
+    test = replace(modes_of("w1", EIGHT, 0.3), tension_read_n=26.0, tension_read_sd_n=0.1)
+    found = diagnose([test], hanger, GapOptions(without=all_but()))
+    assert found.slenderness == pytest.approx(207, rel=0.05)
+    assert "stiff a bar" not in verdict(found)
+    assert "light string" in verdict(found)
+    assert "transverse 1 lies 0.8 % below the other modes" in verdict(found)
+    assert "stiff a bar" in verdict(replace(found, slenderness=12.0))
+    assert "stiff a bar" not in verdict(replace(found, slenderness=NAN))
+
+
+def test_remarks_are_stored_and_documents_without_them_are_read() -> None:
+    posterior = update(TEN, build("beam1", BAR), FEW)
+    document = posterior_document(posterior)
+    assert document["caveats"][0] == posterior.remarks[0]
+
+    def again() -> Posterior:
+        return posterior_from(document, pack_samples(posterior))
+
+    assert again().remarks == posterior.remarks
+    assert again().caveats == posterior.caveats
+    for name in ("remarks", "taut_string_tension_n", "stated_error_percent"):
+        del document[name]
+    assert again().remarks == ()
+
+
+def test_the_thesis_counts_copies_as_given() -> None:
+    assert check_for_update(TEN, build("beam1", HANGER_3, THESIS)) == (TEN, {})
+    assert check_for_update(TEN, build("beam1", BAR, DESCRIPTION))[0] != TEN
+
+
+def test_a_refreshed_posterior_has_the_same_remarks() -> None:
+    model = build("beam1", BAR)
+    known = update(TEN[:1], model, FEW)
+    assert refresh(TEN, model, known, FEW).remarks == check_data(TEN, BAR).remarks
+
+
+def test_nonsense_is_left_to_those_who_refuse_it() -> None:
+    for mode in (
+        Mode("transverse", 1, 0.0),
+        Mode("transverse", 0, 5.0),
+        Mode("transverse", 1, NAN),
+    ):
+        tests = [ModalTest(name, (mode,), temperature_c=k) for k, name in enumerate("abc")]
+        assert len(check_data(tests, BRIDGE).tests) in (1, 3)
+        check_for_update(tests, build("beam1", BRIDGE))
+
+
+def test_what_is_left_must_hold_a_mode() -> None:
+    fallen = modes_of("t1", (20.0, 10.0), 0.1)
+    with pytest.raises(BadInput, match=r"mode that can be used\. Left out: test t1"):
+        update([fallen], build("beam1", BRIDGE), FEW)
+
+
+def test_what_only_the_hardest_hits_show_is_kept() -> None:
+    tests = [replace(each, amplitude=1.0) for each in several(1.0, 1.0, 1.0, 1.1, of=1)]
+    assert len(check_data(tests, BRIDGE).tests[3].modes) == 3
+    tests[3] = replace(tests[3], amplitude=2.0)
+    assert check_data(tests, BRIDGE).tests == tuple(tests)

@@ -1,0 +1,164 @@
+"""Hold the proposal along a bent valley against integrals that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from shm.inference.mixture import Normal, TMixture, effective, normalised
+from shm.inference.valley import Proposal, valleys_through
+from shm.values import FloatArray, IntArray
+
+SD = 0.01
+
+
+def bend(z: FloatArray) -> FloatArray:
+    """Return z with the first coordinate less a parabola of the second: a volume-preserving map."""
+    bent = z.copy()
+    bent[:, 0] -= 0.7 * z[:, 1] ** 2
+    return bent
+
+
+class BentProblem:
+    """Give one datum, z0 - 0.7 z1^2 = 0 to 0.01, of four standard normal coordinates."""
+
+    dimension = 4
+
+    class likelihood:  # noqa: N801
+        @staticmethod
+        def whitening(sigma: float) -> FloatArray:
+            return np.array([[1 / SD]])
+
+    @staticmethod
+    def misfit(z: FloatArray) -> FloatArray:
+        return bend(z)[:, :1]
+
+    @staticmethod
+    def slopes(z: FloatArray, directions: FloatArray | None = None) -> FloatArray:
+        rows = np.zeros((len(z), 1, 4))
+        rows[:, 0, 0], rows[:, 0, 1] = 1.0, -1.4 * z[:, 1]
+        return rows if directions is None else rows @ directions
+
+    @staticmethod
+    def predict(z: FloatArray) -> FloatArray:
+        return bend(z)[:, :1]
+
+
+def points_along(n: int, rng: np.random.Generator) -> FloatArray:
+    """Return points (n, 4) on the bottom of the valley."""
+    z = 0.7 * rng.standard_normal((n, 4))
+    z[:, 0] = 0.7 * z[:, 1] ** 2
+    return z
+
+
+@pytest.fixture(scope="module")
+def proposal() -> Proposal:
+    rng = np.random.default_rng(1)
+    points = points_along(160, rng)
+    valleys = valleys_through(BentProblem(), points, np.zeros(160, int), SD)  # type: ignore[arg-type]
+    assert len(valleys) == 1
+    return Proposal.through(valleys, points, 4, rng)
+
+
+def test_the_determined_direction_is_the_one_that_the_datum_depends_on(proposal: Proposal) -> None:
+    (valley,) = proposal.valleys
+    assert valley.free.shape == (4, 3)
+    assert valley._unfelt.shape == (4, 2)  # z2 and z3
+    np.testing.assert_allclose(np.abs(valley._unfelt[:2]).max(), 0, atol=1e-9)
+    whole = np.hstack([valley.free, valley._determined])
+    np.testing.assert_allclose(whole.T @ whole, np.eye(4), atol=1e-12)
+
+
+def test_a_normal_target_in_the_bent_valley_integrates_to_one(proposal: Proposal) -> None:
+    """Integrate a density over the valley, and the prior times the likelihood."""
+    rng = np.random.default_rng(2)
+    draws = proposal.draw(BentProblem(), 20_000, rng)  # type: ignore[arg-type]
+    bent = bend(draws.z)
+    target = norm(0, SD).logpdf(bent[:, 0]) + norm(0, 1).logpdf(bent[:, 1:]).sum(axis=1)
+    weight = np.exp(target - proposal.log_density(draws))
+    assert weight.mean() == pytest.approx(1, abs=5 * weight.std() / np.sqrt(len(weight)))
+    assert weight.std() < 2
+    mean = weight / weight.sum() @ draws.z
+    assert mean[0] == pytest.approx(0.7, abs=0.05)
+    np.testing.assert_allclose(mean[1:], 0, atol=0.05)
+    # Prior times likelihood: z0 ~ N(0, 1) meets 0.7 z1^2 in one integral.
+    z1 = np.linspace(-8, 8, 4001)
+    evidence = np.trapezoid(norm.pdf(z1) * norm(0, np.hypot(1, SD)).pdf(0.7 * z1**2), z1)
+    log = norm(0, SD).logpdf(bent[:, 0]) + norm.logpdf(draws.z).sum(axis=1)
+    found = np.exp(log - proposal.log_density(draws)).mean()
+    assert np.log(found) == pytest.approx(np.log(evidence), abs=0.03)
+
+
+def test_the_density_of_given_points_is_that_of_their_draw(proposal: Proposal) -> None:
+    (valley,) = proposal.valleys
+    y = np.random.default_rng(3).standard_normal((300, 3))
+    z, square, log_size = valley.draw(y, np.ones(len(y)), np.random.default_rng(4))
+    np.testing.assert_allclose(z @ valley.free, y, atol=1e-9)
+    found = valley.distance(z)
+    np.testing.assert_allclose(found[0], square, atol=0.1)
+    np.testing.assert_allclose(found[1], log_size, atol=0.05)
+    np.testing.assert_allclose(bend(valley.optimum(y))[:, 0], 0, atol=2 * SD)
+
+
+def test_refitting_makes_more_draws_effective(proposal: Proposal) -> None:
+    rng, problem = np.random.default_rng(5), BentProblem()
+
+    def weights(own: Proposal) -> tuple[object, FloatArray]:
+        draws = own.draw(problem, 4000, rng)  # type: ignore[arg-type]
+        target = norm(0, SD).logpdf(bend(draws.z)[:, 0]) + norm.logpdf(draws.z).sum(axis=1)
+        return draws, normalised(target - own.log_density(draws))
+
+    draws, first = weights(proposal)
+    _, second = weights(proposal.refitted(draws, first))  # type: ignore[arg-type]
+    assert effective(second) > effective(first)
+    assert effective(second) > 1500
+
+
+def test_points_in_two_valleys_make_two(proposal: Proposal) -> None:
+    class Twins(BentProblem):
+        """Give z0^2 = 1: two valleys 200 standard deviations apart."""
+
+        @staticmethod
+        def misfit(z: FloatArray) -> FloatArray:
+            return z[:, :1] ** 2 - 1
+
+        @staticmethod
+        def slopes(z: FloatArray, directions: FloatArray | None = None) -> FloatArray:
+            rows = np.zeros((len(z), 1, 4))
+            rows[:, 0, 0] = 2 * z[:, 0]
+            return rows if directions is None else rows @ directions
+
+    rng = np.random.default_rng(6)
+    points = rng.standard_normal((160, 4))
+    nearest: IntArray = (np.arange(160) % 3 == 0).astype(int)
+    points[:, 0] = np.where(nearest, -1.0, 1.0)
+    valleys = valleys_through(Twins(), points, nearest, SD)  # type: ignore[arg-type]
+    assert len(valleys) == 2
+    twins = Proposal.through(valleys, points, 4, rng)
+    assert twins.chances == pytest.approx([2 / 3, 1 / 3], abs=0.01)
+    draws = twins.draw(Twins(), 8000, rng)  # type: ignore[arg-type]
+    log = norm(0, SD).logpdf(draws.z[:, 0] ** 2 - 1) + norm.logpdf(draws.z).sum(axis=1)
+    weight = np.exp(log - twins.log_density(draws))
+    assert weight.mean() == pytest.approx(norm.pdf(1), rel=0.03)  # both, each with slope 2
+    assert weight[draws.z[:, 0] > 0].sum() / weight.sum() == pytest.approx(0.5, abs=0.05)
+    assert not valleys[0].follows(points[nearest == 1]).any()
+
+
+def test_a_few_points_make_one_part_of_a_mixture() -> None:
+    three = np.array([[0.0, 0.0], [50.0, 50.0], [99.0, 0.0]])
+    few = np.repeat(three, 2, axis=0) + 1e-3 * np.eye(6, 2)
+    made = TMixture.of(few, 3, np.random.default_rng(3))
+    assert len(made.parts) == 1
+    np.testing.assert_allclose(made.parts[0].mean, few.mean(axis=0))
+
+
+def test_a_part_that_few_draws_support_stays_near_what_it_was() -> None:
+    """Keep its covariance: one borrowed from all would be that of the distance of the parts."""
+    rng = np.random.default_rng(1)
+    needle = Normal(np.array([10.0, 0.0]), 1e-4 * np.eye(2))
+    parts = TMixture([Normal(np.zeros(2), np.eye(2)), needle], np.ones(2))
+    z = np.vstack([rng.standard_normal((200, 2)), needle.draw_t(3, rng)])
+    fitted = parts.refitted(z, np.full(len(z), 1 / len(z)))
+    assert np.linalg.norm(fitted.parts[1].mean - needle.mean) < 0.05
+    assert np.diag(fitted.parts[1].covariance).max() < 1e-3
