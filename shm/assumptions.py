@@ -434,8 +434,8 @@ _KINDS_OF_ENDS = (
     ),
     *_rows_of_ends(
         "unstated",
-        "Anything from a hinge to a clamp alike.",
-        *((0.5, 0.2887), 0.15, (1.2, 0.9), (0.7, 0.5)),
+        "From a hinge to a clamp, either more probable than the middle: Beta(1/2, 1/2).",
+        *((0.5, 0.3536), 0.15, (1.2, 0.9), (0.7, 0.5)),
     ),
     Assumption(
         "similarity_of_ends",

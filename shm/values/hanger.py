@@ -256,8 +256,9 @@ class Hanger(Shown):
 
     @property
     def end_kind(self) -> str:
-        """Return how its ends are made: as stated, a strand's are sockets, else "unstated"."""
-        return self.ends or ("socket" if self.kind == "strand" else "unstated")
+        """Return how its ends are made: as stated; a strand's fittings are sockets."""
+        has_sockets = self.kind == "strand" and any(self.fittings_m)
+        return self.ends or ("socket" if has_sockets else "unstated")
 
     @classmethod
     def without_model(
