@@ -136,9 +136,10 @@ def test_classes_of_the_thesis_are_equally_probable() -> None:
     assert class_probabilities(found, models, [a_test()])["beam1"] == pytest.approx(0.5)
 
 
-def test_a_strand_has_sockets_unless_it_states_other_ends() -> None:
-    strand = replace(ROD, kind="strand")
+def test_fittings_of_a_strand_are_sockets_unless_it_states_other_ends() -> None:
+    strand = replace(ROD, kind="strand", fittings_m=(0.3, 0.3))
     assert strand.end_kind == "socket"
+    assert replace(strand, fittings_m=(0.0, 0.0)).end_kind == "unstated"
     assert replace(strand, ends="fork").end_kind == "fork"
     assert ROD.end_kind == "unstated"
     own = DEFAULTS.with_numbers(fork_clamped=0.5)
