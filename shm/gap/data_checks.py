@@ -1,4 +1,4 @@
-"""What keeps the tests of a diagnosis from showing more, in words.
+"""Remarks on what keeps the tests of a diagnosis from showing more.
 
 The data themselves are checked by `shm.inference.data_checks`, as for every tension.
 

@@ -1,4 +1,4 @@
-"""How much of the tension's interval inclination and ends decide where they are not stated."""
+"""Shares of the tension's variance that the inclination and the ends explain."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frequencies of a described bar with all that its description makes it of.
+"""Frequencies of a described bar with its ends, fittings, turnbuckles and own weight.
 
 Bending, tension and its gradient, end springs, fittings and turnbuckles as zones with a stiffness
 and a mass of their own, shear, and the sag of its own weight. All is relative to the described bar:
@@ -26,9 +26,9 @@ _STIFF_SNAPSHOTS = (-2.0, 4.0)
 
 @dataclass(frozen=True, eq=False)
 class BarValues:
-    """What `n` bars are, each (n,) over the described one, but for what is said.
+    """Values of `n` bars, each (n,) over that of the described bar unless stated.
 
-    `springs` (n, 2 ends, 2 planes) are k L/EI; `fitting_stiffness` (n, 2 planes); `lean` is the
+    `tension_n` is in N; `springs` (n, 2 ends, 2 planes) are k L/EI; `fitting_stiffness` (n, 2 planes); `lean` is the
     angle from the vertical in rad; `sag_shape` 0 of a bar whose sag its bending holds up, and 1 of
     one that hangs like a cable; `axial` the stiffness against sag over EA/L; `section` the area,
     which changes shear alone (a hundredth of the rotary inertia is below 1e-4 of a frequency), and

@@ -283,7 +283,7 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Diagnosis(Shown):
-    """Where a baseline and the measurements of a hanger differ, why, and what that changes.
+    """Differences of a hanger between baseline and measurement, their causes and consequences.
 
     `causes` holds every effect that these data could show, best first, and the pairs that were
     tried; their probabilities, `no_gap_probability` and `unexplained_probability` add to 1.
