@@ -28,11 +28,11 @@ _STIFF_SNAPSHOTS = (-2.0, 4.0)
 class BarValues:
     """Values of `n` bars, each (n,) over that of the described bar unless stated.
 
-    `tension_n` is in N; `springs` (n, 2 ends, 2 planes) are k L/EI; `fitting_stiffness` (n, 2 planes); `lean` is the
-    angle from the vertical in rad; `sag_shape` 0 of a bar whose sag its bending holds up, and 1 of
-    one that hangs like a cable; `axial` the stiffness against sag over EA/L; `section` the area,
-    which changes shear alone (a hundredth of the rotary inertia is below 1e-4 of a frequency), and
-    `shear` the flexibility in shear over the theory's.
+    `tension_n` is in N; `springs` (n, 2 ends, 2 planes) are k L/EI; `fitting_stiffness` (n, 2
+    planes); `lean` is the angle from the vertical in rad; `sag_shape` 0 of a bar whose sag its
+    bending holds up, and 1 of one that hangs like a cable; `axial` the stiffness against sag over
+    EA/L; `section` the area, which changes shear alone (a hundredth of the rotary inertia is below
+    1e-4 of a frequency), and `shear` the flexibility in shear over the theory's.
     """
 
     tension_n: FloatArray
