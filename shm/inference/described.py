@@ -25,6 +25,7 @@ from shm.inference.priors import (
     TensionPrior,
     reading_of,
 )
+from shm.inference.shapes import swaps_of
 from shm.models.as_made import (
     BENDING,
     DENSITY,
@@ -74,13 +75,14 @@ class DescribedCoordinates:
         planes = {mode.plane for test in tests for mode in test.regular_modes}
         beam = isinstance(model.model, Beam)
         felt = tuple(n for n in model.springs if not beam or _plane_of(n) in planes)
-        self.ends = Ends(self._hanger, felt if beam else (), model.swaps)
+        exchangeable = swaps_of(model, tests)
+        self.ends = Ends(self._hanger, felt if beam else (), exchangeable)
         self.terms = [t for t in model.terms.values() if not t.plane or t.plane in planes]
         box = self._box(() if beam else felt)
         self.names = (TENSION, *box)
         self._tension = TensionPrior(model.bounds[TENSION], self._hanger.assumptions)
         lower, upper = np.array(list(box.values()), dtype=float).reshape(-1, 2).T
-        swaps = [pair for pair in model.swaps if set(pair) <= set(box)]
+        swaps = [pair for pair in exchangeable if set(pair) <= set(box)]
         self._box_coordinates = Coordinates(
             Prior(tuple(box), lower, upper), swaps, wave_stiffness_n_m_rad
         )

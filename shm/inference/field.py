@@ -12,6 +12,8 @@
 - A measured tension errs by its own standard deviation and by what frequencies do not see of the
   bar's mass and length.
 
+Mode shapes have their own errors (`shm.inference.shapes`).
+
 Both unknowns are integrated out on a grid: tau in steps of 1.6 standard deviations of what the data
 can tell, phi at equally probable values.
 What physics says of errors that tests share (`shm.inference.systematic_errors`) adds a mean and
@@ -28,6 +30,7 @@ import scipy
 
 from shm.assumptions import Assumptions
 from shm.inference.likelihood import conditions_of, measured, predicted_hz
+from shm.inference.shapes import MeasuredShapes
 from shm.inference.systematic_errors import errors_of_bar, felt_by, loads_of_ends, mean_of_ends
 from shm.models import AsMade, Model
 from shm.models.as_made import TENSION
@@ -43,6 +46,9 @@ _PHI_NODES = 3
 _BLOCK = 400
 """Misfits taken together, so that intermediate results stay in the processor's cache."""
 
+_SHAPES_LATER = 5.0
+"""Of their standard deviations: by which shapes steer a search until the frequencies have."""
+
 _UNFELT = 0.1
 """Of the least standard deviation of a datum: loads and tau below that change nothing."""
 
@@ -52,7 +58,8 @@ class FieldLikelihood:
 
     `frequency_hz` (data,) are weighted means over tests; `identification_error` (data,) their
     fractional standard deviations as stated. With a `reading` (tension in N, its fractional sd) the
-    last datum is that tension. Raises BadInput where the tests hold no mode.
+    next datum is that tension. Behind them are the misfits of `shapes`, in standard deviations.
+    Raises BadInput where the tests hold no mode.
     """
 
     def __init__(
@@ -86,6 +93,8 @@ class FieldLikelihood:
         self._constant = jacobian + float(of_means)
         if reading is not None:
             self._constant -= np.log(tension) + 0.5 * np.log(2 * np.pi)
+        self.shapes = MeasuredShapes(tests if model.has_shapes else (), model.hanger)
+        self._shapes_factor = _SHAPES_LATER
         self._together = self._goes_together()
         self._ways: dict[float, tuple[FloatArray, FloatArray]] = {}
         self._shift, self._loads = self._systematic(model, self._typical(model))
@@ -125,6 +134,7 @@ class FieldLikelihood:
     def settle(self, model: Model, theta: FloatArray) -> None:
         """Takes what is systematic from `theta` (parameters,): one covariance judges all draws."""
         self._shift, self._loads = self._systematic(model, theta)
+        self._shapes_factor = self.shapes.factor(self.shapes.misfits(model, theta[None]))
         self._ways.clear()
 
     def _typical(self, model: Model) -> FloatArray:
@@ -156,7 +166,7 @@ class FieldLikelihood:
         own = self.identification_error.copy()
         shared = (self._loads**2).sum(axis=1)
         own[: self.frequencies] = np.sqrt(own[: self.frequencies] ** 2 + shared)
-        return own
+        return np.append(own, np.full(self.shapes.size, self._shapes_factor))
 
     def whitening(self, sigma: float) -> FloatArray:
         """Return the matrix (data, data) that makes misfits independent with standard deviations
@@ -165,12 +175,17 @@ class FieldLikelihood:
         covariance = np.diag(self.identification_error**2)
         shared = self._loads @ self._loads.T
         covariance[: self.frequencies, : self.frequencies] += sigma**2 * self._together + shared
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+        own = np.linalg.inv(np.linalg.cholesky(covariance))
+        of_shapes = np.eye(self.shapes.size) / self._shapes_factor
+        return np.asarray(scipy.linalg.block_diag(own, of_shapes))
 
     def misfit(self, predicted: FloatArray) -> FloatArray:
-        """Logarithms of predictions, with mean errors of the bar, over measurements (n, data)."""
+        """Misfits (n, data): logarithms of predictions, with mean errors of the bar, over
+        measurements, and those of shapes as they are.
+        """
+        scalars, shapes = np.split(predicted, [len(self.frequency_hz)], axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.log(predicted / self.frequency_hz) + self._shift
+            return np.hstack([np.log(scalars / self.frequency_hz) + self._shift, shapes])
 
     def marginal(self, predicted: FloatArray) -> FloatArray:
         """Log likelihood (n,) of predictions (n, data), tau and phi integrated out."""
@@ -237,8 +252,10 @@ class FieldLikelihood:
             # (nodes, block, F) by (nodes, F, phi)
             along = (rest[block] @ ways) ** 2
             found[block] = np.moveaxis(-0.5 * along @ precision, 0, 1)
-        reading = self._of_reading(predicted)[:, None, None]
-        return np.asarray(found + constant + self._constant + reading)
+        others = self._of_reading(predicted)
+        if self.shapes.size:
+            others = others + self.shapes.marginal(predicted[:, len(self.frequency_hz) :])
+        return np.asarray(found + constant + self._constant + others[:, None, None])
 
     def _directions(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
         """Eigenvectors (nodes, F, F) and eigenvalues (nodes, F) of all errors but phi's, in those:
@@ -257,7 +274,7 @@ class FieldLikelihood:
         if not self.has_reading:
             return np.zeros(len(predicted))
         variance = self.identification_error[-1] ** 2
-        off = self.misfit(predicted)[:, -1]
+        off = self.misfit(predicted)[:, self.frequencies]
         return np.asarray(-0.5 * (off**2 / variance + np.log(variance)))
 
     def _goes_together(self) -> FloatArray:

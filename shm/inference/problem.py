@@ -15,6 +15,7 @@ from shm.inference.likelihood import Likelihood
 from shm.inference.mixture import Rows
 from shm.inference.options import Progress
 from shm.inference.priors import Calibration, reading_of
+from shm.inference.shapes import swaps_of
 from shm.models import THESIS, AsMade, Model
 from shm.models.as_made import TENSION
 from shm.values import FloatArray, ModalTest
@@ -55,7 +56,7 @@ class Problem:
         if isinstance(model, AsMade):
             self.coordinates = DescribedCoordinates(model, likelihood.tests, own, calibration)
         else:
-            self.coordinates = Coordinates(model.prior, model.swaps, own)
+            self.coordinates = Coordinates(model.prior, swaps_of(model, likelihood.tests), own)
         self.prior = model.prior
         self.dimension = self.coordinates.dimension
 
@@ -90,7 +91,13 @@ class Problem:
             ratio = theta[:, self.model.parameter_names.index(TENSION)]
             tension_n = ratio * self.model.hanger.nominal_tension_n
             found = np.column_stack([found, tension_n])
-        return found
+        return self._with_shapes(found, theta)
+
+    def _with_shapes(self, found: FloatArray, theta: FloatArray) -> FloatArray:
+        """Return `found` (n, data) with the misfits of shapes behind."""
+        if not isinstance(self.likelihood, FieldLikelihood) or not self.likelihood.shapes.size:
+            return found
+        return np.hstack([found, self.likelihood.shapes.misfits(self.model, theta)])
 
     def evaluate(self, z: FloatArray) -> Points:
         """Run the model at `z` (n, d)."""
@@ -142,7 +149,7 @@ class Problem:
     def _near(self, z: FloatArray, steps: FloatArray) -> FloatArray:
         """Return changes (m, measurements, steps) of the misfit by `steps` (k, d) from `z`."""
         if not len(steps):
-            return np.empty((len(z), len(self.likelihood.frequency_hz), 0))
+            return np.empty((len(z), len(self.likelihood.fit_error), 0))
         self.evaluations += len(z)
         theta = self.coordinates.theta(z)
         others = [self.coordinates.theta(z + step) for step in steps]
@@ -152,6 +159,10 @@ class Problem:
             column = self.model.parameter_names.index(TENSION)
             ratio = np.stack([each[:, column] / theta[:, column] for each in others], axis=1)
             found = np.concatenate([found, np.log(ratio)[:, None]], axis=1)
+        if likelihood.shapes.size:
+            here = likelihood.shapes.misfits(model, theta)
+            moved = [likelihood.shapes.misfits(model, each) - here for each in others]
+            found = np.concatenate([found, np.stack(moved, axis=2)], axis=1)
         return np.nan_to_num(found)
 
     def log_posterior(self, points: Points) -> FloatArray:

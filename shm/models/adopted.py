@@ -31,10 +31,9 @@ from shm.models.base import DESCRIPTION, THESIS, Conditions, Model
 from shm.models.composed import ComposedHanger
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey, Variant
 from shm.models.registry import MODELS
-from shm.values import NAN, PLANES, FloatArray, Hanger, ModalTest, Plane
+from shm.values import NAN, PLANES, FloatArray, Hanger, ModalTest
 
 _HALF_WIDTH_IN_SD = math.sqrt(3)  # of a uniform distribution
-_ALONG = 101  # ten points a half wave of order 10: the largest deflection is within 1.2 %
 
 # What was measured: nothing but a test, and all that makes every effect visible.
 _ONE_TEST = Survey(("test",), PLANES, (), False, (), (), ())
@@ -111,15 +110,11 @@ class Adopted(Model):
         found = self._composed.modes(self._values(theta), conditions, modes, shapes=False)
         return found.frequency_hz
 
-    def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
-        places_m = (*map(float, x_m), *np.linspace(0, self.hanger.length_m, _ALONG).tolist())
-        composed = ComposedHanger(
-            self.hanger, AdoptedName.parse(self.name).baseline, self._effects, places_m
-        )
-        axis = PLANES.index(plane)
-        values = self._values(theta[None])
-        found = composed.modes(values, Conditions(), order).shape[0, axis, order - 1, :, axis]
-        return np.asarray(found[: len(x_m)] / np.abs(found).max())
+    def shapes(self, theta: FloatArray, modes: int, x_m: FloatArray) -> FloatArray:
+        baseline = AdoptedName.parse(self.name).baseline
+        composed = ComposedHanger(self.hanger, baseline, self._effects, tuple(map(float, x_m)))
+        seen = composed.modes(self._values(theta), Conditions(), modes).shape
+        return np.stack([seen[:, axis, :, :, axis] for axis in range(len(PLANES))], axis=1)
 
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The ends' own springs and those of the effects, each (n, planes)."""

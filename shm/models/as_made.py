@@ -28,7 +28,7 @@ from shm.assumptions import Assumption, Assumptions
 from shm.models.bar_of_terms import BarValues, bar_of_terms
 from shm.models.base import DESCRIPTION, Conditions, Model, silent
 from shm.models.beam import Beam, Beam3
-from shm.values import PLANES, AddedMass, FloatArray, Hanger, ModalTest, Plane
+from shm.values import PLANES, AddedMass, FloatArray, Hanger, ModalTest
 
 TENSION, LENGTH = "theta_F", "theta_L"
 SECTION, DENSITY, MODULUS = "section", "density", "modulus"
@@ -224,13 +224,15 @@ class AsMade(Model):
     def prepare(self, modes: int, progress: Callable[[float], None] = silent) -> None:
         self.model.prepare(modes, progress)
 
-    def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
+    def shapes(self, theta: FloatArray, modes: int, x_m: FloatArray) -> FloatArray:
         if self.has_terms:
-            bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, order)
-            length = self.stiffness_mass_length(theta[None])[2]
-            shapes = bar.shapes(self._values(theta[None]), x_m / length)
-            return np.asarray(shapes[0, PLANES.index(plane), order - 1])
-        return self.model.shape(self.as_described(theta[None])[0][0], plane, order, x_m)
+            bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes)
+            return bar.shapes(self._values(theta), x_m)
+        return self.model.shapes(self.as_described(theta)[0], modes, x_m)
+
+    @property
+    def has_shapes(self) -> bool:
+        return self.model.has_shapes
 
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         names = [self.parameter_names.index(n) for n in self.model.parameter_names if n != LENGTH]

@@ -88,7 +88,7 @@ class BarOfTerms:
         return self._unit_hz * found, self._unit_hz * moved
 
     def shapes(self, values: BarValues, x_m: FloatArray) -> FloatArray:
-        """Return shapes (n, 2, modes, points) at `x_m`, the largest value of each 1."""
+        """Return shapes (n, 2, modes, points) at `x_m`, each of any size."""
         return self._bar.shapes(self._terms(values, None), x_m / self.hanger.length_m)
 
     def _terms(self, values: BarValues, masses_kg: FloatArray | None) -> BarTerms:

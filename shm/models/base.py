@@ -15,7 +15,7 @@ import numpy as np
 from shm.errors import BadInput, UsageError
 from shm.models.end_effects import EndWaves, coupled_bar
 from shm.models.hanger import PointMass, solve
-from shm.values import AddedMass, FloatArray, Hanger, IntArray, ModalTest, Plane, Prior
+from shm.values import PLANES, AddedMass, FloatArray, Hanger, IntArray, ModalTest, Plane, Prior
 
 Swap = tuple[str, str]
 
@@ -23,6 +23,8 @@ THESIS, DESCRIPTION = "thesis", "description"
 PRIORS = (DESCRIPTION, THESIS)
 """Ranges made for the hanger of the thesis, an exact description; or what the description says."""
 _NOWHERE = np.empty(0)
+_POINTS_A_LOBE, _RISEN = 40, 0.01
+"""Where the largest value of a shape is sought, and what is its first lobe."""
 
 
 def silent(fraction: float) -> None:
@@ -141,9 +143,27 @@ class Model:
     def prepare(self, modes: int, progress: Callable[[float], None] = silent) -> None:
         """Does what has to be done once before many evaluations; `progress` hears the fraction."""
 
-    def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
-        """The mode shape of one parameter set (parameters,) at `x_m` (points,), largest value 1."""
+    def shapes(self, theta: FloatArray, modes: int, x_m: FloatArray) -> FloatArray:
+        """Return shapes (n, 2, modes, points) at `x_m` (points,), each of any size and sign."""
         raise TypeError(f"{type(self).__name__} does not say how its shapes follow.")
+
+    @property
+    def has_shapes(self) -> bool:
+        """Return True where the class says how its shapes follow."""
+        return type(self).shapes is not Model.shapes
+
+    def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
+        """Return one shape of one parameter set (parameters,) at `x_m` (points,).
+
+        Its largest value is 1, and its first lobe from the deck is positive.
+        """
+        fine = np.linspace(0, self.hanger.length_m, _POINTS_A_LOBE * (order + 1))
+        found = self.shapes(theta[None], order, np.append(x_m, fine))
+        values = found[0, PLANES.index(plane), order - 1]
+        along = values[len(x_m) :]
+        largest = np.abs(along).max()
+        first = along[np.argmax(np.abs(along) > _RISEN * largest)]
+        return np.asarray(values[: len(x_m)] / np.copysign(largest, first))
 
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Rotational stiffness of the deck end and the arch end, each (n, planes).

@@ -10,13 +10,10 @@ from shm.models import tensioned_beam
 from shm.models.base import RATIOS, Model
 from shm.models.end_effects import alike_from_both_ends, coupled_bar
 from shm.models.hanger import PhysicalHanger, solve
-from shm.values import PLANES, FloatArray, Hanger, Plane
+from shm.values import PLANES, FloatArray, Hanger
 
 _NO_SHEAR = 1e-9
 """A share of shear that changes no frequency by its rounding."""
-
-_POINTS_A_HALF_WAVE, _RISEN = 40, 0.01
-"""Where the largest value of a shape is sought, and what is its first lobe."""
 
 
 class Beam(Model):
@@ -61,21 +58,27 @@ class Beam(Model):
         bar = coupled_bar(self.hanger, self._length_m(theta), self._tension_n(theta))
         return bar.on_springs(self.springs_n_m_rad(theta))
 
-    def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
-        at = PLANES.index(plane)
-        length, tension = self._length_m(theta[None]), self._tension_n(theta[None])
+    def shapes(self, theta: FloatArray, modes: int, x_m: FloatArray) -> FloatArray:
         if self.hanger.turnbuckles:
-            fine = np.linspace(0, length[0], _POINTS_A_HALF_WAVE * (order + 2))
-            seen = solve(self._coupled(theta[None]), order, np.append(fine, x_m)).shape
-            shape = seen[0, at, order - 1, :, at]
-            along = shape[: len(fine)]
-            peak = np.abs(along).max()
-            first = along[np.argmax(np.abs(along) > _RISEN * peak)]
-            return np.asarray(shape[len(fine) :] / np.copysign(peak, first))
-        deck, arch = (springs[0, at] for springs in self.springs_n_m_rad(theta[None]))
-        stiffness = self.hanger.bending_stiffness_n_m2
-        xi, scale = float(length[0] * np.sqrt(tension[0] / stiffness)), length[0] / stiffness
-        return tensioned_beam.mode_shape(xi, deck * scale, arch * scale, order, x_m / length)
+            seen = solve(self._coupled(theta), modes, x_m).shape
+            return np.stack([seen[:, axis, :, :, axis] for axis in range(len(PLANES))], axis=1)
+        length = self._length_m(theta)[:, None]
+        slenderness = length / self.hanger.bending_stiffness_n_m2
+        deck, arch = (springs * slenderness for springs in self.springs_n_m_rad(theta))
+        tension = self._tension_n(theta)[:, None] * length * slenderness
+        waves = self._waves(tension, slenderness * length, deck, arch, modes)
+        return tensioned_beam.shapes(waves, deck[..., None], x_m / length[..., None, None])
+
+    def _waves(
+        self,
+        tension: FloatArray,
+        flexibility: FloatArray,
+        deck: FloatArray,
+        arch: FloatArray,
+        modes: int,
+    ) -> tensioned_beam.Waves:
+        """Return the waves of bars of T L2/EI (n, 1) and L2/EI (n, 1) with k L/EI (n, 2)."""
+        return tensioned_beam.waves(np.sqrt(tension), deck, arch, modes)
 
     def _length_m(self, theta: FloatArray) -> FloatArray:
         return self.stiffness_mass_length(theta)[2] * self.hanger.length_m
@@ -132,6 +135,20 @@ class Beam3(Beam2):
     def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
         one = np.ones(len(theta))
         return self.frequencies_of_section(theta, one, one, modes)
+
+    def _waves(
+        self,
+        tension: FloatArray,
+        flexibility: FloatArray,
+        deck: FloatArray,
+        arch: FloatArray,
+        modes: int,
+    ) -> tensioned_beam.Waves:
+        hanger = self.hanger
+        gyration = hanger.second_moment_m4 / hanger.area_m2
+        turning = gyration / (flexibility * hanger.bending_stiffness_n_m2)
+        shear = hanger.shear_stiffness_n * flexibility
+        return tensioned_beam.timoshenko_waves(tension, shear, turning, deck, arch, modes)
 
     def frequencies_of_section(
         self, theta: FloatArray, section: FloatArray, shear: FloatArray, modes: int

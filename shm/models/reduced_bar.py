@@ -99,20 +99,12 @@ class ReducedBar:
         return found, near
 
     def shapes(self, terms: BarTerms, x: FloatArray) -> FloatArray:
-        """Return deflections (n, 2, modes, points) at places `x` from 0 to 1, largest value 1."""
-        fine = np.linspace(0, 1, 20 * self.modes + 1)
-        table = self._elements.deflection(np.append(x, fine)) @ self.basis
+        """Return deflections (n, 2, modes, points) at places `x` from 0 to 1, of any size."""
+        table = self._elements.deflection(x) @ self.basis
         found = np.empty((len(terms.tension), 2, self.modes, len(x)))
-        for row in range(len(found)):
-            for plane in (0, 1):
-                stiffness, mass = self._reduced.assembled(terms.take(slice(row, row + 1)), plane)
-                _, vectors = scipy.linalg.eigh(stiffness[0], mass[0])
-                w = (table @ vectors[:, : self.modes]).T
-                along = w[:, len(x) :]
-                largest = np.abs(along).max(axis=1)
-                risen = np.abs(along) > 0.01 * largest[:, None]
-                sign = np.sign(along[np.arange(len(along)), risen.argmax(axis=1)])
-                found[row, plane] = w[:, : len(x)] * (sign / largest)[:, None]
+        for first in range(0, len(found), _BLOCK):
+            block = slice(first, first + _BLOCK)
+            found[block] = self._reduced.deflections(terms.take(block), self.modes, table)
         return found
 
 
@@ -196,6 +188,15 @@ class _Matrices:
             whitened, _ = self._whitened(*self.factors(terms, plane))
             square = np.linalg.eigvalsh(whitened)[:, :modes]
             found[:, plane] = np.sqrt(square.clip(min=0.0))
+        return found
+
+    def deflections(self, terms: BarTerms, modes: int, table: FloatArray) -> FloatArray:
+        """Return deflections (n, 2, modes, points), `table` (points, d) being the basis's."""
+        found = np.empty((len(terms.tension), 2, modes, len(table)))
+        for plane in (0, 1):
+            whitened, back = self._whitened(*self.factors(terms, plane))
+            vectors = back(np.linalg.eigh(whitened)[1][:, :, :modes])
+            found[:, plane] = np.swapaxes(table @ vectors, 1, 2)
         return found
 
     def frequencies_about(

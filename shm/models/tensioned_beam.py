@@ -213,50 +213,48 @@ def _hyperbolic(p: FloatArray) -> tuple[FloatArray, FloatArray]:
     return grown + half * decay, half + half
 
 
-def mode_shape(xi: float, ka: float, kb: float, order: int, x: FloatArray) -> FloatArray:
-    """The shape of one mode at `x` (points,), as a fraction of the length from the deck end.
-
-    Scaled to a largest value of 1 along the beam, positive in its first lobe. The basis
-    exp(-p x), exp(-p (1 - x)), cos q x, sin q x stays in range at any xi.
+@dataclass(frozen=True, eq=False)
+class Waves:
+    """Wave numbers of modes, each (sets, modes): q of the sines and p of the decaying waves, with
+    `turn_q` and `turn_p`, by which their sections turn (Q and P; without shear the same).
     """
-    arrays = np.asarray(xi, float), np.asarray(ka, float), np.asarray(kb, float)
-    q = float(wave_numbers(*arrays, modes=order)[order - 1])
-    p = float(np.hypot(xi, q))
-    coefficients = np.linalg.svd(_end_conditions(p, q, ka, kb))[2][-1]
-    fine = _basis(p, q, np.linspace(0, 1, 40 * order + 1)) @ coefficients
-    peak = np.abs(fine).max()
-    return np.asarray(_basis(p, q, x) @ coefficients / np.copysign(peak, fine[20]))
+
+    q: FloatArray
+    p: FloatArray
+    turn_q: FloatArray
+    turn_p: FloatArray
 
 
-def _basis(p: float, q: float, x: FloatArray) -> FloatArray:
-    """The four solutions at `x`, shape (points, 4)."""
-    return np.stack([np.exp(-p * x), np.exp(-p * (1 - x)), np.cos(q * x), np.sin(q * x)], -1)
+def waves(xi: FloatArray, ka: FloatArray, kb: FloatArray, modes: int) -> Waves:
+    """Return the waves of an Euler-Bernoulli beam; arguments as of `wave_numbers`."""
+    q = wave_numbers(xi, ka, kb, modes)
+    p = np.hypot(np.broadcast_to(xi, np.broadcast(xi, ka, kb).shape)[..., None], q)
+    return Waves(q, p, q, p)
 
 
-def _end_conditions(p: float, q: float, ka: float, kb: float) -> FloatArray:
-    """Displacement and moment conditions at both ends, shape (4, 4), rows of like size."""
-    e, c, s = np.exp(-p), np.cos(q), np.sin(q)
-    w = p**2 + q**2
-    held_a, free_a = _end(ka, w, p + q)
-    held_b, free_b = _end(kb, w, p + q)
-    slope_0, slope_1 = np.array([-p, p * e, 0, q]), np.array([-p * e, p, -q * s, q * c])
-    curve_0 = np.array([p**2, p**2 * e, -(q**2), 0])
-    curve_1 = np.array([p**2 * e, p**2, -(q**2) * c, -(q**2) * s])
-    return np.array(
-        [
-            [1, e, 1, 0],
-            [e, 1, c, s],
-            free_a * curve_0 - held_a * slope_0,
-            free_b * curve_1 + held_b * slope_1,
-        ]
-    )
+def shapes(waves: Waves, ka: FloatArray, x: FloatArray) -> FloatArray:
+    """Return deflections (sets, modes, points) at `x`, fractions of the length from the deck end.
 
-
-def _end(k: float, curvature: float, slope: float) -> tuple[float, float]:
-    """Weights of slope and curvature in the moment condition of an end, of like size together."""
-    free = 1 / (1 + k)
-    size = free * curvature + (1 - free) * slope
-    return (1 - free) / size, free / size
+    They are a exp(-p x) + b exp(-p (1 - x)) + c cos q x + sin q x, which stays in range at any
+    tension. No deflection at either end and the moment of the spring `ka` = k L/EI at the deck give
+    a, b and c.
+    """
+    free = 1 / (1 + ka)
+    held = 1 - free
+    decay, cosine, sine = np.exp(-waves.p), np.cos(waves.q), np.sin(waves.q)
+    # b = own + slope c by the arch's deflection, a = -(c + decay b) by the deck's.
+    apart = 1 - decay**2
+    own, slope = -sine / apart, (decay - cosine) / apart
+    moment = free * waves.turn_p * waves.p
+    near, far = moment + held * waves.turn_p, decay * (moment - held * waves.turn_p)
+    others = free * waves.turn_q * waves.q
+    by_c = others + near * (1 + decay * slope) - far * slope
+    c = (far * own - near * decay * own - held * waves.turn_q) / by_c
+    b = own + slope * c
+    a = -(c + decay * b)
+    p, q = waves.p[..., None], waves.q[..., None]
+    decaying = a[..., None] * np.exp(-p * x) + b[..., None] * np.exp(-p * (1 - x))
+    return np.asarray(decaying + c[..., None] * np.cos(q * x) + np.sin(q * x))
 
 
 _SMALL_SECANT_STEP = 1e-7
@@ -300,10 +298,29 @@ def timoshenko_frequencies_hz(
     )
 
 
+def timoshenko_waves(
+    t: FloatArray, s: FloatArray, r: FloatArray, ka: FloatArray, kb: FloatArray, modes: int
+) -> Waves:
+    """Return the waves of a Timoshenko beam, whose t, s, r, ka and kb broadcast to the sets."""
+    q = _in_blocks(partial(_timoshenko_roots, modes=modes), modes, t, s, r, ka, kb)
+    t, s, r = (each[..., None] for each in (t, s, r))
+    omega2, q2 = _square(q, t, s, r), q * q
+    p = np.sqrt(_decay_squared(omega2, q2, t, s, r))
+    return Waves(q, p, ((s + t) * q2 - omega2) / (s * q), ((s + t) * p * p + omega2) / (s * p))
+
+
 def _omega(
     t: FloatArray, s: FloatArray, r: FloatArray, ka: FloatArray, kb: FloatArray, modes: int
 ) -> FloatArray:
-    """Omega (modes, sets): q = n pi + phi(q) by secants from the string's phase."""
+    """Omega (modes, sets); NaN beyond the cut-off."""
+    omega2 = _square(_timoshenko_roots(t, s, r, ka, kb, modes), t, s, r)
+    return np.sqrt(np.where(r * omega2 < s, omega2, np.nan))
+
+
+def _timoshenko_roots(
+    t: FloatArray, s: FloatArray, r: FloatArray, ka: FloatArray, kb: FloatArray, modes: int
+) -> FloatArray:
+    """q (modes, sets): q = n pi + phi(q) by secants from the string's phase."""
     order = np.arange(1.0, modes + 1)[:, None]
     sign, pinned = np.where(order % 2 == 0, 1.0, -1.0), order * np.pi
     free_a, free_b = _freedom(ka), _freedom(kb)
@@ -326,8 +343,18 @@ def _omega(
         q, value, step = moved, found, -found / slope
         if np.nanmax(np.abs(step), initial=0.0) < _SMALL_SECANT_STEP:
             break
-    omega2 = _square(q + step, t, s, r)
-    return np.sqrt(np.where(r * omega2 < s, omega2, np.nan))
+    return q + step
+
+
+def _decay_squared(
+    omega2: FloatArray, q2: FloatArray, t: FloatArray, s: FloatArray, r: FloatArray
+) -> FloatArray:
+    """Return p^2 of q^2.
+
+    Below its least value p coth p and p / sinh p round to their limit 1, used beyond the cut-off as
+    well.
+    """
+    return np.maximum(omega2 * (s - r * omega2) / ((s + t) * q2), np.finfo(float).eps)
 
 
 def _square(q: FloatArray, t: FloatArray, s: FloatArray, r: FloatArray) -> FloatArray:
@@ -348,8 +375,7 @@ def _phase(
 ) -> FloatArray:
     """phi (modes, sets): 2 atan((B - c)/(A + sqrt(A^2 + B^2 - c^2))), c = (-1)^n C."""
     omega2, q2 = _square(q, t, s, r), q * q
-    # Below it p coth p and p / sinh p round to their limit 1, used beyond the cut-off as well.
-    p2 = np.maximum(omega2 * (s - r * omega2) / ((s + t) * q2), np.finfo(float).eps)
+    p2 = _decay_squared(omega2, q2, t, s, r)
     p = np.sqrt(p2)
     big_p, big_q = ((s + t) * p2 + omega2) / (s * p), ((s + t) * q2 - omega2) / (s * q)
     decay = np.exp(-p)

@@ -104,20 +104,20 @@ class SolidModel(Model):
             found = natural_modes(system, self.hanger.nominal_tension_n, np.zeros(0), modes)
             yield system.unknowns, found.frequencies_hz
 
-    def shape(self, theta: FloatArray, plane: Plane, order: int, x_m: FloatArray) -> FloatArray:
+    def shapes(self, theta: FloatArray, modes: int, x_m: FloatArray) -> FloatArray:
         # Slow to import, and seldom needed.
         from scipy.interpolate import CubicSpline
 
-        basis = transverse_basis(self.description(), order, silent)
-        vector = basis.projected.mode(self._points(theta[None], plane)[0], order)
-        along = CubicSpline(basis.axis_m, basis.deflections @ vector)
-        ends = self._ends_m()
-        depth = x_m - ends[0] if plane == "transverse" else ends[1] - x_m
-        fine = np.linspace(0, ends[1] - ends[0], 40 * order + 1)
-        from_deck = fine[20] if plane == "transverse" else fine[-21]
-        scale = np.copysign(np.abs(along(fine)).max(), along(from_deck))
-        inside = (x_m >= ends[0]) & (x_m <= ends[1])
-        return np.where(inside, along(depth) / scale, 0.0)
+        basis = transverse_basis(self.description(), modes, silent)
+        along = CubicSpline(basis.axis_m, basis.deflections)
+        deck_m, arch_m = self._ends_m()
+        inside = (x_m >= deck_m) & (x_m <= arch_m)
+        found = np.empty((len(theta), 2, modes, len(x_m)))
+        for index, depth_m in enumerate((x_m - deck_m, arch_m - x_m)):
+            table = along(depth_m) * inside[:, None]
+            vectors = basis.projected.modes(self._points(theta, PLANES[index]), modes)
+            found[:, index] = np.swapaxes(table @ vectors, 1, 2)
+        return found
 
     def surface(self, theta: FloatArray, plane: Plane, order: int) -> tuple[FloatArray, FloatArray]:
         """Corners (facets, 4, 3) of the surface in m (x transverse, y longitudinal, z from the deck

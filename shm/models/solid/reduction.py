@@ -319,9 +319,9 @@ class Projected:
         eigenvalues = np.linalg.eigvalsh(self.stiffness(points))[:, :modes]
         return np.asarray(np.sqrt(eigenvalues) / (2 * np.pi))
 
-    def mode(self, point: FloatArray, order: int) -> FloatArray:
-        """The coordinates (n,) of one mode at a point (1 + springs,)."""
-        return np.asarray(np.linalg.eigh(self.stiffness(point[None])[0])[1][:, order - 1])
+    def modes(self, points: FloatArray, modes: int) -> FloatArray:
+        """The coordinates (m, n, modes) of the lowest modes at points (m, 1 + springs)."""
+        return np.asarray(np.linalg.eigh(self.stiffness(points))[1][:, :, :modes])
 
 
 @dataclass(frozen=True, eq=False)
