@@ -160,9 +160,8 @@ class Problem:
             ratio = np.stack([each[:, column] / theta[:, column] for each in others], axis=1)
             found = np.concatenate([found, np.log(ratio)[:, None]], axis=1)
         if likelihood.shapes.size:
-            here = likelihood.shapes.misfits(model, theta)
-            moved = [likelihood.shapes.misfits(model, each) - here for each in others]
-            found = np.concatenate([found, np.stack(moved, axis=2)], axis=1)
+            moved = likelihood.shapes.changes(model, theta, others)
+            found = np.concatenate([found, moved], axis=1)
         return np.nan_to_num(found)
 
     def log_posterior(self, points: Points) -> FloatArray:

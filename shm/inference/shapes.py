@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.models import Model
+from shm.models import AsMade, Model
 from shm.models.base import Swap
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode, ShapePoint
 
@@ -49,6 +49,7 @@ class MeasuredShapes:
         self._order = _repeat([each.order for each in shapes], shapes)
         self._of: IntArray = _repeat(range(len(shapes)), shapes)
         x_m = np.concatenate([np.zeros(0), *(each.x_m for each in shapes)])
+        self._highest = int(self._order.max(initial=0))
         self._places_m, self._place = np.unique(x_m, return_inverse=True)
         self._value = np.concatenate([np.zeros(0), *(each.value for each in shapes)])
         sd = np.concatenate([np.zeros(0), *(each.sd for each in shapes)])
@@ -68,7 +69,16 @@ class MeasuredShapes:
         """Return the misfits (n, size) of parameter sets `theta` (n, parameters)."""
         if not self.size:
             return np.zeros((len(theta), 0))
-        found = model.shapes(theta, int(self._order.max()), self._places_m)
+        return self._misfits_of(model.shapes(theta, self._highest, self._places_m))
+
+    def changes(self, model: AsMade, theta: FloatArray, others: Sequence[FloatArray]) -> FloatArray:
+        """Return changes (n, size, others) of misfits to near parameter sets, to first order."""
+        found, near = model.shapes_near(theta, others, self._highest, self._places_m)
+        here = self._misfits_of(found)
+        return np.stack([self._misfits_of(each) - here for each in near], axis=2)
+
+    def _misfits_of(self, found: FloatArray) -> FloatArray:
+        """Return the misfits (n, size) of shapes (n, 2, modes, places)."""
         raw = found[:, self._plane, self._order - 1, self._place]
         own = self._of == np.arange(self._of[-1] + 1)[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):

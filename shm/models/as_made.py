@@ -187,6 +187,14 @@ class AsMade(Model):
         factors = [self.as_described(each)[1][:, None, None] for each in (theta, *others)]
         return found * factors[0], near * np.array(factors[1:])
 
+    def shapes_near(
+        self, theta: FloatArray, others: Sequence[FloatArray], modes: int, x_m: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return shapes (n, 2, modes, points) and, to first order, those of near parameter sets."""
+        bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes)
+        near = [self._values(each) for each in others]
+        return bar.shapes_about(self._values(theta), near, x_m)
+
     @property
     def _shears(self) -> bool:
         return isinstance(self.model, Beam3)

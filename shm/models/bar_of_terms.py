@@ -91,6 +91,13 @@ class BarOfTerms:
         """Return shapes (n, 2, modes, points) at `x_m`, each of any size."""
         return self._bar.shapes(self._terms(values, None), x_m / self.hanger.length_m)
 
+    def shapes_about(
+        self, values: BarValues, near: Sequence[BarValues], x_m: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return shapes (n, 2, modes, points) and, to first order, those of near bars (s, ...)."""
+        terms, others = self._terms(values, None), [self._terms(each, None) for each in near]
+        return self._bar.shapes_about(terms, others, x_m / self.hanger.length_m)
+
     def _terms(self, values: BarValues, masses_kg: FloatArray | None) -> BarTerms:
         hanger = self.hanger
         stiffness_n_m2, length_m = hanger.bending_stiffness_n_m2, hanger.length_m

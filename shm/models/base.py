@@ -157,7 +157,8 @@ class Model:
 
         Its largest value is 1, and its first lobe from the deck is positive.
         """
-        fine = np.linspace(0, self.hanger.length_m, _POINTS_A_LOBE * (order + 1))
+        length_m = float(self.stiffness_mass_length(theta[None])[2][0]) * self.hanger.length_m
+        fine = np.linspace(0, length_m, _POINTS_A_LOBE * (order + 2))
         found = self.shapes(theta[None], order, np.append(x_m, fine))
         values = found[0, PLANES.index(plane), order - 1]
         along = values[len(x_m) :]

@@ -107,6 +107,20 @@ class ReducedBar:
             found[block] = self._reduced.deflections(terms.take(block), self.modes, table)
         return found
 
+    def shapes_about(
+        self, terms: BarTerms, shifted: Sequence[BarTerms], x: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the same, and to first order those of near hangers (s, n, 2, modes, points)."""
+        table = self._elements.deflection(x) @ self.basis
+        found = np.empty((len(terms.tension), 2, self.modes, len(x)))
+        near = np.empty((len(shifted), *found.shape))
+        for first in range(0, len(found), _BLOCK):
+            block = slice(first, first + _BLOCK)
+            found[block], near[:, block] = self._reduced.deflections_about(
+                terms.take(block), [each.take(block) for each in shifted], self.modes, table
+            )
+        return found, near
+
 
 @dataclass(frozen=True, eq=False)
 class _Matrices:
@@ -199,6 +213,36 @@ class _Matrices:
             found[:, plane] = np.swapaxes(table @ vectors, 1, 2)
         return found
 
+    def deflections_about(
+        self, terms: BarTerms, shifted: Sequence[BarTerms], modes: int, table: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the same, and those of near hangers (s, n, 2, modes, points).
+
+        By the other modes' shares in the change of each (Fox and Kapoor 1968, AIAA J. 6, 2426).
+        """
+        found = np.empty((len(terms.tension), 2, modes, len(table)))
+        near = np.empty((len(shifted), *found.shape))
+        for plane in (0, 1):
+            stiff, heavy = self.factors(terms, plane)
+            whitened, back = self._whitened(stiff, heavy)
+            square, vectors = np.linalg.eigh(whitened)
+            shape = back(vectors)
+            stiffness = _products(self.stiffness, shape, modes)
+            mass = _products(self.mass, shape, modes)
+            apart = square[:, None, :modes] - square[:, :, None]
+            own = np.eye(square.shape[1], modes, dtype=bool)
+            share = np.where(own, 0.0, 1 / np.where(own | (apart == 0), np.inf, apart))
+            seen = table @ shape
+            found[:, plane] = np.swapaxes(seen[:, :, :modes], 1, 2)
+            for index, each in enumerate(shifted):
+                stiffer, heavier = self.factors(each, plane)
+                heavier_by = np.einsum("nt,ntjm->njm", heavier - heavy, mass)
+                change = np.einsum("nt,ntjm->njm", stiffer - stiff, stiffness)
+                change -= square[:, None, :modes] * heavier_by
+                moved = seen @ (share * change - 0.5 * own * heavier_by)
+                near[index, :, plane] = found[:, plane] + np.swapaxes(moved, 1, 2)
+        return found, near
+
     def frequencies_about(
         self, terms: BarTerms, shifted: Sequence[BarTerms], modes: int
     ) -> tuple[FloatArray, FloatArray]:
@@ -252,6 +296,12 @@ def _energies(matrices: FloatArray, shapes: FloatArray) -> FloatArray:
     """Return x' A x (n, terms, modes) of matrices (terms, d, d) and shapes (n, d, modes)."""
     moved = np.einsum("tij,njk->ntik", matrices, shapes, optimize=True)
     return np.asarray((moved * shapes[:, None]).sum(axis=2))
+
+
+def _products(matrices: FloatArray, shapes: FloatArray, modes: int) -> FloatArray:
+    """Return x_j' A x_m (n, terms, d, modes) of all shapes x (n, d, d) with the lowest."""
+    moved = np.einsum("tij,njm->ntim", matrices, shapes[:, :, :modes], optimize=True)
+    return np.asarray(np.swapaxes(shapes, 1, 2)[:, None] @ moved)
 
 
 def _sum(factors: FloatArray, matrices: FloatArray) -> FloatArray:

@@ -13,8 +13,8 @@ from shm.identify.mode_ordering.alignment import log_frequency
 from shm.identify.mode_ordering.confirmed import placed_with_doubtful
 from shm.identify.mode_ordering.order import Expected
 from shm.identify.quality.of_modes import first_orders
-from shm.models.tensioned_beam import mode_shape
 from shm.values import PLANES, Plane, ResponsePoint
+from tests.helpers.beam_shapes import mode_shape
 from tests.helpers.hangers import HANGER_3
 
 HANGER = replace(HANGER_3, plate=None)

@@ -12,9 +12,9 @@ from shm.identify import Identification, IdentifyOptions, identify
 from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.planes import directions
 from shm.identify.quality.of_sensors import sensor_places
-from shm.models.tensioned_beam import mode_shape
 from shm.simulate import HammerPlan, HangerState
 from shm.values import NAN, PLANES, Mode, QualityCheck, Recording, ResponsePoint, ShapePoint
+from tests.helpers.beam_shapes import mode_shape
 from tests.helpers.hangers import HANGER_3
 from tests.worlds.simulated.hammer import hammer_test
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.models import tensioned_beam
 from shm.models.hanger import Zone, solve
+from tests.helpers.beam_shapes import mode_shape
 from tests.helpers.physical_hangers import (
     EI,
     LENGTH,
@@ -27,7 +27,7 @@ def test_shapes_are_those_of_the_exact_beam(k: float) -> None:
     springs = np.full((1, 2), k)
     found = solve(on_springs(clamped(1, 4), springs, springs), 8, PLACES).shape[0]
     for order in range(1, 9):
-        exact = tensioned_beam.mode_shape(xi, k * scale, k * scale, order, PLACES / LENGTH)
+        exact = mode_shape(xi, k * scale, k * scale, order, PLACES / LENGTH)
         exact = exact / exact[np.abs(exact).argmax()]
         for plane in (0, 1):
             seen = found[plane, order - 1]

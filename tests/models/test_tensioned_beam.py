@@ -10,8 +10,9 @@ from numpy.polynomial import Legendre
 from scipy.linalg import eigh, null_space
 from scipy.optimize import brentq
 
-from shm.models.tensioned_beam import mode_shape, wave_numbers
+from shm.models.tensioned_beam import wave_numbers
 from tests.helpers.beam_count import modes_below
+from tests.helpers.beam_shapes import mode_shape
 
 PINNED, CLAMPED = np.array(0.0), np.array(np.inf)
 
