@@ -30,7 +30,7 @@ import scipy
 
 from shm.assumptions import Assumptions
 from shm.inference.likelihood import conditions_of, measured, predicted_hz
-from shm.inference.shapes import MeasuredShapes
+from shm.inference.shapes import SHAPES, MeasuredShapes
 from shm.inference.systematic_errors import errors_of_bar, felt_by, loads_of_ends, mean_of_ends
 from shm.models import AsMade, Model
 from shm.models.as_made import TENSION
@@ -45,9 +45,6 @@ _STEP_IN_SD, _STEP_IN_SD_TO_DRAW = 1.6, 0.4
 _PHI_NODES = 3
 _BLOCK = 400
 """Misfits taken together, so that intermediate results stay in the processor's cache."""
-
-_SHAPES_LATER = 5.0
-"""Of their standard deviations: by which shapes steer a search until the frequencies have."""
 
 _UNFELT = 0.1
 """Of the least standard deviation of a datum: loads and tau below that change nothing."""
@@ -94,7 +91,7 @@ class FieldLikelihood:
         if reading is not None:
             self._constant -= np.log(tension) + 0.5 * np.log(2 * np.pi)
         self.shapes = MeasuredShapes(tests if model.has_shapes else (), model.hanger)
-        self._shapes_factor = _SHAPES_LATER
+        self._shapes_factor = SHAPES.loose
         self._together = self._goes_together()
         self._ways: dict[float, tuple[FloatArray, FloatArray]] = {}
         self._shift, self._loads = self._systematic(model, self._typical(model))

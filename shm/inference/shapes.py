@@ -21,7 +21,23 @@ from shm.models import AsMade, Model
 from shm.models.base import Swap
 from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode, ShapePoint
 
-_NODES, _GROSS_NODES = 5, 12  # numerical: of phi, steps of half its spread and of a third
+
+@dataclass(frozen=True)
+class ShapeOptions:
+    """How shapes count.
+
+    phi has as many usual `nodes` and `gross_nodes`. A search takes shapes for `loose` times less
+    certain until the frequencies have led it. From a probability of `rather_gross` on, the answer
+    says that the shapes are wrong.
+    """
+
+    nodes: int = 5
+    gross_nodes: int = 12
+    loose: float = 5.0
+    rather_gross: float = 0.5
+
+
+SHAPES = ShapeOptions()
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,12 +157,12 @@ class MeasuredShapes:
         The largest makes the most certain component of standard deviation `sd` err by a unit shape.
         """
         spread = self._hanger.assumptions.stated_sd_log_sd.value
-        nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
+        nodes, weights = np.polynomial.hermite_e.hermegauss(SHAPES.nodes)
         top = 1 / sd.min() if len(sd) else 2.0
-        gross = np.geomspace(np.exp(spread), max(top, np.exp(2 * spread)), _GROSS_NODES)
+        gross = np.geomspace(np.exp(spread), max(top, np.exp(2 * spread)), SHAPES.gross_nodes)
         return [
             (np.exp(spread * nodes), weights / weights.sum()),
-            (gross, np.full(_GROSS_NODES, 1 / _GROSS_NODES)),
+            (gross, np.full(SHAPES.gross_nodes, 1 / SHAPES.gross_nodes)),
         ]
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from shm.errors import UsageError
 from shm.inference.chain import run_chain
 from shm.inference.data_checks import check_for_update
+from shm.inference.field import FieldLikelihood
 from shm.inference.importance import Inferred, Weighted, weigh
 from shm.inference.mixture import normalised
 from shm.inference.options import EMCEE, Progress, UpdateOptions, silent
@@ -26,6 +27,7 @@ from shm.inference.outcome import posterior_of
 from shm.inference.priors import clamped_probability, reading_of
 from shm.inference.problem import Points, Problem
 from shm.inference.search import draw_along, known_places, search
+from shm.inference.shapes import SHAPES
 from shm.inference.valley import Proposal, Valley, valleys_through
 from shm.models import THESIS, AsMade, Model
 from shm.values import ENOUGH_EFFECTIVE, NAN, FloatArray, ModalTest, Posterior, Selection
@@ -63,7 +65,8 @@ def update(
     inferred = infer(problem, options, rng, progress, warm_start)
     progress(model.name, 1.0)
     found = posterior_of(problem, inferred, tests, options, rng, started)
-    return replace(found, reading_off_sd=_off_the_reading(tests, model, options, rng), **checked)
+    found = replace(found, reading_off_sd=_off_the_reading(tests, model, options, rng), **checked)
+    return replace(found, remarks=(*found.remarks, *_remarks_on_shapes(problem, inferred)))
 
 
 def refresh(
@@ -145,6 +148,20 @@ def _continue(
     chain, size = run_chain(problem, np.vstack([drawn, points]), rng)
     chosen = chain[rng.choice(len(chain), samples, replace=len(chain) < samples)]
     return problem.evaluate(chosen), size
+
+
+def _remarks_on_shapes(problem: Problem, inferred: Inferred) -> tuple[str, ...]:
+    """Return a remark where no bar that has the frequencies has the mode shapes."""
+    likelihood = problem.likelihood
+    if not isinstance(likelihood, FieldLikelihood) or not likelihood.shapes.size:
+        return ()
+    misfits = inferred.points.predicted[:, -likelihood.shapes.size :]
+    if likelihood.shapes.gross_probability(misfits) < SHAPES.rather_gross:
+        return ()
+    return (
+        "The mode shapes contradict the frequencies and hardly count. Check the place, the plane "
+        "and the sign of each sensor.",
+    )
 
 
 def _off_the_reading(

@@ -193,7 +193,7 @@ class AsMade(Model):
         """Return shapes (n, 2, modes, points) and, to first order, those of near parameter sets."""
         bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes)
         near = [self._values(each) for each in others]
-        return bar.shapes_about(self._values(theta), near, x_m)
+        return bar.shapes_about(self._values(theta), near, self._places_of_described(theta, x_m))
 
     @property
     def _shears(self) -> bool:
@@ -233,10 +233,20 @@ class AsMade(Model):
         self.model.prepare(modes, progress)
 
     def shapes(self, theta: FloatArray, modes: int, x_m: FloatArray) -> FloatArray:
+        described_m = self._places_of_described(theta, x_m)
         if self.has_terms:
             bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes)
-            return bar.shapes(self._values(theta), x_m)
-        return self.model.shapes(self.as_described(theta)[0], modes, x_m)
+            return bar.shapes(self._values(theta), described_m)
+        return self.model.shapes(self.as_described(theta)[0], modes, described_m)
+
+    def _places_of_described(self, theta: FloatArray, x_m: FloatArray) -> FloatArray:
+        """Return places (points,) of the described bar that the real ones have at `x_m`.
+
+        By the mean length of all parameter sets: lengths differ by less than a place is known to.
+        """
+        if self.length_is_open:
+            return x_m
+        return np.asarray(x_m / self.stiffness_mass_length(theta)[2].mean())
 
     @property
     def has_shapes(self) -> bool:

@@ -122,7 +122,7 @@ def test_what_is_drawn_afterwards_moves_no_frequency(case: str) -> None:
     coordinates = coordinates_of(name, hanger, *tests)
     z = coordinates.draw_prior(200, np.random.default_rng(1))
     middle, drawn = coordinates.theta(z), coordinates.finished(z, np.random.default_rng(2))
-    assert np.abs(drawn - middle).max() > 0.005
+    assert np.abs(drawn - middle).max() > 0.004
     columns = [0] if "one plane" in case else [0, 1]
     for conditions in {coordinates.model.conditions(test) for test in tests} or {Conditions()}:
         both = [
@@ -130,12 +130,10 @@ def test_what_is_drawn_afterwards_moves_no_frequency(case: str) -> None:
             for theta in (middle, drawn)
         ]
         far = np.abs(both[1] / both[0] - 1).max(axis=(1, 2))
-        # A known mass, and a little the bar's weight, tell ends that were exchanged apart, in three
-        # quarters of the draws.
+        # The bar's weight tells a little of which end is which, in three quarters of the draws.
         weighs = coordinates.model.has_terms and coordinates.model.swaps
-        apart = conditions.added_mass is not None or weighs
-        assert (np.quantile(far, 0.2) if apart else far.max()) < within
-        assert far.max() < 5e-3 or conditions.added_mass is not None
+        assert (np.quantile(far, 0.2) if weighs else far.max()) < within
+        assert far.max() < 5e-3
 
 
 def test_what_is_seen_is_as_much_as_the_class_and_the_tests_show() -> None:

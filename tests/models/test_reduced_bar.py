@@ -216,10 +216,11 @@ def test_a_mass_in_the_middle_of_a_hinged_bar_has_its_closed_form(tension: float
     np.testing.assert_allclose(found[1::2], even * np.sqrt(tension + even**2), rtol=1e-5)
 
 
-def test_shapes_are_those_of_a_hinged_bar_and_largest_at_one() -> None:
+def test_shapes_are_those_of_a_hinged_bar() -> None:
     terms, x = uniform(6, 50.0), np.linspace(0, 1, 31)
     found = ReducedBar([], terms, 4).shapes(terms.take(slice(0, 1)), x)
     assert found.shape == (1, 2, 4, 31)
     sines = np.sin(np.outer(np.arange(1, 5) * np.pi, x))
     for plane in (0, 1):
-        np.testing.assert_allclose(found[0, plane], sines, atol=5e-3)
+        largest = np.sum(found[0, plane] * sines, axis=1) / np.sum(sines**2, axis=1)
+        np.testing.assert_allclose(found[0, plane] / largest[:, None], sines, atol=5e-3)
