@@ -711,6 +711,16 @@ _DIAGNOSIS = (
         most=1.0,
     ),
     Assumption(
+        "tension_between_tests",
+        0.001,
+        "fraction",
+        JUDGEMENT,
+        "Of the tension from one test to another in the diagnosis: temperature and traffic change "
+        "it by about as much, and nothing is wrong with the hanger.",
+        least=1e-6,
+        most=0.5,
+    ),
+    Assumption(
         "gross_error_share",
         0.01,
         "probability",

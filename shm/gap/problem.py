@@ -139,25 +139,29 @@ class GapProblem:
         """What the errors that repeat do to the data, from the baseline near the data."""
         sensors, errors = sensor_loads(self.observations, self._predicted_near, self.hanger)
         shapes = np.hstack([sensors, turn_loads(self.observations)])
-        return Repeated(self.section_of(self.design), self.readings_of(self.design), shapes, errors)
+        return Repeated(self.section_of(self.design), self.tensions_of(self.design), shapes, errors)
 
-    def readings_of(self, design: Design) -> FloatArray:
-        """What one standard deviation of each tension read does to the frequencies of a design:
-        loads (F, tests with a reading).
+    def tensions_of(self, design: Design) -> FloatArray:
+        """Return what one standard deviation of each test's tension does to the frequencies of a
+        design: loads (F, tests), none of a lone test without a reading.
 
-        All modes of a test move together, those of other tests do not.
+        It differs a little from test to test, and one that was read errs by its reading. All modes
+        of a test move together, those of other tests do not.
         """
-        names = np.array([each.test for each in design.conditions])
-        read = list(dict.fromkeys(c.test for c in design.conditions if c.tension_shift_sd_n > 0))
-        if not read:
+        names = [each.test for each in design.conditions]
+        unread_n = self.hanger.assumptions.tension_between_tests.value
+        unread_n *= self.hanger.nominal_tension_n if len(set(names)) > 1 else 0.0
+        sd_n = np.array([c.tension_shift_sd_n or unread_n for c in design.conditions])
+        if not sd_n.any():
             return np.zeros((design.frequencies, 0))
         moved = tuple(
-            replace(each, tension_shift_n=each.tension_shift_n + _STEP_SD * each.tension_shift_sd_n)
-            for each in design.conditions
+            replace(each, tension_shift_n=each.tension_shift_n + _STEP_SD * float(sd))
+            for each, sd in zip(design.conditions, sd_n, strict=True)
         )
         there = self._predicted_near(replace(design, conditions=moved))
         change = (there - self._predicted_near(design))[: design.frequencies] / _STEP_SD
-        return np.where(names[design.frequency_test, None] == read, change[:, None], 0.0)
+        of_test = np.array(names)[design.frequency_test, None] == list(dict.fromkeys(names))
+        return np.where(of_test, change[:, None], 0.0)
 
     def section_of(self, design: Design) -> FloatArray:
         """What the section along the bar, the sensors' mass and the supports' give do to the

@@ -39,14 +39,14 @@ SensorError: TypeAlias = tuple[Literal["gain", "place", "turn", "cross"], int, i
 class Repeated:
     """Loads of what repeats.
 
-    `section` (F, k) is that of the section along the bar and `readings` (F, tests with a reading)
-    that of tensions read, both of frequencies; `sensors` (S, l) is that of shapes, with those of
+    `section` (F, k) is that of the section along the bar and `tensions` (F, tests) that of each
+    test's tension, both of frequencies; `sensors` (S, l) is that of shapes, with those of
     modes that may be turned, which do not repeat (`turn_loads`); its first are those of
     `sensor_errors`.
     """
 
     section: FloatArray
-    readings: FloatArray
+    tensions: FloatArray
     sensors: FloatArray
     sensor_errors: tuple[SensorError, ...] = ()
 
@@ -57,15 +57,15 @@ class Repeated:
 
     @property
     def loads(self) -> FloatArray:
-        """Of all data (data, k): section and readings move no shape, sensors no frequency."""
+        """Of all data (data, k): section and tensions move no shape, sensors no frequency."""
         return np.asarray(
-            scipy.linalg.block_diag(np.hstack([self.section, self.readings]), self.sensors)
+            scipy.linalg.block_diag(np.hstack([self.section, self.tensions]), self.sensors)
         )
 
     @property
     def frequency(self) -> FloatArray:
         """Covariance (F, F) of the frequencies' logarithms."""
-        return np.asarray(self.section @ self.section.T + self.readings @ self.readings.T)
+        return np.asarray(self.section @ self.section.T + self.tensions @ self.tensions.T)
 
 
 def section_loads(design: Design, physical: PhysicalHanger, hanger: Hanger) -> FloatArray:

@@ -89,12 +89,25 @@ def test_a_readings_error_moves_all_modes_of_its_test_together() -> None:
     problem = GapProblem(STRING, "beam1", observed(tests, STRING))
     theta = problem.theta(Hypothesis(), problem.near)
     level_n = float(theta[0, 0]) * STRING.nominal_tension_n
-    loads = problem.readings_of(problem.design)
+    loads = problem.tensions_of(problem.design)
     assert loads.shape == (8, 2)
     for test, shift_n in enumerate((-21e3, 21e3)):
         own = problem.design.frequency_test == test
         np.testing.assert_allclose(loads[own, test], SD_N / 2 / (level_n + shift_n), rtol=2e-3)
         assert not loads[~own, test].any()
+
+
+def test_the_tension_differs_a_little_from_test_to_test() -> None:
+    """Of a string half of `tension_between_tests` in every mode; a lone test has no other."""
+    same = np.outer(np.ones(3), 3.45 * np.array(ORDERS))
+    tests = loadings(same, (NAN, NAN, NAN), NAN)
+    problem = GapProblem(STRING, "beam1", observed(tests, STRING))
+    loads, own = problem.repeated.tensions, problem.design.frequency_test
+    share = DEFAULTS.tension_between_tests.value / 2
+    level = float(problem.theta(Hypothesis(), problem.near)[0, 0])
+    np.testing.assert_allclose(loads, share / level * (own[:, None] == np.arange(3)), rtol=2e-3)
+    alone = GapProblem(STRING, "beam1", observed(tests[:1], STRING))
+    assert not alone.repeated.tensions.any()
 
 
 @pytest.mark.slow
