@@ -21,7 +21,7 @@ from shm.gap.repeated_errors import (
     sensor_loads,
     turn_loads,
 )
-from shm.inference.systematic_errors import shared_loads
+from shm.inference.systematic_errors import loads_of_radii, shared_loads
 from shm.models.composed import Baseline, ComposedHanger
 from shm.models.effects import Conditions, Variant, parameters_of
 from shm.models.hanger import HangerModes
@@ -139,7 +139,9 @@ class GapProblem:
         """What the errors that repeat do to the data, from the baseline near the data."""
         sensors, errors = sensor_loads(self.observations, self._predicted_near, self.hanger)
         shapes = np.hstack([sensors, turn_loads(self.observations)])
-        return Repeated(self.section_of(self.design), self.readings_of(self.design), shapes, errors)
+        design = self.design
+        readings, masses = self.readings_of(design), self.masses_of(design)
+        return Repeated(self.section_of(design), readings, masses, shapes, errors)
 
     def readings_of(self, design: Design) -> FloatArray:
         """What one standard deviation of each tension read does to the frequencies of a design:
@@ -158,6 +160,19 @@ class GapProblem:
         there = self._predicted_near(replace(design, conditions=moved))
         change = (there - self._predicted_near(design))[: design.frequencies] / _STEP_SD
         return np.where(names[design.frequency_test, None] == read, change[:, None], 0.0)
+
+    def masses_of(self, design: Design) -> FloatArray:
+        """What one standard deviation of the radius of gyration of each known mass that states none
+        does to the frequencies of a design: loads (F, k).
+        """
+
+        def log_frequency(radius_m: float) -> FloatArray:
+            conditions = tuple(each.with_usual_radius(radius_m) for each in design.conditions)
+            near = self._predicted_near(replace(design, conditions=conditions))
+            return near[: design.frequencies]
+
+        masses = [design.conditions[test].added_mass for test in design.frequency_test]
+        return loads_of_radii(masses, log_frequency, self.hanger.assumptions)
 
     def section_of(self, design: Design) -> FloatArray:
         """What the section along the bar, the sensors' mass and the supports' give do to the

@@ -237,11 +237,16 @@ def laden_ratio(
     and the arch end, each (n, planes). A mass beyond the bar's end weighs nothing.
     """
     bare = coupled_bar(hanger, length_m, tension_n).on_springs(springs_n_m_rad)
-    one = np.ones(len(tension_n))
-    mass = PointMass(added_mass.x_m * one, added_mass.mass_kg * one)
-    laden = replace(bare, masses=(mass,))
+    laden = replace(bare, masses=point_masses(hanger, added_mass, len(tension_n)))
     found = [solve(each, modes, _NOWHERE, shapes=False).frequency_hz for each in (laden, bare)]
     return np.asarray(found[0] / found[1])
+
+
+def point_masses(hanger: Hanger, added_mass: AddedMass, count: int) -> tuple[PointMass, ...]:
+    """Return a known mass as `count` hangers of one description have it; usual where unstated."""
+    one, usual_m = np.ones(count), hanger.assumptions.added_mass_radius_m.value
+    points = added_mass.points(hanger.length_m, usual_m)
+    return tuple(PointMass(each.x_m * one, each.mass_kg * one) for each in points)
 
 
 @dataclass(frozen=True)
@@ -260,3 +265,8 @@ class Conditions:
     added_mass: AddedMass | None = None
     tension_shift_n: float = 0.0
     tension_shift_sd_n: float = 0.0
+
+    def with_usual_radius(self, radius_m: float) -> Conditions:
+        """Return the same with this radius of gyration of a known mass that states none."""
+        mass = self.added_mass
+        return replace(self, added_mass=mass and mass.with_usual_radius(radius_m))

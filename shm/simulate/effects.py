@@ -46,7 +46,7 @@ def plant_effects(
         values = _order_values(planted, effect, hanger, variant)
         bar = effect.applied(bar, values, variant, conditions, hanger)
     added = conditions.added_mass
-    return bar if added is None else _clamp_mass_on(bar, added)
+    return bar if added is None else _clamp_mass_on(bar, added, hanger)
 
 
 _OF_READINGS = ("load_scale",)
@@ -97,6 +97,8 @@ def _order_values(
     return np.array([values])
 
 
-def _clamp_mass_on(bar: PhysicalHanger, added: AddedMass) -> PhysicalHanger:
-    mass = PointMass(np.array([added.x_m]), np.array([added.mass_kg]))
-    return replace(bar, masses=(*bar.masses, mass))
+def _clamp_mass_on(bar: PhysicalHanger, added: AddedMass, hanger: Hanger) -> PhysicalHanger:
+    """Return the bar with a known mass: a point where no radius is stated, as it is planted."""
+    points = added.points(hanger.length_m)
+    masses = [PointMass(np.array([each.x_m]), np.array([each.mass_kg])) for each in points]
+    return replace(bar, masses=(*bar.masses, *masses))
