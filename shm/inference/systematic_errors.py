@@ -2,9 +2,10 @@
 
 The accelerometer's own mass lowers each mode by where it sits, both planes alike; the section
 wanders; supports give way sideways and lower high orders of stiff bars; fittings stiffen the ends
-(`shm.models.end_effects`); a known mass turns as much as it is long. All are small, known to first order and of uncertain size, so that their
-mean shifts a prediction and what is uncertain is a few normal errors ("loads": what one standard
-deviation of each does). The remaining errors of a mode are tau's (`shm.inference.field`).
+(`shm.models.end_effects`); a known mass turns with the bar as much as it is long. All are small,
+known to first order and of uncertain size, so that their mean shifts a prediction and what is
+uncertain is a few normal errors ("loads": what one standard deviation of each does). The remaining
+errors of a mode are tau's (`shm.inference.field`).
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ import scipy
 
 from shm.assumptions import Assumption, Assumptions
 from shm.models.bar_of_terms import BarValues, bar_of_terms
-from shm.models.base import DESCRIPTION, Conditions, Model, silent
+from shm.models.base import DESCRIPTION, Conditions, Model, radius_m, silent
 from shm.models.beam import Beam, Beam3
 from shm.values import PLANES, FloatArray, Hanger, ModalTest, Plane
 
@@ -158,14 +158,12 @@ class AsMade(Model):
             # What a mass weighs counts against the real bar's, which is longer, too.
             _, per_length, length = self.stiffness_mass_length(theta)
             kg: Any = mass.mass_kg / (per_length * (1.0 if self.length_is_open else length))
-            mass = replace(mass, mass_kg=kg)
-            conditions = replace(conditions, added_mass=mass)
+            conditions = replace(conditions, added_mass=replace(mass, mass_kg=kg))
         if self.has_terms:
-            usual_m = self.hanger.assumptions.added_mass_radius_m.value
-            points = () if mass is None else mass.points(self.hanger.length_m, usual_m)
-            places = tuple(each.x_m for each in points)
-            bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes, places)
-            kilograms = np.column_stack([each.mass_kg for each in points]) if points else None
+            places = () if mass is None else (mass.x_m,)
+            radii = () if mass is None else (radius_m(self.hanger, mass),)
+            bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes, places, radii)
+            kilograms = None if mass is None else np.asarray(kg)[:, None]
             found = bar.frequencies_hz(self._values(theta), kilograms)
         elif isinstance(self.model, Beam3) and mass is None:
             section = np.exp(self._column(theta, SECTION))

@@ -237,16 +237,21 @@ def laden_ratio(
     and the arch end, each (n, planes). A mass beyond the bar's end weighs nothing.
     """
     bare = coupled_bar(hanger, length_m, tension_n).on_springs(springs_n_m_rad)
-    laden = replace(bare, masses=point_masses(hanger, added_mass, len(tension_n)))
+    laden = replace(bare, masses=(point_mass(hanger, added_mass, len(tension_n)),))
     found = [solve(each, modes, _NOWHERE, shapes=False).frequency_hz for each in (laden, bare)]
     return np.asarray(found[0] / found[1])
 
 
-def point_masses(hanger: Hanger, added_mass: AddedMass, count: int) -> tuple[PointMass, ...]:
-    """Return a known mass as `count` hangers of one description have it; usual where unstated."""
-    one, usual_m = np.ones(count), hanger.assumptions.added_mass_radius_m.value
-    points = added_mass.points(hanger.length_m, usual_m)
-    return tuple(PointMass(each.x_m * one, each.mass_kg * one) for each in points)
+def point_mass(hanger: Hanger, added_mass: AddedMass, count: int) -> PointMass:
+    """Return a known mass as `count` hangers of one description have it."""
+    one, turns = np.ones(count), radius_m(hanger, added_mass)
+    return PointMass(added_mass.x_m * one, added_mass.mass_kg * one, turns * one if turns else None)
+
+
+def radius_m(hanger: Hanger, added_mass: AddedMass) -> float:
+    """Return the radius of gyration of a known mass, the usual one where none is stated."""
+    stated = added_mass.radius_of_gyration_m
+    return hanger.assumptions.added_mass_radius_m.value if stated is None else stated
 
 
 @dataclass(frozen=True)

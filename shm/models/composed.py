@@ -14,7 +14,7 @@ import scipy
 
 from shm.errors import UsageError
 from shm.models.as_made import AsMade
-from shm.models.base import Model, point_masses
+from shm.models.base import Model, point_mass
 from shm.models.beam import Beam, Beam3
 from shm.models.effects import EFFECTS, Conditions, Parameter, Variant, parameters_of
 from shm.models.hanger import HangerModes, PhysicalHanger, solve
@@ -99,8 +99,8 @@ class ComposedHanger:
         added = conditions.added_mass
         if added is None:
             return physical
-        clamped_on = point_masses(self.hanger, added, len(theta))
-        return replace(physical, masses=(*physical.masses, *clamped_on))
+        clamped_on = point_mass(self.hanger, added, len(theta))
+        return replace(physical, masses=(*physical.masses, clamped_on))
 
 
 def _same(one: PhysicalHanger, other: PhysicalHanger) -> bool:

@@ -46,7 +46,7 @@ def plant_effects(
         values = _order_values(planted, effect, hanger, variant)
         bar = effect.applied(bar, values, variant, conditions, hanger)
     added = conditions.added_mass
-    return bar if added is None else _clamp_mass_on(bar, added, hanger)
+    return bar if added is None else _clamp_mass_on(bar, added)
 
 
 _OF_READINGS = ("load_scale",)
@@ -97,8 +97,9 @@ def _order_values(
     return np.array([values])
 
 
-def _clamp_mass_on(bar: PhysicalHanger, added: AddedMass, hanger: Hanger) -> PhysicalHanger:
+def _clamp_mass_on(bar: PhysicalHanger, added: AddedMass) -> PhysicalHanger:
     """Return the bar with a known mass: a point where no radius is stated, as it is planted."""
-    points = added.points(hanger.length_m)
-    masses = [PointMass(np.array([each.x_m]), np.array([each.mass_kg])) for each in points]
-    return replace(bar, masses=(*bar.masses, *masses))
+    radius_m = added.radius_of_gyration_m
+    turning = np.array([radius_m]) if radius_m else None
+    mass = PointMass(np.array([added.x_m]), np.array([added.mass_kg]), turning)
+    return replace(bar, masses=(*bar.masses, mass))

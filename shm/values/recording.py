@@ -13,10 +13,10 @@ from shm.values.kinds import NAN, ComplexArray, FloatArray, IntArray, Plane, Qua
 
 @dataclass(frozen=True)
 class AddedMass:
-    """A known mass clamped on the hanger for one test.
+    """A known mass clamped on the hanger for one test, which turns with the bar.
 
-    `radius_of_gyration_m` is about the axis across the bar and its plane; None where nobody says
-    it.
+    `radius_of_gyration_m` is about the axis across the bar and its plane, 0 of a point; None where
+    nobody says it.
     """
 
     mass_kg: float
@@ -27,18 +27,6 @@ class AddedMass:
         """Return the same with this radius of gyration, where none is stated."""
         stated = self.radius_of_gyration_m
         return self if stated is not None else replace(self, radius_of_gyration_m=radius_m)
-
-    def points(self, length_m: float, usual_m: float = 0.0) -> tuple[AddedMass, ...]:
-        """Return the point masses on a bar of `length_m` that weigh and turn as it does.
-
-        Two halves, a radius of gyration to either side: the same mass and rotary inertia. They
-        stay on the bar. An unstated radius is the `usual_m`; one point has none.
-        """
-        radius_m = self.with_usual_radius(usual_m).radius_of_gyration_m
-        if not radius_m:
-            return (AddedMass(self.mass_kg, self.x_m, 0.0),)
-        places_m = max(self.x_m - radius_m, 0.0), min(self.x_m + radius_m, length_m)
-        return tuple(AddedMass(self.mass_kg / 2, place_m, 0.0) for place_m in places_m)
 
 
 @dataclass(frozen=True, eq=False)
