@@ -6,8 +6,9 @@ and l the ratios of bending stiffness, mass per length and length to the describ
 
     f(T, k) = c f_described(T l^2/e, k l/e),    c = sqrt(e/mu) / l^2,
 
-exactly for a uniform bar on rotational springs. (Fittings, turnbuckles and known masses keep their
-part of the length; plates are as much thicker as the rod is.) So
+exactly for a uniform bar on rotational springs. (Fittings, turnbuckles and known masses, which turn
+as if they were as much longer, keep their part of the length; plates are as much thicker as the rod
+is.) So
 frequencies alone see the *apparent tension* a = T/(mu l^2) and c, and nothing tells whether mass
 and length or the tension made a. That part of the uncertainty, some 1 to 2 %, no number of modes
 takes away; a measured tension does.

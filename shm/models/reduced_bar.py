@@ -54,7 +54,7 @@ class BarTerms:
 class ReducedBar:
     """A reduced basis for hangers like those of `usual`, with `zones` (start, end) of 0 to 1.
 
-    `point_masses` are the places of clamped-on masses, `radii` their radii of gyration.
+    `point_masses` are the places of clamped-on masses, `radii` their radii of gyration, else 0.
     """
 
     def __init__(
@@ -70,8 +70,8 @@ class ReducedBar:
         decay = float(np.sqrt(np.median(usual.tension)))
         elements = bar_elements(list(zones), decay, modes, self.shears, point_masses)
         self._elements = elements
-        at, radius = (np.asarray(each, dtype=float) for each in (point_masses, radii))
-        whole = _Matrices.of(elements, at, radius)
+        at = np.asarray(point_masses, dtype=float)
+        whole = _Matrices.of(elements, at, np.asarray(radii) if radii else np.zeros_like(at))
         usual = usual.take(slice(0, _SNAPSHOTS))
         basis = _basis(whole, usual, modes)
         self.basis = basis @ whole.projected(basis).diagonalised(usual)
