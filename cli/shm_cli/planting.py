@@ -44,7 +44,7 @@ def _pair(text: str) -> tuple[str, float]:
 
 
 def mass_of(text: str | None) -> AddedMass | None:
-    """Reads `KG:X` or `KG:X:RADIUS`; raises UsageError where it is neither."""
+    """Read `KG:X` or `KG:X:RADIUS`; raises UsageError where it is neither."""
     if text is None:
         return None
     try:

@@ -162,8 +162,9 @@ class GapProblem:
         return np.where(names[design.frequency_test, None] == read, change[:, None], 0.0)
 
     def masses_of(self, design: Design) -> FloatArray:
-        """What one standard deviation of the radius of gyration of each known mass that states none
-        does to the frequencies of a design: loads (F, k).
+        """Return what unstated radii of gyration do to the frequencies of a design: loads (F, k).
+
+        Each known mass that states none by itself, one standard deviation more than usual.
         """
 
         def log_frequency(radius_m: float) -> FloatArray:

@@ -159,8 +159,9 @@ class FieldLikelihood:
         return np.append(mean, np.zeros(int(self.has_reading))), left[:, kept] * size[kept]
 
     def _log_with_radius(self, model: Model, theta: FloatArray) -> Callable[[float], FloatArray]:
-        """Return what says ln f (frequencies,) of `theta` (parameters,) where a known mass that
-        states no radius of gyration has one of so many metres.
+        """Return what says ln f (frequencies,) of `theta` (parameters,) for a radius in m.
+
+        It is that of known masses that state no radius of gyration.
         """
 
         def log_frequency(radius_m: float) -> FloatArray:

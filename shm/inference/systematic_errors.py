@@ -121,8 +121,7 @@ def loads_of_radii(
     log_frequency: Callable[[float], FloatArray],
     assumed: Assumptions,
 ) -> FloatArray:
-    """Loads (F, k) of the radii of gyration of known masses that nobody states, each mass by
-    itself.
+    """Return loads (F, k) of unstated radii of gyration, each known mass by itself.
 
     `masses` (F,) are those of the frequencies' tests; `log_frequency` says ln f (F,) where what
     states no radius has one of so many metres. Masses of one size are one body.

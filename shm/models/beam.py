@@ -133,7 +133,7 @@ class Beam3(Beam2):
         return self.frequencies_of_section(theta, one, one, modes)
 
     def _coupled(self, theta: FloatArray) -> PhysicalHanger:
-        """The same with shear and rotary inertia, in turnbuckles those of the bar."""
+        """Return the same with shear and rotary inertia, in turnbuckles those of the bar."""
         hanger, one = self.hanger, np.ones(len(theta))
         turning = hanger.mass_per_length_kg_m * hanger.second_moment_m4 / hanger.area_m2
         return replace(

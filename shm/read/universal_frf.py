@@ -250,7 +250,7 @@ def sign(*directions: int) -> float:
 def id_lines(
     described: Recording | FrequencyResponse, name: str, own: dict[str, float]
 ) -> dict[str, str]:
-    """The id lines of a set of ours, none longer than 80 characters."""
+    """Return the id lines of a set of ours, none longer than 80 characters."""
     time = described.time
     moment = [f"time={format_time(time)}"] if time else []
     mass = [f"{key}={value:g}" for key, value in mass_entries(described.added_mass).items()]

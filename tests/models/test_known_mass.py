@@ -24,9 +24,7 @@ USUAL_M = DEFAULTS.added_mass_radius_m.value
 
 
 def by_elements(hanger: Hanger, mass: AddedMass, elements: int = 120) -> FloatArray:
-    """Return frequencies (modes,) of a clamped bar at its nominal tension with a node that has the
-    mass and its rotary inertia m r^2.
-    """
+    """Return frequencies (modes,) of a clamped bar, with the mass and its m r^2 at a node."""
     size = 2 * (elements + 1)
     stiffness, inertia = np.zeros((size, size)), np.zeros((size, size))
     h = hanger.length_m / elements
@@ -50,28 +48,28 @@ def by_elements(hanger: Hanger, mass: AddedMass, elements: int = 120) -> FloatAr
 
 
 def composed(mass: AddedMass) -> FloatArray:
-    """The general model, as the diagnosis has it."""
+    """Solve the general model, as the diagnosis has it."""
     hanger = ComposedHanger(ROD, "beam1", (), ())
     theta = np.array([[1.0, 0.0, 0.0, 0.0, 0.0]])
     return hanger.modes(theta, Conditions(added_mass=mass), MODES, False).frequency_hz[0, 0]
 
 
 def planted(mass: AddedMass) -> FloatArray:
-    """The general model, as the simulator has it."""
+    """Solve the general model, as the simulator has it."""
     bare = PhysicalHanger.clamped(ROD, np.array([ROD.nominal_tension_n]))
     bar = plant_effects(bare, (), Conditions(added_mass=mass), ROD, ())
     return solve(bar, MODES, np.empty(0), shapes=False).frequency_hz[0, 0]
 
 
 def beam(mass: AddedMass) -> FloatArray:
-    """A class by its closed form, laden by the general model."""
+    """Solve a class by its closed form, laden by the general model."""
     theta = np.array([[1.0, 1.0]])
     model = build("beam1", ROD, THESIS)
     return model.frequencies_at(theta, MODES, Conditions(added_mass=mass))[0, 0]
 
 
 def as_made(mass: AddedMass) -> FloatArray:
-    """A class with the deviations of the bar as made, all 0."""
+    """Solve a class with the deviations of the bar as made, all 0."""
     model = build("beam1", ROD)
     known = {"theta_F": 1.0, "theta_L": 1.0}
     theta = model.pack({name: known.get(name, 0.0) for name in model.parameter_names})[None]
@@ -79,7 +77,7 @@ def as_made(mass: AddedMass) -> FloatArray:
 
 
 def of_terms(mass: AddedMass) -> FloatArray:
-    """The same with terms of a hanger that stands upright, which its weight hardly changes."""
+    """Solve the same with terms of a hanger that stands upright, which its weight hardly changes."""
     model = build("beam1", replace(ROD, inclination_deg=90.0))
     known = {"theta_F": 1.0, "theta_L": 1.0, "inclination": 90.0, "sag_stiffness": 1.0}
     theta = model.pack({name: known.get(name, 0.0) for name in model.parameter_names})[None]

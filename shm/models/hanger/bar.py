@@ -80,7 +80,7 @@ class Bar:
         return self._with_sheared(self._at(x).w)
 
     def slopes(self, x: FloatArray) -> FloatArray:
-        """The slopes of the axis, likewise."""
+        """Return the slopes of the axis, likewise."""
         return self._with_sheared(self._at(x).slope)
 
     def _at(self, x: FloatArray) -> Table:
@@ -252,7 +252,7 @@ def _edges(physical: PhysicalHanger) -> FloatArray:
 
 
 def _heavy(physical: PhysicalHanger) -> list[PointMass]:
-    """The masses that smooth functions would blur."""
+    """Return the masses that smooth functions would blur."""
     bar_kg = physical.mass_per_length_kg_m * physical.length_m
     return [mass for mass in physical.masses if np.any(mass.mass_kg > _LIGHT * bar_kg)]
 
