@@ -77,7 +77,7 @@ def as_made(mass: AddedMass) -> FloatArray:
 
 
 def of_terms(mass: AddedMass) -> FloatArray:
-    """Solve the same with terms of a hanger that stands upright, which its weight hardly changes."""
+    """Solve the same with terms of a hanger that stands upright, whose weight matters little."""
     model = build("beam1", replace(ROD, inclination_deg=90.0))
     known = {"theta_F": 1.0, "theta_L": 1.0, "inclination": 90.0, "sag_stiffness": 1.0}
     theta = model.pack({name: known.get(name, 0.0) for name in model.parameter_names})[None]
