@@ -604,6 +604,16 @@ _SENSORS = (
         most=0.5,
     ),
     Assumption(
+        "added_mass_radius_m",
+        0.05,
+        "m",
+        JUDGEMENT,
+        "Radius of gyration of a known mass clamped on for a test, where none is stated: clamps of "
+        "half a kilogram to 25 kg are 5 to 20 cm long.",
+        sd=0.03,
+        most=1.0,
+    ),
+    Assumption(
         "clamp_gyration_m",
         0.1,
         "m",

@@ -18,7 +18,7 @@ from cattrs.gen import make_dict_structure_fn
 
 from shm.documents import Misfit, finite, key_meant, reader, value_of
 from shm.errors import BadInput
-from shm.values import LONGEST_TEST_ID, ModalTest, Mode, is_test_id, outdoor_c
+from shm.values import LONGEST_TEST_ID, AddedMass, ModalTest, Mode, is_test_id, outdoor_c
 
 MODES_SCHEMA = "shm.modes/1"
 _HIGHEST_ORDER = 200  # technical: models solve for every order below; no hammer reaches it
@@ -35,6 +35,7 @@ _TEST_KEYS = (
     "tension_read_sd_n", "rattles_above", "modes",
 )  # fmt: skip
 _MODE_KEYS = tuple(field.name for field in fields(Mode))
+_MASS_KEYS = tuple(field.name for field in fields(AddedMass))
 _SPELT = {"added_mass": 'Write added_mass = {"mass_kg": ..., "x_m": ...}, in kg and m.'}
 _LARGEST_DOCUMENT_BYTES = 32 << 20  # some thousand tests; it grows thirtyfold when read
 
@@ -55,6 +56,8 @@ def test_document(test: ModalTest) -> dict[str, Any]:
     document.pop("hanger")
     if test.added_mass is None:
         document.pop("added_mass")
+    elif test.added_mass.radius_of_gyration_m is None:
+        document["added_mass"].pop("radius_of_gyration_m")
     if math.isnan(test.tension_read_n):
         document.pop("tension_read_n")
         document.pop("tension_read_sd_n")
@@ -123,6 +126,7 @@ def _parse_test(test: Any, hanger: int | None, index: int, file: str | Path) -> 
             f"{label} has no list `modes`.", file=file, remedy="Give its modes or drop the test."
         )
     _refuse_misspelt(test, _TEST_KEYS, label, file)
+    _refuse_misspelt(test.get("added_mass"), _MASS_KEYS, f"{label}.added_mass", file)
     for i, mode in enumerate(test["modes"]):
         _refuse_misspelt(mode, _MODE_KEYS, f"{label}.modes[{i}]", file)
     filled = {**test, "hanger": hanger, "id": _id(test.get("id", f"t{index + 1}"), label, file)}
@@ -177,6 +181,9 @@ def _faults(test: ModalTest) -> Iterator[tuple[bool, str, str]]:
         ".added_mass needs a positive mass_kg and an x_m",
         "Give both, in kg and m.",
     )
+    radius_m = None if mass is None else mass.radius_of_gyration_m
+    is_wrong = radius_m is not None and radius_m < 0
+    yield is_wrong, ".added_mass: radius_of_gyration_m is negative", _LEAVE_OUT
     warm = test.temperature_c
     is_odd = math.isfinite(warm) and math.isnan(outdoor_c(warm))
     yield is_odd, f": temperature_c = {warm:g} is no temperature outdoors", _LEAVE_OUT

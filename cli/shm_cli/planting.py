@@ -44,16 +44,17 @@ def _pair(text: str) -> tuple[str, float]:
 
 
 def mass_of(text: str | None) -> AddedMass | None:
-    """Reads `KG:X`; raises UsageError where it is not that."""
+    """Read `KG:X` or `KG:X:RADIUS`; raises UsageError where it is neither."""
     if text is None:
         return None
     try:
-        mass_kg, x_m = (float(part) for part in text.split(":"))
+        mass_kg, x_m, *radius_m = (float(part) for part in text.split(":", 2))
     except ValueError:
         raise UsageError(
-            f"--added-mass {text!r} is not KG:X.", remedy="Write --added-mass 25:3.6."
+            f"--added-mass {text!r} is not KG:X or KG:X:RADIUS.",
+            remedy="Write --added-mass 25:3.6, or 25:3.6:0.08.",
         ) from None
-    return AddedMass(mass_kg, x_m)
+    return AddedMass(mass_kg, x_m, *radius_m)
 
 
 _DAY_S = 86400.0

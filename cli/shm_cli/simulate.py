@@ -118,7 +118,11 @@ def _springs(function: flags.F) -> flags.F:
     default=10.0,
     help="Temperature at which the tension is the planted one.",
 )
-@click.option("--added-mass", metavar="KG:X", help="A known mass, clamped on at X m.")
+@click.option(
+    "--added-mass",
+    metavar="KG:X[:RADIUS]",
+    help="A known mass, clamped on at X m: a point, or a body with a RADIUS of gyration in m.",
+)
 @click.option(
     "--stream",
     "as_stream",

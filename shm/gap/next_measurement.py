@@ -281,8 +281,8 @@ def _given_the_old(
     counts = [new, design.size - new, len(mean) - design.size]
     sd = np.repeat([np.median(errors.sd[:old]), shape_sd, reading_sd], counts)
     noise = np.diag(sd**2)
-    read = problem.tensions_of(design)
-    among_new = errors.between(design, design, same=True) + will @ will.T + read @ read.T
+    own = np.hstack([problem.tensions_of(design), problem.masses_of(design)])
+    among_new = errors.between(design, design, same=True) + will @ will.T + own @ own.T
     noise[:new, :new] += among_new - gain @ shared.T
     if errors.sensors is not None:
         noise[new : design.size, new : design.size] += errors.sensors @ errors.sensors.T

@@ -21,7 +21,7 @@ from shm.gap.repeated_errors import (
     sensor_loads,
     turn_loads,
 )
-from shm.inference.systematic_errors import shared_loads
+from shm.inference.systematic_errors import loads_of_radii, shared_loads
 from shm.models.composed import Baseline, ComposedHanger
 from shm.models.effects import Conditions, Variant, parameters_of
 from shm.models.hanger import HangerModes
@@ -139,7 +139,9 @@ class GapProblem:
         """What the errors that repeat do to the data, from the baseline near the data."""
         sensors, errors = sensor_loads(self.observations, self._predicted_near, self.hanger)
         shapes = np.hstack([sensors, turn_loads(self.observations)])
-        return Repeated(self.section_of(self.design), self.tensions_of(self.design), shapes, errors)
+        design = self.design
+        tensions, masses = self.tensions_of(design), self.masses_of(design)
+        return Repeated(self.section_of(design), tensions, masses, shapes, errors)
 
     def tensions_of(self, design: Design) -> FloatArray:
         """Return what one standard deviation of each test's tension does to the frequencies of a
@@ -162,6 +164,20 @@ class GapProblem:
         change = (there - self._predicted_near(design))[: design.frequencies] / _STEP_SD
         of_test = np.array(names)[design.frequency_test, None] == list(dict.fromkeys(names))
         return np.where(of_test, change[:, None], 0.0)
+
+    def masses_of(self, design: Design) -> FloatArray:
+        """Return what unstated radii of gyration do to the frequencies of a design: loads (F, k).
+
+        Each known mass that states none by itself, one standard deviation more than usual.
+        """
+
+        def log_frequency(radius_m: float) -> FloatArray:
+            conditions = tuple(each.with_usual_radius(radius_m) for each in design.conditions)
+            near = self._predicted_near(replace(design, conditions=conditions))
+            return near[: design.frequencies]
+
+        masses = [design.conditions[test].added_mass for test in design.frequency_test]
+        return loads_of_radii(masses, log_frequency, self.hanger.assumptions)
 
     def section_of(self, design: Design) -> FloatArray:
         """What the section along the bar, the sensors' mass and the supports' give do to the

@@ -1,11 +1,11 @@
-"""Errors that repeat in every mode and test, of sensors and of the section along the bar; scale,
-sign and direction of mode shapes.
+"""Errors that repeat in every mode and test, of sensors, of the section along the bar and of known
+masses; scale, sign and direction of mode shapes.
 
 A sensor's gain is a little off, it sits some millimetres from where it should, is turned a little
 and reads some of one axis in the other; a rolled bar is here and there a little thicker than on
-average. None of these is a gap, yet no repetition averages them out. They are normal and small, so
-that what one standard deviation of each does to the data (its load) is all there is to know of
-them.
+average; a known mass is a body, a little longer or shorter than usual. None of these is a gap, yet
+no repetition averages them out. They are normal and small, so that what one standard deviation of
+each does to the data (its load) is all there is to know of them.
 """
 
 from __future__ import annotations
@@ -39,33 +39,37 @@ SensorError: TypeAlias = tuple[Literal["gain", "place", "turn", "cross"], int, i
 class Repeated:
     """Loads of what repeats.
 
-    `section` (F, k) is that of the section along the bar and `tensions` (F, tests) that of each
-    test's tension, both of frequencies; `sensors` (S, l) is that of shapes, with those of
+    `section` (F, k) is that of the section along the bar, `tensions` (F, tests) that of each test's
+    tension and `masses` (F, k) that of known masses whose radius of gyration nobody states, all of
+    frequencies; `sensors` (S, l) is that of shapes, with those of
     modes that may be turned, which do not repeat (`turn_loads`); its first are those of
     `sensor_errors`.
     """
 
     section: FloatArray
     tensions: FloatArray
+    masses: FloatArray
     sensors: FloatArray
     sensor_errors: tuple[SensorError, ...] = ()
 
     @classmethod
     def none(cls, design: Design) -> Repeated:
         nothing = np.zeros((design.frequencies, 0))
-        return cls(nothing, nothing, np.zeros((len(design.shape_mode), 0)))
+        return cls(nothing, nothing, nothing, np.zeros((len(design.shape_mode), 0)))
 
     @property
     def loads(self) -> FloatArray:
-        """Of all data (data, k): section and tensions move no shape, sensors no frequency."""
-        return np.asarray(
-            scipy.linalg.block_diag(np.hstack([self.section, self.tensions]), self.sensors)
-        )
+        """Of all data (data, k): sensors move no frequency, the others no shape."""
+        return np.asarray(scipy.linalg.block_diag(self._of_frequencies, self.sensors))
 
     @property
     def frequency(self) -> FloatArray:
         """Covariance (F, F) of the frequencies' logarithms."""
-        return np.asarray(self.section @ self.section.T + self.tensions @ self.tensions.T)
+        return np.asarray(self._of_frequencies @ self._of_frequencies.T)
+
+    @property
+    def _of_frequencies(self) -> FloatArray:
+        return np.hstack([self.section, self.tensions, self.masses])
 
 
 def section_loads(design: Design, physical: PhysicalHanger, hanger: Hanger) -> FloatArray:

@@ -23,7 +23,7 @@ S^-1/2 (tau^2 R + U U') S^-1/2 serve all phi.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy
@@ -31,7 +31,13 @@ import scipy
 from shm.assumptions import Assumptions
 from shm.inference.likelihood import conditions_of, measured, predicted_hz
 from shm.inference.shapes import SHAPES, MeasuredShapes
-from shm.inference.systematic_errors import errors_of_bar, felt_by, loads_of_ends, mean_of_ends
+from shm.inference.systematic_errors import (
+    errors_of_bar,
+    felt_by,
+    loads_of_ends,
+    loads_of_radii,
+    mean_of_ends,
+)
 from shm.models import AsMade, Model
 from shm.models.as_made import TENSION
 from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
@@ -150,12 +156,27 @@ class FieldLikelihood:
         places = tuple(sorted({point.x_m for mode in self.modes for point in mode.shape}))
         mean, loads = errors_of_bar(model.hanger, self._order + 1, felt_by(ends[0]), places)
         of_ends = loads_of_ends(ends, model.stiff_ends_m, self._plane, self._order, self._assumed)
-        loads = np.hstack([loads, of_ends])
+        masses = [each.added_mass for each in self._conditions]
+        of_masses = loads_of_radii(masses, self._log_with_radius(model, theta), self._assumed)
+        loads = np.hstack([loads, of_ends, of_masses])
         smallest = self._assumed.model_error.lower
         least = max(self.identification_error[: self.frequencies].min(), smallest)
         left, size, _ = np.linalg.svd(loads, full_matrices=False)
         kept = size > _UNFELT * least
         return np.append(mean, np.zeros(int(self.has_reading))), left[:, kept] * size[kept]
+
+    def _log_with_radius(self, model: Model, theta: FloatArray) -> Callable[[float], FloatArray]:
+        """Return what says ln f (frequencies,) of `theta` (parameters,) for a radius in m.
+
+        It is that of known masses that state no radius of gyration.
+        """
+
+        def log_frequency(radius_m: float) -> FloatArray:
+            conditions = [each.with_usual_radius(radius_m) for each in self._conditions]
+            found = predicted_hz(model, theta[None], conditions, self._plane, self._order)
+            return np.asarray(np.log(found[0]))
+
+        return log_frequency
 
     @property
     def fit_error(self) -> FloatArray:

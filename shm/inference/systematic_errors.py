@@ -2,21 +2,22 @@
 
 The accelerometer's own mass lowers each mode by where it sits, both planes alike; the section
 wanders; supports give way sideways and lower high orders of stiff bars; fittings stiffen the ends
-(`shm.models.end_effects`). All are small, known to first order and of uncertain size, so that their
-mean shifts a prediction and what is uncertain is a few normal errors ("loads": what one standard
-deviation of each does). The remaining errors of a mode are tau's (`shm.inference.field`).
+(`shm.models.end_effects`); a known mass turns with the bar as much as it is long. All are small,
+known to first order and of uncertain size, so that their mean shifts a prediction and what is
+uncertain is a few normal errors ("loads": what one standard deviation of each does). The remaining
+errors of a mode are tau's (`shm.inference.field`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 import numpy as np
 
 from shm.assumptions import DEFAULTS, Assumptions
 from shm.models.end_effects import EndWaves
-from shm.values import FloatArray, Hanger, IntArray
+from shm.values import AddedMass, FloatArray, Hanger, IntArray
 
 Ends: TypeAlias = tuple[EndWaves, EndWaves]
 """The deck's and the arch's."""
@@ -113,6 +114,28 @@ def shared_loads(
     give_sd_m_n = assumed.support_compliance_m_n.sd
     size = np.sqrt(2) * give_sd_m_n * _lowered(hanger, order, frequency_hz)
     return np.hstack([sensor, -size[:, None] * _by_plane(plane, assumed)])
+
+
+def loads_of_radii(
+    masses: Sequence[AddedMass | None],
+    log_frequency: Callable[[float], FloatArray],
+    assumed: Assumptions,
+) -> FloatArray:
+    """Return loads (F, k) of unstated radii of gyration, each known mass by itself.
+
+    `masses` (F,) are those of the frequencies' tests; `log_frequency` says ln f (F,) where what
+    states no radius has one of so many metres. Masses of one size are one body.
+    """
+    is_open = [each is not None and each.radius_of_gyration_m is None for each in masses]
+    size_kg = np.array([each.mass_kg if each else 0.0 for each in masses])
+    bodies = np.unique(size_kg[is_open])
+    if not len(bodies):
+        return np.zeros((len(masses), 0))
+    radius = assumed.added_mass_radius_m
+    larger = log_frequency(radius.value + radius.sd)
+    change = (larger - log_frequency(max(radius.value - radius.sd, 0.0))) / 2
+    own = np.equal.outer(size_kg, bodies) & np.array(is_open)[:, None]
+    return np.asarray(np.where(own, change[:, None], 0.0))
 
 
 def _of_string(hanger: Hanger, order: IntArray, x_m: FloatArray) -> FloatArray:

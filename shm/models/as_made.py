@@ -6,8 +6,9 @@ and l the ratios of bending stiffness, mass per length and length to the describ
 
     f(T, k) = c f_described(T l^2/e, k l/e),    c = sqrt(e/mu) / l^2,
 
-exactly for a uniform bar on rotational springs. (Fittings, turnbuckles and known masses keep their
-part of the length; plates are as much thicker as the rod is.) So
+exactly for a uniform bar on rotational springs. (Fittings, turnbuckles and known masses, which turn
+as if they were as much longer, keep their part of the length; plates are as much thicker as the rod
+is.) So
 frequencies alone see the *apparent tension* a = T/(mu l^2) and c, and nothing tells whether mass
 and length or the tension made a. That part of the uncertainty, some 1 to 2 %, no number of modes
 takes away; a measured tension does.
@@ -26,9 +27,9 @@ import scipy
 
 from shm.assumptions import Assumption, Assumptions
 from shm.models.bar_of_terms import BarValues, bar_of_terms
-from shm.models.base import DESCRIPTION, Conditions, Model, silent
+from shm.models.base import DESCRIPTION, Conditions, Model, radius_m, silent
 from shm.models.beam import Beam, Beam3
-from shm.values import PLANES, AddedMass, FloatArray, Hanger, ModalTest
+from shm.values import PLANES, FloatArray, Hanger, ModalTest
 
 TENSION, LENGTH = "theta_F", "theta_L"
 SECTION, DENSITY, MODULUS = "section", "density", "modulus"
@@ -158,10 +159,11 @@ class AsMade(Model):
             # What a mass weighs counts against the real bar's, which is longer, too.
             _, per_length, length = self.stiffness_mass_length(theta)
             kg: Any = mass.mass_kg / (per_length * (1.0 if self.length_is_open else length))
-            conditions = replace(conditions, added_mass=AddedMass(kg, mass.x_m))
+            conditions = replace(conditions, added_mass=replace(mass, mass_kg=kg))
         if self.has_terms:
             places = () if mass is None else (mass.x_m,)
-            bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes, places)
+            radii = () if mass is None else (radius_m(self.hanger, mass),)
+            bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes, places, radii)
             kilograms = None if mass is None else np.asarray(kg)[:, None]
             found = bar.frequencies_hz(self._values(theta), kilograms)
         elif isinstance(self.model, Beam3) and mass is None:

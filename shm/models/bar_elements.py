@@ -46,6 +46,13 @@ class BarElements:
 
     def deflection(self, x: FloatArray) -> FloatArray:
         """Return the deflection (points, d) of each function at places `x` from 0 to 1."""
+        return self._derivative(x, 0)
+
+    def slope(self, x: FloatArray) -> FloatArray:
+        """Return the slope of the axis (points, d) of each function at places `x` from 0 to 1."""
+        return self._derivative(x, 1)
+
+    def _derivative(self, x: FloatArray, order: int) -> FloatArray:
         element = (np.searchsorted(self.edges, x, side="right") - 1).clip(0, len(self.degrees) - 1)
         found = np.zeros((len(x), len(self.area)))
         columns = _columns(self.degrees)
@@ -54,10 +61,10 @@ class BarElements:
             if not len(rows):
                 continue
             start, length = self.edges[index], self.edges[index + 1] - self.edges[index]
-            table = _functions((x[rows] - start) / length, length, self.degrees[index])[0]
+            table = _functions((x[rows] - start) / length, length, self.degrees[index])
             for function, column in enumerate(own):
                 if column >= 0:
-                    found[rows, column] += table[function]
+                    found[rows, column] += table[order][function]
         return found
 
 
@@ -71,7 +78,7 @@ def bar_elements(
     """Return the matrices of a bar with `zones` (start, end), for `modes` modes.
 
     `decay` is L sqrt(T/EI) at a usual tension: elements are short where boundary layers are. They
-    meet where point masses are (`masses_at`), since the shear force jumps there.
+    meet where point masses are (`masses_at`), since shear force and moment jump there.
     """
     edges = _edges(zones, decay, masses_at)
     lengths = np.diff(edges)

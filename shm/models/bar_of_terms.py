@@ -51,7 +51,8 @@ class BarValues:
 class BarOfTerms:
     """The frequencies of bars like `hanger`, with or without shear, for `modes` modes a plane.
 
-    `fittings_m` are the lengths of the deck's and the arch's fitting.
+    `fittings_m` are the lengths of the deck's and the arch's fitting, `radii_m` the radii of
+    gyration of known masses at `masses_at_m`.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class BarOfTerms:
         shears: bool,
         modes: int,
         masses_at_m: Sequence[float] = (),
+        radii_m: Sequence[float] = (),
     ):
         self.hanger, self.shears, self.modes = hanger, shears, modes
         length = hanger.length_m
@@ -72,8 +74,8 @@ class BarOfTerms:
             zones.append((middle - half, middle + half))
         self._unit_hz = math.sqrt(hanger.bending_stiffness_n_m2 / hanger.mass_per_length_kg_m)
         self._unit_hz /= 2 * math.pi * length**2
-        places = [each / length for each in masses_at_m]
-        self._bar = ReducedBar(zones, self._snapshots(len(places)), modes, places)
+        places, radii = ([each / length for each in of] for of in (masses_at_m, radii_m))
+        self._bar = ReducedBar(zones, self._snapshots(len(places)), modes, places, radii)
 
     def frequencies_hz(self, values: BarValues, masses_kg: FloatArray | None = None) -> FloatArray:
         """Return frequencies (n, 2, modes), with known masses (n, places) on the bar."""
@@ -176,9 +178,10 @@ def bar_of_terms(
     shears: bool,
     modes: int,
     masses_at_m: tuple[float, ...] = (),
+    radii_m: tuple[float, ...] = (),
 ) -> BarOfTerms:
     """Return the bar of a hanger; its reduced basis is made once."""
-    return BarOfTerms(hanger, fittings_m, shears, modes, masses_at_m)
+    return BarOfTerms(hanger, fittings_m, shears, modes, masses_at_m, radii_m)
 
 
 _LEAST_FLEXIBLE = 1e-3  # a thousandth of the theory's flexibility changes no frequency

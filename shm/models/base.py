@@ -258,11 +258,21 @@ def laden_ratio(
     and the arch end, each (n, planes). A mass beyond the bar's end weighs nothing.
     """
     bare = coupled_bar(hanger, length_m, tension_n).on_springs(springs_n_m_rad)
-    one = np.ones(len(tension_n))
-    mass = PointMass(added_mass.x_m * one, added_mass.mass_kg * one)
-    laden = replace(bare, masses=(mass,))
+    laden = replace(bare, masses=(point_mass(hanger, added_mass, len(tension_n)),))
     found = [solve(each, modes, _NOWHERE, shapes=False).frequency_hz for each in (laden, bare)]
     return np.asarray(found[0] / found[1])
+
+
+def point_mass(hanger: Hanger, added_mass: AddedMass, count: int) -> PointMass:
+    """Return a known mass as `count` hangers of one description have it."""
+    one, turns = np.ones(count), radius_m(hanger, added_mass)
+    return PointMass(added_mass.x_m * one, added_mass.mass_kg * one, turns * one if turns else None)
+
+
+def radius_m(hanger: Hanger, added_mass: AddedMass) -> float:
+    """Return the radius of gyration of a known mass, the usual one where none is stated."""
+    stated = added_mass.radius_of_gyration_m
+    return hanger.assumptions.added_mass_radius_m.value if stated is None else stated
 
 
 @dataclass(frozen=True)
@@ -281,3 +291,8 @@ class Conditions:
     added_mass: AddedMass | None = None
     tension_shift_n: float = 0.0
     tension_shift_sd_n: float = 0.0
+
+    def with_usual_radius(self, radius_m: float) -> Conditions:
+        """Return the same with this radius of gyration of a known mass that states none."""
+        mass = self.added_mass
+        return replace(self, added_mass=mass and mass.with_usual_radius(radius_m))

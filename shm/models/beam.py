@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -128,11 +129,9 @@ class Beam3(Beam2):
     name = "beam3"
     title = "Beam 3: rotational end springs, shear and rotary inertia"
 
-    @classmethod
-    def unfit(cls, hanger: Hanger) -> str:
-        return "it does not model turnbuckles." if hanger.turnbuckles else super().unfit(hanger)
-
     def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
+        if self.hanger.turnbuckles:
+            return super().frequencies_hz(theta, modes)
         one = np.ones(len(theta))
         return self.frequencies_of_section(theta, one, one, modes)
 
@@ -150,12 +149,22 @@ class Beam3(Beam2):
         shear = hanger.shear_stiffness_n * flexibility
         return tensioned_beam.timoshenko_waves(tension, shear, turning, deck, arch, modes)
 
+    def _coupled(self, theta: FloatArray) -> PhysicalHanger:
+        """Return the same with shear and rotary inertia, in turnbuckles those of the bar."""
+        hanger, one = self.hanger, np.ones(len(theta))
+        turning = hanger.mass_per_length_kg_m * hanger.second_moment_m4 / hanger.area_m2
+        return replace(
+            super()._coupled(theta),
+            shear_compliance_1_n=one / hanger.shear_stiffness_n,
+            rotary_inertia_kg_m=turning * one,
+        )
+
     def frequencies_of_section(
         self, theta: FloatArray, section: FloatArray, shear: FloatArray, modes: int
     ) -> FloatArray:
         """Frequencies (n, 2, modes) of bars of the described bending stiffness and mass whose area
         is `section` (n,) times the described one, which changes shear and rotary inertia alone, and
-        whose shear is `shear` (n,) times the theory's.
+        whose shear is `shear` (n,) times the theory's, without turnbuckles.
         """
         hanger, rigid_n = self.hanger, self.hanger.shear_stiffness_n
         deck, arch = self.springs_n_m_rad(theta)

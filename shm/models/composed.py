@@ -14,13 +14,13 @@ import scipy
 
 from shm.errors import UsageError
 from shm.models.as_made import AsMade
-from shm.models.base import Model
+from shm.models.base import Model, point_mass
 from shm.models.beam import Beam, Beam3
 from shm.models.effects import EFFECTS, Conditions, Parameter, Variant, parameters_of
-from shm.models.hanger import HangerModes, PhysicalHanger, PointMass, solve
+from shm.models.hanger import HangerModes, PhysicalHanger, solve
 from shm.models.registry import MODELS
 from shm.models.solid import S2
-from shm.values import NAN, AddedMass, FloatArray, Hanger
+from shm.values import NAN, FloatArray, Hanger
 
 
 class ComposedHanger:
@@ -96,15 +96,11 @@ class ComposedHanger:
             values = theta[:, at : at + count]
             physical = EFFECTS[name].applied(physical, values, variant, conditions, self.hanger)
             at += count
-        return _clamped_on(physical, conditions.added_mass)
-
-
-def _clamped_on(physical: PhysicalHanger, added: AddedMass | None) -> PhysicalHanger:
-    if added is None:
-        return physical
-    one = np.ones(len(physical.tension_n))
-    mass = PointMass(added.x_m * one, added.mass_kg * one)
-    return replace(physical, masses=(*physical.masses, mass))
+        added = conditions.added_mass
+        if added is None:
+            return physical
+        clamped_on = point_mass(self.hanger, added, len(theta))
+        return replace(physical, masses=(*physical.masses, clamped_on))
 
 
 def _same(one: PhysicalHanger, other: PhysicalHanger) -> bool:

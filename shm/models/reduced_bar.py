@@ -52,7 +52,10 @@ class BarTerms:
 
 
 class ReducedBar:
-    """A reduced basis for hangers like those of `usual`, with `zones` (start, end) of 0 to 1."""
+    """A reduced basis for hangers like those of `usual`, with `zones` (start, end) of 0 to 1.
+
+    `point_masses` are the places of clamped-on masses, `radii` their radii of gyration, else 0.
+    """
 
     def __init__(
         self,
@@ -60,14 +63,15 @@ class ReducedBar:
         usual: BarTerms,
         modes: int,
         point_masses: Sequence[float] = (),
+        radii: Sequence[float] = (),
     ):
         self.modes = modes
         self.shears = usual.shear.size > 0 and bool(np.isfinite(usual.shear).any())
         decay = float(np.sqrt(np.median(usual.tension)))
         elements = bar_elements(list(zones), decay, modes, self.shears, point_masses)
         self._elements = elements
-        self._masses_at = np.asarray(point_masses, dtype=float)
-        whole = _Matrices.of(elements, self._masses_at)
+        at = np.asarray(point_masses, dtype=float)
+        whole = _Matrices.of(elements, at, np.asarray(radii) if radii else np.zeros_like(at))
         usual = usual.take(slice(0, _SNAPSHOTS))
         basis = _basis(whole, usual, modes)
         self.basis = basis @ whole.projected(basis).diagonalised(usual)
@@ -133,7 +137,7 @@ class _Matrices:
     diagonal_mass: bool = False
 
     @classmethod
-    def of(cls, elements: BarElements, masses_at: FloatArray) -> _Matrices:
+    def of(cls, elements: BarElements, masses_at: FloatArray, radii: FloatArray) -> _Matrices:
         springs = np.einsum("ei,ej->eij", elements.end_rotation, elements.end_rotation)
         sag = np.outer(elements.area, elements.area)
         stiffness = [*elements.bending, elements.tension, elements.gradient, *springs, sag]
@@ -142,8 +146,9 @@ class _Matrices:
         if shears:
             stiffness.append(elements.shear)
             mass += [*elements.turning]
-        at = elements.deflection(masses_at)
-        mass += [np.outer(row, row) for row in at]
+        moved, turned = elements.deflection(masses_at), elements.slope(masses_at)
+        for w, turn in zip(moved, radii[:, None] * turned, strict=True):
+            mass.append(np.outer(w, w) + np.outer(turn, turn))
         zones = len(elements.bending) - 1
         return cls(np.array(stiffness), np.array(mass), zones, shears)
 

@@ -284,7 +284,11 @@ _TIMES = {"t", "time", "times", "timedomain", "timevector", "timeaxis", "times_s
 _FREQUENCIES = {"f", "freq", "frequency", "frequencies", "frequencyhz", "freqdomain", "freqhz"}
 _SECONDS = {"s", "sec", "second", "seconds"}
 _RESPONSES = ("frf", "accelerance")
-_MASS = {"addedmasskg": "added_mass_kg", "addedmassatm": "added_mass_at_m"}
+_MASS = {
+    "addedmasskg": "added_mass_kg",
+    "addedmassatm": "added_mass_at_m",
+    "addedmassradiusm": "added_mass_radius_m",
+}
 _RATES = {
     "samplingratehz", "samplingrate", "samplerate", "samplefrequency", "samplingfrequency",
     "samplingfreq", "samplefreq", "fs", "fshz", "timesamplerate",

@@ -20,6 +20,7 @@ KEYS = (
     "temperature_c",
     "added_mass_kg",
     "added_mass_at_m",
+    "added_mass_radius_m",
     "sampling_rate_hz",
 )
 CHANNEL_KEYS = ("unit", "x_m", "plane", "calibration", "full_scale", "leave_out", "coherence")
@@ -107,11 +108,12 @@ class Header:
     def added_mass(self) -> AddedMass | None:
         """The known mass that was clamped on; None where nothing says one."""
         mass, place = self._given("added_mass_kg"), self._given("added_mass_at_m")
-        if mass is None and place is None:
+        radius = self._given("added_mass_radius_m")
+        if mass is None and place is None and radius is None:
             return None
         remedy = "Give both added_mass_kg and added_mass_at_m, from the deck end, or neither."
         if mass is None or place is None:
-            only = mass or place
+            only = mass or place or radius
             assert only is not None
             raise only.refusal("a known mass needs its size and its place.", remedy)
         mass_kg = _number(mass, "added_mass_kg", remedy)
@@ -120,7 +122,7 @@ class Header:
             raise mass.refusal(f"added_mass_kg = {mass.text} is not positive.", remedy)
         if not x_m >= 0:
             raise place.refusal(f"added_mass_at_m = {place.text} is below the deck end.", remedy)
-        return AddedMass(mass_kg, x_m)
+        return AddedMass(mass_kg, x_m, None if radius is None else _radius_m(radius))
 
     @property
     def sampling_rate_hz(self) -> float:
@@ -278,8 +280,19 @@ def _number(entry: Entry, key: str, remedy: str, channel: str = "") -> float:
     return number
 
 
+def _radius_m(entry: Entry) -> float:
+    remedy = "Give the radius of gyration of the known mass in m, 0 of a point, or leave it out."
+    radius_m = _number(entry, "added_mass_radius_m", remedy)
+    if not radius_m >= 0:
+        raise entry.refusal(f"added_mass_radius_m = {entry.text} is negative.", remedy)
+    return radius_m
+
+
 def mass_entries(added_mass: AddedMass | None) -> dict[str, float]:
     """The entries that say of a known mass; none where there is none."""
     if added_mass is None:
         return {}
-    return {"added_mass_kg": added_mass.mass_kg, "added_mass_at_m": added_mass.x_m}
+    said = {"added_mass_kg": added_mass.mass_kg, "added_mass_at_m": added_mass.x_m}
+    if added_mass.radius_of_gyration_m is not None:
+        said["added_mass_radius_m"] = added_mass.radius_of_gyration_m
+    return said

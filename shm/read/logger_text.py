@@ -78,8 +78,8 @@ def _may_be_value(cell: str) -> bool:
 
 
 _OUR_KEYS = {
-    "hanger", "temperature_c", "added_mass_kg", "added_mass_at_m", "sampling_rate_hz", "unit",
-    "x_m", "plane", "calibration", "full_scale", "leave_out",
+    "hanger", "temperature_c", "added_mass_kg", "added_mass_at_m", "added_mass_radius_m",
+    "sampling_rate_hz", "unit", "x_m", "plane", "calibration", "full_scale", "leave_out",
 }  # fmt: skip
 
 

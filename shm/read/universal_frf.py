@@ -250,15 +250,17 @@ def sign(*directions: int) -> float:
 def id_lines(
     described: Recording | FrequencyResponse, name: str, own: dict[str, float]
 ) -> dict[str, str]:
-    """The id lines of a set of ours."""
+    """Return the id lines of a set of ours, none longer than 80 characters."""
     time = described.time
     moment = [f"time={format_time(time)}"] if time else []
-    moment += [f"{key}={value:g}" for key, value in mass_entries(described.added_mass).items()]
+    mass = [f"{key}={value:g}" for key, value in mass_entries(described.added_mass).items()]
+    size_and_place, radius = mass[:2], mass[2:]
+    moment += size_and_place
     known = {"hanger": described.hanger, "temperature_c": described.temperature_c, **own}
     pairs = [f"{key}={value}" for key, value in known.items() if _is_known(value)]
     return {
         "id1": name,
-        "id2": "hammer test of a hanger",
+        "id2": " ".join([_MARK, *radius]) if radius else "hammer test of a hanger",
         "id3": _date_text(time) if time else "NONE",
         "id4": " ".join([_MARK, *moment]) if moment else "NONE",
         "id5": " ".join([_MARK, "format=1", *pairs]),

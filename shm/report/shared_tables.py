@@ -95,7 +95,11 @@ def lineage(told: Mapping[str, str]) -> dict[str, str]:
 
 def added_mass(test: ModalTest) -> str:
     mass = test.added_mass
-    return f"{mass.mass_kg:g} kg at {mass.x_m:g} m from the deck end" if mass else "none"
+    if mass is None:
+        return "none"
+    radius_m = mass.radius_of_gyration_m
+    size = "" if radius_m is None else f", radius of gyration {radius_m:g} m"
+    return f"{mass.mass_kg:g} kg at {mass.x_m:g} m from the deck end{size}"
 
 
 def settings(told: Mapping[str, str]) -> Table:

@@ -98,5 +98,8 @@ def _order_values(
 
 
 def _clamp_mass_on(bar: PhysicalHanger, added: AddedMass) -> PhysicalHanger:
-    mass = PointMass(np.array([added.x_m]), np.array([added.mass_kg]))
+    """Return the bar with a known mass: a point where no radius is stated, as it is planted."""
+    radius_m = added.radius_of_gyration_m
+    turning = np.array([radius_m]) if radius_m else None
+    mass = PointMass(np.array([added.x_m]), np.array([added.mass_kg]), turning)
     return replace(bar, masses=(*bar.masses, mass))

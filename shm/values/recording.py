@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 import numpy as np
@@ -13,10 +13,20 @@ from shm.values.kinds import NAN, ComplexArray, FloatArray, IntArray, Plane, Qua
 
 @dataclass(frozen=True)
 class AddedMass:
-    """A known mass clamped on the hanger for one test."""
+    """A known mass clamped on the hanger for one test, which turns with the bar.
+
+    `radius_of_gyration_m` is about the axis across the bar and its plane, 0 of a point; None where
+    nobody says it.
+    """
 
     mass_kg: float
     x_m: float
+    radius_of_gyration_m: float | None = None
+
+    def with_usual_radius(self, radius_m: float) -> AddedMass:
+        """Return the same with this radius of gyration, where none is stated."""
+        stated = self.radius_of_gyration_m
+        return self if stated is not None else replace(self, radius_of_gyration_m=radius_m)
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,6 +58,7 @@ def _repeated(found: Observations) -> Repeated:
     return Repeated(
         1e-4 * rng.standard_normal((found.design.frequencies, 2)),
         np.zeros((found.design.frequencies, 0)),
+        np.zeros((found.design.frequencies, 0)),
         0.01 * rng.standard_normal((len(found.design.shape_mode), 5)),
     )
 

@@ -22,7 +22,7 @@ from shm.inference.systematic_errors import shared_loads
 from shm.models.composed import Baseline
 from shm.models.hanger import PhysicalHanger, Zone, solve
 from shm.simulate import HangerState
-from shm.values import FloatArray
+from shm.values import AddedMass, FloatArray
 from tests.helpers.hangers import HANGER_3
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
@@ -168,3 +168,31 @@ def test_without_shapes_sensors_have_no_loads() -> None:
     found = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
     assert found.repeated.sensors.shape == Repeated.none(found.design).sensors.shape
     assert np.isfinite(found.likelihood(Hypothesis()).log(np.zeros((1, found.design.size)))).all()
+
+
+def test_an_unstated_radius_of_a_known_mass_is_an_error_of_its_test() -> None:
+    """One standard deviation more and less makes what its load says, in that test alone."""
+    tests = campaign(HANGER_3, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
+    clamp, row = AddedMass(25.0, 3.4), DEFAULTS.added_mass_radius_m
+    laden = [replace(tests[0], id="laden", added_mass=clamp)]
+
+    def problem_with(radius_m: float | None) -> GapProblem:
+        body = replace(clamp, radius_of_gyration_m=radius_m)
+        found = observed([*tests, replace(laden[0], added_mass=body)], HANGER_3)
+        return GapProblem(HANGER_3, "beam1", found)
+
+    unstated = problem_with(None)
+    own = unstated.design.frequency_test == len(tests)
+    near = unstated.near
+    predicted = [
+        problem_with(row.value + side * row.sd).predict(Hypothesis(), near)[0, : len(own)]
+        for side in (-1, 1)
+    ]
+    (load,) = unstated.repeated.masses.T
+    np.testing.assert_allclose(load, (predicted[1] - predicted[0]) / 2, rtol=1e-6, atol=1e-12)
+    assert np.abs(load[own]).max() > 1e-5
+    assert not load[~own].any()
+    assert problem_with(0.1).repeated.masses.shape[1] == 0
+    count = len(own)
+    with_load = unstated.repeated.loads[:count] @ unstated.repeated.loads[:count].T
+    np.testing.assert_allclose(unstated.repeated.frequency, with_load)

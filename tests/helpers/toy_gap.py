@@ -50,6 +50,9 @@ class ToyProblem:
     def readings_of(self, design: Design) -> FloatArray:
         return Repeated.none(design).readings
 
+    def masses_of(self, design: Design) -> FloatArray:
+        return Repeated.none(design).masses
+
     def coordinates(self, hypothesis: Hypothesis) -> ToyCoordinates:
         d = self.slopes[hypothesis](self.observations.design).shape[1]
         return ToyCoordinates((Parameter("size", "", -1, 1, 0, ""),) * d)

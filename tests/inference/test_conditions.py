@@ -123,7 +123,7 @@ def test_a_known_mass_moves_a_beam_as_finite_elements_do(name: str) -> None:
     model, springs = build(name, HANGER_3, THESIS), (2e7, 4e7, 8e7, 6e7)
     given = dict(zip(SPRINGS, np.log10(springs), strict=True))
     theta = model.pack({"theta_F": 1.0, "theta_L": 1.0, **(given if name == "beam2" else {})})
-    mass = AddedMass(25.0, 3.6)
+    mass = AddedMass(25.0, 3.6, 0.0)
     found = model.frequencies_at(theta[None], 6, Conditions(added_mass=mass))[0]
     state = HangerState(HANGER_3.nominal_tension_n, *(springs if name == "beam2" else ()))
     planted = planted_modes(HANGER_3, state, (), TestConditions(added_mass=mass), 6, ())

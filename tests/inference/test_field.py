@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.special import logsumexp
@@ -23,7 +25,7 @@ TAU_UPPER = DEFAULTS.largest_model_error.value
 THETA = MODEL.pack(
     {"theta_F": 1.0, "theta_L": 0.9, "section": 0.0, "density": 0.0, "modulus": 0.0, **SPRINGS}
 )[None]
-CLAMP = AddedMass(25.0, 3.6)
+CLAMP = AddedMass(25.0, 3.6, 0.1)
 Row = tuple[Plane, int]
 FEW: tuple[Row, ...] = (("transverse", 1), ("transverse", 2), ("longitudinal", 1))
 
@@ -197,3 +199,30 @@ def test_each_mode_of_each_test_finds_its_prediction() -> None:
 def test_tests_without_a_mode_are_refused() -> None:
     with pytest.raises(BadInput, match="no measured frequency"):
         FieldLikelihood([ModalTest("t", ())], MODEL)
+
+
+def test_an_unstated_radius_of_a_known_mass_is_a_load_of_its_test_alone() -> None:
+    """Half of what two standard deviations of the radius do to ln f."""
+    row = DEFAULTS.added_mass_radius_m
+    rows: tuple[Row, ...] = (("transverse", 4), ("transverse", 6))
+    unstated, stated = replace(CLAMP, radius_of_gyration_m=None), replace(CLAMP, x_m=6.1)
+    tests = [measured("t1", rows), measured("t2", rows, mass=unstated)]
+    tests.append(measured("t3", rows, mass=stated))
+    typical = FieldLikelihood(tests, MODEL)._typical(MODEL)[None]
+    ln_f = [
+        np.log(MODEL.frequencies_at(typical, 6, Conditions(added_mass=mass))[0, 0, [3, 5]])
+        for radius_m in (row.value - row.sd, row.value + row.sd)
+        for mass in [replace(CLAMP, radius_of_gyration_m=radius_m)]
+    ]
+    load = (ln_f[1] - ln_f[0]) / 2
+    known = [tests[0], replace(tests[1], added_mass=CLAMP), tests[2]]
+    more = _covariance(tests) - _covariance(known)
+    expected = np.zeros((6, 6))
+    expected[2:4, 2:4] = np.outer(load, load)
+    np.testing.assert_allclose(more, expected, atol=0.02 * np.abs(load).max() ** 2)
+    assert np.abs(load).max() > 1e-4
+
+
+def _covariance(tests: list[ModalTest]) -> FloatArray:
+    loads = FieldLikelihood(tests, MODEL)._loads
+    return np.asarray(loads @ loads.T)

@@ -51,8 +51,9 @@ def test_a_class_that_cannot_describe_the_hanger_says_why() -> None:
 def test_the_solid_classes_say_what_they_miss_and_the_beams_serve(
     hanger: Hanger, complaint: str
 ) -> None:
-    fitting, reasons = applicable(hanger, ["beam1", "beam2", "solid0", "solid1", "solid2"])
-    assert fitting == ("beam1", "beam2")
+    names = ["beam1", "beam2", "beam3", "solid0", "solid1", "solid2"]
+    fitting, reasons = applicable(hanger, names)
+    assert fitting == ("beam1", "beam2", "beam3")
     assert list(reasons) == ["solid0", "solid1", "solid2"]
     assert all(complaint in reason for reason in reasons.values())
 

@@ -95,10 +95,10 @@ def test_a_strand_whose_wires_slip_has_the_frequencies_of_one_described_so() -> 
 
 
 def test_a_known_mass_weighs_against_the_bar_as_made() -> None:
-    """It sits at its share of the length."""
-    model, x_m = as_made("beam2", ROD), 3.6
-    found = model.frequencies_at(packed(model), 5, Conditions(added_mass=AddedMass(60.0, x_m)))
-    there = AddedMass(60.0, x_m * DEVIATIONS["theta_L"])
+    """It sits at its share of the length, and turns as if it were as much longer."""
+    model, mass, longer = as_made("beam2", ROD), AddedMass(60.0, 3.6, 0.08), DEVIATIONS["theta_L"]
+    found = model.frequencies_at(packed(model), 5, Conditions(added_mass=mass))
+    there = AddedMass(60.0, 3.6 * longer, 0.08 * longer)
     expected = solved_anew("beam2", described_as_made(ROD), 5, Conditions(added_mass=there))
     np.testing.assert_allclose(found, expected, rtol=1e-6)
 

@@ -84,7 +84,7 @@ def test_an_effect_is_applied_and_a_known_mass_too() -> None:
     theta = np.zeros((1, len(with_effect.names)))
     theta[0, 0], theta[0, order] = 1.1, (25.0, 3.6)
     one = with_effect.modes(theta, PLAIN, 6)
-    known = Conditions("t2", added_mass=AddedMass(25.0, 3.6))
+    known = Conditions("t2", added_mass=AddedMass(25.0, 3.6, 0.0))
     other = plain.modes(theta[:, :5], known, 6)
     np.testing.assert_allclose(one.frequency_hz, other.frequency_hz, rtol=1e-12)
     np.testing.assert_allclose(one.shape, other.shape, atol=1e-9)

@@ -24,7 +24,7 @@ def recording() -> Recording:
         hanger=3,
         time=datetime(2026, 5, 1, 10, 0, 30, 250000, tzinfo=UTC),
         temperature_c=-2.5,
-        added_mass=AddedMass(25.0, 3.6),
+        added_mass=AddedMass(25.0, 3.6, 0.08),
     )
 
 

@@ -406,6 +406,10 @@ def test_what_is_only_read_is_refused_on_writing(recording: Recording, tmp_path:
         ('time = "noon"', "time = 'noon' is not an ISO 8601 time"),
         ('plane = "up"', "'up'"),
         ("added_mass_kg = -1\nadded_mass_at_m = 2", "added_mass_kg = -1 is not positive"),
+        (
+            "added_mass_kg = 1\nadded_mass_at_m = 2\nadded_mass_radius_m = -1",
+            "added_mass_radius_m = -1 is negative",
+        ),
     ],
 )
 @formats

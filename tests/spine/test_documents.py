@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,16 @@ def test_a_document_is_read_back_as_it_was(tmp_path: Path) -> None:
     path.write_text(dump(modes_document([FULL])), encoding="utf-8")
     (back,) = load_modes(path)
     assert_same(back, FULL)
+
+
+def test_a_radius_of_gyration_is_written_where_it_is_known() -> None:
+    known = replace(FULL, added_mass=AddedMass(25.0, 3.6, 0.08))
+    document = json.loads(dump(modes_document([known, FULL])))
+    said = [test["added_mass"] for test in document["tests"]]
+    assert said[0] == {"mass_kg": 25.0, "x_m": 3.6, "radius_of_gyration_m": 0.08}
+    assert said[1] == {"mass_kg": 25.0, "x_m": 3.6}
+    for back, test in zip(parse_modes(document), (known, FULL), strict=True):
+        assert_same(back, test)
 
 
 def test_unknown_is_null_in_json_and_nan_in_memory() -> None:
@@ -101,6 +112,16 @@ MODE = ["tests", 0, "modes", 0]
         (changed([*MODE, "shape"], True), "shape is not a list"),
         (changed(["tests", 0, "time"], "yesterday"), "not an ISO 8601 time"),
         (changed(["tests", 0, "added_mass"], {"mass_kg": -1, "x_m": 2}), "positive mass_kg"),
+        (
+            changed(
+                ["tests", 0, "added_mass"], {"mass_kg": 1, "x_m": 2, "radius_of_gyration_m": -1}
+            ),
+            "radius_of_gyration_m is negative",
+        ),
+        (
+            changed(["tests", 0, "added_mass"], {"mass_kg": 1, "x_m": 2, "radius_of_gyration": 1}),
+            r"tests\[0\]\.added_mass: unknown key radius_of_gyration",
+        ),
         (changed(["tests", 0, "added_mass"], 25), "added_mass is not an object"),
         (changed(["tests", 0, "added_mass_kg"], 25), r"tests\[0\]: unknown key added_mass_kg"),
         (changed(["tests", 0, "temperature"], 12), "unknown key temperature"),

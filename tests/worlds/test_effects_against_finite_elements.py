@@ -23,7 +23,7 @@ from tests.worlds.simulated.reality import GLOBAL, Deviations
 
 PLACES = (1.56, 3.48, 5.4, 7.92)
 MODES = 8
-ADDED = AddedMass(25.0, 3.6)
+ADDED = AddedMass(25.0, 3.6, 0.0)
 WARM_AND_HARD = ("t1", 12.0, 1.7, ADDED)
 DEVIATIONS = Deviations(0.004, -0.006, 0.003, 0.005)
 DIAMETER = 0.130

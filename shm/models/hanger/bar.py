@@ -22,7 +22,7 @@ from shm.models.hanger.functions import (
     polynomials,
     shear_strains,
 )
-from shm.models.hanger.physical import PhysicalHanger, Zone
+from shm.models.hanger.physical import PhysicalHanger, PointMass, Zone
 from shm.values import FloatArray, IntArray
 
 _RIDGE = 1e-10
@@ -77,13 +77,22 @@ class Bar:
 
     def deflections(self, x: FloatArray) -> FloatArray:
         """The functions' deflections at `x` (rows, points): (rows, points, functions but hats)."""
-        tables = [hermite(x), polynomials(x, self.counts.polynomials)]
-        if self.kinks is not None:
-            tables.append(self.kinks.table(x).scaled(self.kink_factor))
-        w = np.concatenate([table.w for table in tables])
+        return self._with_sheared(self._at(x).w)
+
+    def slopes(self, x: FloatArray) -> FloatArray:
+        """Return the slopes of the axis, likewise."""
+        return self._with_sheared(self._at(x).slope)
+
+    def _at(self, x: FloatArray) -> Table:
+        smooth = Table.joined(hermite(x), polynomials(x, self.counts.polynomials))
+        if self.kinks is None:
+            return smooth
+        return Table.joined(smooth, self.kinks.table(x).scaled(self.kink_factor))
+
+    def _with_sheared(self, values: FloatArray) -> FloatArray:
         if self.counts.shear:
-            w = np.concatenate([w, _sheared(w, SHEAR_ENDS)])
-        return w.transpose(1, 2, 0)
+            values = np.concatenate([values, _sheared(values, SHEAR_ENDS)])
+        return values.transpose(1, 2, 0)
 
 
 @lru_cache(maxsize=64)
@@ -236,9 +245,16 @@ def bar_of(physical: PhysicalHanger, modes: int) -> Bar:
 
 
 def _edges(physical: PhysicalHanger) -> FloatArray:
-    """Both ends of all zones (n, 2 zones)."""
-    ends = [x for zone in physical.zones for x in (zone.start_m, zone.end_m)]
-    return along(physical, _columns(ends, len(physical.tension_n)))
+    """Both ends of all zones, then masses that turn: there the bending moment jumps (n, places)."""
+    places = [x for zone in physical.zones for x in (zone.start_m, zone.end_m)]
+    places += [m.x_m for m in _heavy(physical) if m.radius_of_gyration_m is not None]
+    return along(physical, _columns(places, len(physical.tension_n)))
+
+
+def _heavy(physical: PhysicalHanger) -> list[PointMass]:
+    """Return the masses that smooth functions would blur."""
+    bar_kg = physical.mass_per_length_kg_m * physical.length_m
+    return [mass for mass in physical.masses if np.any(mass.mass_kg > _LIGHT * bar_kg)]
 
 
 def _columns(values: list[FloatArray], rows: int) -> FloatArray:
@@ -256,14 +272,13 @@ def _inside(places: FloatArray) -> FloatArray:
 
 
 def _forces(physical: PhysicalHanger) -> FloatArray:
-    """Places (n, kinks) of masses and springs that smooth functions would blur."""
-    bar_kg = physical.mass_per_length_kg_m * physical.length_m
+    """Places (n, kinks) of point masses and springs that smooth functions would blur."""
     unit = physical.bending_stiffness_n_m2.min(axis=1) / physical.length_m**3
-    places = [m.x_m for m in physical.masses if np.any(m.mass_kg > _LIGHT * bar_kg)]
+    places = [m.x_m for m in _heavy(physical) if m.radius_of_gyration_m is None]
     for spring in physical.springs:
         if np.any(spring.stiffness_n_m.max(axis=1) > _SOFT * unit):
             places.append(spring.x_m)
-    return _inside(along(physical, _columns(places, len(bar_kg))))
+    return _inside(along(physical, _columns(places, len(physical.tension_n))))
 
 
 def _spans(physical: PhysicalHanger, edges: FloatArray, kinks: Kinks) -> Spans:

@@ -26,10 +26,15 @@ class Zone:
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """A mass clamped on; both fields (n,). Beyond an end it moves with the end."""
+    """A mass clamped on; fields are (n,). Beyond an end it moves with the end.
+
+    It turns with the bar's axis as one with this radius of gyration; None for a point, which does
+    not.
+    """
 
     x_m: FloatArray
     mass_kg: FloatArray
+    radius_of_gyration_m: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -254,6 +254,12 @@ def _mass(physical: PhysicalHanger, bar: Bar) -> FloatArray:
         share = np.stack([each.mass_kg for each in physical.masses], axis=1) / bar_kg[:, None]
         w = bar.deflections(along(physical, x_m))
         total = _added(total, (w * share[..., None]).transpose(0, 2, 1) @ w)
+    for mass in physical.masses:
+        if mass.radius_of_gyration_m is not None:
+            slope = bar.slopes(along(physical, mass.x_m[:, None]))
+            turning = mass.mass_kg / bar_kg
+            turning = turning * (mass.radius_of_gyration_m / physical.length_m) ** 2
+            total = _added(total, turning[:, None, None] * (slope.transpose(0, 2, 1) @ slope))
     return np.asarray(total[:, None])
 
 
