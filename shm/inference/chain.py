@@ -21,10 +21,11 @@ _SPREAD = 1e-4
 
 def run_chain(
     problem: Problem, start: FloatArray, rng: np.random.Generator
-) -> tuple[FloatArray, float]:
-    """Return points (n, d) of the posterior and how many of them are effective.
+) -> tuple[FloatArray, float, float]:
+    """Return points (n, d) of the posterior, how many of them are effective, and R-hat.
 
-    The walkers start at points drawn from `start` (m, d).
+    R-hat compares the walkers' means with their scatter (Gelman and Rubin 1992), the worst
+    parameter counts. The walkers start at points drawn from `start` (m, d).
     """
     # Its moves load all of scipy.stats, and most posteriors need none of them.
     from emcee import EnsembleSampler
@@ -52,4 +53,7 @@ def run_chain(
         if done > _LONG_ENOUGH * length:
             break
     points = moving.reshape(-1, problem.dimension)
-    return points, len(points) / length if np.isfinite(length) else 0.0
+    if not np.isfinite(length):
+        return points, 0.0, np.inf
+    between, within = moving.mean(axis=0).var(axis=0, ddof=1), moving.var(axis=0).mean(axis=0)
+    return points, len(points) / length, float(np.sqrt(1 + between / within).max())

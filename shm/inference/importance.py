@@ -7,7 +7,6 @@ too small, so that the answer rests on fresh draws from the last mixture alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +14,7 @@ import scipy
 
 from shm.inference.mixture import Pool, effective, normalised, systematic, tempered
 from shm.inference.problem import Points, Problem
-from shm.inference.valley import Draws, Proposal, Valley
+from shm.inference.valley import Draws, Proposal
 from shm.values import FloatArray
 
 # The standard error of a log evidence: a Bayes factor good to 6 %, of which 3 would be a hint. It
@@ -119,13 +118,9 @@ def tail_index(log_weights: FloatArray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Inferred:
-    """Equal draws of the posterior `points` with its evidence, and how they were made.
-
-    `valleys` are those that it was found along.
-    """
+    """Equal draws of the posterior `points` with its evidence, and how they were made."""
 
     points: Points
-    valleys: Sequence[Valley]
     log_evidence: float
     log_evidence_sd: float
     effective_sample_size: float

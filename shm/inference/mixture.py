@@ -270,8 +270,9 @@ def tempered(
     log_weights: FloatArray, fewest: float, cooling: float = 0.8, least: float = 0.0
 ) -> FloatArray:
     """Weights to fit to: where fewer draws than `fewest` carry them raised to a power below 1, in
-    steps of `cooling` down to the `least`."""
+    steps of `cooling` down to the `least`. Of few draws with any weight half is enough."""
     power, weights = 1.0, normalised(log_weights)
+    fewest = min(fewest, np.count_nonzero(np.isfinite(log_weights)) / 2)
     while effective(weights) < fewest and power > least:
         power *= cooling
         weights = normalised(power * log_weights)

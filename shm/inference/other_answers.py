@@ -1,8 +1,7 @@
 """What else the data allow, or what speaks against all of it, which no posterior alone shows.
 
-Its interval weighs by the prior. Ends or orders that fit as well but that the prior makes rare, a
-description that only holds if several tolerances are exceeded, a reading that the frequencies
-contradict: none of these widens it.
+Orders that fit as well, a description that only holds if several tolerances are exceeded, a reading
+that the frequencies contradict: none of these widens its interval.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import numpy as np
 import scipy
 
 from shm.inference.described import DescribedCoordinates
-from shm.inference.importance import Inferred
 from shm.inference.options import silent
 from shm.inference.priors import TensionReading
 from shm.inference.problem import Problem
@@ -24,17 +22,11 @@ from shm.inference.search import descend
 from shm.values import NAN, FloatArray, ModalTest
 
 _AS_WELL = 1.0
-"""A fit that is worse by less in its log likelihood is as good. The 90 % interval of a normal
-posterior reaches to 1.35: as good a fit beyond it is not its tail but another answer, which the
-prior of the ends has ruled out, not the data."""
-
-_MATERIAL = 0.1
-"""Of the width of the interval, what lies farther beyond it is another answer."""
+"""A fit that is worse by less in its log likelihood is as good (judgement)."""
 
 _SEEN = 0.2
 """Judgement: of 200 draws that see no more, the error of their mean would count twofold."""
 
-_TRIED = 150  # numerical: points along the valley, of which some hundred are as probable as usual
 _STARTS = (-1.0, 0.0, 1.0)
 """Scores of the ends at the start of a fit with other orders."""
 _STEPS = 15
@@ -56,13 +48,7 @@ class Outcome:
     method: str
 
 
-def other_answers(
-    problem: Problem,
-    inferred: Inferred,
-    outcome: Outcome,
-    tests: Sequence[ModalTest],
-    rng: np.random.Generator,
-) -> dict[str, Any]:
+def other_answers(problem: Problem, outcome: Outcome, tests: Sequence[ModalTest]) -> dict[str, Any]:
     """Return fields of a `Posterior` that its draws do not show, of a bar as made."""
     coordinates = problem.coordinates
     if not isinstance(coordinates, DescribedCoordinates):
@@ -71,27 +57,14 @@ def other_answers(
     off_sd = {"description_off_sd": _description_off_sd(coordinates.seen_deviates(z))}
     if not coordinates.ends.felt:
         return off_sd
-    tried = _along_valleys(problem, inferred, rng)
-    tried = np.vstack([z[_fits(problem, z).argmax()][None], tried])
-    fits = _fits(problem, tried)
+    fits = _fits(problem, z)
     sigma = float(np.median(outcome.samples[:, -1]))
-    ratio = outcome.samples[:, 0]
     return {
         **off_sd,
-        "tension_of_other_ends_n": _tension_of_other_ends_n(problem, tried, fits, ratio),
         "tension_of_other_orders_n": _tension_of_other_orders_n(
-            problem, tried[fits.argmax()], sigma, float(fits.max()), ratio, tests
+            problem, z[fits.argmax()], sigma, float(fits.max()), outcome.samples[:, 0], tests
         ),
     }
-
-
-def _along_valleys(problem: Problem, inferred: Inferred, rng: np.random.Generator) -> FloatArray:
-    """Return points (n, d) along the whole valleys, far beyond where the prior makes them rare."""
-    found = []
-    for valley in inferred.valleys:
-        y = rng.standard_normal((_TRIED, valley.free.shape[1]))
-        found.append(valley.optimum(y))
-    return np.vstack(found)
 
 
 def _fits(problem: Problem, z: FloatArray) -> FloatArray:
@@ -115,24 +88,6 @@ def _description_off_sd(seen: FloatArray) -> float:
     # Of directions that next to nothing is seen of, or with two answers, the spread says nothing.
     spread = np.where(taken > _SEEN, taken.clip(max=1.0), 1.0)
     return float(np.sqrt(((mean @ direction) ** 2 / spread).sum()))
-
-
-def _tension_of_other_ends_n(
-    problem: Problem, tried: FloatArray, fits: FloatArray, ratio: FloatArray
-) -> float:
-    """Return the tension that fits as well as any, farthest beyond the interval of `ratio`
-    (draws,), theta_F; NaN where there is none.
-
-    Frequencies tell springs from tension worst where all ends turn softly and alike; and where few
-    modes of a short stiff bar tell nearly nothing, clamped ends rule the nominal tension out that
-    springs would allow, and the nominal tension a slack bar.
-    """
-    low, high = np.quantile(ratio, [0.05, 0.95])
-    others = problem.coordinates.theta(tried[fits > fits.max() - _AS_WELL])[:, 0]
-    away = np.maximum(low - others, others - high)
-    if not (away > _MATERIAL * (high - low)).any():
-        return NAN
-    return float(others[away.argmax()] * problem.model.hanger.nominal_tension_n)
 
 
 def _tension_of_other_orders_n(

@@ -37,7 +37,7 @@ _DRAWS_WITHOUT_READING = 1000  # for the quartiles
 # Numerical: parts of the first mixture; where fewer draws are effective, begin again, and from how
 # many points. Weights correct for all.
 _CLUSTERS = 8
-_ATTEMPTS, _POOR, _AGAIN = 3, 0.3, 160
+_ATTEMPTS, _POOR, _AGAIN = 2, 0.3, 160
 
 ENOUGH = 0.5
 """Effective draws for each sample to keep; fewer repeat draws, more cost in proportion."""
@@ -122,32 +122,31 @@ def infer(
     enough = final.effective_sample_size >= min(ENOUGH_EFFECTIVE, samples) and final.light_tailed
     if enough and options.sampler != EMCEE:
         drawn: Points = final.resampled(samples, rng).take(rng.permutation(samples))
-        size, method = final.effective_sample_size, "importance"
+        size, r_hat, method = final.effective_sample_size, final.r_hat, "importance"
     else:
-        drawn, size = _continue(problem, final, points, samples, rng)
+        drawn, size, r_hat = _continue(problem, final, points, samples, rng)
         method = EMCEE
     return Inferred(
         drawn,
-        valleys,
         final.log_evidence,
         final.log_evidence_sd,
         min(size, float(samples)),
-        final.r_hat,
+        r_hat,
         method,
     )
 
 
 def _continue(
     problem: Problem, weighted: Weighted, points: FloatArray, samples: int, rng: np.random.Generator
-) -> tuple[Points, float]:
-    """Return equal draws by emcee, and how many of them are effective.
+) -> tuple[Points, float, float]:
+    """Return equal draws by emcee, how many of them are effective, and R-hat.
 
     Half of the walkers start at weighted draws, half at points along the valley.
     """
     drawn = weighted.resampled(len(points), rng).z
-    chain, size = run_chain(problem, np.vstack([drawn, points]), rng)
+    chain, size, r_hat = run_chain(problem, np.vstack([drawn, points]), rng)
     chosen = chain[rng.choice(len(chain), samples, replace=len(chain) < samples)]
-    return problem.evaluate(chosen), size
+    return problem.evaluate(chosen), size, r_hat
 
 
 def _remarks_on_shapes(problem: Problem, inferred: Inferred) -> tuple[str, ...]:

@@ -50,9 +50,9 @@ class AsMade(Model):
     length; where end plates leave the effective length open, effective over described), springs in
     N m/rad, then `section`, `density` and `modulus` (logarithms of true over described area,
     density and elastic modulus) and of a strand its `bending_factor` and, in beam3, its
-    `shear_share`. A beam with fittings, turnbuckles or a stated inclination has their stiffness and
-    mass (over the bar's, a turnbuckle's over the described ones), its `inclination` in degrees from
-    the horizontal, `sag_shape` (0 held up by bending, 1 like a cable) and, where the inclination is
+    `shear_share`. A beam has stiffness and mass of its fittings and turnbuckles, if any (over the
+    bar's, a turnbuckle's over the described ones), its `inclination` in degrees from the
+    horizontal, `sag_shape` (0 held up by bending, 1 like a cable) and, where the inclination is
     stated, `sag_stiffness`, that against sag over EA/L.
     """
 
@@ -69,8 +69,7 @@ class AsMade(Model):
         hanger = self.hanger
         deck_m, arch_m = self.fittings_m = super().stiff_ends_m
         self.swaps = model.swaps if deck_m == arch_m else ()
-        stated = any(self.fittings_m) or hanger.turnbuckles or math.isfinite(hanger.inclination_deg)
-        self.has_terms = isinstance(model, Beam) and bool(stated)
+        self.has_terms = isinstance(model, Beam) and hanger.as_hanger
         own = [name for name in model.parameter_names if name not in (TENSION, LENGTH)]
         self.springs = tuple(own)
         self.length_is_open = hanger.plate is not None and isinstance(model, Beam)
@@ -135,44 +134,38 @@ class AsMade(Model):
         return stiffness, np.exp(section + density), self._column(theta, LENGTH)
 
     def as_described(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The described bar's parameters (n, own), and c (n,), of parameter sets of the real one.
-
-        A length that is open stays a parameter of its own.
-        """
-        stiffness, mass, length = self.stiffness_mass_length(theta)
-        factor = np.sqrt(stiffness / mass) / (1.0 if self.length_is_open else length**2)
-        taped = np.ones(len(theta)) if self.length_is_open else length
-        springs = [self._column(theta, n) + np.log10(taped / stiffness) for n in self.springs]
-        columns = {TENSION: self._column(theta, TENSION) * taped**2 / stiffness}
-        columns[LENGTH] = length / taped
-        columns |= dict(zip(self.springs, springs, strict=True))
+        """Return the described bar's parameters (n, own), and c (n,), of those of the real one."""
+        stiffness, _, length = self.stiffness_mass_length(theta)
+        springs = [self._column(theta, n) + np.log10(length / stiffness) for n in self.springs]
+        columns = {TENSION: self._column(theta, TENSION) * length**2 / stiffness}
+        columns |= {LENGTH: np.ones(len(theta)), **dict(zip(self.springs, springs, strict=True))}
         names = self.model.parameter_names
-        return np.column_stack([columns[name] for name in names]), np.asarray(factor)
+        return np.column_stack([columns[name] for name in names]), self._factor(theta)
+
+    def _factor(self, theta: FloatArray) -> FloatArray:
+        """Return c (n,), the frequencies' ratio to the described bar's."""
+        stiffness, mass, length = self.stiffness_mass_length(theta)
+        return np.asarray(np.sqrt(stiffness / mass) / length**2)
 
     def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
         return self.frequencies_at(theta, modes, Conditions())
 
     def frequencies_at(self, theta: FloatArray, modes: int, conditions: Conditions) -> FloatArray:
-        own, factor = self.as_described(theta)
         mass = conditions.added_mass
         if mass is not None:
             # What a mass weighs counts against the real bar's, which is longer, too.
             _, per_length, length = self.stiffness_mass_length(theta)
-            kg: Any = mass.mass_kg / (per_length * (1.0 if self.length_is_open else length))
+            kg: Any = mass.mass_kg / (per_length * length)
             conditions = replace(conditions, added_mass=replace(mass, mass_kg=kg))
-        if self.has_terms:
-            places = () if mass is None else (mass.x_m,)
-            radii = () if mass is None else (radius_m(self.hanger, mass),)
-            bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes, places, radii)
-            kilograms = None if mass is None else np.asarray(kg)[:, None]
-            found = bar.frequencies_hz(self._values(theta), kilograms)
-        elif isinstance(self.model, Beam3) and mass is None:
-            section = np.exp(self._column(theta, SECTION))
-            shear = self._column(theta, SHEAR) if self.is_strand else np.ones(len(theta))
-            found = self.model.frequencies_of_section(own, section, shear, modes)
-        else:
-            found = self.model.frequencies_at(own, modes, conditions)
-        return found * factor[:, None, None]
+        if not self.has_terms:
+            own, factor = self.as_described(theta)
+            return self.model.frequencies_at(own, modes, conditions) * factor[:, None, None]
+        places = () if mass is None else (mass.x_m,)
+        radii = () if mass is None else (radius_m(self.hanger, mass),)
+        bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes, places, radii)
+        kilograms = None if mass is None else np.asarray(kg)[:, None]
+        found = bar.frequencies_hz(self._values(theta), kilograms)
+        return found * self._factor(theta)[:, None, None]
 
     def frequencies_near(
         self, theta: FloatArray, others: Sequence[FloatArray], modes: int
@@ -186,7 +179,7 @@ class AsMade(Model):
         found, near = bar.frequencies_about(
             self._values(theta), [self._values(each) for each in others]
         )
-        factors = [self.as_described(each)[1][:, None, None] for each in (theta, *others)]
+        factors = [self._factor(each)[:, None, None] for each in (theta, *others)]
         return found * factors[0], near * np.array(factors[1:])
 
     def shapes_near(
@@ -220,7 +213,7 @@ class AsMade(Model):
             lean=np.radians(90 - terms[INCLINATION]),
             sag_shape=terms[SAG_SHAPE],
             axial=terms.get(SAG_STIFFNESS, one),
-            section=np.exp(self._column(theta, SECTION)),
+            section=np.exp(self._column(theta, SECTION)) / length**2,
             shear=self._column(theta, SHEAR) if SHEAR in self.bounds else one,
         )
 
@@ -246,8 +239,6 @@ class AsMade(Model):
 
         By the mean length of all parameter sets: lengths differ by less than a place is known to.
         """
-        if self.length_is_open:
-            return x_m
         return np.asarray(x_m / self.stiffness_mass_length(theta)[2].mean())
 
     @property

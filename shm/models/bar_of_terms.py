@@ -31,8 +31,8 @@ class BarValues:
     `tension_n` is in N; `springs` (n, 2 ends, 2 planes) are k L/EI; `fitting_stiffness` (n, 2
     planes); `lean` is the angle from the vertical in rad; `sag_shape` 0 of a bar whose sag its
     bending holds up, and 1 of one that hangs like a cable; `axial` the stiffness against sag over
-    EA/L; `section` the area, which changes shear alone (a hundredth of the rotary inertia is below
-    1e-4 of a frequency), and `shear` the flexibility in shear over the theory's.
+    EA/L; `section` the area over the squared length, which changes shear and rotary inertia, and
+    `shear` the flexibility in shear over the theory's.
     """
 
     tension_n: FloatArray
@@ -126,7 +126,7 @@ class BarOfTerms:
             mass=np.hstack(masses),
             sag=self._sag(tension, weight * np.sin(values.lean), values),
             shear=shear,
-            turning=hanger.second_moment_m4 / hanger.area_m2 / length_m**2 * one,
+            turning=hanger.second_moment_m4 / hanger.area_m2 / length_m**2 * values.section,
             point_masses=np.empty((len(one), 0)) if masses_kg is None else masses_kg / mass_kg,
         )
 

@@ -13,9 +13,6 @@ from shm.models.end_effects import alike_from_both_ends, coupled_bar
 from shm.models.hanger import PhysicalHanger, solve
 from shm.values import PLANES, FloatArray, Hanger
 
-_NO_SHEAR = 1e-9
-"""A share of shear that changes no frequency by its rounding."""
-
 
 class Beam(Model):
     """A tensioned Euler-Bernoulli beam; members say which rotational springs hold its ends, if any.
@@ -132,8 +129,19 @@ class Beam3(Beam2):
     def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
         if self.hanger.turnbuckles:
             return super().frequencies_hz(theta, modes)
-        one = np.ones(len(theta))
-        return self.frequencies_of_section(theta, one, one, modes)
+        hanger = self.hanger
+        deck, arch = self.springs_n_m_rad(theta)
+        return tensioned_beam.timoshenko_frequencies_hz(
+            self._length_m(theta)[:, None],
+            self._tension_n(theta)[:, None],
+            np.asarray(hanger.bending_stiffness_n_m2),
+            np.asarray(hanger.mass_per_length_kg_m),
+            np.asarray(hanger.shear_stiffness_n),
+            np.asarray(np.sqrt(hanger.second_moment_m4 / hanger.area_m2)),
+            deck,
+            arch,
+            modes,
+        )
 
     def _waves(
         self,
@@ -157,25 +165,4 @@ class Beam3(Beam2):
             super()._coupled(theta),
             shear_compliance_1_n=one / hanger.shear_stiffness_n,
             rotary_inertia_kg_m=turning * one,
-        )
-
-    def frequencies_of_section(
-        self, theta: FloatArray, section: FloatArray, shear: FloatArray, modes: int
-    ) -> FloatArray:
-        """Frequencies (n, 2, modes) of bars of the described bending stiffness and mass whose area
-        is `section` (n,) times the described one, which changes shear and rotary inertia alone, and
-        whose shear is `shear` (n,) times the theory's, without turnbuckles.
-        """
-        hanger, rigid_n = self.hanger, self.hanger.shear_stiffness_n
-        deck, arch = self.springs_n_m_rad(theta)
-        return tensioned_beam.timoshenko_frequencies_hz(
-            self._length_m(theta)[:, None],
-            self._tension_n(theta)[:, None],
-            np.asarray(hanger.bending_stiffness_n_m2),
-            np.asarray(hanger.mass_per_length_kg_m),
-            rigid_n / (section * shear + _NO_SHEAR)[:, None],
-            np.sqrt(hanger.second_moment_m4 / hanger.area_m2 * section)[:, None],
-            deck,
-            arch,
-            modes,
         )

@@ -13,13 +13,12 @@ from shm.report.diagnosis_summary import next_step, verdict
 from shm.report.diagnosis_wording import AFTER, tension_of
 from shm.report.formatting import Interval
 from shm.values import TENSION, Diagnosis, PredictedFrequency
-from shm.values.posterior import MOST_MISFIT_PERCENT
+from shm.values.posterior import MOST_MISFIT_PERCENT, MOST_R_HAT
 from shm.values.rounding import rounded_percent
 from shm.values.stated_tension import stated
 
-# 1.1 by Gelman and Rubin (1992). Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
+# Judgement: half the limit of a misfit, 1 %, is worth a diagnosis;
 # three names are what a sentence bears.
-_CONVERGED_R_HAT = 1.1
 _WORTH_DIAGNOSING_PERCENT = 0.5
 _MOST_NAMED = 3
 
@@ -299,7 +298,7 @@ def _quality(data: HangerReport) -> str:
 
 
 def _sampling(data: HangerReport) -> str:
-    if not data.posterior.r_hat > _CONVERGED_R_HAT:
+    if not data.posterior.r_hat > MOST_R_HAT:
         return ""
     return (
         f"The sampling has not settled (R-hat {data.posterior.r_hat:.2f}): raise the number of "

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from shm.values.hanger import Hanger, Limits
-from shm.values.kinds import NAN, BoolArray, FloatArray, Plane
+from shm.values.kinds import NAN, FloatArray, Plane
 from shm.values.modes import ModalTest
 from shm.values.rounding import force_unit
 from shm.values.showing import Shown, front, line, tension_words
@@ -95,6 +95,9 @@ MOST_MISFIT_PERCENT = 1.0
 NO_TENSION_PERCENT = 10.0
 """Beyond it no bar of such a description has these modes, whatever holds its ends."""
 
+MOST_R_HAT = 1.1
+"""Gelman and Rubin (1992)."""
+
 CONTRADICTS_FROM_SD = 3.0
 """Of sound hangers one in some hundred comes so far off."""
 
@@ -150,14 +153,6 @@ class Summary:
         spread = float(samples.std(ddof=1))
         return cls(float(samples.mean()), spread, float(q05), float(q50), float(q95))
 
-    def reaching(self, values: Sequence[float]) -> Self:
-        """With an interval that holds `values`, too."""
-        return (
-            replace(self, q05=min(self.q05, *values), q95=max(self.q95, *values))
-            if values
-            else self
-        )
-
 
 @dataclass(frozen=True)
 class PredictedFrequency:
@@ -186,9 +181,9 @@ class Posterior(Shown):
     `at_bounds` are parameters of which many draws lie at an end of their prior; `misfit_percent`
     is the root mean square of predicted over measured frequencies less 1; `log_occam` the log
     evidence less the largest log likelihood, never above 0 where the sampler did its work.
-    `tension_of_other_ends_n` is the tension with ends of another kind, far off, where the data do
-    not speak against these; NaN where there is none. `tension_of_other_orders_n` is the same of
-    modes that are all numbered one higher or one lower, nearer to the nominal tension.
+    `tension_of_other_orders_n` is the tension with modes that are all numbered one higher or one
+    lower, nearer to the nominal one, where that fits as well; NaN where it does not.
+    `tension_of_other_ends_n` is that of other ends in posteriors of version 1.0, NaN in others.
     `description_off_sd` is by how many of its standard deviations the description would be off,
     `reading_off_sd` by how many a tension that was read is off what the frequencies say.
     `remarks` say in words what `shm.inference.data_checks` changed in the tests, or doubts.
@@ -247,7 +242,7 @@ class Posterior(Shown):
         # What was not used of the data comes before what the rest of them says.
         changed = [each for each in self.remarks if each.startswith(_NO_FAULTS)]
         asked = (*self._statements_that_would_help, *self._emcee_reason)
-        return tuple(dict.fromkeys((*failed, *changed, *faults, *self._other_ends, *asked)))
+        return tuple(dict.fromkeys((*failed, *changed, *faults, *asked)))
 
     @property
     def faults(self) -> tuple[str, ...]:
@@ -259,6 +254,11 @@ class Posterior(Shown):
             found.append(
                 f"{_SAMPLER_FAILED}: {self.effective_sample_size:.0f} effective draws of "
                 f"{len(self.samples)}, {ENOUGH_EFFECTIVE} are needed. {_DO_NOT_USE}"
+            )
+        if self.r_hat > MOST_R_HAT:
+            found.append(
+                f"{_SAMPLER_FAILED}: its parts disagree (R-hat {self.r_hat:.2g}, below "
+                f"{MOST_R_HAT:g} is needed). {_DO_NOT_USE}"
             )
         if self.log_occam > 0:
             found.append(
@@ -284,7 +284,7 @@ class Posterior(Shown):
             found.append(
                 "The tension that was read contradicts the frequencies, by "
                 f"{self.reading_off_sd:.0f} standard deviations: this answer lies between the two. "
-                "Check the reading, its unit, and the description."
+                f"Check the reading, its unit, and the description. {_DO_NOT_USE}"
             )
         if self.description_off_sd > CONTRADICTS_FROM_SD:
             found.append(
@@ -316,18 +316,6 @@ class Posterior(Shown):
         )
 
     @property
-    def _other_ends(self) -> tuple[str, ...]:
-        other_n = self.tension_of_other_ends_n
-        if not math.isfinite(other_n):
-            return ()
-        way = "down" if other_n < float(np.median(self.tension_n)) else "up"
-        told = force_unit(other_n).told(other_n)
-        return (
-            f"{_ENDS_DECIDE}: with ends of another stiffness all {way} to {told} fits as "
-            "well. A test with a known mass, or a mode shape, tells which.",
-        )
-
-    @property
     def _statements_that_would_help(self) -> tuple[str, ...]:
         """Return which keys of the description would narrow the tension's interval most."""
         if self.model == WITHOUT_MODEL or self._half_width < _NARROW:
@@ -340,8 +328,8 @@ class Posterior(Shown):
             )
         if self.ends_share_of_variance > DECIDING_SHARE:
             found.append(
-                f"{_ENDS_DECIDE} more than half of the interval. State `ends` of this hanger "
-                "(socket, fork, plate, threaded or welded)."
+                f"{_ENDS_DECIDE} more than half of the interval. State `ends` of this hanger: "
+                "fork where they turn on a pin, else socket, plate, threaded or welded."
             )
         return tuple(found)
 
@@ -403,11 +391,10 @@ class Posterior(Shown):
 class Averaged:
     """The tension over all model classes, each with its probability: what a report leads with.
 
-    `tension_n` is absolute, and its interval reaches to the tension with other ends where the data
-    do not speak against these; `repeatability_sd_n` that of the most probable class, in N.
+    `tension_n` is absolute, `repeatability_sd_n` that of the most probable class, in N.
     `probability_above_limit` and `probability_slack` are those of a tension beyond the hanger's
-    limits (the thesis's robust reliability, 4.18), NaN where the owner sets none or other ends
-    leave it open. `caveats` are what keeps it from being taken at its word.
+    limits (the thesis's robust reliability, 4.18), NaN where the owner sets none. `caveats` are
+    what keeps it from being taken at its word.
     """
 
     tension_n: Summary
@@ -460,22 +447,13 @@ class Selection(Shown):
         draws, limits = self.tension_n, limits or Limits()
         above, slack = limits.tension_max_n, limits.tension_min_n
         likely = [p for p, w in zip(self.posteriors, self.probabilities, strict=True) if w > 0.05]
-        others = [p.tension_of_other_ends_n for p in likely]
-        tension_n = Summary.of(draws).reaching([each for each in others if math.isfinite(each)])
         return Averaged(
-            tension_n,
+            Summary.of(draws),
             self.selected.repeatability_sd_n,
-            _probability(draws > above, tension_n.q95 > above) if above == above else NAN,
-            _probability(draws < slack, tension_n.q05 < slack) if slack == slack else NAN,
+            float(np.mean(draws > above)) if math.isfinite(above) else NAN,
+            float(np.mean(draws < slack)) if math.isfinite(slack) else NAN,
             _distinct([each for posterior in likely for each in posterior.caveats]),
         )
-
-
-def _probability(beyond: BoolArray, reaches: bool) -> float:
-    """The share of draws `beyond` (draws,) a limit; unknown where by these the 90 % interval would
-    not reach beyond it, but by other ends does."""
-    share = float(np.mean(beyond))
-    return NAN if reaches and share < 0.05 else share
 
 
 def _distinct(caveats: Sequence[str]) -> tuple[str, ...]:

@@ -24,6 +24,7 @@ TAU_LOWER, TAU_USUAL = DEFAULTS.model_error.bounds
 TAU_UPPER = DEFAULTS.largest_model_error.value
 THETA = MODEL.pack(
     {"theta_F": 1.0, "theta_L": 0.9, "section": 0.0, "density": 0.0, "modulus": 0.0, **SPRINGS}
+    | {"inclination": 90.0, "sag_shape": 0.5}
 )[None]
 CLAMP = AddedMass(25.0, 3.6, 0.1)
 Row = tuple[Plane, int]

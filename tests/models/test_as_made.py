@@ -16,7 +16,14 @@ from tests.helpers.hangers import HANGER_3
 ROD = replace(HANGER_3, plate=None)
 STRAND = replace(ROD, kind="strand", bending_stiffness_factor=0.7)
 SPRINGS = {"log10_k1": 6.2, "log10_k2": 6.9, "log10_k3": 7.3, "log10_k4": 5.1}
+REDUCED = 5e-6  # of a frequency, by the reduced basis
 DEVIATIONS = {"theta_L": 1.004, "section": 0.02, "density": -0.006, "modulus": 0.03}
+
+
+@pytest.fixture(autouse=True)
+def _weightless(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the bar's own weight out: the classes of the thesis have none."""
+    monkeypatch.setattr("shm.models.bar_of_terms.GRAVITY_M_S2", 0.0)
 
 
 def as_made(name: str, hanger: Hanger) -> AsMade:
@@ -27,7 +34,7 @@ def as_made(name: str, hanger: Hanger) -> AsMade:
 
 def packed(model: AsMade, **values: float) -> FloatArray:
     known = {**SPRINGS, **DEVIATIONS, "theta_F": 0.8, "bending_factor": 0.45, "shear_share": 1.0}
-    known |= values
+    known |= {"inclination": 90.0, "sag_shape": 0.5, **values}
     return model.pack({name: known[name] for name in model.parameter_names})[None]
 
 
@@ -59,19 +66,14 @@ def solved_anew(
 @pytest.mark.parametrize(
     ("name", "length", "within"),
     [
-        ("beam1", 1.004, 1e-12),
-        ("beam2", 1.004, 1e-12),
-        ("beam3", 1.0, 1e-9),
-        ("beam3", 1.0005, 1e-5),
+        ("beam1", 1.004, REDUCED),
+        ("beam2", 1.004, REDUCED),
+        ("beam3", 1.004, REDUCED),
     ],
 )
 def test_a_bar_that_deviates_has_the_frequencies_of_one_described_so(
     name: str, length: float, within: float
 ) -> None:
-    """Exactly, but for a beam3 that is longer: it leaves out that this one shears less for it.
-
-    That is a thousandth of shear's share, by one standard deviation of a tape.
-    """
     model = as_made(name, ROD)
     made = replace(described_as_made(ROD), length_m=length * ROD.length_m)
     found = model.frequencies_hz(packed(model, theta_L=length), 6)
@@ -84,14 +86,14 @@ def test_a_bar_that_deviates_in_nothing_is_the_described_one() -> None:
         model = as_made(name, ROD)
         exact = packed(model, theta_L=1.0, section=0.0, density=0.0, modulus=0.0)
         found = model.frequencies_hz(exact, 6)
-        np.testing.assert_allclose(found, solved_anew(name, ROD, 6), rtol=1e-8)
+        np.testing.assert_allclose(found, solved_anew(name, ROD, 6), rtol=REDUCED)
 
 
 def test_a_strand_whose_wires_slip_has_the_frequencies_of_one_described_so() -> None:
     model = as_made("beam2", STRAND)
     found = model.frequencies_hz(packed(model), 6)
     made = described_as_made(STRAND, bending_factor=0.45)
-    np.testing.assert_allclose(found, solved_anew("beam2", made, 6), rtol=1e-12)
+    np.testing.assert_allclose(found, solved_anew("beam2", made, 6), rtol=REDUCED)
 
 
 def test_a_known_mass_weighs_against_the_bar_as_made() -> None:
@@ -100,7 +102,7 @@ def test_a_known_mass_weighs_against_the_bar_as_made() -> None:
     found = model.frequencies_at(packed(model), 5, Conditions(added_mass=mass))
     there = AddedMass(60.0, 3.6 * longer, 0.08 * longer)
     expected = solved_anew("beam2", described_as_made(ROD), 5, Conditions(added_mass=there))
-    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    np.testing.assert_allclose(found, expected, rtol=REDUCED)
 
 
 def test_shapes_and_springs_are_those_of_the_bar_as_made() -> None:
@@ -111,7 +113,7 @@ def test_shapes_and_springs_are_those_of_the_bar_as_made() -> None:
     np.testing.assert_allclose(
         model.shape(theta[0], "longitudinal", 3, x_m),
         other.shape(own, "longitudinal", 3, x_m),
-        atol=1e-9,
+        atol=1e-3,
     )
     for mine, its in zip(
         model.springs_n_m_rad(theta), other.springs_n_m_rad(own[None]), strict=True
@@ -153,7 +155,7 @@ def test_plates_leave_the_effective_length_open() -> None:
     theta = packed(model, theta_L=0.85, section=0.0, density=0.0, modulus=0.0)
     short = described("beam2", HANGER_3).pack({"theta_F": 0.8, "theta_L": 0.85, **SPRINGS})
     expected = described("beam2", HANGER_3).frequencies_hz(short[None], 6)
-    np.testing.assert_allclose(model.frequencies_hz(theta, 6), expected, rtol=1e-12)
+    np.testing.assert_allclose(model.frequencies_hz(theta, 6), expected, rtol=REDUCED)
     assert not as_made("beam2", ROD).length_is_open
     assert not as_made("solid2", HANGER_3).length_is_open
 
