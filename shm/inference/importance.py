@@ -29,7 +29,6 @@ _TRIAL, _MOST_TRIALS = 400, 8
 _FEWEST, _MOST, _HOPELESS = 1000, 8000, 0.03
 _EXTENSION, _MOST_EXTENSIONS = 2000, 3
 
-_WORST_TAIL = 0.7  # above, the mean converges too slowly to be used (Vehtari et al. 2024)
 _FEWEST_TO_FIT = 10  # effective draws a parameter: fewer make a covariance nearly singular
 _BATCHES = 4  # Gelman and Rubin's few chains: a quarter of the draws each
 
@@ -62,12 +61,6 @@ class Weighted:
         return effective(normalised(self.log_weights))
 
     @property
-    def light_tailed(self) -> bool:
-        """Whether the mean of the weights converges, and no few of them stand for a ridge that the
-        proposal nearly missed."""
-        return tail_index(self.log_weights) <= _WORST_TAIL
-
-    @property
     def r_hat(self) -> float:
         """Potential scale reduction (Gelman and Rubin 1992) of independent batches, the worst.
 
@@ -92,28 +85,6 @@ class Weighted:
         weights = tempered(self.log_weights, n / 2)
         lots = np.log(weights + np.finfo(float).tiny) + rng.gumbel(size=len(weights))
         return np.asarray(self.points.z[np.argsort(-lots)[:n]])
-
-
-def tail_index(log_weights: FloatArray) -> float:
-    """Shape k of the generalised Pareto distribution of the largest weights (n,).
-
-    The fit is that of Zhang and Stephens (2009), drawn to 0.5 as Vehtari, Simpson, Gelman, Yao and
-    Gabry do (2024, J. Mach. Learn. Res. 25(72)). Infinite where few weights are above 0.
-    """
-    weights = np.sort(np.exp(log_weights - log_weights.max()))
-    tail = int(min(len(weights) / 5, 3 * np.sqrt(len(weights))))
-    excess = weights[-tail:] - weights[-tail - 1]
-    tries = np.arange(1, 31 + int(np.sqrt(tail)))
-    quartile = excess[int(tail / 4 + 0.5) - 1]
-    if quartile == 0:
-        return float("inf")
-    theta = 1 / excess[-1] + (1 - np.sqrt(tries[-1] / (tries - 0.5))) / (3 * quartile)
-    shape = np.log1p(-theta[:, None] * excess).mean(axis=1)
-    log_likelihood = tail * (np.log(-theta / shape) - shape - 1)
-    share = np.exp(log_likelihood - log_likelihood.max())
-    best = (theta * share).sum() / share.sum()
-    k = np.log1p(-best * excess).mean()
-    return float((tail * k + 5) / (tail + 10))
 
 
 @dataclass(frozen=True, eq=False)

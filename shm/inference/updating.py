@@ -119,7 +119,7 @@ def infer(
         # The posterior is elsewhere than it seemed: start again from where the weight is.
         points = final.spread(_AGAIN, rng)
     progress(name, 0.8)
-    enough = final.effective_sample_size >= min(ENOUGH_EFFECTIVE, samples) and final.light_tailed
+    enough = final.effective_sample_size >= min(ENOUGH_EFFECTIVE, samples)
     if enough and options.sampler != EMCEE:
         drawn: Points = final.resampled(samples, rng).take(rng.permutation(samples))
         size, r_hat, method = final.effective_sample_size, final.r_hat, "importance"

@@ -120,7 +120,8 @@ class BarOfTerms:
             shear = hanger.shear_stiffness_n * length_m**2 / stiffness_n_m2 / flexible
         return BarTerms(
             tension=tension,
-            gradient=weight * np.cos(values.lean),
+            # The lower end of a hanger is pulled, or not at all: it does not push its support.
+            gradient=np.minimum(weight * np.cos(values.lean), 2 * tension),
             springs=values.springs.clip(max=STIFFEST),
             stiffness=np.concatenate([fittings, couplers[..., None].repeat(2, axis=2)], axis=1),
             mass=np.hstack(masses),

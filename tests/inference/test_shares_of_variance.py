@@ -90,7 +90,7 @@ def test_ends_of_a_sprung_bar_decide_until_stated() -> None:
         for hanger in (BAR, replace(BAR, ends="fork"))
     )
     assert open_.ends_share_of_variance > 0.5
-    assert np.isnan(open_.inclination_share_of_variance)
+    assert open_.inclination_share_of_variance < 0.2
     assert np.isnan(stated.ends_share_of_variance)
     assert not any(each.startswith(ENDS) for each in asked(stated))
 
