@@ -257,7 +257,6 @@ class Posterior(Shown):
         """What says that something is wrong, not only that the data leave more open."""
         found = []
         string = self._compare_with_string()
-        by_far = self.misfit_percent > NO_TENSION_PERCENT
         if self.effective_sample_size < min(ENOUGH_EFFECTIVE, len(self.samples)):
             found.append(
                 f"{_SAMPLER_FAILED}: {self.effective_sample_size:.0f} effective draws of "
@@ -277,14 +276,7 @@ class Posterior(Shown):
                 f"description, its units and the orders of the modes.{string}"
             )
         if not self.fits:
-            found.append(
-                f"{self.model} misses the measured frequencies by {self.misfit_percent:.1f} % "
-                "(root mean square): the description or the model class does not fit this hanger. "
-                "Check the orders of the modes and the description; `shm gap diagnose` finds the "
-                "cause."
-                + (f" {_DO_NOT_USE}" if by_far else "")
-                + (string if by_far and not cut_off else "")
-            )
+            found.append(self._tell_misfit("" if cut_off else string))
         if self.reading_off_sd > CONTRADICTS_FROM_SD:
             found.append(
                 "The tension that was read contradicts the frequencies, by "
@@ -297,7 +289,8 @@ class Posterior(Shown):
                 f"off by {self.description_off_sd:.0f} of their standard deviations. Check "
                 "diameter, length and material; `shm gap diagnose` says which would fit."
             )
-        if math.isfinite(self.tension_of_other_orders_n) and not by_far:
+        no_tension = self.misfit_percent > NO_TENSION_PERCENT
+        if math.isfinite(self.tension_of_other_orders_n) and not no_tension:
             other_n = self.tension_of_other_orders_n
             found.append(
                 f"{_ORDERS_DECIDE}: numbered one higher or lower the modes fit as well, with a "
@@ -311,6 +304,15 @@ class Posterior(Shown):
     def fits(self) -> bool:
         """Return False where frequencies are missed by more than tolerances and stated errors."""
         return not self.misfit_percent > max(MOST_MISFIT_PERCENT, self.stated_error_percent)
+
+    def _tell_misfit(self, string: str) -> str:
+        """Return by how much the frequencies are missed; `string` is said where that is far."""
+        by_far = f" {_DO_NOT_USE}{string}" if self.misfit_percent > NO_TENSION_PERCENT else ""
+        return (
+            f"{self.model} misses the measured frequencies by {self.misfit_percent:.1f} % (root "
+            "mean square): the description or the model class does not fit this hanger. Check the "
+            f"orders of the modes and the description; `shm gap diagnose` finds the cause.{by_far}"
+        )
 
     def _compare_with_string(self) -> str:
         """Return what a taut string would carry, where that is far from the nominal tension."""
