@@ -24,7 +24,9 @@ class Assumption:
 
     A row has a `value`, or a range from `lower` to `upper`, or both; `sd` is the standard deviation
     of the value, and NaN where the value itself is one. What a row does not have is NaN. `least`
-    and `most` bound what an owner may write. `origin` says who stated it.
+    and `most` bound what an owner may write, `least_sd` the standard deviation. `least_beta` is the
+    smallest parameter that a Beta distributed row may have, NaN where it is not Beta distributed.
+    `origin` says who stated it.
     """
 
     name: str
@@ -38,6 +40,8 @@ class Assumption:
     least: float = 0.0
     most: float = math.inf
     origin: str = DEFAULT
+    least_sd: float = 0.0
+    least_beta: float = math.nan
 
     @property
     def has_value(self) -> bool:
@@ -48,6 +52,14 @@ class Assumption:
     def has_sd(self) -> bool:
         """Return True where the value has a standard deviation."""
         return not math.isnan(self.sd)
+
+    @property
+    def most_sd(self) -> float:
+        """Return the largest standard deviation that goes with the value."""
+        if math.isnan(self.least_beta):
+            return math.inf
+        smaller = min(self.value, 1 - self.value)
+        return math.sqrt(self.value * (1 - self.value) / (1 + self.least_beta / smaller))
 
     @property
     def has_range(self) -> bool:
@@ -373,6 +385,8 @@ def _rows_of_ends(
             sd=fixity[1],
             least=0.01,
             most=0.99,
+            least_sd=1e-3,
+            least_beta=0.2,
         ),
         Assumption(
             f"{kind}_clamped",
@@ -392,6 +406,7 @@ def _rows_of_ends(
             sd=stiffness[1],
             least=-10.0,
             most=10.0,
+            least_sd=1e-3,
         ),
         Assumption(
             f"{kind}_mass_log",
@@ -402,6 +417,7 @@ def _rows_of_ends(
             sd=mass[1],
             least=-5.0,
             most=5.0,
+            least_sd=1e-3,
         ),
     )
 
@@ -492,6 +508,7 @@ _WEIGHT = (
         sd=0.3,
         least=-10.0,
         most=1.0,
+        least_sd=1e-3,
     ),
 )
 

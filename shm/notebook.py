@@ -33,12 +33,16 @@ def load_ipython_extension(shell: Any) -> None:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A value in words: a titled table, whose headings may be empty, and paragraphs under it."""
+    """A value in words: a titled table, whose headings may be empty, and paragraphs under it.
+
+    The paragraphs of `lead` stand above the table.
+    """
 
     title: str
     head: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
     notes: tuple[str, ...] = ()
+    lead: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
@@ -49,8 +53,10 @@ class Sheet:
             "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
             for row in table
         ]
-        notes = [textwrap.fill(each, _WIDTH) for each in self.notes]
-        return "\n".join([self.title, *lines, *notes])
+        lead, notes = (
+            [textwrap.fill(each, _WIDTH) for each in told] for told in (self.lead, self.notes)
+        )
+        return "\n".join([self.title, *lead, *lines, *notes])
 
     @property
     def html(self) -> str:
@@ -61,7 +67,10 @@ class Sheet:
             for row in self.rows
         )
         table = f"<caption>{escape(self.title)}</caption>{shown}<tbody>{body}</tbody>"
-        return f"<table>{table}</table>" + "".join(f"<p>{escape(each)}</p>" for each in self.notes)
+        lead, notes = (
+            "".join(f"<p>{escape(each)}</p>" for each in told) for told in (self.lead, self.notes)
+        )
+        return f"{lead}<table>{table}</table>{notes}"
 
 
 def sheet(value: Any) -> Sheet:
@@ -138,10 +147,11 @@ def _frequencies(posterior: Posterior) -> Sheet:
 
 
 def _selection(selection: Selection) -> Sheet:
-    """The model classes, most probable first, with the tension that each gives."""
+    """Show the tension over all classes with its caveats, then what each class gives."""
     from shm.report import formatting
     from shm.report.formatting import Interval
     from shm.values.rounding import force_unit
+    from shm.values.stated_tension import stated
 
     tensions_n = [Interval.of_samples(each.tension_n) for each in selection.posteriors]
     unit = force_unit(*(each.mean for each in tensions_n))
@@ -160,7 +170,9 @@ def _selection(selection: Selection) -> Sheet:
             )
         )
     head = ("class", "probability", "log evidence", *formatting.tension_headings(unit))
-    return Sheet(f"{_whose(selection.selected)}, model classes", head, rows)
+    averaged = selection.averaged()
+    lead = (*averaged.caveats, " ".join(stated(averaged, unit).sentences))
+    return Sheet(f"{_whose(selection.selected)}, model classes", head, rows, lead=lead)
 
 
 def _diagnosis(diagnosis: Diagnosis) -> Sheet:

@@ -200,7 +200,6 @@ def tests_and_hanger(
         if hanger_id is None and hanger_file is None:
             hanger_id = tests[0].hanger
         hanger = one_hanger(ctx, hanger_file, hanger_id)
-        _say_if_another(tests[0], hanger)
         return tests, hanger
     hanger = one_hanger(ctx, hanger_file, hanger_id)
     with opened_store(ctx) as (_, store):
@@ -225,20 +224,18 @@ def told_doubts(
     """
     from shm.plausibility.bars import Known, doubt_of
 
+    others = tuple(
+        f"Doubtful: test {test.id}. It says that it is of hanger {test.hanger}, the description is "
+        f"of hanger {hanger.id}: right file?"
+        for test in tests
+        if test.hanger not in (None, hanger.id)
+    )
     doubts = {test.id: doubt_of(test, Known(hanger), []) for test in tests}
-    said = tuple(f"Doubtful: test {id_}. {doubt.text}" for id_, doubt in doubts.items() if doubt)
+    found = tuple(f"Doubtful: test {id_}. {doubt.text}" for id_, doubt in doubts.items() if doubt)
+    said = (*others, *found)
     for each in said:
         click.echo(each if apart else paragraph(each), err=apart)
     return said
-
-
-def _say_if_another(test: ModalTest, hanger: Hanger) -> None:
-    if test.hanger not in (None, hanger.id):
-        click.echo(
-            f"Mind: the tests are of hanger {test.hanger}, the description is of hanger "
-            f"{hanger.id}.",
-            err=True,
-        )
 
 
 @contextmanager

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import rich_click as click
 
 from shm.documents import posterior_document, selection_document, summary
-from shm.errors import BadInput, UsageError
+from shm.errors import UsageError
 from shm.inference import Progress, UpdateOptions, select, update
 from shm.inference.options import IMPORTANCE, SAMPLERS
-from shm.models import DESCRIPTION, Model, applicable, build, competing_names
+from shm.models import Model, applicable, build, competing_names
 from shm.modes_document import load_modes
-from shm.pipeline.lineage import Taught
 from shm.report.assumed import assumptions_line, with_assumptions
 from shm.settings import load_settings
 from shm.values import Averaged, Hanger, Limits, ModalTest, Posterior, Selection
@@ -58,50 +55,15 @@ def _updating(function: flags.F) -> flags.F:
 
 
 def calibrated(
-    options: UpdateOptions,
-    path: Path | None,
-    hanger: Hanger,
-    models: Sequence[Model],
-    progress: Progress,
+    options: UpdateOptions, path: Path | None, models: Sequence[Model], progress: Progress
 ) -> UpdateOptions:
-    """The options with what the tests of `path` teach, by the most probable of the classes.
-
-    Raises UsageError where the priors leave nothing to learn, BadInput where no tension was read,
-    or one that contradicts the frequencies.
-    """
+    """Return the options with what the tests of `path` teach; raises as `calibrate` does."""
     if path is None:
         return options
-    if any(model.priors != DESCRIPTION for model in models):
-        raise UsageError(
-            "--calibrated-by needs priors of the description: the thesis's take it as exact.",
-            remedy="Leave --priors thesis out.",
-        )
-    tests = load_modes(path)
-    if not any(math.isfinite(test.tension_read_n) for test in tests):
-        raise BadInput(
-            "no test has a tension_read_n to calibrate by.",
-            file=path,
-            remedy="Give the tension that a load cell or a lift-off showed, and its sd.",
-        )
+    from shm.inference.calibrating import calibrate  # it opens what infers: not before
 
-    def tell(label: str, fraction: float) -> None:
-        progress(f"{label} (calibrating)", fraction)
+    return calibrate(options, load_modes(path), models, progress, path)
 
-    posterior = select(tests, models, options, tell).selected
-    if posterior.faults:
-        raise BadInput(
-            f"the tension read does not fit the frequencies. {posterior.faults[0]}",
-            file=path,
-            remedy="Check the reading (in N), the orders and the description.",
-        )
-    own = tests[0].hanger in (None, hanger.id)
-    from shm.pipeline.steps import calibration  # it opens what identifies: not before
-
-    return replace(options, calibration=calibration(Taught(posterior, own), hanger))
-
-
-_POOR_FIT_PERCENT = 5.0
-"""Model errors beyond it are blunders: clamped ends where springs are right cost some 2 %."""
 
 modes_argument = click.argument(
     "modes_file", metavar="[MODES.json]", required=False, type=flags.FILE
@@ -143,9 +105,8 @@ def command(
     tell_irregular(tests)
     with progress_bar("updating") as progress:
         chosen = build(model, hanger, priors)
-        options = calibrated(options, calibrated_by, hanger, [chosen], progress)
+        options = calibrated(options, calibrated_by, [chosen], progress)
         posterior = update(tests, chosen, options, progress)
-    tell_poor_fit(posterior)
     if flags.wants_json():
         show(with_assumptions({**posterior_document(posterior), "doubts": doubts}, hanger))
         return
@@ -170,18 +131,6 @@ def tell_irregular(tests: Sequence[ModalTest]) -> None:
                     "For the cause: shm gap diagnose",
                     err=True,
                 )
-
-
-def tell_poor_fit(posterior: Posterior) -> None:
-    """Says on stderr where a class misses the frequencies as no class of this bar should."""
-    if posterior.misfit_percent > _POOR_FIT_PERCENT:
-        click.echo(
-            f"Poor fit: {posterior.model} misses the frequencies by {posterior.misfit_percent:.0f} "
-            "% (root mean square). Do "
-            "not trust its tension: look at the orders of the modes and at the hanger's "
-            "description. For the cause: shm gap diagnose",
-            err=True,
-        )
 
 
 def show_stated(averaged: Averaged) -> None:
@@ -276,12 +225,15 @@ def select_command(
     names = _names(ctx, models, None if hanger_file else hanger.id)
     _, not_applicable = applicable(hanger, names)
     chosen = [build(name, hanger, priors) for name in competing_names(hanger, names)]
+    if stated is not None:
+        from shm.inference.calibrating import check_class_priors
+
+        check_class_priors(stated, [model.name for model in chosen])
     doubts = told_doubts(tests, hanger, apart=flags.wants_json())
     tell_irregular(tests)
     with progress_bar("updating") as progress:
-        options = calibrated(options, calibrated_by, hanger, chosen, progress)
+        options = calibrated(options, calibrated_by, chosen, progress)
         selection = select(tests, chosen, options, progress, stated)
-    tell_poor_fit(selection.selected)
     if flags.wants_json():
         document = selection_document(selection, hanger.limits)
         complete = {**document, "not_applicable": not_applicable, "doubts": doubts}

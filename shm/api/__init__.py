@@ -8,7 +8,7 @@ and model classes as objects; these here take names and numbers.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -26,9 +26,10 @@ from shm.gap.any_simulator import diagnose_simulator
 from shm.identify import Identification, IdentifyOptions
 from shm.identify.identification import identify as identified
 from shm.inference import UpdateOptions, updating
-from shm.inference.options import silent
+from shm.inference.calibrating import calibrate, check_class_priors
+from shm.inference.options import IMPORTANCE, SAMPLERS, silent
 from shm.models import DESCRIPTION, build, competing_names
-from shm.models.base import Conditions
+from shm.models.base import Conditions, Model
 from shm.read import read as read_file
 from shm.read import registry
 from shm.settings import Settings, load_settings
@@ -225,6 +226,8 @@ def update(
     seed: int = 1,
     samples: int = 1000,
     priors: str = DESCRIPTION,
+    sampler: str = IMPORTANCE,
+    calibrated_by: Tests = (),
     progress: Progress = silent,
 ) -> Posterior:
     """The posterior of tension and end stiffness of one model class, given all modes of `tests`.
@@ -235,7 +238,9 @@ def update(
     to 5 times nominal, ends from pinned to clamped, the tolerances of its `scatter`), or by the
     `thesis`: its ranges, an exact description and f_hat ~ N(f(theta), (sigma f_hat)^2 + sd^2),
     thesis (4.5), with the unknown fractional model error sigma and the identification's standard
-    deviation sd. `progress` hears a label and the fraction done.
+    deviation sd. `sampler` is `importance`, or `emcee`, which is slower and an independent check.
+    `calibrated_by` are tests with a measured tension (`tension_read_n`) of this hanger or of one of
+    its family. `progress` hears a label and the fraction done.
 
     `Posterior.samples` (samples, parameters) are equally weighted draws, `Posterior.tension_n`
     (samples,) is in N; its interval is absolute, `Posterior.repeatability_sd_n` is for shifts and
@@ -248,8 +253,26 @@ def update(
         >>> posterior.tension_n.mean(), posterior.tension_n.std()
         (711000.0, 4000.0)
     """
-    options = UpdateOptions(samples, seed)
-    return updating.update(modal_tests(tests), build(model, hanger, priors), options, progress)
+    chosen = build(model, hanger, priors)
+    options = _options(samples, seed, sampler, calibrated_by, [chosen], progress)
+    return updating.update(modal_tests(tests), chosen, options, progress)
+
+
+def _options(
+    samples: int,
+    seed: int,
+    sampler: str,
+    calibrated_by: Tests,
+    models: Sequence[Model],
+    progress: Progress,
+) -> UpdateOptions:
+    """Return the options of an update with what `calibrated_by` teaches."""
+    if sampler not in SAMPLERS:
+        raise UsageError(
+            f"there is no sampler {sampler!r}.", remedy=f"Name one of {', '.join(SAMPLERS)}."
+        )
+    options = UpdateOptions(samples, seed, sampler=sampler)
+    return calibrate(options, modal_tests(calibrated_by), models, progress)
 
 
 def select(
@@ -260,12 +283,16 @@ def select(
     seed: int = 1,
     samples: int = 1000,
     priors: str = DESCRIPTION,
+    class_priors: Mapping[str, float] | None = None,
+    sampler: str = IMPORTANCE,
+    calibrated_by: Tests = (),
     progress: Progress = silent,
 ) -> Selection:
     """Model classes compared by their evidence, the most probable first.
 
     The classes are equally probable beforehand, thesis (4.15) to (4.17), but for clamped ones
-    beside one with springs unless the `priors` are the thesis's. Without `models` they are
+    beside one with springs unless the `priors` are the thesis's; `class_priors` say otherwise, such
+    as `{"beam1": 0.25, "beam2": 0.75}`. Without `models` they are
     those of the setting `models` that apply to this hanger (`shm.models.applicable` says why
     another does not). `Selection.averaged(hanger.limits)` is the tension over all of them. The
     other options are those of `update`. Raises UsageError where one of `models` does not apply,
@@ -278,8 +305,10 @@ def select(
     """
     usual = () if models else competing_names(hanger, load_settings().model_names)
     classes = [build(name, hanger, priors) for name in models or usual]
-    options = UpdateOptions(samples, seed)
-    return updating.select(modal_tests(tests), classes, options, progress)
+    if class_priors is not None:
+        check_class_priors(class_priors, [each.name for each in classes])
+    options = _options(samples, seed, sampler, calibrated_by, classes, progress)
+    return updating.select(modal_tests(tests), classes, options, progress, class_priors)
 
 
 _OF_GAP = GapOptions()

@@ -81,10 +81,27 @@ def _refuse_impossible(table: Table, row: Assumption) -> None:
             what = f"a {_NUMBERS[key]} of {number:g} {_unit(row)}".rstrip()
             allowed = f"from {row.least:g} to {row.most:g}"
             raise table.refusal(f"{row.name}: {what} is not {allowed}", _how(row))
-    if row.has_sd and row.sd < 0:
-        raise table.refusal(f"{row.name}: a standard deviation of {row.sd:g} is below 0", _how(row))
+    if row.has_sd and not row.least_sd <= row.sd <= row.most_sd:
+        _refuse_sd(table, row)
     if row.has_range and not row.lower < row.upper:
         raise table.refusal(f"{row.name}: {row.lower:g} to {row.upper:g} does not rise", _how(row))
+
+
+def _refuse_sd(table: Table, row: Assumption) -> None:
+    """Raise BadInput of a standard deviation that cannot be, or does not go with the value."""
+    raw = table.values[row.name]
+    is_stated = isinstance(raw, dict) and "sd" in raw
+    bounded = math.isfinite(row.most_sd)
+    allowed = (
+        f"from {row.least_sd:g} to {row.most_sd:.3g}" if bounded else f"{row.least_sd:g} or more"
+    )
+    beside = f" beside a value of {row.value:g}" if bounded else ""
+    which = "a" if is_stated else "its unchanged"
+    what = f"{row.name}: {which} standard deviation of {row.sd:g}{beside} is not {allowed}"
+    if is_stated:
+        raise table.refusal(what, _how(row))
+    example = f"{row.name} = {{value = {row.value:g}, sd = {row.most_sd / 2:.2g}}}"
+    raise table.refusal(what, f"Give the standard deviation too, such as {example}.")
 
 
 def _how(row: Assumption) -> str:

@@ -17,8 +17,9 @@ from typing import Any
 from shm.errors import BadInput
 from shm.inference.priors import reading_sd_n
 from shm.models import THESIS, Model
-from shm.values import COUNTED_ONCE, LEFT_OUT, NAN, PLANES, Hanger, ModalTest, Mode
+from shm.values import COUNTED_ONCE, LEFT_OUT, NAN, OTHER_UNIT, PLANES, Hanger, ModalTest, Mode
 from shm.values.modes import MOST_SLOPE
+from shm.values.rounding import two_digits
 
 _OF_A_MODE = ("plane", "order", "frequency_hz", "frequency_sd_hz", "damping_ratio", "shape")
 _OF_A_TEST = ("temperature_c", "amplitude", "added_mass", "tension_read_n")
@@ -47,7 +48,9 @@ class CheckLimits:
     `largest_by_amplitude`, which is no error. The spectral lines of a record are f_s / 2^k apart;
     sampling rates in use are a power of two times one of `rate_factors`. A peak fewer than
     `fewest_lines` lines above 0 Hz is hidden by drift, so nobody reads one there. Frequencies match
-    a line by chance with less than `chance_of_line`.
+    a line by chance with less than `chance_of_line`. A tension that was read is in another unit
+    where it is `reading_off` times what a taut string would carry, or one part in so many of it:
+    units of force are 1000 apart, and the string of a bar with tension is right to a few times.
     """
 
     gross_sd: float = 6.0
@@ -60,6 +63,7 @@ class CheckLimits:
     finest_line_hz: float = 1e-3
     most_decimals: int = 9
     chance_of_line: float = 1e-4
+    reading_off: float = 30.0
 
 
 _LIMITS = CheckLimits()
@@ -83,8 +87,10 @@ def check_data(tests: Sequence[ModalTest], hanger: Hanger) -> CheckedData:
     Tests that hold no mode from the start, only a tension that was read, stay.
     """
     unit = _compare_units(tests, hanger)
-    used, remarks = list(tests), [unit] if unit else []
-    for check in (_count_lines_once, _count_copies_once, _leave_out_wrong_orders):
+    used, remarks = list(tests), [unit] if unit else _doubt_stated_errors(tests, hanger)
+    # What a string would carry is not known of frequencies in another unit.
+    checks = () if unit else (_leave_out_readings,)
+    for check in (*checks, _count_lines_once, _count_copies_once, _leave_out_wrong_orders):
         used, added = check(used, hanger)
         remarks += added
     used, added = _leave_out_gross_errors(used, hanger)
@@ -160,7 +166,7 @@ def _compare_units(tests: Sequence[ModalTest], hanger: Hanger) -> str:
     if away[unit] > math.log(_SAME_UNIT) or abs(math.log(ratio)) < 2 * math.log(_SAME_UNIT):
         return ""
     return (
-        f"The frequencies look given in {unit}, not in Hz: they are {ratio:.2g} times those of the "
+        f"{OTHER_UNIT} {unit}, not in Hz: they are {two_digits(ratio)} times those of the "
         "description at its nominal tension. Give them in Hz, or check nominal_tension_n."
     )
 
@@ -171,6 +177,59 @@ def _expected_hz(order: int, hanger: Hanger, tension_n: float = NAN) -> float:
     wave = math.pi * (order + 0.25) / hanger.length_m
     pull_n = tension_n + hanger.bending_stiffness_n_m2 * wave**2
     return wave / (2 * math.pi) * math.sqrt(max(pull_n, 0.0) / hanger.mass_per_length_kg_m)
+
+
+def _doubt_stated_errors(tests: Sequence[ModalTest], hanger: Hanger) -> list[str]:
+    """Name the largest stated error of a frequency, where it is larger than any reading's.
+
+    That is the most of what is assumed where none is stated: of peaks read off a plot by eye.
+    """
+    stated = [
+        (mode.frequency_sd_hz / mode.frequency_hz, test, mode)
+        for test in tests
+        for mode in test.regular_modes
+        if mode.frequency_hz > 0 and not is_bare(mode)
+    ]
+    large = [each for each in stated if each[0] > hanger.assumptions.unstated_frequency_sd.upper]
+    if not large:
+        return []
+    _, test, mode = max(large, key=lambda each: each[0])
+    more = f" {len(large) - 1} more frequencies have such errors." if len(large) > 1 else ""
+    return [
+        f"Test {test.id} states a standard deviation of {mode.frequency_sd_hz:g} Hz of "
+        f"{mode_name(mode)}, {mode.frequency_hz:g} Hz: check its unit (frequency_sd_hz is in Hz). "
+        f"So large an error hides what does not fit.{more}"
+    ]
+
+
+def _leave_out_readings(
+    tests: Sequence[ModalTest], hanger: Hanger, limits: CheckLimits = _LIMITS
+) -> tuple[list[ModalTest], list[str]]:
+    """Leave out tensions read in another unit than N, by what frequencies say."""
+    regular = (mode for test in tests for mode in test.regular_modes)
+    modes = [mode for mode in regular if mode.frequency_hz > 0 and mode.order > 0]
+    string_n = taut_string_tension_n(
+        [mode.frequency_hz for mode in modes], [mode.order for mode in modes], hanger
+    )
+    # A slack bar sounds by its stiffness alone, and carries far less than a string would.
+    tells_tension = any(
+        mode.frequency_hz > _SAME_UNIT * _expected_hz(mode.order, hanger, 0.0) for mode in modes
+    )
+    least_n = string_n / limits.reading_off if tells_tension else -math.inf
+    used, remarks = [], []
+    for test in tests:
+        read_n = test.tension_read_n
+        if read_n < least_n or read_n > limits.reading_off * string_n:
+            remarks.append(
+                f"{LEFT_OUT}: the tension read in test {test.id}, {read_n:g} N, is "
+                f"{two_digits(read_n / string_n)} of what a taut string with these frequencies "
+                "carries: give it in N."
+            )
+            if not test.modes:
+                continue
+            test = replace(test, tension_read_n=NAN, tension_read_sd_n=NAN)
+        used.append(test)
+    return used, remarks
 
 
 def _leave_out_wrong_orders(

@@ -1,9 +1,4 @@
-"""The steps of the flow: functions of plain values that run wherever the executor puts them.
-
-Frequencies see tension, mass and length together; where the tension was read as well, what is left
-is mass, stiffness and length of that bar. Siblings of one delivery share its steel and its rolling,
-not its tape: their own scatter about the one that was weighed is taken for a third of the stated.
-"""
+"""The steps of the flow: functions of plain values that run wherever the executor puts them."""
 
 from __future__ import annotations
 
@@ -13,16 +8,14 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-import numpy as np
-
 from shm.bridge import Bridge
 from shm.errors import BadInput
 from shm.identify import IdentifyOptions, identify
 from shm.identify.plausibility import signal_doubts
 from shm.inference import UpdateOptions, refresh, select, update
-from shm.inference.priors import Calibration, calibration_of
-from shm.models import DESCRIPTION, build, described
-from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, SECTION
+from shm.inference.calibrating import learn
+from shm.inference.priors import Calibration
+from shm.models import build, described
 from shm.pipeline.lineage import Taught, Terms, competing, identify_settings, read_limits
 from shm.pipeline.registry import Opens, WatchResult
 from shm.plausibility import fingerprint_of
@@ -45,7 +38,6 @@ from shm.watch.baseline_check import check_baseline
 from shm.watch.frequency_watch import measured_levels, watch_newest_frequencies
 
 _CHECKED_BY = "beam2"  # fast, and any bar is such a beam as far as a mistaken mode goes
-_SHARE_WITHIN_A_FAMILY = 1 / 3  # judgement: one bar of a delivery from another, to one delivery
 
 
 def options_of(terms: Terms, hanger: Hanger) -> UpdateOptions:
@@ -61,33 +53,7 @@ def checked(tests: Sequence[ModalTest], hanger: Hanger, terms: Terms) -> Baselin
 
 def calibration(taught: Taught | None, hanger: Hanger) -> Calibration | None:
     """What a measured tension has taught of `hanger`; None where there is nothing to learn from."""
-    if taught is None or not is_teacher(taught.posterior):
-        return None
-    learnt = calibration_of(taught.posterior.names, taught.posterior.samples, hanger)
-    return learnt if taught.own else of_sibling(learnt, hanger)
-
-
-def is_teacher(posterior: Posterior) -> bool:
-    """Whether the bar as made is among its parameters, and nothing is wrong with it."""
-    return posterior.priors == DESCRIPTION and SECTION in posterior.names and not posterior.faults
-
-
-def of_sibling(learnt: Calibration, hanger: Hanger) -> Calibration:
-    """The same for a hanger of the same family, whose length was taped on its own."""
-    scatter = hanger.scatter
-    bending = scatter.bending_factor
-    unstated = hanger.assumptions.strand_bending_log_sd.value
-    sds = {
-        SECTION: scatter.section,
-        DENSITY: scatter.density,
-        MODULUS: scatter.modulus,
-        BENDING: bending if np.isfinite(bending) else unstated,
-    }
-    kept = [index for index, name in enumerate(learnt.names) if name != LENGTH]
-    names = tuple(learnt.names[index] for index in kept)
-    own = np.array([_SHARE_WITHIN_A_FAMILY * sds[name] for name in names])
-    covariance = learnt.covariance[np.ix_(kept, kept)] + np.diag(own**2)
-    return replace(learnt, names=names, mean=learnt.mean[kept], covariance=covariance)
+    return None if taught is None else learn(taught.posterior, hanger, taught.own)
 
 
 def identify_file(

@@ -13,7 +13,7 @@ from shm.report.diagnosis_summary import next_step, verdict
 from shm.report.diagnosis_wording import AFTER, tension_of
 from shm.report.formatting import Interval
 from shm.values import TENSION, Diagnosis, PredictedFrequency
-from shm.values.posterior import MOST_MISFIT_PERCENT, MOST_R_HAT
+from shm.values.posterior import MOST_R_HAT
 from shm.values.rounding import rounded_percent
 from shm.values.stated_tension import stated
 
@@ -225,7 +225,7 @@ def _rms_percent(data: HangerReport) -> float:
 def _misses(data: HangerReport) -> bool:
     """Whether the class by itself is so far off that its posterior doubts the description: what it
     predicts with the model's error learnt from the same modes fits them all the same."""
-    return data.posterior.misfit_percent > MOST_MISFIT_PERCENT
+    return not data.posterior.fits
 
 
 def _gap(data: HangerReport) -> str:

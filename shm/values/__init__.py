@@ -101,6 +101,7 @@ from shm.values.posterior import (
     ENOUGH_EFFECTIVE,
     LEFT_OUT,
     MOST_MISFIT_PERCENT,
+    OTHER_UNIT,
     WITHOUT_MODEL,
     Averaged,
     BaselineCheck,

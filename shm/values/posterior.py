@@ -14,7 +14,7 @@ import numpy as np
 from shm.values.hanger import Hanger, Limits
 from shm.values.kinds import NAN, FloatArray, Plane
 from shm.values.modes import ModalTest
-from shm.values.rounding import force_unit
+from shm.values.rounding import force_unit, two_digits
 from shm.values.showing import Shown, front, line, tension_words
 
 if TYPE_CHECKING:
@@ -118,6 +118,7 @@ _DO_NOT_USE, _SAMPLER_FAILED = "Do not use this tension.", "The sampler failed"
 _ENDS_DECIDE, _ORDERS_DECIDE = "The ends decide", "The orders decide"
 _INCLINATION_DECIDES, _SAMPLED_BY_EMCEE = "The inclination decides", "Sampled by emcee"
 COUNTED_ONCE, LEFT_OUT = "Counted once", "Left out"
+OTHER_UNIT = "The frequencies look given in"
 _NO_FAULTS = (_ENDS_DECIDE, _INCLINATION_DECIDES, _SAMPLED_BY_EMCEE, COUNTED_ONCE, LEFT_OUT)
 _SAID_ONCE = (
     _ENDS_DECIDE,
@@ -238,18 +239,19 @@ class Posterior(Shown):
     def caveats(self) -> tuple[str, ...]:
         """What keeps this posterior from being taken at its word, worst first; empty: nothing."""
         faults = self.faults
+        # What no other line is worth reading beside, and then what says that there is no answer.
+        first = [each for each in faults if each.startswith(OTHER_UNIT)]
         failed = [each for each in faults if each.startswith(_SAMPLER_FAILED)]
         # What was not used of the data comes before what the rest of them says.
         changed = [each for each in self.remarks if each.startswith(_NO_FAULTS)]
         asked = (*self._statements_that_would_help, *self._emcee_reason)
-        return tuple(dict.fromkeys((*failed, *changed, *faults, *asked)))
+        return tuple(dict.fromkeys((*first, *failed, *changed, *faults, *asked)))
 
     @property
     def faults(self) -> tuple[str, ...]:
         """What says that something is wrong, not only that the data leave more open."""
         found = []
         string = self._compare_with_string()
-        by_far = self.misfit_percent > NO_TENSION_PERCENT
         if self.effective_sample_size < min(ENOUGH_EFFECTIVE, len(self.samples)):
             found.append(
                 f"{_SAMPLER_FAILED}: {self.effective_sample_size:.0f} effective draws of "
@@ -273,13 +275,8 @@ class Posterior(Shown):
                 f"At the bound of its prior: {names}. The interval is cut off there. Check the "
                 f"description, its units and the orders of the modes.{string}"
             )
-        if self.misfit_percent > max(MOST_MISFIT_PERCENT, self.stated_error_percent):
-            found.append(
-                f"{self.model} misses the measured frequencies by {self.misfit_percent:.1f} % "
-                "(root mean square): the description or the model class does not fit this hanger."
-                + (f" {_DO_NOT_USE}" if by_far else "")
-                + (string if by_far and not cut_off else "")
-            )
+        if not self.fits:
+            found.append(self._tell_misfit("" if cut_off else string))
         if self.reading_off_sd > CONTRADICTS_FROM_SD:
             found.append(
                 "The tension that was read contradicts the frequencies, by "
@@ -292,7 +289,8 @@ class Posterior(Shown):
                 f"off by {self.description_off_sd:.0f} of their standard deviations. Check "
                 "diameter, length and material; `shm gap diagnose` says which would fit."
             )
-        if math.isfinite(self.tension_of_other_orders_n):
+        no_tension = self.misfit_percent > NO_TENSION_PERCENT
+        if math.isfinite(self.tension_of_other_orders_n) and not no_tension:
             other_n = self.tension_of_other_orders_n
             found.append(
                 f"{_ORDERS_DECIDE}: numbered one higher or lower the modes fit as well, with a "
@@ -301,6 +299,20 @@ class Posterior(Shown):
             )
         found += [each for each in self.remarks if not each.startswith(_NO_FAULTS)]
         return tuple(found)
+
+    @property
+    def fits(self) -> bool:
+        """Return False where frequencies are missed by more than tolerances and stated errors."""
+        return not self.misfit_percent > max(MOST_MISFIT_PERCENT, self.stated_error_percent)
+
+    def _tell_misfit(self, string: str) -> str:
+        """Return by how much the frequencies are missed; `string` is said where that is far."""
+        by_far = f" {_DO_NOT_USE}{string}" if self.misfit_percent > NO_TENSION_PERCENT else ""
+        return (
+            f"{self.model} misses the measured frequencies by {self.misfit_percent:.1f} % (root "
+            "mean square): the description or the model class does not fit this hanger. Check the "
+            f"orders of the modes and the description; `shm gap diagnose` finds the cause.{by_far}"
+        )
 
     def _compare_with_string(self) -> str:
         """Return what a taut string would carry, where that is far from the nominal tension."""
@@ -311,8 +323,8 @@ class Posterior(Shown):
         if 1 / FAR_FROM_NOMINAL < ratio < FAR_FROM_NOMINAL:
             return ""
         return (
-            f" A taut string would need {force_unit(string_n).told(string_n)}, {ratio:.2g} times "
-            "the nominal: check nominal_tension_n, its unit, the orders."
+            f" A taut string would need {force_unit(string_n).told(string_n)}, {two_digits(ratio)} "
+            "times the nominal: check nominal_tension_n, its unit, the orders."
         )
 
     @property
@@ -347,8 +359,9 @@ class Posterior(Shown):
         if self.sampler == EMCEE:
             return (f"{_SAMPLED_BY_EMCEE}, because it was asked for.",)
         return (
-            f"{_SAMPLED_BY_EMCEE}, because importance sampling was not reliable here: a few draws "
-            "had most of the weight. Trust the evidence of this class less than its error says.",
+            f"{_SAMPLED_BY_EMCEE}, because importance sampling of {self.model} was not reliable "
+            f"here: a few draws had most of the weight. Trust the evidence of {self.model} less "
+            "than its error says.",
         )
 
     def parameter(self, name: str) -> FloatArray:

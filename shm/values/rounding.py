@@ -82,6 +82,11 @@ def to_two_digits(value: float, half: float, sign: str = "") -> str:
     return f"{round(value, places):{sign}z.{max(places, 0)}f}"
 
 
+def two_digits(value: float) -> str:
+    """Return `120`, `6.3` or `0.001`: two significant digits, never as a power of ten."""
+    return np.format_float_positional(value, precision=2, fractional=False, unique=False, trim="-")
+
+
 def rounded_percent(fraction: float, half: float, sign: str = "") -> str:
     """`8.2 ± 1.1 %` of fractions: two digits of the half width, two decimals at most."""
     return f"{rounded(100 * fraction, 100 * half, sign, most_decimals=2)} %"

@@ -96,3 +96,15 @@ def test_posterior_of_structure_shows(test_of_711_kn: shm.ModalTest) -> None:
     html = found._repr_html_()
     assert "measured frequencies without a model" in html
     assert f"{test_of_711_kn.modes[0].frequency_hz:.3f}" in html
+
+
+def test_summary_of_classes_leads_with_caveats_and_the_tension(posterior: shm.Posterior) -> None:
+    doubted = replace(posterior, description_off_sd=5.0)
+    text = " ".join(shm.Selection((doubted, posterior), (0.6, 0.4)).summary().split())
+    caveat, tension, table = (
+        text.index(each)
+        for each in (doubted.faults[0], "Tension 69", "class probability log evidence")
+    )
+    assert caveat < tension < table
+    html = shm.Selection((posterior,), (1.0,))._repr_html_()
+    assert html.index("credible interval") < html.index("<table>")

@@ -29,10 +29,11 @@ COMMANDS = {
         "window_time_constant_s": "window_time_constant_s",
     },
     ("update", "command"): {
-        "model": "model", "seed": "seed", "samples": "samples",
+        "model": "model", "seed": "seed", "samples": "samples", "sampler": "sampler",
     },
     ("update", "select_command"): {
-        "models": "models", "seed": "seed", "samples": "samples",
+        "models": "models", "seed": "seed", "samples": "samples", "sampler": "sampler",
+        "class_priors": "class_priors",
     },
     ("gap", "diagnose"): {
         "baseline": "baseline", "without": "without", "hold_out": "hold_out", "seed": "seed",
@@ -150,3 +151,25 @@ def test_a_bar_on_other_supports_is_not_simulated(hanger: shm.Hanger) -> None:
     slack = replace(hanger, nominal_tension_n=0.0)
     with pytest.raises(UsageError, match="cannot be simulated"):
         shm.simulate(slack)
+
+
+def test_sampler_class_priors_and_calibration_are_those_of_the_command(
+    hanger: shm.Hanger, test_of_711_kn: shm.ModalTest
+) -> None:
+    plain = shm.update(test_of_711_kn, hanger, "beam1", samples=200)
+    read = replace(test_of_711_kn, tension_read_n=680e3, tension_read_sd_n=3e3)
+    taught = shm.update(test_of_711_kn, hanger, "beam1", samples=200, calibrated_by=read)
+    assert taught.tension_n.std() < 0.7 * plain.tension_n.std()
+    with pytest.raises(BadInput, match="no test has a tension_read_n to calibrate by"):
+        shm.update(test_of_711_kn, hanger, "beam1", calibrated_by=test_of_711_kn)
+    in_kn = replace(read, tension_read_n=711.0, tension_read_sd_n=2.0)
+    with pytest.raises(BadInput, match=r"to calibrate by\. Left out: the tension read in test t1"):
+        shm.update(test_of_711_kn, hanger, "beam1", calibrated_by=in_kn)
+    asked = shm.update(test_of_711_kn, hanger, "beam1", samples=200, sampler="emcee")
+    assert asked.method == "emcee"
+    with pytest.raises(UsageError, match="there is no sampler 'tmcmc'"):
+        shm.update(test_of_711_kn, hanger, "beam1", sampler="tmcmc")
+    with pytest.raises(UsageError, match=r"beam9 is not compared. No prior of beam1: give one"):
+        shm.select(test_of_711_kn, hanger, ["beam1"], class_priors={"beam9": 1.0})
+    one = shm.select(test_of_711_kn, hanger, ["beam1"], samples=200, class_priors={"beam1": 2})
+    assert one.probabilities == (1.0,)

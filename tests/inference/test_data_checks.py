@@ -51,6 +51,7 @@ STAY = replace(
     nominal_tension_n=200.0,
     scatter=Scatter(),
 )
+TAUT = replace(STAY, nominal_tension_n=6200.0)
 
 
 def first(name: str, frequency_hz: float, sd_hz: float = NAN, read_n: float = NAN) -> ModalTest:
@@ -194,9 +195,10 @@ def test_scatter_and_temperature_are_no_gross_errors() -> None:
 
 def test_a_nominal_tension_that_slipped_is_named_with_what_a_taut_string_carries() -> None:
     posterior = update([SLIP], build("beam1", STAY), FEW)
-    assert posterior.caveats[0].startswith("At the bound of its prior: theta_F")
+    assert posterior.caveats[0].endswith("Give them in Hz, or check nominal_tension_n.")
+    assert posterior.caveats[1].startswith("At the bound of its prior: theta_F")
     said = "A taut string would need 6.199 kN, 31 times the nominal: check nominal_tension_n, its u"
-    assert said in posterior.caveats[0]
+    assert said in posterior.caveats[1]
     assert sum("taut string" in each for each in posterior.caveats) == 1
     nominal = replace(STAY, nominal_tension_n=6.2e3)
     assert not any("taut" in each for each in update([SLIP], build("beam1", nominal), FEW).caveats)
@@ -262,3 +264,52 @@ def test_what_only_the_hardest_hits_show_is_kept() -> None:
     assert len(check_data(tests, BRIDGE).tests[3].modes) == 3
     tests[3] = replace(tests[3], amplitude=2.0)
     assert check_data(tests, BRIDGE).tests == tuple(tests)
+
+
+def test_reading_in_another_unit_is_left_out_and_said() -> None:
+    in_kn = [replace(SLIP, tension_read_n=6.2), modes_of("t2", (4.34, 8.68), 0.02)]
+    checked = check_data(in_kn, TAUT)
+    assert math.isnan(checked.tests[0].tension_read_n)
+    (remark,) = checked.remarks
+    assert remark.startswith("Left out: the tension read in test t1, 6.2 N, is 0.001 ")
+    assert remark.endswith("of what a taut string with these frequencies carries: give it in N.")
+    right = [replace(SLIP, tension_read_n=5000.0)]
+    assert check_data(right, TAUT).tests == tuple(right)
+
+
+def test_small_reading_of_slack_bar_is_kept() -> None:
+    slack = replace(modes_of("t1", (120.0, 330.0), 0.1), tension_read_n=300.0)
+    string_n = check_for_update([slack], build("beam1", BAR))[1]["taut_string_tension_n"]
+    assert string_n > 30 * 300.0
+    assert check_data([slack], BAR).remarks == ()
+
+
+def test_stated_error_larger_than_any_reading_is_named() -> None:
+    wide = replace(SLIP, modes=(replace(SLIP.modes[0], frequency_sd_hz=100.0), *SLIP.modes[1:]))
+    (remark,) = check_data([wide], TAUT).remarks
+    assert "a standard deviation of 100 Hz of transverse 1, 4.339 Hz: check its unit" in remark
+    assert check_data([modes_of("t1", (4.339, 8.678), 0.1)], TAUT).remarks == ()
+
+
+def test_other_unit_is_said_first_and_no_other_orders_where_nothing_fits() -> None:
+    posterior = update(TEN[:1], build("beam1", BAR), FEW)
+    unit = "The frequencies look given in rad/s, not in Hz: they are 6.3 times those."
+    off = replace(
+        posterior,
+        at_bounds=("theta_F",),
+        misfit_percent=74.0,
+        remarks=("Left out: a mode.", unit),
+        tension_of_other_orders_n=7000.0,
+        taut_string_tension_n=120.0 * posterior.nominal_tension_n,
+    )
+    assert off.caveats[0] == unit
+    said = " ".join(off.caveats)
+    assert "Do not use this tension" in said
+    assert "The orders decide" not in said
+    assert "120 times the nominal" in said
+    assert "The orders decide" in " ".join(replace(off, misfit_percent=3.0).caveats)
+
+
+def test_emcee_names_the_class_whose_evidence_is_worse() -> None:
+    posterior = replace(update(TEN[:1], build("beam1", BAR), FEW), method="emcee", sampler="")
+    assert "Trust the evidence of beam1 less" in " ".join(posterior.caveats)

@@ -20,7 +20,7 @@ from shm.errors import BadInput
 from shm.gap.noise import nodes
 from shm.gap.observations import observed
 from shm.inference.field import FieldLikelihood
-from shm.inference.priors import TensionPrior, reading_of
+from shm.inference.priors import SPRINGS, Ends, TensionPrior, reading_of
 from shm.inference.systematic_errors import errors_of_bar
 from shm.models import described
 from shm.models.effects import EFFECTS, Variant
@@ -85,6 +85,7 @@ def test_row_is_complete(row: Assumption) -> None:
     assert row.source
     assert row.origin == "default"
     assert row.reason.endswith(".")
+    assert not row.has_sd or row.least_sd <= row.sd <= row.most_sd
     numbers = [row.value, row.lower, row.upper]
     assert all(row.least <= each <= row.most for each in numbers if not math.isnan(each))
     assert not row.has_range or row.lower < row.upper
@@ -163,7 +164,12 @@ def test_without_overrides_a_hanger_has_the_defaults(tmp_path: Path) -> None:
         ("accelerometer_mass_kg = true", "True is not a number"),
         ("accelerometer_mass_kg = nan", "nan is not a number"),
         ("accelerometer_mass_kg = [0.1, 0.2]", "has no low end"),
-        ("accelerometer_mass_kg = {sd = -1}", "a standard deviation of -1 is below 0"),
+        ("accelerometer_mass_kg = {sd = -1}", "a standard deviation of -1 is not 0 or more"),
+        ("socket_fixity = 0.99", "unchanged standard deviation of 0.141 beside a value of 0.99"),
+        ("socket_fixity = 0.99", r"too, such as socket_fixity = {value = 0.99, sd = 0.011}"),
+        ("socket_fixity = {value = 0.9, sd = 0.5}", "a value of 0.9 is not from 0.001 to 0.173"),
+        ("socket_fixity = {value = 0.9, sd = 0.0}", "a standard deviation of 0 beside a value"),
+        ("socket_stiffness_log = {value = 2, sd = 0}", "deviation of 0 is not 0.001 or more"),
         ("accelerometer_mass_kg = {valu = 1}", "unknown key valu"),
         ('accelerometer_mass_kg = {reason = "x"}', "states no number"),
         ("accelerometer_mass_kg = {value = 1, reason = 3}", "reason is not a text"),
@@ -179,6 +185,16 @@ def test_impossible_rows_are_refused_with_their_line(
     with pytest.raises(BadInput, match=problem) as refused:
         load(tmp_path, row)
     assert (Path(refused.value.file).name, refused.value.line) == ("bridge.toml", 7)
+
+
+@pytest.mark.parametrize("value", [0.01, 0.5, 0.99])
+def test_widest_fixity_that_is_admitted_is_a_prior(tmp_path: Path, value: float) -> None:
+    widest = replace(DEFAULTS.socket_fixity, value=value).most_sd
+    row = f"socket_fixity = {{value = {value}, sd = {0.9999 * widest}}}"
+    hanger = replace(load(tmp_path, row).hanger(3), ends="socket")
+    assert np.isfinite(Ends(hanger, SPRINGS, ()).scores(
+        {name: np.array([7.0]) for name in SPRINGS}, np.array([5.0]), 1
+    )).all()  # fmt: skip
 
 
 def test_impossible_row_of_a_hanger_names_its_line(tmp_path: Path) -> None:

@@ -1,0 +1,120 @@
+"""What tests with a measured tension teach of a bar, its own or a sibling's, before its update.
+
+Frequencies see tension, mass and length together; where the tension was read as well, what is left
+is mass, stiffness and length of that bar. Siblings of one delivery share its steel and its rolling,
+not its tape: their own scatter about the one that was weighed is taken for a third of the stated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shm.errors import BadInput, UsageError
+from shm.inference.data_checks import check_data
+from shm.inference.options import Progress, UpdateOptions
+from shm.inference.priors import Calibration, calibration_of
+from shm.inference.updating import select
+from shm.models import DESCRIPTION, Model
+from shm.models.as_made import BENDING, DENSITY, LENGTH, MODULUS, SECTION
+from shm.values import Hanger, ModalTest, Posterior
+
+_SHARE_WITHIN_A_FAMILY = 1 / 3  # judgement: one bar of a delivery from another, to one delivery
+
+
+def calibrate(
+    options: UpdateOptions,
+    tests: Sequence[ModalTest],
+    models: Sequence[Model],
+    progress: Progress,
+    file: Path | str = "",
+) -> UpdateOptions:
+    """Return the options with what `tests` teach, by the most probable of the classes.
+
+    The tests are of the models' hanger or of one of its family; `file` is where they come from.
+    Without any the options stay. Raises UsageError where the priors leave nothing to learn,
+    BadInput where no tension was read, or one that contradicts the frequencies.
+    """
+    if not tests:
+        return options
+    hanger = models[0].hanger
+    if any(model.priors != DESCRIPTION for model in models):
+        raise UsageError(
+            "calibration needs priors of the description: the thesis's take it as exact.",
+            remedy="Leave the priors of the thesis out.",
+        )
+    checked = check_data(tests, hanger)
+    if not any(math.isfinite(test.tension_read_n) for test in checked.tests):
+        raise BadInput(
+            " ".join(["no test has a tension_read_n to calibrate by.", *checked.remarks]),
+            file=file,
+            remedy="Give the tension that a load cell or a lift-off showed, in N, and its sd.",
+        )
+
+    def tell(label: str, fraction: float) -> None:
+        progress(f"{label} (calibrating)", fraction)
+
+    posterior = select(tests, models, options, tell).selected
+    if posterior.faults:
+        raise BadInput(
+            f"the tension read does not fit the frequencies. {posterior.faults[0]}",
+            file=file,
+            remedy="Check the reading (in N), the orders and the description.",
+        )
+    own = tests[0].hanger in (None, hanger.id)
+    return replace(options, calibration=learn(posterior, hanger, own))
+
+
+def learn(posterior: Posterior, hanger: Hanger, own: bool) -> Calibration | None:
+    """Return what a posterior with a measured tension, of an `own` test or a sibling's, teaches.
+
+    None where there is nothing to learn from it.
+    """
+    if not _is_teacher(posterior):
+        return None
+    learnt = calibration_of(posterior.names, posterior.samples, hanger)
+    return learnt if own else _of_sibling(learnt, hanger)
+
+
+def check_class_priors(class_priors: Mapping[str, float], names: Sequence[str]) -> None:
+    """Raise UsageError where a class compared has no prior above 0, or another class has one."""
+    odd = [f"{name} is not compared." for name in class_priors if name not in names]
+    lacking = [name for name in names if name not in class_priors]
+    if lacking:
+        odd.append(f"No prior of {', '.join(lacking)}: give one of each class compared.")
+    odd += [
+        f"A prior of {stated:g} of {name} is not above 0."
+        for name, stated in class_priors.items()
+        if name in names and not 0 < stated < math.inf
+    ]
+    if odd:
+        raise UsageError(
+            " ".join(odd), remedy=f"Give priors of {', '.join(names)}, or none at all."
+        )
+
+
+def _is_teacher(posterior: Posterior) -> bool:
+    """Return True where the bar as made is among its parameters, and nothing is wrong with it."""
+    return posterior.priors == DESCRIPTION and SECTION in posterior.names and not posterior.faults
+
+
+def _of_sibling(learnt: Calibration, hanger: Hanger) -> Calibration:
+    """Return the same for a hanger of the same family, whose length was taped on its own."""
+    scatter = hanger.scatter
+    bending = scatter.bending_factor
+    unstated = hanger.assumptions.strand_bending_log_sd.value
+    sds = {
+        SECTION: scatter.section,
+        DENSITY: scatter.density,
+        MODULUS: scatter.modulus,
+        BENDING: bending if np.isfinite(bending) else unstated,
+    }
+    kept = [index for index, name in enumerate(learnt.names) if name != LENGTH]
+    names = tuple(learnt.names[index] for index in kept)
+    own = np.array([_SHARE_WITHIN_A_FAMILY * sds[name] for name in names])
+    covariance = learnt.covariance[np.ix_(kept, kept)] + np.diag(own**2)
+    return replace(learnt, names=names, mean=learnt.mean[kept], covariance=covariance)
