@@ -226,9 +226,9 @@ def update(
     seed: int = 1,
     samples: int = 1000,
     priors: str = DESCRIPTION,
+    progress: Progress = silent,
     sampler: str = IMPORTANCE,
     calibrated_by: Tests = (),
-    progress: Progress = silent,
 ) -> Posterior:
     """The posterior of tension and end stiffness of one model class, given all modes of `tests`.
 
@@ -283,10 +283,10 @@ def select(
     seed: int = 1,
     samples: int = 1000,
     priors: str = DESCRIPTION,
-    class_priors: Mapping[str, float] | None = None,
+    progress: Progress = silent,
     sampler: str = IMPORTANCE,
     calibrated_by: Tests = (),
-    progress: Progress = silent,
+    class_priors: Mapping[str, float] | None = None,
 ) -> Selection:
     """Model classes compared by their evidence, the most probable first.
 

@@ -26,9 +26,9 @@ SIGNATURES = {
     "cross_check='frf', estimator='h1', reference_force_n=1000.0, frequency_allowance=0.0001, "
     "mains_hz=50.0, window_time_constant_s=inf)",
     "update": "(tests, hanger, model='beam2', *, seed=1, samples=1000, "
-    "priors='description', progress)",
+    "priors='description', progress, sampler='importance', calibrated_by=())",
     "select": "(tests, hanger, models=None, *, seed=1, samples=1000, "
-    "priors='description', progress)",
+    "priors='description', progress, sampler='importance', calibrated_by=(), class_priors=None)",
     "diagnose": "(tests, hanger, baseline='beam1', *, without=(), hold_out=(), draws=1000, seed=1, "
     "progress)",
     "diagnose_simulator": "(simulator, readings, *, candidates=(), seed=1)",
