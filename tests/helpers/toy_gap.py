@@ -47,8 +47,8 @@ class ToyProblem:
     def section_of(self, design: Design) -> FloatArray:
         return Repeated.none(design).section
 
-    def readings_of(self, design: Design) -> FloatArray:
-        return Repeated.none(design).readings
+    def tensions_of(self, design: Design) -> FloatArray:
+        return Repeated.none(design).tensions
 
     def masses_of(self, design: Design) -> FloatArray:
         return Repeated.none(design).masses
