@@ -29,7 +29,16 @@ from shm.bridge import load_hanger
 from shm.documents import posterior_document, selection_document
 from shm.errors import BadInput, UsageError
 from shm.inference import UpdateOptions, class_probabilities, refresh, select, update
-from shm.models import PRIORS, THESIS, build, class_of, class_units, described, end_stiffness
+from shm.models import (
+    PRIORS,
+    THESIS,
+    build,
+    class_of,
+    class_units,
+    described,
+    end_stiffness,
+    parameter_sets,
+)
 from shm.modes_document import load_modes
 from shm.simulate import (
     AmbientPlan,
@@ -684,18 +693,20 @@ def nearly(one: Any, other: Any) -> bool:
 
 @pytest.mark.parametrize("name", STORED)
 def test_the_class_of_a_stored_posterior_predicts_as_it_did(name: str) -> None:
-    """Compare with three stored draws to 1e-6, and with the stored means.
+    """Compare with three stored draws to 1e-3, and with the stored means.
 
-    The stored means hold corrections of ends and sensors, too, of up to 0.5 % of a frequency.
+    What is newer in a class, as own weight, has its usual value. The stored means hold corrections
+    of ends and sensors, too, of up to 0.5 % of a frequency.
     """
     posterior, expected = stored_posterior(name)
     model = class_of(posterior, load_hanger(calls.ROD))
     assert model.name == posterior.model
-    assert (*model.parameter_names, "sigma") == posterior.names
+    assert set(posterior.names) <= {*model.parameter_names, "sigma"}
     known = np.array(expected["frequencies_hz"])
-    frequencies_hz = model.frequencies_hz(posterior.samples[:, :-1], known.shape[2])
+    theta = parameter_sets(posterior, model)
+    frequencies_hz = model.frequencies_hz(theta, known.shape[2])
     assert frequencies_hz.shape == (50, 2, known.shape[2])
-    assert frequencies_hz[:3] == pytest.approx(known, rel=1e-6)
+    assert frequencies_hz[:3] == pytest.approx(known, rel=1e-3)
     for row in posterior.predicted:
         mean_hz = frequencies_hz[:, PLANES.index(row.plane), row.order - 1].mean()
         assert mean_hz == pytest.approx(row.mean_hz, rel=0.005)
