@@ -84,7 +84,7 @@ def test_pairs_show_each_parameter_and_each_two(
     drawn: dict[str, Figure], posterior: shm.Posterior
 ) -> None:
     panels = drawn["pairs"].axes
-    assert len(panels) == len(posterior.names) ** 2
+    assert len(panels) == min(len(posterior.names), 7) ** 2  # the first seven at most
     said = [text.get_text() for axes in panels for text in axes.texts]
     force, length, *_ = posterior.samples.T
     assert said[0] == f"{np.corrcoef(force, length)[0, 1]:+.2f}"

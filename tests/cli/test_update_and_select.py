@@ -40,6 +40,7 @@ def test_the_document_of_update_has_the_keys_of_the_contract_and_repeats(
     }  # fmt: skip
     assert set(document["tension_n"]) == QUANTILES
     own = {"theta_F", "theta_L", "section", "density", "modulus", "sigma"}
+    own |= {"inclination", "sag_shape"}
     assert set(document["parameters"]) == own
     assert (document["priors"], document["at_bounds"]) == ("description", [])
     assert document["misfit_percent"] < 1

@@ -146,7 +146,7 @@ def test_posterior_samples_are_exported_alike_as_csv_and_npz(
     with (tmp_path / "s.csv").open(newline="") as file:
         head, *rows = csv.reader(file)
     table = np.array(rows, dtype=float)
-    of_the_bar = ["section", "density", "modulus"]
+    of_the_bar = ["section", "density", "modulus", "inclination", "sag_shape"]
     assert head == ["theta_F", "theta_L", *of_the_bar, "sigma", "tension_n", "log_likelihood"]
     with np.load(tmp_path / "s.npz") as columns:
         for name, column in zip(head, table.T, strict=True):
