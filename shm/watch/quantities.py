@@ -100,11 +100,14 @@ def exchangeable(
 ) -> list[tuple[str, str]]:
     """Pairs of springs of which the frequencies of `modes` do not say which is at which end.
 
-    Those that the class, or the baseline of an adopted one, declares; with a decade between the
-    two, the softer at the base point's or in the lower half of its prior, and all else at the base
-    point, exchanging them moves no frequency by more than 1e-5.
+    Those that the class declares, although its own weight tells them apart by less than absolute
+    frequencies are known. Of an adopted class those of its baseline, where with a decade between
+    the two, the softer at the base point's or in the lower half of its prior, and all else at the
+    base point, exchanging them moves no frequency by more than 1e-5.
     """
-    pairs = MODELS[_baseline_class(model)].swaps if modes else ()
+    if not modes or not is_adopted(model.name):
+        return list(model.swaps) if modes else []
+    pairs = MODELS[_baseline_class(model)].swaps
     return [pair for pair in pairs if _is_exchangeable(model, base, modes, pair)]
 
 
