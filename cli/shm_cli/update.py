@@ -226,7 +226,7 @@ def select_command(
     _, not_applicable = applicable(hanger, names)
     chosen = [build(name, hanger, priors) for name in competing_names(hanger, names)]
     if stated is not None:
-        from shm.inference.calibrating import check_class_priors
+        from shm.inference.updating import check_class_priors
 
         check_class_priors(stated, [model.name for model in chosen])
     doubts = told_doubts(tests, hanger, apart=flags.wants_json())

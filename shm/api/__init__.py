@@ -26,8 +26,9 @@ from shm.gap.any_simulator import diagnose_simulator
 from shm.identify import Identification, IdentifyOptions
 from shm.identify.identification import identify as identified
 from shm.inference import UpdateOptions, updating
-from shm.inference.calibrating import calibrate, check_class_priors
+from shm.inference.calibrating import calibrate
 from shm.inference.options import IMPORTANCE, SAMPLERS, silent
+from shm.inference.updating import check_class_priors
 from shm.models import DESCRIPTION, build, competing_names
 from shm.models.base import Conditions, Model
 from shm.read import read as read_file

@@ -8,7 +8,7 @@ not its tape: their own scatter about the one that was weighed is taken for a th
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -78,23 +78,6 @@ def learn(posterior: Posterior, hanger: Hanger, own: bool) -> Calibration | None
         return None
     learnt = calibration_of(posterior.names, posterior.samples, hanger)
     return learnt if own else _of_sibling(learnt, hanger)
-
-
-def check_class_priors(class_priors: Mapping[str, float], names: Sequence[str]) -> None:
-    """Raise UsageError where a class compared has no prior above 0, or another class has one."""
-    odd = [f"{name} is not compared." for name in class_priors if name not in names]
-    lacking = [name for name in names if name not in class_priors]
-    if lacking:
-        odd.append(f"No prior of {', '.join(lacking)}: give one of each class compared.")
-    odd += [
-        f"A prior of {stated:g} of {name} is not above 0."
-        for name, stated in class_priors.items()
-        if name in names and not 0 < stated < math.inf
-    ]
-    if odd:
-        raise UsageError(
-            " ".join(odd), remedy=f"Give priors of {', '.join(names)}, or none at all."
-        )
 
 
 def _is_teacher(posterior: Posterior) -> bool:

@@ -196,7 +196,7 @@ def select(
     if not models:
         raise UsageError("no model class to select from.", remedy="Name at least one.")
     if class_priors is not None:
-        _check_priors(class_priors, [model.name for model in models])
+        check_class_priors(class_priors, [model.name for model in models])
     cheap = [update(tests, m, options, progress) for m in models if not m.expensive]
     best = max(cheap, key=lambda posterior: posterior.log_evidence, default=None)
     costly = [update(tests, m, options, progress, best) for m in models if m.expensive]
@@ -223,13 +223,20 @@ def class_probabilities(
     return {each.model: float(w) for each, w in zip(posteriors, weights, strict=True)}
 
 
-def _check_priors(class_priors: Mapping[str, float], names: Sequence[str]) -> None:
-    odd = sorted(set(names) ^ set(class_priors))
-    odd += [name for name, stated in class_priors.items() if not 0 < stated < np.inf]
+def check_class_priors(class_priors: Mapping[str, float], names: Sequence[str]) -> None:
+    """Raise UsageError where a class compared has no prior above 0, or another class has one."""
+    odd = [f"{name} is not compared." for name in class_priors if name not in names]
+    lacking = [name for name in names if name not in class_priors]
+    if lacking:
+        odd.append(f"No prior of {', '.join(lacking)}: give one of each class compared.")
+    odd += [
+        f"A prior of {stated:g} of {name} is not above 0."
+        for name, stated in class_priors.items()
+        if name in names and not 0 < stated < math.inf
+    ]
     if odd:
         raise UsageError(
-            f"prior of {', '.join(odd)}: each class compared needs one above 0, no other has one.",
-            remedy=f"Give them of {', '.join(names)}, or none at all.",
+            " ".join(odd), remedy=f"Give priors of {', '.join(names)}, or none at all."
         )
 
 
