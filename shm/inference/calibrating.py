@@ -1,4 +1,4 @@
-"""What tests with a measured tension teach of a bar, its own or a sibling's, before its update.
+"""Learn of a bar from tests with a measured tension, its own or a sibling's, before its update.
 
 Frequencies see tension, mass and length together; where the tension was read as well, what is left
 is mass, stiffness and length of that bar. Siblings of one delivery share its steel and its rolling,

@@ -1,4 +1,4 @@
-"""What else the data allow, or what speaks against all of it, which no posterior alone shows.
+"""Find other answers that the data allow, and contradictions that no posterior alone shows.
 
 Orders that fit as well, a description that only holds if several tolerances are exceeded, a reading
 that the frequencies contradict: none of these widens its interval.

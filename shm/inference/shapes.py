@@ -24,7 +24,7 @@ from shm.values import PLANES, FloatArray, Hanger, IntArray, ModalTest, Mode, Sh
 
 @dataclass(frozen=True)
 class ShapeOptions:
-    """How shapes count.
+    """Hold the settings by which shapes count.
 
     phi has as many usual `nodes` and `gross_nodes`. A search takes shapes for `loose` times less
     certain until the frequencies have led it. From a probability of `rather_gross` on, the answer

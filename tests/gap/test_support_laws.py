@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from shm.assumptions import DEFAULTS
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.fit import baseline_fit, fitted
 from shm.gap.law_error import ByLaws, by_its_laws
@@ -16,6 +19,8 @@ from tests.helpers.hangers import HANGER_3
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 from tests.worlds.simulated.reality import Reality
 
+# The campaign's two tests are of one tension.
+HANGER = replace(HANGER_3, assumptions=DEFAULTS.with_numbers(tension_between_tests=1e-6))
 AT = "deck end, transverse"
 DECK = PlantedEffect(
     "support_motion", AT, {"support_mass_kg": 2000.0, "support_frequency_hz": 16.0}
@@ -28,11 +33,11 @@ def _by_laws(own_laws: bool) -> tuple[ByLaws, Fit]:
     plan = CampaignPlan(
         modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), reality=Reality(own_laws=own_laws)
     )
-    tests = campaign(HANGER_3, HangerState(TENSION_N), [DECK], plan, np.random.default_rng(3))
-    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    tests = campaign(HANGER, HangerState(TENSION_N), [DECK], plan, np.random.default_rng(3))
+    problem = GapProblem(HANGER, "beam1", observed(tests, HANGER))
     rng = np.random.default_rng(1)
     effect = EFFECTS["support_motion"]
-    (at,) = [e for e in effect.variants(HANGER_3, problem.design.survey) if e.at == AT]
+    (at,) = [e for e in effect.variants(HANGER, problem.design.survey) if e.at == AT]
     baseline = baseline_fit(problem, rng)
     before = fitted(problem, Hypothesis((("support_motion", at),)), rng)
     return by_its_laws(problem, baseline, before, rng), before
@@ -40,8 +45,8 @@ def _by_laws(own_laws: bool) -> tuple[ByLaws, Fit]:
 
 def test_a_deck_with_a_second_mode_is_forgiven_and_fitted() -> None:
     found, before = _by_laws(own_laws=True)
-    assert found.gain > 8
-    assert found.fit.log_fit > before.log_fit + 8
+    assert found.gain > 10
+    assert found.fit.log_fit > before.log_fit + 10
 
 
 def test_a_deck_with_one_mode_pays_little_for_the_allowance() -> None:

@@ -117,12 +117,15 @@ def test_what_is_drawn_afterwards_moves_no_frequency(case: str) -> None:
     Of a strand that shears only nearly: its own share of shear is as open as a percent of area.
     """
     # Lean, which the longitudinal plane determines, changes the tension's gradient in both.
-    within = {"strand beam3": 5e-4, "fittings, one plane": 5e-5}.get(case, 1e-5)
+    # The last two by the reduced basis.
+    less_exact = {"strand beam3": 5e-4, "fittings, one plane": 5e-5}
+    less_exact |= {"rod beam3": 1e-5, "with a known mass": 2e-6}
+    within = less_exact.get(case, 1e-6)
     name, hanger, tests = CASES[case]
     coordinates = coordinates_of(name, hanger, *tests)
     z = coordinates.draw_prior(200, np.random.default_rng(1))
     middle, drawn = coordinates.theta(z), coordinates.finished(z, np.random.default_rng(2))
-    assert np.abs(drawn - middle).max() > 0.004
+    assert np.abs(drawn - middle).max() > (0.004 if case == "with a known mass" else 0.005)
     columns = [0] if "one plane" in case else [0, 1]
     for conditions in {coordinates.model.conditions(test) for test in tests} or {Conditions()}:
         both = [

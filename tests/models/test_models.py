@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput, UsageError
-from shm.models import MODELS, PRIORS, THESIS, Model, build
+from shm.models import MODELS, PRIORS, THESIS, AsMade, Model, build
 from shm.values import AddedMass, ModalTest
 from tests.helpers.hangers import HANGER_3
 
@@ -39,6 +39,11 @@ def theta(model: Model) -> np.ndarray:
     return rng.uniform(prior.lower, prior.upper, (20, len(prior.names)))
 
 
+def sags(model: Model) -> bool:
+    """Return True for a class with own weight, which a reduced basis solves."""
+    return isinstance(model, AsMade) and model.has_terms
+
+
 def test_frequencies_have_the_stated_shape_and_rise_with_the_order(model, theta) -> None:
     frequencies = model.frequencies_hz(theta, 6)
     assert frequencies.shape == (20, 2, 6)
@@ -48,8 +53,10 @@ def test_frequencies_have_the_stated_shape_and_rise_with_the_order(model, theta)
 def test_more_tension_raises_every_frequency(model, theta) -> None:
     more = theta.copy()
     more[:, model.parameter_names.index("theta_F")] *= 1.1
-    # In the other plane sag stiffens a slack bar.
-    assert np.all(model.frequencies_hz(more, 6)[:, 0] > model.frequencies_hz(theta, 6)[:, 0])
+    # In the longitudinal plane of one with own weight, sag stiffens a slack bar.
+    planes = slice(0, 1 if sags(model) else 2)
+    tighter, slacker = (model.frequencies_hz(each, 6)[:, planes] for each in (more, theta))
+    assert np.all(tighter > slacker)
 
 
 def test_a_swap_changes_no_frequency(model, theta, monkeypatch) -> None:
@@ -59,7 +66,9 @@ def test_a_swap_changes_no_frequency(model, theta, monkeypatch) -> None:
         columns = [model.parameter_names.index(name) for name in (one, other)]
         swapped[:, columns] = theta[:, columns[::-1]]
         np.testing.assert_allclose(
-            model.frequencies_hz(swapped, 6), model.frequencies_hz(theta, 6), rtol=1e-6
+            model.frequencies_hz(swapped, 6),
+            model.frequencies_hz(theta, 6),
+            rtol=1e-6 if sags(model) else 1e-13,
         )
 
 
