@@ -28,7 +28,9 @@ import scipy
 from shm.assumptions import Assumption, Assumptions
 from shm.models.bar_of_terms import BarValues, bar_of_terms
 from shm.models.base import DESCRIPTION, Conditions, Model, radius_m, silent
-from shm.models.beam import Beam, Beam3
+from shm.models.beam import Beam, Beam1, Beam3
+from shm.models.hanger import PhysicalHanger, Zone
+from shm.models.solid import S2
 from shm.values import PLANES, FloatArray, Hanger, ModalTest
 
 TENSION, LENGTH = "theta_F", "theta_L"
@@ -189,6 +191,81 @@ class AsMade(Model):
         bar = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes)
         near = [self._values(each) for each in others]
         return bar.shapes_about(self._values(theta), near, self._places_of_described(theta, x_m))
+
+    def physical(self, theta: FloatArray, sensors: int = 0) -> PhysicalHanger:
+        """Return the real bars (n) of `theta`, as the general model takes them.
+
+        Fittings and turnbuckles keep their part of the length, and their stiffness and mass over
+        the bar's. Where end plates leave the length open, the bar is in the middle of the described
+        one; else it begins at the deck end. A solid is a bar on equivalent end springs.
+        """
+        hanger = self.hanger
+        stiffness, mass, length = self.stiffness_mass_length(theta)
+        tension_n = self._column(theta, TENSION) * hanger.nominal_tension_n
+        held = isinstance(self.model, Beam1) and not self.has_terms
+        kept = PhysicalHanger.held if held else PhysicalHanger.clamped
+        bar = kept(hanger, tension_n, sensors)
+        deck_m, arch_m = self._ends_m
+        over_m = (1 - length) * hanger.length_m / 2 if self.length_is_open else 0.0
+        deck_end_m = deck_m + over_m + np.zeros(len(theta))
+        bar = replace(
+            bar,
+            deck_end_m=deck_end_m,
+            arch_end_m=deck_end_m + (arch_m - deck_m) * length,
+            bending_stiffness_n_m2=bar.bending_stiffness_n_m2 * stiffness[:, None],
+            mass_per_length_kg_m=bar.mass_per_length_kg_m * mass,
+        )
+        bar = replace(bar, zones=tuple(self._stretched(zone, bar) for zone in bar.zones))
+        if not held:
+            bar = bar.on_springs(self.springs_n_m_rad(theta))
+        if self._shears:
+            section = np.exp(self._column(theta, SECTION))
+            own = SHEAR in self.bounds and self.has_terms
+            flexible = self._column(theta, SHEAR) if own else np.ones(len(theta))
+            turning = hanger.second_moment_m4 / hanger.area_m2 * section
+            bar = replace(
+                bar,
+                shear_compliance_1_n=flexible * section / stiffness / hanger.shear_stiffness_n,
+                rotary_inertia_kg_m=turning * bar.mass_per_length_kg_m,
+            )
+        return self._with_terms(bar, theta) if self.has_terms else bar
+
+    def _with_terms(self, bar: PhysicalHanger, theta: FloatArray) -> PhysicalHanger:
+        """Return bars with fittings, turnbuckles, the tension's gradient and sag."""
+        of = bar_of_terms(self.hanger, self.fittings_m, self._shears, modes=1)
+        terms = of.terms(self._values(theta))
+        length_m = bar.length_m
+        zones = tuple(
+            Zone(
+                bar.deck_end_m + start * length_m,
+                bar.deck_end_m + end * length_m,
+                terms.stiffness[:, index],
+                terms.mass[:, index],
+            )
+            for index, (start, end) in enumerate(of.zones)
+        )
+        return replace(
+            bar,
+            zones=zones,
+            tension_gradient_n=terms.gradient * bar.bending_stiffness_n_m2[:, 0] / length_m**2,
+            sag_parameter=np.stack([0 * terms.sag, terms.sag / terms.tension], axis=1),
+        )
+
+    def _stretched(self, zone: Zone, bar: PhysicalHanger) -> Zone:
+        """Return a zone of the described bar where it is on `bar`."""
+        deck_m, arch_m = self._ends_m
+        ratio = bar.length_m / (arch_m - deck_m)
+        start_m, end_m = (
+            bar.deck_end_m + (each - deck_m) * ratio for each in (zone.start_m, zone.end_m)
+        )
+        return replace(zone, start_m=start_m, end_m=end_m)
+
+    @property
+    def _ends_m(self) -> tuple[float, float]:
+        """Return where the class's bar begins and ends: s2 has the rod between plates alone."""
+        plate = self.hanger.plate
+        plate_m = plate.length_m if isinstance(self.model, S2) and plate is not None else 0.0
+        return plate_m, self.hanger.length_m - plate_m
 
     @property
     def _shears(self) -> bool:

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -52,7 +52,8 @@ class BarOfTerms:
     """The frequencies of bars like `hanger`, with or without shear, for `modes` modes a plane.
 
     `fittings_m` are the lengths of the deck's and the arch's fitting, `radii_m` the radii of
-    gyration of known masses at `masses_at_m`.
+    gyration of known masses at `masses_at_m`. `zones` are where fittings and turnbuckles begin and
+    end, from 0 to 1.
     """
 
     def __init__(
@@ -67,40 +68,46 @@ class BarOfTerms:
         self.hanger, self.shears, self.modes = hanger, shears, modes
         length = hanger.length_m
         self._fittings = sum(1 for each in fittings_m if each > 0)
-        zones = [(0.0, fittings_m[0] / length)] if fittings_m[0] > 0 else []
-        zones += [(1 - fittings_m[1] / length, 1.0)] if fittings_m[1] > 0 else []
+        self.zones = [(0.0, fittings_m[0] / length)] if fittings_m[0] > 0 else []
+        self.zones += [(1 - fittings_m[1] / length, 1.0)] if fittings_m[1] > 0 else []
         for each in hanger.turnbuckles:
             middle, half = each.x_m / length, each.length_m / length / 2
-            zones.append((middle - half, middle + half))
+            self.zones.append((middle - half, middle + half))
         self._unit_hz = math.sqrt(hanger.bending_stiffness_n_m2 / hanger.mass_per_length_kg_m)
         self._unit_hz /= 2 * math.pi * length**2
-        places, radii = ([each / length for each in of] for of in (masses_at_m, radii_m))
-        self._bar = ReducedBar(zones, self._snapshots(len(places)), modes, places, radii)
+        self._places = [each / length for each in masses_at_m]
+        self._radii = [each / length for each in radii_m]
+
+    @cached_property
+    def _bar(self) -> ReducedBar:
+        usual = self._snapshots(len(self._places))
+        return ReducedBar(self.zones, usual, self.modes, self._places, self._radii)
 
     def frequencies_hz(self, values: BarValues, masses_kg: FloatArray | None = None) -> FloatArray:
         """Return frequencies (n, 2, modes), with known masses (n, places) on the bar."""
-        return self._unit_hz * self._bar.frequencies(self._terms(values, masses_kg))
+        return self._unit_hz * self._bar.frequencies(self.terms(values, masses_kg))
 
     def frequencies_about(
         self, values: BarValues, near: Sequence[BarValues]
     ) -> tuple[FloatArray, FloatArray]:
         """Return frequencies (n, 2, modes) and, to first order, those of near bars (s, ...)."""
-        terms, others = self._terms(values, None), [self._terms(each, None) for each in near]
+        terms, others = self.terms(values), [self.terms(each) for each in near]
         found, moved = self._bar.frequencies_about(terms, others)
         return self._unit_hz * found, self._unit_hz * moved
 
     def shapes(self, values: BarValues, x_m: FloatArray) -> FloatArray:
         """Return shapes (n, 2, modes, points) at `x_m`, each of any size."""
-        return self._bar.shapes(self._terms(values, None), x_m / self.hanger.length_m)
+        return self._bar.shapes(self.terms(values), x_m / self.hanger.length_m)
 
     def shapes_about(
         self, values: BarValues, near: Sequence[BarValues], x_m: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return shapes (n, 2, modes, points) and, to first order, those of near bars (s, ...)."""
-        terms, others = self._terms(values, None), [self._terms(each, None) for each in near]
+        terms, others = self.terms(values), [self.terms(each) for each in near]
         return self._bar.shapes_about(terms, others, x_m / self.hanger.length_m)
 
-    def _terms(self, values: BarValues, masses_kg: FloatArray | None) -> BarTerms:
+    def terms(self, values: BarValues, masses_kg: FloatArray | None = None) -> BarTerms:
+        """Return the factors of the matrices, in units of each bar's own length and stiffness."""
         hanger = self.hanger
         stiffness_n_m2, length_m = hanger.bending_stiffness_n_m2, hanger.length_m
         mass_kg = hanger.mass_per_length_kg_m * length_m
@@ -155,6 +162,10 @@ class BarOfTerms:
         n = _SNAPSHOTS
         # Every other one near the nominal tension, the others anywhere.
         log_ratio = np.where(np.arange(n) % 2, rng.uniform(low, high, n), rng.normal(0, 0.4, n))
+        # Plates leave the length open, a strand's wires the shear, down to next to none.
+        plate_m = 0.0 if hanger.plate is None else hanger.plate.length_m
+        most_flexible = hanger.assumptions.strand_shear_share.bounds[1]
+        flexible = (_LEAST_FLEXIBLE, most_flexible) if hanger.kind == "strand" else (1.0, 1.0)
         values = BarValues(
             tension_n=np.exp(log_ratio) * hanger.nominal_tension_n,
             springs=10 ** rng.uniform(*_STIFF_SNAPSHOTS, (n, 2, 2)),
@@ -169,7 +180,13 @@ class BarOfTerms:
             shear=np.ones(n),
         )
         mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
-        return self._terms(values, mass_kg * rng.uniform(0, 0.2, (n, places)))
+        masses_kg = mass_kg * rng.uniform(0, 0.2, (n, places))
+        values = replace(
+            values,
+            section=rng.uniform(1 - 2 * plate_m / hanger.length_m, 1.0, n) ** -2,
+            shear=np.exp(rng.uniform(math.log(flexible[0]), math.log(flexible[1]), n)),
+        )
+        return self.terms(values, masses_kg)
 
 
 @lru_cache(maxsize=32)
@@ -185,5 +202,5 @@ def bar_of_terms(
     return BarOfTerms(hanger, fittings_m, shears, modes, masses_at_m, radii_m)
 
 
-_LEAST_FLEXIBLE = 1e-3  # a thousandth of the theory's flexibility changes no frequency
+_LEAST_FLEXIBLE = 0.03  # of the theory's: less flexibility moves a strand's frequencies by 2e-5
 _HALF_HELD = 6.0  # k L/EI of an end half way from a hinge's buckling load to a clamp's

@@ -158,7 +158,7 @@ class Beam3(Beam2):
         return tensioned_beam.timoshenko_waves(tension, shear, turning, deck, arch, modes)
 
     def _coupled(self, theta: FloatArray) -> PhysicalHanger:
-        """Return the same with shear and rotary inertia, in turnbuckles those of the bar."""
+        """Return the same with shear, in turnbuckles the bar's, and rotary inertia of the mass."""
         hanger, one = self.hanger, np.ones(len(theta))
         turning = hanger.mass_per_length_kg_m * hanger.second_moment_m4 / hanger.area_m2
         return replace(

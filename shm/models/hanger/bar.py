@@ -55,6 +55,7 @@ class Bar:
     """Twice the energies of all functions, each (rows or 1, functions, functions).
 
     Of curvature, deflection's slope, deflection, shear strain, and the rotation of the section;
+    `gradient` is that of a tension x - 1/2, which grows along the bar; rotation goes with mass;
     `bending` goes by plane: (rows or 1, planes or 1, functions, functions).
     `area` (rows or 1, functions) is the integral of the deflection. The functions: four Hermite
     cubics, polynomials, kinks, shear strains.
@@ -62,6 +63,7 @@ class Bar:
 
     bending: FloatArray
     tension: FloatArray
+    gradient: FloatArray
     mass: FloatArray
     shear: FloatArray
     rotation: FloatArray
@@ -140,13 +142,13 @@ def _bar(
         strain = np.concatenate([none, strain])
         rotation = slope - strain
         shear = _energy(strain, weight)
-    tension = _energy(slope, weight)
     return Bar(
         np.stack([_energy(bend, plane) for plane in stiff], axis=1),
-        tension,
+        _energy(slope, weight),
+        _energy(slope, weight * (x - 0.5)),
         _energy(w, heavy),
         shear,
-        _energy(rotation, weight) if counts.shear else tension,
+        _energy(rotation, heavy),
         np.einsum("fnq,nq->nf", w, weight),
         counts,
     )
@@ -223,8 +225,17 @@ def by_plane(zone: Zone) -> FloatArray:
 
 def stiffness_ratio(physical: PhysicalHanger) -> FloatArray:
     """T L^2/EI (n, planes)."""
-    tension = (physical.tension_n * physical.length_m**2)[:, None]
-    return np.asarray(tension / physical.bending_stiffness_n_m2)
+    return _over_bending(physical, physical.tension_n)
+
+
+def gradient_ratio(physical: PhysicalHanger) -> FloatArray:
+    """Return by how much T L^2/EI (n, planes) grows from the deck end to the arch end."""
+    return _over_bending(physical, physical.tension_gradient_n)
+
+
+def _over_bending(physical: PhysicalHanger, force_n: FloatArray) -> FloatArray:
+    force = (force_n * physical.length_m**2)[:, None]
+    return np.asarray(force / physical.bending_stiffness_n_m2)
 
 
 def bar_of(physical: PhysicalHanger, modes: int) -> Bar:

@@ -85,7 +85,8 @@ class PhysicalHanger:
     """`n` hangers in one test. Ends are deck 0, arch 1; planes transverse 0, longitudinal 1.
 
     The bar goes from `deck_end_m` to `arch_end_m` (n,) on the axis of the hanger's description,
-    along which all places are given. `bending_stiffness_n_m2` is (n, planes),
+    along which all places are given. `tension_n` is that at mid-length; the arch end carries
+    `tension_gradient_n` more than the deck end. `bending_stiffness_n_m2` is (n, planes),
     `rotational_compliance_rad_n_m` (n, ends, planes, planes), symmetric, 0 for clamped,
     `translational_compliance_m_n` (n, ends, planes), 0 for held, infinite for free;
     `support_mass_kg` (n, ends, planes) moves with an end that is not held: together they are a
@@ -101,6 +102,7 @@ class PhysicalHanger:
     deck_end_m: FloatArray
     arch_end_m: FloatArray
     tension_n: FloatArray
+    tension_gradient_n: FloatArray
     bending_stiffness_n_m2: FloatArray
     mass_per_length_kg_m: FloatArray
     rotational_compliance_rad_n_m: FloatArray
@@ -128,6 +130,7 @@ class PhysicalHanger:
             deck_end_m=0 * one,
             arch_end_m=hanger.length_m * one,
             tension_n=tension_n,
+            tension_gradient_n=0 * one,
             bending_stiffness_n_m2=np.full((n, 2), hanger.bending_stiffness_n_m2),
             mass_per_length_kg_m=hanger.mass_per_length_kg_m * one,
             rotational_compliance_rad_n_m=np.zeros((n, 2, 2, 2)),

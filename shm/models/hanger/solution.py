@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.models.hanger.bar import Bar, along, bar_of, by_plane, stiffness_ratio
+from shm.models.hanger.bar import Bar, along, bar_of, by_plane, gradient_ratio, stiffness_ratio
 from shm.models.hanger.functions import SLOPES
 from shm.models.hanger.physical import HangerModes, LateralSpring, PhysicalHanger, SupportMode
 from shm.models.hanger.system import Swing, System, are_coupled, rotational_n_m_rad, system
@@ -321,7 +321,8 @@ def _motions_as_a_whole(physical: PhysicalHanger) -> IntArray:
     """
     free = np.isinf(physical.translational_compliance_m_n).sum(axis=1)
     loose = np.isinf(np.einsum("nepp->nep", physical.rotational_compliance_rad_n_m)).all(axis=1)
-    turns = (free > 0) & loose & (physical.tension_n == 0)[:, None]
+    slack = (physical.tension_n == 0) & (physical.tension_gradient_n == 0)
+    turns = (free > 0) & loose & slack[:, None]
     return np.asarray((free == 2) * 1 + turns)
 
 
@@ -335,7 +336,8 @@ def _shift(physical: PhysicalHanger) -> FloatArray:
     and masses clamped on only add to it.
     """
     stiff, heavy = _least_factors(physical)
-    squeezed = np.maximum(-stiffness_ratio(physical), 0.0) / stiff
+    lowest = stiffness_ratio(physical) - np.abs(gradient_ratio(physical)) / 2
+    squeezed = np.maximum(-lowest, 0.0) / stiff
     bent = squeezed**2
     least = np.where(_ends_move(physical), 12 * squeezed + bent, bent / 4) * stiff / heavy
     return np.asarray(1.2 * least + (_FREE_SHIFT if _is_free(physical) else 0.0))

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.models.hanger.bar import Bar, along, stiffness_ratio
+from shm.models.hanger.bar import Bar, along, gradient_ratio, stiffness_ratio
 from shm.models.hanger.functions import DEFLECTIONS, HERMITE, SLOPES
 from shm.models.hanger.physical import PhysicalHanger, SupportMode
 from shm.values import FloatArray, IntArray
@@ -209,6 +209,8 @@ def _stiffness(physical: PhysicalHanger, bar: Bar) -> FloatArray:
     """Bar, shear and lateral springs (n, planes, functions, functions)."""
     ratio = stiffness_ratio(physical)
     total = bar.bending + ratio[..., None, None] * bar.tension[:, None]
+    if np.any(physical.tension_gradient_n):
+        total += gradient_ratio(physical)[..., None, None] * bar.gradient[:, None]
     if bar.counts.shear:
         flexibility = physical.shear_compliance_1_n[:, None] * bending_unit(physical, 2)
         rigid = 1 / np.maximum(flexibility, 1 / _RIGID_IN_SHEAR)
