@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.gap.attribution import SAME_BELOW, grouped
+from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.model_probabilities import (
-    CALIBRATION,
+from shm.gap.groups import SAME_BELOW, group
+from shm.gap.probabilities import (
     SINGLE,
     UNKNOWN,
     ScoredHypothesis,
@@ -26,15 +26,15 @@ from shm.gap.model_probabilities import (
 from shm.gap.search import SUPPORTED
 from shm.gap.simulator_fit import (
     at_bounds,
+    drop_copies,
     errors_of,
-    fitted,
+    fit_hypothesis,
     in_sds,
     moments,
     p_value,
-    refitted,
+    refit,
     rms,
     slips,
-    without_copies,
 )
 from shm.gap.simulator_problem import Condition, Reading, Simulator, SimulatorProblem
 from shm.models.effects.base import Variant
@@ -178,7 +178,7 @@ def diagnose_simulator(
     >>> spring = shm.Simulator(lambda p, at: {"force_n": p["k"] * at["x_m"]}, {"k": prior})
     >>> shm.diagnose_simulator(spring, readings).summary()  # doctest: +SKIP
     """
-    kept, repeated = without_copies(readings)
+    kept, repeated = drop_copies(readings)
     problem = SimulatorProblem(simulator, kept)
     rng = np.random.default_rng(seed)
     answers = _answers(problem, rng)
@@ -223,16 +223,15 @@ class _Answers:
 
 def _answers(problem: SimulatorProblem, rng: np.random.Generator) -> _Answers:
     names = [each.name for each in problem.simulator.effects]
-    alone = fitted(problem, Hypothesis(), rng)
-    singles = [fitted(problem, Hypothesis(((name, _EVERYWHERE),)), rng, alone.z) for name in names]
+    alone = fit_hypothesis(problem, Hypothesis(), rng)
+    singles = [fit_hypothesis(problem, Hypothesis(((name, _EVERYWHERE),)), rng, alone.z) for name in names]
     plain = _by_evidence([*singles, *_pairs(problem, alone, _by_evidence(singles), rng)])
-    fits = [alone, *plain, fitted(problem, Hypothesis(flexible=True), rng, alone.z)]
+    fits = [alone, *plain, fit_hypothesis(problem, Hypothesis(flexible=True), rng, alone.z)]
     for each in plain[:_FLEXIBLE]:
-        fits.append(fitted(problem, replace(each.hypothesis, flexible=True), rng, each.z))
+        fits.append(fit_hypothesis(problem, replace(each.hypothesis, flexible=True), rng, each.z))
     scored = [ScoredHypothesis.fitted(fit, len(alone.z)) for fit in fits]
     tried = families(scored, dict.fromkeys(names, 1))
-    best = next(each.best.fit for each in tried if not each.flexible)
-    chances, unknown = probabilities(tried, p_value(problem, best or alone))
+    chances, unknown = probabilities(tried)
     of = {each.best.hypothesis: float(p) for each, p in zip(tried, chances, strict=True)}
     return _Answers(problem, {fit.hypothesis: fit for fit in fits}, of, float(unknown))
 
@@ -259,7 +258,7 @@ def _pairs(
             # Effects with a parameter of one name are forms of one effect.
             if names not in found and not set(one) & set(other.parameters):
                 pair = Hypothesis((*leader.hypothesis.effects, (other.name, _EVERYWHERE)))
-                found[names] = fitted(problem, pair, rng, leader.z[: len(alone.z)])
+                found[names] = fit_hypothesis(problem, pair, rng, leader.z[: len(alone.z)])
     alone_of = {each.hypothesis.name: each.log_evidence + SUPPORTED for each in singles}
     return [
         each
@@ -288,7 +287,7 @@ def _groups(
     best = max((each.log_evidence for each in own), default=0.0)
     near = [each.log_evidence > best - SAME_BELOW for each in own]
     return tuple(
-        tuple(supported[i] for i in group) for group in grouped([(fit,) for fit in own], near)
+        tuple(supported[i] for i in each) for each in group([(fit,) for fit in own], near)
     )
 
 
@@ -308,8 +307,8 @@ def _held_out(problem: SimulatorProblem, fit: Fit) -> FloatArray:
     fold = np.array([number[e] if several else i for i, e in enumerate(conditions)]) % _FOLDS
     left = np.empty(len(fold))
     for each in np.unique(fold):
-        z = refitted(problem, fit, fold != each)
-        away = problem.value - problem.predicted(fit.hypothesis, z[None])[0]
+        z = refit(problem, fit, fold != each)
+        away = problem.value - problem.predict(fit.hypothesis, z[None])[0]
         left[fold == each] = away[fold == each]
     return left
 

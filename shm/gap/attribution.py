@@ -1,5 +1,4 @@
-"""Which effect causes the gap: evidence for no gap, each effect, pairs, and something unknown; what
-is claimed of it, and what stays possible.
+"""Which effect causes the gap: evidence for no gap, each effect, pairs, and something unknown.
 
 Where these data support several causes and cannot tell them apart, what is claimed is their group.
 """
@@ -8,25 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
 
 import numpy as np
-import scipy
 
 from shm.gap.contract import Fit, GapOptions
-from shm.gap.coordinates import Branch
-from shm.gap.damping import with_damping
-from shm.gap.law_error import without_minor_cause
-from shm.gap.likelihood import Likelihood
-from shm.gap.model_probabilities import (
-    Family,
-    ScoredHypothesis,
-    families,
-    probabilities,
-    undetected_share,
-)
-from shm.gap.optimiser import Landscape
+from shm.gap.groups import SAME_BELOW, group, views_from_peaks
+from shm.gap.probabilities import Family, ScoredHypothesis, families, probabilities
 from shm.gap.problem import GapProblem
+from shm.gap.residuals import predictions, predictive_p_value
 from shm.gap.search import SUPPORTED, Search
 from shm.inference.mixture import normalised
 from shm.inference.options import Progress, silent
@@ -76,8 +64,7 @@ class Attribution:
     `unexplained` is the likeliest fit with a flexible remainder. `p_value` is the posterior
     predictive p-value of the leading explanation that has no remainder. A part of
     `unexplained_probability` is that of something unknown that passes for an effect of the
-    catalogue. `invisible` names the effects that these data cannot show, and why. `search` can be
-    gone on with from what it has `tried`.
+    catalogue. `invisible` names the effects that these data cannot show, and why.
     """
 
     baseline: Fit
@@ -105,76 +92,33 @@ class Attribution:
             self.no_gap_probability, self.unexplained_probability, self.explanations
         )
 
-    def with_unknown(self, probability: float) -> Attribution:
-        """No gap stands only as far as nothing acts of this `probability` beyond what was tried."""
-        moved = probability * self.no_gap_probability
-        return replace(
-            self,
-            no_gap_probability=self.no_gap_probability - moved,
-            unexplained_probability=self.unexplained_probability + moved,
-        )
 
-
-def attributed(
+def attribute(
     problem: GapProblem, options: GapOptions, rng: np.random.Generator, progress: Progress = silent
 ) -> Attribution:
-    """The causes of the gap between the baseline and the measurements, with probabilities.
+    """Return the causes of the gap between the hanger and the measurements, with probabilities.
 
     Sizes that these data cannot show are cut from the priors (`problem.smallest`). Raises
     UsageError for an unknown effect in `options.without`.
     """
     search = Search(problem, options, rng, progress)
-    tried = search.with_unknown(search.singles())
-    if search.calls_for_pairs(tried):
-        tried = search.with_pairs(tried)
-    return _weighed(search, tried)
-
-
-def more_thorough(found: Attribution) -> Attribution:
-    """The attribution gone on with where something unknown leads, or a pair.
-
-    Every effect and pairs of many are fitted, or other pairs of either effect.
-    """
-    search, tried = found.search, list(found.tried)
-    if found.leads == "unexplained":
-        tried = search.with_every_effect(tried)
-        if search.calls_for_pairs(tried):
-            tried = search.with_many_pairs(tried)
-    elif found.leading is None or not found.leading.is_pair:
-        return found
-    return _weighed(search, search.with_other_pairs(tried))
-
-
-def _weighed(search: Search, tried: list[ScoredHypothesis]) -> Attribution:
-    weighed = families(search.with_laws(search.with_sampled(tried)), search.variants)
-    kinds = with_damping(search.problem.observations, weighed)
-    search.progress("weighing", 1.0)
+    search.run()
+    tried = search.scored()
+    kinds = families(tried, search.variants)
     likeliest = _fit([kind for kind in kinds if not kind.flexible])
-    p_value = search.p_value(likeliest)
-    chances, mimic = probabilities(kinds, p_value)
-    chances = without_minor_cause(search.problem, search.baseline, kinds, chances)
-    each = [float(chance) for chance in undetected_share(kinds, chances)]
-    return _attribution(search, tried, kinds, each, mimic, p_value)
-
-
-def _attribution(
-    search: Search,
-    tried: Sequence[ScoredHypothesis],
-    kinds: Sequence[Family],
-    chances: Sequence[float],
-    mimic: float,
-    p_value: float,
-) -> Attribution:
-    """`mimic` is the probability of something unknown that passes for one of the effects."""
+    p_value = predictive_p_value(
+        problem.observations, predictions(problem, likeliest), likeliest.noise
+    )
+    chances, mimic = probabilities(kinds)
+    progress("weighing", 1.0)
     none = next(kind for kind in kinds if not kind.effects and not kind.flexible)
-    flexible = [kind for kind in kinds if kind.flexible]
-    causes, groups = _with_groups(search.problem, _explanations(kinds, chances, none))
+    by_kind = list(zip(kinds, chances.tolist(), strict=True))
+    causes, groups = _with_groups(search.problem, _explanations(by_kind, none))
     return Attribution(
         baseline=_fit([none]),
-        no_gap_probability=sum(c for k, c in zip(kinds, chances, strict=True) if k is none),
-        unexplained_probability=mimic
-        + sum(c for k, c in zip(kinds, chances, strict=True) if k.flexible),
-        unexplained=_fit(flexible),
+        no_gap_probability=sum(chance for kind, chance in by_kind if kind is none),
+        unexplained_probability=mimic + sum(chance for kind, chance in by_kind if kind.flexible),
+        unexplained=_fit([kind for kind in kinds if kind.flexible]),
         explanations=causes,
         groups=groups,
         invisible=search.invisible,
@@ -185,9 +129,9 @@ def _attribution(
 
 
 def _explanations(
-    kinds: Sequence[Family], chances: Sequence[float], none: Family
+    by_kind: Sequence[tuple[Family, float]], none: Family
 ) -> tuple[Explanation, ...]:
-    """Every effect and pair that was tried, the likeliest first."""
+    """Return every effect and pair that was tried, the likeliest first."""
     found = [
         Explanation(
             best=kind.best,
@@ -199,7 +143,7 @@ def _explanations(
                 kind.best.log_fit - none.best.log_fit, kind.log_evidence - none.log_evidence
             ),
         )
-        for kind, chance in zip(kinds, chances, strict=True)
+        for kind, chance in by_kind
         if kind.effects and not kind.flexible
     ]
     return tuple(sorted(found, key=lambda each: -each.probability))
@@ -222,10 +166,11 @@ def _with_groups(
         if best is not None and each.best.fit is not None
         if _reached(each, best) and not _idle(each, alone)
     ]
-    found = grouped([faces(problem, fit) for _, fit, _ in able], [near for *_, near in able])
-    members = [tuple(able[i][0] for i in group) for group in found]
-    names = tuple(tuple(causes[i].effect for i in group) for group in members)
-    index = {i: number for number, group in enumerate(members) for i in group}
+    views = [views_from_peaks(problem, fit) for _, fit, _ in able]
+    found = group(views, [near for *_, near in able])
+    members = [tuple(able[i][0] for i in each) for each in found]
+    names = tuple(tuple(causes[i].effect for i in each) for each in members)
+    index = {i: number for number, each in enumerate(members) for i in each}
     return tuple(replace(each, group=index.get(i)) for i, each in enumerate(causes)), names
 
 
@@ -262,12 +207,12 @@ def answered(attribution: Attribution) -> list[tuple[float, Fit]]:
     if leading is None:
         no_gap = attribution.leads == "no gap"
         return [(1.0, attribution.baseline if no_gap else attribution.unexplained)]
-    group = [
+    alike = [
         each
         for each in attribution.explanations
         if each is leading or (each.group is not None and each.group == leading.group)
     ]
-    found = [(each.probability, each.best.fit) for each in group if each.best.fit is not None]
+    found = [(each.probability, each.best.fit) for each in alike if each.best.fit is not None]
     # A group may lead by members that screening alone has weighed.
     return found or [(1.0, attribution.unexplained)]
 
@@ -291,77 +236,3 @@ def possible(attribution: Attribution) -> list[tuple[float, Fit]]:
                 (cause.probability * s, fit) for s, (_, fit) in zip(share, fitted, strict=True)
             ]
     return fits
-
-
-SAME_BELOW = 3.0
-"""Log Bayes factor, expected or found, under which two causes count as not separable: evidence of
-less than twenty to one is not strong (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
-"""
-NOTABLE_WITHIN = 1.6
-"""A peak with less than a fifth of the best one's evidence does not speak for its cause."""
-
-
-def faces(problem: GapProblem, fit: Fit) -> tuple[Fit, ...]:
-    """A fit as seen from each of its notable peaks, its best point first.
-
-    A mass that may sit in the middle or at an end looks like a stiff end from one of them only.
-    """
-    best = max((peak.log_evidence for peak in fit.peaks), default=0.0)
-    notable = [peak for peak in fit.peaks if peak.log_evidence > best - NOTABLE_WITHIN]
-    if len(notable) < 2:
-        return (fit,)
-    landscape = Landscape(problem, fit.hypothesis)
-    views = landscape.views(np.array([p.w for p in notable]), np.array([p.signs for p in notable]))
-    branches = [Branch(peak.signs) for peak in notable]
-    others = [
-        replace(
-            fit,
-            z=branch.z(w[None])[0],
-            predicted=problem.observations.value - residual,
-            slopes=slopes / branch.stretch(w),
-        )
-        for branch, w, residual, slopes in zip(
-            branches, views.w, views.residual, views.slopes, strict=True
-        )
-    ]
-    return (fit, *others)
-
-
-def grouped(
-    causes: Sequence[Sequence[Fit]], near: Sequence[bool] | None = None
-) -> tuple[tuple[int, ...], ...]:
-    """Indices of `causes` that cannot be told apart, each group of two and more, in their order.
-
-    A cause has one or several faces; one alike is enough. Those that are `near` the best by the
-    evidence found are one group, whatever better data would say. Groups are connected: a cause that
-    is like two others joins them.
-    """
-    close = np.array(near if near is not None else [False] * len(causes), dtype=bool)
-    links = np.eye(len(causes)) + np.outer(close, close)
-    for i, j in combinations(range(len(causes)), 2):
-        if links[i, j]:
-            continue
-        pairs = product(causes[i], causes[j])
-        links[i, j] = any(expected_log_bayes_factor(*pair) < SAME_BELOW for pair in pairs)
-    count, label = scipy.sparse.csgraph.connected_components(
-        scipy.sparse.csr_array(links), directed=False
-    )
-    members = [tuple(int(i) for i in np.flatnonzero(label == k)) for k in range(count)]
-    return tuple(sorted(group for group in members if len(group) > 1))
-
-
-def expected_log_bayes_factor(one: Fit, other: Fit) -> float:
-    """What data like these tell two fitted causes apart, in the direction that tells less.
-
-    If one is true, the other comes as near to its prediction as its parameters allow (linearised);
-    half of the squared distance that is left is the log Bayes factor to expect.
-    """
-    return min(_when_true(one, other), _when_true(other, one))
-
-
-def _when_true(true: Fit, rival: Fit) -> float:
-    """Half of min over z of |predicted - rival(z)|^2 + |z|^2 - |z of the rival's fit|^2."""
-    errors = Likelihood.of(rival.noise, rival.model_error)
-    apart = true.predicted - rival.predicted
-    _, _, square, followed = errors.linear(rival.slopes, apart, rival.z)
-    return max(0.0, square - followed) / 2

@@ -18,8 +18,9 @@ from shm.models.effects import Conditions, Survey, Variant
 from shm.values import FloatArray, IntArray
 from shm.values.diagnosis import joined
 
-Method: TypeAlias = Literal["screened", "normal", "sampled"]
-"""How far a hypothesis was taken: linearised, by Laplace's method, by importance sampling."""
+Method: TypeAlias = Literal["screened", "normal", "sampled", "emcee"]
+"""How far a hypothesis was taken: linearised, by Laplace's method, by importance sampling, by a
+Markov chain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,29 +190,32 @@ class Hypothesis:
 
 @dataclass(frozen=True, eq=False)
 class Peak:
-    """A normal distribution about one of the most probable points of a posterior.
+    """One of the most probable points `z` (d,) of a posterior, with the log density there.
 
-    `signs` (d,) are -1 or 1 for parameters of either sign and 0 for others; `w` (d,) and
-    `covariance` (d, d) are in the coordinates of these signs (see `shm.gap.coordinates`).
+    `covariance` (d, d) is that of a normal distribution on it.
     """
 
-    signs: FloatArray
-    w: FloatArray
+    z: FloatArray
+    log: float
     covariance: FloatArray
-    log_evidence: float
+
+    @property
+    def log_evidence(self) -> float:
+        """Return the log of its integral by Laplace's method (Tierney and Kadane 1986)."""
+        volume = len(self.z) * np.log(2 * np.pi) + np.linalg.slogdet(self.covariance)[1]
+        return float(self.log + volume / 2)
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
     """A hypothesis given the observations, in coordinates z (d) with standard normal priors.
 
-    `z` is the most probable point, `covariance` (d, d) that of the posterior's normal
-    approximation; `predicted` (data,) and `slopes` (data, d) are the prediction there and its
-    derivatives by z. `noise` is the covariance of the data about the prediction: identification
-    and model error, the model error at its most probable size `model_error` (a fraction). `draws`
-    (n, d) are equal draws of the posterior. `log_fit` is the log likelihood at z, `log_evidence`
-    the log evidence. `method` is `screened`, `normal` or `sampled`; `effective` is how many of its
-    draws count then. `peaks` are the normal distributions that its evidence was first taken from.
+    `z` is the most probable point, `covariance` (d, d) that of a normal distribution there;
+    `predicted` (data,) and `slopes` (data, d) are the prediction there and its derivatives by z.
+    `noise` is the covariance of the data about the prediction at its most probable size, with a
+    model error of `model_error` (a fraction). `draws` (n, d) are equal draws of the posterior, of
+    which `effective` count. `log_fit` is the log likelihood at z, `log_evidence` the log evidence.
+    `peaks` are all probable points, the best first.
     """
 
     hypothesis: Hypothesis
@@ -232,14 +236,14 @@ class Fit:
 
 @dataclass(frozen=True)
 class GapOptions:
-    """`baseline` is the model class whose gap is diagnosed, its length that of the description.
+    """`baseline` is the model class whose gap is diagnosed; empty: the beam that these data prefer.
 
     `without` are effects taken out of the catalogue; `hold_out` what the held-out misfit leaves out
     of the fit: ids of tests, or orders of modes such as `4`; empty: every order and every test in
     turn. `draws` are kept of each posterior.
     """
 
-    baseline: str = "beam1"
+    baseline: str = ""
     without: tuple[str, ...] = ()
     hold_out: tuple[str, ...] = ()
     draws: int = 1000

@@ -221,20 +221,6 @@ def told_of_few(tests: Sequence[ModalTest], hanger: Hanger) -> str:
     )
 
 
-def tension_of_any_ends_n(
-    tests: Sequence[ModalTest], hanger: Hanger, seed: int
-) -> FloatArray | None:
-    """Draws of the tension (draws,) where it alone can follow what few modes were measured, with
-    ends of any stiffness; None where there are more or something else holds it.
-    """
-    if len(_modes(tests)) >= FEW_MODES or _held_by(tests, hanger):
-        return None
-    names, _ = applicable(hanger, _BEAMS)
-    return select(
-        tests, [build(name, hanger) for name in names], UpdateOptions(seed=seed)
-    ).tension_n
-
-
 def _modes(tests: Sequence[ModalTest]) -> set[str]:
     return {f"{mode.plane} {mode.order}" for test in tests for mode in test.modes}
 

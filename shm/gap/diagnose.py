@@ -9,37 +9,33 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.gap.attribution import Attribution, Explanation, answered, possible
+from shm.gap.baseline import choose_baseline
 from shm.gap.contract import Fit, GapOptions, Hypothesis
 from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
-from shm.gap.damping import acting
-from shm.gap.data_checks import tension_of_any_ends_n, usable
-from shm.gap.law_error import mixed
+from shm.gap.damping import remark_on_damping
+from shm.gap.data_checks import usable
 from shm.gap.misfit import refuse_misfit
 from shm.gap.next_measurement import ranked
-from shm.gap.observations import observed
-from shm.gap.outlier_removal import (
-    Cleared,
-    doubtful,
-    exclude_outliers,
-    outliers,
-    search_further,
-    set_aside,
-    with_outliers,
+from shm.gap.numbering import doubt_orders
+from shm.gap.outlier_remarks import (
+    describe_doubtful,
+    describe_outliers,
+    describe_set_aside,
+    residuals_with_outliers,
 )
+from shm.gap.outliers import Cleared, exclude_gross_errors
 from shm.gap.places import places
 from shm.gap.problem import GapProblem
-from shm.gap.remainder import remainder_of
-from shm.gap.residuals import compatibility, residuals, sensor_remarks, trends
+from shm.gap.residuals import residuals, sensor_remarks, trends
 from shm.inference.data_checks import CheckedData
+from shm.inference.mixture import systematic
 from shm.inference.options import Progress, silent
-from shm.models import check_baseline
 from shm.models.effects import check_effect_priors
 from shm.plausibility.bars import Known, doubt_of
 from shm.values import (
     ENOUGH_EFFECTIVE,
     MOST_MISFIT_PERCENT,
     NAN,
-    NO_GAP,
     Cause,
     Diagnosis,
     EffectEstimate,
@@ -54,6 +50,7 @@ from shm.values import (
 _ATTRIBUTION = 0.85
 """The part of a diagnosis's time that goes into finding the cause."""
 
+_TENSION_DRAWS = 4000  # numerical: a 95 % interval to 2 % of its width
 _AS_LIKELY = 1.5
 """Places of one effect whose log evidences differ by less are not told apart."""
 
@@ -84,27 +81,30 @@ def examined(
 ) -> tuple[Diagnosis, Attribution]:
     """The diagnosis with the evidence that it rests on, for a diagnosis of several hangers."""
     started = time.perf_counter()
-    found, whole = _to_explain(tests, hanger, options)
+    check_effect_priors(hanger)
+    found = usable(tests, hanger)
     rng = np.random.default_rng(options.seed)
+    whole = choose_baseline(found.tests, hanger, options, rng, progress)
+    check_hold_out(whole, options.hold_out)
     doubts = _of_another(found.tests, hanger)
-    clear = _search(whole, (*found.other_unit, *doubts), options, rng, progress)
-    problem = clear.problem
-    share, dynamic = acting(clear.attribution.no_gap_probability, found.tests, whole.observations)
-    attribution = clear.attribution.with_unknown(share)
+    clear = exclude_gross_errors(
+        whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done)
+    )
+    refuse_misfit(clear, (*found.other_unit, *doubts))
+    problem, attribution = clear.problem, clear.attribution
     progress("shrinkage", _ATTRIBUTION)
     answer, before = answered(attribution), attribution.baseline
     after = attribution.leading.best.fit if attribution.leading else None
-    aside, doubted = (outliers(clear, e, answer[0][1]) for e in (clear.aside, clear.doubted))
+    aside, doubted = (describe_outliers(clear, e, answer[0][1]) for e in (clear.aside, clear.doubted))
     held = held_out(problem, before, after, options.hold_out, rng)
-    compatible = compatibility(problem, _fits(attribution))
-    any_ends_n = tension_of_any_ends_n(found.tests, hanger, options.seed)
-    after_n = _tension(problem, possible(attribution), rng, any_ends_n)
+    after_n = _tension(problem, possible(attribution), rng)
     before_n = _tension(problem, [(1.0, before)], rng)
+    where = residuals(problem, before, after, held)
     return Diagnosis(
         hanger=hanger.id,
-        baseline=options.baseline,
+        baseline=problem.model.name,
         tests=tuple(test.id for test in found.tests),
-        where=with_outliers(clear, residuals(problem, before, after, held), before, after),
+        where=residuals_with_outliers(clear, where, before, after),
         trends=trends(problem, before),
         places=places(problem, before),
         no_gap_probability=attribution.no_gap_probability,
@@ -122,43 +122,15 @@ def examined(
         remarks=(
             *doubts,
             *_states(problem, before, after, (before_n, after_n)),
-            *dynamic,
+            *remark_on_damping(whole.observations),
             *_on_the_way(found, clear, aside, doubted, after or before),
         ),
         seed=options.seed,
         seconds=time.perf_counter() - started,
         outliers=aside,
-        compatibility=compatible,
-        remainder=remainder_of(problem, attribution, compatible),
         widest_swing_m=_widest_swing_m(found.tests),
         slenderness=_slenderness(hanger, before_n.mean),
     ), attribution
-
-
-def _to_explain(
-    tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions
-) -> tuple[CheckedData, GapProblem]:
-    check_effect_priors(hanger)
-    check_baseline(options.baseline, hanger)
-    found = usable(tests, hanger)
-    whole = GapProblem(hanger, options.baseline, observed(found.tests, hanger))
-    check_hold_out(whole, options.hold_out)
-    return found, whole
-
-
-def _search(
-    whole: GapProblem,
-    reasons: Sequence[str],
-    options: GapOptions,
-    rng: np.random.Generator,
-    progress: Progress,
-) -> Cleared:
-    """Search for causes without outliers; raises BadInput with `reasons` where none comes near."""
-    first = exclude_outliers(
-        whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done)
-    )
-    refuse_misfit(first, reasons)
-    return search_further(first)
 
 
 def _widest_swing_m(tests: Sequence[ModalTest]) -> float:
@@ -191,9 +163,10 @@ def _on_the_way(
 ) -> tuple[str, ...]:
     """What was found on the way to data that can be used and hold no gross errors, and what the
     measurement errs by."""
-    gross = (*set_aside(aside, clear.otherwise), *doubtful(doubted))
+    gross = (*describe_set_aside(clear, aside), *describe_doubtful(doubted))
     measured = sensor_remarks(clear.problem, best)
-    return (*found.remarks, *clear.misnumbered, *gross, *measured)
+    orders = doubt_orders(clear.problem, clear.attribution)
+    return (*found.remarks, *orders, *gross, *measured)
 
 
 def _of_another(tests: Sequence[ModalTest], hanger: Hanger) -> tuple[str, ...]:
@@ -209,7 +182,7 @@ def _states(
     found = []
     for fit in (before, *((after,) if after else ())):
         if fit.effective < ENOUGH_EFFECTIVE:
-            what = fit.hypothesis.name.replace("_", " ") or f"baseline {problem.baseline}"
+            what = fit.hypothesis.name.replace("_", " ") or f"baseline {problem.model.name}"
             found.append(
                 f"The sampler failed for {what}: {fit.effective:.0f} effective draws, "
                 f"{ENOUGH_EFFECTIVE} are needed. Its probability and its tension are uncertain."
@@ -255,23 +228,12 @@ def _cause(problem: GapProblem, explanation: Explanation) -> Cause:
 
 
 def _estimates(problem: GapProblem, fit: Fit) -> tuple[EffectEstimate, ...]:
-    """The effects' own parameters, which stand behind those of the hanger."""
-    own = len(problem.names(Hypothesis()))
-    samples = problem.theta(fit.hypothesis, fit.draws)[:, own:]
-    parameters = problem.coordinates(fit.hypothesis).parameters[own:]
+    coordinates = problem.coordinates(fit.hypothesis)
+    values = coordinates.effect_values(fit.draws)
     return tuple(
-        EffectEstimate(each.name, each.unit, *_summary(values))
-        for each, values in zip(parameters, samples.T, strict=True)
+        EffectEstimate(each.name, each.unit, *_summary(column))
+        for each, column in zip(coordinates.effects, values.T, strict=True)
     )
-
-
-def _fits(attribution: Attribution) -> dict[str, list[Fit]]:
-    """Of no gap and of every cause that was fitted in full, at each of its places."""
-    found = {
-        each.effect: [variant.fit for variant in each.variants if variant.fit is not None]
-        for each in attribution.explanations
-    }
-    return {NO_GAP: [attribution.baseline], **{name: fits for name, fits in found.items() if fits}}
 
 
 def _contenders(attribution: Attribution) -> list[Fit]:
@@ -284,25 +246,22 @@ def _contenders(attribution: Attribution) -> list[Fit]:
 
 
 def _tension(
-    problem: GapProblem,
-    fits: Sequence[tuple[float, Fit]],
-    rng: np.random.Generator,
-    without_gap_n: FloatArray | None = None,
+    problem: GapProblem, fits: Sequence[tuple[float, Fit]], rng: np.random.Generator
 ) -> TensionEstimate:
-    """The tension over some fits, each with its weight; NaN of a bar without any.
-
-    `without_gap_n` (draws,) stands for the fit of the baseline alone, if given.
-    """
+    """Return the tension over some fits, each with its weight; NaN of a bar without any."""
     if not problem.hanger.nominal_tension_n:
         return TensionEstimate(NAN, NAN, NAN, NAN)
-    weight = np.array([weight for weight, _ in fits])
-    draws = [
-        without_gap_n
-        if without_gap_n is not None and not (fit.hypothesis.name or fit.hypothesis.flexible)
-        else problem.tension_n(fit.hypothesis, fit.draws)
-        for _, fit in fits
-    ]
-    return tension_estimate(mixed(draws, weight, rng))
+    return tension_estimate(tension_draws_n(problem, fits, rng))
+
+
+def tension_draws_n(
+    problem: GapProblem, fits: Sequence[tuple[float, Fit]], rng: np.random.Generator
+) -> FloatArray:
+    """Return equal draws (n,) of the tension over some fits, each with its weight."""
+    weight = np.concatenate([np.full(len(fit.draws), w / len(fit.draws)) for w, fit in fits])
+    draws = [problem.tension_n(fit.hypothesis, fit.draws, rng) for _, fit in fits]
+    rows = systematic(weight / weight.sum(), _TENSION_DRAWS, rng)
+    return np.asarray(np.concatenate(draws)[rows])
 
 
 def tension_estimate(samples: FloatArray) -> TensionEstimate:

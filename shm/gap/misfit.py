@@ -10,8 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.errors import BadInput
-from shm.gap.fit import BASELINE
-from shm.gap.outlier_removal import Cleared
+from shm.gap.contract import Fit
+from shm.gap.numbering import doubt_orders
+from shm.gap.outliers import Cleared
 from shm.gap.problem import GapProblem
 from shm.inference.data_checks import taut_string_tension_n
 from shm.values.posterior import NO_TENSION_PERCENT
@@ -32,21 +33,21 @@ def refuse_misfit(found: Cleared, reasons: Sequence[str]) -> None:
     if misfit <= NO_TENSION_PERCENT:
         return
     hanger = problem.hanger
-    name = best.hypothesis.name.replace("_", " ") or f"the baseline {problem.baseline}"
+    name = best.hypothesis.name.replace("_", " ") or f"the baseline {problem.model.name}"
     raise BadInput(
         f"no explanation fits the frequencies of hanger {hanger.id}: the best, {name}, misses them "
-        f"by {misfit:.0f} % (root mean square){_range_over_tests(problem)}. "
+        f"by {misfit:.0f} % (root mean square){_range_over_tests(problem, found.attribution.baseline)}. "
         "No cause can be named, and no tension given. "
-        + " ".join((*found.misnumbered, *reasons, *_compare_with_string(problem))),
+        + " ".join((*doubt_orders(problem, found.attribution), *reasons, *_compare_with_string(problem))),
         remedy="Check that all tests are of this hanger, the orders of the modes, and diameter, "
         "length and nominal tension.",
     )
 
 
-def _range_over_tests(problem: GapProblem) -> str:
+def _range_over_tests(problem: GapProblem, baseline: Fit) -> str:
     """Return how far the baseline misses the lowest and the highest test, if there are several."""
-    design, best = problem.design, problem.fits[BASELINE]
-    apart = (problem.observations.value - best.predicted)[: design.frequencies]
+    design = problem.design
+    apart = (problem.observations.value - baseline.predicted)[: design.frequencies]
     names = [each.test for each in design.conditions]
     by_test = {
         names[test]: 100 * float(np.expm1(apart[design.frequency_test == test].mean()))

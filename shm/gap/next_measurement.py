@@ -249,8 +249,9 @@ def _around(problem: GapProblem, fit: Fit, roots: FloatArray) -> FloatArray:
     """
     step = _STEP_IN_SDS * roots
     points = np.concatenate([fit.z[None], fit.z + step, fit.z - step])
-    parameters = problem.coordinates(fit.hypothesis).parameters
-    signed = np.array([parameter.signed for parameter in parameters])
+    coordinates = problem.coordinates(fit.hypothesis)
+    effects = np.array([parameter.signed for parameter in coordinates.effects], dtype=bool)
+    signed = np.append(np.zeros(coordinates.baseline, dtype=bool), effects)
     other_side = signed & (points * fit.z < 0)
     return np.where(other_side, np.copysign(1e-6, fit.z), points)
 

@@ -1,18 +1,13 @@
-"""Outliers: frequencies that belong neither to the model nor to any effect.
+"""Gross errors: frequencies that belong neither to the hanger nor to any effect.
 
 "A gross error in this frequency" is an explanation like any other: with its prior, with the density
-that a wide distribution gives the datum, and beside every other explanation of the same data. So
-an effect that moves many data is no outlier, and one wrong frequency no effect.
-
-A frequency comes with a small probability not from the identification's distribution but from a
-wide one (Box and Tiao, Biometrika 55, 1968): a wrong mode, a tone of a machine, a slip of the pen.
-The price of an ordinary datum is taken from Student's t instead of the normal distribution, since
-the standard deviation that a test states is itself an estimate from some twenty hits: 4.5 of them
-are rare, but no proof of an error.
+that a wide distribution gives the datum (Box and Tiao, Biometrika 55, 1968), and beside every other
+explanation of the same data. So an effect that moves many data is no outlier, and one wrong
+frequency no effect. The price of an ordinary datum is taken from Student's t, since the standard
+deviation that a test states is itself an estimate from some twenty hits.
 
 It may be no slip: a guide with play, or a crack that a swing opens, acts on a mode only above an
-amplitude. In one test at one level that is one frequency off by up to tenths while all others are
-right. It is none where another test, hit as hard, shows the mode where it belongs.
+amplitude. It is none where another test, hit as hard, shows the mode where it belongs.
 """
 
 from __future__ import annotations
@@ -23,50 +18,30 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.assumptions import DEFAULTS
-from shm.gap.attribution import Attribution
-from shm.gap.contract import Design, Fit, Hypothesis
-from shm.gap.detectability import HOPELESS_SHARE
-from shm.gap.fit import fitted
-from shm.gap.law_error import by_its_laws
-from shm.gap.model_probabilities import NO_GAP, UNKNOWN, log_prior
-from shm.gap.optimiser import Landscape
+from shm.gap.attribution import Attribution, answered, attribute
+from shm.gap.contract import Design, Fit, GapOptions, Hypothesis
+from shm.gap.posterior import Target, find_peaks
+from shm.gap.probabilities import NO_GAP, UNKNOWN, ScoredHypothesis, log_prior
 from shm.gap.problem import GapProblem
-from shm.gap.search import LEADERS
 from shm.inference.data_checks import SAME_LEVEL
+from shm.inference.options import Progress, silent
 from shm.values import BoolArray, FloatArray, IntArray
 
 SURE = 0.9
-"""A frequency is set aside where it is a gross error with at least this probability.
-
-Judgement: of ten that go, one may be sound, which costs little data and a remark says so.
-"""
-
+"""A frequency is set aside where it is a gross error with at least this probability."""
+LIKELIER_THAN_NOT = 0.5
 LARGEST_SHARE = 0.1
-"""Never more of the frequencies than this are set aside (one at least may be): the upper end of
-what is usual (`gross_error_share` of `shm.assumptions`)."""
+"""Never more of the frequencies than this are set aside (one at least may be)."""
 
-_FEWEST_LEFT = 4  # judgement: tension, stiffness, and two that can disagree with them
-# Judgement: linear odds of up to 12 to 1 against are worth two fits, more where the gap is large.
-_REACH = 2.5
-# Judgement: a datum ten standard deviations out has pulled the fit out of where it is linear.
-_DRAGGED = 10.0
+_FEWEST_LEFT = 4  # tension, stiffness, and two that can disagree with them
+_WORTH_FITS, _CONTENDERS = -4.0, 3  # linear log odds from which on fits judge, and of how many
 WIDE_FROM, WIDE_TO = 1e-4, 3.0
 """Sizes of gross errors, of the logarithm of the frequency: log-uniform, up or down."""
 FREEDOM = 20.0
 """Degrees of freedom of the stated standard deviations."""
-
-
-@dataclass(frozen=True, eq=False)
-class Believed:
-    """A fit with the log of its hypothesis's prior probability."""
-
-    fit: Fit
-    log_prior: float
-
-    @property
-    def log_weight(self) -> float:
-        return self.fit.log_evidence + self.log_prior
+_BY_AMPLITUDE, _LARGEST = 3 / 48, 0.3
+"""Judgement: a part of what is unknown acts on a mode alone, and moves the logarithm of its
+frequency by so much at most: a stiff guide raises a first mode by a third."""
 
 
 @dataclass(frozen=True)
@@ -77,146 +52,143 @@ class GrossError:
     probability: float
 
 
-def believed(attribution: Attribution) -> list[Believed]:
-    """No gap, something unknown, and every explanation that was fitted, at each place."""
-    causes = attribution.explanations
-    variants = {each.effect: len(each.variants) for each in causes if not each.is_pair}
-    tried = [each for each in attribution.tried if each.hypothesis.effects]
-    plain = [each.fit for each in tried if each.fit and not each.hypothesis.flexible]
-    fits = [attribution.baseline, attribution.unexplained, *plain]
-    return [Believed(fit, log_prior(fit.hypothesis, variants)) for fit in fits]
+@dataclass(frozen=True, eq=False)
+class Cleared:
+    """The attribution of those frequencies `rows` (indices) of `whole` that `problem` keeps.
 
-
-def gross_errors(
-    problem: GapProblem, rows: IntArray, attribution: Attribution, rng: np.random.Generator
-) -> list[GrossError]:
-    """The frequencies that an attribution of `rows` would rather have set aside, in this order.
-
-    The other frequencies of `problem` have been set aside before. At most one of a test and one of
-    a mode, since what moves more together is no slip, and at most a tenth of all. The last one may
-    be less than sure.
+    `aside` are the others, `doubted` at most one of those kept: more likely than not a gross error,
+    but not surely. `first` is the attribution of all frequencies.
     """
-    found: list[GrossError] = []
-    candidates, every = believed(attribution), np.arange(problem.design.frequencies)
+
+    whole: GapProblem
+    problem: GapProblem
+    rows: IntArray
+    attribution: Attribution
+    aside: tuple[GrossError, ...] = ()
+    doubted: tuple[GrossError, ...] = ()
+    first: Attribution | None = None
+
+    def expected(self, error: GrossError, fit: Fit) -> tuple[float, float]:
+        """Return by how much its logarithm lies above what the data kept expect, and the sd."""
+        rows = np.union1d(self.rows, [error.row])
+        index = int(np.searchsorted(rows, error.row))
+        seen = _seen_from(self.whole.part(rows).without_shape(index), fit, index)
+        deviation, sd = seen.expected
+        return float(deviation[0]), float(sd[0])
+
+    def acts_alone(self, error: GrossError, fit: Fit) -> float:
+        """Return how probably what was set aside is no slip, but something on this mode alone."""
+        deviation, _ = self.expected(error, fit)
+        share = self.problem.hanger.assumptions.gross_error_share.value
+        return acts_alone(self.whole.design, self.problem.design, error.row, deviation, share)
+
+
+def exclude_gross_errors(
+    whole: GapProblem, options: GapOptions, rng: np.random.Generator, progress: Progress = silent
+) -> Cleared:
+    """Attribute the gap, and where that leaves gross errors, attribute it again without them.
+
+    Where the last attribution expects one of them as it was measured, the first one applies.
+    """
+    every = np.arange(whole.design.frequencies)
+    first = found = Cleared(whole, whole, every, attribute(whole, options, rng, progress))
     most = max(1, int(LARGEST_SHARE * len(every)))
-    while len(every) - len(rows) < most and len(rows) > _FEWEST_LEFT:
-        part = problem.part(rows)
-        row = _suspect(part, candidates, _open(problem, rows, np.setdiff1d(every, rows)))
-        if row is None:
+    while True:
+        error = _find_gross_error(found)
+        if error is None or error.probability < LIKELIER_THAN_NOT:
             break
-        probability, candidates = _judged(part, candidates, row, rng)
-        found.append(GrossError(int(rows[row]), probability))
-        if probability < SURE:
+        full = len(found.aside) == most or len(found.rows) <= _FEWEST_LEFT
+        if error.probability < SURE or full:
+            found = Cleared(*_fields(found), found.aside, (error,))
             break
-        rows = np.delete(rows, row)
-    return found
+        rows = np.setdiff1d(found.rows, [error.row])
+        part = whole.part(rows)
+        again = attribute(part, options, rng, lambda label, _: progress(label, 1.0))
+        found = Cleared(whole, part, rows, again, (*found.aside, error))
+    kept = all(_remains(found, each) for each in found.aside)
+    last = found if kept else first
+    return Cleared(*_fields(last), last.aside, last.doubted, first.attribution)
 
 
-def _open(problem: GapProblem, rows: IntArray, gone: IntArray) -> BoolArray:
-    """Which of `rows` are of a test and of a mode that no gross error was found in yet."""
-    design = problem.design
-    test, mode = design.frequency_test, design.mode
-    return np.asarray(~np.isin(test[rows], test[gone]) & ~np.isin(mode[rows], mode[gone]))
+def _fields(found: Cleared) -> tuple[GapProblem, GapProblem, IntArray, Attribution]:
+    return found.whole, found.problem, found.rows, found.attribution
 
 
-def _suspect(
-    problem: GapProblem, candidates: Sequence[Believed], possible: BoolArray
-) -> int | None:
-    """The frequency that most likely is a gross error, if it may be one at all.
+def _remains(found: Cleared, error: GrossError) -> bool:
+    """Return True where the answer without a frequency still does not expect it."""
+    rows = np.union1d(found.rows, [error.row])
+    index = int(np.searchsorted(rows, error.row))
+    answer = answered(found.attribution)[0][1]
+    seen = _seen_from(found.whole.part(rows).without_shape(index), answer, index)
+    return bool(seen.gross_given_rest[0] > seen.ordinary_given_rest[0])
 
-    Something unknown counts as a rival only: it could take any single datum for its own.
-    """
-    rows = np.flatnonzero(possible)
-    plain = [each for each in candidates if not each.fit.hypothesis.flexible]
+
+def _find_gross_error(found: Cleared) -> GrossError | None:
+    """Return the frequency that most probably is a gross error, None where none may be one."""
+    problem, variants = found.problem, found.attribution.search.variants
+    tried = [each for each in found.attribution.tried if each.fit is not None]
+    log = np.array([each.log_evidence + log_prior(each.hypothesis, variants) for each in tried])
+    plain = [k for k, each in enumerate(tried) if not each.hypothesis.flexible]
+    rows = np.flatnonzero(_open(found))
     if not len(rows):
         return None
-    seen = [_seen(problem, each.fit, rows) for each in plain]
-    gross = np.array([c.log_weight + s.gross for c, s in zip(plain, seen, strict=True)])
-    ordinary = np.array([c.log_weight + s.ordinary for c, s in zip(plain, seen, strict=True)])
-    unknown = [each.log_weight for each in candidates if each.fit.hypothesis.flexible]
-    rivals = scipy.special.logsumexp([*unknown, scipy.special.logsumexp(ordinary, axis=0).max()])
-    odds = scipy.special.logsumexp(gross, axis=0) - np.maximum(
-        scipy.special.logsumexp(ordinary, axis=0), rivals
-    )
+    seen = [_left_out_of(problem, tried[k].fit, rows) for k in plain]
+    gross = np.array([log[k] + s.gross for k, s in zip(plain, seen, strict=True)])
+    ordinary = np.array([log[k] + s.ordinary for k, s in zip(plain, seen, strict=True)])
+    odds = scipy.special.logsumexp(gross, axis=0) - scipy.special.logsumexp(ordinary, axis=0)
     best = int(odds.argmax())
-    leader = int(gross[:, best].argmax())
-    gain = max(0.0, float(gross[leader, best] - plain[leader].log_weight))
-    return int(rows[best]) if odds[best] > -_REACH - HOPELESS_SHARE * gain else None
+    if odds[best] < _WORTH_FITS:
+        return None
+    # Of a datum that drags the fits along, what is linear about these says too little.
+    leaders = [plain[k] for k in np.argsort(-gross[:, best], kind="stable")[:_CONTENDERS]]
+    chosen = dict.fromkeys([next(k for k in plain if not tried[k].hypothesis.effects), *leaders])
+    row = int(rows[best])
+    without = [log[k] + _gain_without(problem, tried[k], row) for k in chosen]
+    final = scipy.special.logsumexp(without) - scipy.special.logsumexp(log)
+    return GrossError(int(found.rows[row]), float(scipy.special.expit(final)))
 
 
-def _seen(problem: GapProblem, fit: Fit, rows: IntArray) -> LeftOut:
-    return left_out(problem, fit.hypothesis, fit.z, fit.predicted, fit.slopes, rows)
+def _open(found: Cleared) -> BoolArray:
+    """Return which frequencies are of a test and of a mode without a gross error so far.
+
+    What moves more together is no slip.
+    """
+    design, gone = found.whole.design, [each.row for each in found.aside]
+    test, mode = design.frequency_test, design.mode
+    touched = np.isin(test, test[gone]) | np.isin(mode, mode[gone])
+    return np.asarray(~touched[found.rows])
 
 
-def _judged(
-    problem: GapProblem, candidates: Sequence[Believed], row: int, rng: np.random.Generator
-) -> tuple[float, list[Believed]]:
-    """The probability of a gross error, by fits with and without it, and those without it.
+def _gain_without(problem: GapProblem, tried: ScoredHypothesis, row: int) -> float:
+    """Return what a hypothesis gains where a frequency is a gross error, by fits with and without.
 
     The mode's shape is in neither: of a wrong mode it is wrong as well.
     """
+    assert tried.fit is not None
     rest = problem.part(np.delete(np.arange(problem.design.frequencies), row))
     whole = problem.without_shape(row)
-    base, base_of_whole = (fitted(each, Hypothesis(), rng) for each in (rest, whole))
-    gross, ordinary, kept = [], [], []
-    for each in _contenders(problem, candidates, row):
-        without = Believed(_without(rest, each.fit, base, rng), each.log_prior)
-        seen = at(whole, without.fit, row)
-        kept.append(without)
-        gain = _gain(rest, base, without.fit, rng)
-        gross.append(without.log_weight + gain + seen.gross_given_rest[0])
-        tails = without.fit.log_evidence + seen.ordinary_given_rest[0]
-        full = (
-            each.fit
-            if whole is problem
-            else fitted(whole, each.fit.hypothesis, rng, each.fit.z[None])
-        )
-        allowed = full.log_evidence + _gain(whole, base_of_whole, full, rng)
-        ordinary.append(each.log_prior + max(_ordinary(whole, full, row, float(tails)), allowed))
-    odds = float(scipy.special.logsumexp(gross) - scipy.special.logsumexp(ordinary))
-    return float(scipy.special.expit(odds)), kept
+    log = []
+    fit = tried.fit
+    for each in (rest, whole):
+        target = Target(each, tried.hypothesis)
+        peaks = find_peaks(target, np.vstack([fit.z, 0 * fit.z]))
+        log.append(max(peak.log_evidence for peak in peaks))
+        if each is rest:
+            residual, slopes = target.view(peaks[0].z)
+            seen = left_out(
+                whole, tried.hypothesis, peaks[0].z, *_of_whole(whole, tried.hypothesis, peaks[0].z),
+                np.array([row]),
+            )  # fmt: skip
+    # With both as Laplace has them; tails of the ordinary error where the datum drags the fit.
+    ordinary = max(log[1], log[0] + float(seen.ordinary_given_rest[0]))
+    return log[0] + float(seen.gross_given_rest[0]) - ordinary
 
 
-def _gain(problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Generator) -> float:
-    """What a fit gains in log evidence by allowing its effects' laws to be off.
-
-    A law that is off moves one mode more than others, as a gross error does.
-    """
-    hypothesis = fit.hypothesis
-    if hypothesis.flexible or not hypothesis.effects:
-        return 0.0
-    return by_its_laws(problem, baseline, fit, rng).gain
-
-
-def _ordinary(whole: GapProblem, fit: Fit, row: int, tails: float) -> float:
-    """Log evidence with the frequency as an ordinary datum, from a fit to all data.
-
-    Where it drags the fit along, what is linear about that says little: `tails` do, the evidence by
-    the fit without it.
-    """
-    seen = _seen(whole, fit, np.array([row]))
-    away, sd = seen.expected
-    return tails if abs(away[0]) > _DRAGGED * sd[0] else fit.log_evidence + seen.ordinary[0]
-
-
-def _contenders(problem: GapProblem, candidates: Sequence[Believed], row: int) -> list[Believed]:
-    """The candidates that lead with or without the frequency, no gap and something unknown."""
-    flexible = [each for each in candidates if each.fit.hypothesis.flexible]
-    plain = [each for each in candidates if not each.fit.hypothesis.flexible]
-    gross = [c.log_weight + float(_seen(problem, c.fit, np.array([row])).gross[0]) for c in plain]
-    with_it = np.argsort([-each.log_weight for each in plain], kind="stable")[:LEADERS]
-    without = np.argsort(-np.array(gross), kind="stable")[:LEADERS]
-    none = [k for k, each in enumerate(plain) if not each.fit.hypothesis.effects]
-    chosen = dict.fromkeys([*none, *map(int, with_it), *map(int, without)])
-    return [*(plain[k] for k in chosen), *flexible]
-
-
-def _without(rest: GapProblem, fit: Fit, base: Fit, rng: np.random.Generator) -> Fit:
-    """The hypothesis of `fit` on the rest of the data, also from where no gap lies now."""
-    if fit.hypothesis == base.hypothesis:
-        return base
-    starts = np.stack([fit.z, np.append(base.z, fit.z[len(base.z) :])])
-    return fitted(rest, fit.hypothesis, rng, starts)
+def _of_whole(
+    problem: GapProblem, hypothesis: Hypothesis, z: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    residual, slopes = Target(problem, hypothesis).view(z)
+    return problem.value - residual, slopes
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +202,7 @@ class LeftOut:
     deviation: FloatArray
     sd: FloatArray
     log_all: FloatArray
-    gross_share: float = DEFAULTS.gross_error_share.value
+    gross_share: float
 
     @property
     def log_rest(self) -> FloatArray:
@@ -260,14 +232,14 @@ class LeftOut:
     @property
     def gross_given_rest(self) -> FloatArray:
         """Return the log density (r,) given all other data, were each a gross error."""
-        return self.given_rest(log_gross(self.deviation, self.gross_share))
+        return self._given_rest(log_gross(self.deviation, self.gross_share))
 
     @property
     def ordinary_given_rest(self) -> FloatArray:
         """Return the log density (r,) given all other data, were each an ordinary datum."""
-        return self.given_rest(log_ordinary(self.deviation, self.sd, self.gross_share))
+        return self._given_rest(log_ordinary(self.deviation, self.sd, self.gross_share))
 
-    def given_rest(self, log_density: FloatArray) -> FloatArray:
+    def _given_rest(self, log_density: FloatArray) -> FloatArray:
         """Log of the mean density (r,), the possibilities weighed by all other data."""
         rest = self.log_rest
         return np.asarray(
@@ -281,13 +253,13 @@ class LeftOut:
 
 
 def log_gross(deviation: FloatArray, share: float) -> FloatArray:
-    """Log of prior probability times density of a gross error of this size."""
+    """Return the log of prior probability times density of a gross error of this size."""
     size = np.abs(deviation).clip(WIDE_FROM, WIDE_TO)
     return np.asarray(np.log(share) - np.log(2 * size * np.log(WIDE_TO / WIDE_FROM)))
 
 
 def log_ordinary(deviation: FloatArray, sd: FloatArray, share: float) -> FloatArray:
-    """Log of probability times density of an ordinary error."""
+    """Return the log of probability times density of an ordinary error."""
     return np.asarray(np.log1p(-share) + scipy.stats.t.logpdf(deviation, FREEDOM, scale=sd))
 
 
@@ -299,12 +271,12 @@ def left_out(
     slopes: FloatArray,
     rows: IntArray,
 ) -> LeftOut:
-    """Each of the frequencies `rows` (r,) left out in turn, by what is linear about z (d,).
+    """Leave each of the frequencies `rows` (r,) out in turn, by what is linear about z (d,).
 
     `predicted` (data,) and `slopes` (data, d) are those at z. The standardised deviations are the
     deleted residuals of regression (Cook and Weisberg 1982, 2.2), with priors.
     """
-    residual, d = problem.observations.value - predicted, len(z)
+    residual, d = problem.value - predicted, len(z)
     units = np.zeros((len(residual), len(rows)))
     units[rows, np.arange(len(rows))] = 1.0
     likelihood = problem.likelihood(hypothesis)
@@ -325,26 +297,21 @@ def left_out(
     )
 
 
-def at(problem: GapProblem, fit: Fit, row: int) -> LeftOut:
-    """A frequency of `problem` seen from its other data, to which `fit` was fitted."""
-    landscape = Landscape(problem, fit.hypothesis)
-    branch = next(each for each in landscape.coordinates.branches if each.holds(fit.z[None])[0])
-    w = branch.w(fit.z[None])
-    views = landscape.views(w, branch.signs[None])
-    predicted = problem.observations.value - views.residual[0]
-    return left_out(problem, fit.hypothesis, w[0], predicted, views.slopes[0], np.array([row]))
+def _left_out_of(problem: GapProblem, fit: Fit | None, rows: IntArray) -> LeftOut:
+    assert fit is not None
+    return left_out(problem, fit.hypothesis, fit.z, fit.predicted, fit.slopes, rows)
 
 
-_SHARE = 3 / 48
-"""Of unknown effects in docs/trials/blind_trial.md those, guides with play, that moved one mode."""
-_LARGEST = 0.3
-"""Judgement: of the logarithm of the frequency. A stiff guide raises a first mode by so much."""
+def _seen_from(problem: GapProblem, fit: Fit, row: int) -> LeftOut:
+    """Return a frequency of `problem` seen from its other data, to which `fit` was fitted."""
+    around = _of_whole(problem, fit.hypothesis, fit.z)
+    return left_out(problem, fit.hypothesis, fit.z, *around, np.array([row]))
 
 
 def acts_alone(
     design: Design, kept: Design, row: int, deviation: float, gross_share: float
 ) -> float:
-    """The probability that the frequency `row` of `design`, off by `deviation` of its logarithm,
+    """Return how probably the frequency `row` of `design`, off by `deviation` of its logarithm,
     is no slip but moved by something unknown that acts on this mode alone.
 
     `kept` are the frequencies that were not set aside.
@@ -353,7 +320,7 @@ def acts_alone(
         return 0.0
     modes = len(np.unique(design.mode))
     slip = gross_share / np.log(WIDE_TO / WIDE_FROM)
-    acts = UNKNOWN / NO_GAP * _SHARE / modes / np.log(_LARGEST / WIDE_FROM)
+    acts = UNKNOWN / NO_GAP * _BY_AMPLITUDE / modes / np.log(_LARGEST / WIDE_FROM)
     return float(acts / (acts + slip))
 
 
@@ -362,3 +329,6 @@ def _right_elsewhere(design: Design, kept: Design, row: int) -> bool:
         kept.frequency_order == design.frequency_order[row]
     )
     return bool((kept.amplitude[same] * SAME_LEVEL >= design.amplitude[row]).any())
+
+
+__all__: Sequence[str] = ("Cleared", "GrossError", "exclude_gross_errors")

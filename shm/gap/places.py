@@ -171,10 +171,7 @@ class LocalCause:
 
     def predicted(self, problem: GapProblem, baseline: FloatArray, size: FloatArray) -> FloatArray:
         """The data (n, data) with sizes (n,), and the baseline's parameters at z (n, d)."""
-        theta = problem.theta(Hypothesis(), baseline)
-        return problem.predict_at(
-            self.hypothesis, np.concatenate([theta, self._values(problem, size)], axis=1)
-        )
+        return problem.predict_beside(self.hypothesis, baseline, self._values(problem, size))
 
     def _values(self, problem: GapProblem, size: FloatArray) -> FloatArray:
         """The effect's parameters (n, parameters)."""

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from shm.gap.contract import Design, Fit, Hypothesis, Observations
-from shm.gap.coordinates import DEVIATIONS, Coordinates, Pair, Straight, cut
+from shm.gap.contract import Design, Fit, Hypothesis, Observations, Peak
+from shm.gap.coordinates import Coordinates, cut
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import flexible_nodes, nodes
 from shm.gap.repeated_errors import (
@@ -21,113 +20,156 @@ from shm.gap.repeated_errors import (
     sensor_loads,
     turn_loads,
 )
+from shm.inference.described import DescribedCoordinates
 from shm.inference.systematic_errors import loads_of_radii, shared_loads
-from shm.models.composed import Baseline, ComposedHanger
+from shm.models import AsMade
+from shm.models.as_made import BENDING
+from shm.models.beam import Beam3
 from shm.models.effects import Conditions, Variant, parameters_of
 from shm.models.hanger import HangerModes
-from shm.values import BoolArray, FloatArray, Hanger, IntArray
+from shm.models.hanger_with_effects import HangerWithEffects
+from shm.values import BoolArray, FloatArray, Hanger, IntArray, ModalTest
 
 Effects = tuple[tuple[str, Variant], ...]
 
-# Technical: an eighth of the prior's standard deviation apart, over 93 % of the prior.
-_TENSIONS = tuple(float(each) for each in np.linspace(-2.5, 1.5, 33))
-_STEP_SD = 0.01  # technical: of a reading's standard deviation; frequencies are linear over it
+# Numerical: an eighth of the prior's standard deviation apart, over 98 % of the prior.
+_TENSIONS = np.linspace(-2.5, 2.5, 41)
+_STEP_SD = 0.01  # numerical: of a reading's standard deviation; frequencies are linear over it
 _AT_REST = Conditions(amplitude=0.0)
+_STRAIGHT = 0.1
+"""Numerical: standard deviations of a datum by which a prediction may be off its slope where a
+parameter still counts as linear."""
 
 
 class GapProblem:
-    """The measurements of one hanger, and what hypotheses about it predict of them.
+    """The tests of one hanger as made, and what hypotheses about it predict of them.
 
     `smallest` holds, for an effect and where it acts, the share of its sizes' ranges that cannot
-    be seen in these data and that their priors therefore leave out (see `shm.gap.detectability`).
-    `fits` keeps the fits that others start from; `evaluations` counts the hangers solved, each
-    under one set of conditions.
+    be seen in these data and that their priors therefore leave out (see `shm.gap.scan`). `alone`
+    keeps the fit without effects.
     """
 
-    def __init__(self, hanger: Hanger, baseline: str, observations: Observations):
-        self.hanger = hanger
-        self.baseline = baseline
-        self.observations = observations
+    def __init__(
+        self,
+        model: AsMade,
+        tests: Sequence[ModalTest],
+        observations: Observations,
+        described: DescribedCoordinates | None = None,
+    ):
+        self.model, self.hanger = model, model.hanger
+        self.tests, self.observations = tuple(tests), observations
         self.smallest: dict[tuple[str, Variant], float] = {}
-        self.fits: dict[Hypothesis, Fit] = {}
-        self.evaluations = 0
-        self._baseline = Baseline(baseline, hanger)
-        self._composed: dict[Effects, ComposedHanger] = {}
+        order = observations.design.frequency_order
+        wave_n_m = model.wave_stiffness_n_m_rad((1 + order.max()) / 2)
+        known = self.hanger.scatter.tension
+        self.described = described or DescribedCoordinates(
+            model, tests, wave_n_m, known_tension_sd=known
+        )
+        self._linear = self.described.always_linear
+        self.alone: Fit | None = None
+        self._hangers: dict[Effects, HangerWithEffects] = {}
         self._likelihoods: dict[bool, Likelihood] = {}
         self._scaling = ShapeScaling.measured(observations)
 
-    def names(self, hypothesis: Hypothesis) -> tuple[str, ...]:
-        """The parameters' names: the baseline's, the four deviations of the bar, the effects'."""
-        return self.coordinates(hypothesis).names
+    # ------------------------------------------------ what the posterior of a hypothesis asks for
 
-    def theta(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
-        """Parameters (n, d) in their units at z (n, d)."""
-        return self.coordinates(hypothesis).theta(z)
+    @property
+    def value(self) -> FloatArray:
+        return self.observations.value
+
+    def linear(self, hypothesis: Hypothesis) -> IntArray:
+        """Return the columns in which logarithms of frequencies are nearly linear."""
+        return self._linear
+
+    def dimension(self, hypothesis: Hypothesis) -> int:
+        return self.coordinates(hypothesis).dimension
+
+    def settle(self, peak: Peak) -> None:
+        """Take as linear the terms of the hanger whose influence is so about its peak.
+
+        Over one standard deviation, by the second difference against the likeliest errors.
+        """
+        sd = np.sqrt(np.diag(peak.covariance))
+        candidates = self.described.nearly_linear
+        steps = np.zeros((len(candidates), len(peak.z)))
+        steps[np.arange(len(candidates)), candidates] = sd[candidates]
+        alone = Hypothesis()
+        there, back = (self.predict(alone, peak.z + way * steps) for way in (1, -1))
+        bent = (there + back) / 2 - self.predict(alone, peak.z[None])
+        residual = self.value - self.predict(alone, peak.z[None])
+        node = int(self.likelihood(alone).by_node(residual)[0].argmax())
+        square = self.likelihood(alone).squares(np.nan_to_num(bent, nan=np.inf, posinf=1e3))
+        straight = candidates[square[:, node] < _STRAIGHT**2]
+        self._linear = np.union1d(self.described.always_linear, straight)
+
+    # ------------------------------------------------ coordinates and predictions
 
     def coordinates(self, hypothesis: Hypothesis, whole: bool = False) -> Coordinates:
-        """The coordinates of a hypothesis, with the priors `whole` or as `smallest` cuts them."""
-        parameters = list(self._hanger_with(hypothesis.effects).parameters)
-        baseline = len(self._baseline.names)
-        first = baseline + DEVIATIONS
+        """Return the coordinates of a hypothesis, the priors `whole` or as `smallest` cuts them."""
+        parameters = list(self._hanger_with(hypothesis.effects).effect_parameters)
+        first = 0
         for effect in hypothesis.effects if not whole else ():
             last = first + len(parameters_of(effect[0], self.hanger, effect[1]))
             share = self.smallest.get(effect, 0.0)
             parameters[first:last] = [cut(each, share) for each in parameters[first:last]]
             first = last
-        return Coordinates(parameters, baseline, self.hanger.scatter)
+        return Coordinates(self.described, parameters)
 
-    def straight(self, coordinates: Coordinates) -> Straight:
-        """What straightens the posterior of the baseline's end springs among `other` columns."""
-        own = math.log10(
-            self._baseline.wave_stiffness_n_m_rad((1 + self.design.frequency_order.max()) / 2)
-        )
-        other = [coordinates.parameters[column] for column in coordinates.other]
-        at = {parameter.name: index for index, parameter in enumerate(other)}
-        return Straight(
-            [
-                Pair(at[one], at[two], other[at[one]].lower, other[at[one]].upper, own)
-                for one, two in self._baseline.pairs
-            ]
-        )
+    @property
+    def end_columns(self) -> slice:
+        """Return the columns of the ends' scores."""
+        return self.described.ends_at
+
+    @property
+    def has_itself(self) -> tuple[str, ...]:
+        """Return the effects of the catalogue that the hanger has as parameters of its own."""
+        found = ("rotational_end_flexibility",) if self.model.springs else ()
+        found += ("shear_and_rotary_inertia",) if isinstance(self.model.model, Beam3) else ()
+        found += ("sag",) if self.model.has_terms else ()
+        return found + (("bending_stiffness",) if BENDING in self.described.names else ())
 
     def predict(
         self, hypothesis: Hypothesis, z: FloatArray, design: Design | None = None
     ) -> FloatArray:
-        """The data (n, data) that z (n, d) predict, of the tests made or of another design.
+        """Return the data (n, data) that z (n, d) predict, of the tests made or of another design.
 
         Shapes have the scale and sign of those measured; in another design unit length, and the
         sign of the sine that a string would show. The places of another design begin with those
         of the survey.
         """
-        theta = self.theta(hypothesis, z)
+        theta = self.coordinates(hypothesis).theta(z)
         if design is None:
-            return self.predict_at(hypothesis, theta)
-        return self._predicted(
-            hypothesis.effects, theta, design, ShapeScaling.of(design, self.hanger.length_m)
-        )
+            return self._predicted(hypothesis.effects, theta, self.design, self._scaling)
+        scaling = ShapeScaling.of(design, self.hanger.length_m)
+        return self._predicted(hypothesis.effects, theta, design, scaling)
 
-    def predict_at(self, hypothesis: Hypothesis, theta: FloatArray) -> FloatArray:
-        """The data (n, data) that parameters theta (n, d) predict of the tests made."""
-        return self._predicted(hypothesis.effects, theta, self.design, self._scaling)
+    def predict_beside(
+        self, hypothesis: Hypothesis, z: FloatArray, effect: FloatArray
+    ) -> FloatArray:
+        """Return the data (n, data) with values (n, p) of the last effect, all else at z.
 
-    def predicted_with(self, fit: Fit, kept: Sequence[int]) -> FloatArray:
-        """The data (data,) that a fit predicts with only those of its effects, by their indices."""
-        effects = fit.hypothesis.effects
-        ends = [
-            self.coordinates(Hypothesis(effects[:count])).dimension
-            for count in range(len(effects) + 1)
-        ]
-        z = [fit.z[: ends[0]], *(fit.z[ends[index] : ends[index + 1]] for index in kept)]
-        hypothesis = Hypothesis(tuple(effects[index] for index in kept))
-        return np.asarray(self.predict(hypothesis, np.concatenate(z)[None])[0])
+        That is one point (d,) or one for each (n, d).
+        """
+        before = Hypothesis(hypothesis.effects[:-1])
+        theta = self.coordinates(before).theta(np.atleast_2d(z))
+        theta = np.broadcast_to(theta, (len(effect), theta.shape[1]))
+        whole = np.hstack([theta, effect])
+        return self._predicted(hypothesis.effects, whole, self.design, self._scaling)
 
-    def tension_n(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
-        """The true tension (n,) that z (n, d) stand for, of the hanger at rest."""
+    def tension_n(
+        self, hypothesis: Hypothesis, z: FloatArray, rng: np.random.Generator | None = None
+    ) -> FloatArray:
+        """Return the tension (n,) of the hanger at rest that z (n, d) stand for.
+
+        What frequencies never tell of mass and length is drawn with `rng`, else at its middle.
+        """
+        coordinates = self.coordinates(hypothesis)
+        theta = coordinates.theta(z) if rng is None else coordinates.drawn(z, rng)
         composed = self._hanger_with(hypothesis.effects)
-        return np.asarray(composed.physical(self.theta(hypothesis, z), _AT_REST).tension_n)
+        return np.asarray(composed.physical(theta, _AT_REST).tension_n)
 
     def likelihood(self, hypothesis: Hypothesis) -> Likelihood:
-        """The likelihood of residuals, with a flexible remainder where the hypothesis has one."""
+        """Return the likelihood of residuals, with something unknown where the hypothesis has it."""
         flexible = hypothesis.flexible
         if flexible not in self._likelihoods:
             make = flexible_nodes if flexible else nodes
@@ -183,8 +225,8 @@ class GapProblem:
         """What the section along the bar, the sensors' mass and the supports' give do to the
         frequencies of a design: loads (F, k), the same k of every design.
         """
-        theta = self.theta(Hypothesis(), self.near)[:, : len(self._baseline.names)]
-        alike = self._baseline.physical(np.repeat(theta, STRETCHES + 1, axis=0), 0)
+        theta = self.described.theta(self.near)
+        alike = self.model.physical(np.repeat(theta, STRETCHES + 1, axis=0))
         section = section_loads(design, alike, self.hanger)
         if not self.hanger.as_hanger:
             return section
@@ -227,9 +269,8 @@ class GapProblem:
 
     @cached_property
     def _nearest(self) -> tuple[FloatArray, float]:
-        coordinates = self.coordinates(Hypothesis())
-        z = np.zeros((len(_TENSIONS), coordinates.dimension))
-        z[:, coordinates.tension] = np.array(_TENSIONS)[:, None]
+        z = np.zeros((len(_TENSIONS), self.described.dimension))
+        z[:, 0] = _TENSIONS
         count = self.design.frequencies
         apart = (self.predict(Hypothesis(), z) - self.observations.value)[:, :count]
         misfit = np.sqrt(np.mean(apart**2, axis=1))
@@ -252,20 +293,18 @@ class GapProblem:
         return self._with(self.observations.part(np.arange(self.design.frequencies), kept))
 
     def _with(self, part: Observations) -> GapProblem:
-        problem = GapProblem(self.hanger, self.baseline, part)
-        problem.smallest, problem._composed = self.smallest, self._composed
+        problem = GapProblem(self.model, self.tests, part, self.described)
+        problem.smallest, problem._hangers = self.smallest, self._hangers
         return problem
 
     @property
     def design(self) -> Design:
         return self.observations.design
 
-    def _hanger_with(self, effects: Effects) -> ComposedHanger:
-        if effects not in self._composed:
-            self._composed[effects] = ComposedHanger(
-                self.hanger, self.baseline, effects, self.design.places_m
-            )
-        return self._composed[effects]
+    def _hanger_with(self, effects: Effects) -> HangerWithEffects:
+        if effects not in self._hangers:
+            self._hangers[effects] = HangerWithEffects(self.model, effects, self.design.places_m)
+        return self._hangers[effects]
 
     def _predicted(
         self, effects: Effects, theta: FloatArray, design: Design, scaling: ShapeScaling
@@ -292,10 +331,8 @@ class GapProblem:
         if design.places_m == self.design.places_m:
             composed = self._hanger_with(effects)
         else:
-            composed = ComposedHanger(self.hanger, self.baseline, effects, design.places_m)
+            composed = HangerWithEffects(self.model, effects, design.places_m)
         tests = [int(test) for test in np.unique(design.frequency_test)]
         conditions = [design.conditions[test] for test in tests]
         orders, shapes = int(design.frequency_order.max()), len(design.shape_mode) > 0
-        answers = composed.modes_of_tests(theta, conditions, orders, shapes)
-        self.evaluations += len(theta) * len({id(modes) for modes in answers})
-        return zip(tests, answers, strict=True)
+        return zip(tests, composed.modes_of_tests(theta, conditions, orders, shapes), strict=True)

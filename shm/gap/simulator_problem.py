@@ -20,7 +20,8 @@ import scipy
 from shm.assumptions import DEFAULTS
 from shm.errors import BadInput, UsageError
 from shm.gap.contract import Covariance, Hypothesis, NoiseNode
-from shm.values import FloatArray
+from shm.gap.likelihood import Likelihood
+from shm.values import BoolArray, FloatArray, IntArray
 
 Condition: TypeAlias = Mapping[str, float]
 Predict: TypeAlias = Callable[[dict[str, Any], Condition], Mapping[str, Any]]
@@ -123,13 +124,16 @@ class Simulator:
 
 @dataclass(frozen=True, eq=False)
 class SimulatorProblem:
-    """A simulator and its readings, ready to be fitted."""
+    """A simulator and its readings: `value` and `sd` (data,), `scale` (data,) of the observable.
+
+    The scale is the root mean square of an observable's readings unless it is known.
+    """
 
     simulator: Simulator
     readings: tuple[Reading, ...]
+    scale: FloatArray = field(default_factory=lambda: np.empty(0))
     value: FloatArray = field(init=False)
     sd: FloatArray = field(init=False)
-    scale: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
         value = np.array([each.value for each in self.readings], dtype=float)
@@ -142,9 +146,10 @@ class SimulatorProblem:
         same = self.same_observable
         object.__setattr__(self, "value", value)
         object.__setattr__(self, "sd", sd)
-        object.__setattr__(self, "scale", np.sqrt(same @ value**2 / same.sum(axis=1)))
+        if not len(self.scale):
+            object.__setattr__(self, "scale", np.sqrt(same @ value**2 / same.sum(axis=1)))
         for reading in self.readings:
-            if np.isnan(reading.sd) and not np.any(value[self._indices_of(reading.observable)]):
+            if np.isnan(reading.sd) and not self.scale[self._indices_of(reading.observable)].any():
                 raise BadInput(
                     f"All readings of {reading.observable} are 0 and have no standard deviation: "
                     "how large an error could be is unknown.",
@@ -172,8 +177,23 @@ class SimulatorProblem:
         """Of the simulator, then of the effects: one coordinate z each, in this order."""
         return {**self.simulator.parameters, **self.own_priors(hypothesis)}
 
-    def predicted(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
-        """Predictions (n, data) at z (n, d)."""
+    def dimension(self, hypothesis: Hypothesis) -> int:
+        return len(self.priors(hypothesis))
+
+    def linear(self, hypothesis: Hypothesis) -> IntArray:
+        """Return no column: nobody knows in which the simulator is linear."""
+        return np.empty(0, dtype=np.int64)
+
+    def likelihood(self, hypothesis: Hypothesis) -> Likelihood:
+        return Likelihood(self.flexible_nodes() if hypothesis.flexible else self.nodes())
+
+    def part(self, rows: BoolArray) -> SimulatorProblem:
+        """Return the problem of some of the readings (data,)."""
+        kept = [each for each, keep in zip(self.readings, rows, strict=True) if keep]
+        return SimulatorProblem(self.simulator, tuple(kept), self.scale[rows])
+
+    def predict(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
+        """Return predictions (n, data) at z (n, d)."""
         return self.predicted_of(hypothesis, z, self.readings)
 
     def predicted_of(

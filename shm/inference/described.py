@@ -37,7 +37,7 @@ from shm.models.as_made import (
     AsMade,
 )
 from shm.models.beam import Beam, Beam3
-from shm.values import PLANES, FloatArray, ModalTest, Plane, Prior
+from shm.values import PLANES, FloatArray, IntArray, ModalTest, Plane, Prior
 
 # c = sqrt(e/mu)/l^2 with e ~ modulus section^2 and mu ~ density section.
 _C = {SECTION: 0.5, DENSITY: -0.5, MODULUS: 0.5, LENGTH: -2.0, BENDING: 0.5}
@@ -57,7 +57,8 @@ class DescribedCoordinates:
     a strand's bending factor and shear), the scores of the ends that are felt, those of the terms
     that are felt, and the deviations as far as they are seen, the last of them ln c.
     `wave_stiffness_n_m_rad` is EI p of a mode in the middle of those measured. Of a strand whose
-    factor is open, the factor takes all of c.
+    factor is open, the factor takes all of c. The nominal tension is the true one to within
+    `known_tension_sd`, a fraction, where that is finite.
     """
 
     def __init__(
@@ -66,6 +67,7 @@ class DescribedCoordinates:
         tests: Sequence[ModalTest],
         wave_stiffness_n_m_rad: float,
         calibration: Calibration | None = None,
+        known_tension_sd: float = math.nan,
     ):
         self.model, self._hanger = model, model.hanger
         self.parameters = model.parameter_names
@@ -80,7 +82,8 @@ class DescribedCoordinates:
         self.terms = [t for t in model.terms.values() if not t.plane or t.plane in planes]
         box = self._box(() if beam else felt)
         self.names = (TENSION, *box)
-        self._tension = TensionPrior(model.bounds[TENSION], self._hanger.assumptions)
+        bounds, assumed = model.bounds[TENSION], self._hanger.assumptions
+        self._tension = TensionPrior(bounds, assumed, known_tension_sd)
         lower, upper = np.array(list(box.values()), dtype=float).reshape(-1, 2).T
         swaps = [pair for pair in exchangeable if set(pair) <= set(box)]
         self._box_coordinates = Coordinates(
@@ -304,6 +307,18 @@ class DescribedCoordinates:
     def ends_at(self) -> slice:
         """Return the columns of the ends' scores."""
         return slice(self._cuts[0], self._cuts[1])
+
+    @property
+    def always_linear(self) -> IntArray:
+        """Return the columns in which logarithms of frequencies are nearly linear: the tension and
+        what is seen of the deviations.
+        """
+        return np.append(0, np.arange(self._cuts[2], self.dimension))
+
+    @property
+    def nearly_linear(self) -> IntArray:
+        """Return the columns of the terms, in which they may be."""
+        return np.arange(self._cuts[1], self._cuts[2])
 
     def asked_of_description(self, z: FloatArray) -> FloatArray:
         """Return the scores (n, k) of terms and deviations: what the description is off by."""

@@ -116,9 +116,17 @@ def _root(covariance: FloatArray) -> FloatArray:
 
 
 class TensionPrior:
-    """ln of the tension over the nominal one, between `bounds`: about as designed, or anything."""
+    """ln of the tension over the nominal one, between `bounds`: about as designed, or anything.
 
-    def __init__(self, bounds: tuple[float, float], assumed: Assumptions = DEFAULTS):
+    Where it is known to within `known_sd` (a fraction), it is normal about the nominal one.
+    """
+
+    def __init__(
+        self,
+        bounds: tuple[float, float],
+        assumed: Assumptions = DEFAULTS,
+        known_sd: float = math.nan,
+    ):
         low, high = (math.log(each) for each in bounds)
         designed, sd = assumed.as_designed_share.value, assumed.as_designed_log_sd.value
         self._logs = np.linspace(low, high, _NODES)
@@ -128,6 +136,9 @@ class TensionPrior:
         flat = np.linspace(0, 1, _NODES)
         below = designed * (normal - normal[0]) + anything * flat
         self._scores = scipy.special.ndtri(below.clip(_EDGE, 1 - _EDGE))
+        if math.isfinite(known_sd):
+            self._scores = np.linspace(-_WIDEST, _WIDEST, _NODES)
+            self._logs = known_sd * self._scores
 
     def value(self, scores: FloatArray) -> FloatArray:
         """Return logarithms (n,) of normal scores."""

@@ -215,7 +215,7 @@ def class_probabilities(
 ) -> dict[str, float]:
     """Return the probability of each class, by name, given the evidences and before any data."""
     if class_priors is None:
-        prior = {model.name: _log_prior(model) for model in models}
+        prior = {model.name: log_class_prior(model) for model in models}
     else:
         prior = {name: float(np.log(stated)) for name, stated in class_priors.items()}
     log = np.array([each.log_evidence + prior[each.model] for each in posteriors])
@@ -240,7 +240,7 @@ def check_class_priors(class_priors: Mapping[str, float], names: Sequence[str]) 
         )
 
 
-def _log_prior(model: Model) -> float:
+def log_class_prior(model: Model) -> float:
     """Return the log of how probable a class is beforehand, next to one with end springs."""
     if not isinstance(model, AsMade) or model.springs:
         return 0.0

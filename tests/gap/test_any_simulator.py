@@ -13,7 +13,7 @@ import pytest
 from shm.errors import BadInput, UsageError
 from shm.gap.any_simulator import diagnose_simulator
 from shm.gap.contract import Hypothesis
-from shm.gap.simulator_fit import fitted
+from shm.gap.simulator_fit import fit_hypothesis as fitted
 from shm.gap.simulator_problem import (
     Condition,
     Predict,

@@ -1,0 +1,57 @@
+"""The model class that a diagnosis starts from: the one that `select` would prefer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shm.gap.contract import GapOptions, Observations
+from shm.gap.observations import observed
+from shm.gap.problem import GapProblem
+from shm.gap.search import fit_alone
+from shm.inference.options import Progress, silent
+from shm.inference.updating import log_class_prior
+from shm.models import MODELS, AsMade, applicable, check_baseline
+from shm.models.base import held_otherwise
+from shm.values import Hanger, ModalTest
+
+BEAMS = ("beam1", "beam2", "beam3")
+AS_DESCRIBED = "beam1"
+"""The class that takes the ends as they are described, whatever holds them."""
+
+
+def choose_baseline(
+    tests: Sequence[ModalTest],
+    hanger: Hanger,
+    options: GapOptions,
+    rng: np.random.Generator,
+    progress: Progress = silent,
+) -> GapProblem:
+    """Return the problem of the baseline in `options`, else of the likeliest beam.
+
+    Raises UsageError for a class that is no baseline of this hanger.
+    """
+    observations = observed(tests, hanger)
+    if options.baseline:
+        check_baseline(options.baseline, hanger)
+        return _problem(options.baseline, tests, hanger, observations)
+    names = applicable(hanger, BEAMS)[0]
+    if not names:
+        if not held_otherwise(hanger):
+            check_baseline(AS_DESCRIBED, hanger)
+        names = (AS_DESCRIBED,)
+    problems = [_problem(name, tests, hanger, observations) for name in names]
+    if len(problems) == 1:
+        return problems[0]
+    log = []
+    for each in problems:
+        progress(f"baseline {each.model.name}", 0.0)
+        log.append(fit_alone(each, rng).log_evidence + log_class_prior(each.model))
+    return problems[int(np.argmax(log))]
+
+
+def _problem(
+    name: str, tests: Sequence[ModalTest], hanger: Hanger, observations: Observations
+) -> GapProblem:
+    return GapProblem(AsMade(MODELS[name](hanger)), tests, observations)

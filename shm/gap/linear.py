@@ -1,0 +1,53 @@
+"""Parameters in which the data are linear, integrated out in closed form.
+
+With standard normal priors and normal errors both the evidence and the best values of such
+parameters follow from two products of matrices, for each possible size of the errors.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from shm.gap.likelihood import Likelihood
+from shm.values import FloatArray, IntArray
+
+_LONGEST = 2.5  # numerical: standard deviations of a prior; over more no slope holds
+
+
+class Linear:
+    """Parameters with fixed slopes (data, l) of the prediction and standard normal priors."""
+
+    def __init__(self, likelihood: Likelihood, slopes: FloatArray):
+        self.likelihood = likelihood
+        self._weighed = likelihood.weighed(slopes)
+        inner = self._weighed.products(slopes.T) + np.eye(slopes.shape[1])
+        self.covariance: FloatArray = np.linalg.inv(inner)
+        self._height = likelihood.log_height - np.linalg.slogdet(inner)[1] / 2
+
+    def marginal(
+        self, residual: FloatArray, z: FloatArray
+    ) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Return the log marginal likelihood (n,) of residuals (n, data) at z (n, l).
+
+        With it the step (n, l) to the best z, and the index (n,) of the likeliest error.
+        """
+        known = np.isfinite(residual).all(axis=1)
+        residual = np.where(known[:, None], residual, 0.0)
+        pull = self._weighed.products(residual) - z  # (nodes, n, l)
+        step = pull @ self.covariance
+        square = self.likelihood.squares(residual).T + (z**2).sum(axis=1)
+        square = square - (pull * step).sum(axis=2)
+        log = np.where(known, self._height[:, None] - square / 2, -np.inf)
+        node, rows = log.argmax(axis=0), np.arange(len(z))
+        found = step[node, rows].clip(-_LONGEST, _LONGEST)
+        return scipy.special.logsumexp(log, axis=0), np.where(known[:, None], found, 0.0), node
+
+    def visible(self, shift: FloatArray, node: int) -> FloatArray:
+        """Return by how many standard deviations shifts (n, data) go beyond what z can follow.
+
+        By the errors of one `node`; shape (n,).
+        """
+        pull = self._weighed.products(shift)[node]
+        followed = ((pull @ self.covariance[node]) * pull).sum(axis=1)
+        return np.sqrt(np.maximum(self.likelihood.squares(shift)[:, node] - followed, 0.0))

@@ -1,0 +1,126 @@
+"""Modes whose orders look wrong: a slip of whoever numbered them, which no effect imitates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from shm.gap.attribution import Attribution
+from shm.gap.contract import Hypothesis, Peak
+from shm.gap.posterior import Target, find_peaks
+from shm.gap.problem import GapProblem
+from shm.values import PLANES, IntArray
+
+FAR_BETTER = 10.0
+"""What other numbers must gain in log evidence on all that was tried: slips are rare."""
+
+_SHIFTS = {0: "", 1: "one higher", -1: "one lower"}
+
+Shifts = tuple[int, ...]
+
+
+def doubt_orders(problem: GapProblem, attribution: Attribution) -> tuple[str, ...]:
+    """Return a remark where the hanger alone explains the modes far better under other orders.
+
+    Tried are orders one higher or lower, all or from one mode on, and one mode that is none of the
+    hanger's, of either plane or both.
+    """
+    if attribution.leads == "no gap":
+        return ()
+    most = -np.inf
+    best: tuple[_Numbering, Peak] | None = None
+    for each in (*_shifted(problem), *_from_one_on(problem)):
+        if each.problem.near_misfit < problem.near_misfit:  # a fit costs forty times as much
+            peak = _peak(each.problem)
+            log_evidence = peak.log_evidence + each.log_dropped
+            if log_evidence > most:
+                most, best = log_evidence, (each, peak)
+    if best is None or most < max(e.log_evidence for e in attribution.tried) + FAR_BETTER:
+        return ()
+    numbering, peak = best
+    return (
+        f"The orders look wrong: were {numbering.words}, the hanger alone would fit better than "
+        f"any cause does now{_tension(numbering.problem, peak)}. {numbering.asked} If so, number "
+        "them anew and diagnose again.",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Numbering:
+    """The same frequencies by other orders, in `words`; `dropped` are taken for none of its own."""
+
+    words: str
+    problem: GapProblem
+    asked: str = "Was the lowest mode missed, or one counted that is none?"
+    dropped: int = 0
+
+    @property
+    def log_dropped(self) -> float:
+        """A frequency of something else may lie anywhere within two decades, here."""
+        return -self.dropped * float(np.log(np.log(100.0)))
+
+
+def _shifted(problem: GapProblem) -> Iterator[_Numbering]:
+    """All modes of either plane, or of both, numbered one higher or lower."""
+    design = problem.design
+    planes = np.unique(design.frequency_plane)
+    for chosen in product(_SHIFTS, repeat=len(planes)):
+        shifts = np.zeros(len(PLANES), dtype=int)
+        shifts[planes] = chosen
+        order = design.frequency_order + shifts[design.frequency_plane]
+        if shifts.any() and order.min() > 0:
+            yield _Numbering(_words(tuple(shifts)), _numbered(problem, order))
+
+
+def _from_one_on(problem: GapProblem) -> Iterator[_Numbering]:
+    """One mode missed between the others, or one counted that is none; in one plane or both."""
+    design = problem.design
+    planes = np.unique(design.frequency_plane).tolist()
+    for these in [[plane] for plane in planes] + ([planes] if len(planes) > 1 else []):
+        inside = np.isin(design.frequency_plane, these)
+        own = "both planes'" if len(these) > 1 else f"the {PLANES[these[0]]}"
+        for first in np.unique(design.frequency_order[inside]).tolist():
+            above = inside & (design.frequency_order > first)
+            if not above.any():
+                continue
+            up = _numbered(problem, design.frequency_order + above)
+            asked = f"Was a mode missed between {first} and {first + 1}?"
+            yield _Numbering(f"{own} modes above {first} numbered one higher", up, asked)
+            kept = ~(inside & (design.frequency_order == first))
+            down = _numbered(problem.part(kept), (design.frequency_order - above)[kept])
+            yield _Numbering(
+                f"{own} mode {first} left out and those above numbered one lower",
+                down,
+                "Is that mode a damper's, the deck's or another neighbour's?",
+                int(np.sum(~kept)),
+            )
+
+
+def _numbered(problem: GapProblem, order: IntArray) -> GapProblem:
+    design = replace(problem.design, frequency_order=order)
+    observations = replace(problem.observations, design=design)
+    return GapProblem(problem.model, problem.tests, observations)
+
+
+def _peak(problem: GapProblem) -> Peak:
+    """Return the peak of the hanger alone."""
+    return find_peaks(Target(problem, Hypothesis()), problem.near)[0]
+
+
+def _words(shifts: Shifts) -> str:
+    """Return the planes that are numbered otherwise, and how."""
+    by_plane = {plane: _SHIFTS[shift] for plane, shift in zip(PLANES, shifts, strict=True) if shift}
+    if len(by_plane) == len(PLANES) and len(set(by_plane.values())) == 1:
+        return f"the modes of both planes numbered {by_plane[PLANES[0]]}"
+    return " and ".join(f"the {plane} modes numbered {how}" for plane, how in by_plane.items())
+
+
+def _tension(problem: GapProblem, peak: Peak) -> str:
+    """Return the tension that these orders stand for in words; nothing of a bar without any."""
+    if not problem.hanger.nominal_tension_n:
+        return ""
+    tension_n = float(problem.tension_n(Hypothesis(), peak.z[None])[0])
+    return f", at {tension_n / 1e3:.0f} kN"

@@ -1,0 +1,292 @@
+"""The posterior and the evidence of one hypothesis.
+
+Levenberg and Marquardt's steps lead from several starts to the peaks; importance sampling about
+them gives draws and evidence. Parameters in which the data are nearly linear are integrated out in
+closed form at each draw, so that only the others are sampled: from t distributions about the peaks,
+refitted to their own draws, with a share of the prior so that no weight is unbounded (Hesterberg
+1995; Cappe et al. 2008). Where too few draws are effective, emcee goes on from them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import scipy
+
+from shm.gap.contract import Fit, Hypothesis, Peak
+from shm.gap.likelihood import Likelihood
+from shm.gap.linear import Linear
+from shm.inference.chain import run_chain
+from shm.inference.coordinates import log_normal
+from shm.inference.mixture import (
+    Normal,
+    Pool,
+    Rows,
+    TMixture,
+    normalised,
+    systematic,
+    tempered,
+)
+from shm.values import ENOUGH_EFFECTIVE, BoolArray, FloatArray, IntArray
+
+# Numerical: a climb's steps, and the gain in log posterior that is none; forward differences in
+# standard deviations of a prior; a slope beyond is a cliff, where two modes change places.
+_STEPS, _NO_GAIN, _MOST_DAMPING = 25, 0.01, 1e5
+_DIFFERENCE, _STEEPEST, _FARTHEST = 1e-4, 1e3, 4.5
+# Numerical: standard deviations of a peak within which two are one; log density behind the best
+# from which on a peak is not drawn about.
+_SAME, _FAR_BELOW = 0.3, 10.0
+# Numerical: draws and their proposals. Weights correct for all of them.
+_ROUND, _ROUNDS, _AT_FIRST, _FROM_PRIOR, _FROM_FIRST = 150, 24, 0.3, 0.1, 0.2
+_WIDTHS = (1.0, 2.0)
+_SETTLED = 0.3  # of a prior's standard deviation: over less the slopes of linear parameters hold
+
+
+class Problem(Protocol):
+    """What hypotheses predict of one set of data."""
+
+    @property
+    def value(self) -> FloatArray:
+        """Return the data (data,)."""
+
+    def linear(self, hypothesis: Hypothesis) -> IntArray:
+        """Return the columns in which predictions are nearly linear."""
+
+    def dimension(self, hypothesis: Hypothesis) -> int:
+        """Return how many parameters there are."""
+
+    def predict(self, hypothesis: Hypothesis, z: FloatArray) -> FloatArray:
+        """Return the data (n, data) that z (n, d) predict; NaN where they cannot."""
+
+    def likelihood(self, hypothesis: Hypothesis) -> Likelihood:
+        """Return the likelihood of residuals."""
+
+
+class Target:
+    """The posterior of a hypothesis in coordinates z (d,) with standard normal priors."""
+
+    def __init__(
+        self, problem: Problem, hypothesis: Hypothesis, likelihood: Likelihood | None = None
+    ):
+        self.problem, self.hypothesis = problem, hypothesis
+        self.likelihood = likelihood or problem.likelihood(hypothesis)
+        self.dimension = problem.dimension(hypothesis)
+        self.linear = problem.linear(hypothesis)
+        self.other: IntArray = np.setdiff1d(np.arange(self.dimension), self.linear)
+
+    def residual(self, z: FloatArray) -> FloatArray:
+        """Return measured less predicted (n, data) at z (n, d)."""
+        with np.errstate(all="ignore"):
+            return np.asarray(self.problem.value - self.problem.predict(self.hypothesis, z))
+
+    def log(self, z: FloatArray) -> FloatArray:
+        """Return the log of likelihood times prior (n,) at z (n, d)."""
+        return np.asarray(self.likelihood.log(self.residual(z)) + log_normal(z))
+
+    def view(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the residual (data,) and the prediction's slopes (data, d) at z (d,)."""
+        step = np.where(z > 0, -_DIFFERENCE, _DIFFERENCE)
+        residual = self.residual(np.vstack([z, z + np.diag(step)]))
+        slopes = (residual[0] - residual[1:]).T / step
+        return residual[0], np.where(np.abs(slopes) < _STEEPEST, slopes, 0.0)
+
+    def climb(self, z: FloatArray, hopeless: float = -np.inf) -> Peak:
+        """Return the peak above z (d,); gives up where it cannot reach the log posterior
+        `hopeless`.
+        """
+        log, damping = float(self.log(z[None])[0]), 1e-2
+        hessian, gradient = self._curvature(z)
+        for taken in range(_STEPS):
+            step = np.linalg.solve(hessian + damping * np.diag(np.diag(hessian)), gradient)
+            step = step / max(1.0, np.abs(step).max())
+            tried = np.clip(z + step, -_FARTHEST, _FARTHEST)
+            gain = float(self.log(tried[None])[0]) - log
+            if gain > 0:
+                z, log, damping = tried, log + gain, damping / 5
+                hessian, gradient = self._curvature(z)
+            else:
+                damping *= 6
+            hoped = float(gradient @ np.linalg.solve(hessian, gradient))
+            if 0 <= gain < _NO_GAIN or damping > _MOST_DAMPING or hoped < _NO_GAIN:
+                break
+            if taken > 3 and log + 2 * hoped < hopeless:
+                break
+        return Peak(z, log, np.linalg.inv(hessian))
+
+    def _curvature(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return Gauss and Newton's Hessian (d, d) and the gradient (d,) of the log posterior."""
+        residual, slopes = self.view(z)
+        if not np.isfinite(residual).all():
+            return np.eye(len(z)), -z
+        share = scipy.special.softmax(self.likelihood.by_node(residual[None])[0])
+        gram = self.likelihood.gram(np.column_stack([slopes, residual])[None])[0]
+        mean = np.tensordot(share, gram, axes=1)
+        return mean[:-1, :-1] + np.eye(len(z)), mean[:-1, -1] - z
+
+
+def find_peaks(target: Target, starts: FloatArray, hopeless: float = -np.inf) -> list[Peak]:
+    """Return the distinct peaks above `starts` z (m, d), the highest first.
+
+    `hopeless` is the log posterior from which on a peak counts.
+    """
+    found: list[Peak] = []
+    for z in starts:
+        peak = target.climb(z, hopeless)
+        if np.isfinite(peak.log) and not any(_same(peak, each) for each in found):
+            found.append(peak)
+    return sorted(found, key=lambda peak: -peak.log)
+
+
+def _same(one: Peak, other: Peak) -> bool:
+    away = np.abs(one.z - other.z) / np.sqrt(np.diag(other.covariance))
+    return bool((away < _SAME).all())
+
+
+@dataclass(frozen=True, eq=False)
+class _Draws(Rows):
+    """Points z (n, d), their linear parameters at their best, by the likeliest error `node`."""
+
+    z: FloatArray
+    node: IntArray
+
+
+class _Collapsed:
+    """A target with its linear parameters integrated out, near one peak."""
+
+    def __init__(self, target: Target, peak: Peak):
+        self.target, self.dimension = target, len(target.other)
+        self.residual, self.slopes = target.view(peak.z)
+        self.linear = Linear(target.likelihood, self.slopes[:, target.linear])
+        own = np.ix_(target.other, target.other)
+        across = peak.covariance[np.ix_(target.linear, target.other)]
+        self._follow = np.linalg.solve(peak.covariance[own], across.T).T
+        self._peak = peak.z
+
+    def settle(self, w: FloatArray) -> tuple[_Draws, FloatArray]:
+        """Return points with other parameters w (n, o), and the log of their target density (n,).
+
+        The linear parameters go along as at the peak, then where they are best.
+        """
+        target = self.target
+        z = np.tile(self._peak, (len(w), 1))
+        z[:, target.other] = w
+        along = (w - self._peak[target.other]) @ self._follow.T
+        z[:, target.linear] = (z[:, target.linear] + along).clip(-_FARTHEST, _FARTHEST)
+        log, step, node = self.linear.marginal(target.residual(z), z[:, target.linear])
+        z[:, target.linear] += step
+        far = np.flatnonzero((np.abs(step) > _SETTLED).any(axis=1))
+        if len(far):
+            again = self.linear.marginal(target.residual(z[far]), z[np.ix_(far, target.linear)])
+            log[far], node[far] = again[0], again[2]
+            z[np.ix_(far, target.linear)] += again[1]
+        return _Draws(z, node), np.asarray(log + log_normal(w))
+
+    def scatter(self, draws: _Draws, rng: np.random.Generator) -> FloatArray:
+        """Return the points (n, d) with their linear parameters drawn about their best."""
+        z = draws.z.copy()
+        factor = np.linalg.cholesky(self.linear.covariance)[draws.node]
+        normal = rng.standard_normal((len(z), len(self.target.linear), 1))
+        z[:, self.target.linear] += (factor @ normal)[..., 0]
+        return z
+
+    # ------------------------------------------------ what emcee asks for
+
+    def evaluate(self, w: FloatArray) -> FloatArray:
+        return w
+
+    def log_posterior(self, w: FloatArray) -> FloatArray:
+        found = self.settle(w)[1]
+        return np.where(np.isfinite(found), found, -np.inf)
+
+
+def sample(
+    target: Target,
+    peaks: Sequence[Peak],
+    draws: int,
+    rng: np.random.Generator,
+    enough: float = ENOUGH_EFFECTIVE,
+) -> Fit:
+    """Return the fit of a hypothesis by `draws` of its posterior about `peaks`, the best first.
+
+    Goes on until `enough` draws are effective, and with emcee where importance sampling gains none.
+    """
+    best = peaks[0]
+    collapsed = _Collapsed(target, best)
+    if not len(target.other):
+        point, log = collapsed.settle(np.empty((1, 0)))
+        chosen = point.take(np.zeros(draws, dtype=np.int64))
+        return _fit(collapsed, peaks, collapsed.scatter(chosen, rng), float(log[0]), float(draws))
+    pool = _drawn_about(collapsed, peaks, rng, enough)
+    count, method_is_chain = pool.effective, False
+    chosen = pool.batch.take(systematic(normalised(pool.log_weights), draws, rng))
+    if count < enough and enough >= ENOUGH_EFFECTIVE:
+        start = chosen.z[:, target.other]
+        chain, count, _ = run_chain(collapsed, start, rng)
+        chosen = collapsed.settle(chain[rng.choice(len(chain), draws)])[0]
+        method_is_chain = True
+    found = rng.permutation(collapsed.scatter(chosen, rng))
+    return _fit(collapsed, peaks, found, pool.log_evidence, count, method_is_chain)
+
+
+def _drawn_about(
+    collapsed: _Collapsed, peaks: Sequence[Peak], rng: np.random.Generator, enough: float
+) -> Pool[tuple[TMixture, float], _Draws]:
+    other = collapsed.target.other
+
+    def log_density(proposal: tuple[TMixture, float], batch: _Draws) -> FloatArray:
+        (mixture, of_prior), w = proposal, batch.z[:, other]
+        own = np.log1p(-of_prior) + mixture.log_density(w)
+        return np.logaddexp(own, np.log(of_prior) + log_normal(w))
+
+    near = [each for each in peaks if each.log > peaks[0].log - _FAR_BELOW]
+    parts = [
+        Normal(each.z[other], width**2 * each.covariance[np.ix_(other, other)])
+        for each in near
+        for width in _WIDTHS
+    ]
+    shares = scipy.special.softmax([each.log_evidence for each in near for _ in _WIDTHS])
+    first = proposal = TMixture(parts, np.maximum(shares, 0.02))
+    pool: Pool[tuple[TMixture, float], _Draws] = Pool(log_density)
+    for turn in range(_ROUNDS):
+        of_prior = _FROM_PRIOR if turn else _AT_FIRST
+        w = proposal.draw(_ROUND, rng)
+        prior: BoolArray = rng.random(_ROUND) < of_prior
+        w[prior] = rng.standard_normal((int(prior.sum()), len(other)))
+        batch, log = collapsed.settle(w)
+        pool.add((proposal, of_prior), _ROUND, batch, log)
+        if pool.effective > enough:
+            break
+        weight = tempered(pool.log_weights, 6 * len(other), 0.7, 1e-3)
+        proposal = proposal.refitted(pool.batch.z[:, other], weight).mixed(first, _FROM_FIRST)
+    return pool
+
+
+def _fit(
+    collapsed: _Collapsed,
+    peaks: Sequence[Peak],
+    draws: FloatArray,
+    log_evidence: float,
+    count: float,
+    by_chain: bool = False,
+) -> Fit:
+    target, best, residual = collapsed.target, peaks[0], collapsed.residual
+    error = target.likelihood.nodes[int(target.likelihood.by_node(residual[None])[0].argmax())]
+    return Fit(
+        hypothesis=target.hypothesis,
+        z=best.z,
+        covariance=best.covariance,
+        predicted=target.problem.value - residual,
+        slopes=collapsed.slopes,
+        noise=error.covariance,
+        model_error=error.model_error,
+        draws=draws,
+        log_fit=float(target.likelihood.log(residual[None])[0]),
+        log_evidence=log_evidence,
+        log_evidence_sd=count**-0.5 if count > 0 else np.inf,
+        method="emcee" if by_chain else "sampled",
+        peaks=tuple(peaks),
+        effective=min(count, float(len(draws))),
+    )
