@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from shm.models.as_made import AsMade
+from shm.models.as_made import TENSION, AsMade
 from shm.models.base import Conditions, point_mass
 from shm.models.beam import Beam
 from shm.models.effects import EFFECTS, Parameter, Variant, parameters_of
@@ -74,20 +74,37 @@ class HangerWithEffects:
         return self._in_test(made, theta, conditions)
 
     def _in_test(
-        self, physical: PhysicalHanger, theta: FloatArray, conditions: Conditions
+        self, made: PhysicalHanger, theta: FloatArray, conditions: Conditions
     ) -> PhysicalHanger:
-        tension_n = physical.tension_n + conditions.tension_shift_n
-        physical = replace(physical, tension_n=tension_n)
+        physical = replace(made, tension_n=made.tension_n + conditions.tension_shift_n)
         at = self._first
         for (name, variant), count in zip(self.effects, self._counts, strict=True):
             values = theta[:, at : at + count]
             physical = EFFECTS[name].applied(physical, values, variant, conditions, self.hanger)
             at += count
+        physical = self._with_sag(physical, made, theta)
         added = conditions.added_mass
         if added is None:
             return physical
         clamped_on = point_mass(self.hanger, added, len(theta))
         return replace(physical, masses=(*physical.masses, clamped_on))
+
+    def _with_sag(
+        self, physical: PhysicalHanger, made: PhysicalHanger, theta: FloatArray
+    ) -> PhysicalHanger:
+        """Return hangers that sag as their tension lets them, which tests and effects change."""
+        if not self.model.has_terms or np.array_equal(physical.tension_n, made.tension_n):
+            return physical
+        tensioned = theta[:, : self._first].copy()
+        ratio = physical.tension_n / self.hanger.nominal_tension_n
+        column = self.model.parameter_names.index(TENSION)
+        tensioned[:, column] = ratio.clip(self.model.bounds[TENSION][0])
+        now = self.model.physical(tensioned)
+        return replace(
+            physical,
+            sag_parameter=physical.sag_parameter + now.sag_parameter - made.sag_parameter,
+            tension_gradient_n=now.tension_gradient_n,
+        )
 
     def _ratio(self, theta: FloatArray, modes: int) -> FloatArray:
         """Return the class's frequencies over the general model's (n, 2, modes); 1 of a beam."""

@@ -98,6 +98,20 @@ def test_like_tests_are_solved_once() -> None:
     )
 
 
+def test_sag_follows_the_tension_of_a_test() -> None:
+    leaning = replace(ROD, inclination_deg=30.0, nominal_tension_n=50e3)
+    model = as_made("beam2", leaning)
+    bare = HangerWithEffects(model, [])
+    theta = drawn(model)
+    theta[:, 0] = np.linspace(0.6, 1.5, SETS)
+    theta[:, model.parameter_names.index("sag_shape")] = 0.5
+    tighter = theta + np.eye(len(theta[0]))[0] * 5e3 / 50e3
+    found = bare.modes(theta, Conditions(tension_shift_n=5e3), 4, shapes=False)
+    expected = bare.modes(tighter, PLAIN, 4, shapes=False)
+    np.testing.assert_allclose(found.frequency_hz, expected.frequency_hz, rtol=1e-9)
+    assert np.all(bare.physical(tighter, PLAIN).sag_parameter[:, 1] > 0.1)
+
+
 def test_names_of_effects_are_apart_from_the_class_own() -> None:
     turning = Variant("deck end", ends=(0,))
     springs = [("rotational_end_flexibility", turning), ("point_mass", Variant())]
