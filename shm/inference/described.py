@@ -54,8 +54,8 @@ class DescribedCoordinates:
     """Coordinates z (n, d) of parameters theta (n, parameters) of a bar as made.
 
     The columns are those of `names` (tension, a length that plates leave open, springs of a solid,
-    a strand's bending factor and shear), the scores of the ends that are felt, those of the terms
-    that are felt, and the deviations as far as they are seen, the last of them ln c.
+    a strand's bending factor and shear, effects), the scores of the ends that are felt, those of
+    the terms that are felt, and the deviations as far as they are seen, the last of them ln c.
     `wave_stiffness_n_m_rad` is EI p of a mode in the middle of those measured. Of a strand whose
     factor is open, the factor takes all of c. The nominal tension is the true one to within
     `known_tension_sd`, a fraction, where that is finite.
@@ -93,6 +93,8 @@ class DescribedCoordinates:
         others = []
         if isinstance(model.model, Beam3) and not model.is_strand:
             others.append(own.row(section=1.0))
+        if model.effect_names:  # they are of other sizes on another bar
+            others += [own.row(section=1.0), own.row(density=1.0), own.row(theta_L=1.0)]
         if any(test.added_mass is not None for test in tests):
             others.append(own.row(section=1.0, density=1.0, theta_L=1.0))
         seen = [] if self._slips else [own.row(**_C)]
@@ -112,7 +114,7 @@ class DescribedCoordinates:
             bounds[BENDING] = (_WIDER[0] * low, _WIDER[1] * high)
         if SHEAR in self.parameters:
             bounds[SHEAR] = self.model.bounds[SHEAR]
-        return bounds
+        return bounds | {name: self.model.bounds[name] for name in self.model.effect_names}
 
     # ------------------------------------------------ what is seen, and what is not
 
@@ -225,6 +227,7 @@ class DescribedCoordinates:
         springs = {name: box[name] for name in self.model.springs if name in box}
         if isinstance(self.model.model, Beam) and self.model.springs:
             springs = self.ends.log10_springs(ends, self._slenderness(box), rng)
+        columns |= {name: box[name] for name in self.model.effect_names}
         columns |= {name: log + np.log10(stiffness / taped) for name, log in springs.items()}
         of_term = dict(zip((t.name for t in self.terms), terms.T, strict=True))
         for name, term in self.model.terms.items():
@@ -257,6 +260,7 @@ class DescribedCoordinates:
         log_c = np.log(stiffness / mass) / 2 - 2 * np.log(taped)
         box = {TENSION: np.log(values[TENSION] / (mass * taped**2)), LENGTH: values[LENGTH]}
         box |= {BENDING: stated * np.exp(2 * log_c), SHEAR: values.get(SHEAR, slip)}
+        box |= {name: values[name] for name in self.model.effect_names}
         springs = {n: values[n] - np.log10(stiffness / taped) for n in self.model.springs}
         of = self._box_coordinates
         inner = np.array([{**box, **springs}[name] for name in of.prior.names])

@@ -143,8 +143,8 @@ class Problem:
     def _has_slopes(self) -> bool:
         """Return True where the class gives the frequencies of near parameter sets at once."""
         likelihood = self.likelihood
-        terms = isinstance(self.model, AsMade) and self.model.has_terms
-        return terms and isinstance(likelihood, FieldLikelihood) and likelihood.alike_conditions
+        slopes = isinstance(self.model, AsMade) and self.model.has_slopes
+        return slopes and isinstance(likelihood, FieldLikelihood) and likelihood.alike_conditions
 
     def _near(self, z: FloatArray, steps: FloatArray) -> FloatArray:
         """Return changes (m, measurements, steps) of the misfit by `steps` (k, d) from `z`."""

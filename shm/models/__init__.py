@@ -12,7 +12,7 @@ from shlex import quote
 import numpy as np
 
 from shm.errors import UsageError
-from shm.models.adopted import Adopted, AdoptedName, is_adopted
+from shm.models.adopted import Adopted, AdoptedAsMade, AdoptedName, is_adopted, with_parameters
 from shm.models.adopted import unfit as adopted_unfit
 from shm.models.as_made import AsMade
 from shm.models.base import DESCRIPTION, PRIORS, THESIS, Model, held_otherwise
@@ -62,13 +62,15 @@ def described(name: str, hanger: Hanger, priors: str = THESIS) -> Model:
         raise UsageError(f"unknown priors {priors!r}.", remedy=f"Known: {', '.join(PRIORS)}.")
     _refuse_unknown(name, hanger)
     if is_adopted(name):
-        return Adopted(name, hanger, priors)
+        return AdoptedAsMade(name, hanger) if priors == DESCRIPTION else Adopted(name, hanger)
     model = MODELS[name](hanger)
     return AsMade(model) if priors == DESCRIPTION else model.of_the_thesis()
 
 
 def class_of(posterior: Posterior, hanger: Hanger) -> Model:
     """The model class that a posterior's parameters are those of."""
+    if is_adopted(posterior.model):
+        return with_parameters(posterior.model, hanger, posterior.names, posterior.priors)
     return described(posterior.model, hanger, posterior.priors)
 
 

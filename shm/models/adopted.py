@@ -1,10 +1,9 @@
 """Adopted model classes: a baseline with effects of the catalogue, as `shm gap adopt` makes them.
 
-Parameters are the baseline's (its length is that of the description), the deviations of the bar as
-made, and the effects' own. All priors are uniform, as those of every model class: a deviation has
-the standard deviation of the hanger's scatter, a logarithmic size is uniform in its log10, and one
-of either sign is uniform in the value itself, because a logarithm has no zero to cross and a sign
-that is set once could not follow a hanger that changes.
+Parameters are the baseline's as made and the effects' own. Those of effects have uniform priors: a
+logarithmic size is uniform in its log10, and one of either sign is uniform in the value itself,
+because a logarithm has no zero to cross and a sign that is set once could not follow a hanger that
+changes.
 
 Names of adopted model classes: a baseline and the effects that a hanger's owner made part of it.
 
@@ -20,20 +19,22 @@ the diagnosis of many tests found them. So a name says all of a class that its h
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
 from shm.errors import BadInput, UsageError
-from shm.models.as_made import TENSION, AsMade
+from shm.models.as_made import BENDING, LENGTH, SHEAR, TENSION, AsMade
 from shm.models.base import DESCRIPTION, THESIS, Conditions, Model
-from shm.models.composed import ComposedHanger
 from shm.models.effects import EFFECTS, Effect, Parameter, Survey, Variant
+from shm.models.hanger import PhysicalHanger
+from shm.models.hanger_with_effects import HangerWithEffects
 from shm.models.registry import MODELS
 from shm.values import NAN, PLANES, FloatArray, Hanger, ModalTest
 
 _HALF_WIDTH_IN_SD = math.sqrt(3)  # of a uniform distribution
+_DEVIATIONS = ("section", "density", "length", "modulus")
 
 # What was measured: nothing but a test, and all that makes every effect visible.
 _ONE_TEST = Survey(("test",), PLANES, (), False, (), (), ())
@@ -42,57 +43,19 @@ _REFERENCE = "reference_c"
 _REMEDY = "Write BASELINE+EFFECT@WHERE, such as beam1+point_mass@everywhere."
 
 
-class Adopted(Model):
-    """The class of one adopted name.
-
-    Its tension is that at the reference temperature and at rest, where an effect changes it.
-    """
+class _WithEffects(Model):
+    """The methods of a class with effects, in terms of its hanger with effects."""
 
     expensive = True
+    adopted: AdoptedHanger
 
-    def __init__(self, name: str, hanger: Hanger, priors: str = THESIS):
-        super().__init__(hanger)
-        self.priors = priors
-        made = checked(name, hanger)
-        self._effects = [(each.effect, variant_of(each, hanger)) for each in made.effects]
-        self._reference_c = next((e.reference_c for e in made.effects if _follows(e)), math.nan)
-        self._composed = ComposedHanger(hanger, made.baseline, self._effects, ())
-        self.name = name
-        acting = " and ".join(f"{name} ({variant.at})" for name, variant in self._effects)
-        self.title = f"{MODELS[made.baseline].title}, with {acting}"
-        scatter = asdict(hanger.scatter)
-        held = [scatter.get(each.name) == 0 for each in self._composed.parameters]
-        self._free = np.flatnonzero(~np.array(held))
-        free = [self._composed.parameters[index] for index in self._free]
-        of_class, units = MODELS[made.baseline].bounds, MODELS[made.baseline].units
-        # The class's own keep their names, and are uniform as they are there.
-        self._logarithmic = np.array([in_log(e) and e.name not in of_class for e in free])
-        half = {name: _HALF_WIDTH_IN_SD * sd for name, sd in asdict(hanger.scatter).items()}
-        known = AsMade(MODELS[made.baseline](hanger)).bounds if priors == DESCRIPTION else of_class
-        bounds = {
-            e.name if e.name in of_class else own_name(e): known.get(e.name, bounds_of(e))
-            for e in free
-        }
-        self.units = {name: units.get(e.name, e.unit) for name, e in zip(bounds, free, strict=True)}
-        if math.isfinite(hanger.scatter.tension) and TENSION in bounds:
-            bounds[TENSION] = bounds_of(free[0])  # weighed: as exactly as the description says
-        bounds |= {name: (-half[name], half[name]) for name in bounds if name in half}
-        for each in made.effects:
-            for parameter, both in each.ranges.items():
-                own = parameter if parameter in bounds else f"{each.effect}.{parameter}"
-                bounds[own] = both
-        self.bounds = bounds
+    def values(self, theta: FloatArray) -> FloatArray:
+        """Return parameter sets of the hanger with effects from those of the class."""
+        raise NotImplementedError
 
     def conditions(self, test: ModalTest) -> Conditions:
-        """Its added mass, and its temperature and level where an effect follows them."""
-        followed = {each for name, _ in self._effects for each in EFFECTS[name].follows}
-        warm, hard = "temperature" in followed, "amplitude" in followed
-        amplitude = test.frequencies_amplitude
-        return Conditions(
-            temperature_shift_k=test.temperature_c - self._reference_c if warm else 0.0,
-            amplitude=amplitude if hard and math.isfinite(amplitude) else 1.0,
-            added_mass=test.added_mass,
-        )
+        """Return its added mass, and its temperature and level where an effect follows them."""
+        return self.adopted.conditions(test)
 
     def refuse(self, test: ModalTest) -> None:
         """Raises BadInput as any class, and where an effect follows a temperature not given."""
@@ -107,30 +70,163 @@ class Adopted(Model):
         return self.frequencies_at(theta, modes, Conditions())
 
     def frequencies_at(self, theta: FloatArray, modes: int, conditions: Conditions) -> FloatArray:
-        found = self._composed.modes(self._values(theta), conditions, modes, shapes=False)
+        found = self.adopted.bar.modes(self.values(theta), conditions, modes, shapes=False)
         return found.frequency_hz
 
     def shapes(self, theta: FloatArray, modes: int, x_m: FloatArray) -> FloatArray:
-        baseline = AdoptedName.parse(self.name).baseline
-        composed = ComposedHanger(self.hanger, baseline, self._effects, tuple(map(float, x_m)))
-        seen = composed.modes(self._values(theta), Conditions(), modes).shape
+        bar = self.adopted.with_sensors(tuple(map(float, x_m)))
+        seen = bar.modes(self.values(theta), Conditions(), modes).shape
         return np.stack([seen[:, axis, :, :, axis] for axis in range(len(PLANES))], axis=1)
 
+    @property
+    def has_shapes(self) -> bool:
+        return True
+
+    def physical(self, theta: FloatArray, sensors: int = 0) -> PhysicalHanger:
+        """Return the hangers of `theta` with their effects, at rest and at the reference."""
+        return self.adopted.with_sensors((0.0,) * sensors).physical(
+            self.values(theta), Conditions()
+        )
+
     def springs_n_m_rad(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The ends' own springs and those of the effects, each (n, planes)."""
-        physical = self._composed.physical(self._values(theta), Conditions())
-        compliance = np.einsum("nepp->nep", physical.rotational_compliance_rad_n_m)
+        """Return the ends' own springs and those of the effects, each (n, planes)."""
+        compliance = np.einsum("nepp->nep", self.physical(theta).rotational_compliance_rad_n_m)
         with np.errstate(divide="ignore"):
             springs = 1 / compliance
         return springs[:, 0], springs[:, 1]
 
-    def _values(self, theta: FloatArray) -> FloatArray:
-        """All values of the composed hanger (n, values) from parameter sets (n, parameters)."""
-        values = np.zeros((len(theta), len(self._composed.parameters)))
+
+class AdoptedAsMade(_WithEffects, AsMade):
+    """The class of one adopted name, with the priors of the hanger's description.
+
+    Its parameters are the baseline's as made, then the effects'. Its tension is that at the
+    reference temperature and at rest, where an effect changes it.
+    """
+
+    has_slopes = False
+
+    def __init__(self, name: str, hanger: Hanger):
+        self.adopted = AdoptedHanger.of(name, hanger)
+        AsMade.__init__(self, self.adopted.baseline_class)
+        self.name, self.title, self.swaps = name, self.adopted.title, ()
+        own = self.adopted.effect_parameters
+        bounds = dict(self.bounds)
+        if math.isfinite(known := hanger.scatter.tension):  # weighed
+            bounds[TENSION] = (1 - known, 1 + known)
+        self.effect_names = tuple(own)
+        self.bounds = bounds | self.adopted.effect_bounds
+        self.units = {**self.units, **{each: parameter.unit for each, parameter in own.items()}}
+
+    def values(self, theta: FloatArray) -> FloatArray:
+        return self.adopted.in_plain_values(theta)
+
+
+class Adopted(_WithEffects):
+    """The class of one adopted name with uniform priors: that of the thesis, or as shm 1.0 had it.
+
+    Parameters are the baseline's at the described length, logarithms of the deviations of section,
+    density, length and modulus, each in the standard deviation of the hanger's scatter, and the
+    effects'. The bar has neither own weight nor stiff fittings.
+    """
+
+    def __init__(self, name: str, hanger: Hanger, priors: str = THESIS):
+        super().__init__(hanger)
+        self.priors = priors
+        self.adopted = AdoptedHanger.of(name, hanger, with_terms=False)
+        self.name, self.title = name, self.adopted.title
+        baseline = MODELS[self.adopted.baseline]
+        known = self.adopted.bar.model.bounds if priors == DESCRIPTION else baseline.bounds
+        left_out = {LENGTH} if hanger.nominal_tension_n else {LENGTH, TENSION}
+        bounds = {key: known[key] for key in baseline.bounds if key not in left_out}
+        weighed = hanger.scatter.tension
+        if math.isfinite(weighed) and TENSION in bounds:
+            bounds[TENSION] = (1 - weighed, 1 + weighed)
+        sds = asdict(hanger.scatter)
+        halves = {each: _HALF_WIDTH_IN_SD * sds[each] for each in _DEVIATIONS}
+        bounds |= {each: (-half, half) for each, half in halves.items() if half}
+        own = self.adopted.effect_parameters
+        self.units = {**baseline.units, **dict.fromkeys(_DEVIATIONS, "fraction")}
+        self.units |= {each: parameter.unit for each, parameter in own.items()}
+        self.bounds = bounds | self.adopted.effect_bounds
+
+    def values(self, theta: FloatArray) -> FloatArray:
+        given = dict(zip(self.parameter_names, theta.T, strict=True))
+        one = np.ones(len(theta))
+        given[LENGTH] = np.exp(given.get(_DEVIATIONS[2], 0 * one))
+        given[BENDING] = self.hanger.bending_stiffness_factor * one
+        usual = {TENSION: one, SHEAR: one}
+        names = (*self.adopted.bar.model.parameter_names, *self.adopted.effect_parameters)
+        columns = [given.get(name, usual.get(name, 0 * one)) for name in names]
+        return self.adopted.in_plain_values(np.column_stack(columns))
+
+
+@dataclass(frozen=True, eq=False)
+class AdoptedHanger:
+    """The hanger of an adopted name: `bar` with its effects, and their names in the class.
+
+    `effect_bounds` are limits of uniform priors, in the class's coordinates.
+    """
+
+    baseline: str
+    bar: HangerWithEffects
+    reference_c: float
+    effect_parameters: dict[str, Parameter]
+    effect_bounds: dict[str, tuple[float, float]]
+
+    @classmethod
+    def of(cls, name: str, hanger: Hanger, with_terms: bool = True) -> AdoptedHanger:
+        """Return the hanger of a name; raises UsageError where it names what is not there."""
+        made = checked(name, hanger)
+        model = AsMade(MODELS[made.baseline](hanger), with_terms)
+        effects = [(each.effect, variant_of(each, hanger)) for each in made.effects]
+        bar = HangerWithEffects(model, effects)
+        own = {own_name(each): each for each in bar.effect_parameters}
+        bounds = {key: bounds_of(each) for key, each in own.items()}
+        for effect in made.effects:
+            for parameter, both in effect.ranges.items():
+                bounds[parameter if parameter in bounds else f"{effect.effect}.{parameter}"] = both
+        reference_c = next((e.reference_c for e in made.effects if _follows(e)), math.nan)
+        return cls(made.baseline, bar, reference_c, own, bounds)
+
+    @property
+    def baseline_class(self) -> Model:
+        return self.bar.model.model
+
+    @property
+    def title(self) -> str:
+        acting = " and ".join(f"{name} ({variant.at})" for name, variant in self.bar.effects)
+        return f"{MODELS[self.baseline].title}, with {acting}"
+
+    def with_sensors(self, places_m: tuple[float, ...]) -> HangerWithEffects:
+        return HangerWithEffects(self.bar.model, self.bar.effects, places_m)
+
+    def in_plain_values(self, theta: FloatArray) -> FloatArray:
+        """Return `theta` with the effects' values where it has their logarithms."""
+        logarithmic = [in_log(each) for each in self.effect_parameters.values()]
         plain = theta.copy()
-        plain[:, self._logarithmic] = 10.0 ** theta[:, self._logarithmic]
-        values[:, self._free] = plain
-        return values
+        columns = theta.shape[1] - len(logarithmic) + np.flatnonzero(logarithmic)
+        plain[:, columns] = 10.0 ** theta[:, columns]
+        return plain
+
+    def conditions(self, test: ModalTest) -> Conditions:
+        """Return the conditions of a test that the effects follow, and its added mass."""
+        followed = {each for name, _ in self.bar.effects for each in EFFECTS[name].follows}
+        warm, hard = "temperature" in followed, "amplitude" in followed
+        amplitude = test.frequencies_amplitude
+        return Conditions(
+            temperature_shift_k=test.temperature_c - self.reference_c if warm else 0.0,
+            amplitude=amplitude if hard and math.isfinite(amplitude) else 1.0,
+            added_mass=test.added_mass,
+        )
+
+
+def with_parameters(name: str, hanger: Hanger, names: Sequence[str], priors: str) -> Model:
+    """Return the class of an adopted name that has the parameters `names`.
+
+    Posteriors of shm 1.0, and those with the priors of the thesis, are of `Adopted`.
+    """
+    as_made = LENGTH in names
+    return AdoptedAsMade(name, hanger) if as_made else Adopted(name, hanger, priors)
 
 
 def unfit(name: str, hanger: Hanger) -> str:

@@ -55,12 +55,14 @@ class AsMade(Model):
     `shear_share`. A beam has stiffness and mass of its fittings and turnbuckles, if any (over the
     bar's, a turnbuckle's over the described ones), its `inclination` in degrees from the
     horizontal, `sag_shape` (0 held up by bending, 1 like a cable) and, where the inclination is
-    stated, `sag_stiffness`, that against sag over EA/L.
+    stated, `sag_stiffness`, that against sag over EA/L. Without terms it has none of these.
     """
 
     priors = DESCRIPTION
+    effect_names: tuple[str, ...] = ()
+    """Parameters of effects of the catalogue, which stand last and have uniform priors."""
 
-    def __init__(self, model: Model):
+    def __init__(self, model: Model, with_terms: bool = True):
         super().__init__(model.hanger)
         if TENSION in model.bounds and not isinstance(model, Beam):
             # A reduced basis is made for the tensions that its class considers.
@@ -71,7 +73,7 @@ class AsMade(Model):
         hanger = self.hanger
         deck_m, arch_m = self.fittings_m = super().stiff_ends_m
         self.swaps = model.swaps if deck_m == arch_m else ()
-        self.has_terms = isinstance(model, Beam) and hanger.as_hanger
+        self.has_terms = with_terms and isinstance(model, Beam) and hanger.as_hanger
         own = [name for name in model.parameter_names if name not in (TENSION, LENGTH)]
         self.springs = tuple(own)
         self.length_is_open = hanger.plate is not None and isinstance(model, Beam)
@@ -99,6 +101,11 @@ class AsMade(Model):
 
     def usual(self, name: str) -> float:
         return float(self.terms[name].value(np.zeros(1))[0])
+
+    @property
+    def has_slopes(self) -> bool:
+        """Return True where `frequencies_near` and `shapes_near` apply."""
+        return self.has_terms
 
     @property
     def expensive(self) -> bool:  # type: ignore[override]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput, UsageError
-from shm.models import PRIORS, Model, applicable, build, described
+from shm.models import PRIORS, THESIS, AsMade, Model, applicable, build, described
 from shm.models.adopted import AdoptedEffect, AdoptedName, missed_by_one_test, places_of
 from shm.models.effects import EFFECTS, Variant
 from shm.values import AddedMass, ModalTest, Scatter
@@ -27,7 +27,9 @@ ADOPTABLE = [
 
 def parameters(model: Model, **values: float) -> np.ndarray:
     """One parameter set (1, parameters): nominal tension, as described, but for `values`."""
-    known = {"theta_F": 1.0, **values}
+    known = {"theta_F": 1.0, "theta_L": 1.0, **values}
+    if isinstance(model, AsMade):
+        known = {name: model.usual(name) for name in model.terms} | known
     return np.array([[known.get(name, 0.0) for name in model.parameter_names]])
 
 
@@ -156,7 +158,11 @@ def test_a_class_that_follows_the_temperature_refuses_a_test_without() -> None:
 def test_priors_are_those_of_the_catalogue_and_of_the_scatter() -> None:
     bounds = build(MASS, HANGER_3).bounds
     mass = EFFECTS["point_mass"].parameters(HANGER_3, Variant())[0]
-    assert bounds["section"] == pytest.approx((-0.01 * 3**0.5, 0.01 * 3**0.5))
+    as_made = build("beam1", HANGER_3).bounds
+    assert {name: bounds[name] for name in as_made} == as_made
+    uniform = build(MASS, HANGER_3, THESIS).bounds
+    assert uniform["section"] == pytest.approx((-0.01 * 3**0.5, 0.01 * 3**0.5))
+    assert [*uniform][-2:] == [*bounds][-2:] == ["log10_mass_kg", "x_m"]
     assert bounds["log10_mass_kg"][0] == pytest.approx(np.log10(mass.lower))
     assert bounds["x_m"] == (0.0, 12.0)
     signed = build("beam1+bending_stiffness@everywhere", HANGER_3).bounds["stiffness_change"]
