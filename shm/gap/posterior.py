@@ -41,7 +41,8 @@ _DIFFERENCE, _STEEPEST, _FARTHEST = 1e-4, 1e3, 4.5
 _SAME, _FAR_BELOW = 0.3, 10.0
 # Numerical: draws and their proposals. Weights correct for all of them.
 _ROUND, _ROUNDS, _AT_FIRST, _FROM_PRIOR, _FROM_FIRST = 150, 24, 0.3, 0.1, 0.2
-_WIDTHS = (1.0, 2.0)
+_WIDTHS, _WIDE_EVERY, _CANDIDATES = (1.0, 2.0), 4, 3000
+_LEAST_WEIGHT, _RIDGE = 1e-2, 1e-6
 _SETTLED = 0.3  # of a prior's standard deviation: over less the slopes of linear parameters hold
 
 
@@ -147,10 +148,14 @@ def _same(one: Peak, other: Peak) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Draws(Rows):
-    """Points z (n, d), their linear parameters at their best, by the likeliest error `node`."""
+    """Points z (n, d), their linear parameters at their best, by the likeliest error `node` (n,).
+
+    `residual` (n, data) is that with the linear parameters as they go along with the others.
+    """
 
     z: FloatArray
     node: IntArray
+    residual: FloatArray
 
 
 class _Collapsed:
@@ -165,24 +170,37 @@ class _Collapsed:
         self._follow = np.linalg.solve(peak.covariance[own], across.T).T
         self._peak = peak.z
 
-    def settle(self, w: FloatArray) -> tuple[_Draws, FloatArray]:
-        """Return points with other parameters w (n, o), and the log of their target density (n,).
-
-        The linear parameters go along as at the peak, then where they are best.
-        """
+    def along(self, w: FloatArray) -> FloatArray:
+        """Return points (n, d) with others w (n, o) and the linear parameters as at the peak."""
         target = self.target
         z = np.tile(self._peak, (len(w), 1))
         z[:, target.other] = w
-        along = (w - self._peak[target.other]) @ self._follow.T
-        z[:, target.linear] = (z[:, target.linear] + along).clip(-_FARTHEST, _FARTHEST)
-        log, step, node = self.linear.marginal(target.residual(z), z[:, target.linear])
-        z[:, target.linear] += step
+        moved = z[:, target.linear] + (w - self._peak[target.other]) @ self._follow.T
+        z[:, target.linear] = moved.clip(-_FARTHEST, _FARTHEST)
+        return z
+
+    def settle(self, w: FloatArray) -> tuple[_Draws, FloatArray]:
+        """Return points with other parameters w (n, o), and the log of their target density (n,).
+
+        Where the linear parameters go far, the model is solved once more there.
+        """
+        columns, z = self.target.linear, self.along(w)
+        residual = self.target.residual(z)
+        log, step, node = self.linear.marginal(residual, z[:, columns])
         far = np.flatnonzero((np.abs(step) > _SETTLED).any(axis=1))
         if len(far):
-            again = self.linear.marginal(target.residual(z[far]), z[np.ix_(far, target.linear)])
-            log[far], node[far] = again[0], again[2]
-            z[np.ix_(far, target.linear)] += again[1]
-        return _Draws(z, node), np.asarray(log + log_normal(w))
+            there = z[far].copy()
+            there[:, columns] += step[far]
+            moved = self.target.residual(there) + step[far] @ self.slopes[:, columns].T
+            residual[far] = moved
+            log[far], step[far], node[far] = self.linear.marginal(moved, z[np.ix_(far, columns)])
+        z[:, columns] += step
+        return _Draws(z, node, residual), np.asarray(log + log_normal(w))
+
+    def log_target(self, w: FloatArray, residual: FloatArray) -> FloatArray:
+        """Return the log of the target density (n,) by residuals that are known already."""
+        z = self.along(w)
+        return self.linear.marginal(residual, z[:, self.target.linear])[0] + log_normal(w)
 
     def scatter(self, draws: _Draws, rng: np.random.Generator) -> FloatArray:
         """Return the points (n, d) with their linear parameters drawn about their best."""
@@ -202,6 +220,73 @@ class _Collapsed:
         return np.where(np.isfinite(found), found, -np.inf)
 
 
+class _Proposal(Protocol):
+    def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
+        """Return draws (n, o)."""
+
+    def log_density(self, w: FloatArray) -> FloatArray:
+        """Return the log density (n,) at w (n, o)."""
+
+
+class _Wide:
+    """A mixture of t distributions with a share of the prior."""
+
+    def __init__(self, mixture: TMixture, of_prior: float):
+        self.mixture, self.of_prior = mixture, of_prior
+
+    def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
+        w = self.mixture.draw(n, rng)
+        prior: BoolArray = rng.random(n) < self.of_prior
+        w[prior] = rng.standard_normal((int(prior.sum()), w.shape[1]))
+        return w
+
+    def log_density(self, w: FloatArray) -> FloatArray:
+        own = np.log1p(-self.of_prior) + self.mixture.log_density(w)
+        return np.logaddexp(own, np.log(self.of_prior) + log_normal(w))
+
+
+class _Surrogate:
+    """The posterior by a quadratic fit of the residuals at points already solved.
+
+    Draws of a `wide` proposal are weighed by it and drawn again: so it costs no solution of the
+    model. What the fit is off by, weights of exact solutions correct.
+    """
+
+    def __init__(
+        self, collapsed: _Collapsed, known: _Draws, weights: FloatArray, wide: _Wide
+    ):
+        self._collapsed, self._wide = collapsed, wide
+        other = collapsed.target.other
+        w, weights = known.z[:, other], weights + _LEAST_WEIGHT / len(weights)
+        self._centre = np.average(w, axis=0, weights=weights)
+        self._scale = np.sqrt(np.average((w - self._centre) ** 2, axis=0, weights=weights)) + 1e-6
+        usable = np.isfinite(known.residual).all(axis=1)
+        root = np.sqrt(weights[usable])[:, None]
+        columns = root * self._features(w[usable])
+        gram = columns.T @ columns
+        ridge = _RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram))
+        self._fit = np.linalg.solve(gram + ridge, columns.T @ (root * known.residual[usable]))
+        self._log_total = 0.0
+
+    def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
+        w = self._wide.draw(_CANDIDATES, rng)
+        log = self._log(w) - self._wide.log_density(w)
+        self._log_total = float(scipy.special.logsumexp(log) - np.log(len(w)))
+        return np.asarray(w[systematic(normalised(log), n, rng)])
+
+    def log_density(self, w: FloatArray) -> FloatArray:
+        return np.asarray(self._log(w) - self._log_total)
+
+    def _log(self, w: FloatArray) -> FloatArray:
+        return self._collapsed.log_target(w, self._features(w) @ self._fit)
+
+    def _features(self, w: FloatArray) -> FloatArray:
+        """Return one, the places and their products (n, features)."""
+        u = (w - self._centre) / self._scale
+        one, other = np.triu_indices(u.shape[1])
+        return np.hstack([np.ones((len(u), 1)), u, u[:, one] * u[:, other]])
+
+
 def sample(
     target: Target,
     peaks: Sequence[Peak],
@@ -219,28 +304,21 @@ def sample(
         point, log = collapsed.settle(np.empty((1, 0)))
         chosen = point.take(np.zeros(draws, dtype=np.int64))
         return _fit(collapsed, peaks, collapsed.scatter(chosen, rng), float(log[0]), float(draws))
-    pool = _drawn_about(collapsed, peaks, rng, enough)
-    count, method_is_chain = pool.effective, False
+    pool = _draw_about(collapsed, peaks, rng, enough)
+    count, by_chain = pool.effective, False
     chosen = pool.batch.take(systematic(normalised(pool.log_weights), draws, rng))
-    if count < enough and enough >= ENOUGH_EFFECTIVE:
-        start = chosen.z[:, target.other]
-        chain, count, _ = run_chain(collapsed, start, rng)
+    if count < enough:
+        chain, count, _ = run_chain(collapsed, chosen.z[:, target.other], rng)
         chosen = collapsed.settle(chain[rng.choice(len(chain), draws)])[0]
-        method_is_chain = True
+        by_chain = True
     found = rng.permutation(collapsed.scatter(chosen, rng))
-    return _fit(collapsed, peaks, found, pool.log_evidence, count, method_is_chain)
+    return _fit(collapsed, peaks, found, pool.log_evidence, count, by_chain)
 
 
-def _drawn_about(
+def _draw_about(
     collapsed: _Collapsed, peaks: Sequence[Peak], rng: np.random.Generator, enough: float
-) -> Pool[tuple[TMixture, float], _Draws]:
+) -> Pool[_Proposal, _Draws]:
     other = collapsed.target.other
-
-    def log_density(proposal: tuple[TMixture, float], batch: _Draws) -> FloatArray:
-        (mixture, of_prior), w = proposal, batch.z[:, other]
-        own = np.log1p(-of_prior) + mixture.log_density(w)
-        return np.logaddexp(own, np.log(of_prior) + log_normal(w))
-
     near = [each for each in peaks if each.log > peaks[0].log - _FAR_BELOW]
     parts = [
         Normal(each.z[other], width**2 * each.covariance[np.ix_(other, other)])
@@ -248,19 +326,23 @@ def _drawn_about(
         for width in _WIDTHS
     ]
     shares = scipy.special.softmax([each.log_evidence for each in near for _ in _WIDTHS])
-    first = proposal = TMixture(parts, np.maximum(shares, 0.02))
-    pool: Pool[tuple[TMixture, float], _Draws] = Pool(log_density)
+    first = mixture = TMixture(parts, np.maximum(shares, 0.02))
+    pool: Pool[_Proposal, _Draws] = Pool(
+        lambda proposal, batch: proposal.log_density(batch.z[:, other])
+    )
+    proposal: _Proposal = _Wide(first, _AT_FIRST)
     for turn in range(_ROUNDS):
-        of_prior = _FROM_PRIOR if turn else _AT_FIRST
         w = proposal.draw(_ROUND, rng)
-        prior: BoolArray = rng.random(_ROUND) < of_prior
-        w[prior] = rng.standard_normal((int(prior.sum()), len(other)))
         batch, log = collapsed.settle(w)
-        pool.add((proposal, of_prior), _ROUND, batch, log)
+        pool.add(proposal, _ROUND, batch, log)
         if pool.effective > enough:
             break
-        weight = tempered(pool.log_weights, 6 * len(other), 0.7, 1e-3)
-        proposal = proposal.refitted(pool.batch.z[:, other], weight).mixed(first, _FROM_FIRST)
+        fewest = 6 * len(other)
+        weights = tempered(pool.log_weights, fewest, 0.7, 1e-3)
+        mixture = mixture.refitted(pool.batch.z[:, other], weights).mixed(first, _FROM_FIRST)
+        proposal = wide = _Wide(mixture, _FROM_PRIOR)
+        if turn % _WIDE_EVERY:
+            proposal = _Surrogate(collapsed, pool.batch, weights, wide)
     return pool
 
 

@@ -29,7 +29,7 @@ from shm.assumptions import Assumption, Assumptions
 from shm.models.bar_of_terms import BarValues, bar_of_terms
 from shm.models.base import DESCRIPTION, Conditions, Model, radius_m, silent
 from shm.models.beam import Beam, Beam1, Beam3
-from shm.models.hanger import PhysicalHanger, Zone, solve
+from shm.models.hanger import PhysicalHanger, Zone
 from shm.models.solid import S2
 from shm.values import PLANES, FloatArray, Hanger, ModalTest
 
@@ -92,7 +92,6 @@ class AsMade(Model):
         bounds |= {name: term.bounds for name, term in self.terms.items()}
         self.units = {**model.units, **{name: term.unit for name, term in self.terms.items()}}
         self.bounds = bounds
-        self._last_ratio: tuple[tuple[bytes, int], FloatArray] | None = None
 
     @property
     def stiff_ends_m(self) -> tuple[float, float]:
@@ -237,17 +236,6 @@ class AsMade(Model):
                 rotary_inertia_kg_m=turning * bar.mass_per_length_kg_m,
             )
         return self._with_terms(bar, theta) if self.has_terms else bar
-
-    def ratio_to_general(self, theta: FloatArray, modes: int) -> FloatArray:
-        """Return the class's frequencies over those of the general model (n, 2, modes)."""
-        if isinstance(self.model, Beam):
-            return np.ones((len(theta), len(PLANES), modes))
-        key = theta.tobytes(), modes
-        if self._last_ratio is None or self._last_ratio[0] != key:
-            general = solve(self.physical(theta), modes, np.empty(0), shapes=False)
-            found = self.frequencies_hz(theta, modes) / general.frequency_hz
-            self._last_ratio = key, found
-        return self._last_ratio[1]
 
     def _with_terms(self, bar: PhysicalHanger, theta: FloatArray) -> PhysicalHanger:
         """Return bars with fittings, turnbuckles, the tension's gradient and sag."""
