@@ -145,8 +145,7 @@ class Adopted(_WithEffects):
         halves = {each: _HALF_WIDTH_IN_SD * sds[each] for each in _DEVIATIONS}
         bounds |= {each: (-half, half) for each, half in halves.items() if half}
         own = self.adopted.effect_parameters
-        self.units = {**baseline.units, **dict.fromkeys(_DEVIATIONS, "fraction")}
-        self.units |= {each: parameter.unit for each, parameter in own.items()}
+        self.units = {**baseline.units, **{each: of.unit for each, of in own.items()}}
         self.bounds = bounds | self.adopted.effect_bounds
 
     def values(self, theta: FloatArray) -> FloatArray:

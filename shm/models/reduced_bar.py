@@ -21,7 +21,8 @@ STIFFEST = 1e6
 """Of an end spring, in EI/L: one that is stiffer clamps as well, and rounding would be seen."""
 
 _SNAPSHOTS = 60
-_LEFT_OUT = 1e-10  # numerical: of the snapshots' energy, which leaves 1e-6 of a frequency
+_LEFT_OUT = (1e-10, 1e-12)
+"""Of the snapshots' energy, without and with shear: leaves 1e-6 of a frequency (numerical)."""
 _BLOCK = 512
 
 
@@ -331,5 +332,5 @@ def _basis(whole: _Matrices, usual: BarTerms, modes: int) -> FloatArray:
             size = root.T @ vectors
             found.append(size / np.linalg.norm(size, axis=0))
     left, values, _ = np.linalg.svd(np.hstack(found), full_matrices=False)
-    kept = values**2 > _LEFT_OUT * np.sum(values**2)
+    kept = values**2 > _LEFT_OUT[whole.shears] * np.sum(values**2)
     return np.asarray(scipy.linalg.solve_triangular(root.T, left[:, kept]))

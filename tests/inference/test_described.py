@@ -97,11 +97,17 @@ CASES = {
     "fittings, one plane": ("beam2", FITTED, (a_test(planes=("transverse",)),)),
 }
 """Classes, hangers and tests: the frequencies of each depend on other parameters."""
+ADOPTED = {
+    "adopted mass": ("beam1+point_mass@everywhere", ROD, ()),
+    "adopted springs": ("beam2+rotational_end_flexibility@deck_end", FITTED, ()),
+    "adopted stiffness of a strand": ("beam2+bending_stiffness@everywhere", STRAND, ()),
+    "adopted zones, with plates": ("beam3+stiff_end_zones@both_ends", HANGER_3, ()),
+}
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", [*CASES, *ADOPTED])
 def test_places_inverts_theta(case: str) -> None:
-    name, hanger, tests = CASES[case]
+    name, hanger, tests = {**CASES, **ADOPTED}[case]
     coordinates = coordinates_of(name, hanger, *tests)
     z = coordinates.draw_prior(500, np.random.default_rng(1))
     assert z.shape == (500, coordinates.dimension)
@@ -137,6 +143,25 @@ def test_what_is_drawn_afterwards_moves_no_frequency(case: str) -> None:
         weighs = coordinates.model.has_terms and coordinates.model.swaps
         assert (np.quantile(far, 0.2) if weighs else far.max()) < within
         assert far.max() < 5e-3
+
+
+@pytest.mark.parametrize("case", ADOPTED)
+def test_effects_leave_no_deviation_unseen(case: str) -> None:
+    """Effects are in N, kg and m: they tell of the bar's mass and length.
+
+    The modulus of a strand is part of its open bending factor.
+    """
+    name, hanger, tests = ADOPTED[case]
+    coordinates = coordinates_of(name, hanger, *tests)
+    model, z = coordinates.model, coordinates.draw_prior(200, np.random.default_rng(1))
+    assert set(model.effect_names) <= set(coordinates.names)
+    middle, drawn = coordinates.theta(z), coordinates.finished(z, np.random.default_rng(2))
+    both = [model.frequencies_hz(theta, 6) for theta in (middle, drawn)]
+    np.testing.assert_allclose(both[1], both[0], rtol=1e-6)
+    for name in ("section", "density", "theta_L"):
+        column = model.parameter_names.index(name)
+        np.testing.assert_allclose(drawn[:, column], middle[:, column], atol=1e-9)
+        assert np.ptp(drawn[:, column]) > 1e-3
 
 
 def test_what_is_seen_is_as_much_as_the_class_and_the_tests_show() -> None:

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput, UsageError
-from shm.models import PRIORS, THESIS, AsMade, Model, applicable, build, described
+from shm.inference import UpdateOptions
+from shm.models import PRIORS, THESIS, AsMade, Model, applicable, build, class_of, described
 from shm.models.adopted import AdoptedEffect, AdoptedName, missed_by_one_test, places_of
 from shm.models.effects import EFFECTS, Variant
 from shm.values import AddedMass, ModalTest, Scatter
+from tests.helpers import quick_update
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import modes_of
 
@@ -198,3 +200,26 @@ def test_a_shape_reaches_one_and_vanishes_at_clamped_ends() -> None:
 def test_what_a_single_test_cannot_show_is_known() -> None:
     assert missed_by_one_test("temperature_tension", HANGER_3)
     assert not missed_by_one_test("point_mass", HANGER_3)
+
+
+def test_class_of_a_posterior_has_its_parameters() -> None:
+    """Posteriors of shm 1.0 have the deviations of an adopted class in uniform ranges."""
+    model = build(MASS, HANGER_3)
+    former = described(MASS, HANGER_3, THESIS)
+    for each, names in ((model, model.parameter_names), (former, former.parameter_names)):
+        posterior = quick_update.update(
+            [ModalTest("t", modes_of(HANGER_3, 1.0), 3)], each, UpdateOptions(20)
+        )
+        assert posterior.names[:-1] == names
+        found = class_of(replace(posterior, priors="description"), HANGER_3)
+        assert found.parameter_names == names
+        assert isinstance(found, AsMade) == (each is model)
+
+
+def test_frequencies_of_a_former_class_are_those_of_its_bar() -> None:
+    model = described(MASS, HANGER_3, THESIS)
+    theta = parameters(model, log10_mass_kg=-6.0, length=0.002, section=0.01, modulus=0.02)
+    unit = np.exp(0.5 * (2 * 0.01 + 0.02 - 0.01) - 2 * 0.002)
+    tension = np.exp(2 * 0.002 - 2 * 0.01 - 0.02)
+    bare = described("beam1", HANGER_3).frequencies_hz(np.array([[tension, 1.0]]), 5)
+    np.testing.assert_allclose(model.frequencies_hz(theta, 5), unit * bare, rtol=1e-5)
