@@ -43,9 +43,11 @@ _SAME, _FAR_BELOW = 0.3, 10.0
 _ROUND, _ROUNDS, _AT_FIRST, _FROM_PRIOR, _FROM_FIRST = 150, 24, 0.3, 0.1, 0.2
 _WIDTHS, _WIDE_EVERY, _CANDIDATES = (1.0, 2.0), 4, 3000
 _LEAST_WEIGHT, _RIDGE = 1e-2, 1e-6
+_CLUSTERS, _FROM_WITHOUT = 3, 0.4
 _SETTLED = 0.3  # of a prior's standard deviation: over less the slopes of linear parameters hold
 
 
+DEBUG=False
 class Problem(Protocol):
     """What hypotheses predict of one set of data."""
 
@@ -293,10 +295,11 @@ def sample(
     draws: int,
     rng: np.random.Generator,
     enough: float = ENOUGH_EFFECTIVE,
+    without: Fit | None = None,
 ) -> Fit:
     """Return the fit of a hypothesis by `draws` of its posterior about `peaks`, the best first.
 
-    Goes on until `enough` draws are effective, and with emcee where importance sampling gains none.
+    It is looked for also where a fit `without` its last effects has its draws. Goes on until `enough` draws are effective, and with emcee where importance sampling gains none.
     """
     best = peaks[0]
     collapsed = _Collapsed(target, best)
@@ -304,7 +307,7 @@ def sample(
         point, log = collapsed.settle(np.empty((1, 0)))
         chosen = point.take(np.zeros(draws, dtype=np.int64))
         return _fit(collapsed, peaks, collapsed.scatter(chosen, rng), float(log[0]), float(draws))
-    pool = _draw_about(collapsed, peaks, rng, enough)
+    pool = _draw_about(collapsed, _parts(target, peaks, without, rng), rng, enough)
     count, by_chain = pool.effective, False
     chosen = pool.batch.take(systematic(normalised(pool.log_weights), draws, rng))
     if count < enough:
@@ -315,10 +318,14 @@ def sample(
     return _fit(collapsed, peaks, found, pool.log_evidence, count, by_chain)
 
 
-def _draw_about(
-    collapsed: _Collapsed, peaks: Sequence[Peak], rng: np.random.Generator, enough: float
-) -> Pool[_Proposal, _Draws]:
-    other = collapsed.target.other
+def _parts(
+    target: Target, peaks: Sequence[Peak], without: Fit | None, rng: np.random.Generator
+) -> TMixture:
+    """Return t distributions on the peaks, and where the posterior is without the last effects.
+
+    Of an effect that these data hardly show all small sizes are as likely.
+    """
+    other = target.other
     near = [each for each in peaks if each.log > peaks[0].log - _FAR_BELOW]
     parts = [
         Normal(each.z[other], width**2 * each.covariance[np.ix_(other, other)])
@@ -326,7 +333,28 @@ def _draw_about(
         for width in _WIDTHS
     ]
     shares = scipy.special.softmax([each.log_evidence for each in near for _ in _WIDTHS])
-    first = mixture = TMixture(parts, np.maximum(shares, 0.02))
+    first = TMixture(parts, np.maximum(shares, 0.02))
+    if without is None:
+        return first
+    known = without.draws[:, other[other < without.draws.shape[1]]]
+    free = len(other) - known.shape[1]
+    if not known.shape[1]:
+        return first
+    wide = TMixture.of(known, _CLUSTERS, rng)
+    extended = [
+        Normal(
+            np.append(part.mean, np.zeros(free)),
+            scipy.linalg.block_diag(part.covariance, np.eye(free)),
+        )
+        for part in wide.parts
+    ]
+    return first.mixed(TMixture(extended, wide.shares), _FROM_WITHOUT)
+
+
+def _draw_about(
+    collapsed: _Collapsed, first: TMixture, rng: np.random.Generator, enough: float
+) -> Pool[_Proposal, _Draws]:
+    other, mixture = collapsed.target.other, first
     pool: Pool[_Proposal, _Draws] = Pool(
         lambda proposal, batch: proposal.log_density(batch.z[:, other])
     )
@@ -335,6 +363,7 @@ def _draw_about(
         w = proposal.draw(_ROUND, rng)
         batch, log = collapsed.settle(w)
         pool.add(proposal, _ROUND, batch, log)
+        if DEBUG: print('      ', turn, type(proposal).__name__, round(pool.effective), round(pool.log_evidence,2))
         if pool.effective > enough:
             break
         fewest = 6 * len(other)

@@ -150,7 +150,10 @@ class Search:
             behind = best - self.rough[hypothesis]
             if hypothesis.flexible or behind < HOPELESS:
                 enough = ENOUGH_EFFECTIVE if behind < _CLOSE else _ROUGHLY
-                self.fits[hypothesis] = sample(target, peaks, self.draws, self.rng, enough)
+                without = self.baseline if hypothesis.effects else None
+                self.fits[hypothesis] = sample(
+                    target, peaks, self.draws, self.rng, enough, without
+                )
 
     def _leading(self, most: int, effects: int) -> list[Fit]:
         """Return the likeliest fit of each of the leading effects, or pairs."""

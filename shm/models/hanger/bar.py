@@ -49,6 +49,12 @@ class Spans:
     stiffness_factor: FloatArray
     mass_factor: FloatArray
 
+    @property
+    def alike(self) -> bool:
+        """Return True where all rows have the same stretches."""
+        apart = np.ptp(self.start, axis=0).max(), np.ptp(self.length, axis=0).max()
+        return bool(max(apart) < _AT_END)
+
 
 @dataclass(frozen=True, eq=False)
 class Bar:
@@ -107,7 +113,9 @@ def uniform_bar(counts: Counts) -> Bar:
 
 
 def broken_bar(counts: Counts, spans: Spans, kinks: Kinks) -> Bar:
-    """Bars with zones, and functions with kinks."""
+    """Return bars with zones, and functions with kinks."""
+    if spans.alike and np.ptp(kinks.places, axis=0).max(initial=0.0) < _AT_END:
+        return _bar_of_pieces(counts, spans, kinks)
     x, weight, which = _composite(spans, counts.polynomials + HERMITE)
     stiff = weight * np.take_along_axis(spans.stiffness_factor, which[None], axis=2)
     heavy = weight * np.take_along_axis(spans.mass_factor, which, axis=1)
@@ -121,6 +129,108 @@ def broken_bar(counts: Counts, spans: Spans, kinks: Kinks) -> Bar:
     kinked = np.arange(first, first + kinks.count)
     bar.bending[:, :, kinked, kinked] += np.where(factor > 0, _RIDGE, 1.0).T[:, None]
     return Bar(**{**vars(bar), "kinks": kinks, "kink_factor": factor})
+
+
+def _bar_of_pieces(counts: Counts, spans: Spans, kinks: Kinks) -> Bar:
+    """Return bars whose stretches are alike, put together from those of each stretch.
+
+    So most of the work is done once. Kinks take the next of a few rates of decay.
+    """
+    level = np.round(np.log(kinks.decay.clip(1.0, _MOST_DECAY)) / _DECAY_STEP).astype(int)
+    level = level if kinks.count else 0 * level
+    own, which = np.unique(level, return_inverse=True)
+    places = tuple(kinks.forces[0].tolist()), tuple(kinks.steps[0].tolist())
+    start, length = tuple(spans.start[0].tolist()), tuple(spans.length[0].tolist())
+    pieces = [_pieces(counts, start, length, *places, int(each)) for each in own]
+
+    def each_row(name: str) -> FloatArray:
+        found = [getattr(piece, name) for piece in pieces]
+        return np.asarray(found[0] if len(found) == 1 else np.concatenate(found)[which])
+
+    def summed(name: str, factor: FloatArray) -> FloatArray:
+        rows, size = len(which), getattr(pieces[0], name).shape[-1]
+        found = np.empty((rows, size, size))
+        for k, piece in enumerate(pieces):
+            of = np.flatnonzero(which == k)
+            flat = getattr(piece, name).reshape(factor.shape[1], -1)
+            found[of] = (factor[of] @ flat).reshape(len(of), size, size)
+        return found
+
+    bending = [summed("bending", plane) for plane in spans.stiffness_factor]
+    first = HERMITE + counts.polynomials
+    kinked = np.arange(first, first + kinks.count)
+    factor = each_row("kink_factor")
+    for plane in bending:
+        plane[:, kinked, kinked] += np.where(factor > 0, _RIDGE, 1.0)
+    rate = np.exp(_DECAY_STEP * level) if kinks.count else kinks.decay
+    return Bar(
+        np.stack(bending, axis=1),
+        each_row("tension"),
+        each_row("gradient"),
+        summed("mass", spans.mass_factor),
+        each_row("shear"),
+        summed("rotation", spans.mass_factor) if counts.shear else each_row("tension"),
+        each_row("area"),
+        counts,
+        Kinks(kinks.forces, kinks.steps, rate) if kinks.count else None,
+        factor.T if len(factor) > 1 else np.repeat(factor.T, len(which), axis=1),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Energies of the stretches of one bar.
+
+    `bending`, `mass` and `rotation` are (stretches, functions, functions), the others those of the
+    whole bar with one row; `kink_factor` (1, kinks).
+    """
+
+    bending: FloatArray
+    mass: FloatArray
+    rotation: FloatArray
+    tension: FloatArray
+    gradient: FloatArray
+    shear: FloatArray
+    area: FloatArray
+    kink_factor: FloatArray
+
+
+@lru_cache(maxsize=128)
+def _pieces(
+    counts: Counts,
+    start: tuple[float, ...],
+    length: tuple[float, ...],
+    forces: tuple[float, ...],
+    steps: tuple[float, ...],
+    level: int,
+) -> _Pieces:
+    """Return the energies of stretches that begin at `start`, with a decay of kinks by `level`."""
+    count = len(start)
+    one = np.ones((1, count))
+    spans = Spans(np.array([start]), np.array([length]), one[None], one)
+    x, weight, which = _composite(spans, counts.polynomials + HERMITE)
+    table = Table.joined(hermite(x), polynomials(x, counts.polynomials))
+    kinks = Kinks(np.array([forces]), np.array([steps]), np.array([np.exp(_DECAY_STEP * level)]))
+    factor = np.empty((0, 1))
+    if kinks.count:
+        bent = kinks.table(x)
+        factor = normalised(bent.curvature, weight)
+        table = Table.joined(table, bent.scaled(factor))
+    whole = _bar(x, table, weight, weight[None], weight, counts)
+    parts = [
+        _bar(x[:, rows], table.part(rows), weight[:, rows], weight[None][:, :, rows], weight[:, rows], counts)
+        for rows in (np.flatnonzero(which[0] == k) for k in range(count))
+    ]  # fmt: skip
+    return _Pieces(
+        np.concatenate([each.bending[:, 0] for each in parts]),
+        np.concatenate([each.mass for each in parts]),
+        np.concatenate([each.rotation for each in parts]),
+        whole.tension,
+        whole.gradient,
+        whole.shear,
+        whole.area,
+        factor.T,
+    )
 
 
 def _bar(
@@ -201,6 +311,7 @@ _LIGHT, _SOFT = 2e-3, 20.0
 than 1e-6 of what smooth functions do not already say."""
 
 _AT_END = 1e-9  # rounding of places along the bar
+_DECAY_STEP = 0.25  # numerical: of the logarithm of the rate of a kink's decay
 
 # Numerical: frequencies beside a zone three times as stiff are right to 1e-6, with shear to 1e-5;
 # those of a uniform bar need none more.

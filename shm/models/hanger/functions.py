@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shm.values import FloatArray
+from shm.values import FloatArray, IntArray
 
 HERMITE = 4
 """The end functions come first."""
@@ -50,6 +50,10 @@ class Table:
     @classmethod
     def joined(cls, *tables: Table) -> Table:
         return cls(*(np.concatenate(parts) for parts in zip(*map(_fields, tables), strict=True)))
+
+    def part(self, points: IntArray) -> Table:
+        """Return the same at some of the points."""
+        return Table(*(field[..., points] for field in _fields(self)))
 
     def scaled(self, factor: FloatArray) -> Table:
         """Each function times `factor` (functions, rows)."""
