@@ -21,6 +21,8 @@ from shm.inference.options import Progress, silent
 from shm.values import Leads
 from shm.values.leading import MIN_NO_GAP_PROBABILITY, find_leading_cause
 
+OF_THE_ANSWER = 0.1
+"""Of hypotheses with this probability all draws are wanted: the answer rests on them."""
 WITHIN_REACH = 7.0
 """Judgement: at log odds of a thousand to one a cause has no chance beside the best one."""
 AS_GOOD_A_FIT = 1.0
@@ -103,6 +105,17 @@ def attribute(
     """
     search = Search(problem, options, rng, progress)
     search.run()
+    kinds = families(search.scored(), search.variants)
+    chances, _ = probabilities(kinds)
+    search.sample_further(
+        [
+            each.hypothesis
+            for kind, chance in zip(kinds, chances, strict=True)
+            for each in kind.tried
+            if each.fit is not None
+            and chance * np.exp(each.log_evidence - kind.best.log_evidence) > OF_THE_ANSWER
+        ]
+    )
     tried = search.scored()
     kinds = families(tried, search.variants)
     likeliest = _fit([kind for kind in kinds if not kind.flexible])

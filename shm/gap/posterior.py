@@ -10,7 +10,7 @@ refitted to their own draws, with a share of the prior so that no weight is unbo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -47,7 +47,6 @@ _CLUSTERS, _FROM_WITHOUT = 3, 0.4
 _SETTLED = 0.3  # of a prior's standard deviation: over less the slopes of linear parameters hold
 
 
-DEBUG=False
 class Problem(Protocol):
     """What hypotheses predict of one set of data."""
 
@@ -318,6 +317,23 @@ def sample(
     return _fit(collapsed, peaks, found, pool.log_evidence, count, by_chain)
 
 
+def approximate(
+    target: Target, peaks: Sequence[Peak], draws: int, rng: np.random.Generator, beyond: float
+) -> Fit:
+    """Return the fit of a hypothesis by normal distributions on its peaks (Laplace's method).
+
+    `beyond` is added to the log evidence: the difference to sampling of a like posterior.
+    """
+    log = np.array([peak.log_evidence for peak in peaks])
+    counts = rng.multinomial(draws, normalised(log))
+    found = np.vstack(
+        [rng.multivariate_normal(p.z, p.covariance, n) for p, n in zip(peaks, counts, strict=True)]
+    )
+    log_evidence = float(scipy.special.logsumexp(log)) + beyond
+    fit = _fit(_Collapsed(target, peaks[0]), peaks, found, log_evidence, float(draws))
+    return replace(fit, method="normal", effective=float("nan"))
+
+
 def _parts(
     target: Target, peaks: Sequence[Peak], without: Fit | None, rng: np.random.Generator
 ) -> TMixture:
@@ -363,7 +379,6 @@ def _draw_about(
         w = proposal.draw(_ROUND, rng)
         batch, log = collapsed.settle(w)
         pool.add(proposal, _ROUND, batch, log)
-        if DEBUG: print('      ', turn, type(proposal).__name__, round(pool.effective), round(pool.log_evidence,2))
         if pool.effective > enough:
             break
         fewest = 6 * len(other)

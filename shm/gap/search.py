@@ -16,7 +16,7 @@ from shm.errors import BadInput, UsageError
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Peak
 from shm.gap.law_error import allow_for_laws
 from shm.gap.linear import Linear
-from shm.gap.posterior import Target, find_peaks, sample
+from shm.gap.posterior import Target, approximate, find_peaks, sample
 from shm.gap.probabilities import ScoredHypothesis
 from shm.gap.problem import GapProblem
 from shm.gap.scan import Scan, scan, scan_beside
@@ -35,7 +35,9 @@ SUPPORTED = 2.0
 """Log evidence that an effect gains where it explains something, so that pairs are tried."""
 DROWNED = "Even at its largest it would drown in the errors of these data."
 _MOST_SCANNED, _MOST_PAIRS = 12, 8
-_CLOSE, _ROUGHLY = 3.0, 60  # log evidence of contenders, which get all draws; others get so many
+# Numerical: log evidence behind the best, and how many, of those sampled rather than approximated,
+# and until how many draws are effective; what the answer rests on is sampled further.
+_CLOSE, _MOST_SAMPLED, _ROUGHLY = 3.0, 6, 60
 
 
 def hypotheses(problem: GapProblem, without: tuple[str, ...] = ()) -> tuple[Hypothesis, ...]:
@@ -82,6 +84,7 @@ class Search:
         self.baseline = fit_alone(problem, rng, options.draws)
         self.fits: dict[Hypothesis, Fit] = {ALONE: self.baseline}
         self.rough: dict[Hypothesis, float] = {}
+        self._peaks: dict[Hypothesis, tuple[Target, list[Peak]]] = {}
         linear = Linear(problem.likelihood(ALONE), self.baseline.slopes)
         every = hypotheses(problem, options.without)
         scans = {h: scan(problem, self.baseline, linear, h) for h in every}
@@ -146,14 +149,33 @@ class Search:
                 climbed[hypothesis] = target, peaks
                 self.rough[hypothesis] = max(peak.log_evidence for peak in peaks)
                 best = max(best, self.rough[hypothesis])
-        for hypothesis, (target, peaks) in climbed.items():
-            behind = best - self.rough[hypothesis]
-            if hypothesis.flexible or behind < HOPELESS:
-                enough = ENOUGH_EFFECTIVE if behind < _CLOSE else _ROUGHLY
-                without = self.baseline if hypothesis.effects else None
-                self.fits[hypothesis] = sample(
-                    target, peaks, self.draws, self.rng, enough, without
-                )
+        near = [h for h in climbed if h.flexible or self.rough[h] > best - HOPELESS]
+        near.sort(key=lambda h: -self.rough[h])
+        beyond = []
+        for count, hypothesis in enumerate(near):
+            target, peaks = climbed[hypothesis]
+            if count < _MOST_SAMPLED and self.rough[hypothesis] > best - _CLOSE:
+                self._sample(hypothesis, target, peaks, _ROUGHLY)
+                beyond.append(self.fits[hypothesis].log_evidence - self.rough[hypothesis])
+            else:
+                off = float(np.mean(beyond)) if beyond else 0.0
+                found = approximate(target, peaks, self.draws, self.rng, off)
+                self.fits[hypothesis] = found
+        self._peaks |= climbed
+
+    def _sample(
+        self, hypothesis: Hypothesis, target: Target, peaks: Sequence[Peak], enough: float
+    ) -> None:
+        without = self.baseline if hypothesis.effects else None
+        self.fits[hypothesis] = sample(target, peaks, self.draws, self.rng, enough, without)
+
+    def sample_further(self, probable: Sequence[Hypothesis]) -> None:
+        """Sample what the answer rests on until enough draws are effective."""
+        for hypothesis in probable:
+            fit = self.fits[hypothesis]
+            if hypothesis in self._peaks and not fit.effective >= ENOUGH_EFFECTIVE:
+                self.progress(f"sampling {hypothesis.name or 'something unknown'}", 0.9)
+                self._sample(hypothesis, *self._peaks[hypothesis], ENOUGH_EFFECTIVE)
 
     def _leading(self, most: int, effects: int) -> list[Fit]:
         """Return the likeliest fit of each of the leading effects, or pairs."""
