@@ -112,7 +112,7 @@ def is_in_group(row: Row, names: Sequence[str]) -> bool:
 
 def is_sure_and_wrong(row: Row) -> bool:
     """Return True if a group is claimed with more than `SURE` and holds nothing that is true."""
-    return row["claim"] > SURE and is_wrong(row)
+    return bool(row["claim"] > SURE and is_wrong(row))
 
 
 def is_right(row: Row) -> bool:
@@ -127,7 +127,7 @@ def is_inherent(row: Row) -> bool:
 
 def is_wrong(row: Row) -> bool:
     """Return True if a cause leads and its group holds nothing that is true."""
-    return row["leads"] == "cause" and not is_right(row) and not is_inherent(row)
+    return bool(row["leads"] == "cause" and not is_right(row) and not is_inherent(row))
 
 
 def format_share(rows: Sequence[Row], test: Callable[[Row], bool]) -> str:
@@ -167,15 +167,13 @@ def score(rows: Sequence[Row]) -> str:
     stated = [row for row in full if row["claim"] >= STATED]
 
     def holds_all(row: Row) -> bool:
-        return all(
-            is_in_group(row, each["accepted"]) for each in row["truth"]["causes"]
-        )
+        return all(is_in_group(row, each["accepted"]) for each in row["truth"]["causes"])
 
     def is_unexplained(row: Row) -> bool:
-        return row["leads"] == "unexplained"
+        return bool(row["leads"] == "unexplained")
 
     def is_missed(row: Row) -> bool:
-        return row["leads"] == "no gap"
+        return bool(row["leads"] == "no gap")
 
     lines = [
         ("refused", f"{len(refused)} of {len(rows)}"),
@@ -219,8 +217,7 @@ def format_case(row: Row) -> str:
     """Format one diagnosis as a line."""
     truth = row["truth"]
     planted = " + ".join(
-        f"{each['cause']} {each['size']:.3g} ({each['visible']:.0f} se)"
-        for each in truth["causes"]
+        f"{each['cause']} {each['size']:.3g} ({each['visible']:.0f} se)" for each in truth["causes"]
     )
     inherent = ", ".join(f"{name} {size:.0f} se" for name, size in truth["inherent"].items())
     head = f"{row['index']:3d} {'-' if row['without'] else ' '} {truth['kind']:6s} "
@@ -236,7 +233,8 @@ def format_case(row: Row) -> str:
     verdict = next((name for name, test in verdicts.items() if test(row)), "none")
     off = [row[key]["mean"] / truth["tension_n"] - 1 for key in ("before", "after")]
     return (
-        f"{head}\n        {verdict}: {named}, claim {row['claim']:.2f}, no gap {row['no_gap']:.2f}, "
+        f"{head}\n        {verdict}: {named}, claim {row['claim']:.2f}, "
+        f"no gap {row['no_gap']:.2f}, "
         f"unknown {row['unexplained']:.2f}; tension {off[0]:+.2%} -> {off[1]:+.2%}"
         f"{'' if _covers(row) else ' NOT COVERED'}; {row['seconds']:.0f} s\n"
         f"        group: {', '.join(row['group'])}"
@@ -269,8 +267,9 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--without-cause", action="store_true")
     parser.add_argument("--score", action="store_true", help="print what the file holds, no more")
-    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--out", type=Path, default=ROOT / "build" / "gap_worlds.json")
     asked = parser.parse_args()
+    asked.out.parent.mkdir(parents=True, exist_ok=True)
     rows = _read(asked.out, asked.seed)
     wanted = [(index, False) for index in range(asked.hangers)]
     if asked.without_cause:

@@ -232,9 +232,7 @@ def _find_lowest(stiffness: Array, mass: Array, count: int) -> tuple[Array, Arra
     return values[order], vectors[:, order]
 
 
-def solve_modes(
-    bar: Bar, count: int, places: tuple[float, ...] = (), elements: int = 90
-) -> Modes:
+def solve_modes(bar: Bar, count: int, places: tuple[float, ...] = (), elements: int = 90) -> Modes:
     """Return the first `count` modes of one plane of a hanger, with the deflection at places.
 
     With absorbers or a neighbour there are more modes than the bar has: returned are those whose
@@ -259,15 +257,16 @@ def _as_modes(
     return Modes(np.sqrt(values) / (2 * math.pi), shapes[rows], share)
 
 
-def _solve_joined(
-    bar: Bar, parts: _Matrices, count: int, places: tuple[float, ...]
-) -> Modes:
+def _solve_joined(bar: Bar, parts: _Matrices, count: int, places: tuple[float, ...]) -> Modes:
     stiffness, mass, free = parts.stiffness, parts.mass, list(parts.free)
     joints: list[tuple[int, int, float]] = []
     for place, kilograms, frequency_hz in bar.absorbers:
         joints.append((parts.node(place), len(mass), kilograms * (2 * math.pi * frequency_hz) ** 2))
         free.append(len(mass))
-        stiffness, mass = block_diag(stiffness, 0.0), block_diag(mass, kilograms)
+        stiffness, mass = (
+            block_diag(stiffness, np.zeros((1, 1))),
+            block_diag(mass, np.full((1, 1), kilograms)),
+        )
     if bar.neighbour is not None:
         place, k = bar.clamp
         other = _assemble(bar.neighbour, place_nodes(bar.neighbour, (place,), len(parts.x)))
@@ -289,7 +288,7 @@ def _solve_joined(
     plain = np.zeros((own, count))
     plain[bare.free] = vectors
     likeness = (plain.T @ parts.mass @ shapes[:own]) ** 2
-    chosen = []
+    chosen: list[int] = []
     for row in likeness:
         row[chosen] = -1.0
         chosen.append(int(np.argmax(row)))

@@ -4,6 +4,7 @@ import json
 import math
 import tomllib
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,8 @@ from tests.worlds.gapped_hangers import (
     solve,
 )
 from tests.worlds.hermite_bars import Array, Bar, Stretch, solve_modes
+
+pytestmark = pytest.mark.trial  # of the world alone: it shares nothing with the product
 
 L, T, EI, M = 10.0, 2e5, 4e5, 40.0
 PINNED = replace(Bar(L, T, EI, M), rotation_n_m=(0.0, 0.0))
@@ -54,7 +57,8 @@ def test_solve_modes_clamped() -> None:
     def zero(z: float) -> float:
         return math.cos(z) - 1 / math.cosh(z)
 
-    roots = np.array([brentq(zero, (n + 0.5) * math.pi - 1, (n + 0.5) * math.pi + 1) for n in ORDERS])
+    middle = (ORDERS + 0.5) * math.pi
+    roots = np.array([brentq(zero, z - 1, z + 1) for z in middle])
     exact = roots**2 / L**2 * math.sqrt(EI / M) / (2 * math.pi)
     assert frequencies(Bar(L, 0.0, EI, M)) == pytest.approx(exact, rel=2e-5)
 
@@ -94,7 +98,7 @@ def test_solve_modes_timoshenko_pinned() -> None:
 
 
 def test_solve_modes_shear_never_locks() -> None:
-    slender = replace(PINNED, shear_n=1e5 * EI, rotary_kg_m=1e-7 * M)
+    slender = replace(PINNED, shear_n=1e6 * EI, rotary_kg_m=1e-7 * M)
     assert frequencies(slender) == pytest.approx(frequencies(PINNED), rel=1e-5)
 
 
@@ -139,7 +143,7 @@ def test_solve_modes_point_mass_converges() -> None:
     edges = [0.0, *np.sqrt(square[:6])]
     exact = [
         brentq(zero, low * (1 + 1e-9) + 1e-9, high * (1 - 1e-9)) / (2 * math.pi)
-        for low, high in zip(edges[:-1], edges[1:], strict=True)
+        for low, high in pairwise(edges)
     ]
     bar = replace(PINNED, masses=((x, heavy),))
     coarse, fine = frequencies(bar, 6), frequencies(bar, 6, 360)
@@ -167,7 +171,8 @@ def test_solve_modes_absorber_is_a_mass() -> None:
     hz = 0.01
     soft = frequencies(replace(PINNED, absorbers=((0.3 * L, 5e6, hz),)), 4)
     spring = 5e6 * (2 * math.pi * hz) ** 2
-    assert soft == pytest.approx(frequencies(replace(PINNED, springs=((0.3 * L, spring),)), 4), 1e-3)
+    held = frequencies(replace(PINNED, springs=((0.3 * L, spring),)), 4)
+    assert soft == pytest.approx(held, 1e-3)
 
 
 def test_solve_modes_neighbour_alike() -> None:
@@ -247,7 +252,7 @@ def test_make_case_documents(cases: list[Case], tmp_path: Path) -> None:
         document = json.loads(modes_file.read_text(encoding="utf-8"))
         assert 1 <= len(document["tests"]) <= 4
         for test in document["tests"]:
-            hz = {plane: [] for plane in ("transverse", "longitudinal")}
+            hz: dict[str, list[float]] = {plane: [] for plane in ("transverse", "longitudinal")}
             for mode in test["modes"]:
                 hz[mode["plane"]].append(mode["frequency_hz"])
                 assert 8e-5 < mode["frequency_sd_hz"] / mode["frequency_hz"] < 6e-4
@@ -265,7 +270,7 @@ def test_measure_errors_are_as_stated() -> None:
     for index in range(40):
         case = make_case(9, index, quiet, ("none",))
         tests = case.modes["tests"]
-        for one, two in zip(tests[:-1], tests[1:], strict=True):
+        for one, two in pairwise(tests):
             for a, b in zip(one["modes"], two["modes"], strict=True):
                 sd = math.hypot(a["frequency_sd_hz"], b["frequency_sd_hz"])
                 z.append((a["frequency_hz"] - b["frequency_hz"]) / sd)
@@ -283,7 +288,7 @@ def test_plant_vanishes_with_its_size(cause: str) -> None:
     sound = solve(hanger, ())
     small, large = (
         compare(hanger, sound, solve(hanger, (Fault(cause, size * CAUSES[cause].low, 0.37),)))[1]
-        for size in (0.02, 1.0)
+        for size in (0.005, 1.0)
     )
     assert small < 0.1 * large
     assert large > 0
