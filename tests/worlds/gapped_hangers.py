@@ -8,8 +8,8 @@ Hangers are round bars, tubes and strands with sockets; three in ten lean. Ends 
 described (springs of 10,000 to 1,000,000 EI/L), but where a cause says otherwise. Tension 0.5 to
 1.5 times the nominal one; of a hanger whose sag nobody described 0.15 to 0.6 times.
 
-Sizes: the largest change of a single datum, once the tension is fitted, is 5 to 100 of its stated
-standard errors; what lies within the tolerances of a bar (`low` of `CAUSES`) is not planted.
+Sizes: once the tension is fitted, and section, material and length within their tolerances, the
+largest change of a single datum (or of a tolerance) is 5 to 100 of its standard errors.
 
 `CAUSES[...].accepted` are the names that a catalogue of effects may give to a cause; none where it
 knows no such cause. A plain bar clamped at both ends also differs from a sound hanger: by its
@@ -75,7 +75,7 @@ CAUSES: dict[str, Cause] = {
     "joints that soften": Cause(
         ("joint_softening",), 1e-3, 3.0, "EI / k L at level 1", ("levels",)
     ),
-    "clock in all tests": Cause(("timebase",), 0.02, 0.05, "of the frequency"),
+    "clock in all tests": Cause(("timebase",), 0.02, 0.08, "of the frequency"),
     "clock in one test": Cause(("timebase",), 1.5e-3, 0.05, "of the frequency", ("tests",)),
     "turned sensor": Cause(("sensor_misalignment",), 8.0, 45.0, "deg", ("shapes",)),
     "sag": Cause(("sag",), 8.0, 65.0, "deg from the vertical", ("slack",)),
@@ -328,18 +328,65 @@ def solve(hanger: Hanger, faults: tuple[Fault, ...]) -> Data:
     return Data(modes, tuple(clock), tuple(turned))
 
 
-def compare(hanger: Hanger, sound: Data, faulty: Data) -> tuple[float, float]:
-    """Return the largest change of a datum in stated errors: with the tension refitted, and raw."""
-    change = np.concatenate(
+def find_slopes(hanger: Hanger, sound: Data, n: Nuisances) -> Array:
+    """Return what a sound hanger may differ by, as changes of ln f: a row a datum.
+
+    The first column is the tension's, which is free. The others are a standard deviation each: of
+    area, modulus, density, length, a strand's bending, and of the tension of each test.
+    """
+    step = 0.01
+
+    def stiffen(bar: Bar) -> Bar:
+        return replace(bar, bending_n_m2=bar.bending_n_m2 * (1 + step))
+
+    def weigh(bar: Bar) -> Bar:
+        return replace(bar, mass_kg_m=bar.mass_kg_m * (1 + step))
+
+    def thicken(bar: Bar) -> Bar:
+        bending = bar.bending_n_m2 * (1 + step) ** hanger.area_power
+        return weigh(replace(bar, bending_n_m2=bending))
+
+    def lengthen(bar: Bar) -> Bar:
+        return _lengthen(bar, step * bar.length_m)
+
+    bending = math.hypot(n.modulus, n.strand_bending if hanger.kind == "strand" else 0.0)
+    ways = ((stiffen, bending), (weigh, n.density), (thicken, n.area), (lengthen, n.length))
+    share = np.concatenate([sound.modes[key].tension_share for key in sound.modes])
+    columns = [share]
+    for change, sd in ways:
+        other = solve(replace(hanger, bars=(change(hanger.bars[0]), change(hanger.bars[1]))), ())
+        columns.append(_subtract(other, sound) * sd / step)
+    numbers = np.concatenate(
+        [[key[0]] * len(sound.modes[key].tension_share) for key in sound.modes]
+    )
+    for number in range(len(hanger.visits)):
+        columns.append(share * (numbers == number) * n.tension_between_tests)
+    return np.stack(columns, axis=1)
+
+
+def _subtract(one: Data, other: Data) -> Array:
+    """Return the differences of ln f, in the order of the modes of `other`."""
+    return np.concatenate(
         [
-            np.log(faulty.modes[key].frequencies_hz / sound.modes[key].frequencies_hz)
-            + math.log(faulty.clock[key[0]] / sound.clock[key[0]])
-            for key in sound.modes
+            np.log(one.modes[key].frequencies_hz / other.modes[key].frequencies_hz)
+            + math.log(one.clock[key[0]] / other.clock[key[0]])
+            for key in other.modes
         ]
     )
-    share = np.concatenate([sound.modes[key].tension_share for key in sound.modes])
-    left = change - share * (share @ change) / (share @ share)
-    visible, raw = (float(np.abs(each).max()) / hanger.stated_error for each in (left, change))
+
+
+def compare(hanger: Hanger, sound: Data, faulty: Data, slopes: Array) -> tuple[float, float]:
+    """Return the largest change of a datum in stated errors, fitted and raw.
+
+    Fitted are the tension, and within their tolerances section, material, length and the tension of
+    each test; what these would have to be off by, in standard deviations, counts as a datum, too.
+    """
+    change = _subtract(faulty, sound)
+    scaled, tolerances = slopes / hanger.stated_error, np.eye(slopes.shape[1])[1:]
+    data = np.concatenate((change / hanger.stated_error, np.zeros(len(tolerances))))
+    rows = np.vstack((scaled, tolerances))
+    left = data - rows @ np.linalg.lstsq(rows, data, rcond=None)[0]
+    visible, raw = float(np.abs(left).max()), float(np.abs(change).max()) / hanger.stated_error
     if hanger.has_shapes and faulty.turned != sound.turned:
         for modes in sound.modes.values():
             size = np.abs(modes.shapes) / np.abs(modes.shapes).max(axis=0)
@@ -349,7 +396,7 @@ def compare(hanger: Hanger, sound: Data, faulty: Data) -> tuple[float, float]:
     return visible, raw
 
 
-def find_inherent(hanger: Hanger, sound: Data) -> dict[str, float]:
+def find_inherent(hanger: Hanger, sound: Data, slopes: Array) -> dict[str, float]:
     """Return by what a sound hanger is seen to differ from a plain clamped bar, in standard errors.
 
     Names are those of a catalogue of effects.
@@ -368,7 +415,7 @@ def find_inherent(hanger: Hanger, sound: Data) -> dict[str, float]:
     for name, bars in plain.items():
         if tuple(bars) != hanger.bars:
             without = solve(replace(hanger, bars=(bars[0], bars[1])), ())
-            found[name] = compare(hanger, without, sound)[0]
+            found[name] = compare(hanger, without, sound, slopes)[0]
     return {name: size for name, size in found.items() if size >= INHERENT}
 
 
@@ -603,7 +650,9 @@ def draw_fault(draws: Draws, cause: str, hanger: Hanger) -> Fault:
     )
 
 
-def _size_fault(draws: Draws, fault: Fault, hanger: Hanger, sound: Data) -> Fault | None:
+def _size_fault(
+    draws: Draws, fault: Fault, hanger: Hanger, sound: Data, slopes: Array
+) -> Fault | None:
     """Return the fault in a size that a user would notice; None where there is none."""
     cause, target = CAUSES[fault.cause], draws.log(*VISIBLE)
     low, high = cause.low, cause.high
@@ -611,7 +660,7 @@ def _size_fault(draws: Draws, fault: Fault, hanger: Hanger, sound: Data) -> Faul
         low, high = 0.35, 0.7  # the tolerance of its bending stiffness is ten times a bar's
 
     def see(size: float) -> float:
-        return compare(hanger, sound, solve(hanger, (replace(fault, size=size),)))[0]
+        return compare(hanger, sound, solve(hanger, (replace(fault, size=size),)), slopes)[0]
 
     least, most = see(low), see(high)
     if most < VISIBLE[0] or least > VISIBLE[1]:
@@ -766,13 +815,14 @@ def make_case(
             hanger, visits=tuple(replace(visit, tension_factor=1.0) for visit in hanger.visits)
         )
         sound, faults = solve(quiet, ()), []
+        slopes = find_slopes(quiet, sound, n)
         for name in names if names != ("none",) else ():
-            fault = _size_fault(draws, draw_fault(draws, name, quiet), quiet, sound)
+            fault = _size_fault(draws, draw_fault(draws, name, quiet), quiet, sound, slopes)
             if fault is None:
                 break
             faults.append(fault)
         else:
-            return _finish(index, draws, (hanger, quiet), sound, tuple(faults), n)
+            return _finish(index, draws, (hanger, quiet), (sound, slopes), tuple(faults), n)
     raise RuntimeError(f"{names} are seen in no hanger of seed {seed}, case {index}")
 
 
@@ -780,12 +830,15 @@ def _finish(
     index: int,
     draws: Draws,
     hangers: tuple[Hanger, Hanger],
-    sound: Data,
+    alone: tuple[Data, Array],
     faults: tuple[Fault, ...],
     n: Nuisances,
 ) -> Case:
-    """Measure the first hanger; the second is the same in tests of one tension."""
-    hanger, quiet = hangers
+    """Measure the first hanger; the second is the same in tests of one tension.
+
+    `alone` are the sound data of the second, and their slopes.
+    """
+    (hanger, quiet), (sound, slopes) = hangers, alone
     bar = hanger.bars[0]
     truth: dict[str, Any] = {
         "tension_n": bar.tension_n,
@@ -796,11 +849,11 @@ def _finish(
         "counts": list(hanger.counts),
         "tests": len(hanger.visits),
         "shapes": hanger.has_shapes,
-        "inherent": find_inherent(quiet, sound),
+        "inherent": find_inherent(quiet, sound, slopes),
         "causes": [],
     }
     for fault in faults:
-        visible, raw = compare(quiet, sound, solve(quiet, (fault,)))
+        visible, raw = compare(quiet, sound, solve(quiet, (fault,)), slopes)
         told = {key: getattr(fault, key) for key in ("place", "extent", "sign", "detail", "more")}
         truth["causes"].append(
             {
@@ -808,8 +861,8 @@ def _finish(
                 "accepted": list(CAUSES[fault.cause].accepted),
                 "size": fault.size,
                 "unit": CAUSES[fault.cause].unit,
-                "visible": visible,  # largest change over its stated error, tension refitted
-                "raw": raw,  # the same with the tension as it is
+                "visible": visible,  # largest change over its stated error, fitted
+                "raw": raw,  # the same without a fit
                 "ends": list(fault.ends),
                 "planes": list(fault.planes),
                 **told,

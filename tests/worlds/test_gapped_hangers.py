@@ -23,6 +23,7 @@ from tests.worlds.gapped_hangers import (
     compare,
     deal_cause,
     draw_hanger,
+    find_slopes,
     make_case,
     plant,
     solve,
@@ -313,10 +314,9 @@ def _hanger(*needs: str) -> Hanger:
 def test_plant_vanishes_with_its_size(cause: str) -> None:
     hanger = _hanger("shapes", "levels", "temperatures")
     sound = solve(hanger, ())
-    small, large = (
-        compare(hanger, sound, solve(hanger, (Fault(cause, size * CAUSES[cause].low, 0.37),)))[1]
-        for size in (0.005, 1.0)
-    )
+    slopes = find_slopes(hanger, sound, Nuisances())
+    faults = [Fault(cause, size * CAUSES[cause].low, 0.37) for size in (0.005, 1.0)]
+    small, large = (compare(hanger, sound, solve(hanger, (fault,)), slopes)[1] for fault in faults)
     assert small < 0.1 * large
     assert large > 0
 
@@ -359,3 +359,16 @@ def test_plant_temperature_and_level() -> None:
         changed = modes.frequencies_hz / sound.modes[number, plane].frequencies_hz - 1
         if number == softest:
             assert np.abs(changed).max() < 1e-6
+
+
+def test_compare_forgives_tolerances() -> None:
+    """A bar that is stiffer by two standard deviations is sound; by twenty it is not."""
+    hanger, n = _hanger(), Nuisances()
+    sound = solve(hanger, ())
+    slopes = find_slopes(hanger, sound, n)
+    seen = [
+        compare(hanger, sound, solve(hanger, (Fault("other stiffness", size),)), slopes)
+        for size in (2 * n.modulus, 20 * n.modulus)
+    ]
+    assert seen[0][0] < 2.0 < seen[1][0]
+    assert seen[0][1] > 5.0
