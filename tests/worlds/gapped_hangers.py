@@ -13,9 +13,9 @@ largest change of a single datum (or of a tolerance) is 5 to 100 of its standard
 
 `CAUSES[...].accepted` are the names that a catalogue of effects may give to a cause; none where it
 knows no such cause. A plain bar clamped at both ends also differs from a sound hanger: by its
-described fittings, by shear and rotary inertia, by the sag of a described lean. Where these can be
-seen, `truth["inherent"]` holds their names with how many standard errors they are: an answer that
-names them is not false.
+described fittings, by shear and rotary inertia, by the sag of a described lean, by sensors whose
+places are not stated. Where these can be seen, `truth["inherent"]` holds their names with how many
+standard errors they are: an answer that names them is not false.
 
 Left out: modes of both planes that mix where they are close (their errors are correlated, half of
 the time), wrong orders, blunders. The planes' springs differ by their details alone.
@@ -411,6 +411,8 @@ def find_inherent(hanger: Hanger, sound: Data, slopes: Array) -> dict[str, float
         ],
         "sag": [replace(bar, gravity_across_m_s2=0.0) for bar in hanger.bars],
     }
+    if not hanger.has_shapes:  # places of the sensors are not stated
+        plain["sensor_mass"] = [replace(bar, masses=()) for bar in hanger.bars]
     found = {}
     for name, bars in plain.items():
         if tuple(bars) != hanger.bars:
