@@ -55,6 +55,7 @@ SHORT = {
     "gap_dynamics": "--cases 1 --seed 300", "gap_family": "--families 1 --sound 0 --hangers 2",
     "gap_law": "--cases 1", "gap_plan": "--cases 1",
     "gap_trial": "--seeds 1 --effects point_mass --sizes 30 --null 1 --jobs 1",
+    "gap_worlds": "--hangers 1 --out FOLDER/rows.json",
     "general_model": "--repeats 5", "identify_ablation": "--kinds softening --seeds 3:4",
     "identify_limits": "--sound 2 --faulty 1", "identify_seconds": "--runs 1",
     "identify_simulated": "--tests 4", "kill_daemon": "--kills 4 --files 6",
