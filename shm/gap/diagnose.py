@@ -28,8 +28,7 @@ from shm.gap.outlier_removal import (
 )
 from shm.gap.places import places
 from shm.gap.problem import GapProblem
-from shm.gap.remainder import remainder_of
-from shm.gap.residuals import compatibility, residuals, sensor_remarks, trends
+from shm.gap.residuals import residuals, sensor_remarks, trends
 from shm.inference.data_checks import CheckedData
 from shm.inference.options import Progress, silent
 from shm.models import check_baseline
@@ -39,7 +38,6 @@ from shm.values import (
     ENOUGH_EFFECTIVE,
     MOST_MISFIT_PERCENT,
     NAN,
-    NO_GAP,
     Cause,
     Diagnosis,
     EffectEstimate,
@@ -96,7 +94,6 @@ def examined(
     after = attribution.leading.best.fit if attribution.leading else None
     aside, doubted = (outliers(clear, e, answer[0][1]) for e in (clear.aside, clear.doubted))
     held = held_out(problem, before, after, options.hold_out, rng)
-    compatible = compatibility(problem, _fits(attribution))
     any_ends_n = tension_of_any_ends_n(found.tests, hanger, options.seed)
     after_n = _tension(problem, possible(attribution), rng, any_ends_n)
     before_n = _tension(problem, [(1.0, before)], rng)
@@ -128,8 +125,6 @@ def examined(
         seed=options.seed,
         seconds=time.perf_counter() - started,
         outliers=aside,
-        compatibility=compatible,
-        remainder=remainder_of(problem, attribution, compatible),
         widest_swing_m=_widest_swing_m(found.tests),
         slenderness=_slenderness(hanger, before_n.mean),
     ), attribution
@@ -263,15 +258,6 @@ def _estimates(problem: GapProblem, fit: Fit) -> tuple[EffectEstimate, ...]:
         EffectEstimate(each.name, each.unit, *_summary(values))
         for each, values in zip(parameters, samples.T, strict=True)
     )
-
-
-def _fits(attribution: Attribution) -> dict[str, list[Fit]]:
-    """Of no gap and of every cause that was fitted in full, at each of its places."""
-    found = {
-        each.effect: [variant.fit for variant in each.variants if variant.fit is not None]
-        for each in attribution.explanations
-    }
-    return {NO_GAP: [attribution.baseline], **{name: fits for name, fits in found.items() if fits}}
 
 
 def _contenders(attribution: Attribution) -> list[Fit]:
