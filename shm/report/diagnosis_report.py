@@ -13,22 +13,17 @@ from shm.report.assumed import assumptions_line, assumptions_table, with_assumpt
 from shm.report.bar_table import bar_document, bar_table
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_summary import (
-    consequences,
     facts,
     name,
     promise,
     ranked_measurements,
-    slope,
-    summary,
-    verdict,
+    write_details,
+    write_lead,
+    write_summary,
+    write_tension,
 )
 from shm.report.diagnosis_wording import (
     AFTER,
-    Answer,
-    answer,
-    claimed,
-    claims,
-    is_set_aside,
     label,
     quantity,
     size,
@@ -36,16 +31,27 @@ from shm.report.diagnosis_wording import (
     tension_unit,
 )
 from shm.report.figures.every_figure import diagnosis_figures
+from shm.report.formatting import Interval
 from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
-from shm.values import NO_GAP, Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
+from shm.values import (
+    NO_GAP,
+    Cause,
+    GapPlace,
+    Outcome,
+    Residual,
+    TensionEstimate,
+    Trend,
+    group_causes,
+    is_excluded,
+)
 from shm.values.rounding import ForceUnit
 
 _STYLES = {
-    Answer.EXPLAINED: "first",
-    Answer.ALIKE: "first",
-    Answer.NO_GAP: "steady",
-    Answer.UNEXPLAINED: "alert",
-    Answer.UNDECIDED: "watch",
+    Outcome.EXPLAINED: "first",
+    Outcome.ALIKE: "first",
+    Outcome.NO_GAP: "steady",
+    Outcome.PARTLY: "watch",
+    Outcome.UNEXPLAINED: "alert",
 }
 
 
@@ -73,18 +79,19 @@ def diagnosis_paper(sheet: DiagnosisSheet) -> Paper:
 
 def diagnosis_part(sheet: DiagnosisSheet, title: str, paragraphs: Sequence[str] = ()) -> Part:
     """The whole of it: the answer with what follows, remarks on the data, figures, tables."""
-    found = answer(sheet.diagnosis)
+    outcome = sheet.diagnosis.verdict.outcome
     return Part(
         title,
         paragraphs,
-        lead=verdict(sheet.diagnosis),
-        summary=consequences(sheet.diagnosis),
+        lead=write_lead(sheet.diagnosis),
+        summary=write_tension(sheet.diagnosis),
+        details=write_details(sheet.diagnosis),
         facts=facts(sheet),
         remarks=sheet.diagnosis.remarks,
         figures=lambda: diagnosis_figures(sheet),
         tables=(*answers(sheet), *evidence(sheet)),
-        status=found.value,
-        style=_STYLES[found],
+        status=outcome.value,
+        style="watch" if sheet.diagnosis.verdict.is_uncertain else _STYLES[outcome],
     )
 
 
@@ -121,76 +128,55 @@ def _made(
 
 
 def causes(sheet: DiagnosisSheet) -> Table:
-    diagnosis = sheet.diagnosis
-    rows = [_cause_row(diagnosis, cause) for claim in claims(diagnosis) for cause in claim.causes]
+    """Return every cause that was tried, no gap and something unknown, those claimed marked."""
+    diagnosis, verdict = sheet.diagnosis, sheet.diagnosis.verdict
+    found = [cause for claim in group_causes(diagnosis.causes) for cause in claim.causes]
+    claimed = verdict.claim.causes if verdict.claim else ()
     rest = (
-        (NO_GAP, diagnosis.no_gap_probability),
-        ("something not in the catalogue", diagnosis.unexplained_probability),
+        (NO_GAP, diagnosis.no_gap_probability, Outcome.NO_GAP),
+        (
+            "something not in the catalogue",
+            diagnosis.unexplained_probability,
+            Outcome.UNEXPLAINED,
+        ),
     )
-    rows += [
-        (what, formatting.probability(share), "", *_compatible(diagnosis, what), *("",) * 4)
-        for what, share in rest
-    ]
+    marks = [each in claimed for each in found] + [each is verdict.outcome for *_, each in rest]
+    left_out = ", ".join(formatting.quantity(effect) for effect in diagnosis.left_out)
     return Table(
-        "Causes, likeliest first",
+        "Causes, most probable first",
         (
             "cause",
             "probability",
             "alike",
-            *(("compatible",) if diagnosis.compatibility else ()),
             "log Bayes factor",
             "gain of fit",
             "Occam's factor",
             "how",
         ),
-        tuple(rows),
-        note=_cause_note(diagnosis),
-        marks=_marks(diagnosis),
+        (
+            *(_cause_row(cause) for cause in found),
+            *((what, formatting.probability(share), *("",) * 5) for what, share, _ in rest),
+        ),
+        note=(
+            f"Against the baseline {diagnosis.baseline}, in natural logarithms: the Bayes factor "
+            "is what the better fit gains and what Occam's factor takes for free parameters. "
+            "Causes with the same letter cannot be told apart with these data. How far each was "
+            "taken: screened by a linear fit, or fitted in full with a normal or a sampled "
+            "posterior." + (f" Taken out of the catalogue: {left_out}." if left_out else "")
+        ),
+        marks=tuple("claimed" if is_claimed else "left" for is_claimed in marks),
     )
 
 
-def _marks(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """The rows that the answer claims."""
-    claim = claimed(diagnosis)
-    rows = [
-        "claimed" if claim and cause in claim.causes else "left"
-        for each in claims(diagnosis)
-        for cause in each.causes
-    ]
-    found = answer(diagnosis)
-    rest = (found is Answer.NO_GAP, found is Answer.UNEXPLAINED)
-    return (*rows, *("claimed" if is_it else "left" for is_it in rest))
-
-
-def _compatible(diagnosis: Diagnosis, name: str) -> tuple[str, ...]:
-    """Whether the data contradict it; no column of a diagnosis from before that was judged."""
-    found = diagnosis.compatibility
-    return () if found is None else ({True: "yes", False: "no", None: ""}[found.of(name)],)
-
-
-def _cause_row(diagnosis: Diagnosis, cause: Cause) -> tuple[str, ...]:
+def _cause_row(cause: Cause) -> tuple[str, ...]:
     return (
         label(cause),
         formatting.probability(cause.probability),
         "" if cause.group is None else _LETTERS[cause.group % len(_LETTERS)],
-        *_compatible(diagnosis, cause.effect),
         formatting.number(cause.log_bayes_factor, "+z.1f"),
         formatting.number(cause.log_fit, "+z.1f"),
         formatting.number(cause.log_occam, "+z.1f"),
         cause.method,
-    )
-
-
-def _cause_note(diagnosis: Diagnosis) -> str:
-    judged = diagnosis.compatibility is not None
-    left_out = ", ".join(formatting.quantity(effect) for effect in diagnosis.left_out)
-    return (
-        f"Against the baseline {diagnosis.baseline}, in natural logarithms: the Bayes factor is "
-        "what the better fit gains and what Occam's factor takes for free parameters. Causes alike "
-        "by the same letter cannot be told apart with these data. How far each was taken: screened "
-        "by a linear fit, or fitted in full with a normal or a sampled posterior."
-        + (" Compatible: all data within the bounds of their errors." if judged else "")
-        + (f" Taken out of the catalogue: {left_out}." if left_out else "")
     )
 
 
@@ -201,7 +187,7 @@ def sizes(sheet: DiagnosisSheet) -> Table:
         ("cause", "parameter", "size (90 % interval)"),
         tuple(
             (label(cause), quantity(estimate), str(size(estimate)))
-            for claim in claims(sheet.diagnosis)
+            for claim in group_causes(sheet.diagnosis.causes)
             if claim.probability >= 0.05
             for cause in claim.causes
             if cause.probability >= 0.01
@@ -294,14 +280,14 @@ def where(sheet: DiagnosisSheet) -> Table:
     diagnosis = sheet.diagnosis
     residuals = sorted(
         diagnosis.where,
-        key=lambda r: (not is_set_aside(diagnosis, r), math.isnan(r.share), -r.share),
+        key=lambda r: (not is_excluded(diagnosis, r), math.isnan(r.share), -r.share),
     )
     left = len(residuals) - _WORST
     return Table(
         "Where the gap lies, largest share first",
         ("mode", "test", "measured, Hz", "baseline, Hz", "off, %", "z", "share", "off after, %"),
         tuple(
-            _residual_row(residual, is_set_aside(diagnosis, residual))
+            _residual_row(residual, is_excluded(diagnosis, residual))
             for residual in residuals[:_WORST]
         ),
         note=(
@@ -337,7 +323,7 @@ def trends(sheet: DiagnosisSheet) -> Table:
 
 
 def _trend_row(trend: Trend) -> tuple[str, ...]:
-    interval = slope(trend)
+    interval = Interval.normal(trend.slope_percent, trend.slope_sd_percent)
     bounds = f"{interval.low:+z.2f} to {interval.high:+z.2f}"
     return (
         trend.condition,
@@ -378,8 +364,9 @@ def diagnosis_json(sheet: DiagnosisSheet) -> dict[str, Any]:
     """A document for `shm.documents.dump`; unknown numbers become null there."""
     document = {
         **diagnosis_document(sheet.diagnosis),
-        "answer": answer(sheet.diagnosis).name.lower(),
-        "summary": summary(sheet),
+        "answer": sheet.diagnosis.verdict.outcome.name.lower(),
+        "summary": write_summary(sheet.diagnosis),
+        "details": write_details(sheet.diagnosis),
         "bar": bar_document(sheet.bar),
     }
     return with_assumptions(document, sheet.hanger)

@@ -1,93 +1,18 @@
-"""A gap diagnosis in words: what it claims, its effects as names and clauses, their sizes."""
+"""Write causes of a gap as names and clauses, with their sizes."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 
 from shm.models.effects import EFFECTS
 from shm.report import formatting
 from shm.report.formatting import Interval
-from shm.values import Cause, Diagnosis, EffectEstimate, Residual, TensionEstimate, effect_label
+from shm.values import Cause, Claim, Diagnosis, EffectEstimate, TensionEstimate, effect_label
 from shm.values.diagnosis import joined
 from shm.values.parameter_names import base_name, is_logarithm, quantity_name
 from shm.values.rounding import ForceUnit, force_unit
-
-# Even odds; two places fit a sentence.
-_LIKELIER_THAN_NOT = 0.5
-
-
-class Answer(Enum):
-    """What a diagnosis says, in two or three words."""
-
-    EXPLAINED = "Explained"
-    ALIKE = "Explained, causes alike"
-    NO_GAP = "No gap"
-    UNEXPLAINED = "Not explained"
-    UNDECIDED = "Undecided"
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One cause, or the causes that these data cannot tell apart, likeliest first."""
-
-    causes: tuple[Cause, ...]
-
-    @property
-    def probability(self) -> float:
-        return sum(cause.probability for cause in self.causes)
-
-    @property
-    def leading(self) -> Cause:
-        return self.causes[0]
-
-    @property
-    def of_the_measurement(self) -> bool:
-        """Whether all that it names are faults of sensors, clock or what was clamped on to
-        measure."""
-        names = {effect for cause in self.causes for effect in cause.effects}
-        known = [EFFECTS.get(name) for name in names if name != "timebase"]
-        return all(effect is not None and not effect.of_the_hanger for effect in known)
-
-
-def claims(diagnosis: Diagnosis) -> tuple[Claim, ...]:
-    """The causes, those of a group together, likeliest first."""
-    together: dict[str, list[Cause]] = {}
-    for cause in sorted(diagnosis.causes, key=lambda cause: -cause.probability):
-        key = cause.effect if cause.group is None else f"group {cause.group}"
-        together.setdefault(key, []).append(cause)
-    found = [Claim(tuple(causes)) for causes in together.values()]
-    return tuple(sorted(found, key=lambda claim: -claim.probability))
-
-
-def claimed(diagnosis: Diagnosis) -> Claim | None:
-    """The likeliest claim; None where no gap or something unknown is likelier than each."""
-    leading = diagnosis.leading
-    return next((claim for claim in claims(diagnosis) if claim.leading is leading), None)
-
-
-def answer(diagnosis: Diagnosis) -> Answer:
-    """What the diagnosis says; undecided where nothing is likelier than not, and where the claim
-    leaves the frequencies no nearer."""
-    claim, shrinkage = claimed(diagnosis), diagnosis.shrinkage
-    if claim is not None and shrinkage.rms_after_percent >= shrinkage.rms_before_percent:
-        return Answer.UNDECIDED
-    if claim is not None:
-        sure, said = claim.probability, Answer.EXPLAINED if len(claim.causes) == 1 else Answer.ALIKE
-    elif diagnosis.leads == "no gap":
-        sure, said = diagnosis.no_gap_probability, Answer.NO_GAP
-    else:
-        sure, said = diagnosis.unexplained_probability, Answer.UNEXPLAINED
-    return said if sure >= _LIKELIER_THAN_NOT else Answer.UNDECIDED
-
-
-def is_set_aside(diagnosis: Diagnosis, residual: Residual) -> bool:
-    """Whether a frequency was taken for a gross error."""
-    named = [(each.plane, each.order, each.test) for each in diagnosis.outliers]
-    return (residual.plane, residual.order, residual.test) in named
-
 
 _PLACES = {
     "everywhere": "",
@@ -102,6 +27,13 @@ _PLACES = {
 }
 _MOST_PLACES = 2  # what a sentence bears
 _PLACE_STARTS = {"sensor": "of the", "test": "in"}
+
+
+def is_of_the_measurement(claim: Claim) -> bool:
+    """Return whether all that is named are faults of sensors, clock or what was clamped on."""
+    names = {effect for cause in claim.causes for effect in cause.effects}
+    known = [EFFECTS.get(name) for name in names if name != "timebase"]
+    return all(effect is not None and not effect.of_the_hanger for effect in known)
 
 
 def label(cause: Cause) -> str:

@@ -11,7 +11,7 @@ import pytest
 
 import shm
 from shm.errors import UsageError
-from shm.report.diagnosis_summary import verdict
+from shm.report.diagnosis_summary import write_lead
 from shm.report.formatting import Interval, tension
 from shm.values.rounding import force_unit
 from shm.watch.frequency_watch import measured_levels
@@ -52,7 +52,7 @@ def test_a_summary_is_in_the_words_of_the_report(
         text = value.summary()
         assert not re.search(r"\bnan\b|None|\binf\b|<|[ ]$", text, re.MULTILINE)
     assert doubted.faults[0] in " ".join(doubted.summary().split())
-    assert verdict(diagnosis) in " ".join(diagnosis.summary().split())
+    assert write_lead(diagnosis) in " ".join(diagnosis.summary().split())
     assert len(test_of_711_kn.summary().splitlines()) == 2 + len(test_of_711_kn.modes)
 
 
