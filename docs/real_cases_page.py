@@ -29,8 +29,9 @@ from shm.identify import IdentifyOptions, identify
 from shm.report.as_text import as_text
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_report import diagnosis_paper
-from shm.report.diagnosis_wording import label, quantity, size
+from shm.report.diagnosis_wording import label
 from shm.report.formatting import probability
+from shm.report.sizes import quantity, size
 from shm.values import (
     Cause,
     Diagnosis,

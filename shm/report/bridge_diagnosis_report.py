@@ -12,9 +12,10 @@ from shm.report import formatting
 from shm.report.bar_table import bar_document, bars_table
 from shm.report.contents import BridgeDiagnosisSheet
 from shm.report.diagnosis_summary import write_lead
-from shm.report.diagnosis_wording import effect_phrase, quantity, size, tension_of
+from shm.report.diagnosis_wording import effect_phrase, tension_of
 from shm.report.figures.every_figure import bridge_diagnosis_figures
 from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
+from shm.report.sizes import quantity, size
 from shm.values import BridgeDiagnosis, SharedCause, TensionEstimate, effect_label
 from shm.values.rounding import ForceUnit, force_unit
 

@@ -31,7 +31,8 @@ def test_a_line_says_what_whose_and_the_tension_as_the_report_rounds_it(
     read = replace(test_of_711_kn, tension_read_n=700e3, tension_read_sd_n=10e3)
     assert repr(read).endswith("read 700 kN (90 % credible interval 684 to 716 kN)>")
     assert re.fullmatch(
-        r"<Diagnosis of hanger 3: explained: point mass, .* kN \(90 % credible .* kN\)>", repr(a_diagnosis())
+        r"<Diagnosis of hanger 3: explained: point mass, .* kN \(90 % credible .* kN\)>",
+        repr(a_diagnosis()),
     )
 
 

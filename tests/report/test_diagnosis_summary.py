@@ -9,7 +9,8 @@ import pytest
 from shm.models.effects import EFFECTS, Survey
 from shm.report import formatting
 from shm.report.diagnosis_summary import write_details, write_summary
-from shm.report.diagnosis_wording import label, phrase, size, tension_words
+from shm.report.diagnosis_wording import label, phrase, tension_words
+from shm.report.sizes import size
 from shm.values import (
     NAN,
     AddedMass,

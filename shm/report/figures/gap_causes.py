@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_summary import write_lead
-from shm.report.diagnosis_wording import label, quantity, size
+from shm.report.diagnosis_wording import label
 from shm.report.figures import specification as spec
+from shm.report.sizes import quantity, size
 from shm.values import BridgeDiagnosis, Cause, Claim, Diagnosis, effect_label, group_causes
 from shm.values.parameter_names import is_logarithm
 
