@@ -40,6 +40,7 @@ from shm.values import (
     Hanger,
     ModalTest,
     Mode,
+    Outcome,
     ResponsePoint,
     Scatter,
     Supports,
@@ -225,9 +226,10 @@ def _length_row(each: Arrangement, found: Diagnosis) -> tuple[str, ...]:
 
 
 def _leading(found: Diagnosis) -> str:
-    if found.leading is not None:
-        return _words(found.leading.effect)
-    return "no gap" if found.leads == "no gap" else "none of them"
+    verdict = found.verdict
+    if verdict.claim is not None:
+        return _words(verdict.claim.leading.effect)
+    return "no gap" if verdict.outcome is Outcome.NO_GAP else "none of them"
 
 
 def _words(name: str) -> str:

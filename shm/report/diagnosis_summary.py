@@ -48,6 +48,7 @@ _REASONS: Mapping[Reason, str] = {
     "frequencies by more than the stated errors",
     "less probable than not": "no cause is claimed, for it may be that there is no gap",
     "poor fit": "measurements as far off would come by chance with probability {p_value} only",
+    "large misfit": "{misfit} % of the frequencies (rms)",
     "large residuals": "{rms_z} standard deviations (rms)",
     "acts alone": "something may act on {alone} alone, probability {acts_alone}",
     "unknown is more probable": "{start} of the effects {tried} explains it, and the probability "
@@ -106,6 +107,7 @@ def _list_words(diagnosis: Diagnosis, verdict: GapVerdict) -> dict[str, str]:
         "possible": _explain_misfit(diagnosis) if verdict.reason == "misses by percents" else "",
         "p_value": formatting.told_probability(verdict.fit_p_value),
         "rms_z": formatting.plain(verdict.rms_z, 2),
+        "misfit": formatting.plain(diagnosis.shrinkage.rms_after_percent, 2),
         "alone": f"{alone.plane} {alone.order} of test {alone.test}" if alone else "",
         "acts_alone": formatting.told_probability(alone.acts_alone) if alone else "",
         "start": "none" if unknown >= _SURE else "most likely none",

@@ -45,7 +45,8 @@ class Residual:
     identification and of what the baseline leaves open; `share` is its part of the misfit.
     `after_percent` is the same residual with the leading cause in the model, `held_out_percent`
     with that cause fitted without this mode (NaN where it was not held out). `after_z` is
-    `after_percent` in standard deviations of the stated errors and of what repeats.
+    `after_percent` in standard deviations of the stated errors and of what repeats, NaN where no
+    error is stated.
     """
 
     plane: Plane

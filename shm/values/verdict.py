@@ -54,6 +54,7 @@ Reason = Literal[
     # partly or not explained
     "poor fit",
     "large residuals",
+    "large misfit",
     "acts alone",
     "unknown is more probable",
     "much would fit",
@@ -99,7 +100,7 @@ class GapVerdict:
     """State what a diagnosis claims: outcome, reason for what is open, and the causes it names.
 
     `probability` is that of the claim, of no gap, or of something unknown. `rms_z` is the root mean
-    square of what is left, in standard deviations of the stated errors (NaN if not known).
+    square of what is left, in standard deviations of the stated errors (NaN without any).
     `runner_up` is the most probable cause where none is claimed. `alone` is the excluded frequency
     that may be no blunder, but something that acts on one mode alone. `holds_out` is False if
     frequencies that were held out of the fit come no nearer with the claim, None if none were.
@@ -113,6 +114,7 @@ class GapVerdict:
     claim: Claim | None = None
     runner_up: Claim | None = None
     alone: Outlier | None = None
+    is_within_errors: bool = True
     is_uncertain: bool = False
     is_few: bool = False
     holds_out: bool | None = None
@@ -121,11 +123,6 @@ class GapVerdict:
     def is_description_off(self) -> bool:
         """Return whether calliper and tape come first."""
         return self.claim is not None and self.claim.is_description_off
-
-    @property
-    def is_within_errors(self) -> bool:
-        """Return whether no more is left than the stated errors allow."""
-        return not self.rms_z > MAX_RMS_Z and self.fit_p_value >= MIN_FIT_P_VALUE
 
     @property
     def is_open(self) -> bool:
@@ -157,7 +154,8 @@ def judge(diagnosis: Diagnosis) -> GapVerdict:
         found,
         outcome=Outcome.NO_GAP,
         probability=diagnosis.no_gap_probability,
-        reason=_doubt_no_gap(diagnosis, found),
+        reason=(doubt := _doubt_no_gap(diagnosis, found)),
+        is_within_errors=not doubt.startswith("misses"),
     )
 
 
@@ -190,7 +188,8 @@ def _judge_gap(diagnosis: Diagnosis, found: GapVerdict) -> GapVerdict:
         return replace(found, reason="sampler failed")
     if diagnosis.shrinkage.rms_after_percent >= diagnosis.shrinkage.rms_before_percent:
         return replace(found, reason="no nearer")
-    left = _find_left(found)
+    left = _find_left(diagnosis, found)
+    found = replace(found, is_within_errors=left in ("", "acts alone"))
     if left:
         if nearest.log_bayes_factor > MIN_LOG_BAYES_FACTOR:
             return _with_claim(found, Outcome.PARTLY, nearest, left)
@@ -228,10 +227,13 @@ def _join(claims: Sequence[Claim]) -> Claim:
     return Claim(causes)
 
 
-def _find_left(found: GapVerdict) -> Reason:
+def _find_left(diagnosis: Diagnosis, found: GapVerdict) -> Reason:
     """Return what shows that more is left than the errors allow; empty if nothing does."""
     if found.rms_z > MAX_RMS_Z:
         return "large residuals"
+    misfit_percent = diagnosis.shrinkage.rms_after_percent
+    if math.isnan(found.rms_z) and misfit_percent > MOST_MISFIT_PERCENT:
+        return "large misfit"  # without stated errors: more than a sound model leaves
     if not found.fit_p_value >= MIN_FIT_P_VALUE:
         return "poor fit"
     return "acts alone" if found.alone else ""

@@ -23,7 +23,7 @@ from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_report import causes, diagnosis_json, diagnosis_paper, diagnosis_part
 from shm.report.diagnosis_summary import write_lead, write_summary
 from shm.report.figures import gap_before_and_after, gap_causes
-from shm.values import NAN, Cause, Diagnosis, Outcome, Outlier
+from shm.values import NAN, Cause, Diagnosis, Outcome, Outlier, Shrinkage
 from tests.helpers.diagnoses import a_diagnosis
 from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, MASS, make_cause
 
@@ -45,7 +45,9 @@ PROBABLE: dict[str, tuple[float, float, tuple[Cause, ...]]] = {
     "several": (0.04, 0.21, (make_cause("point_mass", 0.45), make_cause("sag", 0.3))),
     "unknown": (0.0, 0.87, (make_cause("point_mass", 0.11, log_bayes_factor=1.0),)),
 }
-LEFT = ((1.0, 0.4), (30.0, 0.4), (1.0, 1e-5), (NAN, 0.4), (NAN, 1e-5))
+# Standardised residuals, p-value, root mean square in percent.
+LEFT = ((1.0, 0.4, 0.2), (30.0, 0.4, 0.2), (1.0, 1e-5, 0.2), (NAN, 0.4, 0.2), (NAN, 0.4, 1.4),
+        (NAN, 1e-5, 0.2))  # fmt: skip
 GUIDE = Outlier("transverse", 3, "t4", 28.17, 21.7, 0.02, 0.9, acts_alone=0.3)
 SLIP = replace(GUIDE, acts_alone=0.0)
 
@@ -66,6 +68,7 @@ def construct() -> Iterator[tuple[str, Diagnosis]]:
             replace(
                 LED, where=where, no_gap_probability=no_gap, unexplained_probability=unknown,
                 causes=found, fit_p_value=left[1], effective_draws=draws, remarks=remarks,
+                shrinkage=Shrinkage(3.0 if no_gap < 0.05 else 0.5, left[2], 3.3, 0.34),
                 outliers=aside, groups=ALIKE.groups if name == "a group" else (),
             ),
         )  # fmt: skip
@@ -106,6 +109,7 @@ def check_words(diagnosis: Diagnosis) -> None:
         assert not diagnosis.effective_draws < 200
         assert not any("The sampler failed" in remark for remark in diagnosis.remarks)
         assert max((each.acts_alone for each in diagnosis.outliers), default=0.0) < 0.05
+        assert not (math.isnan(verdict.rms_z) and diagnosis.shrinkage.rms_after_percent > 1)
     # What is said of the gap in the sentence is what the status says.
     assert ("is explained by" in lead or "most likely due to" in lead) == (
         verdict.outcome is Outcome.EXPLAINED
@@ -141,7 +145,7 @@ def check_words(diagnosis: Diagnosis) -> None:
 @pytest.mark.parametrize("case", PROBABLE)
 def test_words_agree_constructed(case: str) -> None:
     found = [each for name, each in CONSTRUCTED.items() if name.startswith(f"{case}, ")]
-    assert len(found) == 90
+    assert len(found) == 108
     for each in found:
         check_words(each)
 

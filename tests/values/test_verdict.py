@@ -54,6 +54,9 @@ STRONG = replace(LED, causes=(cause("point_mass", 0.3, bayes=300.0),), unexplain
         (leave(1.0, 0.009), Outcome.PARTLY, "poor fit"),
         (leave(NAN), Outcome.EXPLAINED, ""),  # of a former version: by the p-value alone
         (leave(NAN, 0.009), Outcome.PARTLY, "poor fit"),
+        (replace(leave(NAN), shrinkage=Shrinkage(3.0, 1.4, 3.3, 1.8)), Outcome.PARTLY,
+         "large misfit"),
+        (replace(LED, shrinkage=Shrinkage(3.0, 1.4, 3.3, 1.8)), Outcome.EXPLAINED, ""),
         (leave(NAN, NAN), Outcome.PARTLY, "poor fit"),
         (replace(LED, outliers=(GUIDE,)), Outcome.PARTLY, "acts alone"),
         (replace(FAINT, fit_p_value=0.001), Outcome.UNEXPLAINED, "weak evidence"),
