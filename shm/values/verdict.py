@@ -148,14 +148,15 @@ def judge(diagnosis: Diagnosis) -> GapVerdict:
     if not diagnosis.no_gap_probability >= MIN_NO_GAP_PROBABILITY:
         return _judge_gap(diagnosis, found)
     found = replace(found, rms_z=_rms_z(diagnosis, "z"))
+    doubt = _doubt_no_gap(diagnosis, found)
+    found = replace(found, is_within_errors=not doubt.startswith("misses"))
     if alone is not None:
         return replace(found, reason="acts alone", probability=alone.acts_alone)
     return replace(
         found,
         outcome=Outcome.NO_GAP,
         probability=diagnosis.no_gap_probability,
-        reason=(doubt := _doubt_no_gap(diagnosis, found)),
-        is_within_errors=not doubt.startswith("misses"),
+        reason=doubt,
     )
 
 
@@ -177,6 +178,8 @@ def is_excluded(diagnosis: Diagnosis, residual: Residual) -> bool:
 
 def _judge_gap(diagnosis: Diagnosis, found: GapVerdict) -> GapVerdict:
     """Return the verdict where no gap is ruled out."""
+    left = _find_left(diagnosis, found)
+    found = replace(found, is_within_errors=left in ("", "acts alone"))
     claims = group_causes(diagnosis.causes)
     nearest = next(iter(claims), None)
     if nearest is None or math.isnan(nearest.probability):
@@ -188,8 +191,6 @@ def _judge_gap(diagnosis: Diagnosis, found: GapVerdict) -> GapVerdict:
         return replace(found, reason="sampler failed")
     if diagnosis.shrinkage.rms_after_percent >= diagnosis.shrinkage.rms_before_percent:
         return replace(found, reason="no nearer")
-    left = _find_left(diagnosis, found)
-    found = replace(found, is_within_errors=left in ("", "acts alone"))
     if left:
         if nearest.log_bayes_factor > MIN_LOG_BAYES_FACTOR:
             return _with_claim(found, Outcome.PARTLY, nearest, left)
@@ -241,12 +242,12 @@ def _find_left(diagnosis: Diagnosis, found: GapVerdict) -> Reason:
 
 def _doubt_no_gap(diagnosis: Diagnosis, found: GapVerdict) -> Reason:
     """Return why a hanger without a visible gap is not called explained; empty if it is."""
-    if found.is_few:
-        return "few modes"
     if diagnosis.shrinkage.rms_before_percent > MOST_MISFIT_PERCENT:
         return "misses by percents"
     if found.rms_z > MAX_RMS_Z or found.fit_p_value < MIN_FIT_P_VALUE:
         return "misses the errors"
+    if found.is_few:
+        return "few modes"
     return "" if diagnosis.no_gap_probability >= MIN_CLAIM else "less probable than not"
 
 

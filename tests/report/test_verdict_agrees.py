@@ -137,6 +137,7 @@ def check_words(diagnosis: Diagnosis) -> None:
         what = "no gap" if verdict.outcome is Outcome.NO_GAP else "something not in the catalogue"
         assert marked == [what]
     left = {fact[0]: fact[1] for fact in part.facts}.get("What is left", "")
+    assert not (left == "within the errors" and (is_left or not diagnosis.fit_p_value >= 0.01))
     assert not (explains and left == "more than the errors")
     assert not (verdict.outcome is Outcome.PARTLY and verdict.alone is None
                 and left == "within the errors")  # fmt: skip

@@ -94,6 +94,7 @@ def test_judge_gap(diagnosis: Diagnosis, outcome: Outcome, reason: str) -> None:
     found = judge(diagnosis)
     assert (found.outcome, found.reason) == (outcome, reason)
     assert (found.claim is None) == (outcome is Outcome.UNEXPLAINED)
+    assert found.is_within_errors <= (diagnosis.fit_p_value >= 0.01)
 
 
 def without_gap(no_gap: float, rms_z: float = 1.0, rms_percent: float = 0.1) -> Diagnosis:
@@ -116,7 +117,11 @@ def without_gap(no_gap: float, rms_z: float = 1.0, rms_percent: float = 0.1) -> 
         (without_gap(0.9, rms_z=2.1), "misses the errors"),
         (replace(without_gap(0.9), fit_p_value=0.001), "misses the errors"),
         (without_gap(0.9, rms_percent=1.1), "misses by percents"),
-        (replace(without_gap(0.9), where=LED.where[:3]), "few modes"),
+        (replace(without_gap(0.9), where=without_gap(0.9).where[:3]), "few modes"),
+        (
+            replace(without_gap(0.9, rms_z=2.1), where=without_gap(0.9, rms_z=2.1).where[:3]),
+            "misses the errors",
+        ),
     ],
 )
 def test_judge_no_gap(diagnosis: Diagnosis, reason: str) -> None:
