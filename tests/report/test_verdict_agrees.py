@@ -24,6 +24,7 @@ from shm.report.diagnosis_report import causes, diagnosis_json, diagnosis_paper,
 from shm.report.diagnosis_summary import write_lead, write_summary
 from shm.report.figures import gap_before_and_after, gap_causes
 from shm.values import NAN, Cause, Diagnosis, Outcome, Outlier, Shrinkage
+from shm.values.verdict import Reason
 from tests.helpers.diagnoses import a_diagnosis
 from tests.report.diagnoses import ALIKE, CASES, HANGER, LED, MASS, make_cause
 
@@ -161,7 +162,7 @@ def test_every_outcome_is_constructed() -> None:
 
 
 @pytest.mark.parametrize("key", IN_FULL, ids=str)
-def test_text_page_and_document_agree(key: tuple[Outcome, str, bool]) -> None:
+def test_text_page_and_document_agree(key: tuple[Outcome, Reason, bool]) -> None:
     diagnosis, (outcome, *_) = IN_FULL[key], key
     sheet = DiagnosisSheet(diagnosis, HANGER)
     text = " ".join(as_text(diagnosis_paper(sheet)).split())
@@ -182,7 +183,7 @@ def test_text_page_and_document_agree(key: tuple[Outcome, str, bool]) -> None:
 
 
 @pytest.mark.parametrize("key", IN_FULL, ids=str)
-def test_verdict_survives_the_document(key: tuple[Outcome, str, bool]) -> None:
+def test_verdict_survives_the_document(key: tuple[Outcome, Reason, bool]) -> None:
     back = diagnosis_of(json.loads(documents.dump(diagnosis_document(IN_FULL[key]))))
     assert (back.verdict.outcome, back.verdict.reason, back.verdict.is_uncertain) == key
 
