@@ -29,8 +29,9 @@ from shm.identify import IdentifyOptions, identify
 from shm.report.as_text import as_text
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_report import diagnosis_paper
-from shm.report.diagnosis_wording import label, quantity, size
+from shm.report.diagnosis_wording import label
 from shm.report.formatting import probability
+from shm.report.sizes import quantity, size
 from shm.values import (
     Cause,
     Diagnosis,
@@ -39,6 +40,7 @@ from shm.values import (
     Hanger,
     ModalTest,
     Mode,
+    Outcome,
     ResponsePoint,
     Scatter,
     Supports,
@@ -224,9 +226,10 @@ def _length_row(each: Arrangement, found: Diagnosis) -> tuple[str, ...]:
 
 
 def _leading(found: Diagnosis) -> str:
-    if found.leading is not None:
-        return _words(found.leading.effect)
-    return "no gap" if found.leads == "no gap" else "none of them"
+    verdict = found.verdict
+    if verdict.claim is not None:
+        return _words(verdict.claim.leading.effect)
+    return "no gap" if verdict.outcome is Outcome.NO_GAP else "none of them"
 
 
 def _words(name: str) -> str:

@@ -7,26 +7,26 @@ As all documents it holds NaN until `shm.documents.dump` writes null; reading ta
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
 from shm.documents import value_of
-from shm.values import BridgeDiagnosis, Cause, Diagnosis
+from shm.values import NAN, BridgeDiagnosis, Cause, Diagnosis, GapVerdict
 
 DIAGNOSIS_SCHEMA = "shm.diagnosis/1"
 BRIDGE_DIAGNOSIS_SCHEMA = "shm.bridge_diagnosis/1"
 
 _PLAIN = (
     "hanger", "baseline", "no_gap_probability", "unexplained_probability", "fit_p_value",
-    "model_error_percent", "seed", "seconds", "widest_swing_m",
+    "model_error_percent", "seed", "seconds", "widest_swing_m", "effective_draws",
     "slenderness",
 )  # fmt: skip
 
 
 def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the document of `shm gap diagnose --json`."""
-    compatible = diagnosis.compatibility
     return {
         "schema": DIAGNOSIS_SCHEMA,
         **{name: getattr(diagnosis, name) for name in _PLAIN},
@@ -46,9 +46,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "left_out": list(diagnosis.left_out),
         "remarks": list(diagnosis.remarks),
         "outliers": [asdict(outlier) for outlier in diagnosis.outliers],
-        "not_falsified": list(compatible.not_falsified) if compatible else None,
-        "compatibility": asdict(compatible) if compatible else None,
-        "remainder": asdict(diagnosis.remainder) if diagnosis.remainder else None,
+        "verdict": _verdict_document(diagnosis.verdict),
     }
 
 
@@ -68,6 +66,19 @@ def bridge_diagnosis_document(found: BridgeDiagnosis) -> dict[str, Any]:
     }
 
 
+def _verdict_document(verdict: GapVerdict) -> dict[str, Any]:
+    claim = verdict.claim
+    return {
+        "outcome": verdict.outcome.name.lower(),
+        "reason": verdict.reason,
+        "causes": [cause.effect for cause in claim.causes] if claim else [],
+        "probability": verdict.probability,
+        "rms_z": verdict.rms_z,
+        "is_description_off": verdict.is_description_off,
+        "is_uncertain": verdict.is_uncertain,
+    }
+
+
 def _cause_document(cause: Cause) -> dict[str, Any]:
     parameters = {}
     for estimate in cause.parameters:
@@ -79,7 +90,7 @@ def _cause_document(cause: Cause) -> dict[str, Any]:
 def diagnosis_of(document: Mapping[str, Any]) -> Diagnosis:
     """Read a diagnosis from its document; raises KeyError, TypeError or ValueError.
 
-    One from before outliers, 95 % intervals, compatibility and remainders were told has none.
+    What a former version did not state is not known; its `compatibility` and `remainder` are left.
     """
     tension = document["tension_n"]
     renamed = {
@@ -92,4 +103,14 @@ def diagnosis_of(document: Mapping[str, Any]) -> Diagnosis:
         "next_measurements": document["next_measurement"],
         "invisible": [(each["effect"], each["why"]) for each in document["invisible"]],
     }
+    if "effective_draws" not in document:
+        renamed["effective_draws"] = _find_effective_draws(document["remarks"])
     return value_of(Diagnosis, {**document, **renamed})
+
+
+def _find_effective_draws(remarks: Sequence[str]) -> float:
+    """Return the draws of a sampler that failed, which former versions stated in a remark."""
+    found = [
+        re.match(r"The sampler failed for .*: (\d+) effective draws", each) for each in remarks
+    ]
+    return min((float(each[1]) for each in found if each), default=NAN)

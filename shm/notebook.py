@@ -176,12 +176,13 @@ def _selection(selection: Selection) -> Sheet:
 
 
 def _diagnosis(diagnosis: Diagnosis) -> Sheet:
-    """The verdict in words, the likeliest causes, no gap, something unknown."""
+    """Return the verdict in words, the most probable causes, no gap, something unknown."""
     from shm.report import formatting
-    from shm.report.diagnosis_summary import consequences, verdict
-    from shm.report.diagnosis_wording import claims, label
+    from shm.report.diagnosis_summary import write_details, write_summary
+    from shm.report.diagnosis_wording import label
+    from shm.values import group_causes
 
-    causes = [cause for claim in claims(diagnosis) for cause in claim.causes]
+    causes = [cause for claim in group_causes(diagnosis.causes) for cause in claim.causes]
     rows = [
         (label(each), formatting.probability(each.probability)) for each in causes[:_CAUSES_SHOWN]
     ]
@@ -194,8 +195,9 @@ def _diagnosis(diagnosis: Diagnosis) -> Sheet:
     ]
     whose = "" if diagnosis.hanger is None else f" of hanger {diagnosis.hanger}"
     title = f"Gap{whose} to {formatting.model_class(diagnosis.baseline)}"
-    paragraph = f"{verdict(diagnosis)} {consequences(diagnosis)}".strip()
-    return Sheet(title, ("cause", "probability"), rows, (paragraph, *diagnosis.remarks))
+    told = (write_summary(diagnosis), write_details(diagnosis))
+    paragraphs = [paragraph for paragraph in told if paragraph]
+    return Sheet(title, ("cause", "probability"), rows, (*paragraphs, *diagnosis.remarks))
 
 
 def figure_png(figure: Figure) -> bytes:

@@ -334,9 +334,9 @@ def diagnose(
     fraction done.
 
     The probabilities of `Diagnosis.causes`, of no gap and of something unknown add to 1;
-    `Diagnosis.leading` is the likeliest cause, None where none leads; tensions are in N, residuals
-    in percent of a frequency. Raises BadInput where the tests cannot be used, UsageError for a
-    model class, effect, test or order that is not there.
+    `Diagnosis.verdict` is what it claims, `Diagnosis.leading` the most probable cause, None where
+    none leads; tensions are in N, residuals in percent of a frequency. Raises BadInput where the
+    tests cannot be used, UsageError for a model class, effect, test or order that is not there.
 
     Example:
         >>> diagnosis = shm.diagnose(tests, hanger, baseline="beam1")

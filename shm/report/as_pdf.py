@@ -235,6 +235,8 @@ def _part(part: Part, colour: str, figures: count[int], tables: count[int]) -> l
         lead = f"<b>{escape(part.lead)}</b> " if part.lead else ""
         told = Paragraph(f"{lead}{escape(part.summary)}", _BODY)
         found += [_panel(told, colour), Spacer(1, 6)]
+    if part.details:
+        found += [Paragraph(escape(part.details), _BODY), Spacer(1, 6)]
     if part.facts:
         found += [_facts(part.facts), Spacer(1, 8)]
     if part.remarks:

@@ -33,7 +33,7 @@ def as_text(paper: Paper, width: int = WIDTH) -> str:
 
 
 def _part(part: Part, width: int) -> Iterator[str]:
-    for paragraph in (*part.paragraphs, part.full_summary):
+    for paragraph in (*part.paragraphs, part.full_summary, part.details):
         if paragraph:
             yield f"{_folded(paragraph, width)}\n"
     if part.remarks:

@@ -11,10 +11,11 @@ from shm.diagnosis_document import bridge_diagnosis_document
 from shm.report import formatting
 from shm.report.bar_table import bar_document, bars_table
 from shm.report.contents import BridgeDiagnosisSheet
-from shm.report.diagnosis_summary import verdict
-from shm.report.diagnosis_wording import effect_phrase, quantity, size, tension_of
+from shm.report.diagnosis_summary import write_lead
+from shm.report.diagnosis_wording import effect_phrase, tension_of
 from shm.report.figures.every_figure import bridge_diagnosis_figures
 from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
+from shm.report.sizes import quantity, size
 from shm.values import BridgeDiagnosis, SharedCause, TensionEstimate, effect_label
 from shm.values.rounding import ForceUnit, force_unit
 
@@ -205,6 +206,7 @@ def _alone(diagnosis: BridgeDiagnosis) -> Table:
         "What each hanger says for itself",
         ("hanger", "tests", "its own diagnosis"),
         tuple(
-            (str(each.hanger), str(len(each.tests)), verdict(each)) for each in diagnosis.diagnoses
+            (str(each.hanger), str(len(each.tests)), write_lead(each))
+            for each in diagnosis.diagnoses
         ),
     )

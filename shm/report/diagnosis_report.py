@@ -1,4 +1,4 @@
-"""The report of a gap diagnosis: a paper of its own, or a part of a hanger's."""
+"""Report a gap diagnosis: as a paper, or as a part of a hanger's."""
 
 from __future__ import annotations
 
@@ -13,44 +13,46 @@ from shm.report.assumed import assumptions_line, assumptions_table, with_assumpt
 from shm.report.bar_table import bar_document, bar_table
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_summary import (
-    consequences,
     facts,
     name,
     promise,
     ranked_measurements,
-    slope,
-    summary,
-    verdict,
+    write_details,
+    write_lead,
+    write_summary,
+    write_tension,
 )
 from shm.report.diagnosis_wording import (
     AFTER,
-    Answer,
-    answer,
-    claimed,
-    claims,
-    is_set_aside,
     label,
-    quantity,
-    size,
     tension_of,
     tension_unit,
 )
 from shm.report.figures.every_figure import diagnosis_figures
+from shm.report.formatting import Interval
 from shm.report.paper import CREDIBLE, Paper, Part, Table, filled
-from shm.values import NO_GAP, Cause, Diagnosis, GapPlace, Residual, TensionEstimate, Trend
+from shm.report.sizes import quantity, size
+from shm.values import (
+    NO_GAP,
+    Cause,
+    Outcome,
+    TensionEstimate,
+    group_causes,
+    is_excluded,
+)
 from shm.values.rounding import ForceUnit
 
 _STYLES = {
-    Answer.EXPLAINED: "first",
-    Answer.ALIKE: "first",
-    Answer.NO_GAP: "steady",
-    Answer.UNEXPLAINED: "alert",
-    Answer.UNDECIDED: "watch",
+    Outcome.EXPLAINED: "first",
+    Outcome.ALIKE: "first",
+    Outcome.NO_GAP: "steady",
+    Outcome.PARTLY: "watch",
+    Outcome.UNEXPLAINED: "alert",
 }
 
 
 def diagnosis_paper(sheet: DiagnosisSheet) -> Paper:
-    """The answer, figures, the answer in numbers, what it rests on."""
+    """Return the paper: verdict, figures, the answer in numbers, what it rests on."""
     part = diagnosis_part(sheet, "In short")
     return Paper(
         title=name(sheet),
@@ -72,19 +74,20 @@ def diagnosis_paper(sheet: DiagnosisSheet) -> Paper:
 
 
 def diagnosis_part(sheet: DiagnosisSheet, title: str, paragraphs: Sequence[str] = ()) -> Part:
-    """The whole of it: the answer with what follows, remarks on the data, figures, tables."""
-    found = answer(sheet.diagnosis)
+    """Return all of it: verdict, remarks on the data, figures, tables."""
+    outcome = sheet.diagnosis.verdict.outcome
     return Part(
         title,
         paragraphs,
-        lead=verdict(sheet.diagnosis),
-        summary=consequences(sheet.diagnosis),
+        lead=write_lead(sheet.diagnosis),
+        summary=write_tension(sheet.diagnosis),
+        details=write_details(sheet.diagnosis),
         facts=facts(sheet),
         remarks=sheet.diagnosis.remarks,
         figures=lambda: diagnosis_figures(sheet),
         tables=(*answers(sheet), *evidence(sheet)),
-        status=found.value,
-        style=_STYLES[found],
+        status=outcome.value,
+        style="watch" if sheet.diagnosis.verdict.is_uncertain else _STYLES[outcome],
     )
 
 
@@ -103,12 +106,12 @@ _ROWS_SHOWN = 10
 
 
 def answers(sheet: DiagnosisSheet) -> tuple[Table, ...]:
-    """What the diagnosis found, in reading order."""
+    """Return the tables of what the diagnosis found, in reading order."""
     return _made(sheet, (causes, sizes, shrinkage, tension, next_measurements))
 
 
 def evidence(sheet: DiagnosisSheet) -> tuple[Table, ...]:
-    """Where the gap lies and what these data cannot show."""
+    """Return the tables of where the gap lies and what these data cannot show."""
     return _made(sheet, (where, trends, places, invisible))
 
 
@@ -121,59 +124,51 @@ def _made(
 
 
 def causes(sheet: DiagnosisSheet) -> Table:
-    diagnosis = sheet.diagnosis
-    rows = [_cause_row(diagnosis, cause) for claim in claims(diagnosis) for cause in claim.causes]
+    """Return every cause that was tried, no gap and something unknown, those claimed marked."""
+    diagnosis, verdict = sheet.diagnosis, sheet.diagnosis.verdict
+    found = [cause for claim in group_causes(diagnosis.causes) for cause in claim.causes]
+    claimed = verdict.claim.causes if verdict.claim else ()
     rest = (
-        (NO_GAP, diagnosis.no_gap_probability),
-        ("something not in the catalogue", diagnosis.unexplained_probability),
+        (NO_GAP, diagnosis.no_gap_probability, Outcome.NO_GAP),
+        (
+            "something not in the catalogue",
+            diagnosis.unexplained_probability,
+            Outcome.UNEXPLAINED,
+        ),
     )
-    rows += [
-        (what, formatting.probability(share), "", *_compatible(diagnosis, what), *("",) * 4)
-        for what, share in rest
-    ]
+    marks = [each in claimed for each in found] + [each is verdict.outcome for *_, each in rest]
+    left_out = ", ".join(formatting.quantity(effect) for effect in diagnosis.left_out)
     return Table(
-        "Causes, likeliest first",
+        "Causes, most probable first",
         (
             "cause",
             "probability",
             "alike",
-            *(("compatible",) if diagnosis.compatibility else ()),
             "log Bayes factor",
             "gain of fit",
             "Occam's factor",
             "how",
         ),
-        tuple(rows),
-        note=_cause_note(diagnosis),
-        marks=_marks(diagnosis),
+        (
+            *(_cause_row(cause) for cause in found),
+            *((what, formatting.probability(share), *("",) * 5) for what, share, _ in rest),
+        ),
+        note=(
+            f"Against the baseline {diagnosis.baseline}, in natural logarithms: the Bayes factor "
+            "is what the better fit gains and what Occam's factor takes for free parameters. "
+            "Causes with the same letter cannot be told apart with these data. How far each was "
+            "taken: screened by a linear fit, or fitted in full with a normal or a sampled "
+            "posterior." + (f" Taken out of the catalogue: {left_out}." if left_out else "")
+        ),
+        marks=tuple("claimed" if is_claimed else "left" for is_claimed in marks),
     )
 
 
-def _marks(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """The rows that the answer claims."""
-    claim = claimed(diagnosis)
-    rows = [
-        "claimed" if claim and cause in claim.causes else "left"
-        for each in claims(diagnosis)
-        for cause in each.causes
-    ]
-    found = answer(diagnosis)
-    rest = (found is Answer.NO_GAP, found is Answer.UNEXPLAINED)
-    return (*rows, *("claimed" if is_it else "left" for is_it in rest))
-
-
-def _compatible(diagnosis: Diagnosis, name: str) -> tuple[str, ...]:
-    """Whether the data contradict it; no column of a diagnosis from before that was judged."""
-    found = diagnosis.compatibility
-    return () if found is None else ({True: "yes", False: "no", None: ""}[found.of(name)],)
-
-
-def _cause_row(diagnosis: Diagnosis, cause: Cause) -> tuple[str, ...]:
+def _cause_row(cause: Cause) -> tuple[str, ...]:
     return (
         label(cause),
         formatting.probability(cause.probability),
         "" if cause.group is None else _LETTERS[cause.group % len(_LETTERS)],
-        *_compatible(diagnosis, cause.effect),
         formatting.number(cause.log_bayes_factor, "+z.1f"),
         formatting.number(cause.log_fit, "+z.1f"),
         formatting.number(cause.log_occam, "+z.1f"),
@@ -181,27 +176,14 @@ def _cause_row(diagnosis: Diagnosis, cause: Cause) -> tuple[str, ...]:
     )
 
 
-def _cause_note(diagnosis: Diagnosis) -> str:
-    judged = diagnosis.compatibility is not None
-    left_out = ", ".join(formatting.quantity(effect) for effect in diagnosis.left_out)
-    return (
-        f"Against the baseline {diagnosis.baseline}, in natural logarithms: the Bayes factor is "
-        "what the better fit gains and what Occam's factor takes for free parameters. Causes alike "
-        "by the same letter cannot be told apart with these data. How far each was taken: screened "
-        "by a linear fit, or fitted in full with a normal or a sampled posterior."
-        + (" Compatible: all data within the bounds of their errors." if judged else "")
-        + (f" Taken out of the catalogue: {left_out}." if left_out else "")
-    )
-
-
 def sizes(sheet: DiagnosisSheet) -> Table:
-    """The parameters of the causes that are worth a thought."""
+    """Return the parameters of the most probable causes."""
     return Table(
-        "Sizes of the likeliest causes",
+        "Sizes of the most probable causes",
         ("cause", "parameter", "size (90 % interval)"),
         tuple(
             (label(cause), quantity(estimate), str(size(estimate)))
-            for claim in claims(sheet.diagnosis)
+            for claim in group_causes(sheet.diagnosis.causes)
             if claim.probability >= 0.05
             for cause in claim.causes
             if cause.probability >= 0.01
@@ -212,6 +194,7 @@ def sizes(sheet: DiagnosisSheet) -> Table:
 
 
 def shrinkage(sheet: DiagnosisSheet) -> Table:
+    """Return the errors of the frequencies before and after, in and out of the fit."""
     found = sheet.diagnosis.shrinkage
     rows = (
         ("fitted", found.rms_before_percent, found.rms_after_percent),
@@ -229,7 +212,8 @@ def shrinkage(sheet: DiagnosisSheet) -> Table:
 
 
 def tension(sheet: DiagnosisSheet) -> Table:
-    diagnosis, nominal = sheet.diagnosis, sheet.hanger.nominal_tension_n
+    """Return the tension by the baseline, and over all explanations."""
+    diagnosis = sheet.diagnosis
     unit = tension_unit(diagnosis)
     rows = (
         (f"before: the baseline {diagnosis.baseline}", diagnosis.tension_before_n),
@@ -243,46 +227,40 @@ def tension(sheet: DiagnosisSheet) -> Table:
             "% of nominal (90 %)",
         ),
         tuple(
-            _tension_row(what, each, nominal, unit)
+            (what, *_tension_cells(each, sheet.hanger.nominal_tension_n, unit))
             for what, each in rows
             if math.isfinite(each.mean)
         ),
     )
 
 
-def _tension_row(
-    what: str, estimate: TensionEstimate, nominal_n: float, unit: ForceUnit
-) -> tuple[str, ...]:
-    interval, places = tension_of(estimate).in_unit(unit), unit.decimals(estimate.mean)
+def _tension_cells(estimate: TensionEstimate, nominal_n: float, unit: ForceUnit) -> tuple[str, ...]:
+    interval, form = tension_of(estimate).in_unit(unit), f".{unit.decimals(estimate.mean)}f"
+    of_nominal = "no nominal"
+    if nominal_n > 0:
+        share = tension_of(estimate).scaled(100 / nominal_n)
+        is_known = math.isfinite(share.width)
+        of_nominal = formatting.with_span(share) if is_known else f"{share.mean:.1f}"
     return (
-        what,
-        f"{interval.mean:.{places}f}",
-        formatting.number(unit.of(estimate.sd), f".{places}f"),
-        f"{interval.low:.{places}f} to {interval.high:.{places}f}"
-        if math.isfinite(estimate.q05)
-        else "not known",
-        _of_nominal(estimate, nominal_n),
+        format(interval.mean, form),
+        formatting.number(unit.of(estimate.sd), form),
+        _range(interval.low, interval.high, form),
+        of_nominal,
     )
 
 
-def _of_nominal(estimate: TensionEstimate, nominal_n: float) -> str:
-    """In percent with its interval, which comes from the tension alone: nominal is given."""
-    if not nominal_n > 0:
-        return "no nominal"
-    share = tension_of(estimate).scaled(100 / nominal_n)
-    return formatting.with_span(share) if math.isfinite(share.width) else f"{share.mean:.1f}"
+def _range(low: float, high: float, form: str) -> str:
+    is_known = math.isfinite(low + high)
+    return f"{low:{form}} to {high:{form}}" if is_known else "not known"
 
 
 def next_measurements(sheet: DiagnosisSheet) -> Table:
+    """Return the measurements that were considered, best first."""
     return Table(
         "What would tell, best first",
         ("measurement", "tells", "from", "expected log Bayes factor"),
         tuple(
-            (
-                each.what,
-                *(formatting.quantity(name) for name in each.separates),
-                promise(each),
-            )
+            (each.what, *map(formatting.quantity, each.separates), promise(each))
             for each in ranked_measurements(sheet.diagnosis)
         ),
         note="A log Bayes factor of 3 is odds of 20 to 1, of 5 odds of 150 to 1.",
@@ -290,38 +268,35 @@ def next_measurements(sheet: DiagnosisSheet) -> Table:
 
 
 def where(sheet: DiagnosisSheet) -> Table:
-    """The frequencies set aside, then the residuals with the largest shares of the misfit."""
+    """Return the excluded frequencies, then the residuals with the largest shares."""
     diagnosis = sheet.diagnosis
     residuals = sorted(
         diagnosis.where,
-        key=lambda r: (not is_set_aside(diagnosis, r), math.isnan(r.share), -r.share),
+        key=lambda r: (not is_excluded(diagnosis, r), math.isnan(r.share), -r.share),
     )
     left = len(residuals) - _WORST
+    more = f" {left} more residuals are in the JSON document." if left > 0 else ""
     return Table(
         "Where the gap lies, largest share first",
-        ("mode", "test", "measured, Hz", "baseline, Hz", "off, %", "z", "share", "off after, %"),
+        ("mode", "test", "measured, Hz", "baseline, Hz", "off, %", "z", "share", "off after, %",
+         "z after"),
         tuple(
-            _residual_row(residual, is_set_aside(diagnosis, residual))
-            for residual in residuals[:_WORST]
+            (
+                f"{each.plane} {each.order}",
+                each.test,
+                formatting.number(each.measured_hz, ".3f"),
+                formatting.number(each.predicted_hz, ".3f"),
+                formatting.number(each.residual_percent, "+z.2f"),
+                formatting.number(each.z, "+z.1f"),
+                "set aside" if is_excluded(diagnosis, each) else _share(each.share),
+                formatting.number(each.after_percent, "+z.2f", ""),
+                formatting.number(each.after_z, "+z.1f", ""),
+            )
+            for each in residuals[:_WORST]
         ),
-        note=(
-            "Off: measured over predicted frequency, less 1; z: the same in standard deviations."
-            + (f" {left} more residuals are in the JSON document." if left > 0 else "")
-        ),
-    )
-
-
-def _residual_row(residual: Residual, is_aside: bool) -> tuple[str, ...]:
-    return (
-        f"{residual.plane} {residual.order}",
-        residual.test,
-        formatting.number(residual.measured_hz, ".3f"),
-        formatting.number(residual.predicted_hz, ".3f"),
-        formatting.number(residual.residual_percent, "+z.2f"),
-        formatting.number(residual.z, "+z.1f"),
-        "set aside" if is_aside else _share(residual.share),
-        formatting.number(residual.after_percent, "+z.2f", ""),
-    )
+        note="Off: measured over predicted frequency, less 1; z: the same in standard deviations. "
+        f"After: with the leading cause.{more}",
+    )  # fmt: skip
 
 
 def _share(value: float) -> str:
@@ -329,44 +304,46 @@ def _share(value: float) -> str:
 
 
 def trends(sheet: DiagnosisSheet) -> Table:
+    """Return how the gap changes with each condition."""
+    found = [
+        (each, Interval.normal(each.slope_percent, each.slope_sd_percent))
+        for each in sheet.diagnosis.trends
+    ]
     return Table(
         "What the gap goes with",
         ("condition", "change over its range, %", "90 % interval, %", "share of the misfit"),
-        tuple(_trend_row(trend) for trend in sheet.diagnosis.trends),
-    )
-
-
-def _trend_row(trend: Trend) -> tuple[str, ...]:
-    interval = slope(trend)
-    bounds = f"{interval.low:+z.2f} to {interval.high:+z.2f}"
-    return (
-        trend.condition,
-        formatting.number(trend.slope_percent, "+z.2f"),
-        bounds if math.isfinite(interval.width) else "not known",
-        _share(trend.share),
+        tuple(
+            (
+                each.condition,
+                formatting.number(each.slope_percent, "+z.2f"),
+                _range(slope.low, slope.high, "+z.2f"),
+                _share(each.share),
+            )
+            for each, slope in found
+        ),
     )
 
 
 def places(sheet: DiagnosisSheet) -> Table:
+    """Return where along the hanger a local cause of each kind would sit."""
     return Table(
         "Where along the hanger a local cause would sit",
         ("were it", "at, m", "90 % interval, m", "share of the misfit explained"),
-        tuple(_place_row(place) for place in sheet.diagnosis.places),
+        tuple(
+            (
+                formatting.quantity(each.kind),
+                formatting.number(each.x_m, ".2f"),
+                _range(each.low_m, each.high_m, ".2f"),
+                _share(each.share),
+            )
+            for each in sheet.diagnosis.places
+        ),
         note="Places count from the deck end.",
     )
 
 
-def _place_row(place: GapPlace) -> tuple[str, ...]:
-    bounds = f"{place.low_m:.2f} to {place.high_m:.2f}"
-    return (
-        formatting.quantity(place.kind),
-        formatting.number(place.x_m, ".2f"),
-        bounds if math.isfinite(place.low_m + place.high_m) else "not known",
-        _share(place.share),
-    )
-
-
 def invisible(sheet: DiagnosisSheet) -> Table:
+    """Return the effects that these data cannot show, and why."""
     return Table(
         "What these data cannot show",
         ("effect", "why"),
@@ -375,11 +352,12 @@ def invisible(sheet: DiagnosisSheet) -> Table:
 
 
 def diagnosis_json(sheet: DiagnosisSheet) -> dict[str, Any]:
-    """A document for `shm.documents.dump`; unknown numbers become null there."""
+    """Return a document for `shm.documents.dump`; unknown numbers become null there."""
     document = {
         **diagnosis_document(sheet.diagnosis),
-        "answer": answer(sheet.diagnosis).name.lower(),
-        "summary": summary(sheet),
+        "answer": sheet.diagnosis.verdict.outcome.name.lower(),
+        "summary": write_summary(sheet.diagnosis),
+        "details": write_details(sheet.diagnosis),
         "bar": bar_document(sheet.bar),
     }
     return with_assumptions(document, sheet.hanger)

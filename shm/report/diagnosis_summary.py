@@ -1,129 +1,139 @@
-"""The answer of a gap diagnosis in words that an engineer would sign, the claim first."""
+"""Write the verdict of a gap diagnosis as sentences; the verdict itself is `Diagnosis.verdict`."""
 
 from __future__ import annotations
 
 import math
 import statistics
+from collections.abc import Mapping
 
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
-from shm.report.diagnosis_remainder import compatible, law, like_tension, told_of_few
 from shm.report.diagnosis_wording import (
     AFTER,
-    Answer,
-    Claim,
-    answer,
-    claimed,
-    claims,
+    is_of_the_measurement,
     label,
     phrase,
     tension_unit,
     tension_words,
 )
-from shm.report.formatting import Interval
 from shm.report.paper import Fact
-from shm.values import MOST_MISFIT_PERCENT, Diagnosis, NextMeasurement, Trend
+from shm.values import Diagnosis, GapVerdict, NextMeasurement, Outcome, TensionEstimate
+from shm.values.verdict import Reason
 
 _SURE = 0.9
-_POOR_FIT = 0.01
-_FAIR_FIT = 0.05
 _WORTH_MEASURING = 1.0
 _CERTAIN = 20.0
 # Judgement: to rule a rival of less out, however surely, raises no gap by a ninth at most.
 _LEAST_RIVAL = 0.1
-_CERTAIN_ODDS = 1000
-_SHRUNK = 0.8
-"""The largest share of a held-out gap that may remain where it is said to have shrunk."""
-# Judgement: two sds, as for any trend; a fifth of the gap is worth a word; three names fit.
-_SURE_TREND_SD = 2.0
-_TREND_SHARE = 0.2
 _MOST_NAMED = 3
 _STRING_FROM = 100.0  # judgement: of L sqrt(T/EI); bending moves its low modes by 2 % at most
-_CONDITIONS = {
-    "amplitude": "the level of the hits",
-    "order": "the order of the mode",
-    "plane": "the plane",
-    "temperature": "the temperature",
-    "added mass": "the known mass",
+_COUNTS = ("no mode", "one mode", "two modes", "three modes")
+
+_OUTCOMES: Mapping[Outcome, str] = {
+    Outcome.NO_GAP: "{reason} (no gap, probability {chance})",
+    Outcome.EXPLAINED: "the gap {due} {causes}, probability {chance}; what is left is within the "
+    "stated errors",
+    Outcome.PARTLY: "{causes} explains a part of the gap, but more is left than the errors allow: "
+    "{reason}",
+    Outcome.ALIKE: "several causes fit alike, and these data cannot tell them apart: {causes}, "
+    "together probability {chance}",
+    Outcome.UNEXPLAINED: "not explained: {reason}",
 }
+_REASONS: Mapping[Reason, str] = {
+    "": "no gap is visible: the baseline {baseline} explains the measurements",
+    "few modes": "nothing visible in {modes}, where little can be",
+    "misses by percents": "no gap can be shown, though the baseline {baseline} misses the "
+    "frequencies by more than a sound model does: {possible}",
+    "misses the errors": "no gap can be shown, though the baseline {baseline} misses the "
+    "frequencies by more than the stated errors",
+    "less probable than not": "no cause is claimed, for it may be that there is no gap",
+    "poor fit": "measurements as far off would come by chance with probability {p_value} only",
+    "large misfit": "{misfit} % of the frequencies (rms)",
+    "large residuals": "{rms_z} standard deviations (rms)",
+    "acts alone": "something may act on {alone} alone, probability {acts_alone}",
+    "unknown is more probable": "{start} of the effects {tried} explains it, and the probability "
+    "of something else is {unknown}",
+    "much would fit": "{nearest} fits, but so would much that has another cause, and the "
+    "probability of something else is {unknown}",
+    "no nearer": "{nearest} is the most probable cause, but brings the frequencies no nearer",
+    "weak evidence": "{nearest} is the most probable cause, but leaves more than the errors allow",
+    "none is more probable than not": "no cause is more probable than all else",
+    "sampler failed": "no cause is claimed from such draws",
+    "no probabilities": "these data give no probability to any explanation",
+}
+_HELD_OUT: Mapping[bool | None, str] = {
+    True: "",
+    False: "Where they were held out of the fit the frequencies come no nearer: do not rely on the "
+    "cause yet.",
+    None: "Nothing was held out of the fit to check the cause.",
+}
+_UNCERTAIN = "the sampler failed, so the answer is uncertain; "
+_CALLIPER = "measure section, length and weight with calliper and tape first: "
+_MEASUREMENT = "what differs is the measurement's, not the hanger's: "
 
 
 def name(sheet: DiagnosisSheet) -> str:
-    """`Gap diagnosis, Hanger 3`."""
+    """Return `Gap diagnosis, Hanger 3`."""
     return f"Gap diagnosis, {formatting.hanger_name(sheet.hanger.id, sheet.hanger.name)}"
 
 
-def summary(sheet: DiagnosisSheet) -> str:
-    """One paragraph: which cause, what it cannot be told from, how far, tension, what next."""
-    return f"{verdict(sheet.diagnosis)} {consequences(sheet.diagnosis)}".rstrip()
+def write_summary(diagnosis: Diagnosis) -> str:
+    """Return the first paragraph: the verdict, and what it does to the tension."""
+    return f"{write_lead(diagnosis)} {write_tension(diagnosis)}".rstrip()
 
 
-def consequences(diagnosis: Diagnosis) -> str:
-    """What follows the claim: how far the gap shrinks, how it goes, the tension, what next."""
-    sentences = (
-        _runner_up(diagnosis),
-        _shrinkage(diagnosis),
-        _misfit(diagnosis),
-        _pattern(diagnosis),
-        law(diagnosis.remainder),
-        _tension(diagnosis),
-        like_tension(diagnosis.remainder),
-        compatible(diagnosis),
-        _set_aside(diagnosis),
-        next_step(diagnosis),
-    )
-    return " ".join(sentence for sentence in sentences if sentence)
+def write_lead(diagnosis: Diagnosis) -> str:
+    """Return the verdict in a sentence, what asks for care first."""
+    verdict = diagnosis.verdict
+    start = _UNCERTAIN if verdict.is_uncertain else ""
+    if verdict.claim is not None and verdict.is_description_off:
+        start += _CALLIPER
+    elif verdict.claim is not None and is_of_the_measurement(verdict.claim):
+        start += _MEASUREMENT
+    told = start + _OUTCOMES[verdict.outcome].format_map(_list_words(diagnosis, verdict))
+    return f"{told[0].upper()}{told[1:]}."
 
 
-def verdict(diagnosis: Diagnosis) -> str:
-    """The claim with its probability, and what few data keep to themselves."""
-    claim = claimed(diagnosis)
-    if few := told_of_few(diagnosis):
-        return few if answer(diagnosis) is Answer.NO_GAP else f"{_verdict(diagnosis, claim)} {few}"
-    return f"{_verdict(diagnosis, claim)}{_beyond_the_swing(diagnosis)}"
+def _list_words(diagnosis: Diagnosis, verdict: GapVerdict) -> dict[str, str]:
+    """Return the words that the sentences of outcomes and reasons may hold."""
+    alone, unknown = verdict.alone, diagnosis.unexplained_probability
+    left_out = ", ".join(formatting.quantity(effect) for effect in diagnosis.left_out)
+    words = {
+        "chance": formatting.told_probability(verdict.probability),
+        "due": "is explained by" if verdict.probability >= _SURE else "is most likely due to",
+        "causes": _list_causes(verdict),
+        "baseline": diagnosis.baseline,
+        "modes": _count_modes(diagnosis) if verdict.is_few else "",
+        "possible": _explain_misfit(diagnosis) if verdict.reason == "misses by percents" else "",
+        "p_value": formatting.told_probability(verdict.fit_p_value),
+        "rms_z": formatting.plain(verdict.rms_z, 2),
+        "misfit": formatting.plain(diagnosis.shrinkage.rms_after_percent, 2),
+        "alone": f"{alone.plane} {alone.order} of test {alone.test}" if alone else "",
+        "acts_alone": formatting.told_probability(alone.acts_alone) if alone else "",
+        "start": "none" if unknown >= _SURE else "most likely none",
+        "tried": f"that were tried ({left_out} left out)" if left_out else "in the catalogue",
+        "unknown": formatting.told_probability(unknown),
+        "nearest": label(verdict.runner_up.leading) if verdict.runner_up else "the best of them",
+    }
+    return words | {"reason": _REASONS[verdict.reason].format_map(words)}
 
 
-def _beyond_the_swing(diagnosis: Diagnosis) -> str:
-    """What no hit reached, said where nothing was found."""
-    if answer(diagnosis) is not Answer.NO_GAP:
-        return ""
-    swing = "of these hits"
-    if math.isfinite(diagnosis.widest_swing_m):
-        swing = f"of {formatting.plain(1e3 * diagnosis.widest_swing_m, 2)} mm at the sensors"
-    return (
-        f" What acts only beyond swings {swing}, such as a guide with more play or a crack that "
-        "traffic opens, is not visible; what touches only right after a hit hardly is."
-    )
+def _list_causes(verdict: GapVerdict) -> str:
+    """Return `point mass`; of several causes the first, and that there are others."""
+    names = [label(cause) for cause in verdict.claim.causes] if verdict.claim else []
+    shown = names[:_MOST_NAMED] + ["others"] * (len(names) > _MOST_NAMED)
+    is_one_of = len(names) > 1 and verdict.outcome is Outcome.PARTLY
+    return f"{'one of ' if is_one_of else ''}{formatting.listed(shown)}" if shown else ""
 
 
-def _verdict(diagnosis: Diagnosis, claim: Claim | None) -> str:
-    match answer(diagnosis):
-        case Answer.NO_GAP:
-            sure = diagnosis.no_gap_probability >= _SURE
-            chance = formatting.told_probability(diagnosis.no_gap_probability)
-            if diagnosis.shrinkage.rms_before_percent > MOST_MISFIT_PERCENT:
-                return (
-                    f"No gap can be shown, though the baseline {diagnosis.baseline} misses the "
-                    f"frequencies by more than a sound model does: {_possible_misfit(diagnosis)} "
-                    f"(no gap, probability {chance})."
-                )
-            return (
-                f"{'No gap' if sure else 'Most likely no gap'}: the baseline {diagnosis.baseline} "
-                f"explains the measurements, probability {chance}."
-            )
-        case Answer.UNEXPLAINED:
-            return (
-                f"{_none_explains(diagnosis)}: the probability of something else is "
-                f"{formatting.told_probability(diagnosis.unexplained_probability)}."
-            )
-        case Answer.UNDECIDED:
-            return _undecided(diagnosis)
-        case Answer.EXPLAINED | Answer.ALIKE:
-            assert claim is not None
-            return _explained(claim)
+def _count_modes(diagnosis: Diagnosis) -> str:
+    """Return `two modes of transverse vibration`."""
+    modes = {(each.plane, each.order) for each in diagnosis.where}
+    planes = sorted({plane for plane, _ in modes})
+    return f"{_COUNTS[len(modes)]} of {formatting.listed(planes)} vibration"
 
 
-def _possible_misfit(diagnosis: Diagnosis) -> str:
+def _explain_misfit(diagnosis: Diagnosis) -> str:
     """Return what may move the frequencies of a bar, or of a string, as far as the misfit."""
     if diagnosis.slenderness <= _STRING_FROM:
         return "on so stiff a bar what supports and sensors give may be as large"
@@ -138,188 +148,72 @@ def _possible_misfit(diagnosis: Diagnosis) -> str:
     )
 
 
-def _none_explains(diagnosis: Diagnosis) -> str:
-    start = "None" if diagnosis.unexplained_probability >= _SURE else "Most likely none"
-    if not diagnosis.left_out:
-        return f"{start} of the effects in the catalogue explains it"
-    left_out = formatting.listed([formatting.quantity(effect) for effect in diagnosis.left_out])
-    return f"{start} of the effects that were tried ({left_out} left out) explains it"
+def write_tension(diagnosis: Diagnosis) -> str:
+    """Return the tension, and what keeps it or the cause from being relied on."""
+    verdict, after_n = diagnosis.verdict, diagnosis.tension_after_n
+    sentences = []
+    if verdict.is_few and (off := _off_percent(after_n)):
+        sentences.append(f"So few data decide little: the tension may be off by {off} (95 %).")
+    if math.isfinite(after_n.mean):
+        care = ", not to be relied on while the gap is open" if verdict.is_open else ""
+        told = tension_words(after_n, tension_unit(diagnosis))
+        sentences.append(f"{AFTER.capitalize()}, the tension is {told}{care}.")
+    if verdict.claim is not None:
+        sentences.append(_HELD_OUT[verdict.holds_out])
+    return " ".join(sentence for sentence in sentences if sentence)
 
 
-def _explained(claim: Claim) -> str:
-    sure = "is explained by" if claim.probability >= _SURE else "is most likely due to"
-    if claim.of_the_measurement:
-        likely = "is" if claim.probability >= _SURE else "is most likely"
-        return f"What differs {likely} the measurement's, not the hanger's: {_told(claim)}."
-    return f"The gap {sure} {_told(claim)}."
+def _off_percent(tension_n: TensionEstimate) -> str:
+    """Return the larger half of the 95 % interval."""
+    reach = max(tension_n.q975 - tension_n.mean, tension_n.mean - tension_n.q025)
+    if not (math.isfinite(reach) and tension_n.mean > 0):
+        return ""
+    return f"{formatting.plain(100 * reach / tension_n.mean, 2)} %"
 
 
-def _told(claim: Claim) -> str:
-    """The leading cause in full, those that cannot be told from it, and the probability."""
-    others = [label(cause) for cause in claim.causes[1:]]
-    if not others:
-        return f"{phrase(claim.leading)}, {_odds(claim)}"
-    if len(others) > _MOST_NAMED:
-        others = [*others[:_MOST_NAMED], f"{len(others) - _MOST_NAMED} more"]
-    alike = formatting.listed(others)
-    return (
-        f"{phrase(claim.leading)}, or what these data cannot tell from it: {alike}; together "
-        f"{_odds(claim)}"
+def write_details(diagnosis: Diagnosis) -> str:
+    """Return the second paragraph: the cause with its sizes, what no hit reached, what next."""
+    verdict = diagnosis.verdict
+    sentences = (
+        _state_size(verdict),
+        _state_reach(diagnosis) if verdict.outcome is Outcome.NO_GAP else "",
+        next_step(diagnosis),
     )
+    return " ".join(sentence for sentence in sentences if sentence)
 
 
-def _odds(claim: Claim) -> str:
-    return f"probability {formatting.told_probability(claim.probability)}"
-
-
-def _undecided(diagnosis: Diagnosis) -> str:
-    """The likeliest possibilities, where none is likelier than all others together."""
-    possible = [
-        (diagnosis.no_gap_probability, "no gap"),
-        (diagnosis.unexplained_probability, "something that is not in the catalogue"),
-        *((each.probability, label(each.leading)) for each in claims(diagnosis)),
-    ]
-    known = sorted((each for each in possible if math.isfinite(each[0])), reverse=True)
-    if not known:
-        return "Undecided: these data give no probability to any explanation."
-    told = [f"{what} ({formatting.told_probability(share)})" for share, what in known[:_MOST_NAMED]]
-    return f"Undecided: these data leave open {formatting.listed(told)}."
-
-
-def _set_aside(diagnosis: Diagnosis) -> str:
-    """The frequencies that are gross errors, and what should have been measured."""
-    told = [
-        f"{each.plane} {each.order} of test {each.test} "
-        f"({formatting.number(each.measured_hz, '.2f')} Hz, "
-        f"{formatting.number(each.expected_hz, '.2f')} Hz expected)"
-        for each in diagnosis.outliers
-    ]
-    if not told:
+def _state_size(verdict: GapVerdict) -> str:
+    """Return the most probable cause with its sizes and places."""
+    if verdict.claim is not None:
+        most = "The most probable" if len(verdict.claim.causes) > 1 else "The cause"
+        return f"{most}: {phrase(verdict.claim.leading)}."
+    if verdict.runner_up is None:
         return ""
-    gross = "as a gross error" if len(told) == 1 else "as gross errors"
-    return f"Set aside {gross}: {formatting.listed(told)}."
+    chance = formatting.told_probability(verdict.runner_up.probability)
+    return f"The most probable: {phrase(verdict.runner_up.leading)}, probability {chance}."
 
 
-def _runner_up(diagnosis: Diagnosis) -> str:
-    """The likeliest cause where none is claimed but one is not to be forgotten."""
-    best = next(iter(claims(diagnosis)), None)
-    told = answer(diagnosis) not in (Answer.NO_GAP, Answer.UNEXPLAINED)
-    if told or best is None or not best.probability >= 1 - _SURE:
-        return ""
-    return f"The likeliest effect is {_told(best)}.{_why_not(diagnosis, best)}"
-
-
-def _why_not(diagnosis: Diagnosis, best: Claim) -> str:
-    """Why a pair that fits is not claimed where something unknown is."""
-    fits = diagnosis.fit_p_value >= _FAIR_FIT and answer(diagnosis) is Answer.UNEXPLAINED
-    if not fits or len(best.leading.effects) < 2:
-        return ""
-    return " These two fit, but together they would also fit much that has another cause."
-
-
-def _pattern(diagnosis: Diagnosis) -> str:
-    """Which conditions the gap surely goes with."""
-    if answer(diagnosis) is Answer.NO_GAP:
-        return ""
-    sure = [trend for trend in diagnosis.trends if sure_trend(trend)]
-    if not sure:
-        return ""
-    told = [f"{_CONDITIONS.get(t.condition, t.condition)} ({_slope(t)})" for t in sure]
-    return f"The gap changes with {formatting.listed(told)}."
-
-
-def sure_trend(trend: Trend) -> bool:
-    """Whether the gap surely and noticeably goes with the condition."""
-    clear = abs(trend.slope_percent) > _SURE_TREND_SD * trend.slope_sd_percent
-    return clear and trend.share >= _TREND_SHARE
-
-
-def _slope(trend: Trend) -> str:
-    over = "from transverse to longitudinal" if trend.condition == "plane" else "over its range"
-    interval = formatting.span(slope(trend), signed=True)
-    return f"{formatting.mean(slope(trend), signed=True)} % {over}, 90 % interval {interval} %"
-
-
-def slope(trend: Trend) -> Interval:
-    return Interval.normal(trend.slope_percent, trend.slope_sd_percent)
-
-
-def _shrinkage(diagnosis: Diagnosis) -> str:
-    """How far the residuals shrink in and out of the fit; nothing where nothing is claimed."""
-    found = diagnosis.shrinkage
-    if answer(diagnosis) is Answer.NO_GAP:
-        if math.isnan(found.rms_before_percent):
-            return ""
-        return f"The frequencies differ from it by {_percent(found.rms_before_percent)} (rms)."
-    claim = claimed(diagnosis)
-    if math.isnan(found.rms_after_percent) or claim is None:
-        return ""
-    undecided = answer(diagnosis) is Answer.UNDECIDED
-    what = label(claim.leading) if undecided else "it"
-    both = _percent(found.rms_before_percent), _percent(found.rms_after_percent)
-    goes = "shrinks" if found.rms_after_percent < found.rms_before_percent else "grows"
-    inside = f"With {what} the frequencies' error {goes} from {both[0]} to {both[1]} (rms)"
-    return f"{inside}{_held_out(diagnosis)}"
-
-
-def _held_out(diagnosis: Diagnosis) -> str:
-    before = diagnosis.shrinkage.held_out_before_percent
-    after = diagnosis.shrinkage.held_out_after_percent
-    if math.isnan(before) or math.isnan(after):
-        return "; nothing was held out of the fit to check that."
-    if after <= _SHRUNK * before:
-        return (
-            f" and, where they were held out of the fit, from {_percent(before)} to "
-            f"{_percent(after)}."
-        )
+def _state_reach(diagnosis: Diagnosis) -> str:
+    """Return what no hit reached."""
+    swing = "of these hits"
+    if math.isfinite(diagnosis.widest_swing_m):
+        swing = f"of {formatting.plain(1e3 * diagnosis.widest_swing_m, 2)} mm at the sensors"
     return (
-        f", but not where they were held out of the fit ({_percent(before)} before, "
-        f"{_percent(after)} after): do not rely on it yet."
+        f"What acts only beyond swings {swing}, such as a guide with more play or a crack that "
+        "traffic opens, is not visible; what touches only right after a hit hardly is."
     )
-
-
-def _percent(value: float) -> str:
-    return f"{formatting.plain(value, 2)} %"
-
-
-def _misfit(diagnosis: Diagnosis) -> str:
-    if not diagnosis.fit_p_value < _POOR_FIT or answer(diagnosis) is Answer.UNEXPLAINED:
-        return ""
-    chance = formatting.told_probability(diagnosis.fit_p_value)
-    return (
-        "Even so the fit is poor: were this all, measurements as far off would come with "
-        f"probability {chance} only. Something is left."
-    )
-
-
-def _tension(diagnosis: Diagnosis) -> str:
-    plain, better = diagnosis.tension_before_n, diagnosis.tension_after_n
-    if math.isnan(plain.mean):
-        return ""
-    unit = tension_unit(diagnosis)
-    alone = f"the baseline {diagnosis.baseline} alone gives {tension_words(plain, unit)}"
-    if math.isnan(better.mean):
-        return f"For the tension {alone}{_with_care(diagnosis)}."
-    off = 100 * (plain.mean / better.mean - 1)
-    told = f"{AFTER.capitalize()}, the tension is {tension_words(better, unit)}"
-    return f"{told}; {alone}, {formatting.change(off)}{_with_care(diagnosis)}."
-
-
-def _with_care(diagnosis: Diagnosis) -> str:
-    unsure = answer(diagnosis) in (Answer.UNEXPLAINED, Answer.UNDECIDED)
-    return ", not to be relied on while the gap is open" if unsure else ""
 
 
 def ranked_measurements(diagnosis: Diagnosis) -> list[NextMeasurement]:
-    """The measurements that were considered, those that tell most first."""
+    """Return the measurements that were considered, those that tell most first."""
     known = [e for e in diagnosis.next_measurements if math.isfinite(e.expected_log_bayes_factor)]
     return sorted(known, key=lambda each: -each.expected_log_bayes_factor)
 
 
 def next_step(diagnosis: Diagnosis) -> str:
-    """The measurement that tells most between the contenders; beside no gap, those that count."""
+    """Return the measurement that tells most; next to no gap, only one that counts."""
     found = ranked_measurements(diagnosis)
-    if answer(diagnosis) is Answer.NO_GAP:
+    if diagnosis.verdict.outcome is Outcome.NO_GAP:
         found = [each for each in found if _rival(diagnosis, each) >= _LEAST_RIVAL]
     best = next(iter(found), None)
     if best is None:
@@ -327,81 +221,61 @@ def next_step(diagnosis: Diagnosis) -> str:
     one, other = (formatting.quantity(each) for each in best.separates)
     if best.expected_log_bayes_factor < _WORTH_MEASURING:
         return f"No measurement that was considered would tell {one} from {other} for sure."
-    return (
-        f"To tell {one} from {other}, measure next: {best.what} (expected odds of "
-        f"{_odds_to_expect(best)} to 1)."
-    )
+    return f"To tell {one} from {other}, measure next: {best.what}."
 
 
 def _rival(diagnosis: Diagnosis, measurement: NextMeasurement) -> float:
-    """The probability of the likeliest cause that a measurement tells from another answer."""
+    """Return the probability of the best cause that a measurement tells from another answer."""
     told = (e.probability for e in diagnosis.causes if e.effect in measurement.separates)
     return max(told, default=0.0)
 
 
 def promise(measurement: NextMeasurement) -> str:
-    """The expected log Bayes factor; beyond certainty nobody counts."""
+    """Return the expected log Bayes factor; beyond certainty nobody counts."""
     factor = measurement.expected_log_bayes_factor
     return f"{factor:.1f}" if factor < _CERTAIN else f"{_CERTAIN:.0f} or more"
 
 
-def _odds_to_expect(measurement: NextMeasurement) -> str:
-    """The same in words for a sentence: `400`, `more than 1000`."""
-    odds = math.exp(min(measurement.expected_log_bayes_factor, _CERTAIN))
-    return f"{float(f'{odds:.1g}'):.0f}" if odds < _CERTAIN_ODDS else f"more than {_CERTAIN_ODDS}"
+_CLAIMED: Mapping[Outcome, str] = {
+    Outcome.NO_GAP: "Probability of no gap",
+    Outcome.UNEXPLAINED: "Something else",
+}
 
 
 def facts(sheet: DiagnosisSheet) -> tuple[Fact, ...]:
-    """The figures on top: what, value, what stands beside it."""
-    facts = (_claim(sheet), _misses(sheet), _tension_fact(sheet), _fit(sheet))
-    return tuple(fact for fact in facts if fact is not None)
+    """Return the figures on top: what, value, and what belongs to it."""
+    verdict = sheet.diagnosis.verdict
+    found = (
+        (
+            _CLAIMED.get(verdict.outcome, "Probability of the cause"),
+            formatting.probability(verdict.probability),
+            _list_causes(verdict),
+        ),
+        _give_tension(sheet.diagnosis),
+        _give_fit(verdict),
+    )
+    return tuple(fact for fact in found if fact is not None)
 
 
-def _claim(sheet: DiagnosisSheet) -> Fact:
-    diagnosis, claim = sheet.diagnosis, claimed(sheet.diagnosis)
-    if claim is not None:
-        more = len(claim.causes) - 1
-        alike = f" or {formatting.counted(more, 'cause')} like it" if more else ""
-        told = formatting.probability(claim.probability)
-        return ("Probability of the cause", told, f"{label(claim.leading)}{alike}")
-    no_gap, unknown = diagnosis.no_gap_probability, diagnosis.unexplained_probability
-    if diagnosis.leads == "no gap":
-        return ("Probability of no gap", formatting.probability(no_gap), f"by {diagnosis.baseline}")
-    return ("Something else", formatting.probability(unknown), "probability, not in the catalogue")
-
-
-def _misses(sheet: DiagnosisSheet) -> Fact | None:
-    found = sheet.diagnosis.shrinkage
-    if math.isnan(found.rms_before_percent):
+def _give_tension(diagnosis: Diagnosis) -> Fact | None:
+    before_n, after_n = diagnosis.tension_before_n, diagnosis.tension_after_n
+    if math.isnan(before_n.mean):
         return None
-    both = (found.rms_before_percent, found.rms_after_percent)
-    before, with_it = (formatting.plain(value, 2) for value in both)
-    if math.isnan(found.rms_after_percent) or claimed(sheet.diagnosis) is None:
-        return ("Error of the frequencies", f"{before} %", "rms, by the baseline")
-    held = found.held_out_after_percent
-    told = f"rms; held out {formatting.plain(held, 2)} %" if math.isfinite(held) else "rms"
-    return ("Error of the frequencies", f"{before} → {with_it} %", told)
+    unit = tension_unit(diagnosis)
+    alone = f"baseline alone {tension_words(before_n, unit)}"
+    if math.isnan(after_n.mean):
+        return ("Tension", formatting.rounded_tension(before_n.mean, unit), alone)
+    told = f"{tension_words(after_n, unit)}; {alone}"
+    return ("Tension", formatting.rounded_tension(after_n.mean, unit), told)
 
 
-def _tension_fact(sheet: DiagnosisSheet) -> Fact | None:
-    plain, better = sheet.diagnosis.tension_before_n, sheet.diagnosis.tension_after_n
-    if math.isnan(plain.mean):
+def _give_fit(verdict: GapVerdict) -> Fact | None:
+    if math.isnan(verdict.fit_p_value):
         return None
-    unit = tension_unit(sheet.diagnosis)
-    if math.isnan(better.mean):
-        told = f"baseline: {tension_words(plain, unit)}"
-        return ("Tension", formatting.rounded_tension(plain.mean, unit), told)
-    told = f"{tension_words(better, unit)}; baseline alone {tension_words(plain, unit)}"
-    return ("Tension", formatting.rounded_tension(better.mean, unit), told)
-
-
-def _fit(sheet: DiagnosisSheet) -> Fact | None:
-    p_value = sheet.diagnosis.fit_p_value
-    if math.isnan(p_value):
-        return None
-    told = "good" if p_value >= 0.05 else "doubtful" if p_value >= 0.01 else "poor"
+    sds = f"{formatting.plain(verdict.rms_z, 2)} standard deviations rms, "
     return (
-        "Fit of the answer",
-        told,
-        f"posterior predictive p-value {formatting.probability(p_value)}",
+        "What is left",
+        "within the errors" if verdict.is_within_errors else "more than the errors",
+        f"{sds if math.isfinite(verdict.rms_z) else ''}posterior predictive p-value "
+        f"{formatting.probability(verdict.fit_p_value)}",
     )

@@ -1,93 +1,17 @@
-"""A gap diagnosis in words: what it claims, its effects as names and clauses, their sizes."""
+"""Write causes of a gap as names and clauses, with their sizes."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from enum import Enum
 
 from shm.models.effects import EFFECTS
 from shm.report import formatting
 from shm.report.formatting import Interval
-from shm.values import Cause, Diagnosis, EffectEstimate, Residual, TensionEstimate, effect_label
+from shm.report.sizes import Sizes
+from shm.values import Cause, Claim, Diagnosis, EffectEstimate, TensionEstimate, effect_label
 from shm.values.diagnosis import joined
-from shm.values.parameter_names import base_name, is_logarithm, quantity_name
 from shm.values.rounding import ForceUnit, force_unit
-
-# Even odds; two places fit a sentence.
-_LIKELIER_THAN_NOT = 0.5
-
-
-class Answer(Enum):
-    """What a diagnosis says, in two or three words."""
-
-    EXPLAINED = "Explained"
-    ALIKE = "Explained, causes alike"
-    NO_GAP = "No gap"
-    UNEXPLAINED = "Not explained"
-    UNDECIDED = "Undecided"
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One cause, or the causes that these data cannot tell apart, likeliest first."""
-
-    causes: tuple[Cause, ...]
-
-    @property
-    def probability(self) -> float:
-        return sum(cause.probability for cause in self.causes)
-
-    @property
-    def leading(self) -> Cause:
-        return self.causes[0]
-
-    @property
-    def of_the_measurement(self) -> bool:
-        """Whether all that it names are faults of sensors, clock or what was clamped on to
-        measure."""
-        names = {effect for cause in self.causes for effect in cause.effects}
-        known = [EFFECTS.get(name) for name in names if name != "timebase"]
-        return all(effect is not None and not effect.of_the_hanger for effect in known)
-
-
-def claims(diagnosis: Diagnosis) -> tuple[Claim, ...]:
-    """The causes, those of a group together, likeliest first."""
-    together: dict[str, list[Cause]] = {}
-    for cause in sorted(diagnosis.causes, key=lambda cause: -cause.probability):
-        key = cause.effect if cause.group is None else f"group {cause.group}"
-        together.setdefault(key, []).append(cause)
-    found = [Claim(tuple(causes)) for causes in together.values()]
-    return tuple(sorted(found, key=lambda claim: -claim.probability))
-
-
-def claimed(diagnosis: Diagnosis) -> Claim | None:
-    """The likeliest claim; None where no gap or something unknown is likelier than each."""
-    leading = diagnosis.leading
-    return next((claim for claim in claims(diagnosis) if claim.leading is leading), None)
-
-
-def answer(diagnosis: Diagnosis) -> Answer:
-    """What the diagnosis says; undecided where nothing is likelier than not, and where the claim
-    leaves the frequencies no nearer."""
-    claim, shrinkage = claimed(diagnosis), diagnosis.shrinkage
-    if claim is not None and shrinkage.rms_after_percent >= shrinkage.rms_before_percent:
-        return Answer.UNDECIDED
-    if claim is not None:
-        sure, said = claim.probability, Answer.EXPLAINED if len(claim.causes) == 1 else Answer.ALIKE
-    elif diagnosis.leads == "no gap":
-        sure, said = diagnosis.no_gap_probability, Answer.NO_GAP
-    else:
-        sure, said = diagnosis.unexplained_probability, Answer.UNEXPLAINED
-    return said if sure >= _LIKELIER_THAN_NOT else Answer.UNDECIDED
-
-
-def is_set_aside(diagnosis: Diagnosis, residual: Residual) -> bool:
-    """Whether a frequency was taken for a gross error."""
-    named = [(each.plane, each.order, each.test) for each in diagnosis.outliers]
-    return (residual.plane, residual.order, residual.test) in named
-
 
 _PLACES = {
     "everywhere": "",
@@ -102,6 +26,13 @@ _PLACES = {
 }
 _MOST_PLACES = 2  # what a sentence bears
 _PLACE_STARTS = {"sensor": "of the", "test": "in"}
+
+
+def is_of_the_measurement(claim: Claim) -> bool:
+    """Return whether all that is named are faults of sensors, clock or what was clamped on."""
+    names = {effect for cause in claim.causes for effect in cause.effects}
+    known = [EFFECTS.get(name) for name in names if name != "timebase"]
+    return all(effect is not None and not effect.of_the_hanger for effect in known)
 
 
 def label(cause: Cause) -> str:
@@ -158,129 +89,6 @@ def own_estimates(cause: Cause, number: int) -> tuple[EffectEstimate, ...]:
     prefixed = {e.name: e.name.partition(".")[0] for e in cause.parameters if "." in e.name}
     own = cause.effects[number]
     return tuple(e for e in cause.parameters if prefixed.get(e.name, own) == own)
-
-
-_SPRING_PLANES = {1: "transverse", 2: "longitudinal", 3: "transverse", 4: "longitudinal"}
-_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""))
-_LOPSIDED = 3.0
-_SCALED_UNITS = ("N", "N m/rad", "N/m", "N/K")
-_FACTORS = {"fraction": (100.0, "%"), "lambda^2": (1.0, "")}
-"""Units of the catalogue that read better otherwise: a factor and the unit it gives."""
-
-
-@dataclass(frozen=True)
-class Size:
-    """A quantity with its 90 % interval in `unit`; logarithmic ones go by significant digits."""
-
-    interval: Interval
-    unit: str
-    logarithmic: bool = False
-
-    def __str__(self) -> str:
-        return self.told(self.interval)
-
-    @property
-    def sure_sign(self) -> int:
-        """1 or -1 where the whole interval has that sign, else 0."""
-        if self.interval.low > 0:
-            return 1
-        return -1 if self.interval.high < 0 else 0
-
-    def directed(self, up: str, down: str) -> str:
-        """`0.12 m (0.10 to 0.14) longer`; signed numbers where either direction is possible."""
-        if self.sure_sign > 0:
-            return f"{self} {up}"
-        if self.sure_sign < 0:
-            turned = Interval(-self.interval.mean, -self.interval.high, -self.interval.low)
-            return f"{self.told(turned)} {down}"
-        return f"{self.told(self.interval, '+')} {up}"
-
-    def __format__(self, directions: str) -> str:
-        """As text; with `up|down` as `directed` says it."""
-        up, bar, down = directions.partition("|")
-        return self.directed(up, down) if bar else str(self)
-
-    def told(self, interval: Interval, sign: str = "") -> str:
-        """An interval in this size's unit and digits."""
-        mean, low, high = _texts(interval, sign, self.logarithmic)
-        unit = f" {self.unit}" if self.unit else ""
-        return f"{mean}{unit} ({low} to {high})" if low and high else f"{mean}{unit}"
-
-
-def size(estimate: EffectEstimate) -> Size:
-    """An estimate in the unit and prefix that suit it; logarithms as what they are of."""
-    interval = Interval(estimate.mean, estimate.q05, estimate.q95)
-    if logarithmic := is_logarithm(estimate.name):
-        interval = Interval(
-            *(10.0**value for value in (interval.mean, interval.low, interval.high))
-        )
-    scale, unit = _FACTORS.get(estimate.unit, (1.0, estimate.unit))
-    if unit in _SCALED_UNITS:
-        sizes = (pair for pair in _PREFIXES if abs(interval.mean) >= pair[0])
-        divisor, prefix = next(sizes, (1.0, ""))
-        scale, unit = 1 / divisor, prefix + unit
-    return Size(interval.scaled(scale), unit, logarithmic)
-
-
-def _texts(interval: Interval, sign: str, logarithmic: bool) -> tuple[str, str, str]:
-    """Mean and bounds with digits that the width deserves; empty bounds where they are unknown."""
-    half = interval.width / 2
-    if logarithmic or _lopsided(interval) or not (math.isfinite(half) and half > 0):
-        mean, low, high = (_significant(v, sign) for v in _three(interval))
-        return (mean, low, high) if half > 0 else (mean, "", "")
-    places = min(math.ceil(-math.log10(half / 2.95)), _most_places(interval.mean))
-    mean, low, high = (f"{round(v, places):{sign}.{max(0, places)}f}" for v in _three(interval))
-    return mean, low, high
-
-
-def _lopsided(interval: Interval) -> bool:
-    """Whether both bounds have one sign and lie so far apart that each needs its own digits."""
-    near, far = sorted((abs(interval.low), abs(interval.high)))
-    return interval.low * interval.high > 0 and far > _LOPSIDED * near
-
-
-def _most_places(mean: float) -> int:
-    """Decimals beyond which nobody measures: four significant digits."""
-    return 3 - math.floor(math.log10(abs(mean))) if mean else 6
-
-
-def _three(interval: Interval) -> tuple[float, float, float]:
-    return interval.mean, interval.low, interval.high
-
-
-def _significant(value: float, sign: str) -> str:
-    """Two significant digits, never as a power of ten."""
-    if not math.isfinite(value):
-        return "of unknown size" if math.isnan(value) else "unbounded"
-    if value == 0:
-        return "0"
-    places = 1 - math.floor(math.log10(abs(value)))
-    return f"{round(value, places):{sign}.{max(0, places)}f}"
-
-
-def quantity(estimate: EffectEstimate) -> str:
-    """Return the name of an estimate's quantity without its unit, which its size has."""
-    return quantity_name(estimate.name, estimate.unit)
-
-
-class Sizes(dict[str, "Size | str"]):
-    """The sizes of one effect by the catalogue's names of its parameters, for its phrase."""
-
-    def __init__(self, estimates: Sequence[EffectEstimate]):
-        super().__init__({base_name(e.name): size(e) for e in estimates})
-
-    def __missing__(self, stem: str) -> str:
-        """The end springs `stem` 1 to 4, with their planes where there are several."""
-        found = {
-            plane: self[name]
-            for number, plane in _SPRING_PLANES.items()
-            if (name := f"{stem}{number}") in self
-        }
-        if not found:
-            raise KeyError(stem)
-        if len(found) == 1:
-            return str(next(iter(found.values())))
-        return " and ".join(f"{size} {plane}" for plane, size in found.items())
 
 
 AFTER = "weighed over all that may be"

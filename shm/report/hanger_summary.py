@@ -9,8 +9,7 @@ import numpy as np
 
 from shm.report import formatting, open_warnings
 from shm.report.contents import HangerReport, message
-from shm.report.diagnosis_summary import next_step, verdict
-from shm.report.diagnosis_wording import AFTER, tension_of
+from shm.report.diagnosis_summary import next_step, write_summary
 from shm.report.formatting import Interval
 from shm.values import TENSION, Diagnosis, PredictedFrequency
 from shm.values.posterior import MOST_R_HAT
@@ -232,8 +231,8 @@ def _gap(data: HangerReport) -> str:
     """What the model does not explain, and why as far as that was diagnosed."""
     if data.diagnosis is None:
         return _outside(data)
-    told = [_diagnosed_on(data.diagnosis), verdict(data.diagnosis), _allowing(data, data.diagnosis)]
-    return " ".join([part for part in told if part] + [data.gap_watch] * bool(data.gap_watch))
+    told = [_diagnosed_on(data.diagnosis), write_summary(data.diagnosis)]
+    return " ".join(part for part in (*told, data.gap_watch) if part)
 
 
 def _outside(data: HangerReport) -> str:
@@ -266,15 +265,6 @@ def _diagnosed_on(diagnosis: Diagnosis) -> str:
         f"What the plain class {diagnosis.baseline} would leave unexplained was diagnosed on "
         f"{counted_tests(diagnosis.tests)}."
     )
-
-
-def _allowing(data: HangerReport, diagnosis: Diagnosis) -> str:
-    """The tension that the diagnosis arrives at."""
-    estimate = diagnosis.tension_after_n
-    if math.isnan(estimate.mean):
-        return ""
-    tension = formatting.tension(tension_of(estimate), data.tension_unit)
-    return f"{AFTER.capitalize()}, the tension is {tension}."
 
 
 def _chosen(data: HangerReport) -> str:

@@ -118,16 +118,17 @@ def filled(*tables: Table) -> tuple[Table, ...]:
 class Part:
     """A headed part; what it has stands in the order of its fields.
 
-    `lead` begins the summary and is stressed. `figures` are drawn where a renderer asks for them:
-    a terminal does not, and loads nothing that draws. `status` and `style` are those of an answer
-    of its own, as the paper's are of the whole; without a `style` it has the paper's. The first
-    appendix begins a page.
+    `lead` begins the summary and is stressed; `details` is the paragraph after it. `figures` are
+    drawn where a renderer asks for them: a terminal does not, and loads nothing that draws.
+    `status` and `style` are those of an answer of its own, as the paper's are of the whole; without
+    a `style` it has the paper's. The first appendix begins a page.
     """
 
     title: str
     paragraphs: Sequence[str] = ()
     lead: str = ""
     summary: str = ""
+    details: str = ""
     facts: Sequence[Fact] = ()
     remarks: Sequence[str] = ()
     figures: Callable[[], Sequence[Illustration]] = tuple

@@ -14,19 +14,15 @@ from shm.values.bridge_diagnosis import (
     SharedMember,
 )
 from shm.values.diagnosis import (
-    FEW_MODES,
     MEASUREMENT_HOURS,
     NO_GAP,
     Cause,
-    Compatibility,
     Diagnosis,
     EffectEstimate,
     GapPlace,
-    LawTerm,
     Leads,
     NextMeasurement,
     Outlier,
-    Remainder,
     Residual,
     Shrinkage,
     TensionEstimate,
@@ -122,4 +118,13 @@ from shm.values.recording import (
     KnownSamples,
     Recording,
     ResponsePoint,
+)
+from shm.values.verdict import (
+    FEW_MODES,
+    Claim,
+    GapVerdict,
+    Outcome,
+    group_causes,
+    is_excluded,
+    judge,
 )

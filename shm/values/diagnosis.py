@@ -10,17 +10,15 @@ from typing import TYPE_CHECKING, Literal
 from shm.values.kinds import NAN, Plane
 from shm.values.leading import MIN_NO_GAP_PROBABILITY, find_leading_cause, sum_group_probability
 from shm.values.showing import Shown, front, line, tension_words
+from shm.values.verdict import GapVerdict, judge
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 Leads = Literal["cause", "no gap", "unexplained"]
 _AND = " + "
-FEW_MODES = 4
-"""Below which nothing is left to disagree: tension and stiffness take two."""
-
 NO_GAP = "no gap"
-"""How `Compatibility` calls the baseline without any effect."""
+"""The name of the baseline without any effect."""
 
 
 def effect_label(effect: str, at: str) -> str:
@@ -46,7 +44,9 @@ class Residual:
     `residual_percent` is measured over predicted, less 1; `z` is in standard deviations of the
     identification and of what the baseline leaves open; `share` is its part of the misfit.
     `after_percent` is the same residual with the leading cause in the model, `held_out_percent`
-    with that cause fitted without this mode (NaN where it was not held out).
+    with that cause fitted without this mode (NaN where it was not held out). `after_z` is
+    `after_percent` in standard deviations of the stated errors and of what repeats, NaN where no
+    error is stated.
     """
 
     plane: Plane
@@ -60,6 +60,7 @@ class Residual:
     after_percent: float = NAN
     held_out_before_percent: float = NAN
     held_out_after_percent: float = NAN
+    after_z: float = NAN
 
 
 @dataclass(frozen=True)
@@ -216,72 +217,6 @@ class NextMeasurement:
 
 
 @dataclass(frozen=True)
-class Compatibility:
-    """Which explanations the data do not contradict, without priors.
-
-    Names are those of `Cause.effect` and `NO_GAP`; what was not fitted in full is in neither.
-    Bounds that all `data` keep with 95 % are `bound_percent` for a frequency (the median).
-    """
-
-    not_falsified: tuple[str, ...]
-    falsified: tuple[str, ...]
-    bound_percent: float
-    data: int
-
-    def of(self, name: str) -> bool | None:
-        """Whether it is compatible; None of what was not judged."""
-        return (
-            None
-            if name not in self.not_falsified + self.falsified
-            else (name in self.not_falsified)
-        )
-
-
-OverOrders = Literal["even", "order", "order squared", "alternating", "lowest orders", "local"]
-OverTests = Literal["all tests", "temperature", "level", "level squared", "above a level"]
-
-
-@dataclass(frozen=True)
-class LawTerm:
-    """One term of the law that something unknown follows, as a change of the frequencies.
-
-    `x_m` is the place of a local one (NaN for others), from the nearer end as frequencies do not
-    tell the ends apart; `threshold` the level above which it acts. `planes` holds one or both.
-    `change_percent` is its largest change less its smallest, with the sign of the term.
-    `log_bayes_factor` compares the law with it to the law without, less the logarithm of how many
-    terms were tried.
-    """
-
-    over_orders: OverOrders
-    over_tests: OverTests
-    planes: tuple[Plane, ...]
-    change_percent: float
-    change_sd_percent: float
-    log_bayes_factor: float
-    x_m: float = NAN
-    threshold: float = NAN
-    coefficient: float = NAN
-
-
-@dataclass(frozen=True)
-class Remainder:
-    """What is left of the frequencies where something unknown is possible.
-
-    `like_tension` is the part of its root mean square `rms_percent` that looks like a change of
-    the tension, of `tension_percent`. `law` is empty where nothing is claimed; where it is claimed,
-    `held_out_before_percent` and `held_out_after_percent` are root mean squares of what modes (or
-    single frequencies, where the law is one of the tests) miss that were not used for it.
-    """
-
-    rms_percent: float
-    like_tension: float
-    tension_percent: float
-    law: tuple[LawTerm, ...] = ()
-    held_out_before_percent: float = NAN
-    held_out_after_percent: float = NAN
-
-
-@dataclass(frozen=True)
 class Diagnosis(Shown):
     """Differences of a hanger between baseline and measurement, their causes and consequences.
 
@@ -291,9 +226,10 @@ class Diagnosis(Shown):
     the effects that these data cannot show, and why; `left_out` those that were taken out of the
     catalogue. `remarks` say in words what is wrong with the data and what it does to the answer.
     `outliers` are frequencies that were set aside. Hits moved the sensors by `widest_swing_m` at
-    most; what acts only beyond, such as a guide with more play, is not visible. `remainder` is
-    None where nothing unknown is worth a description. `slenderness` is L sqrt(T/EI) of the
-    baseline: about 10 of a bar, above 100 of a string; NaN in documents of former versions.
+    most; what acts only beyond, such as a guide with more play, is not visible. `slenderness` is
+    L sqrt(T/EI) of the baseline: about 10 of a bar, above 100 of a string. `effective_draws` is the
+    least effective sample size of the fits that the answer rests on. Both are NaN in documents of
+    former versions.
     """
 
     hanger: int | None
@@ -318,10 +254,14 @@ class Diagnosis(Shown):
     seed: int
     seconds: float
     outliers: tuple[Outlier, ...] = ()
-    compatibility: Compatibility | None = None
-    remainder: Remainder | None = None
     widest_swing_m: float = NAN
     slenderness: float = NAN
+    effective_draws: float = NAN
+
+    @property
+    def verdict(self) -> GapVerdict:
+        """Return what this diagnosis claims: the one decision that every report states."""
+        return judge(self)
 
     def claim(self, cause: Cause) -> float:
         """Return the probability of a cause and of those that the data cannot tell from it."""
@@ -336,8 +276,8 @@ class Diagnosis(Shown):
         if self.leading is not None:
             return "cause"
         alone = max((each.acts_alone for each in self.outliers), default=0.0)
-        shown = self.no_gap_probability < MIN_NO_GAP_PROBABILITY or alone >= MIN_NO_GAP_PROBABILITY
-        return "unexplained" if shown else "no gap"
+        is_open = not self.no_gap_probability >= MIN_NO_GAP_PROBABILITY
+        return "unexplained" if is_open or alone >= MIN_NO_GAP_PROBABILITY else "no gap"
 
     @property
     def leading(self) -> Cause | None:
@@ -347,8 +287,11 @@ class Diagnosis(Shown):
         )
 
     def __repr__(self) -> str:
-        leading, tension = self.leading, self.tension_after_n
-        said = self.leads if leading is None else effect_label(leading.effect, leading.at)
+        verdict, tension = self.verdict, self.tension_after_n
+        said = verdict.outcome.value.lower()
+        if verdict.claim is not None:
+            leading = verdict.claim.leading
+            said = f"{said}: {effect_label(leading.effect, leading.at)}"
         told = tension_words(tension.mean, tension.q05, tension.q95)
         return line("Diagnosis", self.hanger, f"{said}, {told}")
 

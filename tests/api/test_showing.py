@@ -11,7 +11,7 @@ import pytest
 
 import shm
 from shm.errors import UsageError
-from shm.report.diagnosis_summary import verdict
+from shm.report.diagnosis_summary import write_lead
 from shm.report.formatting import Interval, tension
 from shm.values.rounding import force_unit
 from shm.watch.frequency_watch import measured_levels
@@ -31,7 +31,8 @@ def test_a_line_says_what_whose_and_the_tension_as_the_report_rounds_it(
     read = replace(test_of_711_kn, tension_read_n=700e3, tension_read_sd_n=10e3)
     assert repr(read).endswith("read 700 kN (90 % credible interval 684 to 716 kN)>")
     assert re.fullmatch(
-        r"<Diagnosis of hanger 3: point mass, .* kN \(90 % credible .* kN\)>", repr(a_diagnosis())
+        r"<Diagnosis of hanger 3: explained: point mass, .* kN \(90 % credible .* kN\)>",
+        repr(a_diagnosis()),
     )
 
 
@@ -52,7 +53,7 @@ def test_a_summary_is_in_the_words_of_the_report(
         text = value.summary()
         assert not re.search(r"\bnan\b|None|\binf\b|<|[ ]$", text, re.MULTILINE)
     assert doubted.faults[0] in " ".join(doubted.summary().split())
-    assert verdict(diagnosis) in " ".join(diagnosis.summary().split())
+    assert write_lead(diagnosis) in " ".join(diagnosis.summary().split())
     assert len(test_of_711_kn.summary().splitlines()) == 2 + len(test_of_711_kn.modes)
 
 

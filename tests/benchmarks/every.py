@@ -53,7 +53,7 @@ SHORT = {
     "evidence": "--seeds 2 --textbook-seeds 2", "full_disk": "--files 1 --every 40",
     "fuzz_readers": "--files 200 --flow 5 --processes 1", "gap_calibration": "--cases 1 --jobs 1",
     "gap_dynamics": "--cases 1 --seed 300", "gap_family": "--families 1 --sound 0 --hangers 2",
-    "gap_law": "--cases 1", "gap_plan": "--cases 1",
+    "gap_plan": "--cases 1",
     "gap_trial": "--seeds 1 --effects point_mass --sizes 30 --null 1 --jobs 1",
     "gap_worlds": "--hangers 1 --out FOLDER/rows.json",
     "general_model": "--repeats 5", "identify_ablation": "--kinds softening --seeds 3:4",

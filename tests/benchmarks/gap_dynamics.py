@@ -21,7 +21,6 @@ sys.path.insert(0, str(ROOT))
 
 from shm.errors import NotIdentifiable  # noqa: E402
 from shm.gap import GapOptions, diagnose  # noqa: E402
-from shm.report.diagnosis_wording import answer  # noqa: E402
 from shm.values import ModalTest  # noqa: E402
 from tests.helpers.effects import all_but  # noqa: E402
 from tests.helpers.struck import STRUCK, identified  # noqa: E402
@@ -76,7 +75,7 @@ def main() -> None:
         if tests:
             found = diagnose(tests, STRUCK, GapOptions(without=all_but(*TRIED), draws=300))
             best = found.leading.effect if found.leading else ""
-            said = f"{answer(found).value} {best}".strip()
+            said = f"{found.verdict.outcome.value} {best}".strip()
         print(f"{kind} {seed}: {said}", flush=True)
         counts[kind, said] += 1
     for (kind, said), count in sorted(counts.items()):

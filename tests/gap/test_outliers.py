@@ -23,9 +23,8 @@ from shm.gap.outliers import (
     log_ordinary,
 )
 from shm.gap.problem import GapProblem
-from shm.report.diagnosis_wording import Answer, answer
 from shm.simulate import HangerState, PlantedEffect
-from shm.values import Diagnosis, ModalTest
+from shm.values import Diagnosis, ModalTest, Outcome
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
@@ -187,7 +186,8 @@ def test_a_frequency_that_stands_alone_at_the_highest_level_may_be_met_by_a_guid
     assert one_wrong.leads == "unexplained"
     assert one_wrong.unexplained_probability >= found.acts_alone * one_wrong.no_gap_probability
     assert "softer and with harder hits" in one_wrong.remarks[0]
-    assert answer(one_wrong) in (Answer.UNDECIDED, Answer.UNEXPLAINED)
+    assert one_wrong.verdict.outcome is Outcome.UNEXPLAINED
+    assert one_wrong.verdict.reason == "acts alone"
 
 
 @pytest.mark.parametrize(("other", "possible"), [(0.2, True), (1.0, False), (2.0, False)])

@@ -20,8 +20,8 @@ from shm.inference.priors import reading_of
 from shm.models.effects import EFFECTS
 from shm.models.hanger import PhysicalHanger, solve
 from shm.modes_document import modes_document, parse_modes
-from shm.report.diagnosis_wording import claims
-from shm.values import NAN, FloatArray, ModalTest, Mode, Supports
+from shm.report.diagnosis_wording import is_of_the_measurement
+from shm.values import NAN, FloatArray, ModalTest, Mode, Supports, group_causes
 from tests.helpers.effects import all_but
 from tests.helpers.hangers import HANGER_3
 
@@ -137,7 +137,7 @@ def test_a_cell_that_reads_a_fifth_too_much_is_the_measurements_and_leaves_the_t
     found = diagnose(loadings(measured, read_n, 1e3), HANGER_3, SCALES)
     assert found.leading is not None
     assert found.leading.effect == "load_scale"
-    assert claims(found)[0].of_the_measurement
+    assert is_of_the_measurement(group_causes(found.causes)[0])
     (error,) = found.leading.parameters
     assert error.q05 < 0.2 < error.q95
     assert found.tension_after_n.q025 < true_n.mean() < found.tension_after_n.q975

@@ -14,7 +14,7 @@ from shm.gap.data_checks import usable
 from shm.inference import UpdateOptions, refresh, update
 from shm.inference.data_checks import check_data, check_for_update, find_line_hz
 from shm.models import DESCRIPTION, THESIS, build
-from shm.report.diagnosis_summary import verdict
+from shm.report.diagnosis_summary import write_lead
 from shm.store.blobs import pack_samples, posterior_from
 from shm.values import NAN, Hanger, ModalTest, Mode, Posterior, Scatter, Selection
 from tests.helpers.effects import all_but
@@ -209,11 +209,11 @@ def test_a_slender_string_is_not_called_a_stiff_bar() -> None:
     test = replace(modes_of("w1", EIGHT, 0.3), tension_read_n=26.0, tension_read_sd_n=0.1)
     found = diagnose([test], hanger, GapOptions(without=all_but()))
     assert found.slenderness == pytest.approx(207, rel=0.05)
-    assert "stiff a bar" not in verdict(found)
-    assert "light string" in verdict(found)
-    assert "transverse 1 lies 0.8 % below the other modes" in verdict(found)
-    assert "stiff a bar" in verdict(replace(found, slenderness=12.0))
-    assert "stiff a bar" not in verdict(replace(found, slenderness=NAN))
+    assert "stiff a bar" not in write_lead(found)
+    assert "light string" in write_lead(found)
+    assert "transverse 1 lies 0.8 % below the other modes" in write_lead(found)
+    assert "stiff a bar" in write_lead(replace(found, slenderness=12.0))
+    assert "stiff a bar" not in write_lead(replace(found, slenderness=NAN))
 
 
 def test_remarks_are_stored_and_documents_without_them_are_read() -> None:

@@ -13,7 +13,6 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet, HangerReport
-from shm.report.diagnosis_wording import claimed
 from shm.report.figures import (
     gap_before_and_after,
     gap_causes,
@@ -224,7 +223,7 @@ def _sheet(view: HangerView) -> DiagnosisSheet:
 
 
 def _shrinks(view: HangerView) -> bool:
-    if view.sheet is None or claimed(view.sheet.diagnosis) is None:
+    if view.sheet is None or view.sheet.diagnosis.verdict.claim is None:
         return False
     return any(math.isfinite(residual.after_percent) for residual in kept(view.sheet))
 

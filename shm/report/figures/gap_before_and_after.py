@@ -13,7 +13,6 @@ from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
 from shm.report.diagnosis_wording import (
     AFTER,
-    claimed,
     label,
     tension_of,
     tension_unit,
@@ -52,7 +51,7 @@ _SERIES = (
 
 def specify(sheet: DiagnosisSheet, is_on_screen: bool = False) -> spec.Specification | None:
     residuals = [r for r in kept(sheet) if math.isfinite(r.after_percent)]
-    if not residuals or claimed(sheet.diagnosis) is None:
+    if not residuals or sheet.diagnosis.verdict.claim is None:
         return None
     made = {
         plane: [
@@ -93,7 +92,7 @@ def _values(residuals: Sequence[Residual], order: int, field: str) -> list[float
 
 
 def _caption_of_before_and_after(sheet: DiagnosisSheet) -> str:
-    claim = claimed(sheet.diagnosis)
+    claim = sheet.diagnosis.verdict.claim
     assert claim is not None
     held_out = any(math.isfinite(r.held_out_after_percent) for r in sheet.diagnosis.where)
     diamonds = (

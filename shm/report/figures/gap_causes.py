@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
-from shm.report.diagnosis_summary import verdict
-from shm.report.diagnosis_wording import Claim, claims, label, quantity, size
+from shm.report.diagnosis_summary import write_lead
+from shm.report.diagnosis_wording import label
 from shm.report.figures import specification as spec
-from shm.values import BridgeDiagnosis, Cause, Diagnosis, effect_label
+from shm.report.sizes import quantity, size
+from shm.values import BridgeDiagnosis, Cause, Claim, Diagnosis, effect_label, group_causes
 from shm.values.parameter_names import is_logarithm
 
 _MOST, _MOST_ON_SCREEN = 10, 8
@@ -52,7 +53,9 @@ def specify(sheet: DiagnosisSheet) -> spec.Specification | None:
 
 def specify_on_screen(sheet: DiagnosisSheet) -> spec.Specification:
     """Where those alike share a letter, and fewer are shown."""
-    pairs = [(claim, cause) for claim in claims(sheet.diagnosis) for cause in claim.causes]
+    pairs = [
+        (claim, cause) for claim in group_causes(sheet.diagnosis.causes) for cause in claim.causes
+    ]
     bars = [
         Bar(label(cause) + _letter(cause.group), cause.probability, "blue")
         for _, cause in pairs[:_MOST_ON_SCREEN]
@@ -116,7 +119,9 @@ def _others(diagnosis: Diagnosis) -> tuple[Bar, Bar]:
 
 def _shown(diagnosis: Diagnosis) -> list[tuple[Claim, Cause]]:
     """Causes of any probability to speak of, at least three where there are so many."""
-    all_causes = [(claim, cause) for claim in claims(diagnosis) for cause in claim.causes]
+    all_causes = [
+        (claim, cause) for claim in group_causes(diagnosis.causes) for cause in claim.causes
+    ]
     probable = [pair for pair in all_causes if pair[1].probability >= _LEAST_SHOWN]
     return probable[:_MOST] if len(probable) >= 3 else all_causes[:3]
 
@@ -175,7 +180,7 @@ def _alt(sheet: DiagnosisSheet) -> str:
     bars = [
         f"{bar.label} {formatting.probability(bar.probability)}" for bar in _bars(sheet.diagnosis)
     ]
-    return f"{verdict(sheet.diagnosis)} Probabilities: {'; '.join(bars)}."
+    return f"{write_lead(sheet.diagnosis)} Probabilities: {'; '.join(bars)}."
 
 
 FIGURE = spec.Member("causes", "What causes the gap", specify, caption, _alt)

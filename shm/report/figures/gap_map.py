@@ -10,10 +10,9 @@ import numpy as np
 
 from shm.report import formatting
 from shm.report.contents import DiagnosisSheet
-from shm.report.diagnosis_wording import is_set_aside
 from shm.report.figures import specification as spec
 from shm.report.formatting import NORMAL_90
-from shm.values import PLANES, GapPlace, Plane, Residual, Trend
+from shm.values import PLANES, GapPlace, Plane, Residual, Trend, is_excluded
 
 
 def measured(sheet: DiagnosisSheet) -> list[Residual]:
@@ -23,12 +22,12 @@ def measured(sheet: DiagnosisSheet) -> list[Residual]:
 
 def kept(sheet: DiagnosisSheet) -> list[Residual]:
     """Those of them that were not set aside as gross errors."""
-    return [r for r in measured(sheet) if not is_set_aside(sheet.diagnosis, r)]
+    return [r for r in measured(sheet) if not is_excluded(sheet.diagnosis, r)]
 
 
 def aside(sheet: DiagnosisSheet) -> list[Residual]:
     """Those of them that were."""
-    return [r for r in measured(sheet) if is_set_aside(sheet.diagnosis, r)]
+    return [r for r in measured(sheet) if is_excluded(sheet.diagnosis, r)]
 
 
 def planes(residuals: Sequence[Residual]) -> list[Plane]:
