@@ -9,7 +9,7 @@ import numpy as np
 from shm.gap.contract import GapOptions, Observations
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
-from shm.gap.search import fit_alone
+from shm.gap.search import sample_alone
 from shm.inference.options import Progress, silent
 from shm.inference.updating import log_class_prior
 from shm.models import MODELS, AsMade, applicable, check_baseline
@@ -47,7 +47,7 @@ def choose_baseline(
     log = []
     for each in problems:
         progress(f"baseline {each.model.name}", 0.0)
-        log.append(fit_alone(each, rng).log_evidence + log_class_prior(each.model))
+        log.append(sample_alone(each, rng).log_evidence + log_class_prior(each.model))
     return problems[int(np.argmax(log))]
 
 

@@ -10,13 +10,13 @@ refitted to their own draws, with a share of the prior so that no weight is unbo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import scipy
 
-from shm.gap.contract import Fit, Hypothesis, Peak
+from shm.gap.contract import Fit, Hypothesis, Method, Peak
 from shm.gap.likelihood import Likelihood
 from shm.gap.linear import Linear
 from shm.inference.chain import run_chain
@@ -34,13 +34,13 @@ from shm.values import ENOUGH_EFFECTIVE, BoolArray, FloatArray, IntArray
 
 # Numerical: a climb's steps, and the gain in log posterior that is none; forward differences in
 # standard deviations of a prior; a slope beyond is a cliff, where two modes change places.
-_STEPS, _NO_GAIN, _MOST_DAMPING = 25, 0.01, 1e5
+_STEPS, _NO_GAIN, _MOST_DAMPING = 25, 0.02, 1e5
 _DIFFERENCE, _STEEPEST, _FARTHEST = 1e-4, 1e3, 4.5
 # Numerical: standard deviations of a peak within which two are one; log density behind the best
 # from which on a peak is not drawn about.
 _SAME, _FAR_BELOW = 0.3, 10.0
 # Numerical: draws and their proposals. Weights correct for all of them.
-_ROUND, _ROUNDS, _AT_FIRST, _FROM_PRIOR, _FROM_FIRST = 150, 24, 0.3, 0.1, 0.2
+_ROUND, MOST_ROUNDS, _AT_FIRST, _FROM_PRIOR, _FROM_FIRST = 150, 40, 0.3, 0.1, 0.2
 _WIDTHS, _WIDE_EVERY, _CANDIDATES = (1.0, 2.0), 4, 3000
 _LEAST_WEIGHT, _RIDGE = 1e-2, 1e-6
 _CLUSTERS, _FROM_WITHOUT = 3, 0.4
@@ -88,27 +88,38 @@ class Target:
         """Return the log of likelihood times prior (n,) at z (n, d)."""
         return np.asarray(self.likelihood.log(self.residual(z)) + log_normal(z))
 
-    def view(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the residual (data,) and the prediction's slopes (data, d) at z (d,)."""
+    def view(
+        self, z: FloatArray, known: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the residual (data,) and the prediction's slopes (data, d) at z (d,).
+
+        Of `known` slopes near z those by the linear parameters are taken over.
+        """
+        moved = np.arange(self.dimension) if known is None else self.other
         step = np.where(z > 0, -_DIFFERENCE, _DIFFERENCE)
-        residual = self.residual(np.vstack([z, z + np.diag(step)]))
-        slopes = (residual[0] - residual[1:]).T / step
-        return residual[0], np.where(np.abs(slopes) < _STEEPEST, slopes, 0.0)
+        residual = self.residual(np.vstack([z, z + np.diag(step)[moved]]))
+        slopes = np.zeros((len(residual[0]), self.dimension)) if known is None else known.copy()
+        found = (residual[0] - residual[1:]).T / step[moved]
+        slopes[:, moved] = np.where(np.abs(found) < _STEEPEST, found, 0.0)
+        return residual[0], slopes
 
     def climb(self, z: FloatArray, hopeless: float = -np.inf) -> Peak:
         """Return the peak above z (d,); gives up where it cannot reach the log posterior
         `hopeless`.
         """
         log, damping = float(self.log(z[None])[0]), 1e-2
-        hessian, gradient = self._curvature(z)
+        residual, slopes = self.view(z)
+        hessian, gradient = self._curvature(z, residual, slopes)
         for taken in range(_STEPS):
             step = np.linalg.solve(hessian + damping * np.diag(np.diag(hessian)), gradient)
             step = step / max(1.0, np.abs(step).max())
             tried = np.clip(z + step, -_FARTHEST, _FARTHEST)
             gain = float(self.log(tried[None])[0]) - log
             if gain > 0:
+                far = np.abs(tried - z)[self.linear].max(initial=0.0) > _SETTLED
                 z, log, damping = tried, log + gain, damping / 5
-                hessian, gradient = self._curvature(z)
+                residual, slopes = self.view(z, None if far else slopes)
+                hessian, gradient = self._curvature(z, residual, slopes)
             else:
                 damping *= 6
             hoped = float(gradient @ np.linalg.solve(hessian, gradient))
@@ -118,9 +129,10 @@ class Target:
                 break
         return Peak(z, log, np.linalg.inv(hessian))
 
-    def _curvature(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _curvature(
+        self, z: FloatArray, residual: FloatArray, slopes: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Return Gauss and Newton's Hessian (d, d) and the gradient (d,) of the log posterior."""
-        residual, slopes = self.view(z)
         if not np.isfinite(residual).all():
             return np.eye(len(z)), -z
         share = scipy.special.softmax(self.likelihood.by_node(residual[None])[0])
@@ -288,33 +300,99 @@ class _Surrogate:
         return np.hstack([np.ones((len(u), 1)), u, u[:, one] * u[:, other]])
 
 
+class Sampling:
+    """Importance sampling of a hypothesis about `peaks`, the best first, that can be gone on with.
+
+    It is looked for also where a fit `without` its last effects has its draws.
+    """
+
+    def __init__(
+        self,
+        target: Target,
+        peaks: Sequence[Peak],
+        rng: np.random.Generator,
+        without: Fit | None = None,
+    ):
+        self.target, self.peaks, self.rng = target, tuple(peaks), rng
+        self._collapsed = _Collapsed(target, peaks[0])
+        self._pool: Pool[_Proposal, _Draws] = Pool(
+            lambda proposal, batch: proposal.log_density(batch.z[:, target.other])
+        )
+        self._rounds = 0
+        if len(target.other):
+            self._first = self._mixture = _parts(target, peaks, without, rng)
+            self._proposal: _Proposal = _Wide(self._first, _AT_FIRST)
+
+    @property
+    def effective(self) -> float:
+        """Return Kish's effective number of draws."""
+        if not len(self.target.other):
+            return np.inf
+        return self._pool.effective if self._rounds else 0.0
+
+    @property
+    def log_evidence(self) -> float:
+        """Return the log evidence."""
+        if len(self.target.other):
+            return self._pool.log_evidence
+        return float(self._collapsed.settle(np.empty((1, 0)))[1][0])
+
+    def run(self, enough: float, most_rounds: int) -> None:
+        """Draw until `enough` draws are effective, for so many rounds in all at most."""
+        while self.effective < enough and self._rounds < most_rounds:
+            self._draw()
+
+    def _draw(self) -> None:
+        other = self.target.other
+        batch, log = self._collapsed.settle(self._proposal.draw(_ROUND, self.rng))
+        self._pool.add(self._proposal, _ROUND, batch, log)
+        self._rounds += 1
+        weights = tempered(self._pool.log_weights, 6 * len(other), 0.7, 1e-3)
+        refitted = self._mixture.refitted(self._pool.batch.z[:, other], weights)
+        self._mixture = refitted.mixed(self._first, _FROM_FIRST)
+        self._proposal = wide = _Wide(self._mixture, _FROM_PRIOR)
+        if self._rounds % _WIDE_EVERY > 1:
+            self._proposal = _Surrogate(self._collapsed, self._pool.batch, weights, wide)
+
+    def fit(self, draws: int) -> Fit:
+        """Return the fit with so many equal draws."""
+        if not len(self.target.other):
+            point, _ = self._collapsed.settle(np.empty((1, 0)))
+            chosen = point.take(np.zeros(draws, dtype=np.int64))
+        else:
+            rows = systematic(normalised(self._pool.log_weights), draws, self.rng)
+            chosen = self._pool.batch.take(rows)
+        found = self.rng.permutation(self._collapsed.scatter(chosen, self.rng))
+        return _fit(self._collapsed, self.peaks, found, self.log_evidence, self.effective)
+
+    def fit_by_chain(self, draws: int) -> Fit:
+        """Return the same by emcee, from where importance sampling has come."""
+        known = self.fit(draws)
+        chain, count, _ = run_chain(self._collapsed, known.draws[:, self.target.other], self.rng)
+        chosen = self._collapsed.settle(chain[self.rng.choice(len(chain), draws)])[0]
+        found = self._collapsed.scatter(chosen, self.rng)
+        return _fit(self._collapsed, self.peaks, found, known.log_evidence, count, "emcee")
+
+
 def sample(
     target: Target,
     peaks: Sequence[Peak],
     draws: int,
     rng: np.random.Generator,
     enough: float = ENOUGH_EFFECTIVE,
-    without: Fit | None = None,
 ) -> Fit:
-    """Return the fit of a hypothesis by `draws` of its posterior about `peaks`, the best first.
+    """Return the fit of a hypothesis about `peaks`, the best first, with `enough` effective draws.
 
-    It is looked for also where a fit `without` its last effects has its draws. Goes on until `enough` draws are effective, and with emcee where importance sampling gains none.
+    Where importance sampling does not come to that, emcee goes on.
     """
-    best = peaks[0]
-    collapsed = _Collapsed(target, best)
-    if not len(target.other):
-        point, log = collapsed.settle(np.empty((1, 0)))
-        chosen = point.take(np.zeros(draws, dtype=np.int64))
-        return _fit(collapsed, peaks, collapsed.scatter(chosen, rng), float(log[0]), float(draws))
-    pool = _draw_about(collapsed, _parts(target, peaks, without, rng), rng, enough)
-    count, by_chain = pool.effective, False
-    chosen = pool.batch.take(systematic(normalised(pool.log_weights), draws, rng))
-    if count < enough:
-        chain, count, _ = run_chain(collapsed, chosen.z[:, target.other], rng)
-        chosen = collapsed.settle(chain[rng.choice(len(chain), draws)])[0]
-        by_chain = True
-    found = rng.permutation(collapsed.scatter(chosen, rng))
-    return _fit(collapsed, peaks, found, pool.log_evidence, count, by_chain)
+    sampling = Sampling(target, peaks, rng)
+    sampling.run(enough, MOST_ROUNDS)
+    return sampling.fit(draws) if sampling.effective >= enough else sampling.fit_by_chain(draws)
+
+
+def laplace(peaks: Sequence[Peak]) -> float:
+    """Return the log evidence by normal distributions on the peaks."""
+    return float(scipy.special.logsumexp([peak.log_evidence for peak in peaks]))
 
 
 def approximate(
@@ -329,9 +407,9 @@ def approximate(
     found = np.vstack(
         [rng.multivariate_normal(p.z, p.covariance, n) for p, n in zip(peaks, counts, strict=True)]
     )
-    log_evidence = float(scipy.special.logsumexp(log)) + beyond
-    fit = _fit(_Collapsed(target, peaks[0]), peaks, found, log_evidence, float(draws))
-    return replace(fit, method="normal", effective=float("nan"))
+    log_evidence = laplace(peaks) + beyond
+    nan = float("nan")
+    return _fit(_Collapsed(target, peaks[0]), peaks, found, log_evidence, nan, "normal")
 
 
 def _parts(
@@ -367,36 +445,13 @@ def _parts(
     return first.mixed(TMixture(extended, wide.shares), _FROM_WITHOUT)
 
 
-def _draw_about(
-    collapsed: _Collapsed, first: TMixture, rng: np.random.Generator, enough: float
-) -> Pool[_Proposal, _Draws]:
-    other, mixture = collapsed.target.other, first
-    pool: Pool[_Proposal, _Draws] = Pool(
-        lambda proposal, batch: proposal.log_density(batch.z[:, other])
-    )
-    proposal: _Proposal = _Wide(first, _AT_FIRST)
-    for turn in range(_ROUNDS):
-        w = proposal.draw(_ROUND, rng)
-        batch, log = collapsed.settle(w)
-        pool.add(proposal, _ROUND, batch, log)
-        if pool.effective > enough:
-            break
-        fewest = 6 * len(other)
-        weights = tempered(pool.log_weights, fewest, 0.7, 1e-3)
-        mixture = mixture.refitted(pool.batch.z[:, other], weights).mixed(first, _FROM_FIRST)
-        proposal = wide = _Wide(mixture, _FROM_PRIOR)
-        if turn % _WIDE_EVERY:
-            proposal = _Surrogate(collapsed, pool.batch, weights, wide)
-    return pool
-
-
 def _fit(
     collapsed: _Collapsed,
     peaks: Sequence[Peak],
     draws: FloatArray,
     log_evidence: float,
     count: float,
-    by_chain: bool = False,
+    method: Method = "sampled",
 ) -> Fit:
     target, best, residual = collapsed.target, peaks[0], collapsed.residual
     error = target.likelihood.nodes[int(target.likelihood.by_node(residual[None])[0].argmax())]
@@ -411,8 +466,8 @@ def _fit(
         draws=draws,
         log_fit=float(target.likelihood.log(residual[None])[0]),
         log_evidence=log_evidence,
-        log_evidence_sd=count**-0.5 if count > 0 else np.inf,
-        method="emcee" if by_chain else "sampled",
+        log_evidence_sd=count**-0.5 if count > 0 else np.nan,
+        method=method,
         peaks=tuple(peaks),
         effective=min(count, float(len(draws))),
     )

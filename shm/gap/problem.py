@@ -12,6 +12,7 @@ from shm.gap.contract import Design, Fit, Hypothesis, Observations, Peak
 from shm.gap.coordinates import Coordinates, cut
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import flexible_nodes, nodes
+from shm.gap.posterior import Sampling
 from shm.gap.repeated_errors import (
     STRETCHES,
     Repeated,
@@ -45,8 +46,8 @@ class GapProblem:
     """The tests of one hanger as made, and what hypotheses about it predict of them.
 
     `smallest` holds, for an effect and where it acts, the share of its sizes' ranges that cannot
-    be seen in these data and that their priors therefore leave out (see `shm.gap.scan`). `alone`
-    keeps the fit without effects.
+    be seen in these data and that their priors therefore leave out (see `shm.gap.scan`). `sampling`
+    and `alone` keep the posterior without effects.
     """
 
     def __init__(
@@ -66,6 +67,7 @@ class GapProblem:
             model, tests, wave_n_m, known_tension_sd=known
         )
         self._linear = self.described.always_linear
+        self.sampling: Sampling | None = None
         self.alone: Fit | None = None
         self._hangers: dict[Effects, HangerWithEffects] = {}
         self._likelihoods: dict[bool, Likelihood] = {}

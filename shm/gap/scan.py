@@ -84,7 +84,7 @@ class Scan:
         z = np.hstack([moved, coordinates.effect_z(self.effect, len(before.z))])
         log, own = np.where(self.seen, self.log, -np.inf), slice(len(before.z), None)
         least = log.max() - max(_BEHIND, _BEHIND_SHARE * np.ptp(self.log[self.seen]))
-        most = _STARTS + 2 * (self.effect.shape[1] - 1)
+        most = _STARTS + self.effect.shape[1] - 1
         chosen: list[int] = []
         for row in np.argsort(-log, kind="stable").tolist():
             apart = all(np.abs(z[row, own] - z[k, own]).max() > _APART for k in chosen)

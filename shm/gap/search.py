@@ -16,8 +16,15 @@ from shm.errors import BadInput, UsageError
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Peak
 from shm.gap.law_error import allow_for_laws
 from shm.gap.linear import Linear
-from shm.gap.posterior import Target, approximate, find_peaks, sample
-from shm.gap.probabilities import ScoredHypothesis
+from shm.gap.posterior import (
+    MOST_ROUNDS,
+    Sampling,
+    Target,
+    approximate,
+    find_peaks,
+    laplace,
+)
+from shm.gap.probabilities import ScoredHypothesis, log_prior
 from shm.gap.problem import GapProblem
 from shm.gap.scan import Scan, scan, scan_beside
 from shm.inference.options import Progress, silent
@@ -26,8 +33,8 @@ from shm.values import ENOUGH_EFFECTIVE, FloatArray
 
 ALONE = Hypothesis()
 
-HOPELESS, HOPELESS_SHARE = 6.0, 0.4
-"""Log evidence behind the best, or a share of the gap, from which on nothing is tried further: a
+HOPELESS, HOPELESS_SHARE = 4.0, 0.4
+"""Log of prior times evidence behind the best, or a share of the gap, from which on nothing is tried further: a
 scan is linear, large gaps are not."""
 LEADERS = 3
 """Effects that are tried in pairs, and with something unknown beside."""
@@ -35,9 +42,9 @@ SUPPORTED = 2.0
 """Log evidence that an effect gains where it explains something, so that pairs are tried."""
 DROWNED = "Even at its largest it would drown in the errors of these data."
 _MOST_SCANNED, _MOST_PAIRS = 12, 8
-# Numerical: log evidence behind the best, and how many, of those sampled rather than approximated,
-# and until how many draws are effective; what the answer rests on is sampled further.
-_CLOSE, _MOST_SAMPLED, _ROUGHLY = 3.0, 6, 60
+# Numerical: log evidence behind the best, and how many, of those sampled rather than approximated;
+# effective draws and rounds of these. What the answer rests on is sampled further.
+_CLOSE, _MOST_SAMPLED, _ROUGHLY = 3.0, 4, (40, 8)
 
 
 def hypotheses(problem: GapProblem, without: tuple[str, ...] = ()) -> tuple[Hypothesis, ...]:
@@ -70,7 +77,10 @@ def invisible(problem: GapProblem) -> dict[str, str]:
 
 
 class Search:
-    """Everything tried of a problem: scans, peaks and fits, each by its hypothesis."""
+    """Everything tried of a problem: scans, peaks and fits, each by its hypothesis.
+
+    `rough` are log evidences by scans, or by Laplace's method where one was climbed to.
+    """
 
     def __init__(
         self,
@@ -83,8 +93,9 @@ class Search:
         progress("baseline", 0.0)
         self.baseline = fit_alone(problem, rng, options.draws)
         self.fits: dict[Hypothesis, Fit] = {ALONE: self.baseline}
-        self.rough: dict[Hypothesis, float] = {}
-        self._peaks: dict[Hypothesis, tuple[Target, list[Peak]]] = {}
+        self.rough: dict[Hypothesis, float] = {ALONE: laplace(self.baseline.peaks)}
+        self._beyond = [self.baseline.log_evidence - self.rough[ALONE]]
+        self._samplings: dict[Hypothesis, Sampling] = {}
         linear = Linear(problem.likelihood(ALONE), self.baseline.slopes)
         every = hypotheses(problem, options.without)
         scans = {h: scan(problem, self.baseline, linear, h) for h in every}
@@ -100,11 +111,12 @@ class Search:
         self.progress("single effects", 0.1)
         self._fit({h: self.scans[h].starts(self.problem, self.baseline) for h in self._hopeful()})
         leaders = self._leading(LEADERS, effects=1)
-        if leaders and leaders[0].log_evidence > self.baseline.log_evidence + SUPPORTED:
+        explains = [h for h in self.fits if self.rough[h] > self.rough[ALONE] + SUPPORTED]
+        if explains:
             self.progress("pairs", 0.5)
             self._fit(self._pairs(leaders))
         self.progress("something unknown", 0.8)
-        bases = [self.baseline, *leaders, *self._leading(1, effects=2)]
+        bases = [self.baseline, *leaders[:1], *self._leading(1, effects=2)]
         self._fit({replace(each.hypothesis, flexible=True): each.z[None] for each in bases})
 
     def scored(self) -> list[ScoredHypothesis]:
@@ -122,65 +134,74 @@ class Search:
                     draws=laws.draws,
                 )
             tried.append(own)
-        rest = [(h, log) for h, log in self.rough.items() if h not in self.fits]
+        beyond = float(np.mean(self._beyond))
+        rest = [(h, log + beyond) for h, log in self.rough.items() if h not in self.fits]
         return tried + [ScoredHypothesis(h, log, log) for h, log in rest]
 
+    def _level(self, hypothesis: Hypothesis) -> float:
+        """Return the log of prior times rough evidence."""
+        return self.rough[hypothesis] + log_prior(hypothesis, self.variants)
+
     def _hopeful(self) -> list[Hypothesis]:
-        """Return the scanned hypotheses near the best, and each effect once at least.
+        """Return the scanned hypotheses near the best; each effect once where there is a gap.
 
         Of a narrow peak a coarse scan sees little.
         """
-        ranked = sorted(self.scans, key=lambda h: -self.scans[h].log_evidence)
-        best = self.scans[ranked[0]].log_evidence if ranked else 0.0
-        reach = max(HOPELESS, HOPELESS_SHARE * (best - self.baseline.log_evidence))
-        near = [h for h in ranked[:_MOST_SCANNED] if self.scans[h].log_evidence > best - reach]
-        each_once = {h.name: h for h in reversed(ranked)}
+        ranked = sorted(self.scans, key=lambda h: -self._level(h))
+        if not ranked:
+            return []
+        gap = max(self.rough[h] for h in ranked) - self.rough[ALONE]
+        best = max(self._level(ranked[0]), self._level(ALONE))
+        reach = max(HOPELESS, HOPELESS_SHARE * gap)
+        near = [h for h in ranked[:_MOST_SCANNED] if self._level(h) > best - reach]
+        each_once = {h.name: h for h in reversed(ranked)} if gap > SUPPORTED else {}
         return list(dict.fromkeys([*near, *each_once.values()]))
 
     def _fit(self, starts: Mapping[Hypothesis, FloatArray]) -> None:
-        """Climb from the starts of each hypothesis, then sample those that come near the best."""
+        """Climb from the starts of each hypothesis, then draw from those that come near the best.
+
+        The likeliest are sampled, the others approximated.
+        """
         climbed: dict[Hypothesis, tuple[Target, list[Peak]]] = {}
-        best = max(each.log_evidence for each in self.fits.values())
         for hypothesis, z in starts.items():
             target = Target(self.problem, hypothesis)
-            hopeless = -np.inf if hypothesis.flexible else best - HOPELESS
-            peaks = find_peaks(target, z, hopeless)
+            hopeless = max(self.rough[h] for h in self.fits) - 2 * HOPELESS
+            peaks = find_peaks(target, z, -np.inf if hypothesis.flexible else hopeless)
             if peaks:
                 climbed[hypothesis] = target, peaks
-                self.rough[hypothesis] = max(peak.log_evidence for peak in peaks)
-                best = max(best, self.rough[hypothesis])
-        near = [h for h in climbed if h.flexible or self.rough[h] > best - HOPELESS]
-        near.sort(key=lambda h: -self.rough[h])
-        beyond = []
-        for count, hypothesis in enumerate(near):
+                self.rough[hypothesis] = laplace(peaks)
+        best = max(self._level(h) for h in (*self.fits, *climbed))
+        ranked = sorted(climbed, key=lambda h: -self._level(h))
+        for count, hypothesis in enumerate(ranked):
+            behind = best - self._level(hypothesis)
+            if behind > HOPELESS and not hypothesis.flexible:
+                continue
             target, peaks = climbed[hypothesis]
-            if count < _MOST_SAMPLED and self.rough[hypothesis] > best - _CLOSE:
-                self._sample(hypothesis, target, peaks, _ROUGHLY)
-                beyond.append(self.fits[hypothesis].log_evidence - self.rough[hypothesis])
+            without = self.baseline if hypothesis.effects else None
+            sampling = Sampling(target, peaks, self.rng, without)
+            self._samplings[hypothesis] = sampling
+            if count < _MOST_SAMPLED and behind < _CLOSE:
+                sampling.run(*_ROUGHLY)
+                found = sampling.fit(self.draws)
+                self._beyond.append(found.log_evidence - self.rough[hypothesis])
             else:
-                off = float(np.mean(beyond)) if beyond else 0.0
+                off = float(np.mean(self._beyond))
                 found = approximate(target, peaks, self.draws, self.rng, off)
-                self.fits[hypothesis] = found
-        self._peaks |= climbed
-
-    def _sample(
-        self, hypothesis: Hypothesis, target: Target, peaks: Sequence[Peak], enough: float
-    ) -> None:
-        without = self.baseline if hypothesis.effects else None
-        self.fits[hypothesis] = sample(target, peaks, self.draws, self.rng, enough, without)
+            self.fits[hypothesis] = found
 
     def sample_further(self, probable: Sequence[Hypothesis]) -> None:
         """Sample what the answer rests on until enough draws are effective."""
         for hypothesis in probable:
-            fit = self.fits[hypothesis]
-            if hypothesis in self._peaks and not fit.effective >= ENOUGH_EFFECTIVE:
+            if hypothesis in self._samplings:
                 self.progress(f"sampling {hypothesis.name or 'something unknown'}", 0.9)
-                self._sample(hypothesis, *self._peaks[hypothesis], ENOUGH_EFFECTIVE)
+                sampling = self._samplings[hypothesis]
+                sampling.run(ENOUGH_EFFECTIVE, MOST_ROUNDS)
+                self.fits[hypothesis] = sampling.fit(self.draws)
 
     def _leading(self, most: int, effects: int) -> list[Fit]:
         """Return the likeliest fit of each of the leading effects, or pairs."""
         own = [f for h, f in self.fits.items() if len(h.effects) == effects and not h.flexible]
-        own.sort(key=lambda each: -each.log_evidence)
+        own.sort(key=lambda each: -self.rough[each.hypothesis])
         first: dict[str, Fit] = {}
         for fit in own:
             first.setdefault(fit.hypothesis.name, fit)
@@ -212,8 +233,17 @@ def fit_alone(problem: GapProblem, rng: np.random.Generator, draws: int = 1000) 
 
     Raises BadInput where the model cannot be solved near the data.
     """
-    if problem.alone is not None:
-        return problem.alone
+    if problem.alone is None:
+        sampling = sample_alone(problem, rng)
+        sampling.run(ENOUGH_EFFECTIVE, MOST_ROUNDS)
+        problem.alone = sampling.fit(draws)
+    return problem.alone
+
+
+def sample_alone(problem: GapProblem, rng: np.random.Generator) -> Sampling:
+    """Return the sampling of the hanger without effects as far as its evidence takes, kept."""
+    if problem.sampling is not None:
+        return problem.sampling
     target, ends = Target(problem, ALONE), problem.end_columns
     z = np.zeros((len(_TENSIONS) * len(_ENDS), target.dimension))
     z[:, 0] = np.repeat(_TENSIONS, len(_ENDS))
@@ -224,8 +254,8 @@ def fit_alone(problem: GapProblem, rng: np.random.Generator, draws: int = 1000) 
             f"the model cannot be solved anywhere for {problem.model.name}.",
             remedy="Check the description of the hanger.",
         )
-    starts = z[np.argsort(-log)[:_CLIMBS]]
-    peaks = find_peaks(target, starts)
+    peaks = find_peaks(target, z[np.argsort(-log)[:_CLIMBS]])
     problem.settle(peaks[0])
-    problem.alone = sample(Target(problem, ALONE), peaks, draws, rng)
-    return problem.alone
+    problem.sampling = Sampling(Target(problem, ALONE), peaks, rng)
+    problem.sampling.run(*_ROUGHLY)
+    return problem.sampling
