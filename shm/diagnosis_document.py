@@ -1,6 +1,7 @@
 """The JSON document of a gap diagnosis (`shm.diagnosis/1`), there and back.
 
-And that of a joint diagnosis of several hangers (`shm.bridge_diagnosis/1`), which holds theirs.
+And that of a joint diagnosis of several hangers (`shm.bridge_diagnosis/1`), which holds theirs,
+and that of a check of what a diagnosis would find (`shm.gap_check/1`).
 
 As all documents it holds NaN until `shm.documents.dump` writes null; reading takes either.
 """
@@ -12,10 +13,11 @@ from dataclasses import asdict, fields
 from typing import Any
 
 from shm.documents import value_of
-from shm.values import BridgeDiagnosis, Cause, Diagnosis
+from shm.values import BridgeDiagnosis, Cause, Diagnosis, GapCheck
 
 DIAGNOSIS_SCHEMA = "shm.diagnosis/1"
 BRIDGE_DIAGNOSIS_SCHEMA = "shm.bridge_diagnosis/1"
+GAP_CHECK_SCHEMA = "shm.gap_check/1"
 
 _PLAIN = (
     "hanger", "baseline", "no_gap_probability", "unexplained_probability", "fit_p_value",
@@ -93,3 +95,34 @@ def diagnosis_of(document: Mapping[str, Any]) -> Diagnosis:
         "invisible": [(each["effect"], each["why"]) for each in document["invisible"]],
     }
     return value_of(Diagnosis, {**document, **renamed})
+
+
+def gap_check_document(check: GapCheck) -> dict[str, Any]:
+    """Return the document of `shm gap check --json`.
+
+    `found_from` of an effect is the index of a size; `size`, `others` and `taken_for` follow.
+    """
+    effects = [
+        {
+            **asdict(each),
+            "size": each.size,
+            "others": list(each.others),
+            "taken_for": list(each.taken_for),
+        }
+        for each in check.effects
+    ]
+    invisible = [{"effect": name, "why": why} for name, why in check.invisible]
+    return {
+        "schema": GAP_CHECK_SCHEMA,
+        **asdict(check),
+        "effects": effects,
+        "invisible": invisible,
+        "false_gaps": check.false_gaps,
+        "is_complete": check.is_complete,
+    }
+
+
+def gap_check_of(document: Mapping[str, Any]) -> GapCheck:
+    """Read a check from its document; raises KeyError, TypeError or ValueError."""
+    invisible = [(each["effect"], each["why"]) for each in document["invisible"]]
+    return value_of(GapCheck, {**document, "invisible": invisible})
