@@ -290,7 +290,8 @@ class Check:
         done, lanes = 0, self.options.lanes if executor else 1
         while waiting or running:
             while waiting and len(running) < lanes:
-                running[_submitted(executor, waiting[0])] = waiting.popleft()
+                search = waiting.popleft()
+                running[_submitted(executor, search)] = search
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 search = running.pop(future)
                 search.take(future.result())

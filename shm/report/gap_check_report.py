@@ -106,8 +106,8 @@ def stopped_words(check: GapCheck) -> str:
 def check_text(check: GapCheck) -> list[str]:
     """Return what is said below the table, a paragraph each."""
     limit = (
-        "The twin follows the model of the diagnosis exactly, so that on the bridge these sizes are "
-        "lower limits."
+        "The twin follows the model of the diagnosis exactly, so that on the bridge these are "
+        "lower limits of the size."
     )
     hidden = invisible_words(check)
     lines = [stopped_words(check), sound_words(check), limit]

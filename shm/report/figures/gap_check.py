@@ -68,10 +68,10 @@ def specify(check: GapCheck) -> spec.Specification | None:
     )
     names = [formatting.quantity(each.effect) for each in check.effects]
     panel = spec.Panel(
-        y=spec.Axis(range=(len(rows) - 0.4, -0.6), ticks=rows, tick_labels=names),
+        y=spec.Axis(range=(len(rows) - 0.4, -0.6), ticks=rows, tick_labels=names, grid=False),
         x=spec.Axis(
             label="size, from the weakest to the strongest of its prior range",
-            range=(0.0, 1.45), ticks=(0, 0.25, 0.5, 0.75, 1), grid=False,
+            range=(0.0, 1.35), ticks=(0, 0.25, 0.5, 0.75, 1), grid=False,
         ),
         marks=marks,
     )  # fmt: skip
@@ -91,8 +91,8 @@ def _height(check: GapCheck, row: int, seed: int) -> float:
 def caption(check: GapCheck) -> str:
     """Explain the figure."""
     return (
-        "Each effect was planted in a twin of the hanger and diagnosed. Sizes spread over the range "
-        "of the effect's prior; a bar begins at the smallest that is found, which stands at its "
+        "Each effect was planted in a twin of the hanger and diagnosed. Sizes spread over the "
+        "range of its prior; a bar begins at the smallest that is found, which stands at its "
         f"right. {sound_words(check)}"
     ).strip()
 

@@ -1,0 +1,42 @@
+"""Diagnoses that take no time, for checks of what a diagnosis would find."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shm.gap import GapOptions
+from shm.gap.check import Twin
+from shm.models.effects import Variant
+from shm.values import Diagnosis, FloatArray, Hanger, ModalTest
+from tests.helpers.diagnoses import MASS, a_diagnosis
+
+Diagnose = Callable[[Sequence[ModalTest], Hanger, GapOptions], Diagnosis]
+
+
+def names_from(twin: Twin, least: float, *effects: str) -> Diagnose:
+    """Make a diagnosis that names `effects` where most frequencies are further than `least` off.
+
+    Several are of one group, the first the likeliest; none is something unknown.
+    """
+    nothing = twin.measure("", Variant(), np.empty(0), np.random.default_rng(0))
+    sound_hz = frequencies_hz(nothing)
+
+    def diagnose(tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions) -> Diagnosis:
+        away = np.median(np.abs(np.log(frequencies_hz(tests) / sound_hz)))
+        if away < least:
+            return replace(a_diagnosis(causes=()), no_gap_probability=0.9)
+        group = 0 if len(effects) > 1 else None
+        causes = [
+            replace(MASS, effect=name, probability=0.5 / 2**k, group=group)
+            for k, name in enumerate(effects)
+        ]
+        return a_diagnosis(causes=causes)
+
+    return diagnose
+
+
+def frequencies_hz(tests: Sequence[ModalTest]) -> FloatArray:
+    return np.array([mode.frequency_hz for test in tests for mode in test.modes])
