@@ -30,7 +30,6 @@ from shm_cli.common import (
 )
 
 _PICTURES = (".svg", ".png")
-_STOPPED = 130  # as a shell reports Ctrl-C
 
 
 @click.command()
@@ -102,7 +101,7 @@ def check(
     seed: int,
     figure: Path | None,
 ) -> None:
-    """What a diagnosis would find on this hanger with these sensors, and from which size on.
+    """Say what a diagnosis would find on this hanger with these sensors, and from which size on.
 
     Each effect is planted in a simulated twin of the hanger, with its modes, sensors, errors and
     conditions, and diagnosed. Of MODES.json with --hanger-file, of the latest tests of a hanger of
@@ -131,7 +130,7 @@ def check(
             for each in gap_check_figures(found):
                 each.figure.savefig(figure, facecolor="white")
     if not found.is_complete:
-        ctx.exit(_STOPPED)
+        ctx.exit(130)  # as a shell reports Ctrl-C
 
 
 def _measured(

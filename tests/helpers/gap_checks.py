@@ -10,7 +10,16 @@ import numpy as np
 from shm.gap import GapOptions
 from shm.gap.check import Twin
 from shm.models.effects import Variant
-from shm.values import Diagnosis, FloatArray, Hanger, ModalTest
+from shm.values import (
+    Diagnosis,
+    EffectCheck,
+    FloatArray,
+    GapCheck,
+    GapTrial,
+    Hanger,
+    ModalTest,
+    PlantedParameter,
+)
 from tests.helpers.diagnoses import MASS, a_diagnosis
 
 Diagnose = Callable[[Sequence[ModalTest], Hanger, GapOptions], Diagnosis]
@@ -40,3 +49,23 @@ def names_from(twin: Twin, least: float, *effects: str) -> Diagnose:
 
 def frequencies_hz(tests: Sequence[ModalTest]) -> FloatArray:
     return np.array([mode.frequency_hz for test in tests for mode in test.modes])
+
+
+def a_check() -> GapCheck:
+    """Make a check of one effect that is found from the third of four sizes on."""
+    masses = (0.2, 1.2, 7.0, 48.0)
+    trials = tuple(
+        GapTrial(
+            "point_mass", "everywhere", step, (PlantedParameter("mass_kg", "kg", masses[step]),),
+            1, "alone" if step > 1 else "no gap",
+        )
+        for step in (2, 1)
+    )  # fmt: skip
+    return GapCheck(
+        hanger=3, baseline="beam1", tests=("t1",), tension_n=711e3, misfit_percent=0.02,
+        frequency_sd_percent=0.01,
+        effects=(EffectCheck("point_mass", "mass_kg", "kg", masses, 2, trials),),
+        sound=(GapTrial("", "", -1, (), 1, "no gap"),),
+        invisible=(("sensor_mass", "It takes sensors."),),
+        searches=2, searches_done=2, seeds=1, seed=1,
+    )  # fmt: skip
