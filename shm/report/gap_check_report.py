@@ -10,7 +10,7 @@ from shm.report.diagnosis_wording import size
 from shm.values import NAN, EffectCheck, EffectEstimate, GapCheck, GapTrial
 from shm.values.rounding import force_unit
 
-HEADINGS = ("effect", "found from", "how", "smaller ones are")
+HEADINGS = ("effect", "found from", "how", "largest that was missed")
 
 
 def rows(check: GapCheck) -> list[tuple[str, ...]]:
@@ -37,14 +37,16 @@ def found_from(effect: EffectCheck) -> str:
 def how(effect: EffectCheck) -> str:
     """Return whether it is found alone or together with which others."""
     if effect.found_from is None:
-        return f"not up to {size_words(effect, len(effect.sizes) - 1)}"
+        return ""
     return f"with {_names(effect.others)}" if effect.others else "alone"
 
 
 def missed(effect: EffectCheck) -> str:
-    """Return what the diagnosis says of the sizes that are not found."""
-    said = [_missed(trial) for trial in effect.missed]
-    return " or ".join(dict.fromkeys(said)) or "not tried: the smallest is found"
+    """Return the largest size that was not found, and what the diagnosis says of it."""
+    if not effect.missed:
+        return "none"
+    said = dict.fromkeys(_missed(trial) for trial in effect.missed)
+    return f"{size_words(effect, effect.missed[0].step)}: {' or '.join(said)}"
 
 
 def _missed(trial: GapTrial) -> str:
@@ -106,6 +108,7 @@ def stopped_words(check: GapCheck) -> str:
 def check_text(check: GapCheck) -> list[str]:
     """Return what is said below the table, a paragraph each."""
     limit = (
+        "The limit lies between the largest that was missed and the smallest that is found. "
         "The twin follows the model of the diagnosis exactly, so that on the bridge these are "
         "lower limits of the size."
     )

@@ -99,7 +99,7 @@ def caption(check: GapCheck) -> str:
 
 def _alt(check: GapCheck) -> str:
     told = [
-        f"{formatting.quantity(e.effect)} {found_from(e)}, {how(e)}; smaller ones {missed(e)}"
+        f"{formatting.quantity(e.effect)} {found_from(e)} {how(e)}, largest missed {missed(e)}"
         for e in check.effects
     ]
     return f"From which size on effects are found: {'. '.join(told)}."
