@@ -100,12 +100,13 @@ def diagnosis_of(document: Mapping[str, Any]) -> Diagnosis:
 def gap_check_document(check: GapCheck) -> dict[str, Any]:
     """Return the document of `shm gap check --json`.
 
-    `found_from` of an effect is the index of a size; `size`, `others` and `taken_for` follow.
+    `found_from` and `alone_from` of an effect are indices of `sizes`; `size` is the former's.
     """
     effects = [
         {
             **asdict(each),
             "size": each.size,
+            "alone_from": each.alone_from,
             "others": list(each.others),
             "taken_for": list(each.taken_for),
         }

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import rich_click as click
+from rich.text import Text
 
 from shm.diagnosis_document import gap_check_document
 from shm.errors import BadInput
@@ -25,7 +26,8 @@ from shm_cli.common import (
     opened_store,
     paragraph,
     show,
-    show_rows,
+    show_table,
+    table,
     tests_and_hanger,
 )
 
@@ -193,6 +195,11 @@ def _executor(processes: int) -> Iterator[Executor | None]:
 def _print(found: GapCheck) -> None:
     click.echo(paragraph(introduction(found)))
     if found.effects:
-        show_rows("What a diagnosis would find", HEADINGS, rows(found))
+        made = table("What a diagnosis would find", *HEADINGS)
+        for column in made.columns:
+            column.justify = "left"
+        for row in rows(found):
+            made.add_row(*map(Text, row))
+        show_table(made)
     for line in check_text(found):
         click.echo(paragraph(line))

@@ -7,38 +7,51 @@ from collections.abc import Sequence
 
 from shm.report import formatting
 from shm.report.diagnosis_wording import size
-from shm.values import NAN, EffectCheck, EffectEstimate, GapCheck, GapTrial
+from shm.values import NAN, EffectCheck, EffectEstimate, GapCheck, GapTrial, effect_label
 from shm.values.rounding import force_unit
 
-HEADINGS = ("effect", "found from", "how", "largest that was missed")
+HEADINGS = ("effect", "found from", "there together with", "alone from", "largest that was missed")
 
 
 def rows(check: GapCheck) -> list[tuple[str, ...]]:
     """Return a row of texts for each effect, in the order of the catalogue."""
     return [
-        (formatting.quantity(e.effect), found_from(e), how(e), missed(e)) for e in check.effects
+        (
+            planted(effect),
+            found_from(effect),
+            _names(effect.others) if effect.others else "",
+            _from(effect, effect.alone_from),
+            missed(effect),
+        )
+        for effect in check.effects
     ]
 
 
+def planted(effect: EffectCheck) -> str:
+    """Return the effect and where it was planted: `point mass at 3.4 m`."""
+    labels = {effect_label(trial.effect, trial.at) for trial in effect.trials}
+    places_m = {p.value for trial in effect.trials for p in trial.parameters if p.name == "x_m"}
+    if len(labels) > 1 or len(places_m) > 1:
+        return f"{formatting.quantity(effect.effect)} (several places)"
+    return " at ".join([*labels, *(f"{x_m:.2g} m" for x_m in places_m)])
+
+
 def size_words(effect: EffectCheck, step: int) -> str:
-    """Return a size in the unit that suits it: `24 kg`, `± 1.5 %`."""
+    """Return a size in the unit that suits it: `24 kg`, `1.5 %`."""
     value = effect.sizes[step]
     return str(size(EffectEstimate(effect.name, effect.unit, value, NAN, NAN, NAN)))
 
 
 def found_from(effect: EffectCheck) -> str:
     """Return the smallest size that is found: `24 kg or more`, of a spring `or less`."""
-    if effect.found_from is None:
-        return "not found"
-    side = "less" if effect.sizes[0] > effect.sizes[-1] else "more"
-    return f"{size_words(effect, effect.found_from)} or {side}"
+    return _from(effect, effect.found_from) or "not found"
 
 
-def how(effect: EffectCheck) -> str:
-    """Return whether it is found alone or together with which others."""
-    if effect.found_from is None:
+def _from(effect: EffectCheck, step: int | None) -> str:
+    if step is None:
         return ""
-    return f"with {_names(effect.others)}" if effect.others else "alone"
+    side = "less" if effect.sizes[0] > effect.sizes[-1] else "more"
+    return f"{size_words(effect, step)} or {side}"
 
 
 def missed(effect: EffectCheck) -> str:

@@ -67,6 +67,14 @@ class EffectCheck:
         return NAN if self.found_from is None else self.sizes[self.found_from]
 
     @property
+    def alone_from(self) -> int | None:
+        """Return the smallest size that is found alone in at least half of its trials."""
+        tried: dict[int, list[bool]] = {}
+        for trial in self.trials:
+            tried.setdefault(trial.step, []).append(trial.outcome == "alone")
+        return min((s for s, alone in tried.items() if 2 * sum(alone) >= len(alone)), default=None)
+
+    @property
     def others(self) -> tuple[str, ...]:
         """Return the effects that are found together with this one at its smallest size."""
         return _named(t for t in self.trials if t.step == self.found_from and t.is_found)

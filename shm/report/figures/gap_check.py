@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from shm.report import formatting
 from shm.report.figures import specification as spec
-from shm.report.gap_check_report import found_from, how, missed, size_words, sound_words
+from shm.report.gap_check_report import HEADINGS, found_from, rows, size_words, sound_words
 from shm.values import EffectCheck, GapCheck
 from shm.values.gap_check import Outcome
 
@@ -35,7 +35,7 @@ def specify(check: GapCheck) -> spec.Specification | None:
     """Effects as rows, sizes from the weakest to the strongest, a mark for each diagnosis."""
     if not check.effects:
         return None
-    rows = range(len(check.effects))
+    places = range(len(check.effects))
     marks: list[spec.Mark] = []
     for row, effect in enumerate(check.effects):
         if effect.found_from is not None:
@@ -63,19 +63,24 @@ def specify(check: GapCheck) -> spec.Specification | None:
     told = [found_from(each) for each in check.effects]
     marks.append(
         spec.Points(
-            x=[1.0 for _ in rows], y=list(rows), size=0, labels=told, colour="ink", clipped=False
+            x=[1.0 for _ in places],
+            y=list(places),
+            size=0,
+            labels=told,
+            colour="ink",
+            clipped=False,
         )
     )
     names = [formatting.quantity(each.effect) for each in check.effects]
     panel = spec.Panel(
-        y=spec.Axis(range=(len(rows) - 0.4, -0.6), ticks=rows, tick_labels=names, grid=False),
+        y=spec.Axis(range=(len(places) - 0.4, -0.6), ticks=places, tick_labels=names, grid=False),
         x=spec.Axis(
             label="size, from the weakest to the strongest of its prior range",
             range=(0.0, 1.35), ticks=(0, 0.25, 0.5, 0.75, 1), grid=False,
         ),
         marks=marks,
     )  # fmt: skip
-    return spec.stacked([panel], 0.27 * len(rows) + 1.3, legend_columns=5)
+    return spec.stacked([panel], 0.27 * len(places) + 1.3, legend_columns=5)
 
 
 def _place(effect: EffectCheck, step: int) -> float:
@@ -98,11 +103,8 @@ def caption(check: GapCheck) -> str:
 
 
 def _alt(check: GapCheck) -> str:
-    told = [
-        f"{formatting.quantity(e.effect)} {found_from(e)} {how(e)}, largest missed {missed(e)}"
-        for e in check.effects
-    ]
-    return f"From which size on effects are found: {'. '.join(told)}."
+    told = ["; ".join(each for each in row if each) for row in rows(check)]
+    return f"{'; '.join(HEADINGS)}: {'. '.join(told)}."
 
 
 FIGURE = spec.Member("gap_check", "What a diagnosis would find", specify, caption, _alt)
