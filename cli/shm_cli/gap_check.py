@@ -13,7 +13,7 @@ import rich_click as click
 from rich.text import Text
 
 from shm.diagnosis_document import gap_check_document
-from shm.errors import BadInput
+from shm.errors import BadInput, NothingThere
 from shm.gap.check import Check, CheckOptions
 from shm.report.figures.every_figure import gap_check_figures
 from shm.report.gap_check_report import HEADINGS, check_text, introduction, rows
@@ -128,6 +128,8 @@ def check(
     else:
         _print(found)
     if figure is not None:
+        if not found.effects:
+            raise NothingThere(f"no effect was checked: {figure} is not drawn.")
         with drawing():
             for each in gap_check_figures(found):
                 each.figure.savefig(figure, facecolor="white")

@@ -106,16 +106,14 @@ class Twin:
             # The twin's own amplitude slopes follow from the planted effect.
             self._take(tuple(_without_slopes(test) for test in used), baseline)
             fit = baseline_fit(self._problem, np.random.default_rng(seed))
-            self._z = fit.z
-            self._fitted_sd: FloatArray | float = np.sqrt(fit.noise.frequency.diagonal())
-            self.misfit_percent = self._problem.misfit_percent(fit)
+            self._z, self.misfit_percent = fit.z, self._problem.misfit_percent(fit)
         else:
             plan = usual_tests(hanger)
             self._slope_sd = _slope_sds(plan)
             self._take(plan, baseline)
             self._z = _as_described(self._problem)
             self._take(self._tests_of(self._predicted((), self._z), self._slope_sd), baseline)
-            self._fitted_sd, self.misfit_percent = NAN, NAN
+            self.misfit_percent = NAN
 
     def _take(self, tests: tuple[ModalTest, ...], baseline: str) -> None:
         self.tests = tests
@@ -135,9 +133,15 @@ class Twin:
 
     @property
     def frequency_sd(self) -> FloatArray:
-        """Return the errors of the frequencies (F,) as stated or, where none is, as fitted."""
-        stated = self._problem.observations.sd[: self._problem.design.frequencies]
-        return np.where(np.isfinite(stated), stated, self._fitted_sd)
+        """Return the errors of the frequencies (F,) as stated or, where none is, as assumed.
+
+        A gap of the hanger itself is no error of the measurement, so none is taken from the fit.
+        """
+        found = self._problem.observations
+        stated = found.sd[: found.design.frequencies]
+        usual = self.hanger.assumptions.unstated_frequency_sd.value
+        rounding = 0.0 if found.rounding is None else found.rounding
+        return np.where(np.isfinite(stated), stated, np.hypot(usual, rounding))
 
     def invisible(self) -> dict[str, str]:
         """Return the effects that these tests cannot show, and why."""
@@ -278,8 +282,8 @@ class Check:
         seeds = range(options.seed, options.seed + options.seeds)
         none = range(options.seed, options.seed + options.sound)
         self.searches = [
-            *(_Search(self.twin, options, "", seed) for seed in none),
             *(_Search(self.twin, options, name, seed) for name in self.effects for seed in seeds),
+            *(_Search(self.twin, options, "", seed) for seed in none),
         ]
 
     def searched(

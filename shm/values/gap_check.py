@@ -98,7 +98,8 @@ class GapCheck(Shown):
 
     The twin is the class `baseline` fitted to the tests (`tests` empty: the description with a
     usual hammer test), with the tension `tension_n`; the fit misses their frequencies by
-    `misfit_percent`. `sound` are trials of twins without an effect. `invisible` names effects that
+    `misfit_percent`. Frequencies err by `frequency_sd_percent`, as stated or, where nothing is, as
+    assumed. `sound` are trials of twins without an effect. `invisible` names effects that
     these data cannot show, and why. `searches` were asked for; fewer are done if it was stopped.
     """
 

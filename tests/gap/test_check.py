@@ -81,6 +81,23 @@ def test_a_twin_errs_as_stated(twin: Twin) -> None:
     assert (scatter < 0.01).all()
 
 
+def test_a_gap_of_the_hanger_is_no_error(tests: tuple[ModalTest, ...]) -> None:
+    """Frequencies without a stated error, 5 % off in one plane."""
+    off = tuple(
+        replace(
+            mode,
+            frequency_hz=mode.frequency_hz * (1.05 if mode.plane == "transverse" else 1.0),
+            frequency_sd_hz=np.nan,
+        )
+        for mode in tests[0].modes
+    )
+    twin = Twin([replace(tests[0], modes=off)], PLAIN, "beam1", 1)
+    assert twin.misfit_percent > 1
+    assert twin.frequency_sd == pytest.approx(3e-4)
+    (made,) = twin.measure("", Variant(), np.empty(0), np.random.default_rng(5))
+    assert not any(mode.frequency_sd_hz > 0 for mode in made.modes)
+
+
 def test_a_twin_keeps_shapes_and_conditions(twin: Twin, tests: tuple[ModalTest, ...]) -> None:
     (made,) = twin.measure("", Variant(), np.empty(0), np.random.default_rng(5))
     (given,) = tests
@@ -256,7 +273,8 @@ def test_a_search_that_was_stopped_counts(
     monkeypatch.setattr(module, "diagnose", names_from(twin, 0.01, "distributed_mass"))
     job = Check(tests, PLAIN, MASS)
     found = job.summarise([next(job.searched())])
-    assert (found.searches_done, found.searches, found.effects) == (1, 3, ())
+    assert (found.searches_done, found.searches, found.sound) == (1, 3, ())
+    assert [each.effect for each in found.effects] == ["distributed_mass"]
     assert not found.is_complete
 
 
