@@ -23,9 +23,9 @@ QUICK = ["--effects", "distributed_mass,timebase", "--sound", 1, "--processes", 
 def call(
     shm: Shm, modes_file: Path, hanger_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> list[object]:
-    """Make a check whose diagnoses name a mass where frequencies are more than 1.1 % off."""
+    """Make a check whose diagnoses name a mass where frequencies are more than 1 % off."""
     twin = Twin(load_modes(modes_file), HANGER_3, "beam1", 1)
-    monkeypatch.setattr(module, "diagnose", names_from(twin, 0.011, "distributed_mass"))
+    monkeypatch.setattr(module, "diagnose", names_from(twin, 0.01, "distributed_mass"))
     return ["gap", "check", modes_file, "--hanger-file", hanger_file, *QUICK]
 
 
@@ -96,7 +96,7 @@ def test_check_takes_a_usual_test_where_none_is(
     shm: Shm, bridge: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     twin = Twin((), bridge.bridge.hanger(4), "beam1", 1)
-    monkeypatch.setattr(module, "diagnose", names_from(twin, 0.011, "distributed_mass"))
+    monkeypatch.setattr(module, "diagnose", names_from(twin, 0.01, "distributed_mass"))
     ended = shm("--workspace", bridge.folder, "gap", "check", "--hanger", 4, *QUICK)
     assert ended.code == 0, ended.err
     assert "a usual hammer test, for no test is there" in " ".join(ended.out.split())

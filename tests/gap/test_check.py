@@ -52,7 +52,7 @@ def checked(
     tests: tuple[ModalTest, ...],
     monkeypatch: pytest.MonkeyPatch,
     *named: str,
-    least: float = 0.011,
+    least: float = 0.01,
     options: CheckOptions = MASS,
 ) -> GapCheck:
     monkeypatch.setattr(module, "diagnose", names_from(twin, least, *named))

@@ -30,8 +30,9 @@ def names_from(twin: Twin, least: float, *effects: str) -> Diagnose:
 
     Several are of one group, the first the likeliest; none is something unknown.
     """
-    nothing = twin.measure("", Variant(), np.empty(0), np.random.default_rng(0))
-    sound_hz = frequencies_hz(nothing)
+    rng = np.random.default_rng(0)
+    sound = [frequencies_hz(twin.measure("", Variant(), np.empty(0), rng)) for _ in range(50)]
+    sound_hz = np.mean(sound, axis=0)
 
     def diagnose(tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions) -> Diagnosis:
         away = np.median(np.abs(np.log(frequencies_hz(tests) / sound_hz)))
