@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from shm.bridge import load_hanger
 from shm.gap import check as module
 from shm.gap.check import Twin
 from shm.modes_document import load_modes
@@ -14,7 +15,6 @@ from shm.store import Workspace
 from shm_cli import gap_check as command
 from tests.cli.conftest import Shm
 from tests.helpers.gap_checks import names_from
-from tests.helpers.hangers import HANGER_3
 
 QUICK = ["--effects", "distributed_mass,timebase", "--sound", 1, "--processes", 1]
 
@@ -24,7 +24,7 @@ def call(
     shm: Shm, modes_file: Path, hanger_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> list[object]:
     """Make a check whose diagnoses name a mass where frequencies are more than 1 % off."""
-    twin = Twin(load_modes(modes_file), HANGER_3, "beam1", 1)
+    twin = Twin(load_modes(modes_file), load_hanger(hanger_file), "beam1", 1)
     monkeypatch.setattr(module, "diagnose", names_from(twin, 0.01, "distributed_mass"))
     return ["gap", "check", modes_file, "--hanger-file", hanger_file, *QUICK]
 

@@ -26,7 +26,7 @@ Diagnose = Callable[[Sequence[ModalTest], Hanger, GapOptions], Diagnosis]
 
 
 def names_from(twin: Twin, least: float, *effects: str) -> Diagnose:
-    """Make a diagnosis that names `effects` where most frequencies are further than `least` off.
+    """Make a diagnosis that names `effects` where the first frequency is further than `least` off.
 
     Several are of one group, the first the likeliest; none is something unknown.
     """
@@ -35,7 +35,7 @@ def names_from(twin: Twin, least: float, *effects: str) -> Diagnose:
     sound_hz = np.mean(sound, axis=0)
 
     def diagnose(tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions) -> Diagnosis:
-        away = np.median(np.abs(np.log(frequencies_hz(tests) / sound_hz)))
+        away = abs(np.log(frequencies_hz(tests) / sound_hz)[0])  # that which errs least
         if away < least:
             return replace(a_diagnosis(causes=()), no_gap_probability=0.9)
         group = 0 if len(effects) > 1 else None
