@@ -17,13 +17,15 @@ In a notebook, from a recording to the tension and what limits it::
 - The steps: `read`, `identify`, `update`, `select`, `diagnose`; `simulate` makes a recording whose
   truth is known (a `PlantedEffect` is part of it); `load_modes` takes modal tests that were
   identified before, or elsewhere.
+- `check_gap` says beforehand which effects `diagnose` would find, and from which size on.
 - `diagnose_simulator` asks the same of any simulator of your own: a `Simulator` with a `Prior` for
   each parameter, a `SimulatorEffect` for each possible cause, and a `Reading` for each measurement.
 - `Store` reads what a workspace keeps of years of tests.
 - `plot` draws, `export` hands over to pandas, ArviZ, CSV, netCDF; of a value by itself, its
   `summary()`, `to_dataframe()`, `to_arviz()` do.
 - The nouns that flow between the steps are frozen dataclasses: `Recording`, `FrequencyResponse`,
-  `Identification`, `ModalTest`, `Mode`, `AddedMass`, `Posterior`, `Selection`, `Diagnosis`.
+  `Identification`, `ModalTest`, `Mode`, `AddedMass`, `Posterior`, `Selection`, `Diagnosis`,
+  `GapCheck`.
 - What goes wrong on purpose is a `ShmError`, which says what to do (`shm.errors` has the tree).
 
 SI units throughout (N, m, kg, s, Hz), temperatures in deg C, unknown numbers NaN. The same seed
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
     from shm import notebook as notebook
     from shm import plot as plot
     from shm.api import Store as Store
+    from shm.api import check_gap as check_gap
     from shm.api import diagnose as diagnose
     from shm.api import diagnose_simulator as diagnose_simulator
     from shm.api import identify as identify
@@ -63,6 +66,7 @@ if TYPE_CHECKING:
     from shm.values import AddedMass as AddedMass
     from shm.values import Diagnosis as Diagnosis
     from shm.values import FrequencyResponse as FrequencyResponse
+    from shm.values import GapCheck as GapCheck
     from shm.values import Hanger as Hanger
     from shm.values import ModalTest as ModalTest
     from shm.values import Mode as Mode
@@ -75,16 +79,16 @@ __version__ = "1.0.0"
 _STEPS_AND_PACKAGES = ("identify", "read", "simulate")
 _HOMES = {
     "shm.api": (
-        "Store", "diagnose", "diagnose_simulator", "load_hanger", "load_modes", "round_bar",
-        "select", "update",
+        "Store", "check_gap", "diagnose", "diagnose_simulator", "load_hanger", "load_modes",
+        "round_bar", "select", "update",
     ),
     "shm.errors": ("ShmError",),
     "shm.gap.simulator_problem": ("Prior", "Reading", "Simulator", "SimulatorEffect"),
     "shm.identify": ("Identification",),
     "shm.simulate": ("PlantedEffect",),
     "shm.values": (
-        "AddedMass", "Diagnosis", "FrequencyResponse", "Hanger", "ModalTest", "Mode", "Posterior",
-        "Recording", "Selection",
+        "AddedMass", "Diagnosis", "FrequencyResponse", "GapCheck", "Hanger", "ModalTest", "Mode",
+        "Posterior", "Recording", "Selection",
     ),
 }  # fmt: skip
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

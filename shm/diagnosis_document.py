@@ -1,6 +1,7 @@
 """The JSON document of a gap diagnosis (`shm.diagnosis/1`), there and back.
 
-And that of a joint diagnosis of several hangers (`shm.bridge_diagnosis/1`), which holds theirs.
+And that of a joint diagnosis of several hangers (`shm.bridge_diagnosis/1`), which holds theirs,
+and that of a check of what a diagnosis would find (`shm.gap_check/1`).
 
 As all documents it holds NaN until `shm.documents.dump` writes null; reading takes either.
 """
@@ -17,6 +18,7 @@ from shm.values import NAN, BridgeDiagnosis, Cause, Diagnosis, GapVerdict
 
 DIAGNOSIS_SCHEMA = "shm.diagnosis/1"
 BRIDGE_DIAGNOSIS_SCHEMA = "shm.bridge_diagnosis/1"
+GAP_CHECK_SCHEMA = "shm.gap_check/1"
 
 _PLAIN = (
     "hanger", "baseline", "no_gap_probability", "unexplained_probability", "fit_p_value",

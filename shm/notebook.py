@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from shm.report.formatting import Interval
-    from shm.values import Diagnosis, Hanger, ModalTest, Posterior, Selection
+    from shm.values import Diagnosis, GapCheck, Hanger, ModalTest, Posterior, Selection
 
 _CAUSES_SHOWN = 5  # technical: rows of a cell's table
 _WIDTH = 88  # technical: characters of a line in a notebook's cell
@@ -74,7 +74,7 @@ class Sheet:
 
 
 def sheet(value: Any) -> Sheet:
-    """That of a hanger, modal test, posterior, selection or diagnosis."""
+    """That of a hanger, modal test, posterior, selection, diagnosis or check."""
     return _SHEETS[type(value).__name__](value)
 
 
@@ -200,6 +200,15 @@ def _diagnosis(diagnosis: Diagnosis) -> Sheet:
     return Sheet(title, ("cause", "probability"), rows, (*paragraphs, *diagnosis.remarks))
 
 
+def _gap_check(check: GapCheck) -> Sheet:
+    """Show the effects with the sizes from which on they are found."""
+    from shm.report.gap_check_report import HEADINGS, check_text, introduction, rows
+
+    whose = "" if check.hanger is None else f" of hanger {check.hanger}"
+    title = f"What a diagnosis{whose} would find"
+    return Sheet(title, HEADINGS, rows(check), tuple(check_text(check)), (introduction(check),))
+
+
 def figure_png(figure: Figure) -> bytes:
     """A picture of a figure, also of one that pyplot does not know."""
     buffer = io.BytesIO()
@@ -225,6 +234,7 @@ def _interval_row(name: str, interval: Interval, best: float, meaning: str) -> t
 
 _SHEETS: dict[str, Callable[[Any], Sheet]] = {
     "Diagnosis": _diagnosis,
+    "GapCheck": _gap_check,
     "Hanger": _hanger,
     "ModalTest": _modal_test,
     "Posterior": _posterior,

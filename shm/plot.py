@@ -18,6 +18,7 @@ from shm.errors import NothingThere, UsageError
 from shm.identify import Identification
 from shm.report.contents import DiagnosisSheet, HangerReport, ModalTestReport, TrendRow, trend_row
 from shm.report.figures.gap_causes import FIGURE as CAUSES
+from shm.report.figures.gap_check import FIGURE as CHECK
 from shm.report.figures.gap_map import FIGURE as GAP_MAP
 from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
 from shm.report.figures.hanger_stiffness import FIGURE as STIFFNESS
@@ -28,7 +29,7 @@ from shm.report.figures.modal_test_response import FIGURE as RESPONSE
 from shm.report.figures.modal_test_response import Shown
 from shm.report.figures.parameter_pairs import FIGURE as PAIRS
 from shm.report.figures.specification import Member
-from shm.values import Diagnosis, Hanger, ModalTest, Posterior
+from shm.values import Diagnosis, GapCheck, Hanger, ModalTest, Posterior
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,6 +39,7 @@ __all__ = [
     "frequencies",
     "frequency_response",
     "gap",
+    "gap_check",
     "pairs",
     "shapes",
     "stabilisation",
@@ -160,6 +162,15 @@ def causes(diagnosis: Diagnosis, hanger: Hanger) -> Figure:
         >>> figure = shm.plot.causes(shm.diagnose(tests, hanger), hanger)
     """
     return _drawn(CAUSES, DiagnosisSheet(diagnosis, hanger))
+
+
+def gap_check(check: GapCheck) -> Figure:
+    """Draw from which size on a diagnosis would find each effect.
+
+    Example:
+        >>> figure = shm.plot.gap_check(shm.check_gap(tests, hanger, effects=["point_mass"]))
+    """
+    return _drawn(CHECK, check)
 
 
 def _drawn(member: Member[Data], data: Data) -> Figure:

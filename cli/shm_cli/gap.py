@@ -49,6 +49,7 @@ from shm_cli.common import (
     write_pictures,
 )
 from shm_cli.effects import effects
+from shm_cli.gap_check import check
 
 _baseline = click.option(
     "--baseline",
@@ -235,7 +236,7 @@ def diagnose(
     _show(diagnosis_paper(sheet), diagnosis_json(sheet), draw, html, figures)
 
 
-for _verb in (adopt, adopted, drop, effects):
+for _verb in (adopt, adopted, check, drop, effects):
     command.add_command(_verb)
 
 

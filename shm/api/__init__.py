@@ -23,6 +23,8 @@ from shm.errors import BadInput, UsageError
 from shm.gap import GapOptions, Progress
 from shm.gap import diagnose as diagnosed
 from shm.gap.any_simulator import diagnose_simulator
+from shm.gap.check import CheckOptions
+from shm.gap.check import check_gap as checked
 from shm.identify import Identification, IdentifyOptions
 from shm.identify.identification import identify as identified
 from shm.inference import UpdateOptions, updating
@@ -46,6 +48,7 @@ from shm.values import (
     AddedMass,
     Diagnosis,
     FrequencyResponse,
+    GapCheck,
     Hanger,
     ModalTest,
     Posterior,
@@ -54,8 +57,8 @@ from shm.values import (
 )
 
 __all__ = [
-    "Store", "diagnose", "diagnose_simulator", "identify", "load_hanger", "load_modes", "read",
-    "round_bar", "select", "simulate", "update",
+    "Store", "check_gap", "diagnose", "diagnose_simulator", "identify", "load_hanger",
+    "load_modes", "read", "round_bar", "select", "simulate", "update",
 ]  # fmt: skip
 
 
@@ -345,6 +348,35 @@ def diagnose(
     """
     options = GapOptions(baseline, tuple(without), tuple(hold_out), draws, seed)
     return diagnosed(modal_tests(tests), hanger, options, progress)
+
+
+def check_gap(
+    tests: Tests,
+    hanger: Hanger,
+    baseline: str = _OF_GAP.baseline,
+    *,
+    effects: Sequence[str] = (),
+    seeds: int = 1,
+    sound: int = 5,
+    seed: int = 1,
+    progress: Progress = silent,
+) -> GapCheck:
+    """Return which effects `diagnose` would find on a hanger with these tests, and from which size.
+
+    Each of `effects` (all of the catalogue if empty) is planted in a simulated twin of the hanger
+    with the modes, sensors, errors and conditions of `tests`, and diagnosed: two or three sizes for
+    each of `seeds`, 5 to 30 s each. Without `tests`, `()`, the twin is the description with a usual
+    hammer test. `sound` twins have no effect: `GapCheck.false_gaps` counts gaps that are claimed in
+    them. `shm gap check` does the same on all processors. Raises BadInput where the tests cannot be
+    used, UsageError for a model class or an effect that is not there.
+
+    Example:
+        >>> check = shm.check_gap(tests, hanger, effects=["point_mass"])
+        >>> check.effects[0].size, check.effects[0].unit
+        (3.5, 'kg')
+    """
+    options = CheckOptions(tuple(effects), baseline, seeds, sound, seed=seed)
+    return checked(modal_tests(tests), hanger, options, progress)
 
 
 def simulate(

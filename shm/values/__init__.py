@@ -51,6 +51,12 @@ from shm.values.drift import (
     is_ratio,
     kind_of,
 )
+from shm.values.gap_check import (
+    EffectCheck,
+    GapCheck,
+    GapTrial,
+    PlantedParameter,
+)
 from shm.values.hanger import (
     EffectPrior,
     EndKind,

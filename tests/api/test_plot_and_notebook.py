@@ -20,6 +20,7 @@ from shm.inference import UpdateOptions
 from shm.models import build
 from tests.helpers import quick_update
 from tests.helpers.diagnoses import a_diagnosis
+from tests.helpers.gap_checks import a_check
 
 UNITS = {
     "tension": "tension (kN)",
@@ -32,6 +33,7 @@ UNITS = {
     "stiffness": "log10 of stiffness in N m/rad",
     "gap": "order of the mode",
     "causes": "probability",
+    "gap_check": "size, from the weakest to the strongest of its prior range",
 }
 
 
@@ -55,6 +57,7 @@ def drawn(
         "stiffness": shm.plot.stiffness([sprung], [dated], hanger),
         "gap": shm.plot.gap(a_diagnosis(), hanger),
         "causes": shm.plot.causes(a_diagnosis(), hanger),
+        "gap_check": shm.plot.gap_check(a_check()),
     }
 
 
@@ -134,7 +137,7 @@ def test_a_notebook_shows_values(
     hanger: shm.Hanger, posterior: shm.Posterior, test_of_711_kn: shm.ModalTest
 ) -> None:
     choice = shm.Selection((posterior,), (1.0,))
-    for value in (hanger, posterior, choice, test_of_711_kn, a_diagnosis()):
+    for value in (hanger, posterior, choice, test_of_711_kn, a_diagnosis(), a_check()):
         html = value._repr_html_()
         assert re.search(r"<caption>.*hanger 3", html, re.IGNORECASE)
         assert not re.search(r"\bnan\b|None|\binf\b", html)

@@ -31,6 +31,8 @@ SIGNATURES = {
     "priors='description', progress, sampler='importance', calibrated_by=(), class_priors=None)",
     "diagnose": "(tests, hanger, baseline='beam1', *, without=(), hold_out=(), draws=1000, seed=1, "
     "progress)",
+    "check_gap": "(tests, hanger, baseline='beam1', *, effects=(), seeds=1, sound=5, seed=1, "
+    "progress)",
     "diagnose_simulator": "(simulator, readings, *, candidates=(), seed=1)",
     "simulate": "(hanger, *, tension_n=None, k1_n_m_rad=inf, k2_n_m_rad=inf, k3_n_m_rad=inf, "
     "k4_n_m_rad=inf, damping_ratio=0.001, hits=5, seconds_per_hit=20.0, sampling_rate_hz=512.0, "
@@ -47,6 +49,7 @@ SIGNATURES = {
     "plot.shapes": "(test, hanger)",
     "plot.gap": "(diagnosis, hanger)",
     "plot.causes": "(diagnosis, hanger)",
+    "plot.gap_check": "(check)",
     "export.causes": "(diagnosis)",
     "export.inference_data": "(posterior, tests=(), hanger=None)",
     "export.samples": "(posterior)",
@@ -56,9 +59,9 @@ SIGNATURES = {
     "export.check_format": "(path, format=None)",
 }
 NOUNS = {
-    "AddedMass", "Diagnosis", "FrequencyResponse", "Hanger", "Identification", "ModalTest", "Mode",
-    "PlantedEffect", "Posterior", "Prior", "Reading", "Recording", "Selection", "ShmError",
-    "Simulator", "SimulatorEffect",
+    "AddedMass", "Diagnosis", "FrequencyResponse", "GapCheck", "Hanger", "Identification",
+    "ModalTest", "Mode", "PlantedEffect", "Posterior", "Prior", "Reading", "Recording", "Selection",
+    "ShmError", "Simulator", "SimulatorEffect",
 }  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from shm.report.figures.along_the_bridge import SHIFTS, TENSIONS
 from shm.report.figures.gap_before_and_after import BEFORE_AND_AFTER, GAP_TENSION
 from shm.report.figures.gap_causes import FIGURE as CAUSES
 from shm.report.figures.gap_causes import SHARED
+from shm.report.figures.gap_check import FIGURE as CHECK
 from shm.report.figures.gap_map import FIGURE as GAP_MAP
 from shm.report.figures.hanger_frequencies import FIGURE as FREQUENCIES
 from shm.report.figures.hanger_frequencies import RESPONSE as RESPONSE_OF_LATEST
@@ -22,7 +23,7 @@ from shm.report.figures.modal_test_response import FIGURE as RESPONSE
 from shm.report.figures.modal_test_response import Shown
 from shm.report.figures.modal_test_time_history import FIGURE as TIME_HISTORY
 from shm.report.figures.specification import Illustration, Member, drawn
-from shm.values import BridgeDiagnosis
+from shm.values import BridgeDiagnosis, GapCheck
 
 OF_HANGER: tuple[Member[HangerReport], ...] = (
     TREND, STATES, TENSION, FREQUENCIES, RESPONSE_OF_LATEST, STIFFNESS
@@ -32,6 +33,7 @@ OF_MODAL_TEST: tuple[Member[Shown], ...] = (
 )  # fmt: skip
 OF_DIAGNOSIS: tuple[Member[DiagnosisSheet], ...] = (CAUSES, GAP_MAP, BEFORE_AND_AFTER, GAP_TENSION)
 OF_BRIDGE_DIAGNOSIS: tuple[Member[BridgeDiagnosis], ...] = (SHARED,)
+OF_GAP_CHECK: tuple[Member[GapCheck], ...] = (CHECK,)
 OF_HANGER_NAMES = frozenset(each.name for each in OF_HANGER)
 
 
@@ -61,3 +63,8 @@ def diagnosis_figures(sheet: DiagnosisSheet) -> tuple[Illustration, ...]:
 def bridge_diagnosis_figures(diagnosis: BridgeDiagnosis) -> tuple[Illustration, ...]:
     """Those of a joint diagnosis."""
     return drawn(OF_BRIDGE_DIAGNOSIS, diagnosis)
+
+
+def gap_check_figures(check: GapCheck) -> tuple[Illustration, ...]:
+    """Draw those of a check of what a diagnosis would find."""
+    return drawn(OF_GAP_CHECK, check)

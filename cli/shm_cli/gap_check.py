@@ -1,0 +1,207 @@
+"""`shm gap check`: what a diagnosis would find on a hanger with its sensors."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from pathlib import Path
+
+import rich_click as click
+from rich.text import Text
+
+from shm.diagnosis_document import gap_check_document
+from shm.errors import BadInput, NothingThere
+from shm.gap.check import Check, CheckOptions
+from shm.report.figures.every_figure import gap_check_figures
+from shm.report.gap_check_report import HEADINGS, check_text, introduction, rows
+from shm.values import GapCheck, Hanger, ModalTest
+from shm_cli import completion, flags
+from shm_cli.common import (
+    advancing_bar,
+    drawing,
+    one_hanger,
+    opened_store,
+    paragraph,
+    show,
+    show_table,
+    table,
+    tests_and_hanger,
+)
+
+_PICTURES = (".svg", ".png")
+
+
+@click.command()
+@click.argument("file", metavar="[MODES.json]", required=False, type=flags.FILE)
+@flags.hanger()
+@flags.hanger_file
+@click.option(
+    "--effects",
+    metavar="A,B",
+    shell_complete=completion.effects,
+    help="Plant these alone.  [default: all of the catalogue]",
+)
+@click.option(
+    "--baseline",
+    metavar="NAME",
+    default=CheckOptions().baseline,
+    show_default=True,
+    shell_complete=completion.models,
+    help="The model class of the twin, whose gap is diagnosed.",
+)
+@click.option(
+    "--seeds",
+    type=click.IntRange(1, 50),
+    default=CheckOptions().seeds,
+    show_default=True,
+    help="Searches an effect, each at another place with other errors.",
+)
+@click.option(
+    "--sound",
+    type=click.IntRange(0, 1000),
+    default=CheckOptions().sound,
+    show_default=True,
+    metavar="N",
+    help="Twins without an effect.",
+)
+@click.option(
+    "--processes",
+    type=click.IntRange(1, 64),
+    default=lambda: len(os.sched_getaffinity(0)),
+    show_default="one a processor",
+    metavar="N",
+    help="Diagnoses that run at the same time.",
+)
+@click.option(
+    "--tests",
+    "count",
+    type=click.IntRange(1, 100),
+    default=20,
+    metavar="N",
+    help="How many of the latest tests of a hanger of the workspace.",
+)
+@flags.seed
+@click.option(
+    "--figure", type=flags.NewFile(), metavar="FILE", help="Draw the result here, .svg or .png."
+)
+@flags.json
+@click.pass_context
+def check(
+    ctx: click.Context,
+    file: Path | None,
+    hanger_id: int | None,
+    hanger_file: Path | None,
+    effects: str | None,
+    baseline: str,
+    seeds: int,
+    sound: int,
+    processes: int,
+    count: int,
+    seed: int,
+    figure: Path | None,
+) -> None:
+    """Say what a diagnosis would find on this hanger with these sensors, and from which size on.
+
+    Each effect is planted in a simulated twin of the hanger, with its modes, sensors, errors and
+    conditions, and diagnosed. Of MODES.json with --hanger-file, of the latest tests of a hanger of
+    the workspace, or, where there is no test, of a usual hammer test. Ctrl-C prints what is done.
+
+    \b
+    Example: shm gap check --hanger 3
+    Example: shm gap check hanger3.modes.json --hanger-file H.toml --effects point_mass,timebase
+    """
+    if figure is not None and figure.suffix.lower() not in _PICTURES:
+        raise BadInput(
+            f"{figure} is no name of a picture.", remedy="Let it end in .svg or in .png."
+        )
+    tests, hanger = _measured(ctx, file, hanger_file, hanger_id, count)
+    chosen = tuple(name.strip() for name in effects.split(",")) if effects else ()
+    options = CheckOptions(chosen, baseline, seeds, sound, seed=seed, lanes=processes)
+    job = Check(tests, hanger, options)
+    click.echo(_expected(job, processes), err=True)
+    found = _run(job, processes)
+    if flags.wants_json():
+        show(gap_check_document(found))
+    else:
+        _print(found)
+    if figure is not None:
+        if not found.effects:
+            raise NothingThere(f"no effect was checked: {figure} is not drawn.")
+        with drawing():
+            for each in gap_check_figures(found):
+                each.figure.savefig(figure, facecolor="white")
+    if not found.is_complete:
+        ctx.exit(130)  # as a shell reports Ctrl-C
+
+
+def _measured(
+    ctx: click.Context,
+    file: Path | None,
+    hanger_file: Path | None,
+    hanger_id: int | None,
+    count: int,
+) -> tuple[Sequence[ModalTest], Hanger]:
+    """Return the tests and their hanger; no test where none is given or stored."""
+    if file is not None:
+        return tests_and_hanger(ctx, file, hanger_file, hanger_id)
+    hanger = one_hanger(ctx, hanger_file, hanger_id)
+    if hanger_file is not None:
+        return (), hanger
+    with opened_store(ctx) as (_, store):
+        return [each.test for each in store.tests.list_all(hanger.id)[-count:]], hanger
+
+
+def _expected(job: Check, processes: int) -> str:
+    """Return how long it takes, before it begins."""
+    effects = len(job.effects) * job.options.seeds
+    diagnoses = round(2.5 * effects) + job.options.sound  # two or three a search of four sizes
+    least, most = (math.ceil(diagnoses * each / processes / 60) for each in (5, 30))
+    return (
+        f"About {diagnoses} diagnoses of 5 to 30 s each, {processes} at a time: {least} to {most} "
+        "minutes. Ctrl-C prints what is done."
+    )
+
+
+def _run(job: Check, processes: int) -> GapCheck:
+    """Return what was found until the end or Ctrl-C."""
+    done = []
+    try:
+        with advancing_bar() as progress, _executor(min(processes, len(job.searches))) as executor:
+            for search in job.searched(progress, executor):
+                done.append(search)
+    except KeyboardInterrupt:
+        if not done:
+            raise
+    return job.summarise(done)
+
+
+@contextmanager
+def _executor(processes: int) -> Iterator[Executor | None]:
+    """Yield processes of our own; None for one."""
+    if processes == 1:
+        yield None
+        return
+    from shm_daemon.execution import children_ended, process_pool
+
+    with children_ended():
+        pool = process_pool(processes)
+        try:
+            yield pool
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _print(found: GapCheck) -> None:
+    click.echo(paragraph(introduction(found)))
+    if found.effects:
+        made = table("What a diagnosis would find", *HEADINGS)
+        for column in made.columns:
+            column.justify = "left"
+        for row in rows(found):
+            made.add_row(*map(Text, row))
+        show_table(made)
+    for line in check_text(found):
+        click.echo(paragraph(line))
