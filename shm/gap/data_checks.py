@@ -16,10 +16,8 @@ from dataclasses import replace
 
 from shm.errors import BadInput
 from shm.gap.observations import told_of_rounding
-from shm.inference import UpdateOptions, select
 from shm.inference.data_checks import CheckedData, check_data, mode_name
-from shm.models import applicable, build
-from shm.values import FEW_MODES, FloatArray, Hanger, ModalTest
+from shm.values import FEW_MODES, Hanger, ModalTest
 from shm.values.modes import MOST_SLOPE
 
 SURE_COMMON_SDS = 3.0  # judgement: by chance one test in 370

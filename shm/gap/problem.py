@@ -29,7 +29,7 @@ from shm.models.beam import Beam3
 from shm.models.effects import Conditions, Variant, parameters_of
 from shm.models.hanger import HangerModes
 from shm.models.hanger_with_effects import HangerWithEffects
-from shm.values import BoolArray, FloatArray, Hanger, IntArray, ModalTest
+from shm.values import BoolArray, FloatArray, IntArray, ModalTest
 
 Effects = tuple[tuple[str, Variant], ...]
 

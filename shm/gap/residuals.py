@@ -11,7 +11,6 @@ standard deviations. Given what the best explanation leaves, each has a normal p
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import scipy

@@ -26,7 +26,7 @@ from shm.gap.posterior import (
 )
 from shm.gap.probabilities import ScoredHypothesis, log_prior
 from shm.gap.problem import GapProblem
-from shm.gap.scan import Scan, scan, scan_beside
+from shm.gap.scan import scan, scan_beside
 from shm.inference.options import Progress, silent
 from shm.models.effects import EFFECTS
 from shm.values import ENOUGH_EFFECTIVE, FloatArray
@@ -34,7 +34,8 @@ from shm.values import ENOUGH_EFFECTIVE, FloatArray
 ALONE = Hypothesis()
 
 HOPELESS, HOPELESS_SHARE = 4.0, 0.4
-"""Log of prior times evidence behind the best, or a share of the gap, from which on nothing is tried further: a
+"""Log of prior times evidence behind the best, or a share of the gap, from which on nothing is tried
+further: a
 scan is linear, large gaps are not."""
 LEADERS = 3
 """Effects that are tried in pairs, and with something unknown beside."""
