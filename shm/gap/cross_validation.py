@@ -81,11 +81,9 @@ def check_hold_out(problem: GapProblem, hold_out: tuple[str, ...]) -> None:
 
 def shrinkage(problem: GapProblem, before: Fit, after: Fit | None, held: HeldOut) -> Shrinkage:
     """Root mean squares in percent; NaN for what there is not."""
-    frequencies = problem.observations.design.frequencies
-    value = problem.observations.value[:frequencies]
     return Shrinkage(
-        _rms_percent(value - before.predicted[:frequencies]),
-        NAN if after is None else _rms_percent(value - after.predicted[:frequencies]),
+        _rms_percent(problem.left(before)),
+        NAN if after is None else _rms_percent(problem.left(after)),
         _rms_percent(held.before),
         _rms_percent(held.after),
     )
@@ -94,7 +92,14 @@ def shrinkage(problem: GapProblem, before: Fit, after: Fit | None, held: HeldOut
 def _residuals(problem: GapProblem, fit: Fit, folds: BoolArray) -> FloatArray:
     frequencies = problem.observations.design.frequencies
     predicted = refitted(problem, fit, ~folds)[:, :frequencies]
-    return np.where(folds, problem.observations.value[:frequencies] - predicted, NAN)
+    residual = problem.observations.value[:frequencies] - predicted
+    left = np.full_like(residual, NAN)
+    for fold, out in enumerate(folds):
+        # What repeats in all frequencies is known by those that are kept.
+        kept = fit.noise.frequency[np.ix_(~out, ~out)]
+        across = problem.repeated.frequency[np.ix_(out, ~out)]
+        left[fold, out] = residual[fold, out] - across @ np.linalg.solve(kept, residual[fold, ~out])
+    return left
 
 
 def _named(design: Design, names: tuple[str, ...]) -> BoolArray:
