@@ -9,13 +9,12 @@ import pytest
 
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.experiment_design import like_the_present, measured_already, proposals, with_sensors
-from shm.gap.fit import fitted
-from shm.gap.next_measurement import NO_GAP, Errors, Foresight, divergence, foreseen, ranked
-from shm.gap.observations import observed
-from shm.gap.problem import GapProblem
+from shm.gap.foresight import Errors, Foresight, divergence, foreseen
+from shm.gap.next_measurement import NO_GAP, ranked
 from shm.models.effects import EFFECTS, Conditions, Variant
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import AddedMass
+from tests.helpers.gap_fits import fit_hypothesis, make_problem
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension
 from tests.worlds.simulated.campaign import CampaignPlan
@@ -198,13 +197,13 @@ def asked(effect, others, at="everywhere"):
     plan = CampaignPlan(temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, shapes=False)
     rng = np.random.default_rng(1)
     tests = simulated(HANGER_3, HangerState(711e3), (effect,), plan, rng)
-    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    problem = make_problem(tests, HANGER_3)
     survey = problem.observations.design.survey
     fits = []
     for name in (effect.name, *others):
         variants = EFFECTS[name].variants(HANGER_3, survey)
         variant = next(each for each in variants if each.at == at)
-        fits.append(fitted(problem, Hypothesis(((name, variant),)), rng))
+        fits.append(fit_hypothesis(problem, Hypothesis(((name, variant),))))
     return ranked(problem, fits)
 
 
