@@ -6,14 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.gap.contract import Fit, GapOptions, Hypothesis
+from shm.gap.contract import Fit, Hypothesis
+from shm.gap.linear import Linear
 from shm.gap.observations import observed
 from shm.gap.posterior import Target, approximate, find_peaks
 from shm.gap.problem import GapProblem
-from shm.gap.search import Search, fit_alone
+from shm.gap.scan import scan
+from shm.gap.search import fit_alone
 from shm.models import MODELS, AsMade
 from shm.values import Hanger, ModalTest
-from tests.helpers.effects import all_but
 
 
 def make_problem(tests: Sequence[ModalTest], hanger: Hanger, baseline: str = "beam1") -> GapProblem:
@@ -23,10 +24,10 @@ def make_problem(tests: Sequence[ModalTest], hanger: Hanger, baseline: str = "be
 def fit_hypothesis(problem: GapProblem, hypothesis: Hypothesis, draws: int = 100) -> Fit:
     """Fit the baseline, or one effect by normal distributions on its peaks."""
     rng = np.random.default_rng(1)
+    baseline = fit_alone(problem, rng, draws)
     if not hypothesis.effects:
-        return fit_alone(problem, rng, draws)
-    without = all_but(*hypothesis.names)
-    search = Search(problem, GapOptions(without=without, draws=draws), rng)
-    starts = search.scans[hypothesis].starts(problem, search.baseline)
+        return baseline
+    linear = Linear(problem.likelihood(Hypothesis()), baseline.slopes)
+    starts = scan(problem, baseline, linear, hypothesis).starts(problem, baseline)
     target = Target(problem, hypothesis)
     return approximate(target, find_peaks(target, starts), draws, rng, 0.0)
