@@ -9,7 +9,7 @@ the true one would get ahead of all others together.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -72,36 +72,31 @@ def planned(
     steps: list[PlannedMeasurement] = []
     chosen: list[int] = []
     log_odds, probability = race.expected(chosen)
-    left = budget_hours
     while probability < ENOUGH and len(steps) < _MOST_STEPS:
+        left = budget_hours - sum(step.hours for step in steps)
         costs = {k: hours[each.kind] for k, each in enumerate(race.offered) if k not in chosen}
-        tried = {k: race.expected([*chosen, k]) for k, cost in costs.items() if cost <= left}
-        gains = {k: own - log_odds for k, (own, _) in tried.items() if own - log_odds >= _WORTH_IT}
+        gains = race.gains(chosen, [k for k, cost in costs.items() if cost <= left])
         if not gains:
             break
         best = max(gains, key=lambda k: gains[k] / costs[k])
-        log_odds, probability = tried[best]
-        offered, left = race.offered[best], left - costs[best]
         chosen.append(best)
-        steps.append(
-            PlannedMeasurement(
-                offered.what, offered.kind, costs[best], gains[best], log_odds, probability
-            )
-        )
+        log_odds, probability = race.expected(chosen)
+        what, kind = race.offered[best].what, race.offered[best].kind
+        step = PlannedMeasurement(what, kind, costs[best], gains[best], log_odds, probability)
+        steps.append(step)
     return tuple(steps)
 
 
 def nothing_planned(race: Race, hours: Mapping[str, float], budget_hours: float) -> str:
     """Return in words why a plan holds nothing."""
-    log_odds, probability = race.expected([])
+    _, probability = race.expected([])
     if probability >= ENOUGH:
         return (
             f"These data are enough: whichever explanation is true, it is expected to have "
             f"{probability:.2f} already. What `shm gap diagnose` lists to measure next tells it "
             "from others that are unlikely as it is."
         )
-    gains = [race.expected([k])[0] - log_odds for k in range(len(race.offered))]
-    able = [each for each, gain in zip(race.offered, gains, strict=True) if gain >= _WORTH_IT]
+    able = [race.offered[k] for k in race.gains([], range(len(race.offered)))]
     if not able:
         return "No measurement promises to tell the explanations further apart."
     cheapest = min(able, key=lambda each: hours[each.kind])
@@ -224,6 +219,12 @@ class Race:
             [log_odds_of(own).mean(axis=1), own.mean(axis=1)], axis=1, weights=weight
         )
         return float(means[0]), float(means[1])
+
+    def gains(self, chosen: Sequence[int], further: Iterable[int]) -> dict[int, float]:
+        """Return the log odds that each `further` measurement promises, if it is worth the work."""
+        now, _ = self.expected(chosen)
+        found = {k: self.expected([*chosen, k])[0] - now for k in further}
+        return {k: gain for k, gain in found.items() if gain >= _WORTH_IT}
 
     @property
     def _holds(self) -> FloatArray:

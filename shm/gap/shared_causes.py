@@ -97,26 +97,23 @@ _LIKENESSES: dict[str, Callable[[HangerEvidence], Hashable | None]] = {
 
 @dataclass(frozen=True, eq=False)
 class OwnCauses:
-    """The likelihoods of each hanger having nothing of its own, and something: (n, q) both."""
+    """The likelihoods of each hanger having nothing of its own, and something: (n, q) both.
+
+    `log` (n, q) is that of either, `log_evidence` that of all hangers together.
+    """
 
     nothing: FloatArray
     something: FloatArray
+    log: FloatArray
+    log_evidence: float
 
     @classmethod
     def of(cls, hangers: Sequence[HangerEvidence]) -> OwnCauses:
-        none = np.array([[each.no_gap] for each in hangers])
-        gap = np.array([[each.gap] for each in hangers])
-        return cls(_NOTHING_OWN * none, (1 - _NOTHING_OWN) * gap)
-
-    @property
-    def log(self) -> FloatArray:
-        """Return that of either, (n, q)."""
-        return _log(self.nothing + self.something)
-
-    @property
-    def log_evidence(self) -> float:
-        log = self.log.sum(axis=0)
-        return float(scipy.special.logsumexp(log) - np.log(len(log)))
+        nothing = _NOTHING_OWN * np.array([[each.no_gap] for each in hangers])
+        something = (1 - _NOTHING_OWN) * np.array([[each.gap] for each in hangers])
+        log = _log(nothing + something)
+        together = scipy.special.logsumexp(log.sum(axis=0)) - np.log(len(_NOTHING_OWN))
+        return cls(nothing, something, log, float(together))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +140,8 @@ class SizeGrid:
         known = [each.sizes for each in found if each is not None]
         if len(known) < LEAST:
             return None
-        lower = min(each.lower for each in known) - BELOW
-        line = np.arange(lower, max(each.upper for each in known) + STEP, STEP)
+        lower, upper = np.transpose([each.ends for each in known])
+        line = np.arange(lower.min() - BELOW, upper.max() + STEP, STEP)
         signs = known[0].signs
         x, sign = np.tile(line, len(signs)), np.repeat(signs, len(line))
         away = (x[:, None, None] - x[:, None]) / SCATTERS
@@ -167,7 +164,7 @@ def _likelihoods(
         np.tensordot(np.bincount(at[rows], evidence.weight[rows], len(x)), normal, axes=1)
         for rows in (evidence.visible, ~evidence.visible)
     )
-    lower = evidence.sizes.lower
+    lower, _ = evidence.sizes.ends
     lowest = evidence.x[~evidence.visible].min(initial=lower + STEP / 2) - STEP / 2
     small, smaller = (
         scipy.special.ndtr((edge - x[:, None]) / SCATTERS) for edge in (lower, lowest)

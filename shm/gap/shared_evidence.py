@@ -50,13 +50,20 @@ class Sizes:
 
     def x(self, value: FloatArray) -> FloatArray:
         """Return x of values (n,) in their units, whatever their signs."""
-        plain = np.log10(np.abs(value)) if self._is_logarithmic else value / self._unit
-        return np.asarray(self._direction * plain)
+        parameter = self.parameter
+        if parameter.spread == "logarithmic":
+            value = np.log10(np.abs(value))
+        elif not scale_free(parameter):
+            value = value / (parameter.upper - parameter.lower)
+        return np.asarray(-value if parameter.zero > parameter.upper else value)
 
     def value(self, x: FloatArray) -> FloatArray:
         """Return the values (n,) of x, without a sign."""
-        plain = self._direction * x
-        return np.asarray(10.0**plain if self._is_logarithmic else plain * self._unit)
+        parameter = self.parameter
+        x = -x if parameter.zero > parameter.upper else x
+        if parameter.spread == "logarithmic":
+            return np.asarray(10.0**x)
+        return x if scale_free(parameter) else x * (parameter.upper - parameter.lower)
 
     def sign(self, value: FloatArray) -> FloatArray:
         """Return the signs (n,) of values; 1 of a parameter that has none."""
@@ -67,28 +74,10 @@ class Sizes:
         return np.array([1.0, -1.0] if self.parameter.signed else [1.0])
 
     @property
-    def lower(self) -> float:
-        return float(self._ends.min())
-
-    @property
-    def upper(self) -> float:
-        return float(self._ends.max())
-
-    @property
-    def _ends(self) -> FloatArray:
-        return self.x(np.array([self.parameter.lower, self.parameter.upper]))
-
-    @property
-    def _is_logarithmic(self) -> bool:
-        return self.parameter.spread == "logarithmic"
-
-    @property
-    def _direction(self) -> float:
-        return -1.0 if self.parameter.zero > self.parameter.upper else 1.0
-
-    @property
-    def _unit(self) -> float:
-        return 1.0 if scale_free(self.parameter) else self.parameter.upper - self.parameter.lower
+    def ends(self) -> tuple[float, float]:
+        """Return the least and the largest x."""
+        x = self.x(np.array([self.parameter.lower, self.parameter.upper]))
+        return float(x.min()), float(x.max())
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +164,7 @@ def _effects(
             visible = _of_scan(scan, sizes, tension_n, rng)
         small, ratio = _too_small_to_see(search, scan, sizes, log_nothing, rng)
         factor = _bayes_factor(search, effect, held, any(_is_pair(each) for _, each in tried))
-        span = factor * (sizes.upper - sizes.lower) * len(sizes.signs)
+        span = factor * np.ptp(sizes.ends) * len(sizes.signs)
         x, sign, tensions = np.hstack([visible, small])
         yield (
             (effect[0], effect[1].at),
@@ -250,7 +239,7 @@ def _of_scan(
     spacing = np.ptp(sizes.x(value)) * len(sizes.signs) / len(value)
     x = sizes.x(value[rows]) + spacing * (rng.random(_DRAWS) - 0.5)
     tensions = rng.choice(tension_n, _DRAWS)
-    return np.array([x.clip(sizes.lower, sizes.upper), sizes.sign(value[rows]), tensions])
+    return np.array([x.clip(*sizes.ends), sizes.sign(value[rows]), tensions])
 
 
 def _too_small_to_see(
@@ -262,8 +251,8 @@ def _too_small_to_see(
     effects are linear; far from all of its points they are those of no effect.
     """
     problem, baseline, every = search.problem, search.baseline, sizes.x(scan.effect[:, 0])
-    rows = np.flatnonzero((every < sizes.lower) & np.isfinite(scan.log))
-    line = sizes.lower - STEP * (np.arange(np.ceil(BELOW / STEP)) + 0.5)
+    rows = np.flatnonzero((every < sizes.ends[0]) & np.isfinite(scan.log))
+    line = sizes.ends[0] - STEP * (np.arange(np.ceil(BELOW / STEP)) + 0.5)
     x, sign = np.tile(line, len(sizes.signs)), np.repeat(sizes.signs, len(line))
     near = np.exp(-(((every[rows] - x[:, None]) / _ABOUT) ** 2) / 2)
     near *= sizes.sign(scan.effect[rows, 0]) == sign[:, None]

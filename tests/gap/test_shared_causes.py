@@ -41,10 +41,10 @@ def evidence(
     Sizes too small to see are likelier than no effect by a log likelihood.
     """
     visible = np.log10(size) + sd * np.random.default_rng(3).standard_normal(400)
-    small = SIZES.lower - np.arange(STEP / 2, BELOW, STEP)
+    small = SIZES.ends[0] - np.arange(STEP / 2, BELOW, STEP)
     x = np.append(visible, small)
     weight = np.append(
-        np.full(400, bayes_factor * (SIZES.upper - SIZES.lower) / 400),
+        np.full(400, bayes_factor * np.ptp(SIZES.ends) / 400),
         np.full(len(small), STEP * np.exp(small_gain)),
     )
     is_visible, tension_n = np.arange(len(x)) < 400, 700e3 * (1 + 10**x)
