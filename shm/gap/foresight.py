@@ -35,23 +35,8 @@ class Foresight:
         return Foresight(self.design, sign * self.mean, np.outer(sign, sign) * self.covariance)
 
 
-@dataclass(frozen=True)
-class Remainder:
-    """What something unknown leaves over: `size` (a fraction), alike over orders as `pattern` says.
-
-    It comes again in every test, or is new in each (`by_test`).
-    """
-
-    size: float
-    pattern: Callable[[Design, Design], FloatArray]
-    by_test: bool
-
-    def between(self, one: Design, other: Design, same: bool) -> FloatArray:
-        """Return its covariance (F of one, F of the other); of the `same` tests or not."""
-        found = self.size**2 * self.pattern(one, other)
-        if not self.by_test:
-            return np.asarray(found)
-        return np.asarray(same * found * (one.frequency_test[:, None] == other.frequency_test))
+Pattern = Callable[[Design, Design], FloatArray]
+"""How alike the frequencies of two designs are (F of one, F of the other), from 0 to 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +45,15 @@ class Errors:
 
     Frequencies err by `repeated` as well, a fraction: the model error, the same for a mode in all
     tests. Explanations that are compared are given the same errors, lest a difference in errors
-    pass for one in prediction. Something unknown leaves a `remainder` beside them.
+    pass for one in prediction. Something unknown adds a `remainder`, a fraction that comes again in
+    every test, alike over orders by `pattern`.
     """
 
     frequency_sd: FloatArray
     shape_sd: float
     repeated: float
-    remainder: Remainder | None = None
+    remainder: float = 0.0
+    pattern: Pattern = same_mode
 
     @classmethod
     def of(cls, problem: GapProblem, fit: Fit) -> Errors:
@@ -79,13 +66,10 @@ class Errors:
             fit.model_error if np.isfinite(known).any() else 0.0,
         )
 
-    def between(self, one: Design, other: Design, *, same: bool) -> FloatArray:
-        """Return the covariance (F of one, F of the other) of what repeats.
-
-        Of the `same` tests or not.
-        """
-        found = self.repeated**2 * same_mode(one, other)
-        return found if self.remainder is None else found + self.remainder.between(one, other, same)
+    def between(self, one: Design, other: Design) -> FloatArray:
+        """Return the covariance (F of one, F of the other) of what repeats."""
+        of_modes = self.repeated**2 * same_mode(one, other)
+        return np.asarray(of_modes + self.remainder**2 * self.pattern(one, other))
 
 
 def foreseen(
@@ -112,13 +96,13 @@ def foreseen(
     noise = np.diag(sd**2)
 
     was, will = problem.repeated, problem.section_of(design)
-    shared = errors.between(design, old, same=False) + will @ was.section.T
-    among_old = errors.between(old, old, same=True) + was.frequency
+    shared = errors.between(design, old) + will @ was.section.T
+    among_old = errors.between(old, old) + was.frequency
     gain = np.linalg.solve(among_old + np.diag(errors.frequency_sd**2), shared.T).T
     mean[:new] += gain @ (problem.observations.value - fit.predicted)[: old.frequencies]
     spread[:new] -= gain @ (fit.slopes @ roots.T)[: old.frequencies]
     own = np.hstack([will, problem.tensions_of(design), problem.masses_of(design)])
-    noise[:new, :new] += errors.between(design, design, same=True) + own @ own.T - gain @ shared.T
+    noise[:new, :new] += errors.between(design, design) + own @ own.T - gain @ shared.T
     sensors = problem.sensors_of(design)
     noise[new : design.size, new : design.size] += sensors @ sensors.T
     return Foresight(design, mean, spread @ spread.T + noise)

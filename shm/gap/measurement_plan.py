@@ -3,7 +3,7 @@
 What every explanation foresees of all measurements that could be made is one normal distribution
 of their data, given the old ones (`shm.gap.foresight`); so what a second measurement adds to
 a first one is counted once. Something unknown foresees that what was left over comes again in every
-test, or anew in each. Data drawn from each explanation by its probability tell how far, on average,
+test. Data drawn from each explanation by its probability tell how far, on average,
 the true one would get ahead of all others together.
 """
 
@@ -19,7 +19,7 @@ import scipy
 from shm.gap.attribution import WITHIN_REACH, Attribution
 from shm.gap.contract import Fit
 from shm.gap.experiment_design import Proposal, lift_off, proposals, together
-from shm.gap.foresight import Errors, Foresight, Remainder, foreseen
+from shm.gap.foresight import Errors, Foresight, foreseen
 from shm.gap.next_measurement import NO_GAP, new_sensors
 from shm.gap.noise import (
     FREQUENCY_SIZES,
@@ -275,30 +275,26 @@ def _offered(problem: GapProblem, fits: Sequence[Fit]) -> tuple[Proposal, ...]:
 def _ways(problem: GapProblem, fit: Fit, usual: Errors) -> list[tuple[float, Errors]]:
     """Return the errors by which a fit may go on, with weights: of what is known the `usual` ones.
 
-    Something unknown is as the engine takes it: over orders independent, smooth, or smooth and
-    alike in both planes; the same in every test or new in each; in frequencies alone, or in shapes
-    too. Each counts by what it makes of the data so far.
+    Something unknown moves shapes too, and frequencies independently over orders, smoothly, or
+    smoothly and alike in both planes. Each way counts by what it makes of the data so far.
     """
     if not fit.hypothesis.flexible:
         return [(1.0, usual)]
-    design, count = problem.design, problem.design.frequencies
-    left = (problem.observations.value - fit.predicted)[:count]
-    unseen = float(np.sqrt(usual.shape_sd * LARGEST_SHAPE))
-    shape_sd = float(np.sqrt(np.median(fit.noise.shape))) if len(fit.noise.shape) else unseen
-    wide_sd = max(usual.shape_sd, shape_sd)
-    sizes = sizes_of(
-        usual.frequency_sd, LARGEST_FREQUENCY, FREQUENCY_SIZES, problem.hanger.assumptions
-    )
-    ways = []
-    for size, pattern, by_test in product(sizes, _PATTERNS, (False, True)):
-        own = replace(usual, remainder=Remainder(float(size), pattern, by_test))
-        among = own.between(design, design, same=True) + problem.repeated.frequency
-        root = np.linalg.cholesky(among + np.diag(usual.frequency_sd**2))
-        away = np.linalg.solve(root, left)
-        log = -0.5 * float(away @ away) - float(np.log(np.diag(root)).sum())
-        ways += [(log, own), (log, replace(own, shape_sd=wide_sd))]
-    ways.sort(key=lambda way: -way[0])
-    return [(float(np.exp(log - ways[0][0])), own) for log, own in ways[:_WAYS]]
-
-
-_PATTERNS = (same_mode, smooth_over_orders, alike_in_planes)
+    design, noise = problem.design, problem.repeated.frequency + np.diag(usual.frequency_sd**2)
+    left = (problem.observations.value - fit.predicted)[: design.frequencies]
+    shape_sd = float(np.sqrt(usual.shape_sd * LARGEST_SHAPE))
+    if len(fit.noise.shape):
+        shape_sd = max(usual.shape_sd, float(np.sqrt(np.median(fit.noise.shape))))
+    assumed = problem.hanger.assumptions
+    sizes = sizes_of(usual.frequency_sd, LARGEST_FREQUENCY, FREQUENCY_SIZES, assumed).tolist()
+    ways = [
+        replace(usual, shape_sd=shape_sd, remainder=size, pattern=pattern)
+        for size, pattern in product(sizes, (same_mode, smooth_over_orders, alike_in_planes))
+    ]
+    roots = [np.linalg.cholesky(way.between(design, design) + noise) for way in ways]
+    log = [
+        -np.sum(np.linalg.solve(root, left) ** 2) / 2 - np.log(np.diag(root)).sum()
+        for root in roots
+    ]
+    best = np.argsort(log)[::-1][:_WAYS]
+    return [(float(np.exp(log[k] - log[best[0]])), ways[k]) for k in best]

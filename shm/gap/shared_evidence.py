@@ -35,7 +35,7 @@ STEP = 0.03  # numerical, decades: the least scatter of sizes; normals so far ap
 
 _DRAWS = 1000  # numerical: a mean to 3 % of its standard deviation
 _ABOUT = 0.15  # numerical, decades: as far apart as points of a scan
-_TINY = 1e-300  # numerical: what is divided by
+_MOST_GAIN, _TINY = 500.0, 1e-300  # numerical: a log that has an exponential; what is divided by
 
 
 @dataclass(frozen=True)
@@ -261,7 +261,8 @@ def _too_small_to_see(
     moved_n = problem.tension_n(Hypothesis(), baseline.z + steps)
     tension_n = rng.choice(_tension_n(problem, baseline, rng), len(x))
     tension_n = tension_n * (1 + near @ (moved_n[1:] / moved_n[0] - 1))
-    return np.array([x, sign, tension_n]), 1 + near @ np.expm1(scan.log[rows] - log_nothing)
+    gain = np.minimum(scan.log[rows] - log_nothing, _MOST_GAIN)
+    return np.array([x, sign, tension_n]), 1 + near @ np.expm1(gain)
 
 
 def _resampled(parts: Sequence[tuple[float, FloatArray]], rng: np.random.Generator) -> FloatArray:
