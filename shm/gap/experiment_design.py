@@ -64,11 +64,6 @@ def proposals(design: Design, hanger: Hanger) -> tuple[Proposal, ...]:
     return tuple(proposal for proposal in every if proposal.kind not in done)
 
 
-def sensors_wanted(design: Design) -> bool:
-    """Return whether further sensors are worth a thought."""
-    return "sensors" not in measured_already(design)
-
-
 def with_sensors(design: Design, places_m: tuple[float, ...]) -> Proposal:
     """Return the present test once more with two-axis sensors at further places (m)."""
     modes = _modes(design)
@@ -130,13 +125,10 @@ def together(designs: Sequence[Design]) -> tuple[Design, list[IntArray]]:
 
 
 def _other_plane(design: Design) -> Iterator[Proposal]:
-    planes = np.unique(design.frequency_plane)
-    if len(planes) == len(PLANES):
-        return
     modes, shapes = _modes(design), _present_shapes(design, _modes(design))
     modes = np.column_stack([1 - modes[:, 0], modes[:, 1]])
     shapes = np.column_stack([shapes[:, :2], 1 - shapes[:, 2]])
-    what = f"the {PLANES[1 - planes[0]]} plane, {_orders(modes[:, 1])}"
+    what = f"the {PLANES[modes[0, 0]]} plane, {_orders(modes[:, 1])}"
     yield Proposal("other plane", what, _test(design, modes, shapes))
 
 

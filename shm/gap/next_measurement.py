@@ -8,7 +8,7 @@ from itertools import zip_longest
 import numpy as np
 
 from shm.gap.contract import Fit
-from shm.gap.experiment_design import Proposal, proposals, sensors_wanted, with_sensors
+from shm.gap.experiment_design import Proposal, measured_already, proposals, with_sensors
 from shm.gap.foresight import Errors, divergence, find_signs, foreseen
 from shm.gap.problem import GapProblem
 from shm.values import NextMeasurement
@@ -91,7 +91,7 @@ def _worth_it(promises: Mapping[Proposal, float]) -> list[Proposal]:
 def new_sensors(problem: GapProblem, pair: tuple[Fit, Fit]) -> list[Proposal]:
     """Return sensors where the shapes of the pair differ most; none where there are enough."""
     design = problem.observations.design
-    if not sensors_wanted(design):
+    if "sensors" in measured_already(design):
         return []
     length_m = problem.hanger.length_m
     shares = np.arange(1, _CANDIDATE_PLACES + 1) / (_CANDIDATE_PLACES + 1)
