@@ -72,40 +72,52 @@ class Errors:
         return np.asarray(of_modes + self.remainder**2 * self.pattern(one, other))
 
 
-def foreseen(
-    problem: GapProblem, fit: Fit, design: Design, errors: Errors, reading_sd: float = NAN
-) -> Foresight:
-    """Return the data of new tests that `fit` predicts, given the old ones.
+class NewTests:
+    """Tests not yet made, and what errors that repeat do to their data.
 
     With a `reading_sd` (a fraction) the last datum is the logarithm of a tension that is read.
-    New data err as the present ones do (median). The model error of a mode is the same in the new
-    test as in the old ones, so that what the fit left over of a mode is expected again.
     """
-    roots = _roots(fit.covariance)
-    around = _around(problem, fit, roots)
-    predicted = problem.predict(fit.hypothesis, around, design)
-    predicted = predicted * find_signs(design, predicted, predicted[0])
-    if np.isfinite(reading_sd):
-        tension_n = problem.tension_n(fit.hypothesis, around)
-        predicted = np.column_stack([predicted, np.log(tension_n)])
-    ahead, back = np.split(predicted[1:], 2)
-    mean, spread = predicted[0].copy(), (ahead - back).T / (2 * _STEP_IN_SDS)
-    old, new = problem.design, design.frequencies
-    counts = [new, design.size - new, len(mean) - design.size]
-    sd = np.repeat([np.median(errors.frequency_sd), errors.shape_sd, reading_sd], counts)
-    noise = np.diag(sd**2)
 
-    was, will = problem.repeated, problem.section_of(design)
-    shared = errors.between(design, old) + will @ was.section.T
-    among_old = errors.between(old, old) + was.frequency
-    gain = np.linalg.solve(among_old + np.diag(errors.frequency_sd**2), shared.T).T
-    mean[:new] += gain @ (problem.observations.value - fit.predicted)[: old.frequencies]
-    spread[:new] -= gain @ (fit.slopes @ roots.T)[: old.frequencies]
-    own = np.hstack([will, problem.tensions_of(design), problem.masses_of(design)])
-    noise[:new, :new] += errors.between(design, design) + own @ own.T - gain @ shared.T
-    sensors = problem.sensors_of(design)
-    noise[new : design.size, new : design.size] += sensors @ sensors.T
-    return Foresight(design, mean, spread @ spread.T + noise)
+    def __init__(self, problem: GapProblem, design: Design, reading_sd: float = NAN):
+        self.problem, self.design, self.reading_sd = problem, design, reading_sd
+        self._section, self._sensors = problem.section_of(design), problem.sensors_of(design)
+        tensions, masses = problem.tensions_of(design), problem.masses_of(design)
+        self._of_frequencies = np.hstack([self._section, tensions, masses])
+        self._predictions: dict[Fit, tuple[FloatArray, FloatArray]] = {}
+
+    def foresee(self, fit: Fit, errors: Errors) -> Foresight:
+        """Return the data that `fit` predicts, given the old ones.
+
+        New data err as the present ones do (median). The model error of a mode is the same in the
+        new test as in the old ones, so that what the fit left over of a mode is expected again.
+        """
+        problem, design, old = self.problem, self.design, self.problem.design
+        if fit not in self._predictions:
+            self._predictions[fit] = self._predict(fit)
+        mean, spread = (each.copy() for each in self._predictions[fit])
+        new, size = design.frequencies, design.size
+        sd = [np.median(errors.frequency_sd), errors.shape_sd, self.reading_sd]
+        noise = np.diag(np.repeat(sd, [new, size - new, len(mean) - size]) ** 2)
+        was, own = problem.repeated, self._of_frequencies
+        shared = errors.between(design, old) + self._section @ was.section.T
+        among_old = errors.between(old, old) + was.frequency + np.diag(errors.frequency_sd**2)
+        gain = np.linalg.solve(among_old, shared.T).T
+        mean[:new] += gain @ (problem.observations.value - fit.predicted)[: old.frequencies]
+        spread[:new] -= gain @ (fit.slopes @ _roots(fit.covariance).T)[: old.frequencies]
+        noise[:new, :new] += errors.between(design, design) + own @ own.T - gain @ shared.T
+        noise[new:size, new:size] += self._sensors @ self._sensors.T
+        return Foresight(design, mean, spread @ spread.T + noise)
+
+    def _predict(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
+        """Return the prediction (data,) and its change (data, d) along the posterior's roots."""
+        around = _around(self.problem, fit, _roots(fit.covariance))
+        predicted = self.problem.predict(fit.hypothesis, around, self.design)
+        predicted = predicted * find_signs(self.design, predicted, predicted[0])
+        if np.isfinite(self.reading_sd):
+            tension_n = self.problem.tension_n(fit.hypothesis, around)
+            predicted = np.column_stack([predicted, np.log(tension_n)])
+        ahead, back = np.split(predicted[1:], 2)
+        return predicted[0], (ahead - back).T / (2 * _STEP_IN_SDS)
 
 
 def divergence(one: Foresight, other: Foresight) -> float:

@@ -19,7 +19,7 @@ import scipy
 from shm.gap.attribution import WITHIN_REACH, Attribution
 from shm.gap.contract import Fit
 from shm.gap.experiment_design import Proposal, lift_off, proposals, together
-from shm.gap.foresight import Errors, Foresight, foreseen
+from shm.gap.foresight import Errors, Foresight, NewTests
 from shm.gap.next_measurement import NO_GAP, new_sensors
 from shm.gap.noise import (
     FREQUENCY_SIZES,
@@ -183,12 +183,12 @@ class Race:
             np.append(r, design.size) if read else r for r, read in zip(rows, reads, strict=True)
         ]
         reading_sd = problem.hanger.assumptions.tension_reading_sd.value if any(reads) else NAN
-        errors = Errors.of(problem, known[0])
-        first = foreseen(problem, known[0], design, errors, reading_sd)
+        errors, new = Errors.of(problem, known[0]), NewTests(problem, design, reading_sd)
+        first = new.foresee(known[0], errors)
         contenders = []
         for each in racing:
             ways = [
-                (weight * share, foreseen(problem, fit, design, own, reading_sd).turned_to(first))
+                (weight * share, new.foresee(fit, own).turned_to(first))
                 for weight, fit in each.fits
                 for share, own in _ways(problem, fit, errors)
             ]

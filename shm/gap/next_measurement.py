@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import zip_longest
 
 import numpy as np
 
 from shm.gap.contract import Fit
 from shm.gap.experiment_design import Proposal, measured_already, proposals, with_sensors
-from shm.gap.foresight import Errors, divergence, find_signs, foreseen
+from shm.gap.foresight import Errors, NewTests, divergence, find_signs
 from shm.gap.problem import GapProblem
 from shm.values import NextMeasurement
 
@@ -40,16 +39,15 @@ def ranked(problem: GapProblem, fits: Sequence[Fit]) -> tuple[NextMeasurement, .
     leader, *rivals = _contenders(fits) or (None,)
     if leader is None or not rivals:
         return ()
-    general = proposals(problem.design, problem.hanger)
     errors = Errors.of(problem, leader)
-    by_leader = [foreseen(problem, leader, each.design, errors) for each in general]
+    general = {e: NewTests(problem, e.design) for e in proposals(problem.design, problem.hanger)}
     found = []
     for rival in rivals:
-        promises = {}
         sensors = new_sensors(problem, (leader, rival))
-        for each, seen in zip_longest([*general, *sensors], by_leader):
-            own = seen or foreseen(problem, leader, each.design, errors)
-            other = foreseen(problem, rival, each.design, errors).turned_to(own)
+        promises = {}
+        for each, new in (general | {e: NewTests(problem, e.design) for e in sensors}).items():
+            own = new.foresee(leader, errors)
+            other = new.foresee(rival, errors).turned_to(own)
             promises[each] = min(divergence(own, other), divergence(other, own))
         names = leader.hypothesis.name or NO_GAP, rival.hypothesis.name or NO_GAP
         found += [

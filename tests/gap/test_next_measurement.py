@@ -9,7 +9,7 @@ import pytest
 
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.experiment_design import like_the_present, measured_already, proposals, with_sensors
-from shm.gap.foresight import Errors, Foresight, divergence, foreseen
+from shm.gap.foresight import Errors, Foresight, NewTests, divergence
 from shm.gap.next_measurement import NO_GAP, ranked
 from shm.models.effects import EFFECTS, Conditions, Variant
 from shm.simulate import HangerState, PlantedEffect
@@ -95,7 +95,7 @@ def test_what_is_foreseen_of_a_linear_toy_is_its_exact_predictive_distribution()
     problem, error = toy(), 2e-3
     fit = problem.fit(STIFFER, model_error=error)
     new = like_the_present(problem.observations.design)
-    seen = foreseen(problem, fit, new, Errors.of(problem, fit))
+    seen = NewTests(problem, new).foresee(fit, Errors.of(problem, fit))
     slopes = np.vstack([with_order(problem.observations.design), with_order(new)])
     joint = slopes @ slopes.T + SD**2 * np.eye(12) + error**2 * np.tile(np.eye(6), (2, 2))
     gain = joint[6:, :6] @ np.linalg.inv(joint[:6, :6])
