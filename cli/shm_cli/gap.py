@@ -56,7 +56,7 @@ _baseline = click.option(
     metavar="NAME",
     default=GapOptions().baseline,
     shell_complete=completion.models,
-    help="The model class whose gap is diagnosed.",
+    help="The model class whose gap is diagnosed.  [default: the beam that these data prefer]",
 )
 _without = click.option(
     "--without",
@@ -124,7 +124,12 @@ def plan(
     rows = _rows(steps)
     if flags.wants_json() or not steps:
         answer(
-            {"hanger": diagnosis.hanger, "baseline": baseline, "seed": seed, "steps": rows},
+            {
+                "hanger": diagnosis.hanger,
+                "baseline": diagnosis.baseline,
+                "seed": seed,
+                "steps": rows,
+            },
             "" if steps else nothing_planned(race, bridge.measurement_hours, most_hours),
         )
         return
@@ -138,8 +143,8 @@ def plan(
     ]  # fmt: skip
     show_rows("Next measurements", _HEADS, cells)
     click.echo(
-        "Of the true explanation against all others, averaged over which it is; make the first, "
-        "diagnose, and plan anew."
+        f"Baseline {diagnosis.baseline}. Of the true explanation against all others, averaged over "
+        "which it is; make the first, diagnose, and plan again."
     )
 
 

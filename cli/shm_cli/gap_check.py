@@ -48,9 +48,8 @@ _PICTURES = (".svg", ".png")
     "--baseline",
     metavar="NAME",
     default=CheckOptions().baseline,
-    show_default=True,
     shell_complete=completion.models,
-    help="The model class of the twin, whose gap is diagnosed.",
+    help="The model class of the twin.  [default: the beam that these data prefer]",
 )
 @click.option(
     "--seeds",
@@ -119,7 +118,7 @@ def check(
         )
     tests, hanger = _measured(ctx, file, hanger_file, hanger_id, count)
     chosen = tuple(name.strip() for name in effects.split(",")) if effects else ()
-    options = CheckOptions(chosen, baseline, seeds, sound, seed=seed, lanes=processes)
+    options = CheckOptions(chosen, baseline, seeds, sound, seed=seed)
     job = Check(tests, hanger, options)
     click.echo(_expected(job, processes), err=True)
     found = _run(job, processes)
@@ -170,8 +169,8 @@ def _run(job: Check, processes: int) -> GapCheck:
     done = []
     try:
         with advancing_bar() as progress, _executor(min(processes, len(job.searches))) as executor:
-            for search in job.searched(progress, executor):
-                done.append(search)
+            for trials in job.run(progress, executor):
+                done.append(trials)
     except KeyboardInterrupt:
         if not done:
             raise
