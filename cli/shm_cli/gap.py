@@ -51,13 +51,6 @@ from shm_cli.common import (
 from shm_cli.effects import effects
 from shm_cli.gap_check import check
 
-_baseline = click.option(
-    "--baseline",
-    metavar="NAME",
-    default=GapOptions().baseline,
-    shell_complete=completion.models,
-    help="The model class whose gap is diagnosed.  [default: the beam that these data prefer]",
-)
 _without = click.option(
     "--without",
     multiple=True,
@@ -90,7 +83,7 @@ def command() -> None:
     metavar="HOURS",
     help="Hours of a crew that the plan may cost.  [default: as many as it takes]",
 )
-@_baseline
+@flags.baseline
 @_without
 @flags.seed
 @flags.json
@@ -173,7 +166,7 @@ def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:
 @flags.hanger()
 @flags.hanger_file
 @click.option("--bridge", is_flag=True, help="All hangers of the workspace together.")
-@_baseline
+@flags.baseline
 @_without
 @click.option(
     "--hold-out",
@@ -182,14 +175,7 @@ def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:
     show_default="every order and every test in turn",
     help="Leave a test or an order of modes out of the fit and predict it; may be given again.",
 )
-@click.option(
-    "--tests",
-    "count",
-    type=click.IntRange(1, 100),
-    default=20,
-    metavar="N",
-    help="How many of the latest tests of a hanger of the workspace.",
-)
+@flags.latest
 @flags.seed
 @click.option(
     "--html", type=flags.NewFile(), metavar="FILE", help="Write a page with all figures here."

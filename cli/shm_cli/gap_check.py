@@ -44,13 +44,7 @@ _PICTURES = (".svg", ".png")
     shell_complete=completion.effects,
     help="Plant these alone.  [default: all of the catalogue]",
 )
-@click.option(
-    "--baseline",
-    metavar="NAME",
-    default=CheckOptions().baseline,
-    shell_complete=completion.models,
-    help="The model class of the twin.  [default: the beam that these data prefer]",
-)
+@flags.baseline
 @click.option(
     "--seeds",
     type=click.IntRange(1, 50),
@@ -74,14 +68,7 @@ _PICTURES = (".svg", ".png")
     metavar="N",
     help="Diagnoses that run at the same time.",
 )
-@click.option(
-    "--tests",
-    "count",
-    type=click.IntRange(1, 100),
-    default=20,
-    metavar="N",
-    help="How many of the latest tests of a hanger of the workspace.",
-)
+@flags.latest
 @flags.seed
 @click.option(
     "--figure", type=flags.NewFile(), metavar="FILE", help="Draw the result here, .svg or .png."
@@ -122,10 +109,7 @@ def check(
     job = Check(tests, hanger, options)
     click.echo(_expected(job, processes), err=True)
     found = _run(job, processes)
-    if flags.wants_json():
-        show(gap_check_document(found))
-    else:
-        _print(found)
+    _answer(found)
     if figure is not None:
         if not found.effects:
             raise NothingThere(f"no effect was checked: {figure} is not drawn.")
@@ -193,7 +177,10 @@ def _executor(processes: int) -> Iterator[Executor | None]:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _print(found: GapCheck) -> None:
+def _answer(found: GapCheck) -> None:
+    if flags.wants_json():
+        show(gap_check_document(found))
+        return
     click.echo(paragraph(introduction(found)))
     if found.effects:
         made = table("What a diagnosis would find", *HEADINGS)
