@@ -28,6 +28,7 @@ from shm.values import (
     PlantedParameter,
 )
 from shm.values.gap_check import Outcome
+from shm.values.verdict import Outcome as Verdict
 
 Trials: TypeAlias = tuple[GapTrial, ...]
 """The trials of one search: of one effect, or of none, with one seed."""
@@ -213,19 +214,17 @@ def _diagnose(tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions) -
 
 
 def _judge(diagnosis: Diagnosis | None, effect: str) -> tuple[Outcome, tuple[str, ...], float]:
-    """Return the outcome for the planted effect, the others that are claimed, the probability."""
+    """Return what the verdict says of the planted effect, the others it names, its probability."""
     if diagnosis is None:
         return "refused", (), NAN
-    leading = diagnosis.leading
-    if leading is None and diagnosis.leads == "no gap":
-        return "no gap", (), diagnosis.no_gap_probability
-    if leading is None:
-        return "unexplained", (), diagnosis.unexplained_probability
-    claimed = [c for c in diagnosis.causes if c.group == leading.group is not None] or [leading]
-    claimed.sort(key=lambda cause: -cause.probability)
-    names = dict.fromkeys(name for cause in claimed for name in cause.effects)
+    verdict = diagnosis.verdict
+    if verdict.outcome is Verdict.NO_GAP:
+        return "no gap", (), verdict.probability
+    if verdict.claim is None:
+        return "unexplained", (), verdict.probability
+    names = dict.fromkeys(name for cause in verdict.claim.causes for name in cause.effects)
     others = tuple(name for name in names if name != effect)
     outcome: Outcome = "another cause"
     if effect in names:
         outcome = "in a group" if others else "alone"
-    return outcome, others, diagnosis.claim(leading)
+    return outcome, others, verdict.probability
