@@ -143,9 +143,7 @@ def _chances(search: Search) -> dict[Hypothesis, float]:
     return found
 
 
-def _explanations(
-    by_kind: Sequence[tuple[Family, float]], none: Family
-) -> tuple[Explanation, ...]:
+def _explanations(by_kind: Sequence[tuple[Family, float]], none: Family) -> tuple[Explanation, ...]:
     """Return every effect and pair that was tried, the likeliest first."""
     found = [
         Explanation(

@@ -259,15 +259,11 @@ class GapProblem:
         if not self.hanger.as_hanger:
             return found
         theta, plane = self.described.theta(self.near), design.frequency_plane
-        near = self._predicted(
-            (), theta, design, ShapeScaling.of(design, self.hanger.length_m)
-        )
+        near = self._predicted((), theta, design, ShapeScaling.of(design, self.hanger.length_m))
         frequency_hz = np.exp(near[:, : design.frequencies])
         ends = self.model.end_waves(theta, frequency_hz, plane)
         places = tuple(design.places_m[place] for place in np.unique(design.shape_place))
-        sensors, _ = errors_of_bar(
-            self.hanger, design.frequency_order, felt_by(ends[0]), places
-        )
+        sensors, _ = errors_of_bar(self.hanger, design.frequency_order, felt_by(ends[0]), places)
         supports = mean_of_ends(ends, self.model.stiff_ends_m, self.hanger.assumptions)[0]
         found[: design.frequencies] = sensors + supports
         return found
