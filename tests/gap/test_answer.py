@@ -9,7 +9,7 @@ import pytest
 
 from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.model_probabilities import ScoredHypothesis
+from shm.gap.probabilities import ScoredHypothesis
 from shm.models.effects import Variant
 from tests.gap import linear_toy as toy
 

@@ -93,7 +93,7 @@ def test_what_lessons_teach_reads_back_as_it_was_written(tmp_path: Path) -> None
     """Of the laws of a real fit, by the names that a case gives them."""
     stiffer = Hypothesis((("bending_stiffness", Variant()),))
     problem, rng = problem_of(campaign(stiffer.effects, [0.25])), np.random.default_rng(1)
-    baseline = baseline_fit(problem, rng)
+    baseline = fit_alone(problem, rng)
     own = ways_of(problem, baseline, fitted(problem, stiffer, rng))
     pair = ("sag", "timebase")
     lessons = [

@@ -21,7 +21,7 @@ def _problem(baseline: str = "beam1", **plan: object) -> GapProblem:
     tests = campaign(
         HANGER_3, HangerState(711e3), (), CampaignPlan(**plan), np.random.default_rng(1)
     )
-    return GapProblem(HANGER_3, baseline, observed(tests, HANGER_3))
+    return problem_of(tests, baseline)
 
 
 def test_a_full_campaign_calls_for_the_whole_catalogue() -> None:

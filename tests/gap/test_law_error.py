@@ -33,9 +33,9 @@ def _by_laws(effect: str, own_laws: bool) -> tuple[ByLaws, Fit, GapProblem]:
         modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), reality=Reality(own_laws=own_laws)
     )
     tests = campaign(HANGER_3, HangerState(TENSION_N), [WORN], plan, np.random.default_rng(3))
-    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    problem = problem_of(tests)
     rng = np.random.default_rng(1)
-    baseline = baseline_fit(problem, rng)
+    baseline = fit_alone(problem, rng)
     (variant, *_) = EFFECTS[effect].variants(HANGER_3, problem.design.survey)
     before = fitted(problem, Hypothesis(((effect, variant),)), rng)
     return by_its_laws(problem, baseline, before, rng), before, problem
@@ -88,7 +88,7 @@ def test_a_law_that_shifts_its_action_from_mode_to_mode_is_forgiven() -> None:
     """Modes that the catalogue leaves alone move as much as the others, by a tenth of these."""
     _, fit, problem = _by_laws("section_loss", False)
     rng = np.random.default_rng(1)
-    baseline, count = baseline_fit(problem, rng), problem.design.frequencies
+    baseline, count = fit_alone(problem, rng), problem.design.frequencies
     typical = np.sqrt(np.mean((fit.predicted - baseline.predicted)[:count] ** 2))
     away = problem.observations.value.copy()
     away[:count] += 0.2 * typical * rng.standard_normal(count)
@@ -103,9 +103,9 @@ def test_where_a_law_is_far_off_the_fit_goes_all_the_way() -> None:
         modes=6, temperatures_c=(10.0,), mass_share=0.0, shapes=False, reality=Reality()
     )
     tests = campaign(HANGER_3, HangerState(TENSION_N), [soft], plan, np.random.default_rng(3))
-    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    problem = problem_of(tests)
     rng = np.random.default_rng(1)
-    baseline = baseline_fit(problem, rng)
+    baseline = fit_alone(problem, rng)
     variants = EFFECTS["joint_softening"].variants(HANGER_3, problem.design.survey)
     (variant,) = [each for each in variants if each.at == "both ends"]
     before = fitted(problem, Hypothesis((("joint_softening", variant),)), rng)

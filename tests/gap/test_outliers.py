@@ -12,7 +12,7 @@ from scipy import stats
 
 from shm.assumptions import DEFAULTS
 from shm.gap import GapOptions, diagnose, outliers
-from shm.gap.fit import baseline_fit
+from shm.gap.search import fit_alone
 from shm.gap.observations import observed
 from shm.gap.outliers import (
     FREEDOM,
@@ -140,8 +140,8 @@ def test_both_densities_are_the_prior_of_theirs_in_all() -> None:
 
 def test_a_frequency_left_out_is_what_conditioning_on_all_others_says() -> None:
     """Data y = m + S z + e, z standard normal: y is normal about m with covariance S S' + C."""
-    problem = GapProblem(PLAIN, "beam1", observed(measured(), PLAIN))
-    fit = baseline_fit(problem, np.random.default_rng(1))
+    problem = problem_of(measured(), hanger=PLAIN)
+    fit = fit_alone(problem, np.random.default_rng(1))
     rows = np.array([2, 7])
     seen = left_out(problem, fit.hypothesis, fit.z, fit.predicted, fit.slopes, rows)
     away = problem.observations.value - fit.predicted + fit.slopes @ fit.z

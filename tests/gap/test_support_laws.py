@@ -34,11 +34,11 @@ def _by_laws(own_laws: bool) -> tuple[ByLaws, Fit]:
         modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), reality=Reality(own_laws=own_laws)
     )
     tests = campaign(HANGER, HangerState(TENSION_N), [DECK], plan, np.random.default_rng(3))
-    problem = GapProblem(HANGER, "beam1", observed(tests, HANGER))
+    problem = problem_of(tests, hanger=HANGER)
     rng = np.random.default_rng(1)
     effect = EFFECTS["support_motion"]
     (at,) = [e for e in effect.variants(HANGER, problem.design.survey) if e.at == AT]
-    baseline = baseline_fit(problem, rng)
+    baseline = fit_alone(problem, rng)
     before = fitted(problem, Hypothesis((("support_motion", at),)), rng)
     return by_its_laws(problem, baseline, before, rng), before
 

@@ -6,11 +6,27 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from shm.gap.contract import Fit, Hypothesis
+from shm.gap.linear import Linear
 from shm.gap.observations import observed
+from shm.gap.posterior import MOST_ROUNDS, Sampling, Target, find_peaks
 from shm.gap.problem import GapProblem
+from shm.gap.scan import Scan, scan
+from shm.gap.search import fit_alone
+from shm.models import MODELS, AsMade
 from shm.models.composed import ComposedHanger
 from shm.models.effects import Conditions, Variant
-from shm.values import NAN, PLANES, AddedMass, FloatArray, ModalTest, Mode, ShapePoint
+from shm.values import (
+    ENOUGH_EFFECTIVE,
+    NAN,
+    PLANES,
+    AddedMass,
+    FloatArray,
+    Hanger,
+    ModalTest,
+    Mode,
+    ShapePoint,
+)
 from tests.helpers.hangers import HANGER_3
 
 PLACES_M = (2.0, 4.5, 6.5, 9.0)
@@ -64,9 +80,12 @@ def campaign(
     return tuple(made)
 
 
-def problem_of(tests: Sequence[ModalTest], baseline: str = "beam1") -> GapProblem:
-    """The problem of tests of hanger 3."""
-    return GapProblem(HANGER_3, baseline, observed(tests, HANGER_3))
+def problem_of(
+    tests: Sequence[ModalTest], baseline: str = "beam1", hanger: Hanger = HANGER_3
+) -> GapProblem:
+    """Return the problem of tests of a hanger with a model class as its baseline."""
+    model = AsMade(MODELS[baseline](hanger))
+    return GapProblem(model, tests, observed(tests, hanger))
 
 
 def _points(shape: FloatArray, plane: int, sd: float) -> tuple[ShapePoint, ...]:
@@ -76,3 +95,23 @@ def _points(shape: FloatArray, plane: int, sd: float) -> tuple[ShapePoint, ...]:
         ShapePoint(x_m, float(here[plane]), float(here[1 - plane]), sd)
         for x_m, here in zip(PLACES_M, shape, strict=True)
     )
+
+
+def scan_of(problem: GapProblem, hypothesis: Hypothesis) -> Scan:
+    """Return the scan of an effect beside the hanger alone; cut its prior by it, as a search does."""
+    before = fit_alone(problem, np.random.default_rng(1))
+    linear = Linear(problem.likelihood(Hypothesis()), before.slopes)
+    found = scan(problem, before, linear, hypothesis)
+    if found.smallest < 1:
+        problem.smallest[hypothesis.effects[0]] = found.smallest
+    return found
+
+
+def fit_of(problem: GapProblem, hypothesis: Hypothesis, draws: int = 400) -> Fit:
+    """Return the sampled fit of an effect, from where a scan of it leads."""
+    before = fit_alone(problem, np.random.default_rng(1))
+    starts = scan_of(problem, hypothesis).starts(problem, before)
+    target = Target(problem, hypothesis)
+    sampling = Sampling(target, find_peaks(target, starts), np.random.default_rng(1), before)
+    sampling.run(ENOUGH_EFFECTIVE, MOST_ROUNDS)
+    return sampling.fit(draws)
