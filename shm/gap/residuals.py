@@ -34,7 +34,8 @@ def residuals(
     `z` is the residual over its own standard deviation, of which the tension and the other free
     parameters absorb a part (standardised residual, Cook and Weisberg 1982, 2.1; here with known
     variances and priors). Where the fit allows for no other errors it equals the z-score of the
-    measurement against a prediction from all other data. Shares are parts of the frequencies'
+    measurement against a prediction from all other data. What is left after is in stated standard
+    deviations, NaN without one. Shares are parts of the frequencies'
     chi-square and add to 1; NaN where there is no misfit at all.
     """
     design = problem.observations.design
@@ -58,6 +59,7 @@ def residuals(
             100 * np.expm1(left_after),
             held_out.before_percent,
             held_out.after_percent,
+            left_after / problem.observations.sd[:frequencies],
         ]
     )
     named = zip(design.frequency_plane, design.frequency_order, design.frequency_test, strict=True)
