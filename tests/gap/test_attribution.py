@@ -32,7 +32,7 @@ def _found(
 ) -> tuple[Attribution, tuple[tuple[str, float], ...]]:
     planted = [each for each in (CLAMP, SWING) if each.name in effects]
     tests = campaign(HANGER_3, STATE, planted, PLAN, np.random.default_rng(seed))
-    problem = problem_of(tests)
+    problem = problem_of(tests, hanger=HANGER_3)
     told: list[tuple[str, float]] = []
     found = attributed(
         problem,
@@ -138,7 +138,7 @@ def test_an_effect_that_would_drown_in_the_errors_is_told_to_be_invisible() -> N
         frequency_sd=0.03,
     )  # fmt: skip
     tests = campaign(HANGER_3, STATE, (), plan, np.random.default_rng(1))
-    problem = problem_of(tests)
+    problem = problem_of(tests, hanger=HANGER_3)
     options = GapOptions(without=all_but("distributed_mass"))
     found = attributed(problem, options, np.random.default_rng(1))
     assert "drown" in dict(found.invisible)["distributed_mass"]

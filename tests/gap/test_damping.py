@@ -34,13 +34,13 @@ def _mode(order: int, log_damping: float, sd: float) -> Mode:
 
 
 def test_remark_on_damping_over_seeds() -> None:
-    """A test's own damping is no rise; one by a factor of e is remarked."""
+    """A test's own damping is no rise; one by a factor of 4.5 always is."""
     steady, rising = (
-        [observed(_tests(rise, seed), HANGER_3) for seed in range(30)] for rise in (0.0, 1.0)
+        [observed(_tests(rise, seed), HANGER_3) for seed in range(30)] for rise in (0.0, 1.5)
     )
     assert np.mean([log_rising(each) for each in steady]) < -0.5
     assert not any(remark_on_damping(each) for each in steady)
-    assert sum(len(remark_on_damping(each)) for each in rising) > 24
+    assert all(remark_on_damping(each) for each in rising)
 
 
 def test_log_rising_levels_or_sd_missing() -> None:

@@ -52,7 +52,7 @@ def _numbered(shifts: Mapping[str, int], *effects: PlantedEffect) -> list[ModalT
 
 def _remark(shifts: Mapping[str, int], *effects: PlantedEffect) -> str:
     tests = _numbered(shifts, *effects)
-    problem = problem_of(tests)
+    problem = problem_of(tests, hanger=HANGER_3)
     return "".join(misnumbered(problem, attributed(problem, OPTIONS, np.random.default_rng(1))))
 
 
@@ -87,7 +87,7 @@ def test_a_gap_does_not_hide_wrong_orders() -> None:
 
 
 def _remark_of(tests: list[ModalTest]) -> str:
-    problem = problem_of(tests)
+    problem = problem_of(tests, hanger=HANGER_3)
     return "".join(misnumbered(problem, attributed(problem, OPTIONS, np.random.default_rng(1))))
 
 

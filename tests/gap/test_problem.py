@@ -13,11 +13,9 @@ from shm.gap.search import fit_alone
 from shm.models.base import point_mass
 from shm.models.effects import EFFECTS, Variant
 from shm.models.hanger import solve
-from tests.helpers.gap_campaigns import PLACES_M, campaign, problem_of
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.gap_campaigns import HANGER, PLACES_M, campaign, problem_of
 
 BASELINE = Hypothesis()
-PLAIN = replace(HANGER_3, plate=None)
 MASS = Hypothesis((("point_mass", Variant()),))
 
 
@@ -30,7 +28,7 @@ def test_frequencies_are_the_general_models() -> None:
     for test, conditions in enumerate(design.conditions):
         bar, mass = problem.model.physical(theta), conditions.added_mass
         if mass is not None:
-            bar = replace(bar, masses=(*bar.masses, point_mass(HANGER_3, mass, len(theta))))
+            bar = replace(bar, masses=(*bar.masses, point_mass(HANGER, mass, len(theta))))
         found = solve(bar, 6, np.empty(0), shapes=False).frequency_hz
         rows = design.frequency_test == test
         exact = found[:, design.frequency_plane[rows], design.frequency_order[rows] - 1]
@@ -56,13 +54,13 @@ def test_predicted_shapes_have_unit_length_and_the_measured_sign() -> None:
 def test_the_tension_is_that_of_theta() -> None:
     problem = problem_of(campaign())
     z = np.random.default_rng(2).standard_normal((4, problem.dimension(MASS)))
-    exact = problem.coordinates(MASS).theta(z)[:, 0] * HANGER_3.nominal_tension_n
+    exact = problem.coordinates(MASS).theta(z)[:, 0] * HANGER.nominal_tension_n
     np.testing.assert_allclose(problem.tension_n(MASS, z), exact)
 
 
 def test_settle_keeps_straight_terms_linear() -> None:
     """What is taken as linear is so within a tenth of the likeliest errors."""
-    problem = problem_of(campaign(shape_sd=0.01), hanger=PLAIN)
+    problem = problem_of(campaign(shape_sd=0.01))
     fit = fit_alone(problem, np.random.default_rng(1))
     linear = problem.linear(BASELINE)
     assert set(problem.described.always_linear) < set(linear)
@@ -109,7 +107,7 @@ def test_another_design_has_further_sensors_behind_those_of_the_survey() -> None
 
 def test_a_cut_prior_begins_where_it_was_cut() -> None:
     problem = problem_of(campaign())
-    size = EFFECTS["point_mass"].parameters(HANGER_3, Variant())[0]
+    size = EFFECTS["point_mass"].parameters(HANGER, Variant())[0]
     problem.smallest["point_mass", Variant()] = 0.4
     least = np.zeros((1, problem.dimension(MASS)))
     least[0, -2] = -7.0

@@ -21,20 +21,19 @@ from shm.inference.systematic_errors import shared_loads
 from shm.models.hanger import Zone, solve
 from shm.simulate import HangerState
 from shm.values import AddedMass, FloatArray
-from tests.helpers.gap_campaigns import problem_of
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.gap_campaigns import HANGER, problem_of
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 PLAN = CampaignPlan(
     modes=5, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, as_made=False, shape_sd=1e-3
 )
 TENSION_N = 711e3
-USUAL = HANGER_3.scatter
+USUAL = HANGER.scatter
 
 
 @pytest.fixture(scope="module")
 def problem() -> GapProblem:
-    tests = campaign(HANGER_3, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
+    tests = campaign(HANGER, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
     return problem_of(tests)
 
 
@@ -119,8 +118,8 @@ def test_a_thicker_middle_shifts_frequencies_as_the_sections_loads_say(
     And by a size that fits the prior: a cosine of 0.1 % rms is about one standard deviation.
     """
     plain = problem.model.physical(problem.described.theta(problem.near))
-    edges_m = np.linspace(0, HANGER_3.length_m, 25)
-    middles = (edges_m[1:] + edges_m[:-1]) / 2 / HANGER_3.length_m
+    edges_m = np.linspace(0, HANGER.length_m, 25)
+    middles = (edges_m[1:] + edges_m[:-1]) / 2 / HANGER.length_m
     thick = 1 + 1e-3 * np.sqrt(2) * np.cos(2 * np.pi * middles)
     zones = tuple(
         Zone(np.array([a]), np.array([b]), np.array([f**2]), np.array([f]))
@@ -145,9 +144,9 @@ def test_the_section_varies_about_its_mean_by_what_the_description_says(length_m
 
 
 def test_a_bar_of_one_section_has_no_loads_but_those_of_sensors_and_supports() -> None:
-    scatter = replace(HANGER_3.scatter, along=0.0)
-    tests = campaign(HANGER_3, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
-    hanger = replace(HANGER_3, scatter=scatter)
+    scatter = replace(HANGER.scatter, along=0.0)
+    tests = campaign(HANGER, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
+    hanger = replace(HANGER, scatter=scatter)
     found = problem_of(tests, hanger=hanger)
     design = found.design
     theta = found.described.theta(found.near)
@@ -160,7 +159,7 @@ def test_a_bar_of_one_section_has_no_loads_but_those_of_sensors_and_supports() -
 
 def test_without_shapes_sensors_have_no_loads() -> None:
     plan = replace(PLAN, shapes=False)
-    tests = campaign(HANGER_3, HangerState(TENSION_N), (), plan, np.random.default_rng(4))
+    tests = campaign(HANGER, HangerState(TENSION_N), (), plan, np.random.default_rng(4))
     found = problem_of(tests)
     assert found.repeated.sensors.shape == Repeated.none(found.design).sensors.shape
     assert np.isfinite(found.likelihood(Hypothesis()).log(np.zeros((1, found.design.size)))).all()
@@ -168,7 +167,7 @@ def test_without_shapes_sensors_have_no_loads() -> None:
 
 def test_an_unstated_radius_of_a_known_mass_is_an_error_of_its_test() -> None:
     """One standard deviation more and less makes what its load says, in that test alone."""
-    tests = campaign(HANGER_3, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
+    tests = campaign(HANGER, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
     clamp, row = AddedMass(25.0, 3.4), DEFAULTS.added_mass_radius_m
     laden = [replace(tests[0], id="laden", added_mass=clamp)]
 

@@ -14,8 +14,7 @@ from shm.gap.search import fit_alone, hypotheses
 from shm.inference.data_checks import step_hz
 from shm.values import NAN, ModalTest
 from tests.helpers.effects import all_but
-from tests.helpers.gap_campaigns import campaign, fit_of, problem_of
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.gap_campaigns import HANGER, campaign, fit_of, problem_of
 
 
 def rounded(step: float, sd_hz: float = NAN) -> ModalTest:
@@ -48,7 +47,7 @@ def test_there_is_none_of_full_numbers_nor_where_errors_are_stated() -> None:
 
 def test_low_modes_err_most_and_equal_numbers_are_one_datum() -> None:
     test = rounded(0.1)
-    seen = observed([test], HANGER_3)
+    seen = observed([test], HANGER)
     covariance, hz = rounding_covariance(seen), np.exp(seen.value)
     sd = 0.1 / np.sqrt(12) / hz
     equal = np.equal.outer(hz, hz)
@@ -72,7 +71,7 @@ def test_every_size_of_the_unknown_errors_stands_beside_the_rounding() -> None:
 
 def test_what_rounding_does_to_a_sound_hanger_is_no_evidence_of_a_cause() -> None:
     """Taken as errors of one fraction they gave a loss of section odds of 295 to 1."""
-    seen, rng = observed([rounded(0.2)], HANGER_3), np.random.default_rng(1)
+    seen, rng = observed([rounded(0.2)], HANGER), np.random.default_rng(1)
     gained = []
     for each in (seen, replace(seen, rounding=None)):
         whole = problem_of([rounded(0.2)])

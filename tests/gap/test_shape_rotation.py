@@ -72,7 +72,7 @@ def test_a_turn_as_large_as_may_be_is_no_misfit(test: ModalTest, rad: float) -> 
     """The chi-square of the shapes grows by one for it, and by far more where it is not stated."""
 
     def chi_square(mode: Mode) -> float:
-        problem = problem_of([replace(test, modes=(mode, *rest))])
+        problem = problem_of([replace(test, modes=(mode, *rest))], hanger=HANGER_3)
         covariance = nodes(problem.observations, problem.repeated)[0].covariance
         whole = np.diag(covariance.shape) + covariance.shape_loads @ covariance.shape_loads.T
         expected = observed([test], HANGER_3).value[test_modes:]
@@ -88,7 +88,7 @@ def test_a_turn_as_large_as_may_be_is_no_misfit(test: ModalTest, rad: float) -> 
 def test_without_the_shape_of_one_mode_the_others_may_still_be_turned(test: ModalTest) -> None:
     first, *rest = (_may_be_turned(mode, 0.3) for mode in test.modes)
     turned = replace(test, modes=(first, *rest))
-    whole = problem_of([turned])
+    whole = problem_of([turned], hanger=HANGER_3)
     without = whole.without_shape(0).observations
     others = whole.observations.design.shape_mode != 0
     _, _, *of_others = turn_loads(whole.observations)[others].T

@@ -1,8 +1,9 @@
-"""Small campaigns of hanger 3 for the gap diagnosis, made by the general model itself."""
+"""Small campaigns of hanger 3, without its plates, for the gap diagnosis, made by the general model itself."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,8 +15,9 @@ from shm.gap.problem import GapProblem
 from shm.gap.scan import Scan, scan
 from shm.gap.search import fit_alone
 from shm.models import MODELS, AsMade
-from shm.models.composed import ComposedHanger
+from shm.models.as_made import DENSITY, LENGTH, MODULUS, SECTION, TENSION
 from shm.models.effects import Conditions, Variant
+from shm.models.hanger_with_effects import HangerWithEffects
 from shm.values import (
     ENOUGH_EFFECTIVE,
     NAN,
@@ -29,6 +31,7 @@ from shm.values import (
 )
 from tests.helpers.hangers import HANGER_3
 
+HANGER = replace(HANGER_3, plate=None)
 PLACES_M = (2.0, 4.5, 6.5, 9.0)
 CLAMP = AddedMass(25.0, 3.6)
 Effects = tuple[tuple[str, Variant], ...]
@@ -50,16 +53,20 @@ def campaign(
     Shapes are measured where `shape_sd` is given.
     """
     rng = np.random.default_rng(seed)
-    hanger = ComposedHanger(HANGER_3, "beam1", effects, PLACES_M)
-    theta = np.array([[tension, *(0.005 * rng.standard_normal(4)), *values]])
+    model = AsMade(MODELS["beam1"](HANGER))
+    hanger = HangerWithEffects(model, effects, PLACES_M)
+    section, density, length, modulus = 0.005 * rng.standard_normal(4)
+    made = {TENSION: tension, LENGTH: 1 + length, SECTION: section, DENSITY: density}
+    made |= {MODULUS: modulus, **{name: model.usual(name) for name in model.terms}}
+    theta = np.array([[*(made[name] for name in model.parameter_names), *values]])
     model_error = 2e-5 * rng.standard_normal((2, modes))
-    made = []
+    taken = []
     for t in range(tests):
         mass = CLAMP if t == tests - 1 else None
         found = hanger.modes(theta, Conditions(f"t{t + 1}", 0.0, 1.0, mass), modes)
         log = np.log(found.frequency_hz[0]) + model_error + sd * rng.standard_normal((2, modes))
         shape = found.shape[0] + np.nan_to_num(shape_sd) * rng.standard_normal(found.shape[0].shape)
-        made.append(
+        taken.append(
             ModalTest(
                 f"t{t + 1}",
                 tuple(
@@ -77,11 +84,11 @@ def campaign(
                 added_mass=mass,
             )
         )
-    return tuple(made)
+    return tuple(taken)
 
 
 def problem_of(
-    tests: Sequence[ModalTest], baseline: str = "beam1", hanger: Hanger = HANGER_3
+    tests: Sequence[ModalTest], baseline: str = "beam1", hanger: Hanger = HANGER
 ) -> GapProblem:
     """Return the problem of tests of a hanger with a model class as its baseline."""
     model = AsMade(MODELS[baseline](hanger))
