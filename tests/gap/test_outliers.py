@@ -12,27 +12,28 @@ from scipy import stats
 
 from shm.assumptions import DEFAULTS
 from shm.gap import GapOptions, diagnose, outliers
-from shm.gap.search import fit_alone
 from shm.gap.observations import observed
 from shm.gap.outliers import (
     FREEDOM,
     SURE,
+    GrossError,
     acts_alone,
+    exclude_gross_errors,
     left_out,
     log_gross,
     log_ordinary,
 )
-from shm.gap.problem import GapProblem
+from shm.gap.search import fit_alone
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import Diagnosis, ModalTest, Outcome
 from tests.helpers.effects import all_but
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.gap_campaigns import HANGER as PLAIN
+from tests.helpers.gap_campaigns import problem_of
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 from tests.worlds.simulated.reality import Reality
 
 SHARE = DEFAULTS.gross_error_share.value
 
-PLAIN = replace(HANGER_3, plate=None)
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
 ONE_TEST = CampaignPlan(
     modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, shapes=False
@@ -140,7 +141,7 @@ def test_both_densities_are_the_prior_of_theirs_in_all() -> None:
 
 def test_a_frequency_left_out_is_what_conditioning_on_all_others_says() -> None:
     """Data y = m + S z + e, z standard normal: y is normal about m with covariance S S' + C."""
-    problem = problem_of(measured(), hanger=PLAIN)
+    problem = problem_of(measured())
     fit = fit_alone(problem, np.random.default_rng(1))
     rows = np.array([2, 7])
     seen = left_out(problem, fit.hypothesis, fit.z, fit.predicted, fit.slopes, rows)
@@ -161,20 +162,23 @@ def test_a_frequency_left_out_is_what_conditioning_on_all_others_says() -> None:
 
 
 @pytest.mark.parametrize(("frequencies", "aside"), [(4, 0), (5, 1), (6, 1), (30, 3)])
-def test_tension_stiffness_and_two_to_contradict_them_are_left_and_nine_of_ten(
+def test_exclude_gross_errors_leaves_enough(
     monkeypatch: pytest.MonkeyPatch, frequencies: int, aside: int
 ) -> None:
-    """Even where the next one always looks like a slip."""
-    monkeypatch.setattr(outliers, "believed", lambda attribution: [])
-    monkeypatch.setattr(outliers, "_open", lambda *_: np.ones(1, bool))
-    monkeypatch.setattr(outliers, "_suspect", lambda *_: 0)
-    monkeypatch.setattr(outliers, "_judged", lambda *_: (1.0, []))
+    """Tension, stiffness, two to contradict them and nine of ten, where each looks like a slip."""
+    monkeypatch.setattr(outliers, "attribute", lambda *_: SimpleNamespace())
+    monkeypatch.setattr(outliers, "_remains", lambda *_: True)
+    monkeypatch.setattr(
+        outliers, "_find_gross_error", lambda found: GrossError(int(found.rows[0]), 1.0)
+    )
     problem = SimpleNamespace(
         design=SimpleNamespace(frequencies=frequencies), part=lambda rows: None
     )
-    rows, rng = np.arange(frequencies), np.random.default_rng(1)
-    found = outliers.gross_errors(problem, rows, None, rng)  # type: ignore[arg-type]
-    assert [each.row for each in found] == list(range(aside))
+    rng = np.random.default_rng(1)
+    found = exclude_gross_errors(problem, GapOptions(), rng)  # type: ignore[arg-type]
+    assert [each.row for each in found.aside] == list(range(aside))
+    assert [each.row for each in found.doubted] == [aside]
+    assert found.rows.tolist() == list(range(aside, frequencies))
 
 
 def test_a_frequency_that_stands_alone_at_the_highest_level_may_be_met_by_a_guide(
