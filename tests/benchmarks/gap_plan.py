@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from shm.assumptions import DEFAULTS  # noqa: E402
-from shm.gap.attribution import Attribution, attributed  # noqa: E402
+from shm.gap.attribution import Attribution, attribute  # noqa: E402
 from shm.gap.contract import Design, GapOptions  # noqa: E402
 from shm.gap.experiment_design import Proposal  # noqa: E402
 from shm.gap.measurement_plan import (  # noqa: E402
@@ -41,6 +41,7 @@ from shm.gap.measurement_plan import (  # noqa: E402
 )
 from shm.gap.observations import observed  # noqa: E402
 from shm.gap.problem import GapProblem  # noqa: E402
+from shm.models import MODELS, AsMade  # noqa: E402
 from shm.models.effects import EFFECTS  # noqa: E402
 from shm.simulate import HangerState, PlantedEffect  # noqa: E402
 from shm.values import MEASUREMENT_HOURS, PLANES, FloatArray, Hanger, ModalTest  # noqa: E402
@@ -109,9 +110,10 @@ class Known:
     causes: tuple[str, ...] = CAUSES
 
     def attribution(self, seed: int) -> Attribution:
-        problem = GapProblem(self.hanger, "beam1", observed(self.tests, self.hanger))
+        model = AsMade(MODELS["beam1"](self.hanger))
+        problem = GapProblem(model, self.tests, observed(self.tests, self.hanger))
         without = tuple(name for name in EFFECTS if name not in self.causes)
-        return attributed(
+        return attribute(
             problem, GapOptions(without=without, seed=seed), np.random.default_rng(seed)
         )
 
