@@ -25,9 +25,7 @@ EFFECTS = ("bending_stiffness", "distributed_mass", "point_mass", "effective_len
 def main() -> int:
     """Prints a line for each effect; 1 where a bound is missed."""
     argparse.ArgumentParser(description=__doc__).parse_args()
-    print(
-        f"{'effect':24} {'cases':>6} {'held':>6} {'fit s':>7} {'evidence sd':>12}"
-    )
+    print(f"{'effect':24} {'cases':>6} {'held':>6} {'fit s':>7} {'evidence sd':>12}")
     rates = [_line(effect) for effect in EFFECTS]
     return 0 if all(LEAST <= rate <= MOST for rate in rates) else 1
 

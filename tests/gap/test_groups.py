@@ -76,7 +76,9 @@ class Mirrored:
 
 def test_views_from_notable_peaks() -> None:
     """A peak with a tenth of the best one's evidence gives no view."""
-    peaks = [Peak(np.array([at]), log, np.eye(1)) for at, log in ((1.0, 0.0), (-2.0, -1.0), (3.0, -2.3))]
+    peaks = [
+        Peak(np.array([at]), log, np.eye(1)) for at, log in ((1.0, 0.0), (-2.0, -1.0), (3.0, -2.3))
+    ]
     fit = replace(toy.fit(np.zeros(3), np.zeros((3, 1))), peaks=tuple(peaks))
     first, other = views_from_peaks(Mirrored(), fit)
     assert first is fit

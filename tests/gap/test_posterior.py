@@ -69,7 +69,9 @@ class Bent:
         away = self.value - np.outer(self.bend(z), self.slopes[:, -1])
         own = self.slopes[:, :-1] @ self.slopes[:, :-1].T
         noise = [sd**2 * np.eye(len(self.value)) for sd in self.sds]
-        log = logsumexp([stats.multivariate_normal.logpdf(away, cov=c + own) for c in noise], axis=0)
+        log = logsumexp(
+            [stats.multivariate_normal.logpdf(away, cov=c + own) for c in noise], axis=0
+        )
         log = log - np.log(len(noise)) + stats.norm.logpdf(z)
         weight = np.exp(log - logsumexp(log))
         mean = float(weight @ z)
@@ -140,7 +142,11 @@ def test_sampling_linear_exact(columns: tuple[int, ...]) -> None:
     assert found.draws[:, -1].std() == pytest.approx(sd, rel=0.15)
 
 
-CASES = {"mirrored": (mirrored, 1.2), "signed": (of_either_sign, -0.5), "faint": (of_either_sign, 0.01)}
+CASES = {
+    "mirrored": (mirrored, 1.2),
+    "signed": (of_either_sign, -0.5),
+    "faint": (of_either_sign, 0.01),
+}
 
 
 @pytest.mark.parametrize("name", CASES)

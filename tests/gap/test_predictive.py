@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.gap.search import fit_alone
 from shm.gap.residuals import predictions, predictive_p_value
+from shm.gap.search import fit_alone
 from tests.gap import linear_toy as toy
 from tests.helpers.gap_campaigns import campaign, problem_of
 

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.search import fit_alone
-from shm.gap.observations import observed
 from shm.gap.residuals import sensor_remarks
+from shm.gap.search import fit_alone
 from shm.simulate import HangerState
 from shm.values import Hanger, ModalTest, Scatter
 from tests.helpers.gap_campaigns import problem_of

@@ -1,4 +1,4 @@
-"""Small campaigns of hanger 3, without its plates, for the gap diagnosis, made by the general model itself."""
+"""Small campaigns of hanger 3, without its plates, made by the general model itself."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _points(shape: FloatArray, plane: int, sd: float) -> tuple[ShapePoint, ...]:
 
 
 def scan_of(problem: GapProblem, hypothesis: Hypothesis) -> Scan:
-    """Return the scan of an effect beside the hanger alone; cut its prior by it, as a search does."""
+    """Return the scan of an effect beside the hanger alone, and cut its prior by it."""
     before = fit_alone(problem, np.random.default_rng(1))
     linear = Linear(problem.likelihood(Hypothesis()), before.slopes)
     found = scan(problem, before, linear, hypothesis)
