@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.gap.contract import Fit, GapOptions
+from shm.gap.contract import Fit, GapOptions, Hypothesis
 from shm.gap.groups import SAME_BELOW, group, views_from_peaks
 from shm.gap.probabilities import Family, ScoredHypothesis, families, probabilities
 from shm.gap.problem import GapProblem
@@ -21,8 +21,6 @@ from shm.inference.options import Progress, silent
 from shm.values import Leads
 from shm.values.leading import MIN_NO_GAP_PROBABILITY, find_leading_cause
 
-OF_THE_ANSWER = 0.1
-"""Of hypotheses with this probability all draws are wanted: the answer rests on them."""
 WITHIN_REACH = 7.0
 """Judgement: at log odds of a thousand to one a cause has no chance beside the best one."""
 AS_GOOD_A_FIT = 1.0
@@ -105,17 +103,7 @@ def attribute(
     """
     search = Search(problem, options, rng, progress)
     search.run()
-    kinds = families(search.scored(), search.variants)
-    chances, _ = probabilities(kinds)
-    search.sample_further(
-        [
-            each.hypothesis
-            for kind, chance in zip(kinds, chances, strict=True)
-            for each in kind.tried
-            if each.fit is not None
-            and chance * np.exp(each.log_evidence - kind.best.log_evidence) > OF_THE_ANSWER
-        ]
-    )
+    search.sample_probable(lambda: _chances(search))
     tried = search.scored()
     kinds = families(tried, search.variants)
     likeliest = _fit([kind for kind in kinds if not kind.flexible])
@@ -139,6 +127,20 @@ def attribute(
         search=search,
         tried=tuple(tried),
     )
+
+
+def _chances(search: Search) -> dict[Hypothesis, float]:
+    """Return the probability of each hypothesis that was fitted."""
+    kinds = families(search.scored(), search.variants)
+    found = {}
+    for kind, chance in zip(kinds, probabilities(kinds)[0].tolist(), strict=True):
+        share = normalised(np.array([each.log_evidence for each in kind.tried]))
+        found |= {
+            each.hypothesis: chance * float(part)
+            for each, part in zip(kind.tried, share, strict=True)
+            if each.fit is not None
+        }
+    return found
 
 
 def _explanations(

@@ -40,11 +40,11 @@ _DIFFERENCE, _STEEPEST, _FARTHEST = 1e-4, 1e3, 4.5
 # from which on a peak is not drawn about.
 _SAME, _FAR_BELOW = 0.3, 10.0
 # Numerical: draws and their proposals. Weights correct for all of them.
-_ROUND, MOST_ROUNDS, _AT_FIRST, _FROM_PRIOR, _FROM_FIRST = 150, 40, 0.3, 0.1, 0.2
+_ROUND, MOST_ROUNDS, _AT_FIRST, _FROM_PRIOR, _FROM_FIRST = 150, 30, 0.3, 0.1, 0.2
 _WIDTHS, _WIDE_EVERY, _CANDIDATES = (1.0, 2.0), 4, 3000
 _LEAST_WEIGHT, _RIDGE = 1e-2, 1e-6
-_CLUSTERS, _FROM_WITHOUT = 3, 0.4
-_SETTLED = 0.3  # of a prior's standard deviation: over less the slopes of linear parameters hold
+_CLUSTERS, _FROM_WITHOUT, _PARTS, _POPULATION = 3, 0.4, 8, 600
+_SETTLED, _MOST_SETTLED = 0.3, 4  # of a prior's standard deviation: over less the slopes of linear parameters hold
 
 
 class Problem(Protocol):
@@ -195,19 +195,27 @@ class _Collapsed:
     def settle(self, w: FloatArray) -> tuple[_Draws, FloatArray]:
         """Return points with other parameters w (n, o), and the log of their target density (n,).
 
-        Where the linear parameters go far, the model is solved once more there.
+        Where the linear parameters go far, the model is solved again there.
         """
         columns, z = self.target.linear, self.along(w)
+        start = z[:, columns].copy()
         residual = self.target.residual(z)
-        log, step, node = self.linear.marginal(residual, z[:, columns])
+        log, step, node = self.linear.marginal(residual, start)
+        moved = start + step
         far = np.flatnonzero((np.abs(step) > _SETTLED).any(axis=1))
-        if len(far):
+        for _ in range(_MOST_SETTLED):
+            if not len(far):
+                break
             there = z[far].copy()
-            there[:, columns] += step[far]
-            moved = self.target.residual(there) + step[far] @ self.slopes[:, columns].T
-            residual[far] = moved
-            log[far], step[far], node[far] = self.linear.marginal(moved, z[np.ix_(far, columns)])
-        z[:, columns] += step
+            there[:, columns] = moved[far]
+            # As if the slopes held from the start on, so that all points are alike.
+            back = (moved[far] - start[far]) @ self.slopes[:, columns].T
+            residual[far] = self.target.residual(there) + back
+            log[far], step, node[far] = self.linear.marginal(residual[far], start[far])
+            change = np.abs(start[far] + step - moved[far])
+            moved[far] = start[far] + step
+            far = far[(change > _SETTLED).any(axis=1)]
+        z[:, columns] = moved
         return _Draws(z, node, residual), np.asarray(log + log_normal(w))
 
     def log_target(self, w: FloatArray, residual: FloatArray) -> FloatArray:
@@ -320,7 +328,7 @@ class Sampling:
         )
         self._rounds = 0
         if len(target.other):
-            self._first = self._mixture = _parts(target, peaks, without, rng)
+            self._first = _parts(target, peaks, without, rng)
             self._proposal: _Proposal = _Wide(self._first, _AT_FIRST)
 
     @property
@@ -348,9 +356,10 @@ class Sampling:
         self._pool.add(self._proposal, _ROUND, batch, log)
         self._rounds += 1
         weights = tempered(self._pool.log_weights, 6 * len(other), 0.7, 1e-3)
-        refitted = self._mixture.refitted(self._pool.batch.z[:, other], weights)
-        self._mixture = refitted.mixed(self._first, _FROM_FIRST)
-        self._proposal = wide = _Wide(self._mixture, _FROM_PRIOR)
+        known = self._pool.batch.z[:, other]
+        likely = known[systematic(weights, _POPULATION, self.rng)]
+        clusters = TMixture.of(likely, _PARTS, self.rng).refitted(known, weights)
+        self._proposal = wide = _Wide(clusters.mixed(self._first, _FROM_FIRST), _FROM_PRIOR)
         if self._rounds % _WIDE_EVERY > 1:
             self._proposal = _Surrogate(self._collapsed, self._pool.batch, weights, wide)
 

@@ -22,7 +22,13 @@ from shm.gap.repeated_errors import (
     turn_loads,
 )
 from shm.inference.described import DescribedCoordinates
-from shm.inference.systematic_errors import loads_of_radii, shared_loads
+from shm.inference.systematic_errors import (
+    errors_of_bar,
+    felt_by,
+    loads_of_radii,
+    mean_of_ends,
+    shared_loads,
+)
 from shm.models import AsMade
 from shm.models.as_made import BENDING
 from shm.models.beam import Beam3
@@ -93,6 +99,8 @@ class GapProblem:
         """
         sd = np.sqrt(np.diag(peak.covariance))
         candidates = self.described.nearly_linear
+        if not len(candidates):
+            return
         steps = np.zeros((len(candidates), len(peak.z)))
         steps[np.arange(len(candidates)), candidates] = sd[candidates]
         alone = Hypothesis()
@@ -141,9 +149,11 @@ class GapProblem:
         """
         theta = self.coordinates(hypothesis).theta(z)
         if design is None:
-            return self._predicted(hypothesis.effects, theta, self.design, self._scaling)
+            found = self._predicted(hypothesis.effects, theta, self.design, self._scaling)
+            return found + self._usual
         scaling = ShapeScaling.of(design, self.hanger.length_m)
-        return self._predicted(hypothesis.effects, theta, design, scaling)
+        found = self._predicted(hypothesis.effects, theta, design, scaling)
+        return found + self.usual_of(design)
 
     def predict_beside(
         self, hypothesis: Hypothesis, z: FloatArray, effect: FloatArray
@@ -156,7 +166,8 @@ class GapProblem:
         theta = self.coordinates(before).theta(np.atleast_2d(z))
         theta = np.broadcast_to(theta, (len(effect), theta.shape[1]))
         whole = np.hstack([theta, effect])
-        return self._predicted(hypothesis.effects, whole, self.design, self._scaling)
+        found = self._predicted(hypothesis.effects, whole, self.design, self._scaling)
+        return found + self._usual
 
     def tension_n(
         self, hypothesis: Hypothesis, z: FloatArray, rng: np.random.Generator | None = None
@@ -238,6 +249,29 @@ class GapProblem:
         )
         return np.hstack([section, shared])
 
+    @cached_property
+    def _usual(self) -> FloatArray:
+        return self.usual_of(self.design)
+
+    def usual_of(self, design: Design) -> FloatArray:
+        """Return what usual sensors and supports do to the data of a design (data,)."""
+        found = np.zeros(design.size)
+        if not self.hanger.as_hanger:
+            return found
+        theta, plane = self.described.theta(self.near), design.frequency_plane
+        near = self._predicted(
+            (), theta, design, ShapeScaling.of(design, self.hanger.length_m)
+        )
+        frequency_hz = np.exp(near[:, : design.frequencies])
+        ends = self.model.end_waves(theta, frequency_hz, plane)
+        places = tuple(design.places_m[place] for place in np.unique(design.shape_place))
+        sensors, _ = errors_of_bar(
+            self.hanger, design.frequency_order, felt_by(ends[0]), places
+        )
+        supports = mean_of_ends(ends, self.model.stiff_ends_m, self.hanger.assumptions)[0]
+        found[: design.frequencies] = sensors + supports
+        return found
+
     def sensors_of(self, design: Design) -> FloatArray:
         """What errors of sensors do to the shapes of a new design: loads (S, k)."""
         near = self._predicted_near(design)
@@ -274,7 +308,9 @@ class GapProblem:
         z = np.zeros((len(_TENSIONS), self.described.dimension))
         z[:, 0] = _TENSIONS
         count = self.design.frequencies
-        apart = (self.predict(Hypothesis(), z) - self.observations.value)[:, :count]
+        theta = self.described.theta(z)
+        predicted = self._predicted((), theta, self.design, self._scaling)
+        apart = (predicted - self.observations.value)[:, :count]
         misfit = np.sqrt(np.mean(apart**2, axis=1))
         return z[[int(misfit.argmin())]], float(misfit.min())
 

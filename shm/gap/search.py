@@ -7,7 +7,7 @@ from. What a scan or a climb leaves far behind the best is tried no further.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -43,9 +43,10 @@ SUPPORTED = 2.0
 """Log evidence that an effect gains where it explains something, so that pairs are tried."""
 DROWNED = "Even at its largest it would drown in the errors of these data."
 _MOST_SCANNED, _MOST_PAIRS = 12, 8
-# Numerical: log evidence behind the best, and how many, of those sampled rather than approximated;
-# effective draws and rounds of these. What the answer rests on is sampled further.
-_CLOSE, _MOST_SAMPLED, _ROUGHLY = 3.0, 4, (40, 8)
+OF_THE_ANSWER = 0.1
+"""Hypotheses with this probability are sampled: the answer rests on them."""
+_MOST_SAMPLED = 5  # numerical: with probabilities above a tenth there are seldom more
+_ROUGHLY = 40, 8  # numerical: effective draws and rounds that tell the classes' evidence apart
 
 
 def hypotheses(problem: GapProblem, without: tuple[str, ...] = ()) -> tuple[Hypothesis, ...]:
@@ -95,8 +96,8 @@ class Search:
         self.baseline = fit_alone(problem, rng, options.draws)
         self.fits: dict[Hypothesis, Fit] = {ALONE: self.baseline}
         self.rough: dict[Hypothesis, float] = {ALONE: laplace(self.baseline.peaks)}
-        self._beyond = [self.baseline.log_evidence - self.rough[ALONE]]
-        self._samplings: dict[Hypothesis, Sampling] = {}
+        # What sampling finds beyond Laplace's method is nearly common: the hanger's own part.
+        self._beyond = self.baseline.log_evidence - self.rough[ALONE]
         linear = Linear(problem.likelihood(ALONE), self.baseline.slopes)
         every = hypotheses(problem, options.without)
         scans = {h: scan(problem, self.baseline, linear, h) for h in every}
@@ -135,8 +136,7 @@ class Search:
                     draws=laws.draws,
                 )
             tried.append(own)
-        beyond = float(np.mean(self._beyond))
-        rest = [(h, log + beyond) for h, log in self.rough.items() if h not in self.fits]
+        rest = [(h, log + self._beyond) for h, log in self.rough.items() if h not in self.fits]
         return tried + [ScoredHypothesis(h, log, log) for h, log in rest]
 
     def _level(self, hypothesis: Hypothesis) -> float:
@@ -159,45 +159,39 @@ class Search:
         return list(dict.fromkeys([*near, *each_once.values()]))
 
     def _fit(self, starts: Mapping[Hypothesis, FloatArray]) -> None:
-        """Climb from the starts of each hypothesis, then draw from those that come near the best.
-
-        The likeliest are sampled, the others approximated.
-        """
-        climbed: dict[Hypothesis, tuple[Target, list[Peak]]] = {}
+        """Climb from the starts of each hypothesis; approximate those that come near the best."""
+        climbed: dict[Hypothesis, list[Peak]] = {}
         for hypothesis, z in starts.items():
             target = Target(self.problem, hypothesis)
             hopeless = max(self.rough[h] for h in self.fits) - 2 * HOPELESS
             peaks = find_peaks(target, z, -np.inf if hypothesis.flexible else hopeless)
             if peaks:
-                climbed[hypothesis] = target, peaks
+                climbed[hypothesis] = peaks
                 self.rough[hypothesis] = laplace(peaks)
         best = max(self._level(h) for h in (*self.fits, *climbed))
-        ranked = sorted(climbed, key=lambda h: -self._level(h))
-        for count, hypothesis in enumerate(ranked):
-            behind = best - self._level(hypothesis)
-            if behind > HOPELESS and not hypothesis.flexible:
-                continue
-            target, peaks = climbed[hypothesis]
-            without = self.baseline if hypothesis.effects else None
-            sampling = Sampling(target, peaks, self.rng, without)
-            self._samplings[hypothesis] = sampling
-            if count < _MOST_SAMPLED and behind < _CLOSE:
-                sampling.run(*_ROUGHLY)
-                found = sampling.fit(self.draws)
-                self._beyond.append(found.log_evidence - self.rough[hypothesis])
-            else:
-                off = float(np.mean(self._beyond))
-                found = approximate(target, peaks, self.draws, self.rng, off)
-            self.fits[hypothesis] = found
+        for hypothesis, peaks in climbed.items():
+            if hypothesis.flexible or self._level(hypothesis) > best - HOPELESS:
+                target = Target(self.problem, hypothesis)
+                found = approximate(target, peaks, self.draws, self.rng, self._beyond)
+                self.fits[hypothesis] = found
 
-    def sample_further(self, probable: Sequence[Hypothesis]) -> None:
-        """Sample what the answer rests on until enough draws are effective."""
-        for hypothesis in probable:
-            if hypothesis in self._samplings:
-                self.progress(f"sampling {hypothesis.name or 'something unknown'}", 0.9)
-                sampling = self._samplings[hypothesis]
-                sampling.run(ENOUGH_EFFECTIVE, MOST_ROUNDS)
-                self.fits[hypothesis] = sampling.fit(self.draws)
+    def sample_probable(self, chance: Callable[[], Mapping[Hypothesis, float]]) -> None:
+        """Sample what the answer rests on, by `chance` of each hypothesis, the likeliest first."""
+        for _ in range(_MOST_SAMPLED):
+            open_ = {
+                h: p
+                for h, p in chance().items()
+                if p > OF_THE_ANSWER and self.fits[h].method == "normal"
+            }
+            if not open_:
+                break
+            hypothesis = max(open_, key=lambda h: open_[h])
+            self.progress(f"sampling {hypothesis.name or 'something unknown'}", 0.9)
+            without = self.baseline if hypothesis.effects else None
+            target, peaks = Target(self.problem, hypothesis), self.fits[hypothesis].peaks
+            sampling = Sampling(target, peaks, self.rng, without)
+            sampling.run(ENOUGH_EFFECTIVE, MOST_ROUNDS)
+            self.fits[hypothesis] = sampling.fit(self.draws)
 
     def _leading(self, most: int, effects: int) -> list[Fit]:
         """Return the likeliest fit of each of the leading effects, or pairs."""
