@@ -126,9 +126,6 @@ def test_search_sound_tries_no_pairs() -> None:
     assert max(found.values(), key=lambda each: each.log_evidence).hypothesis == ALONE
 
 
-# FAULT: `Target.climb` stops at 4.5 (`_FARTHEST`) where the bar alone would need 8, so `laplace` of
-# the baseline is 87 below its evidence. The mean of `Search._beyond`, 29, is added to what was not
-# sampled, which then leads.
 def test_search_planted_pair_leads() -> None:
     found = scored(searched(12.0, 3.1, 0.3)[0])
     plain = [each for each in found.values() if not each.hypothesis.flexible]
@@ -154,11 +151,11 @@ def test_scored_laws_of_fitted_effects() -> None:
             assert abs(each.log_evidence - each.fit.log_evidence) < 1
 
 
-def test_sample_further_enough_draws() -> None:
+def test_sample_probable_enough_draws() -> None:
     search, _ = searched(12.0, 3.1)
-    search.sample_further([MASS])
+    search.sample_probable(lambda: {MASS: 0.9})
     assert search.fits[MASS].method == "sampled"
-    assert search._samplings[MASS].effective >= ENOUGH_EFFECTIVE
+    assert search.fits[MASS].effective == 50  # of 50 draws
 
 
 def test_progress_never_goes_back() -> None:
@@ -167,6 +164,8 @@ def test_progress_never_goes_back() -> None:
     assert {"baseline", "single effects", "pairs", "something unknown"} <= set(labels)
 
 
+# FAULT: eight seeds give 50.2 to 51.1, a scatter of 0.3 where `log_evidence_sd` is 0.07; the fewer
+# rounds, the less.
 def test_fit_alone_springs_any_seed() -> None:
     """One test of two planes, ends on springs: evidence and tension do not depend on the seed."""
     found = [
@@ -181,7 +180,8 @@ def test_fit_alone_springs_any_seed() -> None:
     assert np.mean(tension[0]) == pytest.approx(np.mean(tension[1]), abs=0.3 * half)
 
 
-# FAULT: as above; laplace([peak]) is -127.2, the evidence -40.1.
+# FAULT: `Target.climb` stops at 4.5 (`_FARTHEST`) where the bar alone needs 8: laplace(peaks) is far
+# below the evidence, and `Search._beyond` adds the difference to all that is not sampled.
 def test_fit_alone_far_off_priors() -> None:
     """A bar that must be 8 standard deviations off is climbed to all the same."""
     found = searched(12.0, 3.1, 0.3)[0].baseline

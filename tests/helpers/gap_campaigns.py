@@ -84,7 +84,20 @@ def campaign(
                 added_mass=mass,
             )
         )
-    return tuple(taken)
+    return with_usual_errors(taken)
+
+
+def with_usual_errors(tests: Sequence[ModalTest]) -> tuple[ModalTest, ...]:
+    """Return tests with what usual sensors and supports do to their frequencies."""
+    problem = problem_of(tests)
+    factor = np.exp(problem.usual_of(problem.design))
+    rows = iter(factor.tolist())
+    return tuple(
+        replace(
+            test, modes=tuple(replace(m, frequency_hz=m.frequency_hz * next(rows)) for m in test.modes)
+        )
+        for test in tests
+    )
 
 
 def problem_of(
