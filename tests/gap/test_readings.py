@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from shm.assumptions import DEFAULTS
-from shm.documents import dump
-from shm.errors import BadInput
 from shm.gap import GapOptions, diagnose
 from shm.gap.contract import Hypothesis
 from shm.gap.data_checks import usable
 from shm.gap.observations import observed
-from shm.inference.priors import reading_of
 from shm.models.effects import EFFECTS
 from shm.models.hanger import PhysicalHanger, solve
-from shm.modes_document import modes_document, parse_modes
 from shm.report.diagnosis_wording import is_of_the_measurement
 from shm.values import NAN, FloatArray, ModalTest, Mode, Supports, group_causes
 from tests.helpers.effects import all_but
@@ -159,43 +154,6 @@ def test_only_a_load_scale_parts_the_true_tension_from_the_one_at_rest() -> None
             share = 0.8 if name == "load_scale" else 1.0
             expected = share * weighed.nominal_tension_n
             assert problem.tension_n(hypothesis, z) == pytest.approx(expected), name
-
-
-def test_a_reading_survives_the_modes_document_and_is_absent_where_there_was_none() -> None:
-    tests = loadings(frequencies_hz(np.full(2, 7e5)), (600e3, NAN), SD_N)
-    document = json.loads(dump(modes_document(tests)))
-    assert "tension_read_n" not in document["tests"][1]
-    one, other = parse_modes(document)
-    assert (one.tension_read_n, one.tension_read_sd_n) == (600e3, SD_N)
-    assert np.isnan(other.tension_read_n)
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"tension_read_sd_n": 1e4},
-        {"tension_read_n": 6e5, "tension_read_sd_n": 0.0},
-        {"tension_read_n": -1.0, "tension_read_sd_n": 1.0},
-    ],
-)
-def test_a_reading_that_is_none_is_refused(values: dict[str, float]) -> None:
-    tests = loadings(frequencies_hz(np.full(1, 7e5)), (NAN,), SD_N)
-    document = json.loads(dump(modes_document(tests)))
-    document["tests"][0] |= values
-    with pytest.raises(BadInput, match="tension_read"):
-        parse_modes(document)
-
-
-def test_a_reading_without_a_standard_deviation_is_taken_as_an_ordinary_lift_off() -> None:
-    tests = loadings(frequencies_hz(np.full(1, 7e5)), (NAN,), SD_N)
-    document = json.loads(dump(modes_document(tests)))
-    document["tests"][0] |= {"tension_read_n": 6e5}
-    (test,) = parse_modes(document)
-    assert np.isnan(test.tension_read_sd_n)
-    reading = reading_of([test])
-    assert reading is not None
-    usual_n = DEFAULTS.tension_reading_sd.value * 6e5
-    assert reading == reading_of([replace(test, tension_read_sd_n=usual_n)])
 
 
 def test_readings_without_a_standard_deviation_shift_the_diagnosed_tension_too() -> None:

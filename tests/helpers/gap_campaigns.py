@@ -94,7 +94,8 @@ def with_usual_errors(tests: Sequence[ModalTest]) -> tuple[ModalTest, ...]:
     rows = iter(factor.tolist())
     return tuple(
         replace(
-            test, modes=tuple(replace(m, frequency_hz=m.frequency_hz * next(rows)) for m in test.modes)
+            test,
+            modes=tuple(replace(m, frequency_hz=m.frequency_hz * next(rows)) for m in test.modes),
         )
         for test in tests
     )
