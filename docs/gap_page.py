@@ -15,6 +15,7 @@ from shm_cli.example import HANGER_FILE, MODES_FILE
 _END_FLEXIBILITY = ("rotational_end_flexibility", "translational_end_flexibility")
 _ALL = f"all {len(EFFECTS)} effects"
 _CASES = (
+    ("", _ALL, ()),
     ("beam1", _ALL, ()),
     ("beam1", "without end flexibility", _END_FLEXIBILITY),
     (
@@ -38,7 +39,7 @@ def hanger_3_table(seed: int = 1) -> str:
     rows = []
     for baseline, catalogue, without in _CASES:
         found = diagnose(tests, hanger, GapOptions(baseline, without=without, seed=seed))
-        rows.append((baseline, catalogue, *_row(found)))
+        rows.append((baseline or f"preferred: {found.baseline}", catalogue, *_row(found)))
     return markdown(_HEAD, rows)
 
 

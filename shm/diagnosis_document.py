@@ -14,7 +14,7 @@ from dataclasses import asdict, fields
 from typing import Any
 
 from shm.documents import value_of
-from shm.values import NAN, BridgeDiagnosis, Cause, Diagnosis, GapVerdict
+from shm.values import NAN, BridgeDiagnosis, Cause, Diagnosis, GapCheck, GapVerdict
 
 DIAGNOSIS_SCHEMA = "shm.diagnosis/1"
 BRIDGE_DIAGNOSIS_SCHEMA = "shm.bridge_diagnosis/1"
@@ -116,3 +116,28 @@ def _find_effective_draws(remarks: Sequence[str]) -> float:
         re.match(r"The sampler failed for .*: (\d+) effective draws", each) for each in remarks
     ]
     return min((float(each[1]) for each in found if each), default=NAN)
+
+
+def gap_check_document(check: GapCheck) -> dict[str, Any]:
+    """Return the document of `shm gap check --json`.
+
+    `found_from` and `alone_from` of an effect are indices of `sizes`; `size` is the former's.
+    """
+    shown = ("size", "alone_from", "others", "taken_for")
+    return {
+        "schema": GAP_CHECK_SCHEMA,
+        **asdict(check),
+        "effects": [
+            {**asdict(each), **{name: getattr(each, name) for name in shown}}
+            for each in check.effects
+        ],
+        "invisible": [{"effect": name, "why": why} for name, why in check.invisible],
+        "false_gaps": check.false_gaps,
+        "is_complete": check.is_complete,
+    }
+
+
+def gap_check_of(document: Mapping[str, Any]) -> GapCheck:
+    """Read a check from its document; raises KeyError, TypeError or ValueError."""
+    invisible = [(each["effect"], each["why"]) for each in document["invisible"]]
+    return value_of(GapCheck, {**document, "invisible": invisible})

@@ -157,9 +157,7 @@ def _facts(effect: Effect) -> str:
         f"- Source: {effect.source}",
     ]
     if effect.other_laws:
-        lines.append(
-            f"- Or by another law, which the diagnosis allows for: {'; '.join(effect.other_laws)}."
-        )
+        lines.append(f"- A real one may follow another law: {'; '.join(effect.other_laws)}.")
     return "\n".join(lines)
 
 

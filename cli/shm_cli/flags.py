@@ -157,3 +157,19 @@ def hanger(required: bool = False) -> Callable[[F], F]:
 hanger_file = click.option(
     "--hanger-file", type=FILE, metavar="H.toml", help="A [[hanger]] table, instead of a workspace."
 )
+
+baseline = click.option(
+    "--baseline",
+    metavar="NAME",
+    default="",
+    shell_complete=completion.models,
+    help="The model class whose gap is diagnosed.  [default: the beam that these data prefer]",
+)
+latest = click.option(
+    "--tests",
+    "count",
+    type=click.IntRange(1, 100),
+    default=20,
+    metavar="N",
+    help="How many of the latest tests of a hanger of the workspace.",
+)

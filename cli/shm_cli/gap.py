@@ -51,13 +51,6 @@ from shm_cli.common import (
 from shm_cli.effects import effects
 from shm_cli.gap_check import check
 
-_baseline = click.option(
-    "--baseline",
-    metavar="NAME",
-    default=GapOptions().baseline,
-    shell_complete=completion.models,
-    help="The model class whose gap is diagnosed.",
-)
 _without = click.option(
     "--without",
     multiple=True,
@@ -90,7 +83,7 @@ def command() -> None:
     metavar="HOURS",
     help="Hours of a crew that the plan may cost.  [default: as many as it takes]",
 )
-@_baseline
+@flags.baseline
 @_without
 @flags.seed
 @flags.json
@@ -124,7 +117,12 @@ def plan(
     rows = _rows(steps)
     if flags.wants_json() or not steps:
         answer(
-            {"hanger": diagnosis.hanger, "baseline": baseline, "seed": seed, "steps": rows},
+            {
+                "hanger": diagnosis.hanger,
+                "baseline": diagnosis.baseline,
+                "seed": seed,
+                "steps": rows,
+            },
             "" if steps else nothing_planned(race, bridge.measurement_hours, most_hours),
         )
         return
@@ -138,8 +136,8 @@ def plan(
     ]  # fmt: skip
     show_rows("Next measurements", _HEADS, cells)
     click.echo(
-        "Of the true explanation against all others, averaged over which it is; make the first, "
-        "diagnose, and plan anew."
+        f"Baseline {diagnosis.baseline}. Of the true explanation against all others, averaged over "
+        "which it is; make the first, diagnose, and plan again."
     )
 
 
@@ -168,7 +166,7 @@ def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:
 @flags.hanger()
 @flags.hanger_file
 @click.option("--bridge", is_flag=True, help="All hangers of the workspace together.")
-@_baseline
+@flags.baseline
 @_without
 @click.option(
     "--hold-out",
@@ -177,14 +175,7 @@ def _rows(steps: Sequence[PlannedMeasurement]) -> list[dict[str, Any]]:
     show_default="every order and every test in turn",
     help="Leave a test or an order of modes out of the fit and predict it; may be given again.",
 )
-@click.option(
-    "--tests",
-    "count",
-    type=click.IntRange(1, 100),
-    default=20,
-    metavar="N",
-    help="How many of the latest tests of a hanger of the workspace.",
-)
+@flags.latest
 @flags.seed
 @click.option(
     "--html", type=flags.NewFile(), metavar="FILE", help="Write a page with all figures here."

@@ -44,14 +44,7 @@ _PICTURES = (".svg", ".png")
     shell_complete=completion.effects,
     help="Plant these alone.  [default: all of the catalogue]",
 )
-@click.option(
-    "--baseline",
-    metavar="NAME",
-    default=CheckOptions().baseline,
-    show_default=True,
-    shell_complete=completion.models,
-    help="The model class of the twin, whose gap is diagnosed.",
-)
+@flags.baseline
 @click.option(
     "--seeds",
     type=click.IntRange(1, 50),
@@ -75,14 +68,7 @@ _PICTURES = (".svg", ".png")
     metavar="N",
     help="Diagnoses that run at the same time.",
 )
-@click.option(
-    "--tests",
-    "count",
-    type=click.IntRange(1, 100),
-    default=20,
-    metavar="N",
-    help="How many of the latest tests of a hanger of the workspace.",
-)
+@flags.latest
 @flags.seed
 @click.option(
     "--figure", type=flags.NewFile(), metavar="FILE", help="Draw the result here, .svg or .png."
@@ -119,14 +105,11 @@ def check(
         )
     tests, hanger = _measured(ctx, file, hanger_file, hanger_id, count)
     chosen = tuple(name.strip() for name in effects.split(",")) if effects else ()
-    options = CheckOptions(chosen, baseline, seeds, sound, seed=seed, lanes=processes)
+    options = CheckOptions(chosen, baseline, seeds, sound, seed=seed)
     job = Check(tests, hanger, options)
     click.echo(_expected(job, processes), err=True)
     found = _run(job, processes)
-    if flags.wants_json():
-        show(gap_check_document(found))
-    else:
-        _print(found)
+    _answer(found)
     if figure is not None:
         if not found.effects:
             raise NothingThere(f"no effect was checked: {figure} is not drawn.")
@@ -170,8 +153,8 @@ def _run(job: Check, processes: int) -> GapCheck:
     done = []
     try:
         with advancing_bar() as progress, _executor(min(processes, len(job.searches))) as executor:
-            for search in job.searched(progress, executor):
-                done.append(search)
+            for trials in job.run(progress, executor):
+                done.append(trials)
     except KeyboardInterrupt:
         if not done:
             raise
@@ -194,7 +177,10 @@ def _executor(processes: int) -> Iterator[Executor | None]:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _print(found: GapCheck) -> None:
+def _answer(found: GapCheck) -> None:
+    if flags.wants_json():
+        show(gap_check_document(found))
+        return
     click.echo(paragraph(introduction(found)))
     if found.effects:
         made = table("What a diagnosis would find", *HEADINGS)

@@ -331,10 +331,10 @@ def diagnose(
 ) -> Diagnosis:
     """Where the baseline and the tests of a hanger differ, which effect causes it, what it changes.
 
-    `baseline` is the model class whose gap is diagnosed. `without` are effects taken out of the
-    catalogue; `hold_out` what is left out of the fit and predicted: ids of tests or orders of modes
-    (empty: every one in turn). `draws` are kept of each posterior. `progress` hears a label and the
-    fraction done.
+    `baseline` is the model class whose gap is diagnosed, empty for the beam that these data prefer;
+    `Diagnosis.baseline` names it. `without` are effects taken out of the catalogue; `hold_out` what
+    is left out of the fit and predicted: ids of tests or orders of modes (empty: every one in
+    turn). `draws` are kept of each posterior. `progress` hears a label and the fraction done.
 
     The probabilities of `Diagnosis.causes`, of no gap and of something unknown add to 1;
     `Diagnosis.verdict` is what it claims, `Diagnosis.leading` the most probable cause, None where
@@ -342,7 +342,7 @@ def diagnose(
     tests cannot be used, UsageError for a model class, effect, test or order that is not there.
 
     Example:
-        >>> diagnosis = shm.diagnose(tests, hanger, baseline="beam1")
+        >>> diagnosis = shm.diagnose(tests, hanger)
         >>> diagnosis.leading.effect
         'point_mass'
     """
@@ -365,10 +365,11 @@ def check_gap(
 
     Each of `effects` (all of the catalogue if empty) is planted in a simulated twin of the hanger
     with the modes, sensors, errors and conditions of `tests`, and diagnosed: two or three sizes for
-    each of `seeds`, 5 to 30 s each. Without `tests`, `()`, the twin is the description with a usual
-    hammer test. `sound` twins have no effect: `GapCheck.false_gaps` counts gaps that are claimed in
-    them. `shm gap check` does the same on all processors. Raises BadInput where the tests cannot be
-    used, UsageError for a model class or an effect that is not there.
+    each of `seeds`, 5 to 30 s each. The twin is the model class `baseline`, empty for the beam that
+    these data prefer; without `tests`, `()`, it is the description with a usual hammer test.
+    `sound` twins have no effect: `GapCheck.false_gaps` counts gaps that are claimed in them. `shm
+    gap check` does the same on all processors. Raises BadInput where the tests cannot be used,
+    UsageError for a model class or an effect that is not there.
 
     Example:
         >>> check = shm.check_gap(tests, hanger, effects=["point_mass"])

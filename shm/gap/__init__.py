@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from shm.gap.bridge_diagnosis import diagnose_bridge
 from shm.gap.contract import GapOptions
 from shm.gap.diagnose import diagnose
 from shm.inference.options import Progress
 
-__all__ = ["GapOptions", "Progress", "diagnose"]
+__all__ = ["GapOptions", "Progress", "diagnose", "diagnose_bridge"]

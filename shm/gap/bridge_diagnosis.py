@@ -1,8 +1,8 @@
 """The joint diagnosis of several hangers: one cause that they share, or each for itself.
 
-Each hanger is diagnosed for itself; what that says is then weighed again under causes in common
+Each hanger is diagnosed for itself; its evidence is then weighed again under shared causes
 (`shm.gap.shared_causes`). So a bridge costs little more than its hangers, and no data are used
-twice: a hanger's own priors are taken out before the family's come in.
+twice: a hanger's own priors are taken out before those of the group come in.
 """
 
 from __future__ import annotations
@@ -16,14 +16,24 @@ import numpy as np
 import scipy
 
 from shm.errors import UsageError
-from shm.gap.attribution import SAME_BELOW
+from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import GapOptions
 from shm.gap.coordinates import scale_free
 from shm.gap.diagnose import examined, tension_estimate
-from shm.gap.model_probabilities import CALIBRATION, SINGLE, UNKNOWN
-from shm.gap.shared_causes import LEAST, SCATTERS, Own, Shared, Sizes, kin, shared, sizes, unknown
-from shm.gap.shared_evidence import Patient, Place, Reach, patient
-from shm.inference.mixture import systematic
+from shm.gap.groups import SAME_BELOW
+from shm.gap.probabilities import SINGLE, UNKNOWN
+from shm.gap.shared_causes import (
+    LEAST,
+    SCATTERS,
+    OwnCauses,
+    SharedEvidence,
+    SizeGrid,
+    find_groups,
+    weigh_shared,
+    weigh_unknown,
+)
+from shm.gap.shared_evidence import HangerEvidence, Place, Sizes, weigh_hanger
+from shm.inference.mixture import normalised, systematic
 from shm.inference.options import Progress, silent
 from shm.values import (
     BridgeDiagnosis,
@@ -41,12 +51,11 @@ from shm.values import (
 SHARED = 0.5
 _KNOWN = SINGLE / (SINGLE + UNKNOWN)
 
-_JOINTLY = 0.9  # technical: the part of the time that single hangers take
+_JOINTLY = 0.9  # numerical: the part of the time that single hangers take
 _AS_LIKELY = 1.5
 """Places of one effect whose log evidences differ by less are not told apart."""
-_FAINT = 1e-4  # of a probability: what is less likely changes no number that is told
-_TINY = 1e-300  # technical: a sum that is none
-_DRAWS = 4000  # technical: a 95 % interval to 2 % of its width
+_NEGLIGIBLE = 1e-4  # of a probability: what is less likely changes no number of the diagnosis
+_DRAWS = 4000  # numerical: a 95 % interval to 2 % of its width
 
 
 def diagnose_bridge(
@@ -54,7 +63,7 @@ def diagnose_bridge(
     options: GapOptions | None = None,
     progress: Progress = silent,
 ) -> BridgeDiagnosis:
-    """Whether several hangers, each with its tests, share a cause; which, who has it, what then.
+    """Return whether several hangers, each with its tests, share a cause; which, and who has it.
 
     The same tests, options and seed give the same answer. Raises UsageError for fewer than two
     hangers or two of one number, and whatever `diagnose` raises of a single one.
@@ -67,26 +76,26 @@ def diagnose_bridge(
     options = options or GapOptions()
     started = time.perf_counter()
     _check([hanger for hanger, _ in hangers])
-    patients = []
+    evidence = []
     for index, (hanger, tests) in enumerate(hangers):
 
-        def tell(label: str, done: float, at: int = index, of: int = hanger.id) -> None:
-            progress(f"hanger {of}: {label}", _JOINTLY * (at + done) / len(hangers))
+        def report(label: str, done: float, at: int = index, number: int = hanger.id) -> None:
+            progress(f"hanger {number}: {label}", _JOINTLY * (at + done) / len(hangers))
 
-        patients.append(examined_patient(tests, hanger, options, tell))
+        evidence.append(examine_hanger(tests, hanger, options, report))
     progress("what they share", _JOINTLY)
-    found = jointly(patients, options, started)
+    found = diagnose_jointly(evidence, options, started)
     progress("what they share", 1.0)
     return found
 
 
-def examined_patient(
+def examine_hanger(
     tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions, progress: Progress = silent
-) -> Patient:
-    """A hanger diagnosed for itself."""
+) -> HangerEvidence:
+    """Return the evidence of a hanger that is diagnosed for itself."""
     diagnosis, attribution = examined(tests, hanger, options, progress)
     rng = np.random.default_rng([options.seed, hanger.id])
-    return patient(hanger, tests, diagnosis, attribution, rng)
+    return weigh_hanger(hanger, tests, diagnosis, attribution, rng)
 
 
 def _check(hangers: Sequence[Hanger]) -> None:
@@ -101,172 +110,132 @@ def _check(hangers: Sequence[Hanger]) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class _Weighed:
-    """An effect at a place shared by a family; `log_weight` is prior times evidence."""
+class _Candidate:
+    """An effect at a place shared by a group; `log_weight` is prior times evidence."""
 
     place: Place
-    found: Sizes
-    shared: Shared
+    grid: SizeGrid
+    shared: SharedEvidence
     log_weight: float
 
 
-def jointly(
-    patients: Sequence[Patient], options: GapOptions, started: float | None = None
+def diagnose_jointly(
+    hangers: Sequence[HangerEvidence], options: GapOptions, started: float | None = None
 ) -> BridgeDiagnosis:
-    """What hangers share, by what each says for itself."""
+    """Return the causes that hangers share, by the evidence of each."""
     started = time.perf_counter() if started is None else started
-    tried, families = _tried(patients), kin(patients)
-    nameless = [unknown(patients, each, Own.of(patients)).log_evidence for each in families]
-    unknowns = float(scipy.special.logsumexp(nameless)) + np.log(
-        SHARED * (1 - _KNOWN) / len(families)
-    )
-    mimics = [each.log_weight + _log_mimic_odds(patients, each) for each in tried]
-    whole = float(scipy.special.logsumexp([np.log(1 - SHARED), unknowns, *mimics, *_logs(tried)]))
-    by_effect: dict[str, list[_Weighed]] = {}
-    for each in sorted(tried, key=lambda each: -each.log_weight):
+    groups, own = find_groups(hangers), OwnCauses.of(hangers)
+    places = dict.fromkeys(place for each in hangers for place in each.effects)
+    variants = Counter(name for name, _ in places)
+    of_effect = np.log(SHARED * _KNOWN / max(len(variants), 1))
+    candidates = [
+        _Candidate(place, grid, shared, shared.log_evidence + float(log_prior))
+        for place in places
+        if (grid := SizeGrid.of(hangers, place)) is not None
+        for log_prior in [of_effect - np.log(variants[place[0]] * len(groups))]
+        for shared in [weigh_shared(grid, group, own) for group in groups]
+    ]
+    log_unknown = np.log(SHARED * (1 - _KNOWN) / len(groups))
+    unknown = [weigh_unknown(hangers, group, own) + log_unknown for group in groups]
+    unknown += [each.log_weight + _log_mimic_odds(hangers, each) for each in candidates]
+    known = [each.log_weight for each in candidates]
+    total = float(scipy.special.logsumexp([np.log(1 - SHARED), *unknown, *known]))
+    by_effect: dict[str, list[_Candidate]] = {}
+    for each in sorted(candidates, key=lambda each: -each.log_weight):
         by_effect.setdefault(each.place[0], []).append(each)
-    causes = [_cause(patients, every, whole) for every in by_effect.values()]
-    causes, groups = _grouped(sorted(causes, key=lambda each: -each.probability))
+    causes = [_cause(hangers, every, total, float(of_effect)) for every in by_effect.values()]
+    causes, inseparable = _grouped(sorted(causes, key=lambda each: -each.probability))
     return BridgeDiagnosis(
-        baseline=options.baseline,
-        hangers=tuple(each.hanger.id for each in patients),
-        each_for_itself_probability=float(np.exp(np.log(1 - SHARED) - whole)),
-        unknown_probability=float(np.exp(scipy.special.logsumexp([unknowns, *mimics]) - whole)),
+        baseline=", ".join(dict.fromkeys(each.diagnosis.baseline for each in hangers)),
+        hangers=tuple(each.hanger.id for each in hangers),
+        each_for_itself_probability=float(np.exp(np.log(1 - SHARED) - total)),
+        unknown_probability=float(np.exp(scipy.special.logsumexp(unknown) - total)),
         causes=tuple(causes),
-        groups=groups,
-        tensions=_tensions(patients, tried, whole, np.random.default_rng(options.seed)),
-        diagnoses=tuple(each.diagnosis for each in patients),
+        groups=inseparable,
+        tensions=_tensions(hangers, candidates, total, np.random.default_rng(options.seed)),
+        diagnoses=tuple(each.diagnosis for each in hangers),
         left_out=options.without,
         seed=options.seed,
         seconds=time.perf_counter() - started,
     )
 
 
-def _tried(patients: Sequence[Patient]) -> list[_Weighed]:
-    """Every effect at every place, shared by every family."""
-    own, families = Own.of(patients), kin(patients)
-    places = list(dict.fromkeys(place for each in patients for place in each.effects))
-    variants = Counter(name for name, _ in places)
-    tried = []
-    for place in places:
-        found = sizes(patients, place)
-        if found is None:
-            continue
-        prior = SHARED * _KNOWN / (len(variants) * variants[place[0]] * len(families))
-        for family in families:
-            said = shared(found, family, own)
-            tried.append(_Weighed(place, found, said, said.log_evidence + float(np.log(prior))))
-    return tried
+def _log_mimic_odds(hangers: Sequence[HangerEvidence], candidate: _Candidate) -> float:
+    """Return log odds of something unknown that passes for the effect in all that have it.
 
-
-def _logs(tried: Sequence[_Weighed]) -> list[float]:
-    return [each.log_weight for each in tried]
-
-
-def _log_mimic_odds(patients: Sequence[Patient], tried: _Weighed) -> float:
-    """Log odds of something unknown that passes for the effect, in all hangers that have it.
-
-    Its law may be off in every one of them, which speaks up with each; that it fits in each to the
-    letter says no more than in one, since what imitates one imitates all.
+    Its law may be off in every hanger, which adds up; that it fits in each to the letter says no
+    more than in one, since what imitates one imitates all.
     """
-    family, place = tried.shared.kin.members, tried.place
-    odds = np.array(
-        [
-            member * patients[index].effects[place].log_mimic_odds
-            for index, member in zip(family, tried.shared.member, strict=True)
-            if place in patients[index].effects
-        ]
+    shared = candidate.shared
+    odds = sum(
+        member * effect.log_mimic_odds
+        for index, member in zip(shared.group.members, shared.member.tolist(), strict=True)
+        if (effect := hangers[index].effects.get(candidate.place)) is not None
     )
-    together = float(odds.sum())
-    one = together / max(float(tried.shared.member.sum()), 1.0)
-    return max(together, one) + float(np.log(CALIBRATION.mimics_one * UNKNOWN / SINGLE))
+    one = odds / max(float(shared.member.sum()), 1.0)
+    return float(max(odds, one) + np.log(CALIBRATION.mimics_one * UNKNOWN / SINGLE))
 
 
-def _cause(patients: Sequence[Patient], tried: Sequence[_Weighed], whole: float) -> SharedCause:
-    """An effect, by what was tried of it: wherever it acts and whoever shares it, best first."""
-    best, log = tried[0], np.array(_logs(tried))
-    share = np.exp(log - scipy.special.logsumexp(log))
-    chance = np.zeros(len(patients))
-    for each, part in zip(tried, share, strict=True):
-        chance[list(each.shared.kin.members)] += part * each.shared.member
-    family = best.shared.kin.members
-    prior = SHARED * _KNOWN / len({name for each in patients for name, _ in each.effects})
-    also = [
-        each.place[1]
-        for each in tried
-        if each.place != best.place and each.log_weight > best.log_weight - _AS_LIKELY
-    ]
-    reach = next(p.effects[best.place].reach for p in patients if best.place in p.effects)
+def _cause(
+    hangers: Sequence[HangerEvidence],
+    candidates: Sequence[_Candidate],
+    total: float,
+    log_prior: float,
+) -> SharedCause:
+    """Return an effect by its candidates, of all places and groups, the best first."""
+    best, log = candidates[0], np.array([each.log_weight for each in candidates])
+    probability = np.zeros(len(hangers))
+    for each, share in zip(candidates, normalised(log), strict=True):
+        probability[list(each.shared.group.members)] += share * each.shared.member
+    log_weight = float(scipy.special.logsumexp(log))
+    near = [each.place[1] for each in candidates if each.log_weight > best.log_weight - _AS_LIKELY]
+    sizes = next(e.effects[best.place].sizes for e in hangers if best.place in e.effects)
+    of_group = best.shared.size.sum(axis=1)
+    size = _estimate(sizes, best.grid.x, best.grid.sign, of_group)
+    scatter = float(best.shared.size.sum(axis=0) @ SCATTERS)
+    family = best.shared.group.members
     return SharedCause(
         effect=best.place[0],
         at=best.place[1],
-        probability=float(np.exp(scipy.special.logsumexp(log) - whole)),
-        log_bayes_factor=float(scipy.special.logsumexp(log) - np.log(prior)),
-        likeness=best.shared.kin.likeness,
-        family=tuple(patients[index].hanger.id for index in family),
+        probability=float(np.exp(log_weight - total)),
+        log_bayes_factor=log_weight - log_prior,
+        likeness=best.shared.group.likeness,
+        family=tuple(hangers[index].hanger.id for index in family),
         members=tuple(
             SharedMember(
-                patients[index].hanger.id,
-                float(chance[index]),
-                _size(patients[index], best, row, index, reach),
+                hangers[index].hanger.id,
+                float(probability[index]),
+                _member_size(hangers[index], best, index) or size,
             )
-            for row, index in enumerate(family)
+            for index in family
         ),
-        size=_common_size(reach, best),
-        scatter=_scatter(best, reach),
-        also_at=tuple(dict.fromkeys(also)),
+        size=size,
+        scatter=10**scatter - 1 if scale_free(sizes.parameter) else scatter,
+        also_at=tuple(each for each in dict.fromkeys(near) if each != best.place[1]),
     )
 
 
-def _size(one: Patient, best: _Weighed, row: int, index: int, common: Reach) -> EffectEstimate:
-    """Of one hanger, seen with the others; what the family has, where it shows nothing itself."""
-    evidence = one.effects.get(best.place)
-    if evidence is None:
-        return _common_size(common, best)
-    weight = np.concatenate(
-        [
-            best.found.draw_weights(best.found.at[index], best.shared.weight[row]),
-            best.found.draw_weights(best.found.faint_at[index], best.shared.faint[row]),
-        ]
-    )
-    if weight.sum() < _TINY:
-        return _common_size(common, best)
-    x, sign = (
-        np.concatenate([getattr(each, name) for each in (evidence, evidence.faint)])
-        for name in ("x", "sign")
-    )
-    return _estimate(evidence.reach, x, sign, weight)
+def _member_size(hanger: HangerEvidence, best: _Candidate, index: int) -> EffectEstimate | None:
+    """Return the size in one hanger, seen with the others; None where it shows nothing itself."""
+    effect = hanger.effects.get(best.place)
+    if effect is None:
+        return None
+    weight = best.shared.point_weights(best.grid, effect, index)
+    return _estimate(effect.sizes, effect.x, effect.sign, weight) if weight.any() else None
 
 
-def _common_size(reach: Reach, best: _Weighed) -> EffectEstimate:
-    weight = best.shared.size.sum(axis=1)
-    return _estimate(reach, best.found.x, best.found.sign, weight)
-
-
-def _estimate(reach: Reach, x: FloatArray, sign: FloatArray, weight: FloatArray) -> EffectEstimate:
+def _estimate(sizes: Sizes, x: FloatArray, sign: FloatArray, weight: FloatArray) -> EffectEstimate:
     rows = systematic(weight / weight.sum(), _DRAWS, np.random.default_rng(0))
-    value = reach.value(x[rows]) * sign[rows]
+    value = sizes.value(x[rows]) * sign[rows]
     low, high = (float(each) for each in np.quantile(value, [0.05, 0.95]))
-    return EffectEstimate(
-        reach.parameter.name,
-        reach.parameter.unit,
-        float(value.mean()),
-        float(value.std()),
-        low,
-        high,
-    )
-
-
-def _scatter(best: _Weighed, reach: Reach) -> float:
-    """By which fraction the members' sizes differ; of the range where it has no scale."""
-    mean = float(best.shared.size.sum(axis=0) @ SCATTERS)
-    return 10**mean - 1 if scale_free(reach.parameter) else mean
+    name, unit = sizes.parameter.name, sizes.parameter.unit
+    return EffectEstimate(name, unit, float(value.mean()), float(value.std()), low, high)
 
 
 def _grouped(
     causes: Sequence[SharedCause],
 ) -> tuple[list[SharedCause], tuple[tuple[str, ...], ...]]:
-    """Those that the data hardly prefer the best to are claimed with it."""
+    """Return the causes, those that the data hardly prefer the best to in one group with it."""
     best = max((each.log_bayes_factor for each in causes), default=0.0)
     alike = [each.effect for each in causes if each.log_bayes_factor > best - SAME_BELOW]
     if len(alike) < LEAST or best < SAME_BELOW:
@@ -276,28 +245,24 @@ def _grouped(
 
 
 def _tensions(
-    patients: Sequence[Patient], tried: Sequence[_Weighed], whole: float, rng: np.random.Generator
+    hangers: Sequence[HangerEvidence],
+    candidates: Sequence[_Candidate],
+    total: float,
+    rng: np.random.Generator,
 ) -> tuple[HangerTensions, ...]:
-    likely = [
-        (each, float(np.exp(each.log_weight - whole)))
-        for each in tried
-        if each.log_weight - whole > np.log(_FAINT)
-    ]
+    """Return the tensions over all candidates, and over each hanger alone for the rest."""
+    likely = [each for each in candidates if each.log_weight - total > np.log(_NEGLIGIBLE)]
     found = []
-    for index, each in enumerate(patients):
-        draws, weights = [], []
-        for cause, probability in likely:
-            if index in cause.shared.kin.members and cause.place in each.effects:
-                row, evidence = cause.shared.kin.members.index(index), each.effects[cause.place]
-                for points, at, by_size in (
-                    (evidence, cause.found.at[index], cause.shared.weight[row]),
-                    (evidence.faint, cause.found.faint_at[index], cause.shared.faint[row]),
-                ):
-                    draws.append(points.tension_n)
-                    weights.append(probability * cause.found.draw_weights(at, by_size))
+    for index, each in enumerate(hangers):
+        draws, weights = [each.tension_n], [np.empty(0)]
+        for cause in likely:
+            effect = each.effects.get(cause.place)
+            if effect is not None and index in cause.shared.group.members:
+                draws.append(effect.tension_n)
+                points = cause.shared.point_weights(cause.grid, effect, index)
+                weights.append(np.exp(cause.log_weight - total) * points)
         alone = max(0.0, 1 - sum(float(weight.sum()) for weight in weights))
-        draws.append(each.tension_n)
-        weights.append(np.full(len(each.tension_n), alone / len(each.tension_n)))
+        weights[0] = np.full(len(each.tension_n), alone / len(each.tension_n))
         weight = np.concatenate(weights)
         samples = np.concatenate(draws)[systematic(weight / weight.sum(), _DRAWS, rng)]
         found.append(

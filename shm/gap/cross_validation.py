@@ -6,7 +6,6 @@ A fit again on part of its data: a few Gauss-Newton steps that start from the fu
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -34,12 +33,12 @@ class HeldOut:
 
     @property
     def before_percent(self) -> FloatArray:
-        """(F,), of the first fold that holds the frequency out; NaN where none does."""
+        """Return those (F,) of the first fold that holds the frequency out; NaN where none does."""
         return _first(self.before)
 
     @property
     def after_percent(self) -> FloatArray:
-        """(F,), of the first fold that holds the frequency out; NaN where none does."""
+        """Return those (F,) of the first fold that holds the frequency out; NaN where none does."""
         return _first(self.after)
 
 
@@ -50,7 +49,7 @@ def held_out(
     hold_out: tuple[str, ...],
     rng: np.random.Generator,
 ) -> HeldOut:
-    """The baseline and the cause fitted without the held-out data, and what they then predict.
+    """Return what baseline and cause miss of held-out data when fitted without them.
 
     `hold_out` names tests or orders that are left out together; empty: the orders
     between the lowest and the highest in three folds, then tests in turn. A held-out frequency
@@ -74,18 +73,18 @@ def held_out(
 
 
 def check_hold_out(problem: GapProblem, hold_out: tuple[str, ...]) -> None:
-    """Raises what `held_out` would, before anything is fitted."""
+    """Raise what `held_out` would, before anything is fitted."""
     if hold_out:
         _named(problem.observations.design, hold_out)
 
 
 def shrinkage(problem: GapProblem, before: Fit, after: Fit | None, held: HeldOut) -> Shrinkage:
-    """Root mean squares in percent; NaN for what there is not."""
+    """Return root mean squares in percent; NaN for what there is not."""
     frequencies = problem.observations.design.frequencies
     value = problem.observations.value[:frequencies]
     return Shrinkage(
-        _rms_percent(value - before.predicted[:frequencies]),
-        NAN if after is None else _rms_percent(value - after.predicted[:frequencies]),
+        _rms_percent(problem.left(before)),
+        NAN if after is None else _rms_percent(problem.left(after)),
         _rms_percent(held.before),
         _rms_percent(held.after),
     )
@@ -94,11 +93,18 @@ def shrinkage(problem: GapProblem, before: Fit, after: Fit | None, held: HeldOut
 def _residuals(problem: GapProblem, fit: Fit, folds: BoolArray) -> FloatArray:
     frequencies = problem.observations.design.frequencies
     predicted = refitted(problem, fit, ~folds)[:, :frequencies]
-    return np.where(folds, problem.observations.value[:frequencies] - predicted, NAN)
+    residual = problem.observations.value[:frequencies] - predicted
+    left = np.full_like(residual, NAN)
+    for fold, out in enumerate(folds):
+        # What repeats in all frequencies is known by those that are kept.
+        kept = fit.noise.frequency[np.ix_(~out, ~out)]
+        across = problem.repeated.frequency[np.ix_(out, ~out)]
+        left[fold, out] = residual[fold, out] - across @ np.linalg.solve(kept, residual[fold, ~out])
+    return left
 
 
 def _named(design: Design, names: tuple[str, ...]) -> BoolArray:
-    """One fold (1, F) that holds out everything that is named."""
+    """Return one fold (1, F) that holds out everything that is named."""
     tests = np.array([each.test for each in design.conditions])[design.frequency_test]
     orders = np.array([str(order) for order in design.frequency_order])
     unknown = [name for name in names if name not in tests and name not in orders]
@@ -118,7 +124,7 @@ def _named(design: Design, names: tuple[str, ...]) -> BoolArray:
 
 
 def _in_turn(design: Design, after: Fit | None, rng: np.random.Generator) -> BoolArray:
-    """Folds (folds, F) over the orders and over the tests; those that leave too little are out."""
+    """Return folds (folds, F) over orders and over tests that leave enough to fit."""
     folds = np.array([*_over_orders(design), *_over_tests(design, after, rng)], dtype=bool)
     folds = folds.reshape(-1, design.frequencies)
     kept = np.sum(~folds, axis=1)
@@ -127,7 +133,7 @@ def _in_turn(design: Design, after: Fit | None, rng: np.random.Generator) -> Boo
 
 
 def _over_orders(design: Design) -> list[BoolArray]:
-    """Orders between the lowest and the highest, which only stand in where there are no others.
+    """Return folds of the orders between the lowest and the highest, or of these alone.
 
     What acts on the lowest order alone, as sag does, cannot be known without it.
     """
@@ -138,7 +144,7 @@ def _over_orders(design: Design) -> list[BoolArray]:
 
 
 def _over_tests(design: Design, after: Fit | None, rng: np.random.Generator) -> list[BoolArray]:
-    """A test, or where there are many a few, in each fold."""
+    """Return folds of a test each, or of a few where there are many."""
     conditions = design.conditions
     bound = set() if after is None else {v.test for _, v in after.hypothesis.effects}
     candidates = [t for t, each in enumerate(conditions) if each.test not in bound]
@@ -177,78 +183,40 @@ def _rms_percent(residual: FloatArray) -> float:
     return float(100 * np.sqrt(np.mean(np.expm1(known) ** 2))) if known.size else NAN
 
 
-# Technical, as Gauss-Newton steps converge: 0.05 of a standard deviation is no error to speak of.
+# Numerical, as Gauss-Newton steps converge: 0.05 of a standard deviation is no error to speak of.
 _STEPS, _STEP_IN_SDS, _SHORTER = 6, 0.05, 0.3
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """The data `rows` of a fold that stay in the fit, of which the first are frequencies."""
+def refitted(problem: GapProblem, fit: Fit, kept: BoolArray) -> FloatArray:
+    """Return predictions (folds, data) of `fit` refitted to the frequencies `kept` (folds, F).
 
-    rows: IntArray
-    value: FloatArray
-    slopes: FloatArray
-    errors: Likelihood
+    A shape goes with its frequency. The slopes and the sizes of unknown errors are those of the
+    full fit; the predictions are computed anew in every step, for all folds at once. A step that
+    does not lower the misfit is taken back and tried shorter.
+    """
+    value, parts = problem.observations.value, [_part(problem.design, fit, each) for each in kept]
 
-    @classmethod
-    def of(cls, problem: GapProblem, fit: Fit, kept: BoolArray) -> _Part:
-        """`kept` (F,) are the frequencies that stay; a shape goes with its frequency."""
-        design = problem.observations.design
-        frequency, shape = np.flatnonzero(kept), np.flatnonzero(kept[design.shape_mode])
-        rows = np.concatenate([frequency, design.frequencies + shape])
-        return cls(
-            rows,
-            problem.observations.value[rows],
-            fit.slopes[rows],
-            Likelihood.of(fit.noise.part(frequency, shape), fit.model_error),
+    def misfits(z: FloatArray, predicted: FloatArray) -> FloatArray:
+        return np.array(
+            [
+                errors.squares((value - there)[None, rows])[0, 0] + point @ point
+                for (rows, errors), point, there in zip(parts, z, predicted, strict=True)
+            ]
         )
 
-    def weighed(self, data: FloatArray) -> FloatArray:
-        """The precision of the data times `data` (rows, ...)."""
-        found = self.errors.weighed(data.reshape(len(data), -1))
-        return np.concatenate([found.frequency[0], found.shape[0]]).reshape(data.shape)
-
-    @cached_property
-    def information(self) -> FloatArray:
-        """The inverse of the posterior's covariance (d, d)."""
-        return np.eye(self.slopes.shape[1]) + self.slopes.T @ self.weighed(self.slopes)
-
-    def misfit(self, z: FloatArray, predicted: FloatArray) -> float:
-        """Twice the negative log of the posterior density, but for a constant."""
-        residual = self.value - predicted[self.rows]
-        return float(residual @ self.weighed(residual) + z @ z)
-
-    def step(self, z: FloatArray, predicted: FloatArray) -> FloatArray:
-        """The Gauss-Newton step (d,)."""
-        residual = self.value - predicted[self.rows]
-        downhill = self.slopes.T @ self.weighed(residual) - z
-        return np.asarray(np.linalg.solve(self.information, downhill))
-
-    def sds(self, step: FloatArray) -> float:
-        """The length of a step in standard deviations of the posterior."""
-        return float(np.sqrt(step @ self.information @ step))
-
-
-def refitted(problem: GapProblem, fit: Fit, kept: BoolArray) -> FloatArray:
-    """Predictions (folds, data) of `fit` refitted to the frequencies `kept` (folds, F) alone.
-
-    The slopes and the sizes of unknown errors are those of the full fit; the predictions are
-    computed anew in every step, for all folds at once. A step that does not lower the misfit is
-    taken back and tried shorter.
-    """
-    parts = [_Part.of(problem, fit, rows) for rows in kept]
-    z = np.repeat(fit.z[None], len(parts), axis=0)
-    predicted = np.repeat(fit.predicted[None], len(parts), axis=0)
-    misfit = _misfits(parts, z, predicted)
-    length = np.ones(len(parts))
+    z, predicted = (np.tile(each, (len(parts), 1)) for each in (fit.z, fit.predicted))
+    misfit, length = misfits(z, predicted), np.ones(len(parts))
     for _ in range(_STEPS):
-        whole = [part.step(*each) for part, *each in zip(parts, z, predicted, strict=True)]
-        steps = length[:, None] * np.array(whole)
-        large = [part.sds(step) > _STEP_IN_SDS for part, step in zip(parts, steps, strict=True)]
-        if not any(large):
+        found = [
+            errors.linear(fit.slopes[rows], (value - there)[rows], point)
+            for (rows, errors), point, there in zip(parts, z, predicted, strict=True)
+        ]
+        steps = length[:, None] * np.array([step for _, step, *_ in found])
+        squares = [step @ inner @ step for (inner, *_), step in zip(found, steps, strict=True)]
+        if max(squares) <= _STEP_IN_SDS**2:
             break
         there = problem.predict(fit.hypothesis, z + steps)
-        tried = _misfits(parts, z + steps, there)
+        tried = misfits(z + steps, there)
         better = tried < misfit
         z = np.where(better[:, None], z + steps, z)
         predicted = np.where(better[:, None], there, predicted)
@@ -257,5 +225,8 @@ def refitted(problem: GapProblem, fit: Fit, kept: BoolArray) -> FloatArray:
     return predicted
 
 
-def _misfits(parts: list[_Part], z: FloatArray, predicted: FloatArray) -> FloatArray:
-    return np.array([part.misfit(*each) for part, *each in zip(parts, z, predicted, strict=True)])
+def _part(design: Design, fit: Fit, kept: BoolArray) -> tuple[IntArray, Likelihood]:
+    """Return the rows of the data that stay, with their errors."""
+    frequency, shape = np.flatnonzero(kept), np.flatnonzero(kept[design.shape_mode])
+    errors = Likelihood.of(fit.noise.part(frequency, shape), fit.model_error)
+    return np.concatenate([frequency, design.frequencies + shape]), errors

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
 
 import numpy as np
 
@@ -35,7 +36,7 @@ class Proposal:
 
 
 def measured_already(design: Design) -> tuple[str, ...]:
-    """The kinds of measurement that the present tests hold; they are not proposed again.
+    """Return the kinds of measurement that the present tests hold, not to be proposed again.
 
     Of `other plane`, `sensors`, `temperature`, `level`, `known mass`.
     """
@@ -52,7 +53,7 @@ def measured_already(design: Design) -> tuple[str, ...]:
 
 
 def proposals(design: Design, hanger: Hanger) -> tuple[Proposal, ...]:
-    """The present test once more, then everything that was not yet done, but for new sensors."""
+    """Return the present test once more, then all that was not yet done but new sensors."""
     every = [
         Proposal("repeat", "the same test once more", like_the_present(design)),
         *_other_plane(design),
@@ -63,13 +64,8 @@ def proposals(design: Design, hanger: Hanger) -> tuple[Proposal, ...]:
     return tuple(proposal for proposal in every if proposal.kind not in done)
 
 
-def sensors_wanted(design: Design) -> bool:
-    """Whether further sensors are worth a thought."""
-    return "sensors" not in measured_already(design)
-
-
 def with_sensors(design: Design, places_m: tuple[float, ...]) -> Proposal:
-    """The present test once more with two-axis sensors at further places (m)."""
+    """Return the present test once more with two-axis sensors at further places (m)."""
     modes = _modes(design)
     first = len(design.places_m)
     components = [(place, axis) for place in range(len(places_m)) for axis in range(len(PLANES))]
@@ -80,65 +76,59 @@ def with_sensors(design: Design, places_m: tuple[float, ...]) -> Proposal:
 
 
 def like_the_present(design: Design, conditions: Conditions | None = None) -> Design:
-    """A test with all modes and sensors of the present ones, under middling conditions."""
+    """Return a test with all modes and sensors of the present ones, under middling conditions."""
     modes = _modes(design)
     return _test(design, modes, _present_shapes(design, modes), conditions)
 
 
 def lift_off(design: Design, hanger: Hanger) -> tuple[Proposal, ...]:
-    """The present test with the tension read beside it; none where it is known or there is none."""
+    """Return the present test with the tension read; none where it is known or there is none."""
     if not hanger.nominal_tension_n or np.isfinite(hanger.scatter.tension):
         return ()
     return (Proposal("lift-off", "a lift-off, the tension read", like_the_present(design)),)
 
 
 def together(designs: Sequence[Design]) -> tuple[Design, list[IntArray]]:
-    """One design of tests that are all made, and the rows of its data that each has.
+    """Return one design of tests that are all made, and the rows of its data that each has.
 
     All begin with the same places; further ones are each design's own.
     """
     common = min(len(design.places_m) for design in designs)
-    places = designs[0].places_m[:common]
-    parts, rows, shapes = [], [], 0
-    frequencies = 0
-    for test, design in enumerate(designs):
-        own = design.shape_place + np.where(design.shape_place < common, 0, len(places) - common)
-        places += design.places_m[common:]
-        parts.append((design.frequency_test + test, design.shape_mode + frequencies, own))
-        rows.append((frequencies, shapes))
-        frequencies, shapes = frequencies + design.frequencies, shapes + len(own)
-    test_of, mode, place = (np.concatenate(each) for each in zip(*parts, strict=True))
+    frequency = np.cumsum([0, *(design.frequencies for design in designs)])
+    shape = np.cumsum([0, *(len(design.shape_mode) for design in designs)])
+    places_m, shape_place = designs[0].places_m[:common], []
+    for design in designs:
+        behind = len(places_m) - common
+        shape_place.append(design.shape_place + behind * (design.shape_place >= common))
+        places_m += design.places_m[common:]
+
+    def join(name: str, first: Iterable[int] = repeat(0)) -> IntArray:
+        parts = zip(designs, first, strict=False)
+        return np.concatenate([getattr(design, name) + number for design, number in parts])
+
     whole = Design(
         survey=designs[0].survey,
         conditions=tuple(each.conditions[0] for each in designs),
-        places_m=places,
-        frequency_test=test_of,
-        frequency_plane=np.concatenate([each.frequency_plane for each in designs]),
-        frequency_order=np.concatenate([each.frequency_order for each in designs]),
-        shape_mode=mode,
-        shape_place=place,
-        shape_component=np.concatenate([each.shape_component for each in designs]),
+        places_m=places_m,
+        frequency_test=join("frequency_test", range(len(designs))),
+        frequency_plane=join("frequency_plane"),
+        frequency_order=join("frequency_order"),
+        shape_mode=join("shape_mode", frequency),
+        shape_place=np.concatenate(shape_place),
+        shape_component=join("shape_component"),
     )
-    of_each = [
-        np.concatenate(
-            [
-                first + np.arange(design.frequencies),
-                frequencies + shape + np.arange(len(design.shape_mode)),
-            ]
-        )
-        for design, (first, shape) in zip(designs, rows, strict=True)
+    rows = [
+        np.append(np.arange(*frequency[k : k + 2]), frequency[-1] + np.arange(*shape[k : k + 2]))
+        for k in range(len(designs))
     ]
-    return whole, of_each
+    return whole, rows
 
 
 def _other_plane(design: Design) -> Iterator[Proposal]:
-    planes = np.unique(design.frequency_plane)
-    if len(planes) == len(PLANES):
-        return
     modes, shapes = _modes(design), _present_shapes(design, _modes(design))
     modes = np.column_stack([1 - modes[:, 0], modes[:, 1]])
     shapes = np.column_stack([shapes[:, :2], 1 - shapes[:, 2]])
-    what = f"the {PLANES[1 - planes[0]]} plane, {_orders(modes[:, 1])}"
+    what = f"the {PLANES[modes[0, 0]]} plane, {_orders(modes[:, 1])}"
     yield Proposal("other plane", what, _test(design, modes, shapes))
 
 
@@ -155,7 +145,7 @@ def _more_modes(design: Design) -> Iterator[Proposal]:
 
 
 def _other_conditions(design: Design, hanger: Hanger) -> Iterator[Proposal]:
-    """A colder and a warmer day, softer and harder hits, known masses."""
+    """Return a colder and a warmer day, softer and harder hits, known masses."""
     usual = _usual(design)
     for shift_k, word in ((-_WARMER_K, "colder"), (_WARMER_K, "warmer")):
         day = like_the_present(design, replace(usual, temperature_shift_k=shift_k))
@@ -180,7 +170,7 @@ def _test(
     conditions: Conditions | None = None,
     places_m: tuple[float, ...] = (),
 ) -> Design:
-    """One test of `modes` (F, [plane, order]) and `shapes` (S, [mode, place, axis])."""
+    """Return one test of `modes` (F, [plane, order]) and `shapes` (S, [mode, place, axis])."""
     return Design(
         survey=design.survey,
         conditions=(conditions or _usual(design),),
@@ -195,12 +185,12 @@ def _test(
 
 
 def _modes(design: Design) -> IntArray:
-    """The distinct (plane, order) of the present tests."""
+    """Return the distinct (plane, order) of the present tests."""
     return np.unique(np.column_stack([design.frequency_plane, design.frequency_order]), axis=0)
 
 
 def _present_shapes(design: Design, modes: IntArray) -> IntArray:
-    """The distinct (index of the mode, place, axis) of the present tests."""
+    """Return the distinct (index of the mode, place, axis) of the present tests."""
     own = np.column_stack([design.frequency_plane, design.frequency_order])[design.shape_mode]
     mode = np.argmax((own[:, None] == modes).all(axis=2), axis=1) if len(own) else own[:, 0]
     return np.unique(

@@ -1,26 +1,26 @@
 """The next measurements one after the other: what each costs, and what it promises.
 
 What every explanation foresees of all measurements that could be made is one normal distribution
-of their data, given the old ones (`shm.gap.next_measurement`); so what a second measurement adds to
+of their data, given the old ones (`shm.gap.foresight`); so what a second measurement adds to
 a first one is counted once. Something unknown foresees that what was left over comes again in every
-test, or anew in each. Data drawn from each explanation by its probability tell how far, on average,
+test. Data drawn from each explanation by its probability tell how far, on average,
 the true one would get ahead of all others together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 import scipy
 
-from shm.gap.attribution import WITHIN_REACH, Attribution, Explanation
-from shm.gap.contract import Fit, Hypothesis
+from shm.gap.attribution import WITHIN_REACH, Attribution
+from shm.gap.contract import Fit
 from shm.gap.experiment_design import Proposal, lift_off, proposals, together
-from shm.gap.model_probabilities import log_prior
-from shm.gap.next_measurement import NO_GAP, Errors, Foresight, Remainder, foreseen, new_sensors
+from shm.gap.foresight import Errors, Foresight, NewTests
+from shm.gap.next_measurement import NO_GAP, new_sensors
 from shm.gap.noise import (
     FREQUENCY_SIZES,
     LARGEST_FREQUENCY,
@@ -30,6 +30,7 @@ from shm.gap.noise import (
     sizes_of,
     smooth_over_orders,
 )
+from shm.gap.probabilities import families, probabilities
 from shm.gap.problem import GapProblem
 from shm.values import MEASUREMENT_HOURS, NAN, FloatArray, IntArray
 from shm.values.diagnosis import joined, parted
@@ -63,7 +64,7 @@ class PlannedMeasurement:
 def planned(
     race: Race, hours: Mapping[str, float] = MEASUREMENT_HOURS, budget_hours: float = np.inf
 ) -> tuple[PlannedMeasurement, ...]:
-    """The next measurements, that which promises most for its hours first, within a budget.
+    """Return the next measurements, the best promise for its hours first, within a budget.
 
     `hours` are by kind. The plan ends where the true explanation is expected to have 0.95, or
     nothing promises a fifth of a unit of log odds more.
@@ -71,36 +72,31 @@ def planned(
     steps: list[PlannedMeasurement] = []
     chosen: list[int] = []
     log_odds, probability = race.expected(chosen)
-    left = budget_hours
     while probability < ENOUGH and len(steps) < _MOST_STEPS:
+        left = budget_hours - sum(step.hours for step in steps)
         costs = {k: hours[each.kind] for k, each in enumerate(race.offered) if k not in chosen}
-        tried = {k: race.expected([*chosen, k]) for k, cost in costs.items() if cost <= left}
-        gains = {k: own - log_odds for k, (own, _) in tried.items() if own - log_odds >= _WORTH_IT}
+        gains = race.gains(chosen, [k for k, cost in costs.items() if cost <= left])
         if not gains:
             break
         best = max(gains, key=lambda k: gains[k] / costs[k])
-        log_odds, probability = tried[best]
-        offered, left = race.offered[best], left - costs[best]
         chosen.append(best)
-        steps.append(
-            PlannedMeasurement(
-                offered.what, offered.kind, costs[best], gains[best], log_odds, probability
-            )
-        )
+        log_odds, probability = race.expected(chosen)
+        what, kind = race.offered[best].what, race.offered[best].kind
+        step = PlannedMeasurement(what, kind, costs[best], gains[best], log_odds, probability)
+        steps.append(step)
     return tuple(steps)
 
 
 def nothing_planned(race: Race, hours: Mapping[str, float], budget_hours: float) -> str:
-    """Why a plan holds nothing, in words."""
-    log_odds, probability = race.expected([])
+    """Return in words why a plan holds nothing."""
+    _, probability = race.expected([])
     if probability >= ENOUGH:
         return (
             f"These data are enough: whichever explanation is true, it is expected to have "
             f"{probability:.2f} already. What `shm gap diagnose` lists to measure next tells it "
             "from others that are unlikely as it is."
         )
-    gains = [race.expected([k])[0] - log_odds for k in range(len(race.offered))]
-    able = [each for each, gain in zip(race.offered, gains, strict=True) if gain >= _WORTH_IT]
+    able = [race.offered[k] for k in race.gains([], range(len(race.offered)))]
     if not able:
         return "No measurement promises to tell the explanations further apart."
     cheapest = min(able, key=lambda each: hours[each.kind])
@@ -110,32 +106,46 @@ def nothing_planned(race: Race, hours: Mapping[str, float], budget_hours: float)
     )
 
 
-def chances(attribution: Attribution) -> dict[str, float]:
-    """The probability of each explanation by the evidence, by its name.
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A cause, no gap or something unknown by its `name`, with its probability.
+
+    `fits` are those of the places where it may act, each with its weight.
+    """
+
+    name: str
+    probability: float
+    fits: tuple[tuple[float, Fit], ...]
+
+    @property
+    def is_known(self) -> bool:
+        return not self.fits[0][1].hypothesis.flexible
+
+
+def explanations(attribution: Attribution) -> list[Explanation]:
+    """Return every explanation, the likeliest first; the probabilities add to 1.
 
     Without what is kept for causes off the catalogue that pass for one of it, which no measurement
     of a plan changes.
     """
-    once = dict.fromkeys(attribution.search.variants, 1)
-    weights = {NO_GAP: log_prior(Hypothesis(), once)}
-    for each in attribution.explanations:
-        weights[each.effect] = each.log_bayes_factor + log_prior(each.best.hypothesis, once)
-    for name, fit in _remainders(attribution).items():
-        ahead = fit.log_evidence - attribution.baseline.log_evidence
-        weights[name] = ahead + log_prior(fit.hypothesis, once)
-    total = scipy.special.logsumexp(list(weights.values()))
-    return {name: float(np.exp(weight - total)) for name, weight in weights.items()}
-
-
-def _remainders(attribution: Attribution) -> dict[str, Fit]:
-    """The fits with a remainder by their names, which say what known cause comes with it."""
-    fits = [each.fit for each in attribution.tried if each.fit and each.fit.hypothesis.flexible]
-    fits.sort(key=lambda fit: fit.log_evidence)
-    return {joined((*fit.hypothesis.names, UNKNOWN)): fit for fit in fits}
+    kinds = families(attribution.tried, attribution.search.variants)
+    chances, _ = probabilities(kinds)
+    found = []
+    for kind, chance in zip(kinds, (chances / chances.sum()).tolist(), strict=True):
+        name = kind.name or NO_GAP
+        if kind.flexible:
+            name = joined((*kind.best.hypothesis.names, UNKNOWN))
+        fits = [
+            (float(np.exp(each.log_evidence - kind.best.log_evidence)), each.fit)
+            for each in kind.tried
+            if each.fit is not None and each.log_evidence > kind.best.log_evidence - _AS_LIKELY
+        ]
+        found.append(Explanation(name, chance, tuple(fits[:_PLACES])))
+    return sorted(found, key=lambda each: -each.probability)
 
 
 def log_odds_of(probability: FloatArray | float) -> FloatArray:
-    """Log odds of probabilities, up to a thousand to one either way."""
+    """Return log odds of probabilities, up to a thousand to one either way."""
     odds = scipy.special.logit(np.clip(probability, 0.0, 1.0))
     return np.asarray(np.clip(odds, -WITHIN_REACH, WITHIN_REACH))
 
@@ -163,34 +173,28 @@ class Race:
 
     @classmethod
     def of(cls, attribution: Attribution, rng: np.random.Generator) -> Race:
-        problem = attribution.search.problem
-        fits = _fits(attribution)
-        offered = _offered(problem, [own[0][1] for _, _, own in fits if not _unknown(own)])
+        """Return the race of the explanations that these data leave a chance."""
+        problem, racing = attribution.search.problem, _racing(attribution)
+        known = [each.fits[0][1] for each in racing if each.is_known]
+        offered = _offered(problem, known)
         design, rows = together([each.design for each in offered])
+        reads = [each.kind == "lift-off" for each in offered]
         rows = [
-            np.append(own, design.size) if each.kind == "lift-off" else own
-            for each, own in zip(offered, rows, strict=True)
+            np.append(r, design.size) if read else r for r, read in zip(rows, reads, strict=True)
         ]
-        unstated = problem.hanger.assumptions.tension_reading_sd.value
-        reading_sd = unstated if lift_off(problem.design, problem.hanger) else NAN
-        errors = Errors.of(problem, fits[0][2][0][1])
-        errors = replace(errors, sensors=problem.sensors_of(design))
-        first: Foresight | None = None
+        reading_sd = problem.hanger.assumptions.tension_reading_sd.value if any(reads) else NAN
+        errors, new = Errors.of(problem, known[0]), NewTests(problem, design, reading_sd)
+        first = new.foresee(known[0], errors)
         contenders = []
-        for name, probability, own in fits:
-            ways = []
-            for weight, fit in own:
-                flexible = fit.hypothesis.flexible
-                for share, each in (
-                    _unknown_ways(problem, fit, errors) if flexible else [(1.0, errors)]
-                ):
-                    seen = foreseen(problem, fit, design, each, reading_sd)
-                    first = first or seen
-                    ways.append((weight * share, seen.turned_to(first)))
+        for each in racing:
+            ways = [
+                (weight * share, new.foresee(fit, own).turned_to(first))
+                for weight, fit in each.fits
+                for share, own in _ways(problem, fit, errors)
+            ]
             total = sum(weight for weight, _ in ways)
-            contenders.append(
-                Contender(name, probability, tuple((w / total, seen) for w, seen in ways))
-            )
+            shares = tuple((weight / total, seen) for weight, seen in ways)
+            contenders.append(Contender(each.name, each.probability, shares))
         draws = [
             seen.mean
             + rng.standard_normal((_DRAWS, len(seen.mean))) @ np.linalg.cholesky(seen.covariance).T
@@ -200,7 +204,7 @@ class Race:
         return cls(offered, tuple(rows), tuple(contenders), np.array(draws))
 
     def expected(self, chosen: Sequence[int]) -> tuple[float, float]:
-        """Mean log odds and probability of the true one after the `chosen` measurements."""
+        """Return mean log odds and probability of the true one after the `chosen` measurements."""
         prior = np.log([each.probability for each in self.contenders])
         logs = np.broadcast_to(prior[:, None, None], (len(prior), *self.draws.shape[:2]))
         if chosen:
@@ -216,22 +220,28 @@ class Race:
         )
         return float(means[0]), float(means[1])
 
+    def gains(self, chosen: Sequence[int], further: Iterable[int]) -> dict[int, float]:
+        """Return the log odds that each `further` measurement promises, if it is worth the work."""
+        now, _ = self.expected(chosen)
+        found = {k: self.expected([*chosen, k])[0] - now for k in further}
+        return {k: gain for k, gain in found.items() if gain >= _WORTH_IT}
+
     @property
     def _holds(self) -> FloatArray:
-        """(contenders, contenders): 1 where the second names every cause of the first."""
+        """Return 1 where the second names every cause of the first, (contenders, contenders)."""
         names = [each.name for each in self.contenders]
         return np.array([[float(holds(other, one)) for other in names] for one in names])
 
 
 def holds(other: str, one: str) -> bool:
-    """Whether the explanation `other` names every cause that `one` does."""
+    """Return whether the explanation `other` names every cause that `one` does."""
     if {one, other} & {NO_GAP, UNKNOWN}:
         return one == other
     return set(parted(one)) <= set(parted(other))
 
 
 def _log_density(contender: Contender, rows: IntArray, data: FloatArray) -> FloatArray:
-    """Log density (ways, draws) of data (ways, draws, rows), but for a constant."""
+    """Return the log density (ways, draws) of data (ways, draws, rows), but for a constant."""
     found = []
     for share, seen in contender.ways:
         root = np.linalg.cholesky(seen.covariance[np.ix_(rows, rows)])
@@ -242,40 +252,18 @@ def _log_density(contender: Contender, rows: IntArray, data: FloatArray) -> Floa
     return np.asarray(scipy.special.logsumexp(found, axis=0))
 
 
-_Fits = list[tuple[float, Fit]]
-
-
-def _unknown(fits: _Fits) -> bool:
-    return fits[0][1].hypothesis.flexible
-
-
-def _fits(attribution: Attribution) -> list[tuple[str, float, _Fits]]:
-    """Name, probability and fits of the explanations in the race, the likeliest first."""
-    own = {NO_GAP: [(1.0, attribution.baseline)]}
-    own |= {name: [(1.0, fit)] for name, fit in _remainders(attribution).items()}
-    own |= {each.effect: _places(each) for each in attribution.explanations}
-    found = [(name, chance, own[name]) for name, chance in chances(attribution).items()]
-    able = sorted((each for each in found if each[2]), key=lambda each: -each[1])
-    best = next(each[1] for each in able if not _unknown(each[2]))
-    kept = [each for each in able if each[1] > best * np.exp(-WITHIN_REACH)][:_CONTENDERS]
-    kept.sort(key=lambda each: _unknown(each[2]))
-    total = sum(probability for _, probability, _ in kept)
-    return [(name, probability / total, fits) for name, probability, fits in kept]
-
-
-def _places(explanation: Explanation) -> _Fits:
-    """Where it may act, as far as it was fitted there, with weights."""
-    best = explanation.best.log_evidence
-    near = [
-        (float(np.exp(each.log_evidence - best)), each.fit)
-        for each in explanation.variants
-        if each.fit is not None and each.log_evidence > best - _AS_LIKELY
-    ]
-    return near[:_PLACES]
+def _racing(attribution: Attribution) -> list[Explanation]:
+    """Return the explanations in the race, the likeliest known one first, unknown ones last."""
+    able = [each for each in explanations(attribution) if each.fits]
+    best = next(each.probability for each in able if each.is_known)
+    kept = [each for each in able if each.probability > best * np.exp(-WITHIN_REACH)][:_CONTENDERS]
+    total = sum(each.probability for each in kept)
+    kept = [replace(each, probability=each.probability / total) for each in kept]
+    return sorted(kept, key=lambda each: not each.is_known)
 
 
 def _offered(problem: GapProblem, fits: Sequence[Fit]) -> tuple[Proposal, ...]:
-    """Every measurement that could come next; sensors where the leader and a rival differ most."""
+    """Return all that could come next; sensors where the leader and a rival differ most."""
     found = [
         *proposals(problem.design, problem.hanger),
         *lift_off(problem.design, problem.hanger),
@@ -284,33 +272,29 @@ def _offered(problem: GapProblem, fits: Sequence[Fit]) -> tuple[Proposal, ...]:
     return tuple({each.what: each for each in found}.values())
 
 
-def _unknown_ways(problem: GapProblem, fit: Fit, usual: Errors) -> list[tuple[float, Errors]]:
-    """By which errors something unknown may go on, with weights.
+def _ways(problem: GapProblem, fit: Fit, usual: Errors) -> list[tuple[float, Errors]]:
+    """Return the errors by which a fit may go on, with weights: of what is known the `usual` ones.
 
-    As the engine takes it: over orders independent, smooth, or smooth and alike in both planes; the
-    same in every test or new in each; in frequencies alone, or in shapes too. Each counts by what
-    it makes of the data so far.
+    Something unknown moves shapes too, and frequencies independently over orders, smoothly, or
+    smoothly and alike in both planes. Each way counts by what it makes of the data so far.
     """
-    design, count = problem.design, problem.design.frequencies
-    left = (problem.observations.value - fit.predicted)[:count]
-    wide = replace(
-        usual,
-        sd=np.append(usual.sd[:count], np.maximum(usual.sd[count:], np.sqrt(fit.noise.shape))),
-        unseen_shape=float(np.sqrt(usual.unseen_shape * LARGEST_SHAPE)),
-    )
-    sizes = sizes_of(
-        usual.sd[:count], LARGEST_FREQUENCY, FREQUENCY_SIZES, problem.hanger.assumptions
-    )
-    ways = []
-    for size, pattern, by_test in product(sizes, _PATTERNS, (False, True)):
-        own = replace(usual, remainder=Remainder(float(size), pattern, by_test))
-        among = own.between(design, design, same=True) + problem.repeated.frequency
-        root = np.linalg.cholesky(among + np.diag(usual.sd[:count] ** 2))
-        away = np.linalg.solve(root, left)
-        log = -0.5 * float(away @ away) - float(np.log(np.diag(root)).sum())
-        ways += [(log, own), (log, replace(wide, remainder=own.remainder))]
-    ways.sort(key=lambda way: -way[0])
-    return [(float(np.exp(log - ways[0][0])), own) for log, own in ways[:_WAYS]]
-
-
-_PATTERNS = (same_mode, smooth_over_orders, alike_in_planes)
+    if not fit.hypothesis.flexible:
+        return [(1.0, usual)]
+    design, noise = problem.design, problem.repeated.frequency + np.diag(usual.frequency_sd**2)
+    left = (problem.observations.value - fit.predicted)[: design.frequencies]
+    shape_sd = float(np.sqrt(usual.shape_sd * LARGEST_SHAPE))
+    if len(fit.noise.shape):
+        shape_sd = max(usual.shape_sd, float(np.sqrt(np.median(fit.noise.shape))))
+    assumed = problem.hanger.assumptions
+    sizes = sizes_of(usual.frequency_sd, LARGEST_FREQUENCY, FREQUENCY_SIZES, assumed).tolist()
+    ways = [
+        replace(usual, shape_sd=shape_sd, remainder=size, pattern=pattern)
+        for size, pattern in product(sizes, (same_mode, smooth_over_orders, alike_in_planes))
+    ]
+    roots = [np.linalg.cholesky(way.between(design, design) + noise) for way in ways]
+    log = [
+        -np.sum(np.linalg.solve(root, left) ** 2) / 2 - np.log(np.diag(root)).sum()
+        for root in roots
+    ]
+    best = np.argsort(log)[::-1][:_WAYS]
+    return [(float(np.exp(log[k] - log[best[0]])), ways[k]) for k in best]

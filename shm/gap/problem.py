@@ -282,10 +282,19 @@ class GapProblem:
         """The data (data,) that the baseline near the measured ones predicts of a design."""
         return np.asarray(self.predict(Hypothesis(), self.near, design)[0])
 
+    def left(self, fit: Fit) -> FloatArray:
+        """Return what a fit leaves of the frequencies' logarithms (F,).
+
+        Without what sensors, supports, section and tension most probably do alike in all of them.
+        """
+        count = self.design.frequencies
+        residual = (self.value - fit.predicted)[:count]
+        followed = self.repeated.frequency @ np.linalg.solve(fit.noise.frequency, residual)
+        return np.asarray(residual - followed)
+
     def misfit_percent(self, fit: Fit) -> float:
         """Return by how much a fit misses the frequencies, root mean square."""
-        apart = (self.observations.value - fit.predicted)[: self.design.frequencies]
-        return 100 * float(np.sqrt(np.mean(apart**2)))
+        return 100 * float(np.sqrt(np.mean(self.left(fit) ** 2)))
 
     @property
     def stated_error_percent(self) -> float:

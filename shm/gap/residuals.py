@@ -41,10 +41,8 @@ def residuals(
     design = problem.observations.design
     frequencies = design.frequencies
     value = problem.observations.value[:frequencies]
-    deviation = value - before.predicted[:frequencies]
-    left_after = (
-        np.full(frequencies, NAN) if after is None else value - after.predicted[:frequencies]
-    )
+    deviation = problem.left(before)
+    left_after = np.full(frequencies, NAN) if after is None else problem.left(after)
     sd = identification_sd(problem, before if after is None else after)
     left = np.maximum(np.diag(left_over(before, sd)), _LEAST_LEFT * sd[:frequencies] ** 2)
     z = deviation / np.sqrt(left)
@@ -52,7 +50,7 @@ def residuals(
     columns = np.column_stack(
         [
             np.exp(value),
-            np.exp(before.predicted[:frequencies]),
+            np.exp(value - deviation),
             100 * np.expm1(deviation),
             z,
             misfit / misfit.sum() if misfit.sum() > 0 else np.full(frequencies, NAN),
@@ -103,7 +101,7 @@ def trends(problem: GapProblem, before: Fit) -> tuple[Trend, ...]:
     parameters have absorbed. The trend over planes is longitudinal less transverse.
     """
     frequencies = problem.observations.design.frequencies
-    residual = 100 * (problem.observations.value - before.predicted)[:frequencies]
+    residual = 100 * problem.left(before)
     sd = identification_sd(problem, before)
     covariance = 1e4 * left_over(before, sd)
     found = [

@@ -218,9 +218,8 @@ class Search:
         return {h: found[h][1] for h in best}
 
 
-# Numerical: the tension from 0.1 to 7 times the nominal, and ends from loose to fast; of these
-# points as many are climbed from.
-_TENSIONS, _ENDS, _CLIMBS = np.linspace(-2.5, 2.5, 11), (-1.0, 0.0, 1.0), 3
+# Numerical: the tension over nearly all of its prior, and ends from loose to fast.
+_TENSIONS, _ENDS = np.linspace(-2.5, 2.5, 21), (-1.5, -0.5, 0.5, 1.5)
 
 
 def fit_alone(problem: GapProblem, rng: np.random.Generator, draws: int = 1000) -> Fit:
@@ -240,16 +239,19 @@ def sample_alone(problem: GapProblem, rng: np.random.Generator) -> Sampling:
     if problem.sampling is not None:
         return problem.sampling
     target, ends = Target(problem, ALONE), problem.end_columns
-    z = np.zeros((len(_TENSIONS) * len(_ENDS), target.dimension))
-    z[:, 0] = np.repeat(_TENSIONS, len(_ENDS))
-    z[:, ends] = np.tile(_ENDS, len(_TENSIONS))[:, None]
-    log = target.log(z)
+    z = np.zeros((len(_ENDS), len(_TENSIONS), target.dimension))
+    z[:, :, 0] = _TENSIONS
+    z[:, :, ends] = np.array(_ENDS)[:, None, None]
+    log = target.log(z.reshape(-1, target.dimension)).reshape(z.shape[:2])
     if not np.isfinite(log).any():
         raise BadInput(
             f"the model cannot be solved anywhere for {problem.model.name}.",
             remedy="Check the description of the hanger.",
         )
-    peaks = find_peaks(target, z[np.argsort(-log)[:_CLIMBS]])
+    # From each level of ends at the tension that fits best: they trade with each other.
+    best = np.where(np.isnan(log), -np.inf, log).argmax(axis=1)
+    starts = np.unique(z[np.arange(len(best)), best], axis=0)
+    peaks = find_peaks(target, starts)
     problem.settle(peaks[0])
     problem.sampling = Sampling(Target(problem, ALONE), peaks, rng)
     problem.sampling.run(*_ROUGHLY)

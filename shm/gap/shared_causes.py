@@ -3,17 +3,18 @@
     P(data | e shared in F) = mean over pi, q, mu, tau of
         product over hangers i of  (1 - pi) own_i(q) + pi there_i(e, mu, tau, q),  two at least
     own_i(q) = q no_gap_i + (1 - q) gap_i
-    there_i  = B_i(e) integral L_i(x) N(x | mu, tau) dx / mean L_i           over visible x
-             + integral (q no_gap_i L_i(x) / L_i(0) + (1 - q) gap_i) N(x | mu, tau) dx   below
+    there_i  = integral L_i(x) N(x | mu, tau) dx                                 over visible x
+             + integral (q no_gap_i R_i(x) + (1 - q) gap_i) N(x | mu, tau) dx    below
 
-pi is the share of the family F that has the effect e, q that of hangers with nothing of their own
-(both learnt from all hangers), x the size (`Reach`), which scatters by tau about the family's own,
-mu. All are summed over grids. A size far below what is visible says neither yes nor no.
-Hierarchies of this kind: Gelman et al., Bayesian Data Analysis, 2013, chapter 5.
+pi is the share of the group F that has the effect e, q that of hangers with nothing of their own
+(both learnt from all hangers), x the size (`Sizes`), which scatters by tau about the group's, mu.
+All are summed over grids. L_i is the likelihood of the effect against all that a hanger may have,
+R_i that of one too small to see against none. A size far below what is visible says neither yes nor
+no. Hierarchies of this kind: Gelman et al., Bayesian Data Analysis, 2013, chapter 5.
 
-Families are hangers that are alike in something. What a description says is compared as written:
-hangers of one delivery, of one section, with ends alike, of about one length, and those measured in
-one round of tests.
+Groups are hangers that are similar in something. What a description says is compared as written:
+hangers of one delivery, of one section, with similar ends, of about one length, and those measured
+on the same days.
 """
 
 from __future__ import annotations
@@ -25,46 +26,56 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.gap.shared_evidence import Evidence, Faint, Patient, Place
+from shm.gap.shared_evidence import BELOW, STEP, EffectEvidence, HangerEvidence, Place
 from shm.values import FloatArray, IntArray
 
 LEAST = 2
-"""Members of a family: one alone shares nothing."""
+"""Members of a group: one alone shares nothing."""
 
 _CLASSES = 2.0
 """Lengths are of one class from one power of the root of this to the next: judgement, ends of
 hangers as unlike as that are mostly made otherwise."""
+# Numerical: shares of a group, with prior 1 each; a twentieth is finer than 20 hangers can tell.
+_SHARES = (np.arange(10) + 0.5) / 10
+# Judgement: from bridges on which every hanger has something of its own to those on which one in
+# fifty has; 0.25 is what a single diagnosis takes it to be.
+_NOTHING_OWN = np.array([0.1, 0.25, 0.5, 0.8, 0.95, 0.98])
+# Judgement: parts made alike differ by 7 to 60 % in how much they give, weigh or lack; the steps
+# are of a decade, or of the range where it has none, and less scatter is likelier (half normal).
+SCATTERS = np.array([0.03, 0.06, 0.12, 0.2])
+_LIKELY_SCATTER = 0.1
+_TINY = 1e-300  # numerical: what is divided by, and taken the logarithm of
 
 
 @dataclass(frozen=True)
-class Kin:
+class Group:
     """Hangers, by their index, and in words what they have in common."""
 
     likeness: str
     members: tuple[int, ...]
 
 
-def kin(patients: Sequence[Patient]) -> tuple[Kin, ...]:
-    """All hangers, then the parts of them that are alike in something; each set of hangers once."""
-    found = {tuple(range(len(patients))): "all hangers"}
-    for likeness, of in _LIKENESSES.items():
+def find_groups(hangers: Sequence[HangerEvidence]) -> tuple[Group, ...]:
+    """Return all hangers, then the parts of them that are similar in something, each set once."""
+    found = {tuple(range(len(hangers))): "all hangers"}
+    for likeness, describe in _LIKENESSES.items():
         parts: dict[Hashable, list[int]] = {}
-        for index, each in enumerate(patients):
-            if (key := of(each)) is not None:
+        for index, each in enumerate(hangers):
+            if (key := describe(each)) is not None:
                 parts.setdefault(key, []).append(index)
         for members in parts.values():
             if len(members) >= LEAST:
                 found.setdefault(tuple(members), likeness)
-    return tuple(Kin(likeness, members) for members, likeness in found.items())
+    return tuple(Group(likeness, members) for members, likeness in found.items())
 
 
-def _round(each: Patient) -> Hashable | None:
-    """The days on which it was tested; None where a test does not say."""
+def _days(each: HangerEvidence) -> Hashable | None:
+    """Return the days on which it was tested; None where a test does not say."""
     days = {test.time.date() if test.time else None for test in each.tests}
     return None if None in days else frozenset(days)
 
 
-_LIKENESSES: dict[str, Callable[[Patient], Hashable | None]] = {
+_LIKENESSES: dict[str, Callable[[HangerEvidence], Hashable | None]] = {
     "hangers of one delivery": lambda each: each.hanger.family or None,
     "hangers of one section": lambda each: (
         each.hanger.area_m2,
@@ -77,206 +88,174 @@ _LIKENESSES: dict[str, Callable[[Patient], Hashable | None]] = {
         each.hanger.supports,
         each.hanger.fittings_m,
     ),
-    "hangers tested on the same days": _round,
+    "hangers tested on the same days": _days,
     "hangers of about one length": lambda each: math.floor(
         math.log(each.hanger.length_m) / math.log(_CLASSES) * 2
     ),
 }
-# Technical: shares of a family, with prior 1 each; a twentieth is finer than 20 hangers can tell.
-_SHARES = (np.arange(10) + 0.5) / 10
-# Judgement: from bridges on which every hanger has something of its own to those on which one in
-# fifty has; 0.25 is what a single diagnosis takes it to be.
-_NOTHING_OWN = np.array([0.1, 0.25, 0.5, 0.8, 0.95, 0.98])
-# Judgement: parts made alike differ by 7 to 60 % in how much they give, weigh or lack; the steps
-# are of a decade, or of the range where it has none, and less scatter is likelier (half normal).
-SCATTERS = np.array([0.03, 0.06, 0.12, 0.2])
-_LIKELY_SCATTER = 0.1
-_BELOW = 0.5
-"""Judgement, decades: what one hanger sees by half a standard deviation, ten see by 1.5."""
-_ABOUT = 0.15  # technical, decades: as far apart as points of a scan
-_STEP = 0.03  # technical: the least scatter; normals so far apart add up evenly to 1e-8
-
-_TINY = 1e-300  # technical: what is divided by, and taken the logarithm of
 
 
 @dataclass(frozen=True, eq=False)
-class Own:
-    """What speaks for each hanger having nothing of its own, and something: (n, q) both."""
+class OwnCauses:
+    """The likelihoods of each hanger having nothing of its own, and something: (n, q) both.
+
+    `log` (n, q) is that of either, `log_evidence` that of all hangers together.
+    """
 
     nothing: FloatArray
     something: FloatArray
+    log: FloatArray
+    log_evidence: float
 
     @classmethod
-    def of(cls, patients: Sequence[Patient]) -> Own:
-        none = np.array([[each.no_gap] for each in patients])
-        gap = np.array([[each.gap] for each in patients])
-        return cls(_NOTHING_OWN * none, (1 - _NOTHING_OWN) * gap)
-
-    @property
-    def log(self) -> FloatArray:
-        """Of either, (n, q)."""
-        return _log(self.nothing + self.something)
-
-    @property
-    def log_evidence(self) -> float:
-        log = self.log.sum(axis=0)
-        return float(scipy.special.logsumexp(log) - np.log(len(log)))
+    def of(cls, hangers: Sequence[HangerEvidence]) -> OwnCauses:
+        nothing = _NOTHING_OWN * np.array([[each.no_gap] for each in hangers])
+        something = (1 - _NOTHING_OWN) * np.array([[each.gap] for each in hangers])
+        log = _log(nothing + something)
+        together = scipy.special.logsumexp(log.sum(axis=0)) - np.log(len(_NOTHING_OWN))
+        return cls(nothing, something, log, float(together))
 
 
 @dataclass(frozen=True, eq=False)
-class Sizes:
-    """What the hangers say to the size of an effect at a place, on the grid of mu and tau.
+class SizeGrid:
+    """The evidence of all hangers for an effect at a place, on the grid of mu and tau.
 
-    The grid's first axis (m) runs over the sizes `x` (m,) with their signs `sign` (m,). `seen`
-    (n, m, tau) is the likelihood of a visible size, against own causes; `unseen` (n, m, tau) the
-    chance of an invisible one, `faint` (n, m, tau) that times its likelihood over that of no
-    effect. `normal` (m, m, tau) is the density of a hanger's size, first axis, by the family's.
-    `at` says of each hanger's draws where on the grid they lie, `faint_at` of its faint points.
+    The grid's first axis (m) runs over the sizes `x` (m,) with their signs `sign` (m,). `visible`
+    (n, m, tau) is the likelihood of a visible size, `small` (n, m, tau) the chance of one too small
+    to see and `ratio` (n, m, tau) that times its likelihood over that of no effect. `normal`
+    (m, m, tau) is the density of a hanger's size, first axis, by the group's.
     """
 
     x: FloatArray
     sign: FloatArray
-    seen: FloatArray
-    unseen: FloatArray
-    faint: FloatArray
+    visible: FloatArray
+    small: FloatArray
+    ratio: FloatArray
     normal: FloatArray
-    at: tuple[IntArray, ...]
-    faint_at: tuple[IntArray, ...]
 
-    def draw_weights(self, at: IntArray, weight: FloatArray) -> FloatArray:
-        """Of draws `at` places of the grid, by weights (m, tau) of the family's size and scatter;
-        they add to that of all."""
-        mean = self.normal[at].sum(axis=0) if len(at) else np.ones_like(weight)
-        return np.asarray((self.normal[at] * (weight / np.maximum(mean, _TINY))).sum(axis=(1, 2)))
-
-
-def sizes(patients: Sequence[Patient], place: Place) -> Sizes | None:
-    """Of an effect at a place; None where fewer than two hangers could show it."""
-    found = [each.effects.get(place) for each in patients]
-    known = [each for each in found if each is not None]
-    if len(known) < LEAST:
-        return None
-    low = min(each.reach.lower for each in known) - _BELOW
-    line = np.arange(low, max(each.reach.upper for each in known) + _STEP, _STEP)
-    signs = np.array([1.0, -1.0] if known[0].reach.parameter.signed else [1.0])
-    x, sign = np.tile(line, len(signs)), np.repeat(signs, len(line))
-    away = (x[:, None, None] - x[:, None]) / SCATTERS
-    normal = np.exp(-(away**2) / 2) / (SCATTERS * np.sqrt(2 * np.pi))
-    normal *= (sign[:, None] == sign)[..., None]
-    said = [_said(each, x, sign, normal) for each in found]
-    seen, unseen, faint = (np.array([each[k] for each in said]) for k in range(3))
-    at = tuple(_on_grid(each, low, len(line)) for each in found)
-    faint_at = tuple(_on_grid(each and each.faint, low, len(line)) for each in found)
-    return Sizes(x, sign, seen, unseen, faint, normal, at, faint_at)
+    @classmethod
+    def of(cls, hangers: Sequence[HangerEvidence], place: Place) -> SizeGrid | None:
+        """Return the grid of an effect at a place; None where fewer than two could show it."""
+        found = [each.effects.get(place) for each in hangers]
+        known = [each.sizes for each in found if each is not None]
+        if len(known) < LEAST:
+            return None
+        lower, upper = np.transpose([each.ends for each in known])
+        line = np.arange(lower.min() - BELOW, upper.max() + STEP, STEP)
+        signs = known[0].signs
+        x, sign = np.tile(line, len(signs)), np.repeat(signs, len(line))
+        away = (x[:, None, None] - x[:, None]) / SCATTERS
+        normal = np.exp(-(away**2) / 2) / (SCATTERS * np.sqrt(2 * np.pi))
+        normal *= (sign[:, None] == sign)[..., None]
+        parts = np.array([_likelihoods(each, x, normal) for each in found])
+        return cls(x, sign, parts[:, 0], parts[:, 1], parts[:, 2], normal)
 
 
-def _on_grid(points: Evidence | Faint | None, low: float, count: int) -> IntArray:
-    """Where draws or points of a hanger lie on the grid."""
-    if points is None:
-        return np.empty(0, dtype=np.int64)
-    index = np.rint((points.x - low) / _STEP).astype(np.int64).clip(0, count - 1)
-    return np.asarray(index + count * (points.sign < 0))
-
-
-def _said(
-    evidence: Evidence | None, x: FloatArray, sign: FloatArray, normal: FloatArray
+def _likelihoods(
+    evidence: EffectEvidence | None, x: FloatArray, normal: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The likelihood of a visible size, the chance of an invisible one, the same weighed by what
-    the data say to it; (m, tau) all."""
-    every = np.ones((len(x), len(SCATTERS)))
+    """Return `visible`, `small` and `ratio` (m, tau) of one hanger; all is small that has no
+    evidence."""
+    every = np.ones(normal.shape[1:])
     if evidence is None:
         return 0 * every, every, every
-    reach, signs, low = evidence.reach, len(np.unique(sign)), float(x.min())
-    count = len(x) // signs
-    density = normal[_on_grid(evidence, low, count)].mean(axis=0)
-    unseen = scipy.special.ndtr((reach.lower - x[:, None]) / SCATTERS)
-    ratio = _smooth(evidence.faint, x, sign)
-    below = np.tensordot((ratio - 1) * (x < reach.lower) * _STEP, normal, axes=1)
-    seen = evidence.bayes_factor * reach.width * signs * density
-    return seen, unseen, np.maximum(unseen + below, 0.0)
+    at = _on_grid(evidence, x)
+    visible, ratio = (
+        np.tensordot(np.bincount(at[rows], evidence.weight[rows], len(x)), normal, axes=1)
+        for rows in (evidence.visible, ~evidence.visible)
+    )
+    lower, _ = evidence.sizes.ends
+    lowest = evidence.x[~evidence.visible].min(initial=lower + STEP / 2) - STEP / 2
+    small, smaller = (
+        scipy.special.ndtr((edge - x[:, None]) / SCATTERS) for edge in (lower, lowest)
+    )
+    return visible, small, ratio + smaller
 
 
-def _smooth(faint: Faint, x: FloatArray, sign: FloatArray) -> FloatArray:
-    """The likelihood ratio of faint sizes along the grid: the mean of those about each place."""
-    if not len(faint.x):
-        return np.ones(len(x))
-    near = np.exp(-(((faint.x - x[:, None]) / _ABOUT) ** 2) / 2) * (faint.sign == sign[:, None])
-    # Far from all points it is that of no effect.
-    return np.asarray((near @ faint.ratio + _TINY) / (near.sum(axis=1) + _TINY))
+def _on_grid(evidence: EffectEvidence, x: FloatArray) -> IntArray:
+    """Return the index (n,) on the grid of each point; the negative sizes stand behind."""
+    count = len(x) // len(evidence.sizes.signs)
+    index = np.rint((evidence.x - x[0]) / STEP).astype(np.int64).clip(0, count - 1)
+    return np.asarray(index + count * (evidence.sign < 0))
 
 
 @dataclass(frozen=True, eq=False)
-class Shared:
-    """Something that some of a family share, weighed on the grid of mu, tau, pi and q.
+class SharedEvidence:
+    """The evidence for something that some of a group share, on the grid of mu, tau, pi and q.
 
     `log_evidence` is against each hanger having causes of its own. `member` (n,) is the probability
-    of each hanger of the family to have it; `weight` (n, m, tau) is that of each size where the
-    hanger shows it, `faint` (n, m, tau) where it does not; `size` (m, tau) that of the common one.
+    of each hanger of the group to have it; `visible` and `small` (n, m, tau) are, over the
+    likelihoods of the grid, the probabilities of its having it in such a size; `size` (m, tau)
+    those of the group's size.
     """
 
-    kin: Kin
+    group: Group
     log_evidence: float
     member: FloatArray
-    weight: FloatArray
-    faint: FloatArray
+    visible: FloatArray
+    small: FloatArray
     size: FloatArray
 
+    def point_weights(self, grid: SizeGrid, evidence: EffectEvidence, index: int) -> FloatArray:
+        """Return the probability (n,) of each point of a hanger's evidence, by its `index`."""
+        row, at = self.group.members.index(index), _on_grid(evidence, grid.x)
+        visible, small = (
+            np.tensordot(grid.normal, each[row], axes=2)[at] for each in (self.visible, self.small)
+        )
+        return np.asarray(evidence.weight * np.where(evidence.visible, visible, small))
 
-def shared(found: Sizes, family: Kin, own: Own) -> Shared:
-    """An effect at one place, shared by two hangers of a family at least."""
-    rows = list(family.members)
-    seen = found.seen[rows, :, :, None]
+
+def weigh_shared(grid: SizeGrid, group: Group, own: OwnCauses) -> SharedEvidence:
+    """Return the evidence for an effect at one place, shared by two hangers of a group or more."""
+    rows = list(group.members)
     nothing, something = (each[rows][:, None, None, :] for each in (own.nothing, own.something))
-    faint = found.faint[rows, :, :, None] * nothing
+    visible, small, ratio = (
+        each[rows][..., None] for each in (grid.visible, grid.small, grid.ratio)
+    )
     prior = np.exp(-((SCATTERS / _LIKELY_SCATTER) ** 2) / 2)
-    log_prior = np.log(prior / prior.sum() / len(found.x))
+    log_prior = np.log(prior / prior.sum() / len(grid.x))
     own_log = own.log[rows][:, None, None, :]
     others = own.log.sum(axis=0) - own.log[rows].sum(axis=0)
-    present = np.maximum(seen + faint + found.unseen[rows, :, :, None] * something, _TINY)
+    present = np.maximum(visible + ratio * nothing + small * something, _TINY)
     gain = present / np.exp(own_log)
-    log_all, member = [], []
+    log_all, log_prior_only, member = [], [], []
     for part in _SHARES:
-        odds = part / (1 - part) * gain
-        log_all.append(two_at_least(np.log1p(-part) + own_log, odds) + others)
-        member.append(odds / (1 + odds))
+        odds = part / (1 - part)
+        absent, one = np.log1p(-part), np.ones((len(rows), 1))
+        log_all.append(sum_two_or_more(absent + own_log, odds * gain) + others)
+        log_prior_only.append(sum_two_or_more(absent * one, odds * one))
+        member.append(odds * gain / (1 + odds * gain))
     log = np.array(log_all) + log_prior[:, None]
     total = scipy.special.logsumexp(log)
     weight = np.exp(log - total)
-    one = np.ones((len(rows), 1))
-    alone = [two_at_least(np.log1p(-p) * one, p / (1 - p) * one) for p in _SHARES]
-    log_evidence = (
-        total - np.log(len(_NOTHING_OWN)) - scipy.special.logsumexp(alone) - own.log_evidence
-    )
-    there = np.array([(weight[k] * each) for k, each in enumerate(member)]).sum(axis=0)
-    there_with = there / present
-    return Shared(
-        family,
-        float(log_evidence),
+    there = np.array([weight[k] * each for k, each in enumerate(member)]).sum(axis=0)
+    log_two = scipy.special.logsumexp(log_prior_only) + np.log(len(_NOTHING_OWN))
+    return SharedEvidence(
+        group,
+        float(total - log_two - own.log_evidence),
         there.sum(axis=(1, 2, 3)),
-        (there_with * seen).sum(axis=3),
-        (there_with * faint).sum(axis=3),
+        (there / present).sum(axis=3),
+        (there / present * nothing).sum(axis=3),
         weight.sum(axis=(0, 3)),
     )
 
 
-def two_at_least(absent: FloatArray, odds: FloatArray) -> FloatArray:
-    """Log of the sum over all choices of two hangers and more (axis 0) of products of either.
+def sum_two_or_more(absent: FloatArray, odds: FloatArray) -> FloatArray:
+    """Return the log of the sum over all choices of two hangers or more (axis 0) of products.
 
-    `absent` is the log of one factor of a hanger, `odds` the other over it.
+    `absent` is the log of the factor of a hanger that is not chosen, `odds` the other over it.
     """
-    whole = np.log1p(odds).sum(axis=0)
+    every = np.log1p(odds).sum(axis=0)
     few = np.log1p(odds.sum(axis=0))
-    return np.asarray(absent.sum(axis=0) + whole + _log(-np.expm1((few - whole).clip(max=0))))
+    return np.asarray(absent.sum(axis=0) + every + _log(-np.expm1((few - every).clip(max=0))))
 
 
-def unknown(patients: Sequence[Patient], family: Kin, own: Own) -> Shared:
-    """Something unknown that a family shares; of no size."""
-    there = np.array([each.unknown for each in patients])[:, None, None]
-    seen = np.repeat(there, len(SCATTERS), axis=2)
-    nothing = np.empty((0, 0, 0))
-    none = np.zeros_like(seen)
-    found = Sizes(np.zeros(1), np.ones(1), seen, none, none, nothing, (), ())
-    return shared(found, family, own)
+def weigh_unknown(hangers: Sequence[HangerEvidence], group: Group, own: OwnCauses) -> float:
+    """Return the log evidence for something unknown, of no size, that a group shares."""
+    there = np.array([each.unknown for each in hangers])[:, None, None]
+    visible = np.repeat(there, len(SCATTERS), axis=2)
+    none, one = np.zeros_like(visible), np.ones(1)
+    return weigh_shared(SizeGrid(one, one, visible, none, none, none), group, own).log_evidence
 
 
 def _log(value: FloatArray) -> FloatArray:

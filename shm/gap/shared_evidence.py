@@ -1,126 +1,111 @@
-"""What one hanger says of a cause that it may share with others: how much it speaks for the effect
-being there, by the effect's size, and what the tension then is.
+"""The evidence of one hanger for effects that it may share with others.
 
-A diagnosis of one hanger is read back as likelihoods: the probability of an effect over its prior,
-and the draws of its size over the prior of the size. So the priors of a single hanger go out of
-what several hangers say together, and its errors and laws stay in.
+The diagnosis of the hanger is turned back into likelihoods: probabilities over their priors, draws
+of an effect's size over the prior of the size. So the priors of a single hanger drop out of what
+several hangers show together, and its errors and laws stay in.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from shm.gap.attribution import Attribution, Explanation, possible
+from shm.gap.attribution import Attribution, possible
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.coordinates import scale_free
-from shm.gap.detectability import Scan, marginal
-from shm.gap.law_error import mixed
-from shm.gap.model_probabilities import NO_GAP, PAIR, SINGLE, UNKNOWN, ScoredHypothesis
+from shm.gap.linear import Linear
+from shm.gap.probabilities import NO_GAP, PAIR, SINGLE, UNKNOWN, ScoredHypothesis
 from shm.gap.problem import GapProblem
+from shm.gap.scan import Scan
 from shm.gap.search import Search
 from shm.inference.mixture import normalised, systematic
 from shm.models.effects import Parameter, Variant, parameters_of
-from shm.values import Diagnosis, FloatArray, Hanger, ModalTest
+from shm.values import BoolArray, Diagnosis, FloatArray, Hanger, ModalTest
 
 Place = tuple[str, str]
 """An effect of the catalogue and where it acts, in words."""
 
 ALONE = SINGLE / (SINGLE + PAIR)
 """How often a shared cause is the only one: as often as one cause is in a single hanger."""
+BELOW = 0.5
+"""Judgement, decades: what one hanger sees by half a standard deviation, ten see by 1.5."""
+STEP = 0.03  # numerical, decades: the least scatter of sizes; normals so far apart add up evenly
 
-_TINY = 1e-300  # technical: what a logarithm is taken of
-_MOST_GAIN = 3.0
-"""Judgement, log likelihood: what cannot be seen gains no more, unless the scan is not linear."""
-_DRAWS = 400  # technical: of each fit, a mean to 5 % of its standard deviation
+_DRAWS = 1000  # numerical: a mean to 3 % of its standard deviation
+_ABOUT = 0.15  # numerical, decades: as far apart as points of a scan
+_MOST_GAIN, _TINY = 500.0, 1e-300  # numerical: a log that has an exponential; what is divided by
 
 
-@dataclass(frozen=True, eq=False)
-class Reach:
-    """Sizes x that these data could show: `lower` to `upper`, evenly likely before any data.
+@dataclass(frozen=True)
+class Sizes:
+    """The sizes x of an effect that these data could show, evenly likely before any data.
 
     x grows with the effect. It counts decades of a size, and of a stiffness downwards; of what has
-    no scale of its own, such as an angle, the `parameter`'s whole range counts 1.
+    no scale, such as an angle, the whole range of the `parameter` counts 1.
     """
 
     parameter: Parameter
-    lower: float
-    upper: float
-
-    @classmethod
-    def of(cls, parameter: Parameter) -> Reach:
-        """Of the first parameter of an effect, as the data cut its prior."""
-        whole = cls(parameter, 0.0, 0.0)
-        ends = whole.x(np.array([parameter.lower, parameter.upper]))
-        return cls(parameter, float(ends.min()), float(ends.max()))
 
     def x(self, value: FloatArray) -> FloatArray:
-        """Of values (n,) in their units, whatever their signs."""
-        if self.parameter.spread == "logarithmic":
-            return np.asarray(np.log10(np.abs(value)))
-        return np.asarray(value * self._direction / self._unit)
+        """Return x of values (n,) in their units, whatever their signs."""
+        parameter = self.parameter
+        if parameter.spread == "logarithmic":
+            value = np.log10(np.abs(value))
+        elif not scale_free(parameter):
+            value = value / (parameter.upper - parameter.lower)
+        return np.asarray(-value if parameter.zero > parameter.upper else value)
 
     def value(self, x: FloatArray) -> FloatArray:
-        """The inverse of `x`, without a sign."""
-        if self.parameter.spread == "logarithmic":
+        """Return the values (n,) of x, without a sign."""
+        parameter = self.parameter
+        x = -x if parameter.zero > parameter.upper else x
+        if parameter.spread == "logarithmic":
             return np.asarray(10.0**x)
-        return np.asarray(x * self._direction * self._unit)
+        return x if scale_free(parameter) else x * (parameter.upper - parameter.lower)
+
+    def sign(self, value: FloatArray) -> FloatArray:
+        """Return the signs (n,) of values; 1 of a parameter that has none."""
+        return np.where(self.parameter.signed & (value < 0), -1.0, 1.0)
 
     @property
-    def width(self) -> float:
-        return self.upper - self.lower
+    def signs(self) -> FloatArray:
+        return np.array([1.0, -1.0] if self.parameter.signed else [1.0])
 
     @property
-    def _direction(self) -> float:
-        return -1.0 if self.parameter.zero > self.parameter.upper else 1.0
-
-    @property
-    def _unit(self) -> float:
-        return 1.0 if scale_free(self.parameter) else self.parameter.upper - self.parameter.lower
+    def ends(self) -> tuple[float, float]:
+        """Return the least and the largest x."""
+        x = self.x(np.array([self.parameter.lower, self.parameter.upper]))
+        return float(x.min()), float(x.max())
 
 
 @dataclass(frozen=True, eq=False)
-class Faint:
-    """Sizes below those that one hanger could show, at points of a scan.
+class EffectEvidence:
+    """The evidence for one effect at one place in one hanger, at points (n,) of its size.
 
-    `ratio` (k,) is their likelihood over that of no effect, `tension_n` (k,) draws of the tension
-    that goes with each. What one hanger sees by half a standard deviation, twenty see by two.
+    Points `x` with their `sign` are of `visible` sizes or of smaller ones. With sizes of density f
+    the likelihood of a visible effect is the sum of `weight` f(x), against all that a hanger may
+    have otherwise; that of a smaller one is the same sum over its points, against no effect.
+    `tension_n` is that of the hanger with each. `log_mimic_odds` are those of something unknown
+    that passes for the effect, against the effect.
     """
 
+    sizes: Sizes
     x: FloatArray
     sign: FloatArray
-    ratio: FloatArray
-    tension_n: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """Of one effect at one place in one hanger.
-
-    `bayes_factor` is that of the effect being there, alone or with another one, against what a
-    hanger may have otherwise. `x` (n,), `sign` (n,) and `tension_n` (n,) are equal draws of the
-    posterior, or of a scan where the effect was not worth a fit. `log_mimic_odds` are those of
-    something unknown that passes for the effect against the effect itself.
-    """
-
-    bayes_factor: float
-    reach: Reach
-    x: FloatArray
-    sign: FloatArray
+    weight: FloatArray
+    visible: BoolArray
     tension_n: FloatArray
     log_mimic_odds: float
-    faint: Faint
 
 
 @dataclass(frozen=True, eq=False)
-class Patient:
+class HangerEvidence:
     """One hanger of several, diagnosed for itself.
 
-    `no_gap` and `gap` are how much its data speak for either, against what a hanger may have
-    otherwise; `unknown` for something that the catalogue lacks. `tension_n` (n,) are draws over
-    all of that.
+    `no_gap`, `gap` and `unknown` are the likelihoods of each, against all that a hanger may have.
+    `tension_n` (n,) are equal draws over all of that.
     """
 
     hanger: Hanger
@@ -130,22 +115,21 @@ class Patient:
     gap: float
     unknown: float
     tension_n: FloatArray
-    effects: Mapping[Place, Evidence]
+    effects: Mapping[Place, EffectEvidence]
 
 
-def patient(
+def weigh_hanger(
     hanger: Hanger,
     tests: Sequence[ModalTest],
     diagnosis: Diagnosis,
     attribution: Attribution,
     rng: np.random.Generator,
-) -> Patient:
-    """A hanger as its own diagnosis sees it."""
-    none = attribution.no_gap_probability
-    weight, fits = zip(*possible(attribution), strict=True)
-    draws = [_tension_n(attribution.search.problem, fit) for fit in fits]
-    tension_n = mixed(draws, np.array(weight), rng)
-    return Patient(
+) -> HangerEvidence:
+    """Return the evidence of a hanger from its diagnosis."""
+    problem, none = attribution.search.problem, attribution.no_gap_probability
+    parts = [(p, _tension_n(problem, fit, rng)[None]) for p, fit in possible(attribution)]
+    tension_n = _resampled(parts, rng)[0]
+    return HangerEvidence(
         hanger=hanger,
         tests=tuple(tests),
         diagnosis=diagnosis,
@@ -157,122 +141,139 @@ def patient(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Held:
-    """An effect at a place within a hypothesis that holds it, `index` says as which."""
-
-    scored: ScoredHypothesis
-    index: int
-    probability: float
+_Held = list[tuple[float, ScoredHypothesis]]
+"""Hypotheses that hold an effect at a place, each with its probability."""
 
 
 def _effects(
     attribution: Attribution, tension_n: FloatArray, rng: np.random.Generator
-) -> Iterator[tuple[Place, Evidence]]:
-    search = attribution.search
-    singles: dict[Place, list[_Held]] = {}
-    pairs: dict[Place, list[_Held]] = {}
-    variants: dict[Place, Variant] = {}
-    for explanation in attribution.explanations:
-        into = pairs if explanation.is_pair else singles
-        for scored, probability in _by_variant(explanation):
-            for index, (name, variant) in enumerate(scored.hypothesis.effects):
-                place = name, variant.at
-                variants.setdefault(place, replace(variant, law=0))
-                into.setdefault(place, []).append(_Held(scored, index, probability))
-    for place, variant in variants.items():
-        # One of so many effects, at one of so many places.
-        prior = 1 / (len(search.variants) * search.variants[place[0]])
-        alone, paired = singles.get(place, []), pairs.get(place, [])
-        own = sum(each.probability for each in alone) / (SINGLE * prior)
-        joint = sum(each.probability for each in paired) / (2 * PAIR * prior)
-        factor = ALONE * own + (1 - ALONE) * joint if pairs else own
-        held = [*alone, *paired]
-        act = place[0], variant
-        yield place, _evidence(search, act, held, factor, tension_n, rng)
-
-
-def _by_variant(explanation: Explanation) -> Iterator[tuple[ScoredHypothesis, float]]:
-    """Each place where a cause was tried, with its share of the cause's probability."""
-    share = normalised(np.array([each.log_evidence for each in explanation.variants]))
-    for each, part in zip(explanation.variants, share, strict=True):
-        yield each, float(part) * explanation.probability
-
-
-def _evidence(
-    search: Search,
-    place: tuple[str, Variant],
-    held: Sequence[_Held],
-    factor: float,
-    tension_n: FloatArray,
-    rng: np.random.Generator,
-) -> Evidence:
-    problem, single = search.problem, Hypothesis((place,))
-    own = len(problem.names(Hypothesis()))
-    reach = Reach.of(problem.coordinates(single).parameters[own])
-    mimic = sum(
-        each.scored.log_mimic - each.scored.log_evidence
-        for each in held[:1]
-        if each.scored.log_mimic is not None
-    )
-    drawn = [
-        (each.probability, *_draws(problem, fit, each.index, reach))
-        for each in held
-        if (fit := each.scored.posterior) is not None and each.probability > 0
-    ]
-    faint = _faint(search, search.scans[single], reach, rng)
-    if not drawn:
-        x, sign = _screened(search.scans[single], reach, rng)
-        return Evidence(factor, reach, x, sign, rng.choice(tension_n, _DRAWS), mimic, faint)
-    weight = np.concatenate([np.full(len(x), share / len(x)) for share, x, *_ in drawn])
-    rows = systematic(weight / weight.sum(), _DRAWS, rng)
-    x, sign, tensions = (np.concatenate([each[k] for each in drawn])[rows] for k in (1, 2, 3))
-    return Evidence(factor, reach, x, sign, tensions, mimic, faint)
-
-
-def _screened(scan: Scan, reach: Reach, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Sizes x and their signs (n,) of an effect that was only scanned, as its points say."""
-    x = reach.x(scan.effect[:, 0])
-    seen = (x >= reach.lower) & (scan.weight > 0)
-    log = np.where(seen, scan.marginal.log_mean, -np.inf) + np.log(np.maximum(scan.weight, _TINY))
-    rows = systematic(normalised(log), _DRAWS, rng)
-    sign = np.where(scan.effect[rows, 0] < 0, -1.0, 1.0)
-    spacing = reach.width / len(np.unique(x[seen]))
-    spread = x[rows] + spacing * (rng.random(_DRAWS) - 0.5)
-    return spread, sign if reach.parameter.signed else np.ones(_DRAWS)
-
-
-def _faint(search: Search, scan: Scan, reach: Reach, rng: np.random.Generator) -> Faint:
-    """Of a scan: small effects are linear, so that it is as good as a fit."""
+) -> Iterator[tuple[Place, EffectEvidence]]:
+    search, tried = attribution.search, _by_probability(attribution)
     problem, baseline = search.problem, search.baseline
-    nothing = marginal(problem, Hypothesis(), baseline, np.zeros((1, len(baseline.predicted))))
-    x = reach.x(scan.effect[:, 0])
-    rows = np.flatnonzero((x < reach.lower) & (scan.weight > 0))
-    sign = np.where(scan.effect[rows, 0] < 0, -1.0, 1.0)
-    log = scan.marginal.log_likelihood[rows] - nothing.log_likelihood[0]
-    own = _tension_n(problem, replace(baseline, draws=baseline.z[None]))
-    moved = replace(baseline, draws=baseline.z + scan.marginal.follow[rows])
-    scatter = rng.choice(_tension_n(problem, baseline), len(rows)) / own
-    tension_n = _tension_n(problem, moved) * scatter
-    sign = sign if reach.parameter.signed else np.ones(len(rows))
-    return Faint(x[rows], sign, np.exp(log.clip(max=_MOST_GAIN)), tension_n)
+    linear = Linear(problem.likelihood(Hypothesis()), baseline.slopes)
+    residual = problem.value - baseline.predicted
+    log_nothing = float(linear.marginal(residual[None], baseline.z[None])[0][0])
+    for single, scan in search.scans.items():
+        if not np.isfinite(scan.log_evidence):
+            continue
+        (effect,) = single.effects
+        held = [each for each in tried if effect in each[1].hypothesis.effects]
+        sizes = Sizes(problem.coordinates(single).effects[0])
+        visible = _of_fits(problem, effect, held, sizes, rng)
+        if visible is None:
+            visible = _of_scan(scan, sizes, tension_n, rng)
+        small, ratio = _too_small_to_see(search, scan, sizes, log_nothing, rng)
+        factor = _bayes_factor(search, effect, held, any(_is_pair(each) for _, each in tried))
+        span = factor * np.ptp(sizes.ends) * len(sizes.signs)
+        x, sign, tensions = np.hstack([visible, small])
+        yield (
+            (effect[0], effect[1].at),
+            EffectEvidence(
+                sizes=sizes,
+                x=x,
+                sign=sign,
+                weight=np.append(np.full(visible.shape[1], span / visible.shape[1]), STEP * ratio),
+                visible=np.arange(len(x)) < visible.shape[1],
+                tension_n=tensions,
+                log_mimic_odds=sum(
+                    each.log_mimic - each.log_evidence
+                    for _, each in held
+                    if each.log_mimic is not None and not _is_pair(each)
+                ),
+            ),
+        )
 
 
-def _draws(
-    problem: GapProblem, fit: Fit, index: int, reach: Reach
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Sizes x, their signs and tensions (n,) of one effect of a fit."""
-    before = fit.hypothesis.effects[:index]
-    column = len(problem.names(Hypothesis())) + sum(
-        len(parameters_of(name, problem.hanger, variant)) for name, variant in before
-    )
-    value = problem.theta(fit.hypothesis, fit.draws)[:, column]
-    sign = np.where(value < 0, -1.0, 1.0) if reach.parameter.signed else np.ones(len(value))
-    return reach.x(value), sign, _tension_n(problem, fit)
+def _by_probability(attribution: Attribution) -> _Held:
+    """Return each cause at each place where it was tried."""
+    found: _Held = []
+    for cause in attribution.explanations:
+        if cause.probability > 0:
+            share = normalised(np.array([each.log_evidence for each in cause.variants]))
+            found += zip((cause.probability * share).tolist(), cause.variants, strict=True)
+    return found
 
 
-def _tension_n(problem: GapProblem, fit: Fit) -> FloatArray:
-    """Of a fit's draws; NaN of a bar that carries none."""
+def _is_pair(each: ScoredHypothesis) -> bool:
+    return len(each.hypothesis.effects) > 1
+
+
+def _bayes_factor(
+    search: Search, effect: tuple[str, Variant], held: _Held, tried_pairs: bool
+) -> float:
+    """Return that of an effect being there, alone or with another, against all there may be."""
+    # One of so many effects, at one of so many places; an effect is in two of so many pairs.
+    prior = 1 / (len(search.variants) * search.variants[effect[0]])
+    alone = sum(p for p, each in held if not _is_pair(each)) / (SINGLE * prior)
+    paired = sum(p for p, each in held if _is_pair(each)) / (2 * PAIR * prior)
+    return ALONE * alone + (1 - ALONE) * paired if tried_pairs else alone
+
+
+def _of_fits(
+    problem: GapProblem,
+    effect: tuple[str, Variant],
+    held: _Held,
+    sizes: Sizes,
+    rng: np.random.Generator,
+) -> FloatArray | None:
+    """Return equal draws (3, n) of x, sign and tension over all fits with an effect, if any."""
+    parts = []
+    for probability, each in held:
+        fit, effects = each.posterior, each.hypothesis.effects
+        if fit is None or not probability:
+            continue
+        before = effects[: effects.index(effect)]
+        column = sum(len(parameters_of(name, problem.hanger, other)) for name, other in before)
+        value = problem.coordinates(fit.hypothesis).effect_values(fit.draws)[:, column]
+        drawn = sizes.x(value), sizes.sign(value), _tension_n(problem, fit, rng)
+        parts.append((probability, np.array(drawn)))
+    return _resampled(parts, rng) if parts else None
+
+
+def _of_scan(
+    scan: Scan, sizes: Sizes, tension_n: FloatArray, rng: np.random.Generator
+) -> FloatArray:
+    """Return the same of an effect that was only scanned; the tension is that of the hanger."""
+    value = scan.effect[:, 0]
+    rows = systematic(normalised(np.where(scan.seen, scan.log, -np.inf)), _DRAWS, rng)
+    spacing = np.ptp(sizes.x(value)) * len(sizes.signs) / len(value)
+    x = sizes.x(value[rows]) + spacing * (rng.random(_DRAWS) - 0.5)
+    tensions = rng.choice(tension_n, _DRAWS)
+    return np.array([x.clip(*sizes.ends), sizes.sign(value[rows]), tensions])
+
+
+def _too_small_to_see(
+    search: Search, scan: Scan, sizes: Sizes, log_nothing: float, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Return points (3, n) of x, sign and tension below the visible sizes, and their likelihoods.
+
+    The latter (n,) are over that of no effect. A scan is as good as a fit there, since small
+    effects are linear; far from all of its points they are those of no effect.
+    """
+    problem, baseline, every = search.problem, search.baseline, sizes.x(scan.effect[:, 0])
+    rows = np.flatnonzero((every < sizes.ends[0]) & np.isfinite(scan.log))
+    line = sizes.ends[0] - STEP * (np.arange(np.ceil(BELOW / STEP)) + 0.5)
+    x, sign = np.tile(line, len(sizes.signs)), np.repeat(sizes.signs, len(line))
+    near = np.exp(-(((every[rows] - x[:, None]) / _ABOUT) ** 2) / 2)
+    near *= sizes.sign(scan.effect[rows, 0]) == sign[:, None]
+    near /= near.sum(axis=1, keepdims=True) + _TINY
+    steps = np.vstack([np.zeros(len(baseline.z)), scan.step[rows]])
+    moved_n = problem.tension_n(Hypothesis(), baseline.z + steps)
+    tension_n = rng.choice(_tension_n(problem, baseline, rng), len(x))
+    tension_n = tension_n * (1 + near @ (moved_n[1:] / moved_n[0] - 1))
+    gain = np.minimum(scan.log[rows] - log_nothing, _MOST_GAIN)
+    return np.array([x, sign, tension_n]), 1 + near @ np.expm1(gain)
+
+
+def _resampled(parts: Sequence[tuple[float, FloatArray]], rng: np.random.Generator) -> FloatArray:
+    """Return equal draws (k, _DRAWS) of parts (k, n), each with its probability."""
+    weight = np.concatenate([np.full(each.shape[1], p / each.shape[1]) for p, each in parts])
+    rows = systematic(weight / weight.sum(), _DRAWS, rng)
+    return np.asarray(np.hstack([each for _, each in parts])[:, rows])
+
+
+def _tension_n(problem: GapProblem, fit: Fit, rng: np.random.Generator) -> FloatArray:
+    """Return that of a fit's draws; NaN of a bar that carries none."""
     if not problem.hanger.nominal_tension_n:
         return np.full(len(fit.draws), np.nan)
-    return problem.tension_n(fit.hypothesis, fit.draws)
+    return problem.tension_n(fit.hypothesis, fit.draws, rng)

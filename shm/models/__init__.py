@@ -16,9 +16,11 @@ from shm.models.adopted import Adopted, AdoptedAsMade, AdoptedName, is_adopted, 
 from shm.models.adopted import unfit as adopted_unfit
 from shm.models.as_made import AsMade
 from shm.models.base import DESCRIPTION, PRIORS, THESIS, Model, held_otherwise
-from shm.models.composed import AS_DESCRIBED
 from shm.models.registry import MODELS
 from shm.values import PLANES, FloatArray, Hanger, Posterior
+
+AS_DESCRIBED = "beam1"
+"""The class that takes the ends as they are described, whatever holds them."""
 
 
 def build(name: str, hanger: Hanger, priors: str = DESCRIPTION) -> Model:
@@ -129,6 +131,7 @@ def _refuse_unknown(name: str, hanger: Hanger) -> None:
 
 
 __all__ = [
+    "AS_DESCRIBED",
     "DESCRIPTION",
     "MODELS",
     "PRIORS",

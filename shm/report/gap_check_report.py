@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from shm.report import formatting
-from shm.report.diagnosis_wording import size
+from shm.report.sizes import size
 from shm.values import NAN, EffectCheck, EffectEstimate, GapCheck, GapTrial, effect_label
 from shm.values.rounding import force_unit
 

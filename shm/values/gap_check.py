@@ -10,7 +10,7 @@ from shm.values.kinds import NAN
 from shm.values.showing import Shown
 
 Outcome = Literal["alone", "in a group", "another cause", "no gap", "unexplained", "refused"]
-"""What a diagnosis says of a planted effect; `refused` if no explanation comes near the data."""
+"""What the verdict says of a planted effect; `refused` if no explanation comes near the data."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class GapTrial:
 
     @property
     def is_found(self) -> bool:
-        """Return True if the effect is the leading cause or in the leading group."""
+        """Return True if the effect is the claimed cause or one of those claimed together."""
         return self.outcome in ("alone", "in a group")
 
 

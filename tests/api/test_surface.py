@@ -29,10 +29,9 @@ SIGNATURES = {
     "priors='description', progress, sampler='importance', calibrated_by=())",
     "select": "(tests, hanger, models=None, *, seed=1, samples=1000, "
     "priors='description', progress, sampler='importance', calibrated_by=(), class_priors=None)",
-    "diagnose": "(tests, hanger, baseline='beam1', *, without=(), hold_out=(), draws=1000, seed=1, "
+    "diagnose": "(tests, hanger, baseline='', *, without=(), hold_out=(), draws=1000, seed=1, "
     "progress)",
-    "check_gap": "(tests, hanger, baseline='beam1', *, effects=(), seeds=1, sound=5, seed=1, "
-    "progress)",
+    "check_gap": "(tests, hanger, baseline='', *, effects=(), seeds=1, sound=5, seed=1, progress)",
     "diagnose_simulator": "(simulator, readings, *, candidates=(), seed=1)",
     "simulate": "(hanger, *, tension_n=None, k1_n_m_rad=inf, k2_n_m_rad=inf, k3_n_m_rad=inf, "
     "k4_n_m_rad=inf, damping_ratio=0.001, hits=5, seconds_per_hit=20.0, sampling_rate_hz=512.0, "

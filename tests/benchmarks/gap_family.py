@@ -32,8 +32,8 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from shm.gap import GapOptions  # noqa: E402
-from shm.gap.bridge_diagnosis import examined_patient, jointly  # noqa: E402
-from shm.gap.shared_evidence import Patient  # noqa: E402
+from shm.gap.bridge_diagnosis import diagnose_jointly, examine_hanger  # noqa: E402
+from shm.gap.shared_evidence import HangerEvidence  # noqa: E402
 from shm.values import PLANES, BridgeDiagnosis, Diagnosis, Hanger, ModalTest, Mode  # noqa: E402
 from tests.benchmarks.worlds import share  # noqa: E402
 from tests.worlds import finite_elements as world  # noqa: E402
@@ -168,9 +168,9 @@ def with_cause(
     return bar
 
 
-def examined(members: list[Member], options: GapOptions) -> list[Patient]:
+def examined(members: list[Member], options: GapOptions) -> list[HangerEvidence]:
     """Each hanger of a bridge by itself."""
-    return [examined_patient(each.tests, each.hanger, options) for each in members]
+    return [examine_hanger(each.tests, each.hanger, options) for each in members]
 
 
 def names(found: Diagnosis | BridgeDiagnosis) -> set[str]:
@@ -183,7 +183,7 @@ def names(found: Diagnosis | BridgeDiagnosis) -> set[str]:
 
 
 def scored(
-    members: list[Member], patients: list[Patient], found: BridgeDiagnosis
+    members: list[Member], patients: list[HangerEvidence], found: BridgeDiagnosis
 ) -> dict[str, Any]:
     """What became of one bridge."""
     cause = shared_cause(members)
@@ -276,7 +276,7 @@ def main() -> None:
             patients = examined(members, options)
             if kept:
                 kept.write_bytes(pickle.dumps(patients))
-        row = scored(members, patients, jointly(patients, options))
+        row = scored(members, patients, diagnose_jointly(patients, options))
         rows.append(row)
         print(
             f"{cause or 'sound'}: {row['answer']}, apart {row['apart']:.3f}, claim "

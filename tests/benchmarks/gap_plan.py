@@ -16,7 +16,6 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -34,19 +33,17 @@ from shm.gap.measurement_plan import (  # noqa: E402
     ENOUGH,
     Race,
     _offered,
-    chances,
+    explanations,
     holds,
     log_odds_of,
     planned,
 )
-from shm.gap.observations import observed  # noqa: E402
-from shm.gap.problem import GapProblem  # noqa: E402
-from shm.models import MODELS, AsMade  # noqa: E402
 from shm.models.effects import EFFECTS  # noqa: E402
 from shm.simulate import HangerState, PlantedEffect  # noqa: E402
 from shm.values import MEASUREMENT_HOURS, PLANES, FloatArray, Hanger, ModalTest  # noqa: E402
 from tests.benchmarks.gap.outcomes import Case  # noqa: E402
 from tests.benchmarks.gap_trial import ROD, planted_to_size  # noqa: E402
+from tests.helpers.gap_fits import make_problem  # noqa: E402
 from tests.worlds.simulated.campaign import (  # noqa: E402
     CampaignPlan,
     _realised,
@@ -110,8 +107,7 @@ class Known:
     causes: tuple[str, ...] = CAUSES
 
     def attribution(self, seed: int) -> Attribution:
-        model = AsMade(MODELS["beam1"](self.hanger))
-        problem = GapProblem(model, self.tests, observed(self.tests, self.hanger))
+        problem = make_problem(self.tests, self.hanger)
         without = tuple(name for name in EFFECTS if name not in self.causes)
         return attribute(
             problem, GapOptions(without=without, seed=seed), np.random.default_rng(seed)
@@ -135,9 +131,9 @@ class Known:
         return replace(self, hanger=weighed, tests=tests)
 
 
-def chance_of(cause: str, among: Mapping[str, float]) -> float:
-    """The probability of all explanations that name a cause."""
-    return sum(chance for name, chance in among.items() if holds(name, cause))
+def chance_of(cause: str, found: Attribution) -> float:
+    """Return the probability of all explanations that name a cause."""
+    return sum(each.probability for each in explanations(found) if holds(each.name, cause))
 
 
 def plan_of(design: Design, before: tuple[ModalTest, ...]) -> OneTest:
@@ -180,7 +176,7 @@ def tried(index: int, seed: int, causes: tuple[str, ...]) -> dict[str, Any] | No
     found = {
         "cause": cause,
         "at": effect.at,
-        "start": chance_of(cause, chances(start)),
+        "start": chance_of(cause, start),
         "planned": walked(known, start, bridge, by_plan),
         "fixed": walked(known, start, bridge, in_order),
     }
@@ -191,14 +187,14 @@ def walked(known: Known, now: Attribution, bridge: Bridge, chosen: Any) -> list[
     """Test after test, with what was promised and what the true cause won."""
     steps: list[dict[str, Any]] = []
     cause = bridge.planted.name
-    while chance_of(cause, chances(now)) < ENOUGH and len(steps) < MOST:
+    while chance_of(cause, now) < ENOUGH and len(steps) < MOST:
         proposal, promised = chosen(now, len(steps), bridge.seed)
         if proposal is None:
             break
-        before = chance_of(cause, chances(now))
+        before = chance_of(cause, now)
         known = known.after(proposal, bridge)
         now = known.attribution(bridge.seed)
-        after = chance_of(cause, chances(now))
+        after = chance_of(cause, now)
         won = float(log_odds_of(after) - log_odds_of(before))
         steps.append(
             {

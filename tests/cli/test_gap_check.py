@@ -9,7 +9,7 @@ import pytest
 
 from shm.bridge import load_hanger
 from shm.gap import check as module
-from shm.gap.check import Twin
+from shm.gap.twin import Twin
 from shm.modes_document import load_modes
 from shm.store import Workspace
 from shm_cli import gap_check as command

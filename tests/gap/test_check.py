@@ -12,7 +12,8 @@ from shm.diagnosis_document import gap_check_document, gap_check_of
 from shm.documents import dump
 from shm.errors import BadInput, UsageError
 from shm.gap import check as module
-from shm.gap.check import Check, CheckOptions, Twin, check_gap, usual_tests
+from shm.gap.check import Check, CheckOptions, check_gap, magnitude
+from shm.gap.twin import Twin, usual_tests
 from shm.models.effects import EFFECTS, Variant, parameters_of
 from shm.report.figures.every_figure import gap_check_figures
 from shm.report.gap_check_report import rows
@@ -210,9 +211,8 @@ def test_half_of_the_seeds_decide(
 def test_sizes_of_an_effect_grow_away_from_nothing(twin: Twin, name: str) -> None:
     if name in twin.invisible():
         pytest.skip("not visible in this test")
-    search = module._Search(twin, CheckOptions(), name, 1)
-    size = search.parameters[0]
-    steps = [module._magnitude(size, step, 4) for step in range(4)]
+    size = parameters_of(name, PLAIN, twin.variants(name)[0])[0]
+    steps = [magnitude(size, step, 4) for step in range(4)]
     away = np.diff(steps) if np.isfinite(size.zero) else -np.diff(steps)
     assert (away > 0).all()
     assert ((size.lower < np.array(steps)) & (np.array(steps) < size.upper)).all()
@@ -273,7 +273,7 @@ def test_a_search_that_was_stopped_counts(
 ) -> None:
     monkeypatch.setattr(module, "diagnose", names_from(twin, 0.01, "distributed_mass"))
     job = Check(tests, PLAIN, MASS)
-    found = job.summarise([next(job.searched())])
+    found = job.summarise([next(job.run())])
     assert (found.searches_done, found.searches, found.sound) == (1, 3, ())
     assert [each.effect for each in found.effects] == ["distributed_mass"]
     assert not found.is_complete

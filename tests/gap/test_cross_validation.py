@@ -8,12 +8,10 @@ import pytest
 from shm.errors import UsageError
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.cross_validation import held_out, shrinkage
-from shm.gap.fit import fitted
-from shm.gap.observations import observed
-from shm.gap.problem import GapProblem
 from shm.models.effects import Conditions, Variant
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import AddedMass
+from tests.helpers.gap_fits import fit_hypothesis, make_problem
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension
 from tests.worlds.simulated.campaign import CampaignPlan
@@ -169,9 +167,9 @@ def test_a_planted_clamp_shrinks_what_was_held_out_and_a_wrong_cause_does_not():
     clamp = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
     rng = np.random.default_rng(1)
     tests = simulated(HANGER_3, HangerState(711e3), (clamp,), plan, rng)
-    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    problem = make_problem(tests, HANGER_3)
     before, right, wrong = (
-        fitted(problem, hypothesis, rng)
+        fit_hypothesis(problem, hypothesis)
         for hypothesis in (Hypothesis(), WRONG, Hypothesis((("distributed_mass", Variant()),)))
     )
     found = [

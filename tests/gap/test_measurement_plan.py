@@ -7,23 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.attribution import Attribution, attributed
+from shm.gap.attribution import Attribution, attribute
 from shm.gap.contract import GapOptions
 from shm.gap.experiment_design import lift_off, like_the_present, together, with_sensors
 from shm.gap.measurement_plan import (
     UNKNOWN,
     Race,
-    chances,
+    explanations,
     holds,
     nothing_planned,
     planned,
 )
 from shm.gap.next_measurement import NO_GAP
-from shm.gap.observations import observed
-from shm.gap.problem import GapProblem
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import MEASUREMENT_HOURS
 from tests.helpers.effects import all_but
+from tests.helpers.gap_fits import make_problem
 from tests.helpers.hangers import HANGER_3
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
@@ -40,8 +39,8 @@ def found() -> Attribution:
     """One plane's frequencies, in which more mass is the same as less bending stiffness."""
     rng = np.random.default_rng(1)
     tests = campaign(ROD, HangerState(711e3), (SOFTER,), ONE_PLANE, rng)
-    problem = GapProblem(ROD, "beam1", observed(tests, ROD))
-    return attributed(problem, OPTIONS, np.random.default_rng(1))
+    problem = make_problem(tests, ROD)
+    return attribute(problem, OPTIONS, np.random.default_rng(1))
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +85,7 @@ def test_where_the_data_are_enough_an_empty_plan_says_so(race: Race) -> None:
 def test_before_any_measurement_the_odds_are_those_of_the_evidence(
     found: Attribution, race: Race
 ) -> None:
-    now = chances(found)
+    now = {each.name: each.probability for each in explanations(found)}
     assert sum(now.values()) == pytest.approx(1.0)
     of_mass, of_stiffness = (
         sum(chance for name, chance in now.items() if holds(name, cause))

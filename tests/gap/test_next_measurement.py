@@ -9,13 +9,12 @@ import pytest
 
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.experiment_design import like_the_present, measured_already, proposals, with_sensors
-from shm.gap.fit import fitted
-from shm.gap.next_measurement import NO_GAP, Errors, Foresight, divergence, foreseen, ranked
-from shm.gap.observations import observed
-from shm.gap.problem import GapProblem
+from shm.gap.foresight import Errors, Foresight, NewTests, divergence
+from shm.gap.next_measurement import NO_GAP, ranked
 from shm.models.effects import EFFECTS, Conditions, Variant
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import AddedMass
+from tests.helpers.gap_fits import fit_hypothesis, make_problem
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension
 from tests.worlds.simulated.campaign import CampaignPlan
@@ -96,7 +95,7 @@ def test_what_is_foreseen_of_a_linear_toy_is_its_exact_predictive_distribution()
     problem, error = toy(), 2e-3
     fit = problem.fit(STIFFER, model_error=error)
     new = like_the_present(problem.observations.design)
-    seen = foreseen(problem, fit, new, Errors.of(problem, fit))
+    seen = NewTests(problem, new).foresee(fit, Errors.of(problem, fit))
     slopes = np.vstack([with_order(problem.observations.design), with_order(new)])
     joint = slopes @ slopes.T + SD**2 * np.eye(12) + error**2 * np.tile(np.eye(6), (2, 2))
     gain = joint[6:, :6] @ np.linalg.inv(joint[:6, :6])
@@ -198,13 +197,13 @@ def asked(effect, others, at="everywhere"):
     plan = CampaignPlan(temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, shapes=False)
     rng = np.random.default_rng(1)
     tests = simulated(HANGER_3, HangerState(711e3), (effect,), plan, rng)
-    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    problem = make_problem(tests, HANGER_3)
     survey = problem.observations.design.survey
     fits = []
     for name in (effect.name, *others):
         variants = EFFECTS[name].variants(HANGER_3, survey)
         variant = next(each for each in variants if each.at == at)
-        fits.append(fitted(problem, Hypothesis(((name, variant),)), rng))
+        fits.append(fit_hypothesis(problem, Hypothesis(((name, variant),))))
     return ranked(problem, fits)
 
 

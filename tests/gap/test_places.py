@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 
 from shm.gap.contract import Hypothesis, Observations
-from shm.gap.diagnose import places
-from shm.gap.fit import fitted
-from shm.gap.observations import observed
-from shm.gap.places import Change, Misfit
-from shm.gap.problem import GapProblem
+from shm.gap.places import Change, Misfit, places
 from shm.simulate import HangerState, PlantedEffect
+from tests.helpers.gap_fits import fit_hypothesis, make_problem
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.toy_gap import BASELINE, SD, ToyProblem, design_of, tension
 from tests.helpers.toy_gap import campaign as conditions
@@ -27,8 +24,8 @@ FREQUENCIES = CampaignPlan(
 def diagnosed(effect, plan, seed=1):
     """The places of a campaign with `effect` planted, by kind."""
     tests = campaign(HANGER_3, STATE, (effect,), plan, np.random.default_rng(seed))
-    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
-    before = fitted(problem, Hypothesis(), np.random.default_rng(seed))
+    problem = make_problem(tests, HANGER_3)
+    before = fit_hypothesis(problem, Hypothesis())
     return {place.kind: place for place in places(problem, before)}
 
 
@@ -126,6 +123,6 @@ def test_a_spring_is_found_where_it_holds_the_hanger():
 
 def test_where_nothing_is_wrong_no_place_is_claimed():
     tests = campaign(HANGER_3, STATE, (), SHAPES, np.random.default_rng(3))
-    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
-    before = fitted(problem, Hypothesis(), np.random.default_rng(1))
+    problem = make_problem(tests, HANGER_3)
+    before = fit_hypothesis(problem, Hypothesis())
     assert all(place.share < 0.3 for place in places(problem, before))

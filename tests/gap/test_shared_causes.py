@@ -13,9 +13,9 @@ from shm.diagnosis_document import bridge_diagnosis_document
 from shm.documents import dump
 from shm.errors import UsageError
 from shm.gap import GapOptions, diagnose_bridge
-from shm.gap.bridge_diagnosis import jointly
-from shm.gap.shared_causes import kin, two_at_least
-from shm.gap.shared_evidence import Evidence, Faint, Patient, Place, Reach
+from shm.gap.bridge_diagnosis import diagnose_jointly
+from shm.gap.shared_causes import find_groups, sum_two_or_more
+from shm.gap.shared_evidence import BELOW, STEP, EffectEvidence, HangerEvidence, Place, Sizes
 from shm.models.effects import EFFECTS, Variant
 from shm.report.as_text import as_text
 from shm.report.bridge_diagnosis_report import bridge_diagnosis_paper
@@ -27,37 +27,43 @@ from tests.helpers.hangers import HANGER_3
 
 MASS: Place = ("distributed_mass", "everywhere")
 CLOCK: Place = ("timebase", "all tests")
-REACH = Reach.of(EFFECTS[MASS[0]].parameters(HANGER_3, Variant())[0])
+SIZES = Sizes(EFFECTS[MASS[0]].parameters(HANGER_3, Variant())[0])
 SOUND = {"no_gap": 3.2, "gap": 0.27, "unknown": 0.3}
 """A no-gap probability of 0.8, against a prior of 0.25."""
 ILL = {"no_gap": 0.1, "gap": 1.3, "unknown": 0.8}
 
 
-def evidence(bayes_factor: float, size: float, sd: float = 0.03) -> Evidence:
-    """A size known to `sd` decades, and a tension that is known with it."""
-    x = np.log10(size) + sd * np.random.default_rng(3).standard_normal(400)
-    return Evidence(bayes_factor, REACH, x, np.ones(400), 700e3 * (1 + 10**x), -0.5, faint())
+def evidence(
+    bayes_factor: float, size: float, sd: float = 0.03, small_gain: float = 0.0
+) -> EffectEvidence:
+    """A size known to `sd` decades, and a tension that is known with it.
+
+    Sizes too small to see are likelier than no effect by a log likelihood.
+    """
+    visible = np.log10(size) + sd * np.random.default_rng(3).standard_normal(400)
+    small = SIZES.ends[0] - np.arange(STEP / 2, BELOW, STEP)
+    x = np.append(visible, small)
+    weight = np.append(
+        np.full(400, bayes_factor * np.ptp(SIZES.ends) / 400),
+        np.full(len(small), STEP * np.exp(small_gain)),
+    )
+    is_visible, tension_n = np.arange(len(x)) < 400, 700e3 * (1 + 10**x)
+    return EffectEvidence(SIZES, x, np.ones(len(x)), weight, is_visible, tension_n, -0.5)
 
 
-def faint(log_gain: float = 0.0) -> Faint:
-    """Sizes from 0.2 % down, likelier than no effect by a log likelihood."""
-    x = REACH.lower - np.linspace(0.0, 0.5, 20)
-    ratio = np.full(20, np.exp(log_gain))
-    return Faint(x, np.ones(20), ratio, 700e3 * (1 + 10**x))
-
-
-def hanger(number: int, effects: dict[Place, Evidence], said: dict[str, float]) -> Patient:
+def hanger(
+    number: int, effects: dict[Place, EffectEvidence], said: dict[str, float]
+) -> HangerEvidence:
     described: Hanger = replace(HANGER_3, id=number, length_m=8.0 + number)
     diagnosis = replace(a_diagnosis(), hanger=number)
     tension_n = 700e3 * (1 + 0.05 * np.random.default_rng(number).random(1000))
-    return Patient(
-        described, (ModalTest("t1", ()),), diagnosis, **said, tension_n=tension_n, effects=effects
-    )
+    tests = (ModalTest("t1", ()),)
+    return HangerEvidence(described, tests, diagnosis, **said, tension_n=tension_n, effects=effects)
 
 
 def bridge(factors: Sequence[float], sizes: Sequence[float]) -> BridgeDiagnosis:
     """Hangers for which the mass has these Bayes factors; the clock fits none of them."""
-    return jointly(
+    return diagnose_jointly(
         [
             hanger(
                 number,
@@ -103,8 +109,10 @@ def test_one_hanger_with_a_cause_of_its_own_shares_it_with_nobody() -> None:
 
 def test_what_none_can_see_adds_up() -> None:
     def found(log_gain: float) -> BridgeDiagnosis:
-        little = replace(evidence(0.3, 0.003), faint=faint(log_gain))
-        return jointly([hanger(n, {MASS: little}, SOUND) for n in range(1, 11)], GapOptions())
+        little = evidence(0.3, 0.003, small_gain=log_gain)
+        return diagnose_jointly(
+            [hanger(n, {MASS: little}, SOUND) for n in range(1, 11)], GapOptions()
+        )
 
     assert found(0.0).leads == "each for itself"
     assert found(1.2).leading is not None
@@ -120,7 +128,7 @@ def test_sizes_that_differ_speak_against_a_common_cause() -> None:
 def test_a_size_known_poorly_in_one_hanger_takes_that_of_the_others() -> None:
     poor = {MASS: evidence(8.0, 0.1, 0.4)}
     others = [hanger(n, {MASS: evidence(8.0, 0.05)}, ILL) for n in range(2, 7)]
-    found = jointly([hanger(1, poor, ILL), *others], GapOptions())
+    found = diagnose_jointly([hanger(1, poor, ILL), *others], GapOptions())
     assert found.leading is not None
     size = found.leading.members[0].size
     assert size.mean == pytest.approx(0.05, rel=0.2)
@@ -132,7 +140,7 @@ def test_a_size_known_poorly_in_one_hanger_takes_that_of_the_others() -> None:
 def test_a_hanger_that_cannot_show_it_neither_joins_nor_leaves() -> None:
     blind = hanger(9, {}, SOUND)
     shown = [hanger(n, {MASS: evidence(20.0, 0.05)}, ILL) for n in range(1, 5)]
-    found = jointly([*shown, blind], GapOptions())
+    found = diagnose_jointly([*shown, blind], GapOptions())
     assert found.leading is not None
     assert 0.5 < found.leading.members[-1].probability < 0.95
 
@@ -145,7 +153,7 @@ def test_two_at_least_is_the_sum_over_all_such_choices() -> None:
         for chosen in product((False, True), repeat=5)
         if sum(chosen) >= 2
     )
-    assert two_at_least(absent, np.exp(present - absent)) == pytest.approx(np.log(whole))
+    assert sum_two_or_more(absent, np.exp(present - absent)) == pytest.approx(np.log(whole))
 
 
 def test_families_are_the_hangers_alike_each_set_once() -> None:
@@ -154,7 +162,7 @@ def test_families_are_the_hangers_alike_each_set_once() -> None:
         replace(p, hanger=replace(p.hanger, family="A" if n < 2 else "B"))
         for n, p in enumerate(made)
     ]
-    found = {each.members: each.likeness for each in kin(older)}
+    found = {each.members: each.likeness for each in find_groups(older)}
     assert found[(0, 1, 2, 3)] == "all hangers"
     assert found[(0, 1)] == found[(2, 3)] == "hangers of one delivery"
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from shm.gap import GapOptions
-from shm.gap.check import Twin
+from shm.gap.twin import Twin
 from shm.models.effects import Variant
 from shm.values import (
     Diagnosis,

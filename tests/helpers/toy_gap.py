@@ -20,7 +20,10 @@ SD = 1e-3
 
 @dataclass(frozen=True)
 class ToyCoordinates:
-    parameters: tuple[Parameter, ...]
+    """All parameters are the baseline's."""
+
+    baseline: int
+    effects: tuple[Parameter, ...] = ()
 
 
 class ToyProblem:
@@ -53,9 +56,11 @@ class ToyProblem:
     def masses_of(self, design: Design) -> FloatArray:
         return Repeated.none(design).masses
 
+    def sensors_of(self, design: Design) -> FloatArray:
+        return Repeated.none(design).sensors
+
     def coordinates(self, hypothesis: Hypothesis) -> ToyCoordinates:
-        d = self.slopes[hypothesis](self.observations.design).shape[1]
-        return ToyCoordinates((Parameter("size", "", -1, 1, 0, ""),) * d)
+        return ToyCoordinates(self.slopes[hypothesis](self.observations.design).shape[1])
 
     def fit(self, hypothesis: Hypothesis = BASELINE, model_error: float = 0.0) -> Fit:
         """The exact posterior."""

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from shm.errors import UsageError
-from shm.models import applicable, build, check_baseline
-from shm.models.composed import Baseline, ComposedHanger
+from shm.inference.described import DescribedCoordinates
+from shm.models import MODELS, AsMade, applicable, build, check_baseline
 from shm.models.effects import EFFECTS, Conditions, Survey, parameters_of
 from shm.models.hanger import PhysicalHanger, solve
-from shm.values import PLANES, FloatArray, Scatter, Supports
+from shm.models.hanger_with_effects import HangerWithEffects
+from shm.values import PLANES, FloatArray, Hanger, Scatter, Supports
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.physical_hangers import EI, LENGTH, MASS, NOWHERE, TENSION
 
@@ -26,6 +28,19 @@ HANGING = Supports("free", "pinned", 500.0)
 
 def held(supports: Supports, tension_n: float) -> PhysicalHanger:
     return PhysicalHanger.held(replace(HANGER_3, supports=supports), np.array([tension_n]))
+
+
+def beam_1(hanger: Hanger) -> AsMade:
+    return AsMade(MODELS["beam1"](hanger))
+
+
+def middle_of(hanger: Hanger, scores: Sequence[float]) -> FloatArray:
+    """Make parameter sets of beam1 by scores of the tension, all else at its middle."""
+    known = hanger.scatter.tension
+    described = DescribedCoordinates(beam_1(hanger), (), 1.0, known_tension_sd=known)
+    z = np.zeros((len(scores), described.dimension))
+    z[:, 0] = scores
+    return described.theta(z)
 
 
 def both_ways(physical: PhysicalHanger, modes: int) -> list[FloatArray]:
@@ -84,30 +99,29 @@ def test_every_effect_that_may_act_gives_finite_frequencies(
     if EFFECTS[name].invisible(hanger, EVERYTHING):
         return
     for variant in EFFECTS[name].variants(hanger, EVERYTHING):
-        composed = ComposedHanger(hanger, "beam1", [(name, variant)], (6.0,))
-        middle = [float(each.value(np.array(0.4))) for each in parameters_of(name, hanger, variant)]
-        plain = [1.0] * (tension_n > 0) + [0.0] * 4
-        modes = composed.modes(np.array([plain + middle]), Conditions("t1"), 4)
+        acted_on = HangerWithEffects(beam_1(hanger), [(name, variant)], (6.0,))
+        middle = [[each.value(np.array(0.4)) for each in parameters_of(name, hanger, variant)]]
+        theta = np.hstack([middle_of(hanger, [0.0]), middle])
+        modes = acted_on.modes(theta, Conditions("t1"), 4)
         assert np.isfinite(modes.frequency_hz).all(), variant
         assert (modes.frequency_hz > 0).all(), variant
         assert np.isfinite(modes.shape).all(), variant
 
 
-def test_a_bar_without_tension_has_no_parameter_of_it() -> None:
+def test_a_bar_without_tension_has_none() -> None:
     hanger = replace(HANGER_3, supports=FREE, nominal_tension_n=0.0)
-    baseline = Baseline("beam1", hanger)
-    assert baseline.names == ()
-    assert baseline.physical(np.empty((3, 0)), 2).tension_n.tolist() == [0.0, 0.0, 0.0]
+    theta = middle_of(hanger, [-1.0, 0.0, 1.0])
+    bars = HangerWithEffects(beam_1(hanger), ()).physical(theta, Conditions())
+    assert bars.tension_n.tolist() == [0.0, 0.0, 0.0]
 
 
 def test_a_weighed_load_has_a_normal_prior_about_the_nominal_tension() -> None:
     weighed = replace(HANGER_3, scatter=Scatter(tension=0.02))
-    (tension,) = Baseline("beam1", weighed).parameters
-    share = np.array([0.5, 0.8413447])
-    np.testing.assert_allclose(tension.value(share), [1.0, 1.02], atol=1e-8)
-    np.testing.assert_allclose(tension.share(tension.value(share)), share)
-    (usual,) = Baseline("beam1", HANGER_3).parameters
-    assert (usual.lower, usual.upper, usual.spread) == (0.02, 5.0, "logarithmic")
+    scores = [-1.0, 0.0, 1.0]
+    np.testing.assert_allclose(middle_of(weighed, scores)[:, 0], np.exp([-0.02, 0, 0.02]))
+    low, middle, high = middle_of(HANGER_3, scores)[:, 0]
+    assert high / low > 1.5
+    assert middle == pytest.approx(1, rel=0.1)
     assert np.isinf(HANGER_3.scatter.tension)
 
 
