@@ -17,8 +17,7 @@ import json
 import os
 import sys
 import tempfile
-from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
@@ -33,12 +32,12 @@ from scipy.special import logsumexp
 from shm.bridge import load_hanger
 from shm.errors import ShmError
 from shm.gap.attribution import Attribution
+from shm.gap.baseline import choose_baseline
+from shm.gap.calibration import CALIBRATION, FILE, Calibration, Provenance, Share
 from shm.gap.contract import Fit, GapOptions
 from shm.gap.data_checks import usable
-from shm.gap.law_error import allowances, by_its_laws, second_cause
-from shm.gap.model_probabilities import CALIBRATION, FILE, Calibration, Provenance, Share, log_prior
-from shm.gap.observations import observed
-from shm.gap.outlier_removal import Cleared, exclude_outliers, search_further
+from shm.gap.law_error import _allowances, _linear
+from shm.gap.outliers import Cleared, exclude_gross_errors
 from shm.gap.problem import GapProblem
 from shm.modes_document import load_modes
 from tests.benchmarks.blind.layout import (
@@ -55,40 +54,34 @@ from tests.benchmarks.blind.truth import TrueCase
 FEWEST = 10
 FITS = 0.05
 """A p-value from which on an explanation counts as fitting: one right one in twenty does not."""
-STEADY = 2
-"""Answers added on either side of odds, so that a few do not make certain."""
-Ways = dict[str, float]
-"""Log evidence of each way in which a law may be off, named as in `Allowance.way`."""
+Ways = tuple[float, ...]
+"""Log evidences of an exact law, then of one that is off by each fraction of `CALIBRATION`."""
 
 
 @dataclass(frozen=True)
 class Lesson:
-    """What one case taught; None and empty where it taught nothing of that.
+    """What one case taught; None where it taught nothing of that.
 
     `own` and `mimicking` are the ways of the law of what was planted, and of what led in its place.
-    `second` is how far the second cause of the likeliest pair moves the data against the first,
-    `undetected` whether a cause was there where something unknown led, `mimics` how many effects
-    together do what the missing one does, `pair` those that led in its place.
+    `mimics` is how many effects together do what the missing one does.
     """
 
     case: str
-    causes: int
     own: Ways | None = None
-    second: float | None = None
-    undetected: bool | None = None
     mimics: int | None = None
-    pair: tuple[str, ...] = ()
     mimicking: Ways | None = None
 
 
 def lesson(directory: Path, truth: TrueCase) -> Lesson:
-    """A case diagnosed with and without what was planted in it."""
-    nothing = Lesson(truth.case, len(truth.effects))
+    """Diagnose a case with and without what was planted in it."""
+    nothing = Lesson(truth.case)
     if truth.size < LARGE:
         return nothing
     try:
         whole = diagnosed(directory, ())
-        first = replace(nothing, **_with_the_whole_catalogue(whole, truth))
+        planted = _fit_of(whole.attribution, tuple(each.name for each in truth.effects))
+        own = ways_of(whole.problem, whole.attribution.baseline, planted) if planted else None
+        first = replace(nothing, own=own if truth.effects else None)
         if truth.kind == "unknown":
             return first
         return replace(first, **_without_the_planted(diagnosed(directory, truth.left_out)))
@@ -101,175 +94,78 @@ def diagnosed(directory: Path, without: tuple[str, ...]) -> Cleared:
     told = read_document(directory / CASE_FILE, CASE_SCHEMA)
     hanger, tests = load_hanger(directory / HANGER_FILE), load_modes(directory / MODES_FILE)
     options = GapOptions(str(told["baseline"]), without, seed=int(told["seed"]))
-    problem = GapProblem(hanger, options.baseline, observed(usable(tests, hanger).tests, hanger))
-    return search_further(exclude_outliers(problem, options, np.random.default_rng(options.seed)))
-
-
-def _with_the_whole_catalogue(clear: Cleared, truth: TrueCase) -> dict[str, object]:
-    found, problem = clear.attribution, clear.problem
-    planted = _fit_of(found, tuple(each.name for each in truth.effects))
-    alone = dict.fromkeys(found.search.variants, 1)
-    pair = max(
-        found.explanations,
-        key=lambda each: each.log_bayes_factor + log_prior(each.best.hypothesis, alone),
-        default=None,
-    )
-    share = second_cause(problem, found.baseline, pair.best.fit)[1] if pair else 1.0
-    return {
-        "own": ways_of(problem, found.baseline, planted) if planted and truth.effects else None,
-        "second": share if truth.effects and pair and pair.is_pair and share < 1 else None,
-        "undetected": bool(truth.effects) if found.leads == "unexplained" else None,
-    }
+    rng = np.random.default_rng(options.seed)
+    problem = choose_baseline(usable(tests, hanger).tests, hanger, options, rng)
+    return exclude_gross_errors(problem, options, rng)
 
 
 def _without_the_planted(clear: Cleared) -> dict[str, object]:
     found = clear.attribution
     if found.leads == "no gap" or not found.explanations:
         return {}
-    likeliest, leading = found.explanations[0], found.leading
-    fit = _fit_of(found, tuple(name for name, _ in likeliest.best.hypothesis.effects))
-    fits = found.p_value >= FITS
+    names = found.explanations[0].best.hypothesis.names
+    fit = _fit_of(found, names)
     return {
-        "mimics": len(likeliest.best.hypothesis.effects) if fits else 0,
-        "pair": leading.best.hypothesis.names if leading and leading.is_pair else (),
+        "mimics": len(names) if found.p_value >= FITS else 0,
         "mimicking": ways_of(clear.problem, found.baseline, fit) if fit else None,
     }
 
 
 def _fit_of(found: Attribution, effects: tuple[str, ...]) -> Fit | None:
-    """The likeliest fit by the very laws of effects, before these may be off."""
-    tried = [
-        each
-        for each in found.tried
-        if each.fit and not each.hypothesis.flexible
-        if sorted(name for name, _ in each.hypothesis.effects) == sorted(effects)
-    ]
-    return max(tried, key=lambda each: each.log_evidence).fit if tried else None
+    """Return the likeliest fit of effects."""
+    fits = [each.fit for each in found.tried if not each.hypothesis.flexible and each.fit]
+    own = [fit for fit in fits if sorted(fit.hypothesis.names) == sorted(effects)]
+    return max(own, key=lambda fit: fit.log_evidence, default=None)
 
 
 def ways_of(problem: GapProblem, baseline: Fit, fit: Fit) -> Ways:
-    """All allowances of one way are as likely."""
-    logs = by_its_laws(problem, baseline, fit, np.random.default_rng(0)).log_evidences
-    ways = [("exact", 0.0), *(each.way for each in allowances(problem, baseline, fit))]
-    by_way = defaultdict(list)
-    for (kind, fraction), log in zip(ways, logs, strict=True):
-        by_way[f"{kind} {fraction:g}"].append(log)
-    return {way: float(logsumexp(each) - np.log(len(each))) for way, each in by_way.items()}
+    """Return the log evidence of each fraction, its patterns as likely."""
+    residual = problem.value - fit.predicted
+    log = [_linear(fit, errors, residual)[0] for _, errors in _allowances(problem, baseline, fit)]
+    by_fraction = np.reshape(log, (len(CALIBRATION.off_by), -1))
+    off = logsumexp(by_fraction, axis=1) - np.log(by_fraction.shape[1])
+    return (_linear(fit, fit.noise, residual)[0], *map(float, off))
 
 
-def shares(cases: Sequence[Ways]) -> Ways:
-    """How often each way is the right one, by which the cases' evidence is largest.
+def shares(cases: Sequence[Ways]) -> list[float]:
+    """Return how often each way is the right one, by which the cases' evidence is largest.
 
-    Those of a law that may be rough beside those that cannot: "rough" is how often such a law is,
-    and what is rough and what is not add to 1 each. Expectation and maximisation (Dempster, Laird
-    and Rubin, J. R. Stat. Soc. B 39, 1977), half a case added to each way (Jeffreys).
+    Expectation and maximisation (Dempster, Laird and Rubin, J. R. Stat. Soc. B 39, 1977), half a
+    case added to each way (Jeffreys).
     """
-    names = sorted({way for each in cases for way in each})
-    log = np.array([[each.get(way, -np.inf) for way in names] for each in cases])
-    rough = np.array([way.startswith("rough") for way in names])
-    level = np.isfinite(log[:, rough]).any(axis=1)
-    found, often = np.where(rough, 1 / max(rough.sum(), 1), 1 / (~rough).sum()), 0.5
+    log = np.array(cases)
+    found = np.full(log.shape[1], 1 / log.shape[1])
     for _ in range(500):
-        of_case = np.where(rough, often, np.where(level, 1 - often, 1.0)[:, None])
-        with np.errstate(divide="ignore"):  # what cannot be rough
-            weight = log + np.log(found * of_case)
+        weight = log + np.log(found)
         counts = np.exp(weight - logsumexp(weight, axis=1, keepdims=True)).sum(axis=0) + 0.5
-        found = counts / np.where(rough, counts[rough].sum(), counts[~rough].sum())
-        often = (counts[rough].sum() - rough.sum() / 2 + 0.5) / (level.sum() + 1)
-    return {**dict(zip(names, map(float, found), strict=True)), "rough": float(often)}
+        found = counts / counts.sum()
+    return [float(each) for each in found]
 
 
 def calibrated(lessons: Sequence[Lesson], about: Provenance) -> Calibration:
-    """The values that lessons teach; others as they are."""
+    """Return the values that lessons teach; others as they are."""
     mimics = [each.mimics for each in lessons if each.mimics is not None]
-    pairs = [each.pair for each in lessons if each.pair]
-    undetected = [each.undetected for each in lessons if each.undetected is not None]
-    second = [(each.second, each.causes > 1) for each in lessons if each.second is not None]
     own = [each.own for each in lessons if each.own]
     mimicking = [each.mimicking for each in lessons if each.mimicking]
-    answers = (
-        f"{len(mimics)} without the true effect, {len(pairs)} of these a pair; {len(undetected)} "
-        f"unexplained; {len(second)} pairs; laws of {len(own)} planted and {len(mimicking)} others"
-    )
+    answers = f"{len(mimics)} without the true effect; laws of {len(own)} and {len(mimicking)}"
     new = replace(CALIBRATION, provenance=replace(about, answers=answers))
     if len(mimics) >= FEWEST:
         one, two = (mimics.count(n) / len(mimics) for n in (1, 2))
         new = replace(new, mimics_one=one, mimics_two=two)
-    if len(pairs) >= FEWEST:
-        new = replace(new, **_pairs(pairs))
-    if len(undetected) >= FEWEST:
-        new = replace(new, undetected_share=sum(undetected) / len(undetected))
-    if len(second) >= FEWEST:
-        below, odds = minor(second)
-        new = replace(new, minor_below=below, minor_law_odds=odds)
-    return replace(new, **_laws(own, mimicking)) if min(len(own), len(mimicking)) >= FEWEST else new
-
-
-def _pairs(pairs: Iterable[tuple[str, ...]]) -> dict[str, object]:
-    """Counts of effects and, beside them, of the ends that led with turned sensors."""
-    turned, led = Counter[str](), Counter[str]()
-    for pair in pairs:
-        (turned if "sensor_misalignment" in pair else led).update(pair)
-    del turned["sensor_misalignment"]
-    return {"in_mimicking_pairs": dict(led.most_common()), "with_turned_sensors": dict(turned)}
-
-
-def minor(second: Sequence[tuple[float, bool]]) -> tuple[float, float]:
-    """Below which share a second cause is mostly the law of the first, and the odds that it is.
-
-    Of all shares that which puts the fewest answers (share, whether there were two) on the wrong
-    side.
-    """
-    ordered = sorted(second)
-    wrong = [
-        sum(two for _, two in ordered[:i]) + sum(not two for _, two in ordered[i:])
-        for i in range(len(ordered) + 1)
-    ]
-    count = int(np.argmin(wrong))
-    edges = [0.0, *(share for share, _ in ordered), 1.0]
-    causes = sum(two for _, two in ordered[:count])
-    odds = (count - causes + STEADY) / (causes + STEADY)
-    return (edges[count] + edges[count + 1]) / 2, odds
-
-
-def _laws(own: Sequence[Ways], mimicking: Sequence[Ways]) -> dict[str, object]:
-    planted, others = shares(own), shares(mimicking)
-
-    def share(way: str) -> Share:
-        return Share(planted[way], others[way])
-
-    return {
-        "exact": share("exact 0"),
-        "of_a_mode": {f: share(f"mode {f:g}") for f in CALIBRATION.of_a_mode},
-        "on_the_whole": {f: share(f"whole {f:g}") for f in CALIBRATION.on_the_whole},
-        "rough": planted["rough"],
-        "where_rough": {
-            f: planted.get(f"rough {f:g}", old) for f, old in CALIBRATION.where_rough.items()
-        },
-    }
+    if min(len(own), len(mimicking)) >= FEWEST:
+        exact, *off = map(Share, shares(own), shares(mimicking))
+        new = replace(new, exact=exact, off_by=dict(zip(CALIBRATION.off_by, off, strict=True)))
+    return new
 
 
 def text(told: Calibration) -> str:
-    """The data file."""
-    about = told.provenance
-
-    def table(counts: Mapping[str, int]) -> str:
-        return "\n".join(f"{name} = {count}" for name, count in counts.items())
-
-    def rows(laws: Mapping[float, Share]) -> str:
-        made = (
-            f"    {{ fraction = {f:g}, own = {each.own:.4g}, unknown = {each.unknown:.4g} }},"
-            for f, each in laws.items()
-        )
-        return "\n".join(made)
-
-    rough = "\n".join(
-        f"    {{ fraction = {f:g}, share = {share:.4g} }}," for f, share in told.where_rough.items()
+    """Return the data file: that of today with other values."""
+    about, values = told.provenance, FILE.read_text(encoding="utf-8").partition("[provenance]")
+    of_laws = "\n".join(
+        f"    {{ fraction = {f:g}, own = {each.own:.4g}, unknown = {each.unknown:.4g} }},"
+        for f, each in told.off_by.items()
     )
-    return f"""# What trials on simulated hangers taught the gap diagnosis; `shm/gap/model_probabilities.py` reads it.
-# `python tests/benchmarks/gap_calibration.py` runs the trial and writes this file anew.
-
-[provenance]
+    return f"""{values[0]}[provenance]
 trial = "{about.trial}"
 seeds = "{about.seeds}"
 cases = "{about.cases}"
@@ -283,45 +179,14 @@ command = "{about.command}"
 one_effect = {told.mimics_one:.4g}
 two_effects = {told.mimics_two:.4g}
 
-# In how many of the pairs that led with the true effect left out each effect was.
-[mimic.in_pairs]
-{table(told.in_mimicking_pairs)}
-
-# In how many more turned sensors led with an end: together they do what skewed axes do.
-[mimic.with_turned_sensors]
-{table(told.with_turned_sensors)}
-
-# Where a free remainder explains what no cause does, so likely is a cause nevertheless: its place
-# was not found, or its law is farther off than allowed for.
-[undetected]
-share = {told.undetected_share:.4g}
-
-# The second cause of a pair is minor where it moves the data by less than `below` of what the first
-# does; `law_odds` are the odds that it then is no cause, but the error of the first one's law.
-[minor]
-below = {told.minor_below:.4g}
-law_odds = {told.minor_law_odds:.4g}
-
 # How often an effect's law is off, by which fraction of what the effect does: `own` of effects that
 # were planted, `unknown` of what passed for an effect and was another one, which had been left out.
-# `of_a_mode`: of what it does to that very mode; `on_the_whole`: to the modes of a test and plane.
 [law]
 exact = {{ own = {told.exact.own:.4g}, unknown = {told.exact.unknown:.4g} }}
-of_a_mode = [
-{rows(told.of_a_mode)}
+off = [
+{of_laws}
 ]
-on_the_whole = [
-{rows(told.on_the_whole)}
-]
-
-# How often the law of an effect that goes with the level is only roughly known, and by which
-# fractions of what it does to a mode it is then off.
-[rough_law]
-probability = {told.rough:.4g}
-of_a_mode = [
-{rough}
-]
-"""  # noqa: E501
+"""
 
 
 def arguments() -> argparse.Namespace:
@@ -363,8 +228,7 @@ def main() -> int:
 
 
 def _kept(line: str) -> Lesson:
-    found = Lesson(**json.loads(line))
-    return replace(found, pair=tuple(found.pair))
+    return Lesson(**json.loads(line))
 
 
 if __name__ == "__main__":

@@ -30,10 +30,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from docs.filling import write_csv
-from shm.gap.attribution import Attribution, Explanation, attributed
+from shm.gap.attribution import Attribution, Explanation, attribute
 from shm.gap.contract import GapOptions
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
+from shm.models import MODELS, AsMade
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import Hanger
 from tests.benchmarks.gap.outcomes import ABOUT, NONE, Case, Outcome, kept
@@ -71,9 +72,9 @@ def solved(case: Case) -> Outcome:
         return Outcome(case, None)
     made = campaign_with_truth(ROD, state, [planted] if planted else [], PLAN, rng)
     started = time.process_time()
-    problem = GapProblem(ROD, "beam1", observed(made.tests, ROD))
+    problem = GapProblem(AsMade(MODELS["beam1"](ROD)), made.tests, observed(made.tests, ROD))
     options = GapOptions(without=case.without, seed=case.seed)
-    found = attributed(problem, options, np.random.default_rng(case.seed))
+    found = attribute(problem, options, np.random.default_rng(case.seed))
     seconds = time.process_time() - started
     return scored(case, planted, problem, found, made.truth.tension_n, seconds)
 
@@ -148,9 +149,10 @@ def covered(
     fit = next((each.best.fit for each in causes if each.effect == planted.name), None)
     if fit is None or fit.hypothesis.at != planted.at:
         return None
-    names = problem.names(fit.hypothesis)
+    coordinates = problem.coordinates(fit.hypothesis)
     name = next(iter(planted.values))
-    draws = problem.theta(fit.hypothesis, fit.draws)[:, names.index(name)]
+    column = [each.name for each in coordinates.effects].index(name)
+    draws = coordinates.effect_values(fit.draws)[:, column]
     low, high = np.quantile(draws, [0.05, 0.95])
     return bool(low <= planted.values[name] <= high)
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from shm.gap.attribution import Attribution, Explanation, attributed, hardly_behind, more_thorough
+from shm.gap.attribution import Attribution, Explanation, attribute, hardly_behind
 from shm.gap.contract import GapOptions, Hypothesis
-from shm.gap.model_probabilities import CALIBRATION, ScoredHypothesis
-from shm.gap.observations import observed
-from shm.gap.problem import GapProblem
+from shm.gap.probabilities import ScoredHypothesis
 from shm.simulate import HangerState, PlantedEffect
 from tests.helpers.effects import all_but
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.gap_campaigns import HANGER, problem_of
 from tests.helpers.slow import few_of
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
@@ -31,10 +30,10 @@ def _found(
     *effects: str, known: tuple[str, ...] = KNOWN, seed: int = 1
 ) -> tuple[Attribution, tuple[tuple[str, float], ...]]:
     planted = [each for each in (CLAMP, SWING) if each.name in effects]
-    tests = campaign(HANGER_3, STATE, planted, PLAN, np.random.default_rng(seed))
-    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    tests = campaign(HANGER, STATE, planted, PLAN, np.random.default_rng(seed))
+    problem = problem_of(tests)
     told: list[tuple[str, float]] = []
-    found = attributed(
+    found = attribute(
         problem,
         GapOptions(without=all_but(*known)),
         np.random.default_rng(seed),
@@ -81,24 +80,8 @@ def test_two_planted_effects_are_named_as_a_pair() -> None:
 def test_an_effect_that_is_not_in_the_catalogue_is_unexplained() -> None:
     known = tuple(name for name in KNOWN if name != "point_mass")
     found, _ = _found("point_mass", known=known)
-    assert found.unexplained_probability == pytest.approx(
-        1 - CALIBRATION.undetected_share, abs=0.05
-    )
+    assert found.unexplained_probability > 0.9
     assert found.unexplained.hypothesis.flexible
-
-
-@pytest.mark.slow
-def test_effects_that_screening_gave_up_are_fitted_before_all_is_left_unexplained() -> None:
-    """Of a bar half as stiff a scan about the described one sees little."""
-    known = tuple(name for name in KNOWN if name != "point_mass")
-    first, _ = _found("point_mass", known=known)
-    assert first.leads == "unexplained"
-    given_up = {each.hypothesis.name for each in first.tried if each.fit is None}
-    assert given_up
-    found = more_thorough(first)
-    fitted = {each.hypothesis.name for each in found.tried if each.fit is not None}
-    assert given_up <= fitted
-    assert len({each.hypothesis for each in found.tried}) == len(found.tried)
 
 
 def test_evidence_is_what_the_fit_gains_less_what_freedom_costs() -> None:
@@ -132,16 +115,14 @@ def test_progress_is_told_and_never_goes_back() -> None:
     assert fractions[-1] == 1.0
 
 
-def test_an_effect_that_would_drown_in_the_errors_is_told_to_be_invisible() -> None:
-    plan = CampaignPlan(
-        modes=2, shapes=False, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0,
-        frequency_sd=0.03,
-    )  # fmt: skip
-    tests = campaign(HANGER_3, STATE, (), plan, np.random.default_rng(1))
-    problem = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
-    options = GapOptions(without=all_but("distributed_mass"))
-    found = attributed(problem, options, np.random.default_rng(1))
-    assert "drown" in dict(found.invisible)["distributed_mass"]
+def test_attribute_drowned_effect_alone() -> None:
+    """Where the data can show no effect that is left, there is none to explain anything."""
+    plan = replace(PLAN, modes=2, shapes=False, mass_share=0.0, frequency_sd=0.03)
+    plan = replace(plan, temperatures_c=(10.0,), amplitudes=(1.0,))
+    problem = problem_of(campaign(HANGER, STATE, (), plan, np.random.default_rng(1)))
+    options = GapOptions(without=all_but("point_mass"))
+    found = attribute(problem, options, np.random.default_rng(1))
+    assert "drown" in dict(found.invisible)["point_mass"]
     assert found.leading is None
     assert found.explanations == ()
 

@@ -128,8 +128,9 @@ def test_a_description_in_other_units_is_doubted_before_anything_else(
     untouched: Diagnosis,
 ) -> None:
     in_kilonewtons = replace(PLAIN, nominal_tension_n=711.0)
+    few = planted(plan=replace(ONE_TEST, modes=4, shapes=False))
     with pytest.raises(BadInput, match=r"right hanger, right description\?"):
-        diagnose(planted(), in_kilonewtons, GapOptions(without=all_but("timebase")))
+        diagnose(few, in_kilonewtons, GapOptions("beam1", without=all_but("timebase")))
     assert "Doubtful" not in "".join(untouched.remarks)
 
 
@@ -158,9 +159,9 @@ def test_two_tests_that_contradict_each_other_make_something_unknown_likely() ->
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (GapOptions(without=("gremlins",)), "gremlins"),
+        (GapOptions("beam1", without=("gremlins",)), "gremlins"),
         (GapOptions(baseline="beam9"), "beam9"),
-        (GapOptions(hold_out=("t77",)), "t77"),
+        (GapOptions("beam1", hold_out=("t77",)), "t77"),
     ],
 )
 def test_names_that_are_not_there_are_refused(options: GapOptions, said: str) -> None:

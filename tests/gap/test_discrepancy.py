@@ -13,17 +13,6 @@ SEEDS = pytest.mark.parametrize(
 )
 
 
-def test_the_weights_of_all_possibilities_add_to_one() -> None:
-    found = flexible_nodes(toy.observations(np.zeros(toy.design().size)))
-    assert np.exp([node.log_weight for node in found]).sum() == pytest.approx(1.0)
-
-
-def test_every_covariance_has_a_cholesky_factor() -> None:
-    for node in flexible_nodes(toy.observations(np.zeros(toy.design().size))):
-        np.linalg.cholesky(node.covariance.frequency)
-        assert (node.covariance.shape > 0).all()
-
-
 def test_tests_at_several_temperatures_allow_a_remainder_that_grows_with_them() -> None:
     plain = toy.observations(np.zeros(toy.design().size))
     varied = toy.observations(plain.value, toy.design((-15.0, 0.0, 15.0)))

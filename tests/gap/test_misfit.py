@@ -37,6 +37,7 @@ def clamped(name: str, tension_n: float, factor: float = 1.0) -> ModalTest:
     return ModalTest(name, tuple(modes))
 
 
+@pytest.mark.slow
 def test_tests_of_two_hangers_under_one_number_are_refused() -> None:
     """The second half of the tests is 1.5 times as high in every mode."""
     tests = [clamped(f"own_{k}", 711e3) for k in range(3)]

@@ -17,7 +17,6 @@ from shm.gap.noise import (
     MODEL_ERROR_SCALE,
     drawn_together,
     nodes,
-    same_mode,
 )
 from shm.gap.repeated_errors import Repeated
 from shm.values import FloatArray
@@ -66,15 +65,6 @@ def _repeated(found: Observations) -> Repeated:
 @pytest.mark.parametrize("sd", [2e-4, None])
 def test_the_weights_add_to_one(sd: float | None) -> None:
     assert logsumexp([node.log_weight for node in nodes(_observations(sd))]) == pytest.approx(0)
-
-
-def test_a_model_error_is_one_number_for_a_mode_in_all_tests() -> None:
-    found = _observations()
-    same = same_mode(found.design)
-    assert same.sum() == toy.TESTS * found.design.frequencies
-    node = nodes(found)[-1]
-    off = node.covariance.frequency[same.astype(bool) & ~np.eye(len(same), dtype=bool)]
-    np.testing.assert_allclose(off, node.model_error**2)
 
 
 def test_peaks_that_overlap_may_err_together() -> None:

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from shm.assumptions import DEFAULTS
-from shm.documents import dump
-from shm.errors import BadInput
 from shm.gap import GapOptions, diagnose
 from shm.gap.contract import Hypothesis
 from shm.gap.data_checks import usable
 from shm.gap.observations import observed
-from shm.gap.problem import GapProblem
-from shm.inference.priors import reading_of
 from shm.models.effects import EFFECTS
 from shm.models.hanger import PhysicalHanger, solve
-from shm.modes_document import modes_document, parse_modes
 from shm.report.diagnosis_wording import is_of_the_measurement
 from shm.values import NAN, FloatArray, ModalTest, Mode, Supports, group_causes
 from tests.helpers.effects import all_but
+from tests.helpers.gap_campaigns import problem_of
 from tests.helpers.hangers import HANGER_3
 
 ORDERS = (1, 2, 3, 4)
@@ -86,9 +81,8 @@ def test_one_reading_alone_says_nothing() -> None:
 def test_a_readings_error_moves_all_modes_of_its_test_together() -> None:
     """Of a string d ln f/dT = 1/(2 T): half the reading's fraction, in every mode."""
     tests = loadings(np.outer([1.0, 1.0], 3.45 * np.array(ORDERS)), (690e3, 732e3), SD_N)
-    problem = GapProblem(STRING, "beam1", observed(tests, STRING))
-    theta = problem.theta(Hypothesis(), problem.near)
-    level_n = float(theta[0, 0]) * STRING.nominal_tension_n
+    problem = problem_of(tests, hanger=STRING)
+    level_n = float(problem.tension_n(Hypothesis(), problem.near)[0])
     loads = problem.tensions_of(problem.design)
     assert loads.shape == (8, 2)
     for test, shift_n in enumerate((-21e3, 21e3)):
@@ -101,12 +95,12 @@ def test_the_tension_differs_a_little_from_test_to_test() -> None:
     """Of a string half of `tension_between_tests` in every mode; a lone test has no other."""
     same = np.outer(np.ones(3), 3.45 * np.array(ORDERS))
     tests = loadings(same, (NAN, NAN, NAN), NAN)
-    problem = GapProblem(STRING, "beam1", observed(tests, STRING))
+    problem = problem_of(tests, hanger=STRING)
     loads, own = problem.repeated.tensions, problem.design.frequency_test
     share = DEFAULTS.tension_between_tests.value / 2
-    level = float(problem.theta(Hypothesis(), problem.near)[0, 0])
+    level = float(problem.tension_n(Hypothesis(), problem.near)[0]) / STRING.nominal_tension_n
     np.testing.assert_allclose(loads, share / level * (own[:, None] == np.arange(3)), rtol=2e-3)
-    alone = GapProblem(STRING, "beam1", observed(tests[:1], STRING))
+    alone = problem_of(tests[:1], hanger=STRING)
     assert not alone.repeated.tensions.any()
 
 
@@ -128,6 +122,8 @@ SCALES = GapOptions(
 )
 
 
+# FAULT: 807 kN of 677.5. `Coordinates.drawn` draws mass and length until the tension at rest is the
+# one read, which beside a load scale is 1.2 times as much (its `theta` gives 682 kN).
 def test_a_cell_that_reads_a_fifth_too_much_is_the_measurements_and_leaves_the_tension() -> None:
     """Four loadings whose frequencies follow the true tensions, while the cell shows 1.2 times."""
     rng = np.random.default_rng(3)
@@ -147,53 +143,17 @@ def test_only_a_load_scale_parts_the_true_tension_from_the_one_at_rest() -> None
     """A known tension that was read a quarter too high is four fifths of it."""
     weighed = replace(HANGER_3, scatter=replace(HANGER_3.scatter, tension=0.01))
     tests = loadings(frequencies_hz(np.full(2, 7e5)), (NAN, NAN), SD_N)
-    problem = GapProblem(weighed, "beam1", observed(tests, weighed))
+    problem = problem_of(tests, hanger=weighed)
     for name, effect in EFFECTS.items():
         for variant in effect.variants(weighed, problem.design.survey):
             hypothesis = Hypothesis(((name, variant),))
-            theta = problem.theta(hypothesis, np.zeros((1, len(problem.names(hypothesis)))))
-            theta[:, -1] = 0.25 if name == "load_scale" else theta[:, -1]
-            z = problem.coordinates(hypothesis).z(theta)
+            coordinates = problem.coordinates(hypothesis)
+            z = np.zeros((1, coordinates.dimension))
+            if name == "load_scale":
+                z[:, -1:] = coordinates.effect_z(np.array([[0.25]]), z.shape[1] - 1)
             share = 0.8 if name == "load_scale" else 1.0
             expected = share * weighed.nominal_tension_n
             assert problem.tension_n(hypothesis, z) == pytest.approx(expected), name
-
-
-def test_a_reading_survives_the_modes_document_and_is_absent_where_there_was_none() -> None:
-    tests = loadings(frequencies_hz(np.full(2, 7e5)), (600e3, NAN), SD_N)
-    document = json.loads(dump(modes_document(tests)))
-    assert "tension_read_n" not in document["tests"][1]
-    one, other = parse_modes(document)
-    assert (one.tension_read_n, one.tension_read_sd_n) == (600e3, SD_N)
-    assert np.isnan(other.tension_read_n)
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"tension_read_sd_n": 1e4},
-        {"tension_read_n": 6e5, "tension_read_sd_n": 0.0},
-        {"tension_read_n": -1.0, "tension_read_sd_n": 1.0},
-    ],
-)
-def test_a_reading_that_is_none_is_refused(values: dict[str, float]) -> None:
-    tests = loadings(frequencies_hz(np.full(1, 7e5)), (NAN,), SD_N)
-    document = json.loads(dump(modes_document(tests)))
-    document["tests"][0] |= values
-    with pytest.raises(BadInput, match="tension_read"):
-        parse_modes(document)
-
-
-def test_a_reading_without_a_standard_deviation_is_taken_as_an_ordinary_lift_off() -> None:
-    tests = loadings(frequencies_hz(np.full(1, 7e5)), (NAN,), SD_N)
-    document = json.loads(dump(modes_document(tests)))
-    document["tests"][0] |= {"tension_read_n": 6e5}
-    (test,) = parse_modes(document)
-    assert np.isnan(test.tension_read_sd_n)
-    reading = reading_of([test])
-    assert reading is not None
-    usual_n = DEFAULTS.tension_reading_sd.value * 6e5
-    assert reading == reading_of([replace(test, tension_read_sd_n=usual_n)])
 
 
 def test_readings_without_a_standard_deviation_shift_the_diagnosed_tension_too() -> None:

@@ -9,7 +9,6 @@ import pytest
 
 from shm.assumptions import DEFAULTS
 from shm.gap.contract import Hypothesis, Observations
-from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.gap.repeated_errors import (
     STRETCHES,
@@ -19,24 +18,23 @@ from shm.gap.repeated_errors import (
     section_ways,
 )
 from shm.inference.systematic_errors import shared_loads
-from shm.models.composed import Baseline
-from shm.models.hanger import PhysicalHanger, Zone, solve
+from shm.models.hanger import Zone, solve
 from shm.simulate import HangerState
 from shm.values import AddedMass, FloatArray
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.gap_campaigns import HANGER, problem_of
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 PLAN = CampaignPlan(
     modes=5, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, as_made=False, shape_sd=1e-3
 )
 TENSION_N = 711e3
-USUAL = HANGER_3.scatter
+USUAL = HANGER.scatter
 
 
 @pytest.fixture(scope="module")
 def problem() -> GapProblem:
-    tests = campaign(HANGER_3, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
-    return GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    tests = campaign(HANGER, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
+    return problem_of(tests)
 
 
 def _shapes(observations: Observations) -> FloatArray:
@@ -87,10 +85,8 @@ def test_a_sensor_elsewhere_changes_what_its_load_says(problem: GapProblem) -> N
     design = problem.design
     moved = (*design.places_m, design.places_m[2] + USUAL.sensor_place_m)
     place = np.where(design.shape_place == 2, len(design.places_m), design.shape_place)
-    theta = np.array([[TENSION_N / HANGER_3.nominal_tension_n, 0, 0, 0, 0]])
-    z = problem.coordinates(Hypothesis()).z(theta)
     here, there = (
-        problem.predict(Hypothesis(), z, each)[0, design.frequencies :]
+        problem.predict(Hypothesis(), problem.near, each)[0, design.frequencies :]
         for each in (
             replace(design, places_m=moved),
             replace(design, places_m=moved, shape_place=place),
@@ -121,11 +117,9 @@ def test_a_thicker_middle_shifts_frequencies_as_the_sections_loads_say(
 
     And by a size that fits the prior: a cosine of 0.1 % rms is about one standard deviation.
     """
-    plain = Baseline("beam1", HANGER_3).physical(
-        np.array([[TENSION_N / HANGER_3.nominal_tension_n]]), 0
-    )
-    edges_m = np.linspace(0, HANGER_3.length_m, 25)
-    middles = (edges_m[1:] + edges_m[:-1]) / 2 / HANGER_3.length_m
+    plain = problem.model.physical(problem.described.theta(problem.near))
+    edges_m = np.linspace(0, HANGER.length_m, 25)
+    middles = (edges_m[1:] + edges_m[:-1]) / 2 / HANGER.length_m
     thick = 1 + 1e-3 * np.sqrt(2) * np.cos(2 * np.pi * middles)
     zones = tuple(
         Zone(np.array([a]), np.array([b]), np.array([f**2]), np.array([f]))
@@ -150,12 +144,13 @@ def test_the_section_varies_about_its_mean_by_what_the_description_says(length_m
 
 
 def test_a_bar_of_one_section_has_no_loads_but_those_of_sensors_and_supports() -> None:
-    scatter = replace(HANGER_3.scatter, along=0.0)
-    tests = campaign(HANGER_3, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
-    hanger = replace(HANGER_3, scatter=scatter)
-    found = GapProblem(hanger, "beam1", observed(tests, hanger))
+    scatter = replace(HANGER.scatter, along=0.0)
+    tests = campaign(HANGER, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
+    hanger = replace(HANGER, scatter=scatter)
+    found = problem_of(tests, hanger=hanger)
     design = found.design
-    bars = PhysicalHanger.clamped(hanger, np.full(STRETCHES + 1, TENSION_N))
+    theta = found.described.theta(found.near)
+    bars = found.model.physical(np.repeat(theta, STRETCHES + 1, axis=0))
     assert not section_loads(design, bars, hanger).any()
     frequency_hz = np.exp(found.observations.value[: design.frequencies])
     own = shared_loads(hanger, design.frequency_plane, design.frequency_order, frequency_hz)
@@ -164,22 +159,21 @@ def test_a_bar_of_one_section_has_no_loads_but_those_of_sensors_and_supports() -
 
 def test_without_shapes_sensors_have_no_loads() -> None:
     plan = replace(PLAN, shapes=False)
-    tests = campaign(HANGER_3, HangerState(TENSION_N), (), plan, np.random.default_rng(4))
-    found = GapProblem(HANGER_3, "beam1", observed(tests, HANGER_3))
+    tests = campaign(HANGER, HangerState(TENSION_N), (), plan, np.random.default_rng(4))
+    found = problem_of(tests)
     assert found.repeated.sensors.shape == Repeated.none(found.design).sensors.shape
     assert np.isfinite(found.likelihood(Hypothesis()).log(np.zeros((1, found.design.size)))).all()
 
 
 def test_an_unstated_radius_of_a_known_mass_is_an_error_of_its_test() -> None:
     """One standard deviation more and less makes what its load says, in that test alone."""
-    tests = campaign(HANGER_3, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
+    tests = campaign(HANGER, HangerState(TENSION_N), (), PLAN, np.random.default_rng(4))
     clamp, row = AddedMass(25.0, 3.4), DEFAULTS.added_mass_radius_m
     laden = [replace(tests[0], id="laden", added_mass=clamp)]
 
     def problem_with(radius_m: float | None) -> GapProblem:
         body = replace(clamp, radius_of_gyration_m=radius_m)
-        found = observed([*tests, replace(laden[0], added_mass=body)], HANGER_3)
-        return GapProblem(HANGER_3, "beam1", found)
+        return problem_of([*tests, replace(laden[0], added_mass=body)])
 
     unstated = problem_with(None)
     own = unstated.design.frequency_test == len(tests)

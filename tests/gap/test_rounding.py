@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from shm.gap.contract import Hypothesis
-from shm.gap.fit import baseline_fit, fitted, hypotheses
 from shm.gap.observations import observed, rounding_covariance, told_of_rounding
 from shm.gap.problem import GapProblem
+from shm.gap.search import fit_alone, hypotheses
 from shm.inference.data_checks import step_hz
 from shm.values import NAN, ModalTest
 from tests.helpers.effects import all_but
-from tests.helpers.gap_campaigns import campaign
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.gap_campaigns import HANGER, campaign, fit_of, problem_of
 
 
 def rounded(step: float, sd_hz: float = NAN) -> ModalTest:
@@ -48,7 +47,7 @@ def test_there_is_none_of_full_numbers_nor_where_errors_are_stated() -> None:
 
 def test_low_modes_err_most_and_equal_numbers_are_one_datum() -> None:
     test = rounded(0.1)
-    seen = observed([test], HANGER_3)
+    seen = observed([test], HANGER)
     covariance, hz = rounding_covariance(seen), np.exp(seen.value)
     sd = 0.1 / np.sqrt(12) / hz
     equal = np.equal.outer(hz, hz)
@@ -63,7 +62,7 @@ def test_low_modes_err_most_and_equal_numbers_are_one_datum() -> None:
 
 
 def test_every_size_of_the_unknown_errors_stands_beside_the_rounding() -> None:
-    problem = GapProblem(HANGER_3, "beam1", observed([rounded(0.1)], HANGER_3))
+    problem = problem_of([rounded(0.1)])
     least = problem.repeated.frequency + rounding_covariance(problem.observations)
     for node in problem.likelihood(Hypothesis()).nodes:
         beyond = np.diag(node.covariance.frequency - least)
@@ -72,13 +71,14 @@ def test_every_size_of_the_unknown_errors_stands_beside_the_rounding() -> None:
 
 def test_what_rounding_does_to_a_sound_hanger_is_no_evidence_of_a_cause() -> None:
     """Taken as errors of one fraction they gave a loss of section odds of 295 to 1."""
-    seen, rng = observed([rounded(0.2)], HANGER_3), np.random.default_rng(1)
+    seen, rng = observed([rounded(0.2)], HANGER), np.random.default_rng(1)
     gained = []
     for each in (seen, replace(seen, rounding=None)):
-        problem = GapProblem(HANGER_3, "beam1", each)
-        nothing = baseline_fit(problem, rng)
+        whole = problem_of([rounded(0.2)])
+        problem = GapProblem(whole.model, whole.tests, each)
+        nothing = fit_alone(problem, rng)
         (loss,) = hypotheses(problem, all_but("section_loss"))
-        gained.append(fitted(problem, loss, rng).log_evidence - nothing.log_evidence)
+        gained.append(fit_of(problem, loss).log_evidence - nothing.log_evidence)
     assert gained[0] < 0 < 3 < gained[1]
 
 

@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.fit import baseline_fit
-from shm.gap.observations import observed
-from shm.gap.problem import GapProblem
 from shm.gap.residuals import sensor_remarks
+from shm.gap.search import fit_alone
 from shm.simulate import HangerState
 from shm.values import Hanger, ModalTest, Scatter
+from tests.helpers.gap_campaigns import problem_of
 from tests.helpers.hangers import HANGER_3
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
@@ -45,8 +44,8 @@ def _mounted(test: ModalTest, sensor: int, turn_deg: float, gain: float) -> Moda
 
 
 def _told(test: ModalTest, hanger: Hanger = PLAIN) -> str:
-    problem = GapProblem(hanger, "beam1", observed([test], hanger))
-    return " ".join(sensor_remarks(problem, baseline_fit(problem, np.random.default_rng(1))))
+    problem = problem_of([test], hanger=hanger)
+    return " ".join(sensor_remarks(problem, fit_alone(problem, np.random.default_rng(1))))
 
 
 def test_a_turned_sensor_that_reads_too_much_is_told_with_its_errors() -> None:

@@ -9,10 +9,10 @@ import pytest
 
 from shm.gap.noise import nodes
 from shm.gap.observations import observed, told_apart
-from shm.gap.problem import GapProblem
 from shm.gap.repeated_errors import turn_loads
 from shm.simulate import HangerState
 from shm.values import ModalTest, Mode
+from tests.helpers.gap_campaigns import problem_of
 from tests.helpers.hangers import HANGER_3
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
@@ -72,9 +72,7 @@ def test_a_turn_as_large_as_may_be_is_no_misfit(test: ModalTest, rad: float) -> 
     """The chi-square of the shapes grows by one for it, and by far more where it is not stated."""
 
     def chi_square(mode: Mode) -> float:
-        problem = GapProblem(
-            HANGER_3, "beam1", observed([replace(test, modes=(mode, *rest))], HANGER_3)
-        )
+        problem = problem_of([replace(test, modes=(mode, *rest))], hanger=HANGER_3)
         covariance = nodes(problem.observations, problem.repeated)[0].covariance
         whole = np.diag(covariance.shape) + covariance.shape_loads @ covariance.shape_loads.T
         expected = observed([test], HANGER_3).value[test_modes:]
@@ -90,7 +88,7 @@ def test_a_turn_as_large_as_may_be_is_no_misfit(test: ModalTest, rad: float) -> 
 def test_without_the_shape_of_one_mode_the_others_may_still_be_turned(test: ModalTest) -> None:
     first, *rest = (_may_be_turned(mode, 0.3) for mode in test.modes)
     turned = replace(test, modes=(first, *rest))
-    whole = GapProblem(HANGER_3, "beam1", observed([turned], HANGER_3))
+    whole = problem_of([turned], hanger=HANGER_3)
     without = whole.without_shape(0).observations
     others = whole.observations.design.shape_mode != 0
     _, _, *of_others = turn_loads(whole.observations)[others].T

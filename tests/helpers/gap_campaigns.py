@@ -1,18 +1,37 @@
-"""Small campaigns of hanger 3 for the gap diagnosis, made by the general model itself."""
+"""Small campaigns of hanger 3, without its plates, made by the general model itself."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from shm.gap.contract import Fit, Hypothesis
+from shm.gap.linear import Linear
 from shm.gap.observations import observed
+from shm.gap.posterior import MOST_ROUNDS, Sampling, Target, find_peaks
 from shm.gap.problem import GapProblem
-from shm.models.composed import ComposedHanger
+from shm.gap.scan import Scan, scan
+from shm.gap.search import fit_alone
+from shm.models import MODELS, AsMade
+from shm.models.as_made import DENSITY, LENGTH, MODULUS, SECTION, TENSION
 from shm.models.effects import Conditions, Variant
-from shm.values import NAN, PLANES, AddedMass, FloatArray, ModalTest, Mode, ShapePoint
+from shm.models.hanger_with_effects import HangerWithEffects
+from shm.values import (
+    ENOUGH_EFFECTIVE,
+    NAN,
+    PLANES,
+    AddedMass,
+    FloatArray,
+    Hanger,
+    ModalTest,
+    Mode,
+    ShapePoint,
+)
 from tests.helpers.hangers import HANGER_3
 
+HANGER = replace(HANGER_3, plate=None)
 PLACES_M = (2.0, 4.5, 6.5, 9.0)
 CLAMP = AddedMass(25.0, 3.6)
 Effects = tuple[tuple[str, Variant], ...]
@@ -34,16 +53,20 @@ def campaign(
     Shapes are measured where `shape_sd` is given.
     """
     rng = np.random.default_rng(seed)
-    hanger = ComposedHanger(HANGER_3, "beam1", effects, PLACES_M)
-    theta = np.array([[tension, *(0.005 * rng.standard_normal(4)), *values]])
+    model = AsMade(MODELS["beam1"](HANGER))
+    hanger = HangerWithEffects(model, effects, PLACES_M)
+    section, density, length, modulus = 0.005 * rng.standard_normal(4)
+    made = {TENSION: tension, LENGTH: 1 + length, SECTION: section, DENSITY: density}
+    made |= {MODULUS: modulus, **{name: model.usual(name) for name in model.terms}}
+    theta = np.array([[*(made[name] for name in model.parameter_names), *values]])
     model_error = 2e-5 * rng.standard_normal((2, modes))
-    made = []
+    taken = []
     for t in range(tests):
         mass = CLAMP if t == tests - 1 else None
         found = hanger.modes(theta, Conditions(f"t{t + 1}", 0.0, 1.0, mass), modes)
         log = np.log(found.frequency_hz[0]) + model_error + sd * rng.standard_normal((2, modes))
         shape = found.shape[0] + np.nan_to_num(shape_sd) * rng.standard_normal(found.shape[0].shape)
-        made.append(
+        taken.append(
             ModalTest(
                 f"t{t + 1}",
                 tuple(
@@ -61,12 +84,29 @@ def campaign(
                 added_mass=mass,
             )
         )
-    return tuple(made)
+    return with_usual_errors(taken)
 
 
-def problem_of(tests: Sequence[ModalTest], baseline: str = "beam1") -> GapProblem:
-    """The problem of tests of hanger 3."""
-    return GapProblem(HANGER_3, baseline, observed(tests, HANGER_3))
+def with_usual_errors(tests: Sequence[ModalTest]) -> tuple[ModalTest, ...]:
+    """Return tests with what usual sensors and supports do to their frequencies."""
+    problem = problem_of(tests)
+    factor = np.exp(problem.usual_of(problem.design))
+    rows = iter(factor.tolist())
+    return tuple(
+        replace(
+            test,
+            modes=tuple(replace(m, frequency_hz=m.frequency_hz * next(rows)) for m in test.modes),
+        )
+        for test in tests
+    )
+
+
+def problem_of(
+    tests: Sequence[ModalTest], baseline: str = "beam1", hanger: Hanger = HANGER
+) -> GapProblem:
+    """Return the problem of tests of a hanger with a model class as its baseline."""
+    model = AsMade(MODELS[baseline](hanger))
+    return GapProblem(model, tests, observed(tests, hanger))
 
 
 def _points(shape: FloatArray, plane: int, sd: float) -> tuple[ShapePoint, ...]:
@@ -76,3 +116,23 @@ def _points(shape: FloatArray, plane: int, sd: float) -> tuple[ShapePoint, ...]:
         ShapePoint(x_m, float(here[plane]), float(here[1 - plane]), sd)
         for x_m, here in zip(PLACES_M, shape, strict=True)
     )
+
+
+def scan_of(problem: GapProblem, hypothesis: Hypothesis) -> Scan:
+    """Return the scan of an effect beside the hanger alone, and cut its prior by it."""
+    before = fit_alone(problem, np.random.default_rng(1))
+    linear = Linear(problem.likelihood(Hypothesis()), before.slopes)
+    found = scan(problem, before, linear, hypothesis)
+    if found.smallest < 1:
+        problem.smallest[hypothesis.effects[0]] = found.smallest
+    return found
+
+
+def fit_of(problem: GapProblem, hypothesis: Hypothesis, draws: int = 400) -> Fit:
+    """Return the sampled fit of an effect, from where a scan of it leads."""
+    before = fit_alone(problem, np.random.default_rng(1))
+    starts = scan_of(problem, hypothesis).starts(problem, before)
+    target = Target(problem, hypothesis)
+    sampling = Sampling(target, find_peaks(target, starts), np.random.default_rng(1), before)
+    sampling.run(ENOUGH_EFFECTIVE, MOST_ROUNDS)
+    return sampling.fit(draws)

@@ -13,7 +13,7 @@ PlantedKind = Literal["none", "one", "two", "unknown"]
 
 MIX: Mapping[PlantedKind, float] = {"none": 1 / 4, "one": 1 / 2, "two": 1 / 8, "unknown": 1 / 8}
 """How often each is planted: judgement, the same as the diagnosis's priors
-(`shm.gap.model_probabilities`)."""
+(`shm.gap.probabilities`)."""
 
 Richness = Literal[
     "one plane", "two planes", "known mass", "shapes", "conditions", "everything", "three modes"
