@@ -130,7 +130,7 @@ class Target:
                 break
             if taken > 3 and log + 2 * hoped < hopeless:
                 break
-        return Peak(z, log, np.linalg.inv(hessian))
+        return Peak(z, log, np.asarray(np.linalg.inv(hessian), dtype=np.float64))
 
     def _curvature(
         self, z: FloatArray, residual: FloatArray, slopes: FloatArray
@@ -266,7 +266,7 @@ class _Wide:
 
     def log_density(self, w: FloatArray) -> FloatArray:
         own = np.log1p(-self.of_prior) + self.mixture.log_density(w)
-        return np.logaddexp(own, np.log(self.of_prior) + log_normal(w))
+        return np.asarray(np.logaddexp(own, np.log(self.of_prior) + log_normal(w)))
 
 
 class _Surrogate:
