@@ -19,9 +19,10 @@ import scipy
 
 from shm.gap.attribution import Attribution, answered, attribute
 from shm.gap.contract import Design, Fit, GapOptions, Hypothesis
-from shm.gap.posterior import Target, find_peaks
+from shm.gap.posterior import Target, find_peaks, laplace
 from shm.gap.probabilities import NO_GAP, UNKNOWN, ScoredHypothesis, log_prior
 from shm.gap.problem import GapProblem
+from shm.gap.search import find_starts
 from shm.inference.data_checks import SAME_LEVEL
 from shm.inference.options import Progress, silent
 from shm.values import BoolArray, FloatArray, IntArray
@@ -142,8 +143,9 @@ def _find_gross_error(found: Cleared) -> GrossError | None:
     leaders = [plain[k] for k in np.argsort(-gross[:, best], kind="stable")[:_CONTENDERS]]
     chosen = dict.fromkeys([next(k for k in plain if not tried[k].hypothesis.effects), *leaders])
     row = int(rows[best])
-    without = [log[k] + _gain_without(problem, tried[k], row) for k in chosen]
-    final = scipy.special.logsumexp(without) - scipy.special.logsumexp(log)
+    priors = {k: log_prior(tried[k].hypothesis, variants) for k in chosen}
+    fits = np.array([_judge(problem, tried[k], row) + priors[k] for k in chosen])
+    final = scipy.special.logsumexp(fits[:, 0]) - scipy.special.logsumexp([*log, *fits[:, 1]])
     return GrossError(int(found.rows[row]), float(scipy.special.expit(final)))
 
 
@@ -158,30 +160,26 @@ def _open(found: Cleared) -> BoolArray:
     return np.asarray(~touched[found.rows])
 
 
-def _gain_without(problem: GapProblem, tried: ScoredHypothesis, row: int) -> float:
-    """Return what a hypothesis gains where a frequency is a gross error, by fits with and without.
+def _judge(problem: GapProblem, tried: ScoredHypothesis, row: int) -> FloatArray:
+    """Return the log evidence of a hypothesis were a frequency gross, and were it ordinary, (2,).
 
-    The mode's shape is in neither: of a wrong mode it is wrong as well.
+    By a fit to all other data; the mode's shape is not among them: of a wrong mode it is wrong as
+    well.
     """
     assert tried.fit is not None
+    fit, hypothesis = tried.fit, tried.hypothesis
     rest = problem.part(np.delete(np.arange(problem.design.frequencies), row))
-    whole = problem.without_shape(row)
-    log = []
-    fit = tried.fit
-    for each in (rest, whole):
-        target = Target(each, tried.hypothesis)
-        peaks = find_peaks(target, np.vstack([fit.z, 0 * fit.z]))
-        log.append(max(peak.log_evidence for peak in peaks))
-        if each is rest:
-            z = peaks[0].z
-            around = _of_whole(whole, tried.hypothesis, z)
-            seen = left_out(whole, tried.hypothesis, z, *around, np.array([row]))
-    # Tails of the ordinary error where the datum drags the fit.
-    ordinary = max(log[1], log[0] + float(seen.ordinary_given_rest[0]))
-    return log[0] + float(seen.gross_given_rest[0]) - ordinary
+    # The datum may have dragged the fit far from where the others have it.
+    alone = find_starts(rest)
+    effects = np.tile(fit.z[alone.shape[1] :], (len(alone), 1))
+    peaks = find_peaks(Target(rest, hypothesis), np.vstack([fit.z, np.hstack([alone, effects])]))
+    whole, z = problem.without_shape(row), peaks[0].z
+    seen = left_out(whole, hypothesis, z, *_around(whole, hypothesis, z), np.array([row]))
+    given_rest = np.array([seen.gross_given_rest[0], seen.ordinary_given_rest[0]])
+    return laplace(peaks) + given_rest
 
 
-def _of_whole(
+def _around(
     problem: GapProblem, hypothesis: Hypothesis, z: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     residual, slopes = Target(problem, hypothesis).view(z)
@@ -301,7 +299,7 @@ def _left_out_of(problem: GapProblem, fit: Fit | None, rows: IntArray) -> LeftOu
 
 def _seen_from(problem: GapProblem, fit: Fit, row: int) -> LeftOut:
     """Return a frequency of `problem` seen from its other data, to which `fit` was fitted."""
-    around = _of_whole(problem, fit.hypothesis, fit.z)
+    around = _around(problem, fit.hypothesis, fit.z)
     return left_out(problem, fit.hypothesis, fit.z, *around, np.array([row]))
 
 

@@ -35,7 +35,7 @@ from shm.models.beam import Beam3
 from shm.models.effects import Conditions, Variant, parameters_of
 from shm.models.hanger import HangerModes
 from shm.models.hanger_with_effects import HangerWithEffects
-from shm.values import BoolArray, FloatArray, IntArray, ModalTest
+from shm.values import NAN, BoolArray, FloatArray, IntArray, ModalTest
 
 Effects = tuple[tuple[str, Variant], ...]
 
@@ -69,8 +69,10 @@ class GapProblem:
         order = observations.design.frequency_order
         wave_n_m = model.wave_stiffness_n_m_rad((1 + order.max()) / 2)
         known = self.hanger.scatter.tension
+        # Of readings only differences between tests count (see `shm.gap.observations`).
+        unread = [replace(test, tension_read_n=NAN, tension_read_sd_n=NAN) for test in tests]
         self.described = described or DescribedCoordinates(
-            model, tests, wave_n_m, known_tension_sd=known
+            model, unread, wave_n_m, known_tension_sd=known
         )
         self._linear = self.described.always_linear
         self.sampling: Sampling | None = None

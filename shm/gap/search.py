@@ -234,24 +234,34 @@ def fit_alone(problem: GapProblem, rng: np.random.Generator, draws: int = 1000) 
 
 
 def sample_alone(problem: GapProblem, rng: np.random.Generator) -> Sampling:
-    """Return the sampling of the hanger without effects as far as its evidence takes, kept."""
+    """Return the sampling of the hanger without effects, which the problem keeps.
+
+    It has come as far as the evidence takes.
+    """
     if problem.sampling is not None:
         return problem.sampling
-    target, ends = Target(problem, ALONE), problem.end_columns
+    peaks = find_peaks(Target(problem, ALONE), find_starts(problem))
+    problem.settle(peaks[0])
+    problem.sampling = Sampling(Target(problem, ALONE), peaks, rng)
+    problem.sampling.run(*_ROUGHLY)
+    return problem.sampling
+
+
+def find_starts(problem: GapProblem) -> FloatArray:
+    """Return points z (m, d) of the hanger alone from which to climb.
+
+    For each level of the ends the tension that fits best: they trade with each other. Raises
+    BadInput where the model cannot be solved near the data.
+    """
+    target = Target(problem, ALONE)
     z = np.zeros((len(_ENDS), len(_TENSIONS), target.dimension))
     z[:, :, 0] = _TENSIONS
-    z[:, :, ends] = np.array(_ENDS)[:, None, None]
+    z[:, :, problem.end_columns] = np.array(_ENDS)[:, None, None]
     log = target.log(z.reshape(-1, target.dimension)).reshape(z.shape[:2])
     if not np.isfinite(log).any():
         raise BadInput(
             f"the model cannot be solved anywhere for {problem.model.name}.",
             remedy="Check the description of the hanger.",
         )
-    # From each level of ends at the tension that fits best: they trade with each other.
     best = np.where(np.isnan(log), -np.inf, log).argmax(axis=1)
-    starts = np.unique(z[np.arange(len(best)), best], axis=0)
-    peaks = find_peaks(target, starts)
-    problem.settle(peaks[0])
-    problem.sampling = Sampling(Target(problem, ALONE), peaks, rng)
-    problem.sampling.run(*_ROUGHLY)
-    return problem.sampling
+    return np.unique(z[np.arange(len(best)), best], axis=0)
