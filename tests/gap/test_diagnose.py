@@ -14,10 +14,9 @@ from shm.gap import GapOptions, diagnose
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import NAN, Diagnosis, EffectPrior, Hanger, ModalTest
 from tests.helpers.effects import all_but
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.gap_campaigns import HANGER as PLAIN
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
-PLAIN = replace(HANGER_3, plate=None)
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
 FEW_EFFECTS = GapOptions(without=all_but("timebase", "bending_stiffness"))
 CLAMPS_ALONE = GapOptions(without=all_but("point_mass"))
