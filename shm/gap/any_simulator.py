@@ -224,7 +224,9 @@ class _Answers:
 def _answers(problem: SimulatorProblem, rng: np.random.Generator) -> _Answers:
     names = [each.name for each in problem.simulator.effects]
     alone = fit_hypothesis(problem, Hypothesis(), rng)
-    singles = [fit_hypothesis(problem, Hypothesis(((name, _EVERYWHERE),)), rng, alone.z) for name in names]
+    singles = [
+        fit_hypothesis(problem, Hypothesis(((name, _EVERYWHERE),)), rng, alone.z) for name in names
+    ]
     plain = _by_evidence([*singles, *_pairs(problem, alone, _by_evidence(singles), rng)])
     fits = [alone, *plain, fit_hypothesis(problem, Hypothesis(flexible=True), rng, alone.z)]
     for each in plain[:_FLEXIBLE]:
@@ -286,9 +288,7 @@ def _groups(
     own = [of[name] for name in supported]
     best = max((each.log_evidence for each in own), default=0.0)
     near = [each.log_evidence > best - SAME_BELOW for each in own]
-    return tuple(
-        tuple(supported[i] for i in each) for each in group([(fit,) for fit in own], near)
-    )
+    return tuple(tuple(supported[i] for i in each) for each in group([(fit,) for fit in own], near))
 
 
 def _shrinkage(problem: SimulatorProblem, alone: Fit, best: Fit) -> Shrinkage:

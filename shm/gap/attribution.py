@@ -132,7 +132,7 @@ def attribute(
 def _chances(search: Search) -> dict[Hypothesis, float]:
     """Return the probability of each hypothesis that was fitted."""
     kinds = families(search.scored(), search.variants)
-    found = {}
+    found: dict[Hypothesis, float] = {}
     for kind, chance in zip(kinds, probabilities(kinds)[0].tolist(), strict=True):
         share = normalised(np.array([each.log_evidence for each in kind.tried]))
         found |= {
@@ -143,9 +143,7 @@ def _chances(search: Search) -> dict[Hypothesis, float]:
     return found
 
 
-def _explanations(
-    by_kind: Sequence[tuple[Family, float]], none: Family
-) -> tuple[Explanation, ...]:
+def _explanations(by_kind: Sequence[tuple[Family, float]], none: Family) -> tuple[Explanation, ...]:
     """Return every effect and pair that was tried, the likeliest first."""
     found = [
         Explanation(

@@ -12,13 +12,11 @@ from shm.gap.problem import GapProblem
 from shm.gap.search import sample_alone
 from shm.inference.options import Progress, silent
 from shm.inference.updating import log_class_prior
-from shm.models import MODELS, AsMade, applicable, check_baseline
+from shm.models import AS_DESCRIBED, MODELS, AsMade, applicable, check_baseline
 from shm.models.base import held_otherwise
 from shm.values import Hanger, ModalTest
 
 BEAMS = ("beam1", "beam2", "beam3")
-AS_DESCRIBED = "beam1"
-"""The class that takes the ends as they are described, whatever holds them."""
 
 
 def choose_baseline(

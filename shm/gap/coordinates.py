@@ -50,7 +50,7 @@ class Coordinates:
 
     def __init__(self, described: DescribedCoordinates, effects: Sequence[Parameter]):
         self.described, self.effects = described, tuple(effects)
-        self.baseline = described.dimension
+        self.baseline: int = described.dimension
 
     @property
     def dimension(self) -> int:
@@ -59,7 +59,8 @@ class Coordinates:
     @property
     def places(self) -> IntArray:
         """Return the columns of places along the hanger."""
-        return self.baseline + np.flatnonzero([is_place(each) for each in self.effects])
+        own = [is_place(each) for each in self.effects]
+        return np.asarray(self.baseline + np.flatnonzero(own))
 
     def theta(self, z: FloatArray) -> FloatArray:
         """Return parameters (n, parameters) in their units, what is not seen at its middle."""

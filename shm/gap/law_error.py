@@ -71,9 +71,7 @@ def _linear(
     return float(log), step, inner
 
 
-def _allowances(
-    problem: GapProblem, baseline: Fit, fit: Fit
-) -> Iterator[tuple[Share, Covariance]]:
+def _allowances(problem: GapProblem, baseline: Fit, fit: Fit) -> Iterator[tuple[Share, Covariance]]:
     design, shift = problem.design, fit.predicted - baseline.predicted
     count, patterns = design.frequencies, (same_mode(design), smooth_over_orders(design))
     for fraction, share in CALIBRATION.off_by.items():

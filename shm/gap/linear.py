@@ -22,7 +22,7 @@ class Linear:
         self.likelihood = likelihood
         self._weighed = likelihood.weighed(slopes)
         inner = self._weighed.products(slopes.T) + np.eye(slopes.shape[1])
-        self.covariance: FloatArray = np.linalg.inv(inner)
+        self.covariance: FloatArray = np.asarray(np.linalg.inv(inner), dtype=np.float64)
         self._height = likelihood.log_height - np.linalg.slogdet(inner)[1] / 2
 
     def marginal(
@@ -32,7 +32,7 @@ class Linear:
 
         With it the step (n, l) to the best z, and the index (n,) of the likeliest error.
         """
-        known = np.isfinite(residual).all(axis=1)
+        known = np.asarray(np.isfinite(residual).all(axis=1))
         residual = np.where(known[:, None], residual, 0.0)
         pull = self._weighed.products(residual) - z  # (nodes, n, l)
         step = pull @ self.covariance
@@ -50,4 +50,5 @@ class Linear:
         """
         pull = self._weighed.products(shift)[node]
         followed = ((pull @ self.covariance[node]) * pull).sum(axis=1)
-        return np.sqrt(np.maximum(self.likelihood.squares(shift)[:, node] - followed, 0.0))
+        beyond = self.likelihood.squares(shift)[:, node] - followed
+        return np.asarray(np.sqrt(np.maximum(beyond, 0.0)))

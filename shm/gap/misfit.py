@@ -38,7 +38,9 @@ def refuse_misfit(found: Cleared, reasons: Sequence[str]) -> None:
         f"no explanation fits the frequencies of hanger {hanger.id}: the best, {name}, misses them "
         f"by {misfit:.0f} % (root mean square){_range_over_tests(problem, found.attribution.baseline)}. "
         "No cause can be named, and no tension given. "
-        + " ".join((*doubt_orders(problem, found.attribution), *reasons, *_compare_with_string(problem))),
+        + " ".join(
+            (*doubt_orders(problem, found.attribution), *reasons, *_compare_with_string(problem))
+        ),
         remedy="Check that all tests are of this hanger, the orders of the modes, and diameter, "
         "length and nominal tension.",
     )

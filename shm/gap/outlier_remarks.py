@@ -40,7 +40,7 @@ def _outlier(found: Cleared, error: GrossError, fit: Fit) -> Outlier:
 def residuals_with_outliers(
     found: Cleared, kept: Sequence[Residual], before: Fit, after: Fit | None
 ) -> tuple[Residual, ...]:
-    """Return the residuals of the frequencies `kept` and of those set aside, in the order of the data.
+    """Return the residuals of the frequencies `kept` and of those set aside, in their order.
 
     These have no share in the misfit, since it is that of the others.
     """

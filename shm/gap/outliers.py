@@ -12,7 +12,6 @@ amplitude. It is none where another test, hit as hard, shows the mode where it b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -174,12 +173,10 @@ def _gain_without(problem: GapProblem, tried: ScoredHypothesis, row: int) -> flo
         peaks = find_peaks(target, np.vstack([fit.z, 0 * fit.z]))
         log.append(max(peak.log_evidence for peak in peaks))
         if each is rest:
-            residual, slopes = target.view(peaks[0].z)
-            seen = left_out(
-                whole, tried.hypothesis, peaks[0].z, *_of_whole(whole, tried.hypothesis, peaks[0].z),
-                np.array([row]),
-            )  # fmt: skip
-    # With both as Laplace has them; tails of the ordinary error where the datum drags the fit.
+            z = peaks[0].z
+            around = _of_whole(whole, tried.hypothesis, z)
+            seen = left_out(whole, tried.hypothesis, z, *around, np.array([row]))
+    # Tails of the ordinary error where the datum drags the fit.
     ordinary = max(log[1], log[0] + float(seen.ordinary_given_rest[0]))
     return log[0] + float(seen.gross_given_rest[0]) - ordinary
 
@@ -329,6 +326,3 @@ def _right_elsewhere(design: Design, kept: Design, row: int) -> bool:
         kept.frequency_order == design.frequency_order[row]
     )
     return bool((kept.amplitude[same] * SAME_LEVEL >= design.amplitude[row]).any())
-
-
-__all__: Sequence[str] = ("Cleared", "GrossError", "exclude_gross_errors")

@@ -35,7 +35,7 @@ from shm.values import ENOUGH_EFFECTIVE, BoolArray, FloatArray, IntArray
 # Numerical: a climb's steps, and the gain in log posterior that is none; forward differences in
 # standard deviations of a prior; a slope beyond is a cliff, where two modes change places.
 _STEPS, _NO_GAIN, _MOST_DAMPING = 25, 0.02, 1e5
-_DIFFERENCE, _STEEPEST, _FARTHEST = 1e-4, 1e3, 4.5
+_DIFFERENCE, _STEEPEST, _FARTHEST, _FARTHEST_LINEAR = 1e-4, 1e3, 4.5, 12.0
 # Numerical: standard deviations of a peak within which two are one; log density behind the best
 # from which on a peak is not drawn about.
 _SAME, _FAR_BELOW = 0.3, 10.0
@@ -44,7 +44,10 @@ _ROUND, MOST_ROUNDS, _AT_FIRST, _FROM_PRIOR, _FROM_FIRST = 150, 30, 0.3, 0.1, 0.
 _WIDTHS, _WIDE_EVERY, _CANDIDATES = (1.0, 2.0), 4, 3000
 _LEAST_WEIGHT, _RIDGE = 1e-2, 1e-6
 _CLUSTERS, _FROM_WITHOUT, _PARTS, _POPULATION = 3, 0.4, 8, 600
-_SETTLED, _MOST_SETTLED = 0.3, 4  # of a prior's standard deviation: over less the slopes of linear parameters hold
+_SETTLED, _MOST_SETTLED = (
+    0.3,
+    4,
+)  # of a prior's standard deviation: over less the slopes of linear parameters hold
 
 
 class Problem(Protocol):
@@ -78,6 +81,8 @@ class Target:
         self.dimension = problem.dimension(hypothesis)
         self.linear = problem.linear(hypothesis)
         self.other: IntArray = np.setdiff1d(np.arange(self.dimension), self.linear)
+        self.farthest: FloatArray = np.full(self.dimension, _FARTHEST)
+        self.farthest[self.linear] = _FARTHEST_LINEAR
 
     def residual(self, z: FloatArray) -> FloatArray:
         """Return measured less predicted (n, data) at z (n, d)."""
@@ -88,9 +93,7 @@ class Target:
         """Return the log of likelihood times prior (n,) at z (n, d)."""
         return np.asarray(self.likelihood.log(self.residual(z)) + log_normal(z))
 
-    def view(
-        self, z: FloatArray, known: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+    def view(self, z: FloatArray, known: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
         """Return the residual (data,) and the prediction's slopes (data, d) at z (d,).
 
         Of `known` slopes near z those by the linear parameters are taken over.
@@ -113,7 +116,7 @@ class Target:
         for taken in range(_STEPS):
             step = np.linalg.solve(hessian + damping * np.diag(np.diag(hessian)), gradient)
             step = step / max(1.0, np.abs(step).max())
-            tried = np.clip(z + step, -_FARTHEST, _FARTHEST)
+            tried = np.clip(z + step, -self.farthest, self.farthest)
             gain = float(self.log(tried[None])[0]) - log
             if gain > 0:
                 far = np.abs(tried - z)[self.linear].max(initial=0.0) > _SETTLED
@@ -127,7 +130,7 @@ class Target:
                 break
             if taken > 3 and log + 2 * hoped < hopeless:
                 break
-        return Peak(z, log, np.linalg.inv(hessian))
+        return Peak(z, log, np.asarray(np.linalg.inv(hessian), dtype=np.float64))
 
     def _curvature(
         self, z: FloatArray, residual: FloatArray, slopes: FloatArray
@@ -189,7 +192,7 @@ class _Collapsed:
         z = np.tile(self._peak, (len(w), 1))
         z[:, target.other] = w
         moved = z[:, target.linear] + (w - self._peak[target.other]) @ self._follow.T
-        z[:, target.linear] = moved.clip(-_FARTHEST, _FARTHEST)
+        z[:, target.linear] = moved.clip(-_FARTHEST_LINEAR, _FARTHEST_LINEAR)
         return z
 
     def settle(self, w: FloatArray) -> tuple[_Draws, FloatArray]:
@@ -263,7 +266,7 @@ class _Wide:
 
     def log_density(self, w: FloatArray) -> FloatArray:
         own = np.log1p(-self.of_prior) + self.mixture.log_density(w)
-        return np.logaddexp(own, np.log(self.of_prior) + log_normal(w))
+        return np.asarray(np.logaddexp(own, np.log(self.of_prior) + log_normal(w)))
 
 
 class _Surrogate:
@@ -273,9 +276,7 @@ class _Surrogate:
     model. What the fit is off by, weights of exact solutions correct.
     """
 
-    def __init__(
-        self, collapsed: _Collapsed, known: _Draws, weights: FloatArray, wide: _Wide
-    ):
+    def __init__(self, collapsed: _Collapsed, known: _Draws, weights: FloatArray, wide: _Wide):
         self._collapsed, self._wide = collapsed, wide
         other = collapsed.target.other
         w, weights = known.z[:, other], weights + _LEAST_WEIGHT / len(weights)

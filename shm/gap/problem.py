@@ -133,10 +133,13 @@ class GapProblem:
     @property
     def has_itself(self) -> tuple[str, ...]:
         """Return the effects of the catalogue that the hanger has as parameters of its own."""
-        found = ("rotational_end_flexibility",) if self.model.springs else ()
-        found += ("shear_and_rotary_inertia",) if isinstance(self.model.model, Beam3) else ()
-        found += ("sag",) if self.model.has_terms else ()
-        return found + (("bending_stiffness",) if BENDING in self.described.names else ())
+        own = {
+            "rotational_end_flexibility": bool(self.model.springs),
+            "shear_and_rotary_inertia": isinstance(self.model.model, Beam3),
+            "sag": self.model.has_terms,
+            "bending_stiffness": BENDING in self.described.names,
+        }
+        return tuple(name for name, has in own.items() if has)
 
     def predict(
         self, hypothesis: Hypothesis, z: FloatArray, design: Design | None = None
@@ -182,7 +185,7 @@ class GapProblem:
         return np.asarray(composed.physical(theta, _AT_REST).tension_n)
 
     def likelihood(self, hypothesis: Hypothesis) -> Likelihood:
-        """Return the likelihood of residuals, with something unknown where the hypothesis has it."""
+        """Return the likelihood of residuals; with something unknown if the hypothesis has it."""
         flexible = hypothesis.flexible
         if flexible not in self._likelihoods:
             make = flexible_nodes if flexible else nodes
@@ -259,15 +262,11 @@ class GapProblem:
         if not self.hanger.as_hanger:
             return found
         theta, plane = self.described.theta(self.near), design.frequency_plane
-        near = self._predicted(
-            (), theta, design, ShapeScaling.of(design, self.hanger.length_m)
-        )
+        near = self._predicted((), theta, design, ShapeScaling.of(design, self.hanger.length_m))
         frequency_hz = np.exp(near[:, : design.frequencies])
         ends = self.model.end_waves(theta, frequency_hz, plane)
         places = tuple(design.places_m[place] for place in np.unique(design.shape_place))
-        sensors, _ = errors_of_bar(
-            self.hanger, design.frequency_order, felt_by(ends[0]), places
-        )
+        sensors, _ = errors_of_bar(self.hanger, design.frequency_order, felt_by(ends[0]), places)
         supports = mean_of_ends(ends, self.model.stiff_ends_m, self.hanger.assumptions)[0]
         found[: design.frequencies] = sensors + supports
         return found

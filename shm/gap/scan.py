@@ -96,9 +96,7 @@ class Scan:
         return np.vstack([z[chosen], mirrored]) if len(places) else z[chosen]
 
 
-def scan(
-    problem: GapProblem, before: Fit, linear: Linear, hypothesis: Hypothesis
-) -> Scan:
+def scan(problem: GapProblem, before: Fit, linear: Linear, hypothesis: Hypothesis) -> Scan:
     """Scan the last effect of `hypothesis`, beside a fit `before` without it.
 
     `linear` has the slopes of that fit.
@@ -113,9 +111,7 @@ def scan(
     return _scanned(problem, before, linear, hypothesis, effect, predicted - before.predicted)
 
 
-def scan_beside(
-    problem: GapProblem, before: Fit, linear: Linear, alone: Scan
-) -> Scan:
+def scan_beside(problem: GapProblem, before: Fit, linear: Linear, alone: Scan) -> Scan:
     """Scan the effect of a scan `alone` beside a fit of another one; what both do is added up."""
     pair = Hypothesis((*before.hypothesis.effects, *alone.hypothesis.effects))
     return _scanned(problem, before, linear, pair, alone.effect, alone.shift)

@@ -34,9 +34,8 @@ from shm.values import ENOUGH_EFFECTIVE, FloatArray
 ALONE = Hypothesis()
 
 HOPELESS, HOPELESS_SHARE = 4.0, 0.4
-"""Log of prior times evidence behind the best, or a share of the gap, from which on nothing is tried
-further: a
-scan is linear, large gaps are not."""
+"""Log of prior times evidence behind the best, or a share of the gap, from which on nothing is
+tried further: a scan is linear, large gaps are not."""
 LEADERS = 3
 """Effects that are tried in pairs, and with something unknown beside."""
 SUPPORTED = 2.0

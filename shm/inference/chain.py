@@ -5,9 +5,10 @@ They go on where importance sampling has too few effective draws, and check it o
 
 from __future__ import annotations
 
+from typing import Any, Protocol
+
 import numpy as np
 
-from shm.inference.problem import Problem
 from shm.values import FloatArray
 
 # Numerical: walkers for each parameter; steps until the chain is fifty times as long as the mean
@@ -19,8 +20,22 @@ _FROZEN = 1e-9
 _SPREAD = 1e-4
 
 
+class Posterior(Protocol):
+    """A density that can be evaluated up to a constant."""
+
+    @property
+    def dimension(self) -> int:
+        """Return how many coordinates a point has."""
+
+    def evaluate(self, z: FloatArray) -> Any:
+        """Return the points z (n, d) with what the density needs of them."""
+
+    def log_posterior(self, points: Any) -> FloatArray:
+        """Return the log density (n,) of evaluated points."""
+
+
 def run_chain(
-    problem: Problem, start: FloatArray, rng: np.random.Generator
+    problem: Posterior, start: FloatArray, rng: np.random.Generator
 ) -> tuple[FloatArray, float, float]:
     """Return points (n, d) of the posterior, how many of them are effective, and R-hat.
 

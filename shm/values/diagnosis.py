@@ -129,7 +129,7 @@ class Cause:
     log_fit: float
     log_occam: float
     parameters: tuple[EffectEstimate, ...]
-    method: Literal["screened", "normal", "sampled"]
+    method: Literal["screened", "normal", "sampled", "emcee"]
     group: int | None = None
     also_at: tuple[str, ...] = ()
 

@@ -217,10 +217,11 @@ def _pieces(
         factor = normalised(bent.curvature, weight)
         table = Table.joined(table, bent.scaled(factor))
     whole = _bar(x, table, weight, weight[None], weight, counts)
-    parts = [
-        _bar(x[:, rows], table.part(rows), weight[:, rows], weight[None][:, :, rows], weight[:, rows], counts)
-        for rows in (np.flatnonzero(which[0] == k) for k in range(count))
-    ]  # fmt: skip
+    parts = []
+    for stretch in range(count):
+        rows = np.flatnonzero(which[0] == stretch)
+        own = weight[:, rows]
+        parts.append(_bar(x[:, rows], table.part(rows), own, own[None], own, counts))
     return _Pieces(
         np.concatenate([each.bending[:, 0] for each in parts]),
         np.concatenate([each.mass for each in parts]),
