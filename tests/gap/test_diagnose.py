@@ -123,6 +123,7 @@ def test_few_modes_are_answered_with_a_remark() -> None:
     assert np.isnan(found.shrinkage.held_out_before_percent)
 
 
+# FAULT: not refused, as in `test_misfit`.
 def test_a_description_in_other_units_is_doubted_before_anything_else(
     untouched: Diagnosis,
 ) -> None:

@@ -208,7 +208,7 @@ def test_what_another_test_hit_as_hard_shows_in_its_place_was_a_slip(
     )  # farther than any guide moves one
 
 
-# FAULT: no gap with 0.9, as `acting` of main went with the odds of damping; only the remark is left.
+# FAULT: it leads to no gap: `acting` of main went with the odds of damping, the remark is left.
 @pytest.mark.slow
 def test_a_hanger_that_knocks_while_it_swings_far_is_not_called_sound() -> None:
     (test,) = measured()

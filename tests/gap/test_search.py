@@ -180,8 +180,6 @@ def test_fit_alone_springs_any_seed() -> None:
     assert np.mean(tension[0]) == pytest.approx(np.mean(tension[1]), abs=0.3 * half)
 
 
-# FAULT: `Target.climb` stops at 4.5 (`_FARTHEST`) where the bar alone needs 8: laplace(peaks) is far
-# below the evidence, and `Search._beyond` adds the difference to all that is not sampled.
 def test_fit_alone_far_off_priors() -> None:
     """A bar that must be 8 standard deviations off is climbed to all the same."""
     found = searched(12.0, 3.1, 0.3)[0].baseline

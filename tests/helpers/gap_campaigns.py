@@ -10,7 +10,6 @@ import numpy as np
 from shm.assumptions import DEFAULTS
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.linear import Linear
-from shm.gap.observations import observed
 from shm.gap.posterior import MOST_ROUNDS, Sampling, Target, find_peaks
 from shm.gap.problem import GapProblem
 from shm.gap.scan import Scan, scan
@@ -30,6 +29,7 @@ from shm.values import (
     Mode,
     ShapePoint,
 )
+from tests.helpers.gap_fits import make_problem
 from tests.helpers.hangers import HANGER_3
 
 TOUCHLESS = DEFAULTS.with_numbers(support_compliance_m_n=0.0, accelerometer_mass_kg=0.0)
@@ -94,8 +94,7 @@ def problem_of(
     tests: Sequence[ModalTest], baseline: str = "beam1", hanger: Hanger = HANGER
 ) -> GapProblem:
     """Return the problem of tests of a hanger with a model class as its baseline."""
-    model = AsMade(MODELS[baseline](hanger))
-    return GapProblem(model, tests, observed(tests, hanger))
+    return make_problem(tests, hanger, baseline)
 
 
 def _points(shape: FloatArray, plane: int, sd: float) -> tuple[ShapePoint, ...]:
