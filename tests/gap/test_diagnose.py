@@ -99,6 +99,7 @@ def test_other_classes_may_be_the_baseline(baseline: str) -> None:
     assert probabilities(found) == pytest.approx(1.0)
 
 
+# FAULT: 923 kN, 1.07 times 866: one class is chosen, and its ends are the only ones allowed for.
 @pytest.mark.slow
 def test_of_one_frequency_the_tension_is_as_wide_as_mass_and_length_are_known() -> None:
     """A string's tension goes with mass and length squared; the first mode bends as well."""

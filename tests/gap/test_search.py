@@ -164,20 +164,17 @@ def test_progress_never_goes_back() -> None:
     assert {"baseline", "single effects", "pairs", "something unknown"} <= set(labels)
 
 
-# FAULT: eight seeds give 50.2 to 51.1, a scatter of 0.3 where `log_evidence_sd` is 0.07; the fewer
-# rounds, the less.
+# FAULT: 49.6 to 50.5, a scatter of 0.3 where `log_evidence_sd` is 0.07.
 def test_fit_alone_springs_any_seed() -> None:
     """One test of two planes, ends on springs: evidence and tension do not depend on the seed."""
-    found = [
-        fit_alone(problem_of(own_campaign(tests=1, modes=5), "beam2"), np.random.default_rng(seed))
-        for seed in (1, 2)
-    ]
+    tests = own_campaign(tests=1, modes=5)
+    problems = [problem_of(tests, "beam2") for _ in range(4)]
+    found = [fit_alone(p, np.random.default_rng(seed)) for seed, p in enumerate(problems, 1)]
     assert all(each.effective >= ENOUGH_EFFECTIVE for each in found)
-    assert found[0].log_evidence == pytest.approx(found[1].log_evidence, abs=0.4)
-    problem = problem_of(own_campaign(tests=1, modes=5), "beam2")
-    tension = [problem.tension_n(ALONE, each.draws) for each in found]
-    half = np.ptp(np.quantile(tension[0], [0.05, 0.95])) / 2
-    assert np.mean(tension[0]) == pytest.approx(np.mean(tension[1]), abs=0.3 * half)
+    tension = np.array([problems[0].tension_n(ALONE, each.draws) for each in found])
+    assert np.ptp(tension.mean(axis=1)) < 0.3 * tension.std()
+    log_evidence = [each.log_evidence for each in found]
+    assert np.std(log_evidence) < 2 * found[0].log_evidence_sd
 
 
 def test_fit_alone_far_off_priors() -> None:
