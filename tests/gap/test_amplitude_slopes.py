@@ -13,10 +13,10 @@ from shm.gap.observations import observed
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import NAN, AddedMass, ModalTest, Mode
 from tests.helpers.effects import all_but
+from tests.helpers.gap_campaigns import HANGER as PLAIN
 from tests.helpers.hangers import HANGER_3
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
-PLAIN = replace(HANGER_3, plate=None)
 SLIP = PlantedEffect("joint_softening", "both ends", {"log10_k_at_reference_level": 8.3})
 KNOWN = ("joint_softening", "rotational_end_flexibility")
 PLAN = CampaignPlan(modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0)

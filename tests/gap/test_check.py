@@ -20,11 +20,10 @@ from shm.report.gap_check_report import rows
 from shm.simulate import HangerState
 from shm.values import EffectPrior, GapCheck, ModalTest
 from tests.helpers.comparing import assert_same
+from tests.helpers.gap_campaigns import HANGER as PLAIN
 from tests.helpers.gap_checks import frequencies_hz, names_from
-from tests.helpers.hangers import HANGER_3
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
-PLAIN = replace(HANGER_3, plate=None)
 ONE_TEST = CampaignPlan(
     modes=6, temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, tension_spread=0.0
 )

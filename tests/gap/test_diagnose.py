@@ -14,10 +14,9 @@ from shm.gap import GapOptions, diagnose
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import NAN, Diagnosis, EffectPrior, Hanger, ModalTest
 from tests.helpers.effects import all_but
-from tests.helpers.hangers import HANGER_3
+from tests.helpers.gap_campaigns import HANGER as PLAIN
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
-PLAIN = replace(HANGER_3, plate=None)
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
 FEW_EFFECTS = GapOptions(without=all_but("timebase", "bending_stiffness"))
 CLAMPS_ALONE = GapOptions(without=all_but("point_mass"))
@@ -100,6 +99,7 @@ def test_other_classes_may_be_the_baseline(baseline: str) -> None:
     assert probabilities(found) == pytest.approx(1.0)
 
 
+# FAULT: 923 kN, 1.07 times 866: one class is chosen, and its ends are the only ones allowed for.
 @pytest.mark.slow
 def test_of_one_frequency_the_tension_is_as_wide_as_mass_and_length_are_known() -> None:
     """A string's tension goes with mass and length squared; the first mode bends as well."""
@@ -124,6 +124,7 @@ def test_few_modes_are_answered_with_a_remark() -> None:
     assert np.isnan(found.shrinkage.held_out_before_percent)
 
 
+# FAULT: not refused, as in `test_misfit`.
 def test_a_description_in_other_units_is_doubted_before_anything_else(
     untouched: Diagnosis,
 ) -> None:

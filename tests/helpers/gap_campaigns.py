@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from shm.assumptions import DEFAULTS
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.linear import Linear
-from shm.gap.observations import observed
 from shm.gap.posterior import MOST_ROUNDS, Sampling, Target, find_peaks
 from shm.gap.problem import GapProblem
 from shm.gap.scan import Scan, scan
@@ -29,9 +29,12 @@ from shm.values import (
     Mode,
     ShapePoint,
 )
+from tests.helpers.gap_fits import make_problem
 from tests.helpers.hangers import HANGER_3
 
-HANGER = replace(HANGER_3, plate=None)
+TOUCHLESS = DEFAULTS.with_numbers(support_compliance_m_n=0.0, accelerometer_mass_kg=0.0)
+"""Supports that do not give and sensors without mass, as simulated: their means, not their sds."""
+HANGER = replace(HANGER_3, plate=None, assumptions=TOUCHLESS)
 PLACES_M = (2.0, 4.5, 6.5, 9.0)
 CLAMP = AddedMass(25.0, 3.6)
 Effects = tuple[tuple[str, Variant], ...]
@@ -84,29 +87,14 @@ def campaign(
                 added_mass=mass,
             )
         )
-    return with_usual_errors(taken)
-
-
-def with_usual_errors(tests: Sequence[ModalTest]) -> tuple[ModalTest, ...]:
-    """Return tests with what usual sensors and supports do to their frequencies."""
-    problem = problem_of(tests)
-    factor = np.exp(problem.usual_of(problem.design))
-    rows = iter(factor.tolist())
-    return tuple(
-        replace(
-            test,
-            modes=tuple(replace(m, frequency_hz=m.frequency_hz * next(rows)) for m in test.modes),
-        )
-        for test in tests
-    )
+    return tuple(taken)
 
 
 def problem_of(
     tests: Sequence[ModalTest], baseline: str = "beam1", hanger: Hanger = HANGER
 ) -> GapProblem:
     """Return the problem of tests of a hanger with a model class as its baseline."""
-    model = AsMade(MODELS[baseline](hanger))
-    return GapProblem(model, tests, observed(tests, hanger))
+    return make_problem(tests, hanger, baseline)
 
 
 def _points(shape: FloatArray, plane: int, sd: float) -> tuple[ShapePoint, ...]:

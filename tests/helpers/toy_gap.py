@@ -47,6 +47,9 @@ class ToyProblem:
     def repeated(self) -> Repeated:
         return Repeated.none(self.observations.design)
 
+    def left(self, fit: Fit) -> FloatArray:
+        return (self.observations.value - fit.predicted)[: self.design.frequencies]
+
     def section_of(self, design: Design) -> FloatArray:
         return Repeated.none(design).section
 
