@@ -9,7 +9,8 @@ import numpy as np
 from shm.gap.contract import GapOptions, Observations
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
-from shm.gap.search import sample_alone
+from shm.gap.search import fit_alone, sample_alone
+from shm.inference.mixture import normalised
 from shm.inference.options import Progress, silent
 from shm.inference.updating import log_class_prior
 from shm.models import AS_DESCRIBED, MODELS, AsMade, applicable, check_baseline
@@ -17,6 +18,7 @@ from shm.models.base import held_otherwise
 from shm.values import Hanger, ModalTest
 
 BEAMS = ("beam1", "beam2", "beam3")
+_OF_NOTE = 0.02  # of the classes' probability: less moves no interval that is told
 
 
 def choose_baseline(
@@ -46,7 +48,13 @@ def choose_baseline(
     for each in problems:
         progress(f"baseline {each.model.name}", 0.0)
         log.append(sample_alone(each, rng).log_evidence + log_class_prior(each.model))
-    return problems[int(np.argmax(log))]
+    share = normalised(np.array(log))
+    chosen = problems[int(share.argmax())]
+    for of, each in zip(share.tolist(), problems, strict=True):
+        if of > _OF_NOTE:
+            fit_alone(each, rng, options.draws)
+            chosen.rivals.append((of, each))
+    return chosen
 
 
 def _problem(

@@ -27,6 +27,7 @@ from shm.gap.outliers import Cleared, exclude_gross_errors
 from shm.gap.places import places
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import residuals, sensor_remarks, trends
+from shm.gap.search import check_effects
 from shm.inference.data_checks import CheckedData
 from shm.inference.mixture import systematic
 from shm.inference.options import Progress, silent
@@ -79,18 +80,9 @@ def diagnose(
 def examined(
     tests: Sequence[ModalTest], hanger: Hanger, options: GapOptions, progress: Progress = silent
 ) -> tuple[Diagnosis, Attribution]:
-    """The diagnosis with the evidence that it rests on, for a diagnosis of several hangers."""
-    started = time.perf_counter()
-    check_effect_priors(hanger)
-    found = usable(tests, hanger)
-    rng = np.random.default_rng(options.seed)
-    whole = choose_baseline(found.tests, hanger, options, rng, progress)
-    check_hold_out(whole, options.hold_out)
-    doubts = _of_another(found.tests, hanger)
-    clear = exclude_gross_errors(
-        whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done)
-    )
-    refuse_misfit(clear, (*found.other_unit, *doubts))
+    """Return the diagnosis with the evidence that it rests on."""
+    started, rng = time.perf_counter(), np.random.default_rng(options.seed)
+    found, doubts, clear = _search(tests, hanger, options, rng, progress)
     problem, attribution = clear.problem, clear.attribution
     progress("shrinkage", _ATTRIBUTION)
     answer, before = answered(attribution), attribution.baseline
@@ -123,7 +115,7 @@ def examined(
         remarks=(
             *doubts,
             *_states(problem, before, after, (before_n, after_n)),
-            *remark_on_damping(whole.observations),
+            *remark_on_damping(clear.whole.observations),
             *_on_the_way(found, clear, aside, doubted, after or before),
         ),
         seed=options.seed,
@@ -133,6 +125,27 @@ def examined(
         effective_draws=_effective_draws(answer),
         slenderness=_slenderness(hanger, before_n.mean),
     ), attribution
+
+
+def _search(
+    tests: Sequence[ModalTest],
+    hanger: Hanger,
+    options: GapOptions,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> tuple[CheckedData, tuple[str, ...], Cleared]:
+    """Return the data as they count, doubts that they are of this hanger, and the causes."""
+    check_effects(options.without)
+    check_effect_priors(hanger)
+    found = usable(tests, hanger)
+    whole = choose_baseline(found.tests, hanger, options, rng, progress)
+    check_hold_out(whole, options.hold_out)
+    doubts = _of_another(found.tests, hanger)
+    clear = exclude_gross_errors(
+        whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done)
+    )
+    refuse_misfit(clear, (*found.other_unit, *doubts))
+    return found, doubts, clear
 
 
 def _effective_draws(answer: Sequence[tuple[float, Fit]]) -> float:
@@ -260,10 +273,20 @@ def _tension(
 def tension_draws_n(
     problem: GapProblem, fits: Sequence[tuple[float, Fit]], rng: np.random.Generator
 ) -> FloatArray:
-    """Return equal draws (n,) of the tension over some fits, each with its weight."""
-    weight = np.concatenate([np.full(len(fit.draws), w / len(fit.draws)) for w, fit in fits])
-    draws = [problem.tension_n(fit.hypothesis, fit.draws, rng) for _, fit in fits]
-    rows = systematic(weight / weight.sum(), _TENSION_DRAWS, rng)
+    """Return equal draws (n,) of the tension over some fits, each with its weight.
+
+    That of the hanger alone is averaged over the model classes.
+    """
+    alone = [(odds, rival, rival.alone) for odds, rival in problem.rivals if rival.alone]
+    parts = []
+    for weight, fit in fits:
+        if fit.hypothesis == Hypothesis() and alone:
+            parts += [(weight * odds, rival, own) for odds, rival, own in alone]
+        else:
+            parts.append((weight, problem, fit))
+    share = np.concatenate([np.full(len(f.draws), w / len(f.draws)) for w, _, f in parts])
+    draws = [each.tension_n(f.hypothesis, f.draws, rng) for _, each, f in parts]
+    rows = systematic(share / share.sum(), _TENSION_DRAWS, rng)
     return np.asarray(np.concatenate(draws)[rows])
 
 

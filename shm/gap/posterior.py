@@ -43,7 +43,7 @@ _SAME, _FAR_BELOW = 0.3, 10.0
 _ROUND, MOST_ROUNDS, _AT_FIRST, _FROM_PRIOR, _FROM_FIRST = 150, 30, 0.3, 0.1, 0.2
 _WIDTHS, _WIDE_EVERY, _CANDIDATES = (1.0, 2.0), 4, 3000
 _LEAST_WEIGHT, _RIDGE = 1e-2, 1e-6
-_CLUSTERS, _FROM_WITHOUT, _PARTS, _POPULATION = 3, 0.4, 8, 600
+_CLUSTERS, _FROM_WITHOUT, _PARTS, _POPULATION, _DRAWS_A_PART = 3, 0.4, 8, 600, 4
 _SETTLED, _MOST_SETTLED = (
     0.3,
     4,
@@ -358,9 +358,12 @@ class Sampling:
         self._rounds += 1
         weights = tempered(self._pool.log_weights, 6 * len(other), 0.7, 1e-3)
         known = self._pool.batch.z[:, other]
-        likely = known[systematic(weights, _POPULATION, self.rng)]
-        clusters = TMixture.of(likely, _PARTS, self.rng).refitted(known, weights)
-        self._proposal = wide = _Wide(clusters.mixed(self._first, _FROM_FIRST), _FROM_PRIOR)
+        likely = systematic(weights, _POPULATION, self.rng)
+        clusters = self._first
+        if len(np.unique(likely)) > _DRAWS_A_PART * _PARTS:
+            clusters = TMixture.of(known[likely], _PARTS, self.rng)
+        refitted = clusters.refitted(known, weights)
+        self._proposal = wide = _Wide(refitted.mixed(self._first, _FROM_FIRST), _FROM_PRIOR)
         if self._rounds % _WIDE_EVERY > 1:
             self._proposal = _Surrogate(self._collapsed, self._pool.batch, weights, wide)
 

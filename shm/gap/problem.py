@@ -43,6 +43,7 @@ Effects = tuple[tuple[str, Variant], ...]
 _TENSIONS = np.linspace(-2.5, 2.5, 41)
 _STEP_SD = 0.01  # numerical: of a reading's standard deviation; frequencies are linear over it
 _AT_REST = Conditions(amplitude=0.0)
+_MOST_REPEATED = 3.0  # standard deviations
 _STRAIGHT = 0.1
 """Numerical: standard deviations of a datum by which a prediction may be off its slope where a
 parameter still counts as linear."""
@@ -53,7 +54,8 @@ class GapProblem:
 
     `smallest` holds, for an effect and where it acts, the share of its sizes' ranges that cannot
     be seen in these data and that their priors therefore leave out (see `shm.gap.scan`). `sampling`
-    and `alone` keep the posterior without effects.
+    and `alone` keep the posterior without effects; `rivals` are the problems of all model classes of
+    note, itself among them, with their probabilities.
     """
 
     def __init__(
@@ -77,6 +79,7 @@ class GapProblem:
         self._linear = self.described.always_linear
         self.sampling: Sampling | None = None
         self.alone: Fit | None = None
+        self.rivals: list[tuple[float, GapProblem]] = []
         self._hangers: dict[Effects, HangerWithEffects] = {}
         self._likelihoods: dict[bool, Likelihood] = {}
         self._scaling = ShapeScaling.measured(observations)
@@ -286,12 +289,13 @@ class GapProblem:
     def left(self, fit: Fit) -> FloatArray:
         """Return what a fit leaves of the frequencies' logarithms (F,).
 
-        Without what sensors, supports, section and tension most probably do alike in all of them.
+        Without what sensors, supports, section and tension most probably do alike in all of them:
+        each by three of its standard deviations at most, for what is larger is no such error.
         """
-        count = self.design.frequencies
-        residual = (self.value - fit.predicted)[:count]
-        followed = self.repeated.frequency @ np.linalg.solve(fit.noise.frequency, residual)
-        return np.asarray(residual - followed)
+        residual = (self.value - fit.predicted)[: self.design.frequencies]
+        loads = self.repeated.of_frequencies
+        size = loads.T @ np.linalg.solve(fit.noise.frequency, residual)
+        return np.asarray(residual - loads @ size.clip(-_MOST_REPEATED, _MOST_REPEATED))
 
     def misfit_percent(self, fit: Fit) -> float:
         """Return by how much a fit misses the frequencies, root mean square."""

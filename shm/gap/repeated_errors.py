@@ -60,15 +60,16 @@ class Repeated:
     @property
     def loads(self) -> FloatArray:
         """Of all data (data, k): sensors move no frequency, the others no shape."""
-        return np.asarray(scipy.linalg.block_diag(self._of_frequencies, self.sensors))
+        return np.asarray(scipy.linalg.block_diag(self.of_frequencies, self.sensors))
 
     @property
     def frequency(self) -> FloatArray:
         """Covariance (F, F) of the frequencies' logarithms."""
-        return np.asarray(self._of_frequencies @ self._of_frequencies.T)
+        return np.asarray(self.of_frequencies @ self.of_frequencies.T)
 
     @property
-    def _of_frequencies(self) -> FloatArray:
+    def of_frequencies(self) -> FloatArray:
+        """Return the loads (F, k) of frequencies."""
         return np.hstack([self.section, self.tensions, self.masses])
 
 

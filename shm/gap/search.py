@@ -54,11 +54,7 @@ def hypotheses(problem: GapProblem, without: tuple[str, ...] = ()) -> tuple[Hypo
     Left out are the effects `without`, those that the hanger has itself and those that these data
     cannot show. Raises UsageError for a name that is not in the catalogue.
     """
-    unknown = sorted(set(without) - set(EFFECTS))
-    if unknown:
-        raise UsageError(
-            f"No effect is called {', '.join(unknown)}. The catalogue has {', '.join(EFFECTS)}."
-        )
+    check_effects(without)
     survey, reasons = problem.design.survey, invisible(problem)
     return tuple(
         Hypothesis(((name, variant),))
@@ -66,6 +62,15 @@ def hypotheses(problem: GapProblem, without: tuple[str, ...] = ()) -> tuple[Hypo
         if name not in without and name not in reasons
         for variant in effect.variants(problem.hanger, survey)
     )
+
+
+def check_effects(names: Sequence[str]) -> None:
+    """Raise UsageError for a name that is not in the catalogue."""
+    unknown = sorted(set(names) - set(EFFECTS))
+    if unknown:
+        raise UsageError(
+            f"No effect is called {', '.join(unknown)}. The catalogue has {', '.join(EFFECTS)}."
+        )
 
 
 def invisible(problem: GapProblem) -> dict[str, str]:
