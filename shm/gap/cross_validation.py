@@ -80,7 +80,6 @@ def check_hold_out(problem: GapProblem, hold_out: tuple[str, ...]) -> None:
 
 def shrinkage(problem: GapProblem, before: Fit, after: Fit | None, held: HeldOut) -> Shrinkage:
     """Return root mean squares in percent; NaN for what there is not."""
-    frequencies = problem.observations.design.frequencies
     return Shrinkage(
         _rms_percent(problem.left(before)),
         NAN if after is None else _rms_percent(problem.left(after)),

@@ -10,7 +10,7 @@ import numpy as np
 
 from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.baseline import choose_baseline
-from shm.gap.contract import Fit, GapOptions
+from shm.gap.contract import Fit, GapOptions, Hypothesis
 from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
 from shm.gap.damping import remark_on_damping
 from shm.gap.data_checks import usable

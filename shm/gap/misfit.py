@@ -32,11 +32,11 @@ def refuse_misfit(found: Cleared, reasons: Sequence[str]) -> None:
     misfit = problem.misfit_percent(best)
     if misfit <= NO_TENSION_PERCENT:
         return
-    hanger = problem.hanger
+    hanger, over_tests = problem.hanger, _range_over_tests(problem, found.attribution.baseline)
     name = best.hypothesis.name.replace("_", " ") or f"the baseline {problem.model.name}"
     raise BadInput(
         f"no explanation fits the frequencies of hanger {hanger.id}: the best, {name}, misses them "
-        f"by {misfit:.0f} % (root mean square){_range_over_tests(problem, found.attribution.baseline)}. "
+        f"by {misfit:.0f} % (root mean square){over_tests}. "
         "No cause can be named, and no tension given. "
         + " ".join(
             (*doubt_orders(problem, found.attribution), *reasons, *_compare_with_string(problem))

@@ -54,8 +54,8 @@ class GapProblem:
 
     `smallest` holds, for an effect and where it acts, the share of its sizes' ranges that cannot
     be seen in these data and that their priors therefore leave out (see `shm.gap.scan`). `sampling`
-    and `alone` keep the posterior without effects; `rivals` are the problems of all model classes of
-    note, itself among them, with their probabilities.
+    and `alone` keep the posterior without effects; `rivals` are the problems of all model classes
+    of note, itself among them, with their probabilities.
     """
 
     def __init__(
