@@ -27,7 +27,7 @@ def refuse_misfit(found: Cleared, reasons: Sequence[str]) -> None:
     """
     problem = found.problem
     fits = [each.fit for each in found.attribution.tried if not each.hypothesis.flexible]
-    fitted = [fit for fit in fits if fit is not None]
+    fitted = [fit for fit in fits if fit and np.isfinite(problem.misfit_percent(fit))]
     best = min(fitted, key=problem.misfit_percent)
     misfit = problem.misfit_percent(best)
     if misfit <= NO_TENSION_PERCENT:

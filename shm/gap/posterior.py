@@ -358,10 +358,10 @@ class Sampling:
         self._rounds += 1
         weights = tempered(self._pool.log_weights, 6 * len(other), 0.7, 1e-3)
         known = self._pool.batch.z[:, other]
-        likely = systematic(weights, _POPULATION, self.rng)
+        likely = known[systematic(weights, _POPULATION, self.rng)]
         clusters = self._first
-        if len(np.unique(likely)) > _DRAWS_A_PART * _PARTS:
-            clusters = TMixture.of(known[likely], _PARTS, self.rng)
+        if len(np.unique(likely, axis=0)) > _DRAWS_A_PART * _PARTS:
+            clusters = TMixture.of(likely, _PARTS, self.rng)
         refitted = clusters.refitted(known, weights)
         self._proposal = wide = _Wide(refitted.mixed(self._first, _FROM_FIRST), _FROM_PRIOR)
         if self._rounds % _WIDE_EVERY > 1:
@@ -445,7 +445,7 @@ def _parts(
         return first
     known = without.draws[:, other[other < without.draws.shape[1]]]
     free = len(other) - known.shape[1]
-    if not known.shape[1]:
+    if not known.shape[1] or len(np.unique(known, axis=0)) < _DRAWS_A_PART * _CLUSTERS:
         return first
     wide = TMixture.of(known, _CLUSTERS, rng)
     extended = [

@@ -140,8 +140,10 @@ class Search:
                     draws=laws.draws,
                 )
             tried.append(own)
-        rest = [(h, log + self._beyond) for h, log in self.rough.items() if h not in self.fits]
-        return tried + [ScoredHypothesis(h, log, log) for h, log in rest]
+        # What was not fitted is no better than what is hopeless: a scan may say anything far off.
+        most = max(each.log_evidence for each in tried) - HOPELESS
+        rest = {h: min(e + self._beyond, most) for h, e in self.rough.items() if h not in self.fits}
+        return tried + [ScoredHypothesis(h, log, log) for h, log in rest.items()]
 
     def _level(self, hypothesis: Hypothesis) -> float:
         """Return the log of prior times rough evidence."""
@@ -177,7 +179,8 @@ class Search:
             if hypothesis.flexible or self._level(hypothesis) > best - HOPELESS:
                 target = Target(self.problem, hypothesis)
                 found = approximate(target, peaks, self.draws, self.rng, self._beyond)
-                self.fits[hypothesis] = found
+                if np.isfinite(found.predicted).all():
+                    self.fits[hypothesis] = found
 
     def sample_probable(self, chance: Callable[[], Mapping[Hypothesis, float]]) -> None:
         """Sample what the answer rests on, by `chance` of each hypothesis, the likeliest first."""

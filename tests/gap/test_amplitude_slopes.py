@@ -60,7 +60,6 @@ def test_both_frequencies_of_a_mode_share_their_error_but_that_of_the_slope() ->
     assert min(np.linalg.eigvalsh(each).min() for each in seen) > 0.1 * SLOPE_SD**2
 
 
-# FAULT: 8.3043 +- 0.0006 of 8.3.
 @pytest.mark.slow
 def test_the_slopes_of_one_test_name_the_joint_that_slips() -> None:
     def at(amplitude: float) -> ModalTest:

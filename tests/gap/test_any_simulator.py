@@ -78,7 +78,6 @@ def test_without_stated_deviations_a_large_offset_is_found_all_the_same() -> Non
     assert diagnose_simulator(LINE, readings).named == ("offset",)
 
 
-# FAULT: `TMixture.of` divides 0 by 0 where fewer than `_PARTS` draws differ (`Sampling._draw`).
 @pytest.mark.parametrize(
     ("simulator", "world", "true", "size"),
     few_of(

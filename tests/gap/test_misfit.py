@@ -51,8 +51,6 @@ def test_tests_of_two_hangers_under_one_number_are_refused() -> None:
     assert "all tests are of this hanger" in refused.value.remedy
 
 
-# FAULT: not refused; `GapProblem.left`, by which a misfit is measured, takes what the errors that
-# repeat follow out of it, however far they must go (0.35 % where nothing fits).
 def test_a_nominal_tension_off_by_thirty_times_is_named() -> None:
     speed_m_s = np.sqrt(30 * STRING.nominal_tension_n / STRING.mass_per_length_kg_m)
     modes = [Mode("transverse", k, k * float(speed_m_s) / (2 * 0.65), 0.5) for k in range(1, 5)]

@@ -122,8 +122,6 @@ SCALES = GapOptions(
 )
 
 
-# FAULT: 807 kN of 677.5. `Coordinates.drawn` draws mass and length until the tension at rest is the
-# one read, which beside a load scale is 1.2 times as much (its `theta` gives 682 kN).
 def test_a_cell_that_reads_a_fifth_too_much_is_the_measurements_and_leaves_the_tension() -> None:
     """Four loadings whose frequencies follow the true tensions, while the cell shows 1.2 times."""
     rng = np.random.default_rng(3)
