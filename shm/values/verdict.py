@@ -192,7 +192,8 @@ def _judge_gap(diagnosis: Diagnosis, found: GapVerdict) -> GapVerdict:
     if diagnosis.shrinkage.rms_after_percent >= diagnosis.shrinkage.rms_before_percent:
         return replace(found, reason="no nearer")
     if left:
-        if nearest.log_bayes_factor > MIN_LOG_BAYES_FACTOR:
+        is_worth_naming = nearest.probability >= MIN_RUNNER_UP
+        if is_worth_naming and nearest.log_bayes_factor > MIN_LOG_BAYES_FACTOR:
             return _with_claim(found, Outcome.PARTLY, nearest, left)
         return replace(found, reason="weak evidence" if diagnosis.leading else _UNKNOWN)
     if diagnosis.leading is None:

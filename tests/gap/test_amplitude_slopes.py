@@ -82,7 +82,8 @@ def test_the_slopes_of_one_test_name_the_joint_that_slips() -> None:
     assert found.leading.effect == "joint_softening"
     assert found.leading.probability > 0.9
     size = found.leading.parameters[0]
-    assert size.mean == pytest.approx(8.3, abs=4 * size.sd)
+    # The simulator and the model, which share no code, agree to a hundredth of a stiffness.
+    assert size.mean == pytest.approx(8.3, abs=0.01)
     assert any("depend on amplitude" in remark for remark in found.remarks)
     assert "joint_softening" in dict(
         diagnose([replace(told, modes=hit.modes)], PLAIN, options).invisible
