@@ -12,7 +12,6 @@ from shm.gap.contract import Design, Fit, Hypothesis, Observations, Peak
 from shm.gap.coordinates import Coordinates, cut
 from shm.gap.likelihood import Likelihood
 from shm.gap.noise import flexible_nodes, nodes
-from shm.gap.posterior import Sampling
 from shm.gap.repeated_errors import (
     STRETCHES,
     Repeated,
@@ -21,6 +20,7 @@ from shm.gap.repeated_errors import (
     sensor_loads,
     turn_loads,
 )
+from shm.gap.sampling import Sampling
 from shm.inference.described import DescribedCoordinates
 from shm.inference.systematic_errors import (
     errors_of_bar,

@@ -16,16 +16,10 @@ from shm.errors import BadInput, UsageError
 from shm.gap.contract import Fit, GapOptions, Hypothesis, Peak
 from shm.gap.law_error import allow_for_laws
 from shm.gap.linear import Linear
-from shm.gap.posterior import (
-    MOST_ROUNDS,
-    Sampling,
-    Target,
-    approximate,
-    find_peaks,
-    laplace,
-)
+from shm.gap.posterior import Target, find_peaks, laplace
 from shm.gap.probabilities import ScoredHypothesis, log_prior
 from shm.gap.problem import GapProblem
+from shm.gap.sampling import MOST_ROUNDS, Sampling, approximate
 from shm.gap.scan import scan, scan_beside
 from shm.inference.options import Progress, silent
 from shm.models.effects import EFFECTS

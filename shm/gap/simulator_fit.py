@@ -8,7 +8,8 @@ import numpy as np
 import scipy
 
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.posterior import Target, find_peaks, sample
+from shm.gap.posterior import Target, find_peaks
+from shm.gap.sampling import sample
 from shm.gap.simulator_problem import Prior, Reading, SimulatorProblem
 from shm.values import BoolArray, FloatArray
 

@@ -12,7 +12,8 @@ from scipy.special import logsumexp, ndtr
 
 from shm.gap.contract import Covariance, Hypothesis, NoiseNode
 from shm.gap.likelihood import Likelihood
-from shm.gap.posterior import Sampling, Target, approximate, find_peaks, laplace, sample
+from shm.gap.posterior import Target, find_peaks, laplace
+from shm.gap.sampling import Sampling, approximate, sample
 from shm.models.effects import Parameter
 from shm.values import ENOUGH_EFFECTIVE, FloatArray, IntArray
 

@@ -10,8 +10,9 @@ import numpy as np
 from shm.assumptions import DEFAULTS
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.linear import Linear
-from shm.gap.posterior import MOST_ROUNDS, Sampling, Target, find_peaks
+from shm.gap.posterior import Target, find_peaks
 from shm.gap.problem import GapProblem
+from shm.gap.sampling import MOST_ROUNDS, Sampling
 from shm.gap.scan import Scan, scan
 from shm.gap.search import fit_alone
 from shm.models import MODELS, AsMade
