@@ -1,7 +1,7 @@
 """Hold documents, names, signatures and exit codes of the gap diagnosis.
 
 Golden files are by `write_gap_golden.py`. Keys, types, names and outcomes are compared as they are;
-what a sampler gives, within tolerances that nearly every seed meets.
+what a sampler gives, within tolerances that other seeds meet as well.
 """
 
 from __future__ import annotations
@@ -40,8 +40,11 @@ TOLERANCES = {
     r".*": {"rel": 2e-5},
 }
 """Differences allowed to numbers, by key; the last is what golden files of six digits leave."""
-OF_INTERVALS = 0.1
-"""Difference allowed to a tension or size, as a fraction of its 90 % interval."""
+OF_INTERVALS = {"mean": 0.1, "sd": 0.1, "q05": 0.25, "q95": 0.25, "q025": 0.25, "q975": 0.25}
+"""Differences allowed to a tension or size, as fractions of its 90 % interval.
+
+Of 200 effective draws, two means differ by 0.03, two quantiles of 2.5 % by 0.08 (1 sd).
+"""
 TEXTS = {"summary", "details", "remarks", "what"}
 """Keys of texts that state numbers, which are passed over."""
 
@@ -72,7 +75,7 @@ def differ(now: Any, before: Any, key: str = "", at: str = "") -> Iterator[str]:
             place = f"{at}.{name}"
             if "q95" in before and isinstance(value, float) and isinstance(now[name], float):
                 away = abs(now[name] - value) / (before["q95"] - before["q05"])
-                if not away <= OF_INTERVALS:
+                if not away <= OF_INTERVALS[name]:
                     yield f"{place}: {now[name]}, not {value}, {away:.2f} of the interval"
             else:
                 yield from differ(now[name], value, name, place)
@@ -119,7 +122,9 @@ def test_golden_files_hold_what_was_planted() -> None:
     assert (wrong["plane"], wrong["order"]) == ("transverse", 4)
     assert wrong["measured_hz"] == pytest.approx(1.04 * wrong["expected_hz"], rel=1e-3)
     assert found["line"]["named"] == ["offset"]
-    assert [each["family"] for each in found["bridge"]["causes"]] == [[3, 4], [3, 4]]
+    (shared,) = found["bridge"]["causes"]
+    assert (shared["effect"], shared["family"]) == ("bending_stiffness", [3, 4])
+    assert shared["size"]["q05"] < -0.2 < shared["size"]["q95"]
     assert [step["kind"] for step in found["plan"]["steps"]] == ["known mass"]
 
 
