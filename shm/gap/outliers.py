@@ -145,7 +145,13 @@ def _find_gross_error(found: Cleared) -> GrossError | None:
     row = int(rows[best])
     priors = {k: log_prior(tried[k].hypothesis, variants) for k in chosen}
     fits = np.array([_judge(problem, tried[k], row) + priors[k] for k in chosen])
-    final = scipy.special.logsumexp(fits[:, 0]) - scipy.special.logsumexp([*log, *fits[:, 1]])
+    whole = problem.without_shape(row)
+    unknown = [
+        _log_evidence(whole, each) + log_prior(each.hypothesis, variants)
+        for each in tried
+        if each.hypothesis.flexible
+    ]
+    final = scipy.special.logsumexp(fits[:, 0]) - scipy.special.logsumexp([*unknown, *fits[:, 1]])
     return GrossError(int(found.rows[row]), float(scipy.special.expit(final)))
 
 
@@ -175,8 +181,16 @@ def _judge(problem: GapProblem, tried: ScoredHypothesis, row: int) -> FloatArray
     peaks = find_peaks(Target(rest, hypothesis), np.vstack([fit.z, np.hstack([alone, effects])]))
     whole, z = problem.without_shape(row), peaks[0].z
     seen = left_out(whole, hypothesis, z, *_around(whole, hypothesis, z), np.array([row]))
-    given_rest = np.array([seen.gross_given_rest[0], seen.ordinary_given_rest[0]])
-    return laplace(peaks) + given_rest
+    gross, ordinary = laplace(peaks) + np.array(
+        [seen.gross_given_rest[0], seen.ordinary_given_rest[0]]
+    )
+    return np.array([gross, max(ordinary, _log_evidence(whole, tried))])
+
+
+def _log_evidence(problem: GapProblem, tried: ScoredHypothesis) -> float:
+    """Return the log evidence of a hypothesis by some of the data, from a fit to all."""
+    assert tried.fit is not None
+    return laplace(find_peaks(Target(problem, tried.hypothesis), tried.fit.z[None]))
 
 
 def _around(

@@ -98,6 +98,13 @@ def test_a_frequency_a_fifth_too_high_is_set_aside() -> None:
     assert [(each.plane, each.order) for each in found.outliers] == [("longitudinal", 1)]
 
 
+def test_a_wrong_frequency_whose_mode_has_a_shape_is_set_aside_as_well() -> None:
+    plan = replace(ONE_TEST, shapes=True)
+    tests = campaign(PLAIN, HangerState(711e3), (), plan, np.random.default_rng(101))
+    found = diagnose(spoiled(tests, "transverse", 4, 1.04), PLAIN, only("timebase"))
+    assert [(each.plane, each.order) for each in found.outliers] == [("transverse", 4)]
+
+
 @pytest.mark.slow
 def test_an_effect_is_named_beside_a_wrong_frequency_and_loses_nothing_without_one() -> None:
     two = only("point_mass", "bending_stiffness")
