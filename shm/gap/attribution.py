@@ -1,4 +1,4 @@
-"""Which effect causes the gap: evidence for no gap, each effect, pairs, and something unknown.
+"""Attribute a gap to effects: evidence for no gap, each effect, pairs, and something unknown.
 
 Where these data support several causes and cannot tell them apart, what is claimed is their group.
 """
@@ -58,7 +58,7 @@ class Explanation:
 
 @dataclass(frozen=True, eq=False)
 class Attribution:
-    """What the evidence says of a gap. All probabilities add to 1.
+    """The causes of a gap as the evidence has them. All probabilities add to 1.
 
     `explanations` are the effects that were tried and the pairs that called for it, best first;
     `unexplained` is the likeliest fit with a flexible remainder. `p_value` is the posterior

@@ -1,4 +1,4 @@
-"""How far an effect's law may be off: a real one does not follow the catalogue to the letter.
+"""Allow for laws that are off: a real effect does not follow the catalogue to the letter.
 
 Corrosion has no edges, sockets taper, joints slip by another power. So the data may err about a
 prediction by an unknown fraction of what the effect does beyond what the hanger alone can follow,

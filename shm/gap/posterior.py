@@ -27,7 +27,7 @@ SETTLED = 0.3
 
 
 class Problem(Protocol):
-    """What hypotheses predict of one set of data."""
+    """Predictions of hypotheses for one set of data."""
 
     @property
     def value(self) -> FloatArray:

@@ -225,7 +225,11 @@ def class_probabilities(
 
 def check_class_priors(class_priors: Mapping[str, float], names: Sequence[str]) -> None:
     """Raise UsageError where a class compared has no prior above 0, or another class has one."""
-    odd = [f"{name} is not compared." for name in class_priors if name not in names]
+    odd = [
+        f"A prior of {name} is given, but {name} is not compared."
+        for name in class_priors
+        if name not in names
+    ]
     lacking = [name for name in names if name not in class_priors]
     if lacking:
         odd.append(f"No prior of {', '.join(lacking)}: give one of each class compared.")

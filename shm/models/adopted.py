@@ -51,7 +51,7 @@ class _WithEffects(Model):
 
     def values(self, theta: FloatArray) -> FloatArray:
         """Return parameter sets of the hanger with effects from those of the class."""
-        raise NotImplementedError
+        raise TypeError(f"{type(self).__name__} does not say what its parameters stand for.")
 
     def conditions(self, test: ModalTest) -> Conditions:
         """Return its added mass, and its temperature and level where an effect follows them."""

@@ -1,4 +1,4 @@
-"""What a gap diagnosis would find on a hanger with its tests, tried on simulated twins of it."""
+"""Results of a gap check: causes that a diagnosis finds on simulated twins of a hanger."""
 
 from __future__ import annotations
 

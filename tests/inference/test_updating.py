@@ -156,7 +156,7 @@ def test_stated_priors_of_classes_multiply_the_ratio_of_their_evidence() -> None
     assert chances["beam1"] / chances["beam2"] == pytest.approx(3 * np.e)
     assert sum(chances.values()) == pytest.approx(1)
     for odd in ({"beam1": 1.0}, {"beam1": 1.0, "beam2": 0.0}, {"beam1": 1, "beam2": 1, "s1": 1}):
-        with pytest.raises(UsageError, match=r"[Pp]rior of|is not compared"):
+        with pytest.raises(UsageError, match="prior of"):
             select(test, models, class_priors=odd)
 
 

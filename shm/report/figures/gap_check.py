@@ -13,7 +13,7 @@ from shm.values.gap_check import Outcome
 
 @dataclass(frozen=True)
 class _Look:
-    """How trials of some outcomes are drawn."""
+    """The marks of trials with some outcomes."""
 
     outcomes: tuple[Outcome, ...]
     name: str
