@@ -72,6 +72,13 @@ def test_tension_never_sharper(effect: str, own_laws: bool) -> None:
     assert after > 0.85 * before
 
 
+@pytest.mark.slow
+def test_worn_without_edges_its_size_right() -> None:
+    found, fit, problem = _by_laws("section_loss", True)
+    loss = _loss(problem, fit, found.draws)
+    assert abs(loss.mean() - WORN.values["loss"]) < 3 * loss.std()
+
+
 def test_exact_law_pays_little() -> None:
     found, *_ = _by_laws("section_loss", False)
     assert found.gain < 1.0
