@@ -33,7 +33,7 @@ HOOK_KEYS = ("escalation_after_seconds", QUIET_HOURS)
 
 
 def overlaid(document: Mapping[str, Any], changed: Mapping[str, object]) -> dict[str, Any]:
-    """A document of `bridge.toml` with changes; those of what it does not describe do nothing.
+    """Return a document of `bridge.toml` with changes; those of unknown tables do nothing.
 
     An empty text takes the key out.
     """
@@ -48,7 +48,7 @@ def overlaid(document: Mapping[str, Any], changed: Mapping[str, object]) -> dict
 
 
 def _place(document: dict[str, Any], key: str) -> tuple[dict[str, Any] | None, str]:
-    """The table that a key lies in, None where the file has none such, and its name there."""
+    """Return the table of a key, None where the file has none such, and the key's name there."""
     kind, _, rest = key.partition(".")
     if kind == "settings":
         return document.setdefault("settings", {}), rest

@@ -49,7 +49,7 @@ NO_LETTERHEAD = Letterhead()
 
 
 def letterhead_of(document: Mapping[str, Any], path: Path) -> Letterhead:
-    """What `[report]` says; raises BadInput for what it cannot hold. The logo is not opened."""
+    """Read `[report]`; raises BadInput for what it cannot hold. The logo is not opened."""
     table = _table(document, "report", path) or Table({}, "[report]", path)
     table.refuse_unknown(_LETTERHEAD)
     organisation, prepared_by, checked_by, logo = (table.text(key, "") for key in _LETTERHEAD)
@@ -81,7 +81,7 @@ class OtherBridge:
 
 
 def other_bridge_of(values: Mapping[str, Any], path: Path) -> OtherBridge:
-    """The bridge of one table; raises BadInput naming it and what to write."""
+    """Return the bridge of one table; raises BadInput naming it and what to write."""
     table = Table(values, f"other_bridge {values.get('name', '?')}", path)
     if "token" in table:
         raise table.refusal("bridge.toml is no place for a token", _WHERE_TOKENS_STAND)
@@ -122,7 +122,7 @@ class SingleSignOn:
 
 
 def single_sign_on_of(document: Mapping[str, Any], path: Path) -> SingleSignOn | None:
-    """What `[single_sign_on]` says, None where there is none; raises BadInput."""
+    """Read `[single_sign_on]`, None where there is none; raises BadInput."""
     table = _table(document, "single_sign_on", path)
     if table is None:
         return None
@@ -202,11 +202,11 @@ class Bridge:
         )
 
     def stream(self, name: str) -> Stream:
-        """The stream of that name; raises BadInput when the bridge has none such."""
+        """Return the stream of that name; raises BadInput when the bridge has none such."""
         return stream_named(self.streams, name)
 
     def hanger(self, hanger_id: int) -> Hanger:
-        """The hanger of that number; raises BadInput when the bridge has none such."""
+        """Return the hanger of that number; raises BadInput when the bridge has none such."""
         for hanger in self.hangers:
             if hanger.id == hanger_id:
                 return hanger
@@ -224,7 +224,7 @@ class Bridge:
 
 
 def load_bridge(path: Path, changed: Mapping[str, object] = MappingProxyType({})) -> Bridge:
-    """Reads and checks `bridge.toml`, in which values of `changed` hold instead: see `overlaid`.
+    """Read and check `bridge.toml`, in which values of `changed` hold instead: see `overlaid`.
 
     Raises BadInput naming the table and key at fault.
     """
@@ -307,7 +307,7 @@ def _parse(path: Path) -> dict[str, Any]:
 
 
 def _table(document: Mapping[str, Any], name: str, path: Path) -> Table | None:
-    """The table of that name; None where there is none."""
+    """Return the table of that name; None where there is none."""
     values = document.get(name)
     if values is None:
         return None
@@ -330,7 +330,7 @@ def _refuse_doubles(keys: list[Any], what: str, path: Path) -> None:
 
 
 def _built(values: dict[str, Any], path: Path) -> date | None:
-    """The day from which on there can be tests; tests of before are held."""
+    """Return the day from which on there can be tests; tests of before are held."""
     found = values.get("built")
     if found is None or (isinstance(found, date) and not isinstance(found, datetime)):
         return found
@@ -342,7 +342,7 @@ def _built(values: dict[str, Any], path: Path) -> date | None:
 
 
 def _hours(document: Mapping[str, Any], path: Path) -> Mapping[str, float]:
-    """What measurements cost, the usual where the table does not say."""
+    """Return the costs of measurements, the usual ones where the table does not say."""
     table = _table(document, "measurement_hours", path)
     if table is None:
         return dict(MEASUREMENT_HOURS)

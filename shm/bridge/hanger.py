@@ -146,8 +146,10 @@ def _refuse_other_units(table: Table, density_kg_m3: float, stress_pa: float) ->
 def _scatter(
     table: Table, length_m: float, area_m2: float, open_ends: bool, assumed: Assumptions
 ) -> Scatter:
-    """As stated; where nothing is said of ends, the way of taping tells how well the length that
-    swings is known."""
+    """Return the scatter as stated.
+
+    Where nothing is said of ends, the way of taping tells how well the swinging length is known.
+    """
     scatter = scatter_of(table.table("scatter"), assumed)
     by = _length_by(table) or "faces"
     if by == "faces" or not open_ends or math.isfinite(scatter.effective_length):
@@ -177,7 +179,7 @@ def _survey(table: Table) -> Survey:
 
 
 def structure_of(values: dict[str, Any], path: Path) -> Hanger:
-    """What a `[[structure]]` table describes; raises BadInput naming table and key at fault."""
+    """Return the structure of a `[[structure]]` table; raises BadInput naming table and key."""
     table = Table(values, f"[[structure]] id {values.get('id', '?')}", path)
     table.refuse_unknown(("id", "name", "kind", "thresholds"))
     table.value("kind", Literal["any"], "is no kind of structure", 'Write kind = "any".', "any")
@@ -193,7 +195,7 @@ def _is_number(id_: int) -> bool:
 
 
 def _kind(table: Table) -> Kind:
-    """A strand where it says so, or where its wires are said to slip."""
+    """Return a strand where it says so, or where its wires are said to slip."""
     slips = table.fraction("bending_stiffness_factor", 1.0, _LEAST_FACTOR, 1) < 1
     remedy = 'Write "rod" or "strand"; of what no model describes, a [[structure]] table.'
     usual = "strand" if slips else "rod"
@@ -335,7 +337,7 @@ def _plate_faults(plate: EndPlate, hanger_length_m: float, diameter_m: float) ->
 
 
 def _turnbuckles(tables: list[Table], hanger_length_m: float) -> tuple[Turnbuckle, ...]:
-    """The turnbuckles from the deck end up; they may touch, but not overlap."""
+    """Return the turnbuckles from the deck end up; they may touch, but not overlap."""
     names = [field.name for field in fields(Turnbuckle)]
     found = []
     for table in tables:
@@ -360,7 +362,7 @@ _KNOWN_SUPPORTS = ("deck", "arch", "both", "hanging_mass_kg")
 
 
 def supports_of(table: Table | None) -> Supports:
-    """The `[hanger.supports]` table; raises BadInput naming the key at fault."""
+    """Return the `[hanger.supports]` table; raises BadInput naming the key at fault."""
     if table is None:
         return Supports()
     table.refuse_unknown(_KNOWN_SUPPORTS)
@@ -390,7 +392,7 @@ _LARGEST_TURN_DEG = 45.0  # nothing is farther from the nearer of two axes
 
 
 def scatter_of(table: Table | None, assumed: Assumptions = DEFAULTS) -> Scatter:
-    """The `[hanger.scatter]` table; raises BadInput naming the key at fault."""
+    """Return the `[hanger.scatter]` table; raises BadInput naming the key at fault."""
     usual_scatter = Scatter.of(assumed)
     if table is None:
         return usual_scatter
@@ -403,7 +405,7 @@ def scatter_of(table: Table | None, assumed: Assumptions = DEFAULTS) -> Scatter:
 
 
 def effect_priors_of(table: Table | None) -> tuple[EffectPrior, ...]:
-    """The ranges of all `[hanger.effects.NAME]` tables, in the file's order.
+    """Return the ranges of all `[hanger.effects.NAME]` tables, in the file's order.
 
     Whether the catalogue knows the names is for `shm.models.effects.check_effect_priors` to say.
     Raises BadInput where something is no range.

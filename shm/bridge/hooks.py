@@ -70,7 +70,7 @@ def quiet_hours_of(table: Table, zone: tzinfo) -> QuietHours | None:
 
 
 def zone_of(values: dict[str, Any], path: Path) -> tzinfo:
-    """The time zone that `[bridge]` states, else UTC; raises BadInput for one that nobody knows."""
+    """Return the time zone of `[bridge]`, else UTC; raises BadInput for one that nobody knows."""
     name = values.get("time_zone", "UTC")
     if name == "UTC":
         return UTC  # known where the computer has no table of zones, too
@@ -125,7 +125,7 @@ class Hook:
     quiet_hours: QuietHours | None = field(default=None, kw_only=True)
 
     def quiet_until(self, message: str, at: datetime, *, is_raised: bool) -> datetime | None:
-        """The end of the quiet hours that a message waits for; None where it goes at once.
+        """Return the end of the quiet hours that a message waits for; None where it goes at once.
 
         What must be done today and an escalation wait for nothing; that they are over does.
         """
@@ -176,7 +176,7 @@ class AppriseHook(Hook):
 
 
 def escalations_s(hooks: Iterable[Hook]) -> dict[str, float]:
-    """The hooks that are told only of what nobody has acknowledged after so many seconds."""
+    """Return the hooks that are told only of what nobody has acknowledged after so many seconds."""
     return {
         hook.name: hook.escalation_after_seconds
         for hook in hooks
@@ -185,7 +185,7 @@ def escalations_s(hooks: Iterable[Hook]) -> dict[str, float]:
 
 
 def hook_of(values: Mapping[str, Any], path: Path, zone: tzinfo) -> Hook:
-    """The hook of one `[[hook]]` table, for a bridge in a time zone.
+    """Return the hook of one `[[hook]]` table, for a bridge in a time zone.
 
     Raises BadInput naming the hook and what to write.
     """
@@ -218,7 +218,7 @@ def _escalation_after_seconds(table: Table) -> float | None:
 
 
 def apprise_scheme(address: str) -> str:
-    """The scheme of an address of apprise; raises ValueError where alerts do not go by it.
+    """Return the scheme of an address of apprise; raises ValueError where alerts do not go by it.
 
     The message names the scheme alone: the rest of an address may hold a password.
     """
@@ -273,7 +273,7 @@ _KINDS: dict[str, Callable[[Table, str], Hook]] = {
 
 
 def _text(table: Table, key: str, remedy: str) -> str:
-    """A text of the table, empty where the key is missing."""
+    """Return a text of the table, empty where the key is missing."""
     value = table.values.get(key, "")
     if key in table and (not isinstance(value, str) or not value.strip()):
         raise table.refusal(f"{key} is not a text", remedy)

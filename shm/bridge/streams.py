@@ -22,7 +22,7 @@ def is_stream_name(text: str) -> bool:
 
 
 def stream_of(values: dict[str, Any], path: Path, hangers: Mapping[int, Hanger]) -> Stream:
-    """The stream of a `[[stream]]` table; raises BadInput naming table and key at fault."""
+    """Return the stream of a `[[stream]]` table; raises BadInput naming table and key at fault."""
     table = Table(values, f"stream {values.get('name', '?')}", path)
     table.refuse_unknown(("name", "hanger", "sampling_rate_hz", "channel"))
     name = _name(table, "h7")
@@ -74,7 +74,7 @@ def _refuse_doubles(names: list[str], table: Table) -> None:
 def streams_of(
     tables: list[dict[str, Any]], path: Path, hangers: Mapping[int, Hanger]
 ) -> tuple[Stream, ...]:
-    """The streams of all `[[stream]]` tables; raises BadInput."""
+    """Return the streams of all `[[stream]]` tables; raises BadInput."""
     streams = tuple(stream_of(table, path, hangers) for table in tables)
     if pair := _alike([stream.name for stream in streams]):
         remedy = "Give each a name of its own: each has a folder, and some disks know no capitals."
@@ -84,7 +84,7 @@ def streams_of(
 
 
 def _refuse_second(streams: Sequence[Stream], path: Path) -> None:
-    """What the watch learns is of sensors and clock: it would begin anew by each other stream."""
+    """Refuse two streams of a hanger: the watch learns sensors and clock, and would begin anew."""
     first: dict[int, str] = {}
     for each in streams:
         if each.hanger in first:
@@ -115,7 +115,7 @@ def _both(one: str, other: str) -> str:
 
 
 def stream_named(streams: tuple[Stream, ...], name: str) -> Stream:
-    """The stream of that name; raises BadInput when the bridge has none such."""
+    """Return the stream of that name; raises BadInput when the bridge has none such."""
     for stream in streams:
         if stream.name == name:
             return stream

@@ -28,12 +28,12 @@ class Table:
         return key in self.values
 
     def refusal(self, problem: str, remedy: str) -> BadInput:
-        """The error that says what is wrong with this table."""
+        """Return the error that says what is wrong with this table."""
         line = _line_of(self.path, self.label, problem)
         return BadInput(f"{self.label}: {problem}.", file=self.path, line=line, remedy=remedy)
 
     def refuse_unknown(self, known: Iterable[str]) -> None:
-        """Raises BadInput where a key is none of `known`."""
+        """Raise BadInput where a key is none of `known`."""
         names = sorted(known)
         for key in self.values.keys() - set(names):
             raise self.refusal(f"unknown key {key}", f"Known: {', '.join(names)}.")
@@ -47,7 +47,7 @@ class Table:
         usual: Any = None,
         holds: Callable[[Any], bool] = lambda _: True,
     ) -> Any:
-        """What stands at a key, of a kind for which something `holds`; else it is `wrong`.
+        """Return the value of a key, of a kind for which something `holds`; else it is `wrong`.
 
         Where the key is missing it is `usual`. Raises BadInput, also where that is None.
         """
@@ -64,7 +64,7 @@ class Table:
         raise self.refusal(f"{key} = {self.values[key]!r} {wrong}", remedy)
 
     def text(self, key: str, usual: str | None = None, remedy: str = "") -> str:
-        """A text that one line can show, without blanks around it.
+        """Return a text that one line can show, without blanks around it.
 
         Where the key is missing it is `usual`. Raises BadInput, also where that is None; an empty
         text is one only where that is `usual`.
@@ -77,17 +77,17 @@ class Table:
         return str(self.value(key, str, "is not a text", remedy, usual, can_be_shown)).strip()
 
     def positive(self, key: str, unit: str = "SI units") -> float:
-        """A number above 0; raises BadInput where it is missing or none."""
+        """Return a number above 0; raises BadInput where it is missing or none."""
         remedy, wrong = f"Give {key} in {unit}.", "is not a positive number"
         return float(self.value(key, float, wrong, remedy, holds=lambda value: value > 0))
 
     def not_negative(self, key: str) -> float:
-        """A number from 0 up; raises BadInput where it is missing or none."""
+        """Return a number from 0 up; raises BadInput where it is missing or none."""
         remedy, wrong = f"Give {key} in SI units.", "is not a number from 0 up"
         return float(self.value(key, float, wrong, remedy, holds=lambda value: value >= 0))
 
     def fraction(self, key: str, default: float, low: float, high: float) -> float:
-        """A number from `low` to `high`, both included; `default` where the key is missing."""
+        """Return a number from `low` to `high`, both included; `default` without the key."""
         if key not in self:
             return default
         remedy = f"Give a number from {low:g} to {high:g}."
@@ -101,7 +101,7 @@ class Table:
         return self.label.split()[0].strip("[]")
 
     def table(self, key: str) -> Table | None:
-        """The sub-table `key`; None where there is none."""
+        """Return the sub-table `key`; None where there is none."""
         if key not in self:
             return None
         values = self.values[key]
@@ -110,7 +110,7 @@ class Table:
         return Table(values, f"{self.label} {key}", self.path)
 
     def tables(self, key: str) -> list[Table]:
-        """The list of sub-tables `key`; empty where there is none."""
+        """Return the list of sub-tables `key`; empty where there is none."""
         found = self.values.get(key, [])
         if not isinstance(found, list) or not all(isinstance(each, dict) for each in found):
             remedy = f"Write [[{self._kind}.{key}]] and its keys below."
@@ -122,7 +122,7 @@ class Table:
 
 
 def web_address(table: Table, key: str, remedy: str, no_password: str) -> str:
-    """An address of the web, encrypted unless it is this machine or `allow_http` stands there.
+    """Return a web address, encrypted unless it is this machine or `allow_http` stands there.
 
     `no_password` says why it needs none. Raises BadInput.
     """
@@ -162,8 +162,9 @@ _PLAIN_LABEL = re.compile(r"\[(\w+)\]")
 
 
 def _line_of(path: Path, label: str, problem: str) -> int | None:
-    """The line of a table's key that a problem names, else that of the table; None where neither
-    is found. The parser of TOML tells no places of what it has read.
+    """Return the line of the key that a problem names, else that of its table, else None.
+
+    The parser of TOML tells no places of what it has read.
     """
     named, plain = _LABEL.match(label), _PLAIN_LABEL.fullmatch(label)
     if named is None and plain is None:
@@ -205,7 +206,7 @@ def _other(line: str, kind: str) -> bool:
 
 
 def _line_within(lines: Sequence[str], block: range, said: str) -> int:
-    """The last line of a block that sets or opens something that is named."""
+    """Return the last line of a block that sets or opens something that is named."""
     words = set(re.findall(r"\w+", said))
     for number in reversed(block):
         keys = re.findall(r"(\w+)\s*=", lines[number]) or re.findall(r"\.(\w+)\]", lines[number])

@@ -36,7 +36,7 @@ def write(
     tests: Sequence[ModalTest] = (),
     hanger: Hanger | None = None,
 ) -> None:
-    """Writes the draws of a posterior; `format` is one of `FORMATS`, or follows from the suffix.
+    """Write the draws of a posterior; `format` is one of `FORMATS`, or follows from the suffix.
 
     `csv` (.csv) and `npz` (.npz): a column a parameter, then `tension_n` in N and `log_likelihood`.
     `json` (.json): the document of `shm update --json` with all draws by name under `draws`.
@@ -64,7 +64,7 @@ def write(
 
 
 def check_format(path: Path, format: str | None = None) -> str:
-    """The format of a file to be; raises UsageError for one that is not known."""
+    """Return the format of a file to be; raises UsageError for one that is not known."""
     suffixes = {".nc": "netcdf"} | {f".{name}": name for name in FORMATS}
     named = suffixes.get(path.suffix.lower()) if format is None else format
     if named is None or named not in FORMATS:
@@ -88,7 +88,7 @@ def columns(posterior: Posterior) -> dict[str, FloatArray]:
 
 
 def samples(posterior: Posterior) -> DataFrame:
-    """The draws as a table: a row a draw, all of equal weight.
+    """Return the draws as a table: a row a draw, all of equal weight.
 
     A column a parameter (`theta_F` is tension over nominal tension, `log10_k1` the log10 of a
     spring in N m/rad, `sigma` the fractional model error), then `tension_n` in N and
@@ -104,7 +104,7 @@ def samples(posterior: Posterior) -> DataFrame:
 
 
 def modes(tests: Sequence[ModalTest]) -> DataFrame:
-    """The modes of tests as a table, a row a mode; what is not known is NaN or NaT.
+    """Return the modes of tests as a table, a row a mode; what is not known is NaN or NaT.
 
     Columns: test, time (UTC), temperature_c, amplitude, plane, order, frequency_hz,
     frequency_sd_hz, damping_ratio, damping_sd.
@@ -133,7 +133,7 @@ def modes(tests: Sequence[ModalTest]) -> DataFrame:
 
 
 def causes(diagnosis: Diagnosis) -> DataFrame:
-    """The causes of a diagnosis as a table, a row a cause, best first.
+    """Return the causes of a diagnosis as a table, a row a cause, best first.
 
     Columns: cause, at, probability, log_bayes_factor, log_fit, log_occam, group (NaN where the data
     tell it from all others), method, then mean and standard deviation of each parameter in the unit

@@ -42,7 +42,7 @@ Group: TypeAlias = dict[str, tuple[tuple[str, ...], FloatArray, str]]
 def datatree(
     posterior: Posterior, tests: Sequence[ModalTest] = (), hanger: Hanger | None = None
 ) -> DataTree:
-    """The posterior as a DataTree for ArviZ, 0.23 or 1.x.
+    """Return the posterior as a DataTree for ArviZ, 0.23 or 1.x.
 
     Groups:
 
@@ -86,7 +86,7 @@ def datatree(
 def inference_data(
     posterior: Posterior, tests: Sequence[ModalTest] = (), hanger: Hanger | None = None
 ) -> Any:
-    """The `datatree` as the installed ArviZ computes with it: 0.x has a class of its own.
+    """Return the `datatree` as the installed ArviZ computes with it: 0.x has a class of its own.
 
     Raises UsageError where ArviZ is not installed, and as `datatree` does.
 
@@ -102,7 +102,7 @@ def inference_data(
 
 
 def write_netcdf(tree: DataTree, path: Path) -> None:
-    """Writes a DataTree as netCDF, whole or not at all; raises UsageError without h5netcdf."""
+    """Write a DataTree as netCDF, whole or not at all; raises UsageError without h5netcdf."""
     _require("h5netcdf")
     part = path.with_name(f".{path.name}.part")
     try:
@@ -123,7 +123,7 @@ def _require(library: str) -> None:
 
 
 def _groups(posterior: Posterior) -> dict[str, Group]:
-    """What a posterior holds by itself."""
+    """Return the content of a posterior by itself."""
     parameters = dict(zip(posterior.names, posterior.samples.T, strict=True))
     drawn: Group = {
         name: (_DRAWN, values, _unit(posterior, name)) for name, values in parameters.items()
@@ -226,7 +226,7 @@ class Predictive:
 
 
 def predictive(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hanger) -> Predictive:
-    """Evaluates the model class again; draws are seeded with the posterior's seed.
+    """Evaluate the model class again; draws are seeded with the posterior's seed.
 
     Raises BadInput where `tests` and `hanger` are not those that the posterior was made from.
     """
@@ -249,7 +249,7 @@ def predictive(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hanger)
 
 
 def _of_the_field(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hanger) -> Predictive:
-    """The same where the likelihood is that of `shm.inference.field`."""
+    """Return the same where the likelihood is that of `shm.inference.field`."""
     model = class_of(posterior, hanger)
     used = check_for_update(tests, model)[0] if posterior.remarks else tests
     problem = Problem.of(used, model, silent)

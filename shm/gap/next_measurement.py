@@ -1,4 +1,4 @@
-"""What to measure next: the tests that are expected to tell the leading explanations apart."""
+"""Next measurements: the tests that are expected to tell the leading explanations apart."""
 
 from __future__ import annotations
 

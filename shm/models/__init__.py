@@ -24,7 +24,7 @@ AS_DESCRIBED = "beam1"
 
 
 def build(name: str, hanger: Hanger, priors: str = DESCRIPTION) -> Model:
-    """The model class `name` of `hanger`, with the priors of its description or of the thesis.
+    """Return class `name` of `hanger`, with the priors of its description or of the thesis.
 
     Raises UsageError for an unknown name, and where the hanger does not admit the class or the
     class cannot describe the hanger.
@@ -40,7 +40,7 @@ def build(name: str, hanger: Hanger, priors: str = DESCRIPTION) -> Model:
 
 
 def check_baseline(name: str, hanger: Hanger) -> None:
-    """Raises UsageError where the model class `name` is no baseline of a diagnosis of `hanger`.
+    """Raise UsageError where the model class `name` is no baseline of a diagnosis of `hanger`.
 
     That is where `build` does, but that a diagnosis takes beam1 on any supports, and with no
     tension.
@@ -56,7 +56,7 @@ def check_baseline(name: str, hanger: Hanger) -> None:
 
 
 def described(name: str, hanger: Hanger, priors: str = THESIS) -> Model:
-    """The model class `name` of `hanger`, be it admitted or not.
+    """Return the model class `name` of `hanger`, be it admitted or not.
 
     Raises UsageError for an unknown name, of a class or of priors.
     """
@@ -70,7 +70,7 @@ def described(name: str, hanger: Hanger, priors: str = THESIS) -> Model:
 
 
 def class_of(posterior: Posterior, hanger: Hanger) -> Model:
-    """The model class that a posterior's parameters are those of."""
+    """Return the model class that a posterior's parameters are those of."""
     if is_adopted(posterior.model):
         return with_parameters(posterior.model, hanger, posterior.names, posterior.priors)
     return described(posterior.model, hanger, posterior.priors)
@@ -108,12 +108,12 @@ def competing_names(hanger: Hanger, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _why_not(name: str, hanger: Hanger) -> str:
-    """A sentence from its predicate on; empty where the class applies."""
+    """Return a sentence from its predicate on; empty where the class applies."""
     return _not_this_bar(name, hanger) or held_otherwise(hanger)
 
 
 def _not_this_bar(name: str, hanger: Hanger) -> str:
-    """The same, whatever holds the bar."""
+    """Return the same, whatever holds the bar."""
     _refuse_unknown(name, hanger)
     if hanger.models and not {name, name.partition("+")[0]} & set(hanger.models):
         return f"the hanger's `models` admits {', '.join(hanger.models)} only."

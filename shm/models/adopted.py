@@ -58,7 +58,7 @@ class _WithEffects(Model):
         return self.adopted.conditions(test)
 
     def refuse(self, test: ModalTest) -> None:
-        """Raises BadInput as any class, and where an effect follows a temperature not given."""
+        """Raise BadInput as any class, and where an effect follows a temperature not given."""
         super().refuse(test)
         if not math.isfinite(self.conditions(test).temperature_shift_k):
             raise BadInput(
@@ -237,7 +237,7 @@ def unfit(name: str, hanger: Hanger) -> str:
 
 
 def checked(name: str, hanger: Hanger) -> AdoptedName:
-    """The parts of a name; raises UsageError where it is malformed or names what is not there."""
+    """Return the parts of a name; raises UsageError where it is malformed or unknown."""
     made = AdoptedName.parse(name)
     if made.baseline not in MODELS:
         raise UsageError(
@@ -267,7 +267,7 @@ def variant_of(adopted: AdoptedEffect, hanger: Hanger) -> Variant:
 
 
 def places_of(effect: str, hanger: Hanger) -> tuple[str, ...]:
-    """The keys of where an effect may act; raises UsageError for what cannot be adopted."""
+    """Return the keys of where an effect may act; raises UsageError for what cannot be adopted."""
     return tuple(_variants(_effect(effect), hanger))
 
 
@@ -277,7 +277,7 @@ def missed_by_one_test(effect: str, hanger: Hanger) -> str:
 
 
 def own_name(parameter: Parameter) -> str:
-    """The name that a parameter of an effect has in the class."""
+    """Return the name that a parameter of an effect has in the class."""
     effect, dot, name = parameter.name.rpartition(".")
     return f"{effect}{dot}log10_{name}" if in_log(parameter) else parameter.name
 
@@ -358,7 +358,7 @@ class AdoptedName:
 
     @classmethod
     def parse(cls, text: str) -> AdoptedName:
-        """The parts of a name; raises UsageError where it is malformed."""
+        """Return the parts of a name; raises UsageError where it is malformed."""
         baseline, *effects = text.split("+")
         if not baseline or not effects:
             raise _malformed(text, "it names no baseline or no effect")
@@ -381,7 +381,7 @@ def _effect_named(part: str, text: str) -> AdoptedEffect:
 
 
 def _option(option: str, text: str) -> tuple[str, tuple[float, float]]:
-    """A name and its range; that of the reference begins and ends alike."""
+    """Return a name and its range; that of the reference begins and ends alike."""
     name, _, value = option.partition("=")
     low, _, high = value.partition("..")
     try:
@@ -395,7 +395,7 @@ def _option(option: str, text: str) -> tuple[str, tuple[float, float]]:
 
 
 def _text(value: float) -> str:
-    """A number without the sign that joins effects."""
+    """Return a number without the sign that joins effects."""
     return f"{value:.6g}".replace("e+", "e")
 
 

@@ -305,7 +305,7 @@ class AsMade(Model):
         return self.model.conditions(test)
 
     def refuse(self, test: ModalTest) -> None:
-        """Raises BadInput as the class itself does."""
+        """Raise BadInput as the class itself does."""
         self.model.refuse(test)
 
     def prepare(self, modes: int, progress: Callable[[float], None] = silent) -> None:

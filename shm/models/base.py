@@ -86,11 +86,11 @@ class Model:
         raise KeyError(name)
 
     def of_the_thesis(self) -> Model:
-        """The class with the thesis's reading of the description, where that is another."""
+        """Return the class with the thesis's reading of the description, where that is another."""
         return self
 
     def as_it_hangs(self) -> Model:
-        """The class with the description read as one of the hanger under its tension."""
+        """Return the class with the description read as one of the hanger under its tension."""
         return self
 
     @classmethod
@@ -115,7 +115,7 @@ class Model:
         raise TypeError(f"{type(self).__name__} does not say how its frequencies follow.")
 
     def conditions(self, test: ModalTest) -> Conditions:
-        """The conditions of `test` that this class takes notice of; others stay at the reference.
+        """Return the conditions of `test` that this class notices; others stay at the reference.
 
         Tests whose conditions are equal share their frequencies.
         """
@@ -137,11 +137,11 @@ class Model:
         return found * laden_ratio(self.hanger, length_m, tension_n, springs, mass, modes)
 
     def reference_frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
-        """The same without any approximation made for speed, where the class makes one."""
+        """Return the same without any approximation made for speed, where the class makes one."""
         return self.frequencies_hz(theta, modes)
 
     def prepare(self, modes: int, progress: Callable[[float], None] = silent) -> None:
-        """Does what has to be done once before many evaluations; `progress` hears the fraction."""
+        """Do what has to be done once before many evaluations; `progress` hears the fraction."""
 
     def shapes(self, theta: FloatArray, modes: int, x_m: FloatArray) -> FloatArray:
         """Return shapes (n, 2, modes, points) at `x_m` (points,), each of any size and sign."""
@@ -175,8 +175,9 @@ class Model:
         return clamped, clamped
 
     def stiffness_mass_length(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Bending stiffness, mass per length and length of parameter sets (n, parameters), each
-        (n,) over the described one.
+        """Return bending stiffness, mass per length and length, each (n,) over the described one.
+
+        Of parameter sets (n, parameters).
 
         A class whose length is neither the description's nor `theta_L` says it here.
         """
@@ -187,8 +188,9 @@ class Model:
     def end_waves(
         self, theta: FloatArray, frequency_hz: FloatArray, plane: IntArray
     ) -> tuple[EndWaves, EndWaves]:
-        """Modes near the deck's and the arch's end: `frequency_hz` (n, data) of `theta`
-        (n, parameters) in planes `plane` (data,).
+        """Return the modes near the deck's and the arch's end.
+
+        They have `frequency_hz` (n, data) of `theta` (n, parameters) in planes `plane` (data,).
         """
         hanger = self.hanger
         e, mu, length = (each[:, None] for each in self.stiffness_mass_length(theta))
@@ -213,7 +215,7 @@ class Model:
         return (0.0, 0.0) if stated else self.hanger.fittings_m
 
     def wave_stiffness_n_m_rad(self, order: float) -> float:
-        """What an end spring is stiff or soft against: bending stiffness times wave number.
+        """Return what an end spring is stiff or soft against: bending stiffness times wave number.
 
         That of mode `order` of a uniform hanger at its nominal tension.
         """
@@ -223,7 +225,7 @@ class Model:
         return hanger.bending_stiffness_n_m2 * wave_number
 
     def refuse(self, test: ModalTest) -> None:
-        """Raises BadInput where this class cannot describe the conditions of `test`."""
+        """Raise BadInput where this class cannot describe the conditions of `test`."""
         mass, length_m = test.added_mass, self.hanger.length_m
         if mass is not None and not 0 <= mass.x_m <= length_m:
             raise BadInput(

@@ -36,7 +36,7 @@ def tension_n(
     mass_per_length_kg_m: float,
     bending_stiffness_n_m2: float,
 ) -> float:
-    """The tension by frequencies of orders; NaN of fewer than two."""
+    """Return the tension by frequencies of orders; NaN of fewer than two."""
     # Slow to import, and seldom needed.
     from scipy.optimize import least_squares
 

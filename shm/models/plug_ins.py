@@ -29,7 +29,7 @@ class PlugInSkipped(UserWarning):
 
 
 def members_with_plug_ins(group: str, own: Mapping[str, M], kind: type) -> dict[str, M]:
-    """The members of our `own` and those installed under `group`, which are of `kind`.
+    """Return the members of our `own` and those installed under `group`, which are of `kind`.
 
     Our own are all instances of `kind` or all classes of it, and what is plugged in becomes the
     same: of a class of effects an instance is made.

@@ -44,7 +44,7 @@ class PracticeFormula:
         mass_per_length_kg_m: float,
         bending_stiffness_n_m2: float,
     ) -> float:
-        """The tension; negative where bending alone would give a higher frequency."""
+        """Return the tension; negative where bending alone would give a higher frequency."""
         string = 4 * mass_per_length_kg_m * (frequency_hz * length_m / self.order) ** 2
         ratio = math.sqrt(bending_stiffness_n_m2 / mass_per_length_kg_m) / length_m**2
         ratio /= frequency_hz

@@ -19,7 +19,7 @@ MODELS: dict[str, type[Model]] = members_with_plug_ins(
 
 
 def registered(name: str, hanger: Hanger) -> Model:
-    """The registered class `name` of `hanger`, be it admitted there or not.
+    """Return the registered class `name` of `hanger`, be it admitted there or not.
 
     Raises UsageError for an unknown name, and where the class cannot describe the hanger.
     """

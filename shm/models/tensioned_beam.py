@@ -89,7 +89,7 @@ class _Sets:
 
 
 def wave_numbers(xi: FloatArray, ka: FloatArray, kb: FloatArray, modes: int) -> FloatArray:
-    """The roots q of the first modes.
+    """Return the roots q of the first modes.
 
     `xi` = L sqrt(T/EI) and the end springs `ka`, `kb` = k L/EI (inf for clamped) broadcast to
     one shape S; the answer has shape S + (modes,), dimensionless, right to 1e-12.
@@ -139,7 +139,7 @@ def _in_blocks(solve: Callable[..., FloatArray], modes: int, *sets: FloatArray) 
 
 
 def _roots(xi: FloatArray, ka: FloatArray, kb: FloatArray, modes: int) -> FloatArray:
-    """The roots q (modes, sets) of a block of parameter sets (sets,), by Newton's method."""
+    """Return the roots q (modes, sets) of a block of parameter sets (sets,), by Newton's method."""
     order = np.arange(1.0, modes + 1)[:, None]
     pinned: FloatArray = order * np.pi
     sets = _shared(xi, ka, kb, np.where(order % 2 == 0, 1.0, -1.0))
@@ -173,7 +173,7 @@ def _freedom(k: FloatArray) -> FloatArray:
 
 
 def _newton_step(q: FloatArray, pinned: FloatArray, sets: _Sets) -> FloatArray:
-    """What to take off `q` (modes, sets) on the way to q - phi(q) = n pi."""
+    """Return Newton's step of `q` (modes, sets) on the way to q - phi(q) = n pi."""
     a, b, c, a_slope, b_slope, c_slope = _coefficients(q, sets)
     d = np.sqrt(a * a + b * b - c * c)
     t = (b - c) / (a + d)
@@ -183,7 +183,7 @@ def _newton_step(q: FloatArray, pinned: FloatArray, sets: _Sets) -> FloatArray:
 
 
 def _coefficients(q: FloatArray, sets: _Sets) -> tuple[FloatArray, ...]:
-    """A, B, c and their derivatives by q, with p' = q/p and W' = 4 q."""
+    """Return A, B, c and their derivatives by q, with p' = q/p and W' = 4 q."""
     q_squared = q * q
     p_squared = q_squared + sets.xi_squared
     w = p_squared + q_squared
@@ -215,8 +215,9 @@ def _hyperbolic(p: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 @dataclass(frozen=True, eq=False)
 class Waves:
-    """Wave numbers of modes, each (sets, modes): q of the sines and p of the decaying waves, with
-    `turn_q` and `turn_p`, by which their sections turn (Q and P; without shear the same).
+    """Wave numbers (sets, modes): q of the sines and p of the decaying waves.
+
+    Their sections turn by `turn_q` and `turn_p` (Q and P; without shear the same).
     """
 
     q: FloatArray

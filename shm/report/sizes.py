@@ -84,7 +84,7 @@ def _texts(interval: Interval, sign: str, logarithmic: bool) -> tuple[str, str, 
 
 
 def _lopsided(interval: Interval) -> bool:
-    """Whether both bounds have one sign and lie so far apart that each needs its own digits."""
+    """Return True where both bounds have one sign and lie too far apart to share digits."""
     near, far = sorted((abs(interval.low), abs(interval.high)))
     return interval.low * interval.high > 0 and far > _LOPSIDED * near
 

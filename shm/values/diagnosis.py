@@ -33,13 +33,13 @@ def joined(names: Iterable[str]) -> str:
 
 
 def parted(name: str) -> tuple[str, ...]:
-    """The names that `joined` made one."""
+    """Return the names that `joined` made one."""
     return tuple(name.split(_AND))
 
 
 @dataclass(frozen=True)
 class Residual:
-    """How far one measured frequency lies from the baseline's best prediction of it.
+    """A measured frequency beside the baseline's best prediction of it.
 
     `residual_percent` is measured over predicted, less 1; `z` is in standard deviations of the
     identification and of what the baseline leaves open; `share` is its part of the misfit.
@@ -296,6 +296,6 @@ class Diagnosis(Shown):
         return line("Diagnosis", self.hanger, f"{said}, {told}")
 
     def to_dataframe(self) -> DataFrame:
-        """The causes, a row a cause: the table of `shm.export.causes`."""
+        """Return the causes, a row a cause: the table of `shm.export.causes`."""
         table: DataFrame = front().export.causes(self)
         return table

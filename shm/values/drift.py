@@ -73,7 +73,7 @@ def is_ratio(quantity: str) -> bool:
 
 
 def threshold_of(quantity: str, hanger: Hanger) -> float:
-    """The shift of which its owner must know: a fraction of the tension, or decades."""
+    """Return the shift of which its owner must know: a fraction of the tension, or decades."""
     limits = hanger.thresholds
     if quantity == TENSION:
         return limits.tension_shift_fraction
@@ -365,8 +365,7 @@ AlertKind = Literal[
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """The tests next to the newest, the nearest first: as they `came` in, before and after it, and
-    as they are `dated`.
+    """Tests next to the newest, the nearest first: as they `came` in, and as they are `dated`.
 
     Those that came may be `held` (their names) for their clock alone: what they measured counts.
     Tests that are not watched yet are left out; each is asked of in its turn. Those `of_works`

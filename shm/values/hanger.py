@@ -121,8 +121,9 @@ class Scatter:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a hanger may carry, in N: above `tension_max_n` it is overloaded, below `tension_min_n`
-    slack. NaN where the owner sets none.
+    """Limits of the tension in N: overloaded above `tension_max_n`, slack below `tension_min_n`.
+
+    NaN where the owner sets none.
     """
 
     tension_max_n: float = NAN
@@ -264,7 +265,7 @@ class Hanger(Shown):
     def without_model(
         cls, id_: int, name: str = "", thresholds: Thresholds | None = None
     ) -> Hanger:
-        """A structure that no model class describes: it has no length, no section, no tension."""
+        """Return a structure without a model class: it has no length, no section, no tension."""
         limits = Thresholds() if thresholds is None else thresholds
         return cls(id_, NAN, NAN, NAN, NAN, NAN, NAN, name, limits, kind="any")
 

@@ -24,5 +24,5 @@ COLDEST_C, WARMEST_C = -60.0, 80.0
 
 
 def outdoor_c(temperature_c: float) -> float:
-    """The temperature where air or steel outdoors can have it, else NaN."""
+    """Return the temperature where air or steel outdoors can have it, else NaN."""
     return temperature_c if COLDEST_C <= temperature_c <= WARMEST_C else NAN

@@ -35,7 +35,7 @@ class Lead:
 
     @classmethod
     def of(cls, message: str) -> Lead:
-        """That of a whole message."""
+        """Return that of a whole message."""
         state, *others = _SENTENCES.split(message.strip(), maxsplit=2)
         return cls(state, others[0] if others else "")
 

@@ -118,12 +118,12 @@ def is_test_id(text: str) -> bool:
 
 
 def as_test_id(name: str) -> str:
-    """An id out of any name: what cannot be printed, and would break a line or a log, is "_"."""
+    """Return an id out of any name: what cannot be printed or would break a line is "_"."""
     return printable(name)[:LONGEST_TEST_ID] or "_"
 
 
 def printable(text: str, instead: str = "_") -> str:
-    """A text with something else `instead` of each character that cannot be printed."""
+    """Return a text with something else `instead` of each character that cannot be printed."""
     return "".join(each if each.isprintable() else instead for each in text)
 
 
@@ -163,7 +163,7 @@ class ModalTest(Shown):
         return line(f"ModalTest {self.id}", self.hanger, said)
 
     def to_dataframe(self) -> DataFrame:
-        """The modes, a row a mode: the table of `shm.export.modes`."""
+        """Return the modes, a row a mode: the table of `shm.export.modes`."""
         table: DataFrame = front().export.modes([self])
         return table
 
@@ -174,8 +174,7 @@ class ModalTest(Shown):
 
     @property
     def widest_swing_m(self) -> float:
-        """What its hits move the sensors by at most: all modes of a plane together; NaN where
-        unknown."""
+        """Return the sensors' largest motion, all modes of a plane together; NaN if unknown."""
         swings = {mode.plane: 0.0 for mode in self.modes}
         for mode in self.modes:
             if math.isfinite(mode.acceleration_m_s2):

@@ -15,8 +15,9 @@ class NoteKind(StrEnum):
 
 @dataclass(frozen=True)
 class Note:
-    """What `who` wrote of a hanger, or of the bridge where `hanger` is None; `at` is when it was
-    seen or done.
+    """A note of `who` on a hanger, or on the bridge where `hanger` is None.
+
+    `at` is when it was seen or done.
     """
 
     id: int

@@ -1,6 +1,4 @@
-"""What inference finds, and what the tests of a baseline say of each other: what was left out of
-it, and whether it fits.
-"""
+"""Results of inference: posteriors, selections, and how well the tests of a baseline agree."""
 
 from __future__ import annotations
 
@@ -63,7 +61,7 @@ class BaselineCheck:
     unchecked: str = ""
 
     def kept(self, test: ModalTest) -> ModalTest:
-        """A test of the baseline without the modes that are left out."""
+        """Return a test of the baseline without the modes that are left out."""
         out = {(each.plane, each.order) for each in self.modes if each.test == test.id}
         if not out:
             return test
@@ -73,7 +71,7 @@ class BaselineCheck:
         return replace(test, modes=modes)
 
     def kept_of(self, tests: Sequence[ModalTest]) -> tuple[ModalTest, ...]:
-        """The tests without the modes and the tests that are left out."""
+        """Return the tests without the modes and the tests that are left out."""
         return tuple(self.kept(test) for test in tests if not self.leaves_out(test.id))
 
     def leaves_out(self, test: str) -> bool:
@@ -365,7 +363,7 @@ class Posterior(Shown):
         )
 
     def parameter(self, name: str) -> FloatArray:
-        """Samples of one parameter, shape (samples,)."""
+        """Return samples of one parameter, shape (samples,)."""
         return self.samples[:, self.names.index(name)]
 
     def unit(self, name: str) -> str:
@@ -387,12 +385,14 @@ class Posterior(Shown):
         return line("Posterior", self.hanger, said)
 
     def to_dataframe(self) -> DataFrame:
-        """The draws, a row a draw: the table of `shm.export.samples`."""
+        """Return the draws, a row a draw: the table of `shm.export.samples`."""
         table: DataFrame = front().export.samples(self)
         return table
 
     def to_arviz(self, tests: Sequence[ModalTest] = (), hanger: Hanger | None = None) -> Any:
-        """What ArviZ computes with: see `shm.export.inference_data` for the arguments.
+        """Return the data set that ArviZ computes with.
+
+        The arguments are those of `shm.export.inference_data`.
 
         Example:
             >>> arviz.summary(posterior.to_arviz())
@@ -456,7 +456,7 @@ class Selection(Shown):
         return np.concatenate(parts)
 
     def averaged(self, limits: Limits | None = None) -> Averaged:
-        """What all classes together say of the tension."""
+        """Return the tension over all classes together."""
         draws, limits = self.tension_n, limits or Limits()
         above, slack = limits.tension_max_n, limits.tension_min_n
         likely = [p for p, w in zip(self.posteriors, self.probabilities, strict=True) if w > 0.05]

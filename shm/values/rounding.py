@@ -1,6 +1,4 @@
-"""What messages say alike: a number with its interval, several words in a row, and forces in the
-unit that fits their size: N, kN or MN.
-"""
+"""Numbers with intervals, words in a row, and forces in N, kN or MN, as all messages write them."""
 
 from __future__ import annotations
 
@@ -27,7 +25,7 @@ class ForceUnit:
     newtons: float
 
     def of(self, force_n: Force) -> Force:
-        """Forces in N, a number or an array of any shape, in this unit."""
+        """Return forces in N, a number or an array of any shape, in this unit."""
         return force_n / self.newtons
 
     def decimals(self, force_n: float) -> int:
@@ -54,7 +52,7 @@ _KILONEWTON_FROM_N, _MEGANEWTON_FROM_N = 1e3, 1e7
 
 
 def force_unit(*forces_n: float) -> ForceUnit:
-    """The one unit for all these forces in N, by the largest; kN where none is known."""
+    """Return the one unit for all these forces in N, by the largest; kN where none is known."""
     known = [abs(each) for each in forces_n if math.isfinite(each)]
     if not known or _KILONEWTON_FROM_N <= max(known) < _MEGANEWTON_FROM_N:
         return _KILONEWTON
@@ -93,5 +91,5 @@ def rounded_percent(fraction: float, half: float, sign: str = "") -> str:
 
 
 def listed(words: Sequence[str]) -> str:
-    """`a, b and c`."""
+    """Join words as `a, b and c`."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

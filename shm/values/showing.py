@@ -15,7 +15,7 @@ class Shown:
     """A value that a person can read."""
 
     def summary(self) -> str:
-        """What it says, as plain text in the words and the rounding of the report.
+        """Return its content as plain text in the words and the rounding of the report.
 
         Example:
             >>> print(posterior.summary())
@@ -36,7 +36,7 @@ def hand_over_to(package: Any) -> None:
 
 
 def front() -> Any:
-    """The package that was told."""
+    """Return the package that was told."""
     return _front
 
 

@@ -15,12 +15,12 @@ _LEAST_SAID = 0.01  # ten of a thousand draws: they tell a smaller probability t
 def averaged_now(
     posterior: Posterior, selection: Selection | None = None, limits: Limits | None = None
 ) -> Averaged:
-    """The tension by a `posterior`, averaged over the classes of its hanger's `selection`."""
+    """Return the tension by a `posterior`, averaged over the classes of a `selection`."""
     return selection_now(posterior, selection).averaged(limits)
 
 
 def selection_now(posterior: Posterior, selection: Selection | None = None) -> Selection:
-    """The classes of a hanger's `selection` as they are by a later `posterior` of one of them.
+    """Return the classes of a `selection` as they are by a later `posterior` of one of them.
 
     Where later tests are updated in the selected class alone, the others follow as it has moved
     since: of a change they say the same, of the tension itself each its own.
@@ -79,7 +79,7 @@ class StatedTension:
 
 
 def stated(averaged: Averaged, unit: ForceUnit | None = None) -> StatedTension:
-    """A tension in words, rounded to two digits of its interval's half width."""
+    """Return a tension in words, rounded to two digits of its interval's half width."""
     tension_n, sd_n = averaged.tension_n, averaged.repeatability_sd_n
     unit = unit or force_unit(tension_n.mean)
     low, mean, high = (unit.of(n) for n in (tension_n.q05, tension_n.mean, tension_n.q95))

@@ -31,7 +31,7 @@ PERIODS: Mapping[Period, timedelta] = {  # as their names say
 
 
 def period_start(at: datetime, length: timedelta) -> datetime:
-    """The beginning of the stretch of that length, counted from midnight, that holds a moment."""
+    """Return the beginning of the stretch, of that length from midnight on, that holds a moment."""
     midnight = at.astimezone(UTC).replace(hour=0, minute=0, second=0, microsecond=0)
     return midnight + (at - midnight) // length * length
 

@@ -90,7 +90,7 @@ EFFECTS: dict[str, Effect] = members_with_plug_ins(
 
 
 def parameters_of(name: str, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
-    """The parameters of effect `name`, within the ranges that the hanger's owner gives."""
+    """Return the parameters of effect `name`, within the ranges that the hanger's owner gives."""
     ranges = {prior.parameter: prior for prior in hanger.effect_priors if prior.effect == name}
     return tuple(
         _narrowed(parameter, ranges) for parameter in EFFECTS[name].parameters(hanger, variant)
@@ -103,7 +103,7 @@ def _narrowed(parameter: Parameter, ranges: Mapping[str, EffectPrior]) -> Parame
 
 
 def check_effect_priors(hanger: Hanger) -> None:
-    """Raises BadInput where a range of the owner names nothing known or cannot be."""
+    """Raise BadInput where a range of the owner names nothing known or cannot be."""
     for prior in hanger.effect_priors:
         _check(prior, hanger)
 
@@ -131,7 +131,7 @@ def _check(prior: EffectPrior, hanger: Hanger) -> None:
 
 
 def _fault(prior: EffectPrior, parameter: Parameter) -> tuple[str, str]:
-    """What is wrong with a range, and what to do; both empty where it is good."""
+    """Return the fault of a range, and what to do; both empty where it is good."""
     if prior.lower >= prior.upper:
         return "does not rise", f"Give the smaller number first, in {parameter.unit}."
     if parameter.spread == "logarithmic" and prior.lower <= 0:

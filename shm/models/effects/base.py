@@ -100,7 +100,7 @@ class Parameter:
         return self._between(share)
 
     def share(self, value: FloatArray) -> FloatArray:
-        """The inverse of `value`."""
+        """Return the inverse of `value`."""
         if not self.signed:
             return self._part(value)
         return np.asarray(0.5 + np.sign(value) * self._part(np.abs(value)) / 2)
@@ -187,14 +187,14 @@ _ENDS = (("deck end", (0,)), ("arch end", (1,)), ("both ends", (0, 1)))
 
 
 def single_planes(survey: Survey) -> tuple[Variant, ...]:
-    """The whole hanger in each measured plane alone."""
+    """Return the whole hanger in each measured plane alone."""
     return tuple(
         Variant(f"everywhere, {plane}", planes=(PLANES.index(plane),)) for plane in survey.planes
     )
 
 
 def planes(survey: Survey) -> tuple[Variant, ...]:
-    """The whole hanger: both planes where both were measured, and each measured plane alone."""
+    """Return the whole hanger in both planes, where both were measured, and in each alone."""
     both = (Variant(),) if len(survey.planes) == len(PLANES) else ()
     return both + single_planes(survey)
 
@@ -232,12 +232,12 @@ def at_ends(variants: tuple[Variant, ...], ends: tuple[int, ...]) -> tuple[Varia
 
 
 def free_planes(variant: Variant) -> tuple[int, ...]:
-    """The planes that have a spring of their own; the first stands for all where they are alike."""
+    """Return the planes with a spring of their own; the first stands for all alike."""
     return variant.planes[:1] if variant.alike else variant.planes
 
 
 def place_along(hanger: Hanger) -> Parameter:
-    """The place of a local effect."""
+    """Return the place of a local effect."""
     return Parameter(
         "x_m",
         "m",
@@ -257,7 +257,7 @@ def nested_zones(
     stiffness_factor: FloatArray,
     mass_factor: FloatArray,
 ) -> tuple[Zone, ...]:
-    """A stretch that begins and ends in steps: one zone a share of its extent, about one middle.
+    """Return a stretch that begins and ends in steps: zones about one middle, one for each reach.
 
     Arrays (draws,); where zones overlap their factors multiply.
     """
@@ -276,12 +276,12 @@ _MIDDLE_ORDER = 4  # of the seven or so orders that a hammer test finds
 
 
 def mass_kg(hanger: Hanger) -> float:
-    """The hanger's own mass."""
+    """Return the hanger's own mass."""
     return hanger.mass_per_length_kg_m * hanger.length_m
 
 
 def rotational_stiffness(name: str, hanger: Hanger, hinge: bool = False) -> Parameter:
-    """The log10 of an end spring's stiffness, scaled by EI p of a mode of order 4.
+    """Return the log10 of an end spring's stiffness, scaled by EI p of a mode of order 4.
 
     No effect is an infinite stiffness, or none at all where the description has a `hinge`.
     """

@@ -239,7 +239,7 @@ class StiffEndZones(Effect):
 
 
 def _steps(ratio: FloatArray, law: int) -> list[tuple[float, FloatArray]]:
-    """The reaches of steps one in another, each with the factor by which it stiffens."""
+    """Return the reaches of steps one in another, each with the factor by which it stiffens."""
     if law == 0:
         return [(1.0, ratio)]
     if law == 1:
@@ -335,7 +335,7 @@ def _mode(
     mass_kg: FloatArray,
     frequency_hz: FloatArray,
 ) -> SupportMode:
-    """A mode at one end in one plane; none where the mass is infinite."""
+    """Return a mode at one end in one plane; none where the mass is infinite."""
     compliance, moving = np.zeros((2, *physical.support_mass_kg.shape))
     compliance[where] = 1 / (mass_kg * (2 * np.pi * frequency_hz) ** 2)
     moving[where] = np.where(np.isinf(mass_kg), 0.0, mass_kg)

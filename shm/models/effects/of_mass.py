@@ -1,6 +1,4 @@
-"""Effects of what the bar carries and what holds it between its ends: mass all along, over a
-stretch, at one place or of the sensors, and a spring.
-"""
+"""Effects of mass: all along, over a stretch, at one place, of sensors; and of a lateral spring."""
 
 from __future__ import annotations
 

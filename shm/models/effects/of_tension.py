@@ -160,7 +160,7 @@ class JointSoftening(Effect):
 
 
 def _share(own: FloatArray, compliance: FloatArray) -> FloatArray:
-    """The joint's part (n, ends) of the ends' compliance (n, ends, 2, 2), mean of both planes.
+    """Return the joint's part (n, ends) of compliances (n, ends, 2, 2), the mean of both planes.
 
     Springs in series share their strain energy as they share the compliance, so that the loss
     factor of both is the mean weighted by it.

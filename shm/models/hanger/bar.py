@@ -84,7 +84,7 @@ class Bar:
         return max(self.counts.shear - SHEAR_ENDS, 0)
 
     def deflections(self, x: FloatArray) -> FloatArray:
-        """The functions' deflections at `x` (rows, points): (rows, points, functions but hats)."""
+        """Return the deflections (rows, points, functions but hats) at `x` (rows, points)."""
         return self._with_sheared(self._at(x).w)
 
     def slopes(self, x: FloatArray) -> FloatArray:
@@ -266,7 +266,7 @@ def _bar(
 
 
 def _sheared(field_: FloatArray, count: int) -> FloatArray:
-    """What deflects with the shear strains.
+    """Return the deflection that goes with the shear strains.
 
     The first two strain an end, whose section stays as it is while the bar's axis turns.
     """
@@ -323,14 +323,13 @@ _MOST_DECAY = 1000.0  # technical: at most 70 functions; stiffer in tension a ba
 
 
 def along(physical: PhysicalHanger, x_m: FloatArray) -> FloatArray:
-    """Places (n, points) on the hanger's axis as fractions of the bar; those beyond its ends move
-    with the end."""
+    """Return places (n, points) as fractions of the bar; those beyond its ends move with them."""
     share = (x_m - physical.deck_end_m[:, None]) / physical.length_m[:, None]
     return np.asarray(np.clip(share, 0.0, 1.0))
 
 
 def by_plane(zone: Zone) -> FloatArray:
-    """A zone's stiffness factor (n, planes or 1); given as (n,) it is that of both planes."""
+    """Return a zone's stiffness factor (n, planes or 1); given as (n,) it is of both planes."""
     factor = zone.stiffness_factor
     return factor if factor.ndim == 2 else factor[:, None]
 
@@ -351,7 +350,7 @@ def _over_bending(physical: PhysicalHanger, force_n: FloatArray) -> FloatArray:
 
 
 def bar_of(physical: PhysicalHanger, modes: int) -> Bar:
-    """The bar with its zones, and with kinks where masses, springs and zones' edges call for them.
+    """Return the bar with its zones, and with kinks at masses, springs and zones' edges.
 
     `modes` frequencies of each plane are to be right.
     """
@@ -385,7 +384,7 @@ def _columns(values: list[FloatArray], rows: int) -> FloatArray:
 
 
 def _inside(places: FloatArray) -> FloatArray:
-    """The columns that lie inside the bar in any row, each once."""
+    """Return the columns that lie inside the bar in any row, each once."""
     inside = np.any((places > _AT_END) & (places < 1 - _AT_END), axis=0)
     kept: list[FloatArray] = []
     for column in places.T[inside]:
@@ -405,7 +404,7 @@ def _forces(physical: PhysicalHanger) -> FloatArray:
 
 
 def _spans(physical: PhysicalHanger, edges: FloatArray, kinks: Kinks) -> Spans:
-    """The stretches between all breaks, with the factors of the zones that cover them."""
+    """Return the stretches between all breaks, with the factors of the zones that cover them."""
     rows = len(edges)
     ends = np.broadcast_to([0.0, 1.0], (rows, 2))
     breaks = np.sort(np.hstack([ends, edges, kinks.forces]), axis=1)

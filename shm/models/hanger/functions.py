@@ -65,7 +65,7 @@ def _fields(table: Table) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def hermite(x: FloatArray) -> Table:
-    """The end functions at `x` (rows, points)."""
+    """Return the end functions at `x` (rows, points)."""
     one, s = np.ones_like(x), x
     squared = s * s
     hump = s - squared
@@ -137,7 +137,7 @@ class Kinks:
         return int(self.forces.shape[1] + 3 * self.steps.shape[1])
 
     def table(self, x: FloatArray) -> Table:
-        """The functions at `x` (rows, points)."""
+        """Return the functions at `x` (rows, points)."""
         raw = self._raw(x)
         ends = self._raw(np.broadcast_to([0.0, 1.0], (len(x), 2)))
         held = np.stack([ends.w[..., 0], ends.slope[..., 0], ends.w[..., 1], ends.slope[..., 1]])
@@ -166,12 +166,12 @@ class Kinks:
 
 
 def _combined(held: FloatArray, cubic: FloatArray) -> FloatArray:
-    """Sums of the cubics (4, rows, points) by factors (4, kinks, rows): (kinks, rows, points)."""
+    """Return sums (kinks, rows, points) of cubics (4, rows, points) by factors (4, kinks, rows)."""
     return np.asarray((held.transpose(2, 1, 0) @ cubic.transpose(1, 0, 2)).transpose(1, 0, 2))
 
 
 def _decay(away: FloatArray, side: FloatArray, s: FloatArray) -> Table:
-    """A curvature of exp(-s away), twice integrated; `side` is the sign of the direction away."""
+    """Integrate a curvature of exp(-s away) twice; `side` is the sign of the direction away."""
     decay = np.exp(-s * away)
     grown = (1 - decay) / s
     return Table(((away - grown) / s)[None], (side * grown)[None], decay[None])

@@ -123,7 +123,7 @@ class PhysicalHanger:
 
     @classmethod
     def clamped(cls, hanger: Hanger, tension_n: FloatArray, sensors: int = 0) -> PhysicalHanger:
-        """The bar as described with its turnbuckles, at tensions (n,), both ends clamped."""
+        """Return the bar as described with its turnbuckles, at tensions (n,), both ends clamped."""
         n = len(tension_n)
         one = np.ones(n)
         return cls(
@@ -155,7 +155,7 @@ class PhysicalHanger:
 
     @classmethod
     def held(cls, hanger: Hanger, tension_n: FloatArray, sensors: int = 0) -> PhysicalHanger:
-        """The same on the supports of its description; what hangs from a free end is a mass."""
+        """Return the same on the described supports; what hangs from a free end is a mass."""
         supports = hanger.supports
         bar = cls.clamped(hanger, tension_n, sensors)
         for end in supports.ends("pinned", "free"):
@@ -169,7 +169,7 @@ class PhysicalHanger:
         return replace(bar, masses=(PointMass(at_end_m * one, supports.hanging_mass_kg * one),))
 
     def on_springs(self, springs_n_m_rad: tuple[FloatArray, FloatArray]) -> PhysicalHanger:
-        """The same on rotational springs at the deck and the arch end, each (n, planes)."""
+        """Return the same on rotational springs at the deck and the arch end, each (n, planes)."""
         springs = np.stack(springs_n_m_rad, axis=1)
         compliance = (1 / springs)[..., None] * np.eye(2)
         return replace(self, rotational_compliance_rad_n_m=compliance)

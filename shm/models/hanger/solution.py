@@ -1,5 +1,6 @@
-"""Modes of the general hanger model, of one plane each though planes may be coupled; what sensors
-see of them, and how joints and springs damp them.
+"""Modes of the general hanger model, how sensors see them, and how joints and springs damp them.
+
+A mode is of one plane, though planes may be coupled.
 
 The eigenvalues are mu = 1/omega^2 of A = L^-1 M L^-T with K = L L^T: the stiffness is factorised,
 not the mass, so that springs from soft to rigid do no harm and the lowest modes, which have the
@@ -25,7 +26,7 @@ _PLANES = len(PLANES)
 def solve(
     physical: PhysicalHanger, modes: int, places_m: FloatArray, shapes: bool = True
 ) -> HangerModes:
-    """The first `modes` modes of each plane of n hangers, seen by sensors at `places_m` (places,).
+    """Return the first `modes` modes of each plane of n hangers, as sensors at `places_m` see them.
 
     With `shapes` false the shapes are empty, (n, 2, modes, 0, 2), and the damping that loss factors
     add is not found (NaN): the frequencies alone cost half as much. Motions of a free bar as a
@@ -145,7 +146,7 @@ def planes_alike(physical: PhysicalHanger) -> bool:
 
 
 def one_plane(physical: PhysicalHanger) -> PhysicalHanger:
-    """The transverse plane alone."""
+    """Return the transverse plane alone."""
     return replace(
         physical,
         bending_stiffness_n_m2=physical.bending_stiffness_n_m2[:, :1],
@@ -236,15 +237,18 @@ _SEARCHED = 4  # technical: times as many modes hold those of both planes, howev
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """`omega_rad_s` (n, planes, modes); `vectors` (n, planes, axes, functions kept, modes) of unit
-    modal mass m L^3, None unless asked for. With coupled planes a mode moves along both axes."""
+    """Circular frequencies `omega_rad_s` (n, planes, modes) and mode vectors.
+
+    `vectors` (n, planes, axes, functions kept, modes) have unit modal mass m L^3; None unless asked
+    for. With coupled planes a mode moves along both axes.
+    """
 
     omega_rad_s: FloatArray
     vectors: FloatArray | None
 
 
 def motion(physical: PhysicalHanger, parts: System, modes: int, with_vectors: bool) -> Motion:
-    """The first `modes` modes of each plane."""
+    """Return the first `modes` modes of each plane."""
     if are_coupled(physical):
         return _coupled(physical, parts, modes)
     rows, planes, unknowns = parts.stiffness.shape[:3]
@@ -392,7 +396,7 @@ _UNDECIDED = 0.15  # share of the energy of a direction within 9 degrees of 45
 
 
 def families(transverse_share: FloatArray, modes: int) -> tuple[IntArray, IntArray]:
-    """Indices (n, modes) of the transverse and of the longitudinal modes, each ascending.
+    """Return the indices (n, modes) of transverse and of longitudinal modes, each ascending.
 
     `transverse_share` (n, all modes, ascending) of the kinetic energy. A mode belongs to the plane
     that holds more than half. Near principal axes at 45 degrees a pair of neighbours would fall to
@@ -432,13 +436,13 @@ class Spectrum:
     vectors: FloatArray | None
 
     def without(self, left_out: BoolArray) -> Spectrum:
-        """The modes `left_out` (rows, modes) become the last ones."""
+        """Return the modes `left_out` (rows, modes) become the last ones."""
         squared = np.where(left_out, np.inf, self.omega_squared)
         order = np.argsort(squared, axis=1, kind="stable")
         return Spectrum(np.take_along_axis(squared, order, axis=1), self._vectors(order))
 
     def taken(self, order: IntArray) -> Spectrum:
-        """The modes `order` (rows, fewer modes)."""
+        """Return the modes `order` (rows, fewer modes)."""
         return Spectrum(np.take_along_axis(self.omega_squared, order, axis=1), self._vectors(order))
 
     def first(self, modes: int) -> Spectrum:

@@ -60,7 +60,7 @@ def swings(physical: PhysicalHanger, kept: IntArray) -> tuple[Swing, ...]:
 
 
 def _at_end(physical: PhysicalHanger, end: int, deflection: int, unknown: int) -> Iterator[Swing]:
-    """The first mode, then the further ones, whose own unknowns begin with `unknown`."""
+    """Return the first mode, then the further ones, whose own unknowns begin with `unknown`."""
     first = SupportMode(physical.translational_compliance_m_n, physical.support_mass_kg)
     further = [each for each in physical.support_modes if np.any(each.compliance_m_n[:, end])]
     own = np.arange(unknown, unknown + len(further))
@@ -82,7 +82,7 @@ def _swing(
 def on_swings(
     stiffness: FloatArray, mass: FloatArray, found: tuple[Swing, ...]
 ) -> tuple[FloatArray, FloatArray]:
-    """A bar's stiffness and mass with those of what swings at its ends.
+    """Return a bar's stiffness and mass with those of what swings at its ends.
 
     The bar's stiffness may be overwritten.
     """

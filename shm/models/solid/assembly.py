@@ -1,5 +1,7 @@
-"""One bending plane of a solid hanger on its supports, as an affine system: stiffness, mass and
-initial-stress stiffness under unit tension, on second-order hexahedra, end faces and their edges.
+"""One bending plane of a solid hanger on its supports, as an affine system.
+
+Stiffness, mass and initial-stress stiffness under unit tension, on second-order hexahedra, end
+faces and their edges.
 
 The matrices of linear elasticity are put together from the nine scalar integrals of products of
 two gradients (Zienkiewicz and Taylor 2000, vol. 1, 4.5); the initial-stress stiffness is that of
@@ -52,12 +54,12 @@ _STRAIN = 1e-3
 def assembled(
     geometry: Geometry, material: Material, support: Support, plane: Plane
 ) -> AffineSystem:
-    """The system of a hanger's motions in `plane`."""
+    """Return the system of a hanger's motions in `plane`."""
     return bending_plane(Solid.of(Mesh.of(geometry), material), support, plane)
 
 
 def bending_plane(solid: Solid, support: Support, plane: Plane) -> AffineSystem:
-    """The system of motions in `plane`: antisymmetric to the plane across it."""
+    """Return the system of motions in `plane`: antisymmetric to the plane across it."""
     axis = PLANES.index(plane)
     free = ~_held(solid, support, axis).ravel()
     springs = _springs(solid, support, plane)
@@ -80,8 +82,10 @@ def bending_plane(solid: Solid, support: Support, plane: Plane) -> AffineSystem:
 def surface_of_mode(
     geometry: Geometry, material: Material, support: Support, point: FloatArray, order: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Corners (facets, 4, 3) of the whole hanger's surface in m, and how the transverse mode of
-    `order` moves them, the largest by 1, at a point of tension in N and log10 k."""
+    """Return corners (facets, 4, 3) of the surface in m, and their motion in a transverse mode.
+
+    The largest motion is 1; the mode is that of `order` at a point of tension in N and log10 k.
+    """
     solid = Solid.of(Mesh.of(geometry), material)
     system = bending_plane(solid, support, "transverse")
     found = natural_modes(system, float(point[0]), 10 ** point[1:], order)
@@ -208,7 +212,7 @@ def _stiff(mesh: Mesh, material: Material) -> tuple[csr_array, csr_array, FloatA
 
 
 def _gauss(*points: int) -> tuple[FloatArray, FloatArray]:
-    """The product rule with that many points along each axis of the unit cell."""
+    """Return the product rule with that many points along each axis of the unit cell."""
     rules = [np.polynomial.legendre.leggauss(n) for n in points]
     places = np.meshgrid(*((x + 1) / 2 for x, _ in rules), indexing="ij")
     weights = np.einsum("i,j,k->ijk", *(w / 2 for _, w in rules))
@@ -220,7 +224,7 @@ def _gradient_product(basis: Basis, i: int, j: int) -> csr_array:
 
 
 def _initial_stress(basis: Basis, stress: dict[str, FloatArray]) -> csr_array:
-    """The form grad v . s grad u for the stress field s."""
+    """Return the form grad v . s grad u for the stress field s."""
 
     def form(u: Any, v: Any, w: Any) -> Any:
         terms = [w[f"s{i}{j}"] * u.grad[j] * v.grad[i] for i in range(3) for j in range(3)]
@@ -256,7 +260,7 @@ def _pulled(mesh: Mesh, stiffness: csr_array) -> FloatArray:
 
 
 def _stress(basis: Basis, displacement: FloatArray, material: Material) -> dict[str, FloatArray]:
-    """The stress field at the points of integration, by component."""
+    """Return the stress field at the points of integration, by component."""
     lame, shear = material.lame_pa
     gradient = np.stack([basis.interpolate(displacement[i::3]).grad for i in range(3)])
     dilation = lame * np.trace(gradient)
@@ -285,7 +289,7 @@ class Mesh:
 
     @classmethod
     def of(cls, geometry: Geometry) -> Mesh:
-        """The quarter of the hanger."""
+        """Return the quarter of the hanger."""
         corners = _cells(geometry)[:, None, :] + _HEXAHEDRON
         points, index = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
         linear = MeshHex1(*_by_column(points, index.reshape(len(corners), 8)), validate=False)
@@ -293,7 +297,7 @@ class Mesh:
         return cls(geometry, MeshHex2(geometry.place(grid), linear.t, validate=False), grid)
 
     def moved(self, displacement_m: FloatArray) -> Mesh:
-        """The mesh with its nodes displaced by (3 nodes,)."""
+        """Return the mesh with its nodes displaced by (3 nodes,)."""
         places = self.cells.doflocs + displacement_m.reshape(-1, 3).T
         cells = MeshHex2(np.ascontiguousarray(places), self.cells.t, validate=False)
         return replace(self, cells=cells)
@@ -326,7 +330,7 @@ class Mesh:
         return shares
 
     def edges(self, edges: Sequence[Edge]) -> csr_array:
-        """The integral of u v ds along edges of the end faces' quarters, (nodes, nodes), in m."""
+        """Return the integral (nodes, nodes) of u v ds along edges of the end faces' quarters."""
         total = csr_array((self.nodes, self.nodes))
         for arch, large in edges:
             total = total + self._edge(arch, large)
@@ -350,7 +354,7 @@ class Mesh:
         return float(self.grid[2].max()) if arch else 0.0
 
     def _find(self, grid: FloatArray) -> IntArray:
-        """The nodes at places (3, points) of the grid."""
+        """Return the nodes at places (3, points) of the grid."""
         numbers = {tuple(place): number for number, place in enumerate(self.grid.T.tolist())}
         return np.array([numbers[tuple(place)] for place in grid.T.tolist()])
 

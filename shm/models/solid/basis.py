@@ -48,11 +48,11 @@ class Description:
     upper: tuple[float, ...]
 
     def system(self, plane: Plane, modes: int) -> AffineSystem:
-        """The full model's bending plane, on a mesh that resolves that many modes."""
+        """Return the full model's bending plane, on a mesh that resolves that many modes."""
         return self.meshed(plane, max(self.geometry.fineness.rod, _CELLS_A_MODE * modes))
 
     def meshed(self, plane: Plane, rod: int) -> AffineSystem:
-        """The full model's bending plane with that many cells along the rod."""
+        """Return the full model's bending plane with that many cells along the rod."""
         from shm.models.solid.assembly import assembled
 
         fine = replace(self.geometry.fineness, rod=rod)
@@ -71,7 +71,7 @@ class Description:
         )
 
     def key(self, modes: int) -> str:
-        """A name that changes with anything that would change the basis."""
+        """Return a name that changes with anything that would change the basis."""
         text = json.dumps([_VERSION, TARGET_ERROR, modes, asdict(self)], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
@@ -80,14 +80,14 @@ _made: dict[tuple[Description, int], Reduction] = {}
 
 
 def rounded_up(modes: int) -> int:
-    """The number of modes that a basis for `modes` is made for."""
+    """Return the number of modes that a basis for `modes` is made for."""
     return -(-modes // _BATCH_OF_MODES) * _BATCH_OF_MODES
 
 
 def transverse_basis(
     description: Description, modes: int, progress: Callable[[float], None]
 ) -> Reduction:
-    """The basis for the first `modes` transverse modes."""
+    """Return the basis for the first `modes` transverse modes."""
     modes = rounded_up(modes)
     if (description, modes) not in _made:
         key = description.key(modes)
@@ -117,7 +117,7 @@ def folder() -> Path:
 
 
 def load(key: str) -> Reduction | None:
-    """The basis of that key; None where there is none that can be read."""
+    """Return the basis of that key; None where there is none that can be read."""
     path = _path(key)
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
@@ -136,7 +136,7 @@ def load(key: str) -> Reduction | None:
 
 
 def save(key: str, reduction: Reduction) -> None:
-    """Writes the basis whole or not at all; where the folder refuses it, says so and goes on."""
+    """Write the basis whole or not at all; where the folder refuses it, says so and goes on."""
     path = _path(key)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -77,7 +77,7 @@ class SolidModel(Model):
         )
 
     def prepare(self, modes: int, progress: Callable[[float], None] = silent) -> None:
-        """Makes the reduced basis for that many modes a plane, where it is not there yet."""
+        """Make the reduced basis for that many modes a plane, where it is not there yet."""
         transverse_basis(self.description(), modes, progress)
 
     def frequencies_hz(self, theta: FloatArray, modes: int) -> FloatArray:
@@ -120,8 +120,11 @@ class SolidModel(Model):
         return found
 
     def surface(self, theta: FloatArray, plane: Plane, order: int) -> tuple[FloatArray, FloatArray]:
-        """Corners (facets, 4, 3) of the surface in m (x transverse, y longitudinal, z from the deck
-        end) and how the mode moves them, the largest by 1; by the full model."""
+        """Return corners (facets, 4, 3) of the surface in m, and their motion in a mode.
+
+        x is transverse, y longitudinal, z from the deck end; the largest motion is 1. By the full
+        model.
+        """
         from shm.models.solid.assembly import surface_of_mode
 
         asked = self.description()
@@ -148,7 +151,7 @@ class SolidModel(Model):
         return np.stack(deck, axis=1), np.stack(arch[::-1], axis=1)
 
     def description(self) -> Description:
-        """What the basis depends on."""
+        """Return what the basis depends on."""
         lower, upper = self.prior.lower.copy(), self.prior.upper.copy()
         lower[0] *= self.hanger.nominal_tension_n
         upper[0] *= self.hanger.nominal_tension_n
@@ -178,7 +181,7 @@ class SolidModel(Model):
         return np.hstack([tension, theta[:, columns]])
 
     def _slots(self, plane: Plane) -> list[str]:
-        """The parameters that stand for the springs of the transverse system."""
+        """Return the parameters that stand for the springs of the transverse system."""
         slots = self.support.springs("transverse")
         return list(slots) if plane == "transverse" else [_MIRRORED[name] for name in slots]
 
@@ -219,7 +222,7 @@ class S2(SolidModel):
     with_plates = False
 
     def refuse(self, test: ModalTest) -> None:
-        """Raises BadInput for a known mass: its place counts along the whole hanger."""
+        """Raise BadInput for a known mass: its place counts along the whole hanger."""
         if test.added_mass is not None:
             raise BadInput(
                 f"test {test.id} has a known mass clamped on, which model class s2 does not have.",

@@ -1,5 +1,4 @@
-"""A round rod with or without end plates, as a map from a grid of unit cells; its steel and
-supports.
+"""A round rod with or without end plates, as a map from unit cells, its steel and supports.
 
 x is transverse, y longitudinal, z along the hanger from the deck end. Only the quarter x, y >= 0 is
 meshed. In the section, unit (0, 0) is the core that rod and plates share, (1, 0) and (0, 1) are
@@ -85,7 +84,7 @@ class Geometry:
         return self.plate.thickness_m / 2 if self.plate else 0.5 * self.radius_m
 
     def zones(self) -> tuple[Zone, ...]:
-        """The stretches from the deck end to the arch end."""
+        """Return the stretches from the deck end to the arch end."""
         fine, length, plate = self.fineness, self.length_m, self.plate
         if plate is None:
             return (Zone(0.0, length, fine.rod, has_rod=True),)
@@ -99,7 +98,7 @@ class Geometry:
         )
 
     def section_cells(self, zone: Zone) -> Iterator[tuple[int, int]]:
-        """The cells (i, j) of the grid that the sections of `zone` have."""
+        """Return the cells (i, j) of the grid that the sections of `zone` have."""
         across = self.fineness.section
         if zone.has_rod:
             yield from product(range(2 * across), repeat=2)
@@ -139,7 +138,7 @@ class Geometry:
         return np.where(in_corner, corner_along, along), np.where(in_corner, corner_across, across)
 
     def _corner(self, u: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The unit (1, 1), blended from its two straight and two circular sides.
+        """Return the unit (1, 1), blended from its two straight and two circular sides.
 
         Coons 1967: u and v run from 0 to 1 along and across the plate.
         """
@@ -196,7 +195,7 @@ class Support:
     lateral_springs: bool
 
     def springs(self, plane: Plane) -> tuple[str, ...]:
-        """The parameters of the springs that act on motions in `plane`."""
+        """Return the parameters of the springs that act on motions in `plane`."""
         axial = tuple(AXIAL) if self.axial_springs else ()
         return axial + (tuple(LATERAL[plane]) if self.lateral_springs else ())
 

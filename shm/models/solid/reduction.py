@@ -72,7 +72,7 @@ def stiffness(
 def natural_modes(
     system: AffineSystem, tension_n: float, springs_n_m: FloatArray, modes: int
 ) -> Modes:
-    """The lowest modes, by Lanczos iterations with the factorised stiffness."""
+    """Return the lowest modes, by Lanczos iterations with the factorised stiffness."""
     matrix = stiffness(system, tension_n, springs_n_m)
     inverse = scipy.sparse.linalg.LinearOperator(matrix.shape, matvec=factorised(matrix).solve)
     # A fixed start makes the result the same each time.
@@ -85,7 +85,7 @@ def natural_modes(
 
 
 def factorised(matrix: scipy.sparse.csc_array) -> scipy.sparse.linalg.SuperLU:
-    """The factors of a symmetric positive definite matrix."""
+    """Return the factors of a symmetric positive definite matrix."""
     return scipy.sparse.linalg.splu(
         matrix,
         permc_spec="MMD_AT_PLUS_A",
@@ -148,7 +148,7 @@ class Reservoir:
         self.matrices = np.zeros((4 + len(self.system.springs), 0, 0))
 
     def add(self, modes: Modes) -> None:
-        """Takes in further modes; what earlier ones span already adds no vector."""
+        """Take in further modes; what earlier ones span already adds no vector."""
         energy = np.sqrt(np.einsum("ij,ij->j", modes.vectors, self.reference @ modes.vectors))
         new = modes.vectors / energy
         rest = self._beyond(self._beyond(new))
@@ -163,12 +163,12 @@ class Reservoir:
         self.coordinates = np.hstack([known, self.vectors.T @ (self.reference @ new)])
 
     def _beyond(self, vectors: FloatArray) -> FloatArray:
-        """The part of `vectors` outside of the span."""
+        """Return the part of `vectors` outside of the span."""
         known = self.vectors @ (self.vectors.T @ (self.reference @ vectors))
         return np.asarray(vectors - known)
 
     def _grown(self, added: FloatArray) -> FloatArray:
-        """The projected matrices (mass first) with rows and columns for the `added` vectors."""
+        """Return the projected matrices (mass first), rows and columns of `added` vectors in."""
         system, old, count = self.system, self.vectors.shape[1], added.shape[1]
         grown = np.zeros((len(self.matrices), old + count, old + count))
         grown[:, :old, :old] = self.matrices
@@ -188,11 +188,11 @@ class Reservoir:
         return int(self.vectors.shape[1])
 
     def whole(self) -> Projected:
-        """The system on all vectors."""
+        """Return the system on all vectors."""
         return self.compressed(self.size)[1]
 
     def compressed(self, unknowns: int) -> tuple[FloatArray, Projected]:
-        """The basis (reservoir, n) of the strongest directions, and the system on it.
+        """Return the basis (reservoir, n) of the strongest directions, and the system on it.
 
         Directions whose mass is lost in rounding, local motions of very high frequency, are left
         out of it.
@@ -209,7 +209,7 @@ class Reservoir:
 def reduce(
     system: AffineSystem, box: Box, modes: int, progress: Callable[[float], None]
 ) -> Reduction:
-    """The smallest basis whose estimated error in frequency is within `TARGET_ERROR` over `box`.
+    """Return the smallest basis with an estimated error within `TARGET_ERROR` over `box`.
 
     `progress` hears the fraction done, as far as it can be told.
     """
@@ -235,7 +235,7 @@ def _filled(
     modes: int,
     progress: Callable[[float], None],
 ) -> tuple[Reservoir, int]:
-    """A reservoir good over the candidates, and how many full solutions it holds."""
+    """Return a reservoir good over the candidates, and how many full solutions it holds."""
     middle = (box.lower + box.upper) / 2
     springs = np.full(len(system.springs), _REFERENCE_SPRING_N_M)
     reservoir = Reservoir(system, stiffness(system, float(middle[0]), springs))
@@ -259,7 +259,7 @@ def _solution(system: AffineSystem, point: FloatArray, modes: int) -> Modes:
 
 
 def _error(projected: Projected, points: FloatArray, truth_hz: FloatArray) -> FloatArray:
-    """The worst fractional error (m,) of each point's frequencies (m, modes)."""
+    """Return the worst fractional error (m,) of each point's frequencies (m, modes)."""
     own = projected.frequencies_hz(points, truth_hz.shape[1])
     return np.asarray(np.abs(own / truth_hz - 1).max(axis=1))
 
@@ -267,7 +267,7 @@ def _error(projected: Projected, points: FloatArray, truth_hz: FloatArray) -> Fl
 def _least_certain(
     reservoir: Reservoir, candidates: FloatArray, unused: BoolArray, modes: int
 ) -> int:
-    """The unused candidate where the reservoir and most of it differ most."""
+    """Return the unused candidate where the reservoir and most of it differ most."""
     whole = reservoir.whole().frequencies_hz(candidates, modes)
     most = reservoir.compressed(max(modes, int(0.8 * reservoir.size)))[1]
     return int(np.where(unused, _error(most, candidates, whole), -1.0).argmax())
@@ -276,7 +276,7 @@ def _least_certain(
 def _smallest(
     reservoir: Reservoir, candidates: FloatArray, modes: int
 ) -> tuple[FloatArray, Projected, float]:
-    """The smallest compression within the target of the reservoir, and its worst error."""
+    """Return the smallest compression within the target of the reservoir, and its worst error."""
     whole = reservoir.whole().frequencies_hz(candidates, modes)
     within, worst = (1 - _SHARE_OF_TARGET) * TARGET_ERROR, 0
     for unknowns in range(modes, reservoir.size + 1):
@@ -315,12 +315,12 @@ class Projected:
         return np.asarray((factors @ flat).reshape(square))
 
     def frequencies_hz(self, points: FloatArray, modes: int) -> FloatArray:
-        """The lowest frequencies (m, modes) at points (m, 1 + springs)."""
+        """Return the lowest frequencies (m, modes) at points (m, 1 + springs)."""
         eigenvalues = np.linalg.eigvalsh(self.stiffness(points))[:, :modes]
         return np.asarray(np.sqrt(eigenvalues) / (2 * np.pi))
 
     def modes(self, points: FloatArray, modes: int) -> FloatArray:
-        """The coordinates (m, n, modes) of the lowest modes at points (m, 1 + springs)."""
+        """Return the coordinates (m, n, modes) of the lowest modes at points (m, 1 + springs)."""
         return np.asarray(np.linalg.eigh(self.stiffness(points))[1][:, :, :modes])
 
 
