@@ -49,7 +49,7 @@ from tests.benchmarks.watch_trial.outcomes import BEGINS  # noqa: E402
 from tests.benchmarks.watch_trial.report import HEADS, events, save_figure, tables  # noqa: E402
 from tests.benchmarks.watch_trial.rivals import rivals  # noqa: E402
 
-WORLDS = ("tied_arch", "network")
+WORLDS = ("tied_arch", "network", "road_bridge")
 ON_A_BRIDGE = 6
 """Hangers of one bridge; a quiet one gives as many, one with an event a single one."""
 
@@ -96,14 +96,17 @@ def hanger_of(description: dict[str, Any], number: int) -> Hanger:
     names = {"modulus_pa": "elastic_modulus_pa"}
     taken = (
         "diameter_m", "area_m2", "second_moment_m4", "mass_per_length_kg_m", "length_m",
-        "nominal_tension_n", "elastic_modulus_pa", "density_kg_m3",
+        "nominal_tension_n", "elastic_modulus_pa", "density_kg_m3", "bending_stiffness_factor",
+        "fittings_m", "ends", "inclination_deg",
     )  # fmt: skip
     for key, value in known.items():
         key = names.get(key, key)
         if key in taken and not (key == "density_kg_m3" and "diameter_m" not in known):
-            lines.append(f"{key} = {value!r}")
+            lines.append(f"{key} = {json.dumps(value)}")
     if known.get("kind") == "strand":
         lines.append('kind = "strand"')
+    for each in known.get("turnbuckle", ()):
+        lines += ["[[hanger.turnbuckle]]", *(f"{key} = {value!r}" for key, value in each.items())]
     path = CACHE / f"hanger-{hashlib.sha256(repr(lines).encode()).hexdigest()[:16]}.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("\n".join(lines) + "\n")
