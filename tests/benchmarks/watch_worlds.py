@@ -56,6 +56,8 @@ ON_A_BRIDGE = 6
 SCENARIOS: dict[str, tuple[str, dict[str, Any]]] = {
     "quiet": ("none", {}),
     "creep": ("none", {}),
+    "step1": ("tension_step", {"size": -0.01}),
+    "step2": ("tension_step", {"size": -0.02}),
     "step3": ("tension_step", {"size": -0.03}),
     "step5": ("tension_step", {"size": -0.05}),
     "step10": ("tension_step", {"size": -0.10}),
@@ -64,6 +66,7 @@ SCENARIOS: dict[str, tuple[str, dict[str, Any]]] = {
     "ramp2": ("tension_ramp", {"size": -0.02}),
     "ramp5": ("tension_ramp", {"size": -0.05}),
     "springs": ("springs", {"size": 1 / 3}),
+    "springs10": ("springs", {"size": 1 / 10}),
     "lamp": ("lamp", {"size": 8.0}),
     "clock": ("clock", {"size": 0.002}),
     "section": ("section_loss", {"size": 0.10}),
@@ -139,6 +142,11 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
         tests = tests_of(described.visits)
         if len(tests) < baseline_tests + 6:
             continue
+        start = tests[0].time
+        days = [(t.time - start).total_seconds() / 86400 for t in tests]
+        zero = described_day(season, number, tests)
+        if SCENARIOS[scenario][0] != "none" and days[baseline_tests - 1] + zero >= BEGINS:
+            continue  # the baseline would hold the event
         hanger = hanger_of(described.description, number)
         first = tests[:baseline_tests]
         check = check_baseline(first, build("beam2", hanger))
@@ -151,9 +159,6 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
             WatchOptions(baseline_tests=baseline_tests),
         )  # fmt: skip
         seconds = time.process_time() - started
-        start = tests[0].time
-        days = [(t.time - start).total_seconds() / 86400 for t in tests]
-        zero = described_day(season, number, tests)
         alerts = [
             *alerts_of(watched.watch.tests, hanger),
             *agreeing(watched, dated, baseline_tests, hanger),

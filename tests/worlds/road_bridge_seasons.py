@@ -334,7 +334,7 @@ class Weather:
     def at(self, series: Array, days: Array) -> Array:
         """Return a series at days from the season's first."""
         hours = np.arange(len(series)) / 24 - SETTLING_DAYS
-        return np.interp(days, hours, series)
+        return np.asarray(np.interp(days, hours, series))
 
 
 def weather(seed: int, begin_day: float, years: float) -> Weather:
