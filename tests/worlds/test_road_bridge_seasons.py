@@ -33,11 +33,11 @@ DAY = 540.0
 
 @cache
 def _quiet(seed: int = 4) -> Season:
-    return season(seed, years=3.0, event=QUIET, nuisances=Nuisances.none())
+    return season(seed, years=2.2, event=QUIET, nuisances=Nuisances.none())
 
 
 def _with(event: Event, seed: int = 4, **on: bool) -> Season:
-    return season(seed, years=3.0, event=event, nuisances=Nuisances.none(**on))
+    return season(seed, years=2.2, event=event, nuisances=Nuisances.none(**on))
 
 
 def _first_hz(found: Season, number: int) -> Any:
@@ -109,7 +109,7 @@ def test_weather_has_seasons_and_lags() -> None:
     assert sky.hanger.max() > air.max()
 
 
-@pytest.mark.parametrize("size", [-0.10, -0.05, -0.02, -0.01])
+@pytest.mark.parametrize("size", [-0.10, -0.01])
 def test_a_lost_tension_goes_to_the_neighbours(size: float) -> None:
     number = 6
     found = _with(Event("tension_step", number, DAY, size))
@@ -146,7 +146,7 @@ def test_a_neighbours_loss_raises_by_its_size() -> None:
     [("springs", 1 / 3), ("springs", 0.1), ("lamp", 20.0), ("section_loss", 0.08)],
 )
 def test_events_that_keep_the_tension_move_frequencies(kind: str, size: float) -> None:
-    for number in _tested_after()[::8]:
+    for number in _tested_after()[::9]:
         found = _with(Event(kind, number, DAY, size, end="arch")).hangers[number].truth
         quiet = _quiet().hangers[number].truth
         after = found["day"] >= DAY
@@ -223,7 +223,7 @@ def test_half_of_the_hangers_have_one_event_each() -> None:
 
 def test_errors_are_as_stated_or_half_as_large_again() -> None:
     errors = []
-    for seed in range(4):
+    for seed in range(2):
         found = _with(QUIET, seed=seed, scatter=True, misstated=True)
         for each in found.hangers:
             for visit, exact in zip(each.visits, each.truth["exact_hz"], strict=True):
