@@ -49,13 +49,15 @@ from tests.benchmarks.watch_trial.outcomes import BEGINS  # noqa: E402
 from tests.benchmarks.watch_trial.report import HEADS, events, save_figure, tables  # noqa: E402
 from tests.benchmarks.watch_trial.rivals import rivals  # noqa: E402
 
-WORLDS = ("tied_arch", "network")
+WORLDS = ("tied_arch", "network", "road_bridge")
 ON_A_BRIDGE = 6
 """Hangers of one bridge; a quiet one gives as many, one with an event a single one."""
 
 SCENARIOS: dict[str, tuple[str, dict[str, Any]]] = {
     "quiet": ("none", {}),
     "creep": ("none", {}),
+    "step1": ("tension_step", {"size": -0.01}),
+    "step2": ("tension_step", {"size": -0.02}),
     "step3": ("tension_step", {"size": -0.03}),
     "step5": ("tension_step", {"size": -0.05}),
     "step10": ("tension_step", {"size": -0.10}),
@@ -64,6 +66,7 @@ SCENARIOS: dict[str, tuple[str, dict[str, Any]]] = {
     "ramp2": ("tension_ramp", {"size": -0.02}),
     "ramp5": ("tension_ramp", {"size": -0.05}),
     "springs": ("springs", {"size": 1 / 3}),
+    "springs10": ("springs", {"size": 1 / 10}),
     "lamp": ("lamp", {"size": 8.0}),
     "clock": ("clock", {"size": 0.002}),
     "section": ("section_loss", {"size": 0.10}),
@@ -96,14 +99,17 @@ def hanger_of(description: dict[str, Any], number: int) -> Hanger:
     names = {"modulus_pa": "elastic_modulus_pa"}
     taken = (
         "diameter_m", "area_m2", "second_moment_m4", "mass_per_length_kg_m", "length_m",
-        "nominal_tension_n", "elastic_modulus_pa", "density_kg_m3",
+        "nominal_tension_n", "elastic_modulus_pa", "density_kg_m3", "bending_stiffness_factor",
+        "fittings_m", "ends", "inclination_deg",
     )  # fmt: skip
     for key, value in known.items():
         key = names.get(key, key)
         if key in taken and not (key == "density_kg_m3" and "diameter_m" not in known):
-            lines.append(f"{key} = {value!r}")
+            lines.append(f"{key} = {json.dumps(value)}")
     if known.get("kind") == "strand":
         lines.append('kind = "strand"')
+    for each in known.get("turnbuckle", ()):
+        lines += ["[[hanger.turnbuckle]]", *(f"{key} = {value!r}" for key, value in each.items())]
     path = CACHE / f"hanger-{hashlib.sha256(repr(lines).encode()).hexdigest()[:16]}.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("\n".join(lines) + "\n")
@@ -136,6 +142,11 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
         tests = tests_of(described.visits)
         if len(tests) < baseline_tests + 6:
             continue
+        start = tests[0].time
+        days = [(t.time - start).total_seconds() / 86400 for t in tests]
+        zero = described_day(season, number, tests)
+        if SCENARIOS[scenario][0] != "none" and days[baseline_tests - 1] + zero >= BEGINS:
+            continue  # the baseline would hold the event
         hanger = hanger_of(described.description, number)
         first = tests[:baseline_tests]
         check = check_baseline(first, build("beam2", hanger))
@@ -148,9 +159,6 @@ def solved(task: tuple[str, str, int, int, float]) -> list[dict[str, Any]]:
             WatchOptions(baseline_tests=baseline_tests),
         )  # fmt: skip
         seconds = time.process_time() - started
-        start = tests[0].time
-        days = [(t.time - start).total_seconds() / 86400 for t in tests]
-        zero = described_day(season, number, tests)
         alerts = [
             *alerts_of(watched.watch.tests, hanger),
             *agreeing(watched, dated, baseline_tests, hanger),
