@@ -213,7 +213,7 @@ def _family_row(key: tuple[str, str], pairs: Sequence[Diagnosed]) -> tuple[str, 
 
 
 def _length_row(each: Arrangement, found: Diagnosis) -> tuple[str, ...]:
-    best, hinge = found.causes[0], _hinge(found)
+    best, hinge = max(found.causes, key=lambda each: each.probability), _hinge(found)
     group = found.groups[best.group] if best.group is not None else ()
     return (
         f"{each.hanger.length_m:.3f}",
@@ -282,7 +282,7 @@ def told(file: str, hanger: Hanger, tests: list[ModalTest]) -> str:
 
 
 def _cause_row(cause: Cause) -> tuple[str, ...]:
-    sizes = [f"{quantity(each.name)} {size(each)}" for each in cause.parameters]
+    sizes = [f"{quantity(each)} {size(each)}" for each in cause.parameters]
     return (
         label(cause),
         probability(cause.probability),

@@ -44,6 +44,8 @@ sys.path.insert(0, str(ROOT))
 import shm  # noqa: E402
 from shm.diagnosis_document import diagnosis_document  # noqa: E402
 from shm.documents import dump  # noqa: E402
+from tests.benchmarks.blind_page import list_hanger, write_page  # noqa: E402
+from tests.benchmarks.blind_scores import Row, effects_of_class, score, table  # noqa: E402
 from tests.worlds import finite_elements, gapped_hangers, spectral  # noqa: E402
 
 Truth = dict[str, Any]
@@ -75,7 +77,7 @@ def plan_hangers(count: int, seed: int) -> list[Plan]:
     deck: list[str] = []
     for number in range(count - n_sound):
         deck = deck or [str(each) for each in rng.permutation(gapped_hangers.FAULTY)]
-        causes = (deck.pop(),)
+        causes: tuple[str, ...] = (deck.pop(),)
         if number % PAIR_EVERY == PAIR_EVERY - 1:
             others = [each for each in gapped_hangers.SECOND if each != causes[0]]
             causes = (*causes, str(rng.choice(others)))
@@ -242,14 +244,15 @@ def hangers_to_repeat(
             yield name
 
 
-def effects_of_class(answer: dict[str, Any]) -> set[str]:
-    """Return the effects that are parameters of the model class that the diagnosis chose."""
-    invisible = answer.get("diagnosis", {}).get("invisible", [])
-    return {each["effect"] for each in invisible if "parameters of its own" in each["why"]}
+def read_rows(trial: Trial) -> list[Row]:
+    """Return every answer beside the truth, the round without the causes last."""
+    truths = trial.open_truth()
+    rounds = (trial.answers(COMPLETE), trial.answers(LEFT_OUT))
+    return [Row(truths[name], answer) for each in rounds for name, answer in each.items()]
 
 
-def main() -> None:
-    """Make, solve and score a trial."""
+def main() -> int:
+    """Make, solve and score a trial; return 1 where a mark is missed."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -258,12 +261,23 @@ def main() -> None:
     parser.add_argument("--left-out", type=int, default=12)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--score", action="store_true", help="diagnose no more")
+    parser.add_argument("--write-docs", action="store_true")
     given = parser.parse_args()
     trial = Trial(given.folder.resolve())
-    if not (trial.folder / "trial.json").exists():
-        make_trial(trial, given.hangers, given.left_out, given.seed)
-    run(trial, given.jobs)
+    if not given.score:
+        if not (trial.folder / "trial.json").exists():
+            make_trial(trial, given.hangers, given.left_out, given.seed)
+        run(trial, given.jobs)
+    rows = read_rows(trial)
+    for row in rows:
+        print(" | ".join(list_hanger(row)))
+    marks = score(rows)
+    print(table(marks))
+    if given.write_docs:
+        write_page(rows, trial.read())
+    return int(any(mark.is_met is False for mark in marks))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
