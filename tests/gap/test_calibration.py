@@ -14,7 +14,7 @@ from shm.gap.calibration import CALIBRATION, FILE, Calibration, Provenance, read
 from shm.gap.contract import Hypothesis
 from shm.gap.search import fit_alone
 from shm.models.effects import Variant
-from tests.benchmarks.blind.making import make_trial
+from tests.benchmarks.blind_trial import make_hanger, plan_hangers
 from tests.benchmarks.gap_calibration import Lesson, calibrated, lesson, shares, text, ways_of
 from tests.helpers.gap_campaigns import campaign, fit_of, problem_of
 
@@ -82,10 +82,12 @@ def _read_back(lessons: list[Lesson], folder: Path) -> Calibration:
 
 
 @pytest.mark.trial
-def test_a_trial_teaches_what_the_file_holds(tmp_path: Path) -> None:
-    """Two cases, each taken for ten: the file written of them reads back as it was."""
-    made = make_trial(tmp_path / "trial", 2, seed=7)
-    lessons = [lesson(tmp_path / "trial" / "cases" / each.case, each) for each in made]
-    assert any(each.own for each in lessons)
+def test_hangers_teach_what_the_file_holds(tmp_path: Path) -> None:
+    """Two hangers with a cause, each taken for ten: the file written of them reads back."""
+    plans = [each for each in plan_hangers(12, seed=7) if each.causes]
+    made = [make_hanger(each, 7, tmp_path / each.name) for each in plans]
+    listed = [each for each in made if each["accepted"]][:2]
+    lessons = [lesson(tmp_path / each["hanger"], each) for each in listed]
+    assert any(each.mimicking for each in lessons)
     read = _read_back(lessons * 10, tmp_path)
     assert sum(each.own for each in read.off_by.values()) < 1
