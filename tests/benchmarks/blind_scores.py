@@ -91,7 +91,8 @@ class Row:
             return bool(self.named & (true | set(self.truth["inherent"])))
         if self.outcome is Outcome.NO_GAP:
             return self.is_sound or self.in_class
-        return self.outcome is not None and (self.is_without or not self.truth["accepted"])
+        is_unlisted = self.is_without or not (self.is_sound or self.truth["accepted"])
+        return self.outcome is not None and is_unlisted
 
     @property
     def is_false_cause(self) -> bool:
@@ -152,8 +153,8 @@ def find_contradictions(found: Diagnosis) -> list[str]:
         said.append("settled, though a remark doubts that the tests are of this hanger")
     before, after = found.tension_before_n, found.tension_after_n
     for each in (before, after):
-        ordered = (each.q025, each.q05, each.mean, each.q95, each.q975)
-        if math.isfinite(each.mean) and list(ordered) != sorted(ordered):
+        ordered = [each.q025, each.q05, each.mean, each.q95, each.q975]
+        if all(map(math.isfinite, ordered)) and ordered != sorted(ordered):
             said.append("the interval of the tension does not hold its mean")
     if none >= STATED and not before.q025 <= after.mean <= before.q975:
         said.append("no gap, but another tension than without one")
@@ -225,28 +226,30 @@ def score(rows: Sequence[Row]) -> list[Mark]:
     stated = [row for row in full if row.outcome in CLAIMS and row.probability >= STATED]
     return [
         Mark("refused", "", f"{len(rows) - len(done)} of {len(rows)}"),
-        count("gap claimed on sound hangers", sound, lambda r: not r.is_right, most=1 / 20),
-        count("... a false cause named", sound, lambda r: r.is_false_cause),
+        count("gap claimed on sound hangers", sound, _claims_a_gap, most=1 / 20),
+        count("a false cause named, sound hangers", sound, lambda r: r.is_false_cause),
         count("cause named first", asked, lambda r: is_planted(r, r.first), least=0.75),
         count("cause named first or in its group", asked, lambda r: is_planted(r, r.named), 0.92),
-        count(
-            "... most probable, whether named or not", asked, lambda r: is_planted(r, nearest(r))
-        ),
-        count("... no gap stated", asked, lambda r: r.outcome is Outcome.NO_GAP),
-        count("... not explained", asked, lambda r: r.outcome is Outcome.UNEXPLAINED),
-        count("... a false cause named", asked, lambda r: r.is_false_cause),
-        count("cause that the class has itself: no false cause", itself, lambda r: r.is_right),
+        count("cause most probable, named or not", asked, lambda r: is_planted(r, nearest(r))),
+        count("cause missed: no gap stated", asked, lambda r: r.outcome is Outcome.NO_GAP),
+        count("cause missed: not explained", asked, lambda r: r.outcome is Outcome.UNEXPLAINED),
+        count("cause missed: a false cause named", asked, lambda r: r.is_false_cause),
+        count("cause that the class has itself: no gap stated", itself, lambda r: r.is_right),
         count("cause off the catalogue: a false cause named", foreign, lambda r: r.is_false_cause),
         count(f"sure (> {SURE}) and wrong", full, is_sure_and_wrong, most=1 / 30),
-        count("... with the true cause left out", less, is_sure_and_wrong, most=1 / 10),
-        count("... a false cause named there", less, lambda r: r.is_false_cause),
+        count("sure and wrong, true cause left out", less, is_sure_and_wrong, most=1 / 10),
+        count("a false cause named, true cause left out", less, lambda r: r.is_false_cause),
         count(f"cause stated with {STATED} or more: right", stated, lambda r: r.is_right, 0.88),
         count("95 % interval of the tension holds", done, lambda r: r.holds, least=0.92),
-        count("... sound hangers", sound, lambda r: r.holds),
-        count("... with the true cause left out", less, lambda r: r.holds),
+        count("95 % interval, sound hangers", sound, lambda r: r.holds),
+        count("95 % interval, true cause left out", less, lambda r: r.holds),
         *_quantities(full),
         count("answers that contradict themselves", done, _contradicts, most=0.0),
     ]
+
+
+def _claims_a_gap(row: Row) -> bool:
+    return row.outcome is not Outcome.NO_GAP
 
 
 def _contradicts(row: Row) -> bool:
