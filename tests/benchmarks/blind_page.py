@@ -27,6 +27,7 @@ from tests.benchmarks.blind_scores import (
 TRIALS = Path(__file__).resolve().parents[2] / "docs" / "trials"
 BESIDE = "blind_trial/hangers.csv"
 RIGHT, WRONG, GREY = "#1b6ca8", "#c0392b", "#8a8a8a"
+PERCENT = -30, -10, -3, -1, 0, 1, 3, 10, 30, 100
 PROBABILITIES = 0.0, 0.5, 0.7, 0.8, 0.9, 1.0
 NO_GAP, NOT_EXPLAINED, SOUND = "no gap", "not explained", "sound"
 HEAD = (
@@ -91,8 +92,10 @@ def draw_reliability(axes: Axes, rows: Sequence[Row]) -> None:
             continue
         x, (bottom, top) = float(stated[chosen].mean()), interval(k, n)
         axes.errorbar(x, k / n, [[k / n - bottom], [top - k / n]], fmt="o", color=RIGHT, capsize=3)
-        axes.annotate(f"{k} of {n}", (x, k / n), (6, -12), textcoords="offset points", fontsize=8)
-    axes.set(xlim=(0, 1.08), ylim=(0, 1.02), xlabel="probability that the answer states")
+        axes.annotate(
+            f"{k} of {n}", (x, k / n), (-5, 4), textcoords="offset points", ha="right", fontsize=8
+        )
+    axes.set(xlim=(0, 1.02), ylim=(-0.03, 1.08), xlabel="probability that the answer states")
     axes.set(ylabel="fraction right, 90 % interval", title="Do the probabilities hold?")
     axes.legend(loc="upper left", frameon=False)
 
@@ -125,7 +128,8 @@ def draw_confusion(axes: Axes, rows: Sequence[Row]) -> None:
                 axes.annotate(
                     str(len(cell)), (x, y), color="white", ha="center", va="center", fontsize=9
                 )
-    axes.set_xticks(range(len(across)), [e.replace("_", " ") for e in across], rotation=90)
+    labels = [each.replace("_", " ").replace(" + ", "\n+ ") for each in across]
+    axes.set_xticks(range(len(across)), labels, rotation=90, fontsize=9)
     axes.set_yticks(range(len(up)), up)
     axes.set(xlim=(-0.7, len(across) - 0.3), ylim=(len(up) - 0.3, -0.7))
     axes.set(ylabel="planted", title="What was planted and what the verdict names first")
@@ -153,12 +157,14 @@ def draw_intervals(axes: Axes, rows: Sequence[Row]) -> None:
         axes.plot(before, y, "x", color=GREY, markersize=4)
     axes.axvline(0, color="black", linewidth=0.8)
     axes.set_xscale("symlog", linthresh=1)
+    axes.set_xticks(PERCENT, [f"{each:+g}" if each else "0" for each in PERCENT])
+    axes.set_xticks([], minor=True)
     axes.set_yticks([])
     axes.set(xlabel="tension over the truth, less one, % (logarithmic beyond 1 %)")
     axes.set(title="Tension: 95 % interval after the diagnosis (cross: mean before)")
     for colour, label in ((RIGHT, "holds the truth"), (WRONG, "misses it")):
         axes.plot([], [], color=colour, linewidth=2, label=label)
-    axes.legend(loc="upper left", frameon=False)
+    axes.legend(loc="lower left", frameon=False)
 
 
 def save_figures(rows: Sequence[Row], folder: Path) -> list[str]:
