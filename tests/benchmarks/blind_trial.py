@@ -76,7 +76,7 @@ def plan_hangers(count: int, seed: int) -> list[Plan]:
     ]
     deck: list[str] = []
     for number in range(count - n_sound):
-        deck = deck or [str(each) for each in rng.permutation(gapped_hangers.FAULTY)]
+        deck = deck or [str(each) for each in rng.permutation(list(gapped_hangers.CAUSES))]
         causes: tuple[str, ...] = (deck.pop(),)
         if number % PAIR_EVERY == PAIR_EVERY - 1:
             others = [each for each in gapped_hangers.SECOND if each != causes[0]]
@@ -89,7 +89,7 @@ def plan_hangers(count: int, seed: int) -> list[Plan]:
 def make_hanger(plan: Plan, seed: int, folder: Path) -> Truth:
     """Write the hanger's description and its tests; return the truth."""
     if plan.world == GAPPED:
-        case = gapped_hangers.make_case(seed, plan.index, causes=plan.causes or ("none",))
+        case = gapped_hangers.make_case(seed, plan.index, plan.causes)
         case.write(folder)
         kept = ("tension_n", "kind", "causes", "inherent")
         truth = {key: case.truth[key] for key in kept}

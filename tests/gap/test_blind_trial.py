@@ -59,7 +59,7 @@ def test_plan_hangers_quarter_sound_each_cause_once() -> None:
     sound = Counter(each.world for each in plans if not each.causes)
     assert sound == {blind_trial.GAPPED: 3, blind_trial.ELEMENTS: 3, blind_trial.SPECTRAL: 3}
     planted = Counter(each.causes[0] for each in plans if each.causes)
-    assert set(planted) == set(CAUSES) - {"none"}
+    assert set(planted) == set(CAUSES)
     assert max(planted.values()) == 2
     assert sum(len(each.causes) == 2 for each in plans) == 3
     assert len({(each.world, each.index) for each in plans}) == 36
