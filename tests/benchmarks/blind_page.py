@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -25,7 +26,7 @@ from tests.benchmarks.blind_scores import (
 )
 
 TRIALS = Path(__file__).resolve().parents[2] / "docs" / "trials"
-BESIDE = "blind_trial/hangers.csv"
+BESIDE, SEALED = "blind_trial/hangers.csv", "blind_trial/truth.json"
 RIGHT, WRONG, GREY = "#1b6ca8", "#c0392b", "#8a8a8a"
 PERCENT = -30, -10, -3, -1, 0, 1, 3, 10, 30, 100
 PROBABILITIES = 0.0, 0.5, 0.7, 0.8, 0.9, 1.0
@@ -185,17 +186,18 @@ def save_figures(rows: Sequence[Row], folder: Path) -> list[str]:
     return names
 
 
-def write_page(rows: Sequence[Row], trial: dict[str, object]) -> None:
-    """Fill in the page of the trial, its figures and its table of hangers."""
+def write_page(rows: Sequence[Row], trial: dict[str, object], truth: Path) -> None:
+    """Fill in the page of the trial, its figures, its table of hangers and the sealed file."""
     reliability, confusion, intervals = save_figures(rows, TRIALS / "figures")
     write_csv(TRIALS / BESIDE, [HEAD, *(list_hanger(row) for row in rows)])
+    shutil.copyfile(truth, TRIALS / SEALED)
     full = sum(not row.is_without for row in rows)
     sound = sum(row.is_sound for row in rows if not row.is_without)
     text = (
         f"{full} hangers, {sound} of them sound, and {len(rows) - full} of them once more without "
         f"the true cause; seed {trial['seed']}, commit {str(trial['commit'])[:8]}; SHA-256 of the "
         f"truth `{trial['truth_sha256']}`.\n\n{table(score(rows))}\n\n"
-        f"[Every hanger]({BESIDE}).\n\n"
+        f"[Every hanger]({BESIDE}), [the file that was sealed]({SEALED}).\n\n"
         f"![Fraction right over the probability stated](figures/{reliability})\n\n"
         f"![Planted causes against those named](figures/{confusion})\n\n"
         f"![The 95 % interval of each tension](figures/{intervals})"

@@ -82,13 +82,13 @@ class Row:
     def is_right(self) -> bool:
         """Return whether the answer is true.
 
-        That is a planted cause among those named, or a difference that a sound hanger has; no gap
-        where there is none, or where the class has the cause itself; not explained where the
-        catalogue has no cause of it.
+        That is a planted cause among those named, or first what a sound hanger differs by and
+        nothing else; no gap where there is none, or where the class has the cause itself; not
+        explained where the catalogue has no cause of it.
         """
         if self.outcome in CLAIMS:
             true = set() if self.is_without else set(self.truth["accepted"])
-            return bool(self.named & (true | set(self.truth["inherent"])))
+            return bool(self.named & true) or self.first <= set(self.truth["inherent"])
         if self.outcome is Outcome.NO_GAP:
             return self.is_sound or self.in_class
         is_unlisted = self.is_without or not (self.is_sound or self.truth["accepted"])

@@ -222,11 +222,14 @@ def solve(trial: Trial, which: str, wanted: dict[str, Sequence[str]], jobs: int)
             print(f"{which} {number} of {len(wanted)}: {name} {said}, {seconds}", flush=True)
 
 
-def run(trial: Trial, jobs: int) -> None:
-    """Diagnose all hangers, close the answers, open the truth, diagnose without the causes."""
+def run(trial: Trial, jobs: int, first: int | None = None) -> None:
+    """Diagnose the hangers, close the answers, open the truth, diagnose without the causes.
+
+    With `first` only so many are diagnosed, by their names.
+    """
     told = trial.read()
-    solve(trial, COMPLETE, dict.fromkeys(told["hangers"], ()), jobs)
     if "answers_sha256" not in told:
+        solve(trial, COMPLETE, dict.fromkeys(told["hangers"][:first], ()), jobs)
         trial.write(told | {"answers_sha256": trial.hash_answers(COMPLETE)})
     truths, answers = trial.open_truth(), trial.answers(COMPLETE)
     chosen = list(hangers_to_repeat(truths, answers))[: told["left_out"]]
@@ -237,9 +240,9 @@ def hangers_to_repeat(
     truths: dict[str, Truth], answers: dict[str, dict[str, Any]]
 ) -> Iterator[str]:
     """Yield the hangers with causes that the catalogue has and their model class has not itself."""
-    for name, truth in truths.items():
-        known = [set(each["accepted"]) for each in truth["causes"]]
-        itself = effects_of_class(answers[name])
+    for name, answer in answers.items():
+        known = [set(each["accepted"]) for each in truths[name]["causes"]]
+        itself = effects_of_class(answer)
         if known and all(each and not each & itself for each in known):
             yield name
 
@@ -261,6 +264,7 @@ def main() -> int:
     parser.add_argument("--left-out", type=int, default=12)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--first", type=int, help="diagnose only so many, by their names")
     parser.add_argument("--score", action="store_true", help="diagnose no more")
     parser.add_argument("--write-docs", action="store_true")
     given = parser.parse_args()
@@ -268,14 +272,14 @@ def main() -> int:
     if not given.score:
         if not (trial.folder / "trial.json").exists():
             make_trial(trial, given.hangers, given.left_out, given.seed)
-        run(trial, given.jobs)
+        run(trial, given.jobs, given.first)
     rows = read_rows(trial)
     for row in rows:
         print(" | ".join(list_hanger(row)))
     marks = score(rows)
     print(table(marks))
     if given.write_docs:
-        write_page(rows, trial.read())
+        write_page(rows, trial.read(), trial.truth_file)
     return int(any(mark.is_met is False for mark in marks))
 
 

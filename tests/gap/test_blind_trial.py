@@ -25,6 +25,7 @@ from tests.worlds.gapped_hangers import CAUSES
 TENSION = TensionEstimate(101.0, 1.0, 99.5, 102.5, 99.0, 103.0)
 EXPLAINED = replace(a_diagnosis(), tension_before_n=TENSION, tension_after_n=TENSION)
 SURE = replace(EXPLAINED, causes=(replace(MASS, probability=0.95),), no_gap_probability=0.02)
+PAIR = replace(EXPLAINED, causes=(replace(MASS, effect="point_mass + sag", probability=0.95),))
 NO_GAP = replace(
     EXPLAINED,
     causes=(replace(MASS, probability=0.05),),
@@ -183,6 +184,8 @@ def test_hangers_to_repeat() -> None:
         (make_row(EXPLAINED, "point_mass", "timebase"), True, False),
         (make_row(EXPLAINED, "timebase"), False, True),
         (make_row(EXPLAINED, "timebase", inherent=("point_mass",)), True, False),
+        (make_row(PAIR, "timebase", inherent=("point_mass",)), False, True),
+        (make_row(PAIR, "timebase", inherent=("point_mass", "sag")), True, False),
         (make_row(EXPLAINED, "point_mass", without=("point_mass",)), False, True),
         (make_row(EXPLAINED), False, True),
         (make_row(EXPLAINED, "crack", accepted=False), False, True),
