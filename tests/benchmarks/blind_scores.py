@@ -95,6 +95,14 @@ class Row:
         return self.outcome is not None and is_unlisted
 
     @property
+    def has_false_partner(self) -> bool:
+        """Return whether the first cause is a pair of a planted effect with a false one."""
+        planted = set(self.truth["accepted"])
+        return bool(self.first & planted) and not self.first <= planted | set(
+            self.truth["inherent"]
+        )
+
+    @property
     def is_false_cause(self) -> bool:
         """Return whether a cause is named and nothing that is named is true."""
         return self.outcome in CLAIMS and not self.is_right
@@ -230,6 +238,7 @@ def score(rows: Sequence[Row]) -> list[Mark]:
         count("a false cause named, sound hangers", sound, lambda r: r.is_false_cause),
         count("cause named first", asked, lambda r: is_planted(r, r.first), least=0.75),
         count("cause named first or in its group", asked, lambda r: is_planted(r, r.named), 0.92),
+        count("cause named first with a false partner", asked, lambda r: r.has_false_partner),
         count("cause most probable, named or not", asked, lambda r: is_planted(r, nearest(r))),
         count("cause missed: no gap stated", asked, lambda r: r.outcome is Outcome.NO_GAP),
         count("cause missed: not explained", asked, lambda r: r.outcome is Outcome.UNEXPLAINED),

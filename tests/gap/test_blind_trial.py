@@ -206,6 +206,14 @@ def test_is_right_of_a_group() -> None:
     assert row.named == {"point_mass", "temperature_tension"}
 
 
+def test_has_false_partner() -> None:
+    assert make_row(PAIR, "point_mass").has_false_partner
+    assert not make_row(PAIR, "point_mass", "sag").has_false_partner
+    assert not make_row(PAIR, "point_mass", inherent=("sag",)).has_false_partner
+    assert not make_row(PAIR, "timebase").has_false_partner
+    assert not make_row(EXPLAINED, "point_mass").has_false_partner
+
+
 def test_is_right_of_not_explained() -> None:
     unknown = replace(EXPLAINED, causes=(), unexplained_probability=0.98)
     assert make_row(unknown, "crack", accepted=False).is_right
