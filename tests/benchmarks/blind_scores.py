@@ -63,15 +63,20 @@ class Row:
         claim = self.diagnosis.verdict.claim if self.diagnosis else None
         return frozenset(claim.leading.effects) if claim else frozenset()
 
-    @property
-    def named(self) -> frozenset[str]:
-        """Return the effects of all causes that the verdict names, or cannot tell from these."""
+    @cached_property
+    def claimed(self) -> tuple[frozenset[str], ...]:
+        """Return the causes that the verdict names, or cannot tell from these, by their effects."""
         verdict = self.diagnosis.verdict if self.diagnosis else None
         if self.diagnosis is None or verdict is None or verdict.claim is None:
-            return frozenset()
+            return ()
         groups = {each.group for each in verdict.claim.causes} - {None}
         alike = [each for each in self.diagnosis.causes if each.group in groups]
-        return frozenset(name for each in (*verdict.claim.causes, *alike) for name in each.effects)
+        return tuple(frozenset(each.effects) for each in (*verdict.claim.causes, *alike))
+
+    @property
+    def named(self) -> frozenset[str]:
+        """Return the effects of all these causes."""
+        return frozenset[str]().union(*self.claimed)
 
     @property
     def probability(self) -> float:
@@ -82,13 +87,14 @@ class Row:
     def is_right(self) -> bool:
         """Return whether the answer is true.
 
-        That is a planted cause among those named, or first what a sound hanger differs by and
-        nothing else; no gap where there is none, or where the class has the cause itself; not
-        explained where the catalogue has no cause of it.
+        Right are a planted cause among those named, or one by which a sound hanger differs, too;
+        no gap where there is none, or where the class has the cause itself; not explained where
+        the catalogue has no such cause.
         """
         if self.outcome in CLAIMS:
             true = set() if self.is_without else set(self.truth["accepted"])
-            return bool(self.named & true) or self.first <= set(self.truth["inherent"])
+            inherent = set(self.truth["inherent"])
+            return bool(self.named & true) or any(each <= inherent for each in self.claimed)
         if self.outcome is Outcome.NO_GAP:
             return self.is_sound or self.in_class
         is_unlisted = self.is_without or not (self.is_sound or self.truth["accepted"])
