@@ -82,7 +82,7 @@ def list_hanger(row: Row) -> tuple[str, ...]:
 
 
 def draw_reliability(axes: Axes, rows: Sequence[Row]) -> None:
-    """Draw how often answers are right over the probability that they state."""
+    """Draw how often a cause or no gap is right over the probability that the answer states."""
     axes.plot([0, 1], [0, 1], color=GREY, linewidth=1, label="as stated")
     stated = np.array([row.probability for row in rows])
     right = np.array([row.is_right for row in rows])
@@ -172,9 +172,10 @@ def save_figures(rows: Sequence[Row], folder: Path) -> list[str]:
     """Save the three figures; return their names."""
     done = [row for row in rows if row.diagnosis]
     full = [row for row in done if not row.is_without]
+    stated = [row for row in done if row.outcome is not Outcome.UNEXPLAINED]
     names = []
     for name, size, draw, chosen in (
-        ("blind_reliability", (5.5, 4.5), draw_reliability, done),
+        ("blind_reliability", (5.5, 4.5), draw_reliability, stated),
         ("blind_confusion", (9.5, 7.5), draw_confusion, full),
         ("blind_interval", (7.5, 7.0), draw_intervals, done),
     ):
