@@ -165,7 +165,7 @@ def draw_intervals(axes: Axes, rows: Sequence[Row]) -> None:
     axes.set(title="Tension: 95 % interval after the diagnosis (cross: mean before)")
     for colour, label in ((RIGHT, "holds the truth"), (WRONG, "misses it")):
         axes.plot([], [], color=colour, linewidth=2, label=label)
-    axes.legend(loc="lower left", frameon=False)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=2, frameon=False)
 
 
 def save_figures(rows: Sequence[Row], folder: Path) -> list[str]:
@@ -176,7 +176,7 @@ def save_figures(rows: Sequence[Row], folder: Path) -> list[str]:
     names = []
     for name, size, draw, chosen in (
         ("blind_reliability", (5.5, 4.5), draw_reliability, stated),
-        ("blind_confusion", (9.5, 7.5), draw_confusion, full),
+        ("blind_confusion", (11.0, 7.5), draw_confusion, full),
         ("blind_interval", (7.5, 7.0), draw_intervals, done),
     ):
         figure, axes = plt.subplots(figsize=size, layout="constrained")
