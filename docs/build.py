@@ -7,7 +7,7 @@ repository: `shm VERB --help`, `shm settings`, `shm gap effects` and
 python docs/build.py --quick    # what follows from the code alone; `make docs` does this first
 python docs/build.py            # the computed tables too: validation, gap
 
-The blind trial takes hours; `make -C tests/benchmarks blind-trial` fills its page.
+`python tests/benchmarks/blind_trial.py DIR --write-docs` fills the page of the blind trial.
 The real measurements are not in this repository; docs/real_cases_page.py fills their page in two
 minutes where they are.
 """

@@ -9,8 +9,6 @@ sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 
 from shm import __version__
 
-_BLIND_TRIAL = Path(__file__).parent / "trials" / "blind_trial.html"
-
 project = "shm"
 author = "the authors of shm"
 copyright = author
@@ -30,8 +28,6 @@ html_math_renderer = "drawn"
 html_show_copyright = False
 html_copy_source = False
 html_static_path = ["static"]
-# Only who has solved the trial has its page (docs/blind_page.py).
-html_extra_path = ["trials/blind_trial.html"] if _BLIND_TRIAL.exists() else []
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"

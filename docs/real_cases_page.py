@@ -213,7 +213,7 @@ def _family_row(key: tuple[str, str], pairs: Sequence[Diagnosed]) -> tuple[str, 
 
 
 def _length_row(each: Arrangement, found: Diagnosis) -> tuple[str, ...]:
-    best, hinge = found.causes[0], _hinge(found)
+    best, hinge = max(found.causes, key=lambda each: each.probability), _hinge(found)
     group = found.groups[best.group] if best.group is not None else ()
     return (
         f"{each.hanger.length_m:.3f}",
@@ -267,7 +267,7 @@ def _one_hinge(hinges: list[EffectEstimate]) -> str:
 
 
 def told(file: str, hanger: Hanger, tests: list[ModalTest]) -> str:
-    """The causes above 1 %; the answer of `shm gap diagnose` in words goes into a file beside."""
+    """Return the causes above 1 %; the answer in words goes into a file beside."""
     found = diagnose(tests, hanger, GapOptions(seed=SEED))
     paper = diagnosis_paper(DiagnosisSheet(found, hanger))
     text = as_text(paper).split(f"\n{paper.parts[2].title}\n")[0]
@@ -278,11 +278,20 @@ def told(file: str, hanger: Hanger, tests: list[ModalTest]) -> str:
     ]
     (HANGERS / file).write_text(f"{text.rstrip()}\n", encoding="utf-8")
     said = f"[What `shm gap diagnose` says](real_cases/{file}), and the causes above 0.01:"
-    return f"{said}\n\n{markdown(_CAUSE_HEAD, rows)}"
+    return f"{said}\n\n{markdown(_CAUSE_HEAD, rows)}{_tensions(found)}"
+
+
+def _tensions(found: Diagnosis) -> str:
+    """Return a line on the tension by the baseline and by all that may be; none of a bar."""
+    before, after = found.tension_before_n, found.tension_after_n
+    if not math.isfinite(after.mean):
+        return f"\n\nBaseline {found.baseline}."
+    words = (f"{each.mean:.1f} N ({each.q05:.1f} to {each.q95:.1f} N)" for each in (before, after))
+    return f"\n\nTension: by the baseline {found.baseline} {', by all that may be '.join(words)}."
 
 
 def _cause_row(cause: Cause) -> tuple[str, ...]:
-    sizes = [f"{quantity(each.name)} {size(each)}" for each in cause.parameters]
+    sizes = [f"{quantity(each)} {size(each)}" for each in cause.parameters]
     return (
         label(cause),
         probability(cause.probability),

@@ -1,517 +1,287 @@
-"""Try the gap diagnosis blind: three worlds, both baselines, from everything to three modes.
+"""Try the gap diagnosis blind, on hangers of independent physics whose causes are sealed.
 
-python tests/benchmarks/blind_trial.py make DIR --cases 96 --seed 20261126
-python tests/benchmarks/blind_trial.py solve DIR --until 16:10
-python tests/benchmarks/blind_trial.py solve DIR --left-out --until 16:25
-python tests/benchmarks/blind_trial.py score DIR --write-docs
+python tests/benchmarks/blind_trial.py build/blind_trial --hangers 36 --left-out 12 --seed 20261129
+python tests/benchmarks/blind_trial.py build/blind_trial --score                # what is there
+python tests/benchmarks/blind_trial.py build/blind_trial --score --write-docs   # the page, too
 
-Layout, sealing, guarded solving and scores of single cases stand in `tests/benchmarks/blind`;
-`make -C tests/benchmarks blind-trial` does all four. `solve` takes cases in the order of their
-names, which says nothing, and goes on where it stopped; `score` takes those that were solved.
-Sound hangers, one effect each, and what the catalogue lacks:
+A quarter of the hangers is sound: a third each of `tests/worlds/gapped_hangers.py`,
+`finite_elements.py` and `spectral.py`. The others are of the first world and have one of its twenty
+causes in turn, four of which the catalogue lacks; every eighth has two. None of these worlds shares
+equations, draws or nuisances with the product.
 
-- `tests/worlds/simulated`: every effect that it can plant;
-- `tests/worlds/finite_elements.py`: frequencies, with its nuisances of the field;
-- `tests/worlds/struck_bar.py`: hammer records in time of two levels and three places, identified.
-
-A family is a bridge of hangers of the finite elements that share a cause.
+The truth is written with a salt before the first diagnosis, and its SHA-256 into `trial.json`. A
+process that diagnoses may not open it. When all answers are there, their SHA-256 is written, and
+the truth is opened. Some hangers with a cause of the catalogue are then diagnosed once more without
+it. A second call goes on where the first one stopped; a diagnosis takes ten to sixty seconds.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
-import math
+import multiprocessing
 import os
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+import secrets
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
+# Processes of one thread each: more only wait for each other.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
-from scipy.stats import beta
 
-from docs.filling import fill_in, write_csv
-from shm.documents import dump
-from shm.errors import NotIdentifiable
-from shm.identify import IdentifyOptions
-from shm.identify.identification import identify
-from shm.modes_document import modes_document
-from shm.values import Hanger, ModalTest
-from tests.benchmarks import gap_dynamics, gap_family
-from tests.benchmarks.blind.case import Draft, make_case
-from tests.benchmarks.blind.layout import (
-    CASE_FILE,
-    CASE_SCHEMA,
-    HANGER_FILE,
-    MODES_FILE,
-    Round,
-    Trial,
-    answered,
-    key_beside,
-    read_answers,
-    read_trial,
-    verified_sha256,
-)
-from tests.benchmarks.blind.making import seal
-from tests.benchmarks.blind.scores import (
-    FEWEST,
-    LARGE,
-    NO_GAP,
-    SURE,
-    bins_of,
-    case_scores,
-    corrected_calibration_error,
-    leading,
-    left_out_scores,
-)
-from tests.benchmarks.blind.sealing import key_of
-from tests.benchmarks.blind.solving import solve_left_out, solve_trial
-from tests.benchmarks.blind.truth import CaseScore, Richness, TrueCase, TrueEffect
-from tests.helpers.struck import STRUCK, recordings
-from tests.worlds import finite_elements, struck_bar
-from tests.worlds.simulated.effects.registry import PLANTED, UNLISTED
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
 
-SIMULATOR, ELEMENTS, BAR = "simulator", "finite elements", "struck bar"
-TRIALS = Path(__file__).resolve().parents[2] / "docs" / "trials"
-THREE: Richness = "three modes"
-RICHNESSES: dict[str, tuple[Richness, ...]] = {
-    SIMULATOR: ("everything", "two planes", "one plane", THREE),
-    ELEMENTS: ("two planes", "one plane", THREE),
-    BAR: ("shapes",),
-}
-# Of twelve cases: the bar's take minutes to identify, and the simulator alone has "everything".
-TWELVE = (
-    *[(SIMULATOR, "none")] * 2, *[(SIMULATOR, "one")] * 4, (SIMULATOR, "unknown"),
-    (ELEMENTS, "none"), *[(ELEMENTS, "one")] * 3, (BAR, ""),
-)  # fmt: skip
-BASELINES = "beam1", "beam2"
-IN_BEAM2 = "rotational_end_flexibility"  # no gap of a baseline that has end springs
-SIZES = 1.0, 1000.0  # of the first trial, even in the logarithm
-BAR_EFFECTS = {"joint": "joint_softening", "crack": "breathing_crack", "guide": "loose_guide"}
-REPEAT = 7e-5  # the middle, in its logarithm, of the error that the world's modes repeat
-STIFFNESS_SD = 0.025  # of EI, by the world's modulus (1.5 %) and section (1 %, so 2 % of I)
+import shm  # noqa: E402
+from shm.diagnosis_document import diagnosis_document  # noqa: E402
+from shm.documents import dump  # noqa: E402
+from tests.benchmarks.blind_page import list_hanger, write_page  # noqa: E402
+from tests.benchmarks.blind_scores import Row, effects_of_class, score, table  # noqa: E402
+from tests.worlds import finite_elements, gapped_hangers, spectral  # noqa: E402
+
+Truth = dict[str, Any]
+SCHEMA = "shm.blind_trial/2"
+GAPPED, ELEMENTS, SPECTRAL = "gapped hangers", "finite elements", "spectral"
+SOUND_FRACTION = 1 / 4
+PAIR_EVERY = 8
+COMPLETE, LEFT_OUT = "complete", "left_out"
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A case before anything is drawn for it; `effects` in the order in which they are tried."""
+    """A hanger before it is made: its world, its place in it, and its causes."""
 
-    case: str
+    name: str
     world: str
-    kind: str
-    richness: Richness
-    baseline: str
-    effects: tuple[str, ...]
+    index: int
+    causes: tuple[str, ...] = ()
 
 
-def plans(cases: int, seed: int) -> list[Plan]:
-    """In twelves that hold every kind of every world; each effect and richness takes its turn."""
-    rng = np.random.default_rng([seed, 2])
-    turns: dict[str, Iterator[Any]] = {}
-
-    def turn(name: str, of: Sequence[Any]) -> Any:
-        """The next of these, in an order drawn anew whenever all had their turn."""
-        if name not in turns:
-            turns[name] = (of[i] for _ in iter(int, 1) for i in rng.permutation(len(of)))
-        return next(turns[name])
-
-    found = []
-    for number in range(cases):
-        if number % len(TWELVE) == 0:
-            order = rng.permutation(len(TWELVE))
-        world, kind = TWELVE[order[number % len(TWELVE)]]
-        richness = turn(f"{world} {kind}", RICHNESSES[world])
-        baseline = turn(f"{world} {kind} {richness}", BASELINES)
-        known = {
-            SIMULATOR: tuple(UNLISTED if kind == "unknown" else PLANTED),
-            ELEMENTS: tuple(gap_family.SIZES),
-            BAR: gap_dynamics.KINDS,
-        }[world]
-        first = "" if kind == "none" else turn(f"{world} {kind} effect", known)
-        rest = (str(each) for each in rng.permutation(list(known)) if each != first)
-        effects = tuple(
-            each for each in (first, *rest) if each and (baseline, each) != ("beam2", IN_BEAM2)
-        )
-        found.append(Plan(f"c{number + 1:04d}", world, kind, richness, baseline, effects))
-    return found
+def plan_hangers(count: int, seed: int) -> list[Plan]:
+    """Return the plans, in an order that says nothing about the causes."""
+    rng = np.random.default_rng([seed, 58])
+    n_sound = round(count * SOUND_FRACTION)
+    worlds = (GAPPED, ELEMENTS, SPECTRAL)
+    wanted: list[tuple[str, tuple[str, ...]]] = [
+        (worlds[number % len(worlds)], ()) for number in range(n_sound)
+    ]
+    deck: list[str] = []
+    for number in range(count - n_sound):
+        deck = deck or [str(each) for each in rng.permutation(list(gapped_hangers.CAUSES))]
+        causes: tuple[str, ...] = (deck.pop(),)
+        if number % PAIR_EVERY == PAIR_EVERY - 1:
+            others = [each for each in gapped_hangers.SECOND if each != causes[0]]
+            causes = (*causes, str(rng.choice(others)))
+        wanted.append((GAPPED, causes))
+    order = rng.permutation(count)
+    return [Plan(f"h{n + 1:03d}", wanted[k][0], int(k), wanted[k][1]) for n, k in enumerate(order)]
 
 
-def make(directory: Path, cases: int, seed: int) -> None:
-    """The cases and, beside them, the key."""
-    seeds = np.random.SeedSequence([seed, 3]).spawn(cases)
-    truths = []
-    for plan, own in zip(plans(cases, seed), seeds, strict=True):
-        truths.append(MAKERS[plan.world](directory / "cases" / plan.case, plan, own))
-        print(f"made {plan.case} of {cases}", flush=True)
-    sha256 = seal(directory, key_beside(directory), truths, seed)
-    print(f"SHA-256 of the key {sha256}")
+def make_hanger(plan: Plan, seed: int, folder: Path) -> Truth:
+    """Write the hanger's description and its tests; return the truth."""
+    if plan.world == GAPPED:
+        case = gapped_hangers.make_case(seed, plan.index, plan.causes)
+        case.write(folder)
+        kept = ("tension_n", "kind", "causes", "inherent")
+        truth = {key: case.truth[key] for key in kept}
+    else:
+        world = finite_elements if plan.world == ELEMENTS else spectral
+        other = world.sound_hangers(seed, plan.index + 1)[plan.index]
+        other.write(folder)
+        truth = {key: other.truth[key] for key in ("tension_n", "kind")}
+        truth |= {"causes": [], "inherent": {}}
+    accepted = sorted({name for each in truth["causes"] for name in each["accepted"]})
+    return {"hanger": plan.name, "world": plan.world, "accepted": accepted, **truth}
 
 
-def by_simulator(directory: Path, plan: Plan, seed: np.random.SeedSequence) -> TrueCase:
-    share = float(np.random.default_rng(seed.spawn(1)[0]).uniform())
-    draft = Draft(plan.case, cast(Any, plan.kind), plan.richness, share, plan.effects)
-    truth = make_case(directory, draft, seed)
-    told = json.loads((directory / CASE_FILE).read_text(encoding="utf-8"))
-    _write_told(directory, plan, told["seed"])
-    left_out = truth.left_out if plan.kind == "one" else ()
-    return replace(truth, left_out=left_out)
-
-
-def by_elements(directory: Path, plan: Plan, seed: np.random.SeedSequence) -> TrueCase:
-    rng = np.random.default_rng(seed)
-    cause = plan.effects[0] if plan.kind == "one" else ""
-    diameter_m, slenderness = rng.uniform(0.05, 0.10), rng.uniform(80, 170)
-    length_m, nominal_n = diameter_m * slenderness, 1e6 * rng.uniform(80, 200)
-    size = float(np.exp(rng.uniform(*np.log(gap_family.SIZES[cause])))) if cause else 0.0
-    place_m, sd = rng.uniform(0.2, 0.8) * length_m, float(np.exp(rng.uniform(-10.8, -8.1)))
-    modes = rng.integers(5, 9, 2)
-    made = gap_family.member(
-        rng, 1, diameter_m, length_m, length_m, nominal_n * np.pi * diameter_m**2 / 4,
-        cause, size, place_m, sd, modes,
-    )  # fmt: skip
-    planes = 2 if plan.richness == "two planes" else 1
-    most = 3 if plan.richness == THREE else 99
-    tests = [
-        replace(t, modes=tuple(
-            m for m in t.modes if m.order <= most and (planes == 2 or m.plane == "transverse")
-        ))
-        for t in made.tests
-    ]  # fmt: skip
-    write_case(directory, plan, made.hanger, tests, int(rng.integers(2**31)))
-    orders = [min(most, int(each)) for each in modes[:planes]]
-    seen = size_of(made, cause, size, place_m, sd, orders, plan.baseline) if cause else 0.0
-    return true_case(plan, cause, seen, made.tension_n)
-
-
-def size_of(
-    made: gap_family.Member, cause: str, size: float, place_m: float, sd: float,
-    orders: Sequence[int], baseline: str,
-) -> float:  # fmt: skip
-    """What the cause does to the frequencies in standard deviations, beyond what the baseline can.
-
-    To first order: less what a tension, a stiffness and, of beam2, end springs do.
-    """
-    hanger, most = made.hanger, max(orders)
-    bending = hanger.elastic_modulus_pa * hanger.second_moment_m4
-    clamp = gap_family.CLAMP * bending / hanger.length_m
-    bar = finite_elements.Bar(
-        hanger.length_m, made.tension_n, bending, hanger.mass_per_length_kg_m,
-        spring_deck_n_m_rad=clamp, spring_arch_n_m_rad=clamp,
-    )  # fmt: skip
-    free = [replace(bar, tension_n=1.01 * bar.tension_n),
-            replace(bar, bending_stiffness_n_m2=1.01 * bending)]  # fmt: skip
-    if baseline == "beam2":
-        free += [replace(bar, spring_deck_n_m_rad=100 * bending / hanger.length_m)]
-    caused = gap_family.with_cause(bar, cause, size, place_m, hanger.length_m, hanger.area_m2)
-
-    def logs(each: finite_elements.Bar) -> np.ndarray:
-        hz = np.log(finite_elements.natural_frequencies_hz(each, most))
-        return np.concatenate([hz[:order] for order in orders])
-
-    clock = math.log1p(size) if cause == gap_family.CLOCK else 0.0
-    change = logs(caused) + clock - logs(bar)
-    one = np.hypot(sd / np.sqrt(len(made.tests)), REPEAT)
-    columns = np.transpose([logs(each) - logs(bar) for each in free]) / one
-    known = np.zeros((1, len(free)))
-    known[0, 1] = 0.01 / STIFFNESS_SD
-    columns, change = np.vstack([columns, known]), np.append(change / one, 0.0)
-    left = change - columns @ np.linalg.lstsq(columns, change, rcond=None)[0]
-    return float(np.linalg.norm(left))
-
-
-def by_bar(directory: Path, plan: Plan, seed: np.random.SeedSequence) -> TrueCase:
-    rng = np.random.default_rng(seed)
-    kind = plan.effects[0]
-    usual = struck_bar.Bar()
-    off = 1 + 0.01 * rng.standard_normal(2)
-    bar = replace(
-        usual, tension_n=float(usual.tension_n * rng.uniform(0.8, 1.25)),
-        bending_nm2=float(usual.bending_nm2 * off[0]), mass_kg_m=float(usual.mass_kg_m * off[1]),
-    )  # fmt: skip
-    hanger = struck_bar.Hanger(bar, gap_dynamics.drawn(kind, rng))
-    crew, tests = struck_bar.Crew(hits=4), []
-    options = IdentifyOptions(reference_force_n=crew.peak_n, frequency_allowance=1e-4)
-    for number, level in enumerate(gap_dynamics.LEVELS, 1):
-        records = recordings(struck_bar.tested(hanger, crew, level, rng), crew)
-        try:
-            found = identify(records, options, test_id=f"t{number}", hanger=STRUCK)
-        except NotIdentifiable as error:
-            print(f"{plan.case}, level {level}: {error}", flush=True)
-            continue
-        tests.append(found.test)
-    write_case(directory, plan, STRUCK, tests, int(rng.integers(2**31)))
-    return true_case(plan, BAR_EFFECTS.get(kind, ""), math.nan, bar.tension_n)
-
-
-MAKERS: dict[str, Callable[[Path, Plan, np.random.SeedSequence], TrueCase]] = {
-    SIMULATOR: by_simulator,
-    ELEMENTS: by_elements,
-    BAR: by_bar,
-}
-
-
-def true_case(plan: Plan, effect: str, size: float, tension_n: float) -> TrueCase:
-    """A line of the key; where it acts and how much is not scored."""
-    kind = "none" if not effect else "one" if effect in PLANTED else "unknown"
-    effects = (TrueEffect(effect, "", {}, size),) if effect else ()
-    left_out = (effect,) if kind == "one" else ()
-    return TrueCase(
-        plan.case, cast(Any, kind), plan.richness, effects, size if effect else 0.0,
-        float(tension_n), left_out,
-    )  # fmt: skip
-
-
-def write_case(
-    directory: Path, plan: Plan, hanger: Hanger, tests: Sequence[ModalTest], seed: int
-) -> None:
-    directory.mkdir(parents=True)
-    described = {
-        "diameter_m": hanger.diameter_m, "length_m": hanger.length_m,
-        "elastic_modulus_pa": hanger.elastic_modulus_pa,
-        "density_kg_m3": hanger.mass_per_length_kg_m / hanger.area_m2,
-        "nominal_tension_n": hanger.nominal_tension_n,
-    }  # fmt: skip
-    lines = [f"{name} = {float(value)!r}" for name, value in described.items() if value]
-    text = "\n".join(["[[hanger]]", "id = 1", *lines, ""])
-    (directory / HANGER_FILE).write_text(text, encoding="utf-8")
-    ours = [replace(test, hanger=1) for test in tests]
-    text = dump(modes_document(ours)) + "\n"
-    (directory / MODES_FILE).write_text(text, encoding="utf-8")
-    _write_told(directory, plan, seed)
-
-
-def _write_told(directory: Path, plan: Plan, seed: int) -> None:
-    told = {"schema": CASE_SCHEMA, "baseline": plan.baseline, "seed": seed}
-    (directory / CASE_FILE).write_text(dump(told) + "\n", encoding="utf-8")
-
-
-def moment(until: str | None) -> datetime:
-    if until is None:
-        return datetime.max.replace(tzinfo=UTC)
-    hour, minute = map(int, until.split(":"))
-    return datetime.now(UTC).replace(hour=hour, minute=minute, second=0)
-
-
-def solve(directory: Path, left_out: bool, until: datetime, at_once: int) -> None:
-    """Few cases at a time, sealed each time, until the clock says."""
-    trial = read_trial(directory)
-    which: Round = "left_out" if left_out else "answers"
-    wanted: dict[str, tuple[str, ...]] = dict.fromkeys(trial.cases, ())
-    if left_out:
-        done = answered(trial.answers("answers"))
-        truths, _ = key_of(trial, key_beside(directory))
-        wanted = {t.case: t.left_out for t in truths if t.left_out and t.case in done}
-    while datetime.now(UTC) < until:
-        have = answered(trial.answers(which))
-        missing = [case for case in wanted if case not in have][:at_once]
-        if not missing:
-            break
-        some = {case: wanted[case] for case in wanted if case in have or case in missing}
-        if left_out:
-            sha256 = solve_left_out(trial, some)
-        else:
-            sha256 = solve_trial(Trial(directory, tuple(some), trial.key_sha256))
-        now = datetime.now(UTC)
-        print(f"{now:%H:%M:%S} {which}: {len(some)} of {len(wanted)} {sha256}", flush=True)
+# ---------------------------------------------------------------- the seal
 
 
 @dataclass(frozen=True)
-class Scored:
-    """A case beside what was said of it in either round."""
+class Trial:
+    """The folder of a trial."""
 
-    plan: Plan
-    first: CaseScore
-    second: CaseScore | None
+    folder: Path
 
     @property
-    def large(self) -> bool:
-        """Sound, larger than 4, or of the bar, whose sizes nobody knows."""
-        return self.first.kind == "none" or not self.first.size <= LARGE
+    def truth_file(self) -> Path:
+        """Return the file that stays closed until all answers are there."""
+        return self.folder / "sealed" / "truth.json"
 
-    @property
-    def sure(self) -> bool:
-        """A claim of more than 0.9; that there is no gap is none where it is too small to see."""
-        claims = self.first.leader != NO_GAP or self.large
-        return self.first.leading_probability > SURE and claims
+    def read(self) -> dict[str, Any]:
+        """Return what anybody may know: hangers, seed, commit, hashes."""
+        document: dict[str, Any] = json.loads((self.folder / "trial.json").read_text())
+        if document["schema"] != SCHEMA:
+            raise SystemExit(f"{self.folder} is a trial of {document['schema']}: name another.")
+        return document
+
+    def write(self, document: dict[str, Any]) -> None:
+        """Write what anybody may know."""
+        _replace(self.folder / "trial.json", document)
+
+    def hanger(self, name: str) -> Path:
+        """Return the folder of a hanger."""
+        return self.folder / "hangers" / name
+
+    def answer(self, which: str, name: str) -> Path:
+        """Return the file of an answer."""
+        return self.folder / which / f"{name}.json"
+
+    def answers(self, which: str) -> dict[str, dict[str, Any]]:
+        """Return the answers of a round by the names of the hangers."""
+        files = sorted((self.folder / which).glob("*.json"))
+        return {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in files}
+
+    def hash_answers(self, which: str) -> str:
+        """Return the SHA-256 of all answers of a round."""
+        files = sorted((self.folder / which).glob("*.json"))
+        return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+    def open_truth(self) -> dict[str, Truth]:
+        """Return the truth by the names of the hangers; it must be that which was sealed."""
+        told, content = self.read(), self.truth_file.read_bytes()
+        if hashlib.sha256(content).hexdigest() != told["truth_sha256"]:
+            raise SystemExit(f"{self.truth_file} was changed since it was sealed.")
+        if self.hash_answers(COMPLETE) != told.get("answers_sha256"):
+            raise SystemExit(f"Answers of {self.folder} are lacking or were changed since.")
+        return {each["hanger"]: each for each in json.loads(content)["hangers"]}
 
 
-def scored(directory: Path) -> list[Scored]:
-    """The cases that were solved; sensors that err in direction are no false alarm: they do."""
-    trial = read_trial(directory)
-    truths, seed = key_of(trial, key_beside(directory))
-    verified_sha256(trial, "answers")
-    answers = read_answers(trial.answers("answers"))
-    told = {each.case for each in answers}
-    firsts = case_scores([each for each in truths if each.case in told], answers)
-    seconds: dict[str, CaseScore] = {}
-    if trial.seal("left_out").exists():
-        verified_sha256(trial, "left_out")
-        again = read_answers(trial.answers("left_out"))
-        cases = {each.case for each in again}
-        known = [each for each in truths if each.case in cases]
-        own = [each for each in answers if each.case in cases]
-        seconds = {each.case: each for each in left_out_scores(known, own, again)}
-    of = {plan.case: plan for plan in plans(len(trial.cases), seed)}
-    return [
-        Scored(
-            of[each.case], replace(each, right=each.right or turned(each)), seconds.get(each.case)
-        )
-        for each in firsts
-    ]
+def _replace(path: Path, document: dict[str, Any]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part")
+    part.write_text(dump(document) + "\n", encoding="utf-8")
+    part.replace(path)
 
 
-def turned(case: CaseScore) -> bool:
-    return case.kind == "none" and case.leader == "sensor_misalignment"
+def make_trial(trial: Trial, count: int, left_out: int, seed: int) -> None:
+    """Make the hangers and seal the truth."""
+    plans = plan_hangers(count, seed)
+    truths = [make_hanger(plan, seed, trial.hanger(plan.name)) for plan in plans]
+    _replace(trial.truth_file, {"salt": secrets.token_hex(32), "hangers": truths})
+    sha256 = hashlib.sha256(trial.truth_file.read_bytes()).hexdigest()
+    commit = subprocess.run(
+        ["git", "rev-parse", "HEAD"], cwd=ROOT, check=True, capture_output=True, text=True
+    ).stdout.strip()
+    document = {"schema": SCHEMA, "seed": seed, "commit": commit, "truth_sha256": sha256}
+    trial.write(document | {"left_out": left_out, "hangers": [plan.name for plan in plans]})
+    print(f"{count} hangers; SHA-256 of the truth {sha256}", flush=True)
 
 
-def share(flags: Sequence[bool | None], low: float, high: float) -> tuple[str, str]:
-    """The share with its 95 % interval, and whether its better end keeps the bounds."""
-    hits, of = sum(map(bool, flags)), len(flags)
-    if not of:
-        return "no case", "too few to judge"
-    ends = (
-        float(beta.ppf(0.025, hits, of - hits + 1)) if hits else 0.0,
-        float(beta.ppf(0.975, hits + 1, of - hits)) if hits < of else 1.0,
+# ---------------------------------------------------------------- the diagnoses
+
+
+def guard(sealed: str) -> None:
+    """Refuse to open anything in a folder in this process from now on."""
+
+    def refuse(event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open" and isinstance(arguments[0], str | bytes | os.PathLike):
+            path = os.path.realpath(os.fsdecode(arguments[0]))
+            if path == sealed or path.startswith(sealed + os.sep):
+                raise PermissionError(f"a diagnosis of a blind trial may not open {path}")
+
+    sys.addaudithook(refuse)
+
+
+def diagnose_hanger(folder: Path, without: Sequence[str]) -> dict[str, Any]:
+    """Diagnose a hanger as its owner would: its two files, all options left alone."""
+    hanger = shm.load_hanger(folder / "hanger.toml")
+    tests = shm.load_modes(folder / "case.modes.json")
+    started = time.process_time()
+    answer: dict[str, Any] = {"without": list(without)}
+    try:
+        answer["diagnosis"] = diagnosis_document(shm.diagnose(tests, hanger, without=without))
+    except shm.ShmError as error:
+        answer["refused"] = str(error)
+    return answer | {"processor_s": time.process_time() - started}
+
+
+def solve(trial: Trial, which: str, wanted: dict[str, Sequence[str]], jobs: int) -> None:
+    """Diagnose what has no answer yet, each hanger without some effects."""
+    lacking = [name for name in wanted if not trial.answer(which, name).exists()]
+    sealed = os.path.realpath(trial.truth_file.parent)
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, context, guard, (sealed,)) as pool:
+        running = {
+            pool.submit(diagnose_hanger, trial.hanger(name), wanted[name]): name for name in lacking
+        }
+        for number, future in enumerate(as_completed(running), len(wanted) - len(lacking) + 1):
+            name, answer = running[future], future.result()
+            _replace(trial.answer(which, name), answer)
+            said = answer.get("diagnosis", {}).get("verdict", {}).get("outcome", "refused")
+            seconds = f"{answer['processor_s']:.0f} s"
+            print(f"{which} {number} of {len(wanted)}: {name} {said}, {seconds}", flush=True)
+
+
+def run(trial: Trial, jobs: int, first: int | None = None) -> None:
+    """Diagnose the hangers, close the answers, open the truth, diagnose without the causes.
+
+    With `first` only so many are diagnosed, by their names.
+    """
+    told = trial.read()
+    if "answers_sha256" not in told:
+        solve(trial, COMPLETE, dict.fromkeys(told["hangers"][:first], ()), jobs)
+        trial.write(told | {"answers_sha256": trial.hash_answers(COMPLETE)})
+    truths, answers = trial.open_truth(), trial.answers(COMPLETE)
+    chosen = list(hangers_to_repeat(truths, answers))[: told["left_out"]]
+    solve(trial, LEFT_OUT, {name: truths[name]["accepted"] for name in chosen}, jobs)
+
+
+def hangers_to_repeat(
+    truths: dict[str, Truth], answers: dict[str, dict[str, Any]]
+) -> Iterator[str]:
+    """Yield the hangers with causes that the catalogue has and their model class has not itself."""
+    for name, answer in answers.items():
+        known = [set(each["accepted"]) for each in truths[name]["causes"]]
+        itself = effects_of_class(answer)
+        if known and all(each and not each & itself for each in known):
+            yield name
+
+
+def read_rows(trial: Trial) -> list[Row]:
+    """Return every answer beside the truth, the round without the causes last."""
+    truths = trial.open_truth()
+    rounds = (trial.answers(COMPLETE), trial.answers(LEFT_OUT))
+    return [Row(truths[name], answer) for each in rounds for name, answer in each.items()]
+
+
+def main() -> int:
+    """Make, solve and score a trial; return 1 where a mark is missed."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    value = hits / of
-    verdict = "met" if low <= value <= high else "missed"
-    if of < FEWEST:
-        verdict = "too few to judge"
-    elif verdict == "missed" and ends[0] <= high and ends[1] >= low:
-        verdict = "met by the better end"
-    return f"{hits} of {of}: {value:.2f} ({ends[0]:.2f} to {ends[1]:.2f})", verdict
-
-
-Row = tuple[str, ...]
-
-
-def marks(cases: Sequence[Scored]) -> list[Row]:
-    """What was asked, what came out with 95 % intervals, and whether it is met."""
-    sound = [c.first for c in cases if c.first.kind == "none"]
-    one = [c for c in cases if c.first.kind == "one" and c.large]
-    known = [c for c in one if c.first.size > 2 * LARGE or math.isnan(c.first.size)]
-    sure = [c.first.right for c in cases if c.sure]
-    blamed = [c.second.misattributed for c in one if c.second]
-    covered = [c.first.tension_covered for c in cases]
-    few = [c.first.tension_covered for c in cases if c.plan.richness == THREE]
-
-    def named(richness: str) -> list[bool]:
-        return [c.first.first for c in one if c.plan.richness == richness]
-
-    asked: list[tuple[str, Sequence[bool | None], float, float]] = [
-        ("False alarms, at most 0.03", [not each.right for each in sound], 0, 0.03),
-        ("Named first, two planes, at least 0.75", named("two planes"), 0.75, 1),
-        ("Named first, everything, at least 0.9", named("everything"), 0.9, 1),
-        ("In the first's group above size 8, at least 0.93",
-         [c.first.in_group for c in known], 0.93, 1),
-        ("Sure (above 0.9) and right, at least 0.95", sure, 0.95, 1),
-        ("Left out: a wrong effect blamed, at most 0.05", blamed, 0, 0.05),
-        ("Tension in its 95 % interval, 0.90 to 0.98", covered, 0.9, 0.98),
-        ("The same with three modes", few, 0.9, 0.98),
-    ]  # fmt: skip
-    rows = [(what, *share(flags, low, high)) for what, flags, low, high in asked]
-    off, ends = corrected_calibration_error(
-        np.array([leading(c.first) for c in cases]),
-        np.array([float(c.first.right) for c in cases]),
-        np.random.default_rng(0),
-    )
-    verdict = "met" if off <= 0.05 else "met by the better end" if ends[0] <= 0.05 else "missed"
-    said = f"{off:.3f} ({ends[0]:.3f} to {ends[1]:.3f}), {len(cases)} cases"
-    if bins_of(len(cases)) < 2:
-        verdict = "too few to judge"
-    return [*rows, ("Expected calibration error, at most 0.05", said, verdict)]
-
-
-def by_part(cases: Sequence[Scored]) -> list[Row]:
-    """The same by world, richness and baseline."""
-    rows: list[Row] = [
-        ("part", "cases", "sound: false alarms", "named first", "first or in its group",
-         "sure and right", "tension covered"),
-    ]  # fmt: skip
-    parts = [(c.plan.world, c.plan.richness, c.plan.baseline) for c in cases]
-    for index in range(3):
-        for name in sorted({part[index] for part in parts}):
-            own = [c for c, part in zip(cases, parts, strict=True) if part[index] == name]
-            one = [c.first for c in own if c.first.kind == "one" and c.large]
-            flags: list[list[bool | None]] = [
-                [not c.first.right for c in own if c.first.kind == "none"],
-                [each.first for each in one],
-                [each.in_group for each in one],
-                [c.first.right for c in own if c.sure],
-                [c.first.tension_covered for c in own],
-            ]
-            counts = (f"{sum(map(bool, each))} of {len(each)}" for each in flags)
-            rows.append((name, str(len(own)), *counts))
-    return rows
-
-
-def every_case(cases: Sequence[Scored]) -> list[Row]:
-    rows: list[Row] = [
-        ("case", "world", "richness", "baseline", "planted", "size", "said", "probability", "right",
-         "tension off, %", "covered", "left out: said", "probability", "blamed"),
-    ]  # fmt: skip
-    for case in cases:
-        plan, one, two = case.plan, case.first, case.second
-        said = " / ".join((one.leader, *one.alike)) or one.failure
-        again = (
-            (two.leader, f"{two.leading_probability:.2f}", str(two.misattributed)) if two else ()
-        )
-        rows.append(
-            (one.case, plan.world, plan.richness, plan.baseline, one.planted, f"{one.size:.1f}",
-             said, f"{one.leading_probability:.2f}", str(one.right),
-             f"{100 * one.tension_error_after:.2f}", str(one.tension_covered), *again)
-        )  # fmt: skip
-    return rows
-
-
-def score(directories: Sequence[Path], write: bool) -> None:
-    cases = [case for directory in directories for case in scored(directory)]
-    told = [("asked", "found (95 % interval)", "verdict"), *marks(cases)]
-    for row in told:
-        print(" | ".join(row))
-    if write:
-        trials = [read_trial(directory) for directory in directories]
-        lines = ["| " + " | ".join(row) + " |" for row in told]
-        keys = ", ".join(f"`{trial.key_sha256}`" for trial in trials)
-        made = sum(len(trial.cases) for trial in trials)
-        head = f"{len(cases)} of {made} cases, {kinds(cases)}; SHA-256 of the keys {keys}."
-        table = "\n".join([lines[0], "|---|---|---|", *lines[1:]])
-        fill_in(TRIALS / "blind_trial.md", "blind trial 2", f"{head}\n\n{table}")
-        write_csv(TRIALS / "blind_trial_2" / "by_part.csv", by_part(cases))
-        write_csv(TRIALS / "blind_trial_2" / "every_case.csv", every_case(cases))
-
-
-def kinds(cases: Sequence[Scored]) -> str:
-    counts = Counter(case.first.kind for case in cases)
-    return (
-        f"{counts['none']} sound, {counts['one']} with one effect of the catalogue, "
-        f"{counts['unknown']} with one that it lacks"
-    )
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("what", choices=["make", "solve", "score"])
-    parser.add_argument("directory", type=Path, nargs="+", help="to score: one or several trials")
-    parser.add_argument("--cases", type=int, default=96)
-    parser.add_argument("--seed", type=int, default=20261126)
-    parser.add_argument("--left-out", action="store_true")
-    parser.add_argument("--until", help="UTC, today; else to the end")
-    parser.add_argument("--at-once", type=int, default=12)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--hangers", type=int, default=36)
+    parser.add_argument("--left-out", type=int, default=12)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--first", type=int, help="diagnose only so many, by their names")
+    parser.add_argument("--score", action="store_true", help="diagnose no more")
     parser.add_argument("--write-docs", action="store_true")
     given = parser.parse_args()
-    if given.what == "make":
-        make(given.directory[0], given.cases, given.seed)
-    elif given.what == "solve":
-        solve(given.directory[0], given.left_out, moment(given.until), given.at_once)
-    else:
-        score(given.directory, given.write_docs)
+    trial = Trial(given.folder.resolve())
+    if not given.score:
+        if not (trial.folder / "trial.json").exists():
+            make_trial(trial, given.hangers, given.left_out, given.seed)
+        run(trial, given.jobs, given.first)
+    rows = read_rows(trial)
+    for row in rows:
+        print(" | ".join(list_hanger(row)))
+    marks = score(rows)
+    print(table(marks))
+    if given.write_docs:
+        write_page(rows, trial.read(), trial.truth_file)
+    return int(any(mark.is_met is False for mark in marks))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -38,15 +38,13 @@ ELSEWHERE = ("every", "peers", "identify_peers")
 # Arguments of the whole run and of the short one, where it has any. Commands of one are parted by
 # semicolons; FOLDER is one of its own, not there at the first.
 WHOLE = {
-    "blind_families": "make FOLDER; solve FOLDER; score FOLDER",
-    "blind_trial": "make FOLDER; solve FOLDER; solve FOLDER --left-out; score FOLDER",
+    "blind_trial": "FOLDER",
     "gap_dynamics": "--seed 300",
 }
 SHORT = {
     "adopted_classes": "100", "alert_delivery": "--alerts 12 --kills 2",
     "any_simulator": "--cases 2", "beam_frequencies": "--repeats 5 --checked 20",
-    "blind_families": "make FOLDER --families 1; solve FOLDER; score FOLDER",
-    "blind_trial": "make FOLDER --cases 2; solve FOLDER --at-once 1; score FOLDER",
+    "blind_trial": "FOLDER --hangers 2 --left-out 1",
     "calibration": "--draws 20 --samples 300", "clock_faults": "1", "copies": "3",
     "damage": "--minutes 0.5", "dashboard": "--hangers 4 --tests 10 --rounds 1 --warm-only",
     "durations": "--repeats 1",
@@ -54,8 +52,6 @@ SHORT = {
     "fuzz_readers": "--files 200 --flow 5 --processes 1", "gap_calibration": "--cases 1 --jobs 1",
     "gap_dynamics": "--cases 1 --seed 300", "gap_family": "--families 1 --sound 0 --hangers 2",
     "gap_plan": "--cases 1",
-    "gap_trial": "--seeds 1 --effects point_mass --sizes 30 --null 1 --jobs 1",
-    "gap_worlds": "--hangers 1 --out FOLDER/rows.json",
     "general_model": "--repeats 5", "identify_ablation": "--kinds softening --seeds 3:4",
     "identify_limits": "--sound 2 --faulty 1", "identify_seconds": "--runs 1",
     "identify_simulated": "--tests 4", "kill_daemon": "--kills 4 --files 6",
@@ -82,8 +78,7 @@ TESTS = {
     "slow-without-avx512": "The slow numerics as on a processor without AVX-512.",
     "slow-without-avx2": "The slow numerics as on a processor without AVX2.",
 }
-# One that hangs must not keep the others waiting. The longest should be `gap_trial`: 940 diagnoses
-# of 20 s, two at a time, are under three hours; and `kill_workers` gives up after four.
+# One that hangs must not keep the others waiting. `kill_workers` gives up after four hours.
 LONGEST_S, LONGEST_SHORT_S = 8 * 3600, 90
 HELD, MISSED, BROKEN = "held", "missed a mark", "broken"
 UNFINISHED = "not finished, no fault so far"

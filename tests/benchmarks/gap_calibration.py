@@ -3,11 +3,11 @@
     python tests/benchmarks/gap_calibration.py --cases 480 --seed 131 --jobs 2 --keep lessons.jsonl
         --write
 
-Makes the cases of a blind trial and diagnoses each twice, with the whole catalogue and without what
-was planted, key in hand: this teaches, it does not judge, so score with another seed. What a case
-taught is kept in the file, and a later run goes on from there. Of gaps below four standard
-deviations nothing is learnt. A value for which fewer than ten answers speak stays as it is. Without
-`--write` the file is only printed. A case takes some 20 s of a core.
+Makes the hangers of a blind trial (`blind_trial.py`) and diagnoses each that has a cause of the
+catalogue twice, with the whole catalogue and without what was planted, truth in hand: this teaches,
+it does not judge, so score with another seed. What a hanger taught is kept in the file, and a later
+run goes on from there. A value for which fewer than ten answers speak stays as it is. Without
+`--write` the file is only printed. A hanger takes some 40 s of a core.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
+from itertools import repeat
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -40,16 +41,7 @@ from shm.gap.law_error import _allowances, _linear
 from shm.gap.outliers import Cleared, exclude_gross_errors
 from shm.gap.problem import GapProblem
 from shm.modes_document import load_modes
-from tests.benchmarks.blind.layout import (
-    CASE_FILE,
-    CASE_SCHEMA,
-    HANGER_FILE,
-    MODES_FILE,
-    read_document,
-)
-from tests.benchmarks.blind.making import make_trial
-from tests.benchmarks.blind.scores import LARGE
-from tests.benchmarks.blind.truth import TrueCase
+from tests.benchmarks.blind_trial import Truth, make_hanger, plan_hangers
 
 FEWEST = 10
 FITS = 0.05
@@ -72,43 +64,41 @@ class Lesson:
     mimicking: Ways | None = None
 
 
-def lesson(directory: Path, truth: TrueCase) -> Lesson:
-    """Diagnose a case with and without what was planted in it."""
-    nothing = Lesson(truth.case)
-    if truth.size < LARGE:
+def lesson(folder: Path, truth: Truth) -> Lesson:
+    """Diagnose a hanger with and without what was planted in it."""
+    nothing = Lesson(truth["hanger"])
+    if not all(each["accepted"] for each in truth["causes"]) or not truth["causes"]:
         return nothing
     try:
-        whole = diagnosed(directory, ())
-        planted = _fit_of(whole.attribution, tuple(each.name for each in truth.effects))
+        whole = diagnosed(folder, ())
+        planted = _fit_of(whole.attribution, tuple(e["accepted"][0] for e in truth["causes"]))
         own = ways_of(whole.problem, whole.attribution.baseline, planted) if planted else None
-        first = replace(nothing, own=own if truth.effects else None)
-        if truth.kind == "unknown":
-            return first
-        return replace(first, **_without_the_planted(diagnosed(directory, truth.left_out)))
+        without = diagnosed(folder, tuple(truth["accepted"]))
+        return _without_the_planted(replace(nothing, own=own), without)
     except ShmError as error:
-        print(f"{truth.case}: {error}", file=sys.stderr)
+        print(f"{truth['hanger']}: {error}", file=sys.stderr)
         return nothing
 
 
-def diagnosed(directory: Path, without: tuple[str, ...]) -> Cleared:
-    told = read_document(directory / CASE_FILE, CASE_SCHEMA)
-    hanger, tests = load_hanger(directory / HANGER_FILE), load_modes(directory / MODES_FILE)
-    options = GapOptions(str(told["baseline"]), without, seed=int(told["seed"]))
+def diagnosed(folder: Path, without: tuple[str, ...]) -> Cleared:
+    hanger, tests = load_hanger(folder / "hanger.toml"), load_modes(folder / "case.modes.json")
+    options = GapOptions(without=without)
     rng = np.random.default_rng(options.seed)
     problem = choose_baseline(usable(tests, hanger).tests, hanger, options, rng)
     return exclude_gross_errors(problem, options, rng)
 
 
-def _without_the_planted(clear: Cleared) -> dict[str, object]:
+def _without_the_planted(taught: Lesson, clear: Cleared) -> Lesson:
     found = clear.attribution
     if found.leads == "no gap" or not found.explanations:
-        return {}
+        return taught
     names = found.explanations[0].best.hypothesis.names
     fit = _fit_of(found, names)
-    return {
-        "mimics": len(names) if found.p_value >= FITS else 0,
-        "mimicking": ways_of(clear.problem, found.baseline, fit) if fit else None,
-    }
+    return replace(
+        taught,
+        mimics=len(names) if found.p_value >= FITS else 0,
+        mimicking=ways_of(clear.problem, found.baseline, fit) if fit else None,
+    )
 
 
 def _fit_of(found: Attribution, effects: tuple[str, ...]) -> Fit | None:
@@ -205,11 +195,11 @@ def main() -> int:
     name = f"{given.cases} of seed {given.seed}: "
     lessons = [each for each in map(_kept, lines) if each.case.startswith(name)]
     with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(given.jobs) as pool:
-        trial = Path(folder) / "trial"
-        made = make_trial(trial, given.cases, given.seed, given.jobs)
         known = {each.case for each in lessons}
-        missing = [each for each in made if name + each.case not in known]
-        places = [trial / "cases" / each.case for each in missing]
+        plans = plan_hangers(given.cases, given.seed)
+        plans = [each for each in plans if name + each.name not in known]
+        places = [Path(folder) / each.name for each in plans]
+        missing = [make_hanger(*each) for each in zip(plans, repeat(given.seed), places)]
         with given.keep.open("a") as kept:
             for each in pool.map(lesson, places, missing):
                 lessons.append(replace(each, case=name + each.case))

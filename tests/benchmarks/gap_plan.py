@@ -41,14 +41,14 @@ from shm.gap.measurement_plan import (  # noqa: E402
 from shm.models.effects import EFFECTS  # noqa: E402
 from shm.simulate import HangerState, PlantedEffect  # noqa: E402
 from shm.values import MEASUREMENT_HOURS, PLANES, FloatArray, Hanger, ModalTest  # noqa: E402
-from tests.benchmarks.gap.outcomes import Case  # noqa: E402
-from tests.benchmarks.gap_trial import ROD, planted_to_size  # noqa: E402
 from tests.helpers.gap_fits import make_problem  # noqa: E402
 from tests.worlds.simulated.campaign import (  # noqa: E402
     CampaignPlan,
     _realised,
     identified,
 )
+from tests.worlds.simulated.detectable import at_share, scaled_to, size_of  # noqa: E402
+from tests.worlds.simulated.effects.registry import choices, drawn  # noqa: E402
 from tests.worlds.simulated.reality import (  # noqa: E402
     Reality,
     sd_factors,
@@ -63,6 +63,36 @@ FIXED = ("other plane", "known mass", "sensors", "temperature", "level", "more m
 SIZE, REFERENCE_C, MOST = 30.0, 10.0, 5
 REALITY = Reality(own_laws=False)
 ONE_PLANE = CampaignPlan(PLANES[:1], shapes=False, reality=REALITY)
+FULL = CampaignPlan(reality=REALITY)
+ROD = Hanger(
+    id=3,
+    length_m=12.0,
+    elastic_modulus_pa=200e9,
+    area_m2=np.pi * 0.130**2 / 4,
+    second_moment_m4=np.pi * 0.130**4 / 64,
+    mass_per_length_kg_m=7800 * np.pi * 0.130**2 / 4,
+    nominal_tension_n=711e3,
+    diameter_m=0.130,
+)
+DRAWS_OF_A_CASE, ABOUT, WEAK = 12, 1.02, (0.02, 0.2)
+
+
+def plant_to_size(cause: str, state: HangerState, rng: np.random.Generator) -> PlantedEffect | None:
+    """Draw an effect of the size in a full campaign; None where it never is so large.
+
+    Where its weakest is larger everywhere, it is drawn from the weak end of its range, but not from
+    the very end, which no interval could hold.
+    """
+    places = choices(cause, FULL.places_m(ROD), [test.id for test in FULL.tests(ROD)])
+    weak = None
+    for _ in range(DRAWS_OF_A_CASE):
+        effect = drawn(cause, str(rng.choice(places)), ROD, rng)
+        scaled = scaled_to(SIZE, ROD, state, effect, FULL)
+        if scaled is not None and size_of(ROD, state, [scaled], FULL) < ABOUT * SIZE:
+            return scaled
+        if scaled is not None and weak is None:
+            weak = at_share(float(rng.uniform(*WEAK)), ROD, effect)
+    return weak
 
 
 @dataclass(frozen=True)
@@ -164,9 +194,8 @@ def tried(index: int, seed: int, causes: tuple[str, ...]) -> dict[str, Any] | No
     """One hanger by the plan and in the fixed order."""
     cause = causes[index % len(causes)]
     own = 1000 * seed + index
-    case = Case(cause, SIZE, own)
     rng = np.random.default_rng((own, 0))
-    effect = planted_to_size(case, HangerState(ROD.nominal_tension_n), rng)
+    effect = plant_to_size(cause, HangerState(ROD.nominal_tension_n), rng)
     if effect is None:
         return None
     bridge, started = Bridge(effect, own), time.process_time()

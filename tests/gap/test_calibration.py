@@ -14,7 +14,7 @@ from shm.gap.calibration import CALIBRATION, FILE, Calibration, Provenance, read
 from shm.gap.contract import Hypothesis
 from shm.gap.search import fit_alone
 from shm.models.effects import Variant
-from tests.benchmarks.blind.making import make_trial
+from tests.benchmarks.blind_trial import GAPPED, Plan, make_hanger
 from tests.benchmarks.gap_calibration import Lesson, calibrated, lesson, shares, text, ways_of
 from tests.helpers.gap_campaigns import campaign, fit_of, problem_of
 
@@ -82,10 +82,11 @@ def _read_back(lessons: list[Lesson], folder: Path) -> Calibration:
 
 
 @pytest.mark.trial
-def test_a_trial_teaches_what_the_file_holds(tmp_path: Path) -> None:
-    """Two cases, each taken for ten: the file written of them reads back as it was."""
-    made = make_trial(tmp_path / "trial", 2, seed=7)
-    lessons = [lesson(tmp_path / "trial" / "cases" / each.case, each) for each in made]
-    assert any(each.own for each in lessons)
-    read = _read_back(lessons * 10, tmp_path)
+def test_a_hanger_teaches_what_the_file_holds(tmp_path: Path) -> None:
+    """One hanger with a cause, taken for ten: the file written of it reads back."""
+    plan = Plan("h001", GAPPED, 0, ("mass all along",))
+    taught = lesson(tmp_path, make_hanger(plan, 7, tmp_path))
+    assert taught.own
+    assert taught.mimicking
+    read = _read_back([taught] * 10, tmp_path)
     assert sum(each.own for each in read.off_by.values()) < 1

@@ -58,7 +58,6 @@ class Cause:
 
 
 CAUSES: dict[str, Cause] = {
-    "none": Cause((), 0.0, 0.0, ""),
     "mass at a point": Cause(("point_mass",), 3e-4, 0.1, "of the hanger's mass"),
     "guide": Cause(("intermediate_support",), 1e-3, 5.0, "of the bar's lateral stiffness there"),
     "end that turns": Cause(("rotational_end_flexibility",), 1e-3, 5.0, "EI / k L"),
@@ -85,9 +84,7 @@ CAUSES: dict[str, Cause] = {
     "clamp to a neighbour": Cause((), 1e-3, 2.0, "of the bar's lateral stiffness there"),
 }
 
-FAULTY = tuple(name for name in CAUSES if name != "none")
-SECOND = tuple(name for name in FAULTY if CAUSES[name].accepted and name not in ("sag",))
-PAIR_SHARE = 1 / 8
+SECOND = tuple(name for name in CAUSES if CAUSES[name].accepted and name != "sag")
 VISIBLE = (5.0, 100.0)  # standard errors
 INHERENT = 3.0
 
@@ -787,29 +784,15 @@ def _sense(
     return points
 
 
-def deal_cause(seed: int, index: int) -> str:
-    """Return the cause of a case: every 43 hold each cause twice and three sound hangers."""
-    size = len(FAULTY)
-    block, rest = divmod(index, 2 * size + 3)
-    half, place = divmod(rest, size + 1) if rest < size + 1 else (1, rest - size - 1)
-    deck = [*FAULTY, "none"] if half == 0 else [*FAULTY, "none", "none"]
-    order = np.random.default_rng([seed, block, half, 41]).permutation(len(deck))
-    return deck[int(order[place])]
-
-
 def make_case(
-    seed: int, index: int, nuisances: Nuisances | None = None, causes: tuple[str, ...] = ()
+    seed: int, index: int, causes: tuple[str, ...], nuisances: Nuisances | None = None
 ) -> Case:
-    """Make case `index` of a seed, which depends on both alone; `causes` replace the dealt ones.
+    """Make case `index` of a seed with the causes; it depends on these alone.
 
     Where a cause cannot be seen in a hanger, another hanger is drawn.
     """
-    n, first = nuisances or Nuisances(), Draws(seed, index)
-    names = causes or (deal_cause(seed, index),)
-    if not causes and names != ("none",) and first.chance(PAIR_SHARE):
-        others = [name for name in SECOND if name != names[0]]
-        names = (*names, first.pick(*others))
-    needs = frozenset(need for name in names for need in CAUSES[name].needs)
+    n = nuisances or Nuisances()
+    needs = frozenset(need for name in causes for need in CAUSES[name].needs)
     for attempt in range(200):
         draws = Draws(seed, index, attempt + 1)
         hanger = draw_hanger(draws, needs, n)
@@ -818,14 +801,14 @@ def make_case(
         )
         sound, faults = solve(quiet, ()), []
         slopes = find_slopes(quiet, sound, n)
-        for name in names if names != ("none",) else ():
+        for name in causes:
             fault = _size_fault(draws, draw_fault(draws, name, quiet), quiet, sound, slopes)
             if fault is None:
                 break
             faults.append(fault)
         else:
             return _finish(index, draws, (hanger, quiet), (sound, slopes), tuple(faults), n)
-    raise RuntimeError(f"{names} are seen in no hanger of seed {seed}, case {index}")
+    raise RuntimeError(f"{causes} are seen in no hanger of seed {seed}, case {index}")
 
 
 def _finish(
