@@ -163,7 +163,7 @@ class Search:
         climbed: dict[Hypothesis, list[Peak]] = {}
         for hypothesis, z in starts.items():
             target = Target(self.problem, hypothesis)
-            hopeless = max(self.rough[h] for h in self.fits) - 2 * HOPELESS
+            hopeless = max(self.rough[h] for h in (*self.fits, *climbed)) - 2 * HOPELESS
             peaks = find_peaks(target, z, -np.inf if hypothesis.flexible else hopeless)
             if peaks:
                 climbed[hypothesis] = peaks
