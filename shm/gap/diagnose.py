@@ -14,8 +14,8 @@ from shm.gap.contract import Fit, GapOptions, Hypothesis
 from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
 from shm.gap.damping import remark_on_damping
 from shm.gap.data_checks import usable
+from shm.gap.measurement_plan import ranked
 from shm.gap.misfit import refuse_misfit
-from shm.gap.next_measurement import ranked
 from shm.gap.numbering import doubt_orders
 from shm.gap.outlier_remarks import (
     describe_doubtful,

@@ -143,6 +143,16 @@ class Search:
         """Return the log of prior times rough evidence."""
         return self.rough[hypothesis] + log_prior(hypothesis, self.variants)
 
+    def _needed(self, target: Target, level: float) -> float:
+        """Return the log posterior at the peak that a level needs at least.
+
+        Parameters of the hanger are as uncertain as without effects, those of effects as before.
+        """
+        alone = self.baseline.peaks[0]
+        added = target.dimension - len(alone.z)
+        volume = alone.log_evidence - alone.log + added * np.log(2 * np.pi) / 2
+        return float(level - log_prior(target.hypothesis, self.variants) - volume)
+
     def _hopeful(self) -> list[Hypothesis]:
         """Return the scanned hypotheses near the best; each effect once where there is a gap.
 
@@ -163,8 +173,9 @@ class Search:
         climbed: dict[Hypothesis, list[Peak]] = {}
         for hypothesis, z in starts.items():
             target = Target(self.problem, hypothesis)
-            hopeless = max(self.rough[h] for h in (*self.fits, *climbed)) - 2 * HOPELESS
-            peaks = find_peaks(target, z, -np.inf if hypothesis.flexible else hopeless)
+            best = max(self._level(h) for h in (*self.fits, *climbed))
+            hopeless = -np.inf if hypothesis.flexible else self._needed(target, best - 2 * HOPELESS)
+            peaks = find_peaks(target, z, hopeless)
             if peaks:
                 climbed[hypothesis] = peaks
                 self.rough[hypothesis] = laplace(peaks)

@@ -220,7 +220,7 @@ def by_plan(now: Attribution, step: int, seed: int) -> tuple[Proposal | None, fl
 def in_order(now: Attribution, step: int, seed: int) -> tuple[Proposal | None, float]:
     """The first kind of the fixed order that was not made yet."""
     fits = [now.baseline, *(each.best.fit for each in now.explanations if each.best.fit)]
-    offered = _offered(now.search.problem, fits[:2])
+    offered, *_ = _offered(now.search.problem, fits[:2])
     able = [each for kind in FIXED for each in offered if each.kind == kind]
     return (able[0], float("nan")) if able else (None, float("nan"))
 

@@ -11,6 +11,7 @@ from shm.gap.attribution import Attribution, attribute
 from shm.gap.contract import GapOptions
 from shm.gap.experiment_design import lift_off, like_the_present, together, with_sensors
 from shm.gap.measurement_plan import (
+    NO_GAP,
     UNKNOWN,
     Race,
     explanations,
@@ -18,7 +19,6 @@ from shm.gap.measurement_plan import (
     nothing_planned,
     planned,
 )
-from shm.gap.next_measurement import NO_GAP
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import MEASUREMENT_HOURS
 from tests.helpers.effects import all_but

@@ -10,7 +10,7 @@ import pytest
 from shm.gap.contract import Hypothesis, Observations
 from shm.gap.experiment_design import like_the_present, measured_already, proposals, with_sensors
 from shm.gap.foresight import Errors, Foresight, NewTests, divergence
-from shm.gap.next_measurement import NO_GAP, ranked
+from shm.gap.measurement_plan import NO_GAP, ranked
 from shm.models.effects import EFFECTS, Conditions, Variant
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import AddedMass
@@ -64,7 +64,7 @@ def toy(conditions=ONE_TEST, modes=MODES, places_m=()):
 
 
 def normal(mean, covariance):
-    return Foresight(design_of(ONE_TEST, MODES[: len(mean)]), np.array(mean), np.array(covariance))
+    return Foresight(np.array(mean), np.array(covariance))
 
 
 def test_the_divergence_of_two_normal_distributions_is_the_closed_form():
