@@ -16,7 +16,6 @@ from itertools import product
 import numpy as np
 import scipy
 
-from shm.gap.attribution import WITHIN_REACH, Attribution
 from shm.gap.contract import Fit
 from shm.gap.experiment_design import (
     Proposal,
@@ -38,6 +37,7 @@ from shm.gap.noise import (
 )
 from shm.gap.probabilities import families, probabilities
 from shm.gap.problem import GapProblem
+from shm.gap.search import WITHIN_REACH, Attribution
 from shm.values import MEASUREMENT_HOURS, NAN, FloatArray, IntArray, NextMeasurement
 from shm.values.diagnosis import joined, parted
 

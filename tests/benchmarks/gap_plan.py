@@ -26,7 +26,6 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from shm.assumptions import DEFAULTS  # noqa: E402
-from shm.gap.attribution import Attribution, attribute  # noqa: E402
 from shm.gap.contract import Design, GapOptions  # noqa: E402
 from shm.gap.experiment_design import Proposal  # noqa: E402
 from shm.gap.measurement_plan import (  # noqa: E402
@@ -38,6 +37,7 @@ from shm.gap.measurement_plan import (  # noqa: E402
     log_odds_of,
     planned,
 )
+from shm.gap.search import Attribution, attribute  # noqa: E402
 from shm.models.effects import EFFECTS  # noqa: E402
 from shm.simulate import HangerState, PlantedEffect  # noqa: E402
 from shm.values import MEASUREMENT_HOURS, PLANES, FloatArray, Hanger, ModalTest  # noqa: E402

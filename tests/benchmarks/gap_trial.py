@@ -30,10 +30,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from docs.filling import write_csv
-from shm.gap.attribution import Attribution, Explanation, attribute
 from shm.gap.contract import GapOptions
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
+from shm.gap.search import Attribution, Explanation, attribute
 from shm.models import MODELS, AsMade
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import Hanger

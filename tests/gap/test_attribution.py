@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shm.gap.attribution import Attribution, Explanation, attribute, hardly_behind
 from shm.gap.contract import GapOptions, Hypothesis
 from shm.gap.probabilities import ScoredHypothesis
+from shm.gap.search import Attribution, Explanation, attribute, hardly_behind
 from shm.simulate import HangerState, PlantedEffect
 from tests.helpers.effects import all_but
 from tests.helpers.gap_campaigns import HANGER, problem_of

@@ -7,7 +7,7 @@ import pytest
 
 from shm.errors import UsageError
 from shm.gap.contract import Hypothesis, Observations
-from shm.gap.cross_validation import held_out, shrinkage
+from shm.gap.residuals import held_out, shrinkage
 from shm.models.effects import Conditions, Variant
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import AddedMass

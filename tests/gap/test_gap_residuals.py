@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from shm.gap.contract import Hypothesis, Observations
-from shm.gap.cross_validation import HeldOut
-from shm.gap.residuals import identification_sd, residuals, trends
+from shm.gap.residuals import HeldOut, identification_sd, residuals, trends
 from shm.models.effects import Conditions
 from shm.values import NAN, AddedMass
 from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.attribution import Attribution, attribute
 from shm.gap.contract import GapOptions
 from shm.gap.experiment_design import lift_off, like_the_present, together, with_sensors
 from shm.gap.measurement_plan import (
@@ -19,6 +18,7 @@ from shm.gap.measurement_plan import (
     nothing_planned,
     planned,
 )
+from shm.gap.search import Attribution, attribute
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import MEASUREMENT_HOURS
 from tests.helpers.effects import all_but

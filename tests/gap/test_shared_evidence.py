@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.attribution import Attribution, attribute
 from shm.gap.contract import GapOptions
 from shm.gap.probabilities import NO_GAP, SINGLE, UNKNOWN
 from shm.gap.scan import VISIBLE
+from shm.gap.search import Attribution, attribute
 from shm.gap.shared_evidence import STEP, HangerEvidence, weigh_hanger
 from shm.simulate import HangerState, PlantedEffect
 from tests.helpers.diagnoses import a_diagnosis
