@@ -43,7 +43,7 @@ from shm.simulate import HangerState, PlantedEffect  # noqa: E402
 from shm.values import MEASUREMENT_HOURS, PLANES, FloatArray, Hanger, ModalTest  # noqa: E402
 from tests.benchmarks.gap.outcomes import Case  # noqa: E402
 from tests.benchmarks.gap_trial import ROD, planted_to_size  # noqa: E402
-from tests.helpers.gap_fits import make_problem  # noqa: E402
+from tests.helpers.gap_campaigns import problem_of  # noqa: E402
 from tests.worlds.simulated.campaign import (  # noqa: E402
     CampaignPlan,
     _realised,
@@ -107,7 +107,7 @@ class Known:
     causes: tuple[str, ...] = CAUSES
 
     def attribution(self, seed: int) -> Attribution:
-        problem = make_problem(self.tests, self.hanger)
+        problem = problem_of(self.tests, self.hanger)
         without = tuple(name for name in EFFECTS if name not in self.causes)
         return attribute(
             problem, GapOptions(without=without, seed=seed), np.random.default_rng(seed)
