@@ -20,18 +20,38 @@ from shm.inference.coordinates import log_normal
 from shm.inference.mixture import Rows
 from shm.values import BoolArray, FloatArray, IntArray
 
-# Numerical: a climb's steps, of which the first are free, the gain in log posterior that is none,
-# and how far below the best a way ends; dampings of a step, those tried at once, by factors, with
-# the most standard deviations that each goes, and the factor where none leads up.
-_STEPS, _FREE_STEPS, _NO_GAIN, _FAR_BEHIND = 25, 2, 0.02, 8.0
-_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 0.03, 1e-3, 1e5
-_TRIED, _LONGEST, _SHORTER = np.array([0.03, 1.0, 30.0]), np.array([3.0, 1.0, 1.0]), 100.0
-# Numerical: forward differences in standard deviations of a prior; a slope beyond is a cliff, where
-# two modes change places; how far a climb goes.
-_DIFFERENCE, _STEEPEST, _FARTHEST, FARTHEST_LINEAR = 1e-4, 1e3, 4.5, 12.0
-_SAME = 0.3  # numerical: standard deviations of a peak within which two are one
+_STEEPEST, FARTHEST_LINEAR = 1e3, 12.0  # numerical: a slope beyond is a cliff: two modes cross
 SETTLED = 0.3
 """Numerical: of a prior's standard deviation; over less the slopes of linear parameters hold."""
+
+
+@dataclass(frozen=True)
+class ClimbOptions:
+    """Hold the numbers of a climb, all of them numerical.
+
+    It takes so many `steps`, of which the first are `free`, until one gains less than `no_gain` in
+    log posterior, or it is `far_behind` the best. Each step is `tried` with several dampings, by
+    factors, with the `longest` way of each in standard deviations of a prior; the next one is a
+    factor `shorter` where none leads up. Slopes are forward differences over `difference`. No
+    climb goes beyond `farthest`. Peaks within `same` of their standard deviations are one.
+    """
+
+    steps: int = 25
+    free: int = 3
+    no_gain: float = 0.02
+    far_behind: float = 8.0
+    damping: float = 0.03
+    least_damping: float = 1e-3
+    most_damping: float = 1e5
+    tried: tuple[float, ...] = (0.03, 1.0, 30.0)
+    longest: tuple[float, ...] = (3.0, 1.0, 1.0)
+    shorter: float = 100.0
+    difference: float = 1e-4
+    farthest: float = 4.5
+    same: float = 0.3
+
+
+_HOW = ClimbOptions()
 
 
 class Problem(Protocol):
@@ -65,7 +85,7 @@ class Target:
         self.dimension = problem.dimension(hypothesis)
         self.linear = problem.linear(hypothesis)
         self.other: IntArray = np.setdiff1d(np.arange(self.dimension), self.linear)
-        self.farthest: FloatArray = np.full(self.dimension, _FARTHEST)
+        self.farthest: FloatArray = np.full(self.dimension, _HOW.farthest)
         self.farthest[self.linear] = FARTHEST_LINEAR
 
     def residual(self, z: FloatArray) -> FloatArray:
@@ -89,12 +109,12 @@ class Target:
         """
         residual = self.residual(starts)
         log = np.asarray(self.likelihood.log(residual) + log_normal(starts))
-        slopes, damping = self._slopes(starts, residual), np.full(len(starts), _DAMPING)
+        slopes, damping = self._slopes(starts, residual), np.full(len(starts), _HOW.damping)
         ways, found = self._ways(starts, log, residual, slopes, damping), list[Peak]()
-        for taken in range(_STEPS):
-            hopeless = max(hopeless, float(ways.log.max()) - _FAR_BEHIND)
+        for taken in range(_HOW.steps):
+            hopeless = max(hopeless, float(ways.log.max()) - _HOW.far_behind)
             over = ways.settled | ways.met
-            if taken > _FREE_STEPS:
+            if taken >= _HOW.free:
                 over |= ways.log + 2 * ways.hoped < hopeless
             found += ways.take(over).peaks
             ways = ways.take(~over)
@@ -105,26 +125,28 @@ class Target:
 
     def _step(self, ways: _Ways) -> _Ways:
         """Take the best of steps of Levenberg and Marquardt of several lengths on each way."""
-        damping = ways.damping[:, None] * _TRIED
+        damping = ways.damping[:, None] * np.array(_HOW.tried)
         inner = ways.hessian[:, None] * (1 + damping[..., None, None] * np.eye(self.dimension))
-        step = np.linalg.solve(inner, np.tile(ways.gradient[:, None, :, None], (len(_TRIED), 1, 1)))
+        step = np.linalg.solve(
+            inner, np.tile(ways.gradient[:, None, :, None], (len(_HOW.tried), 1, 1))
+        )
         largest = np.abs(step).max(axis=2, keepdims=True)
-        step = (step / np.maximum(1.0, largest / _LONGEST[:, None, None]))[..., 0]
+        step = (step / np.maximum(1.0, largest / np.array(_HOW.longest)[:, None, None]))[..., 0]
         tried = np.clip(ways.z[:, None] + step, -self.farthest, self.farthest)
         flat = tried.reshape(-1, self.dimension)
         residual = self.residual(flat)
         log = np.asarray(self.likelihood.log(residual) + log_normal(flat)).reshape(damping.shape)
         best = np.arange(len(log)), log.argmax(axis=1)
         up = np.asarray(log[best] > ways.log)
-        shorter = np.where(up, np.inf, ways.damping * _SHORTER)
+        shorter = np.where(up, np.inf, ways.damping * _HOW.shorter)
         stayed = replace(ways, damping=shorter).take(~up)
         if not up.any():
             return stayed
-        gained = np.where(log[best] - ways.log < _NO_GAIN, np.inf, damping[best])[up]
+        gained = np.where(log[best] - ways.log < _HOW.no_gain, np.inf, damping[best])[up]
         z, residual = tried[best][up], residual.reshape(*damping.shape, -1)[best][up]
         near = (np.abs(z - ways.z[up])[:, self.linear] <= SETTLED).all(axis=1)
         slopes = self._slopes(z, residual, ways.slopes[up], near)
-        moved = self._ways(z, log[best][up], residual, slopes, gained.clip(_LEAST_DAMPING))
+        moved = self._ways(z, log[best][up], residual, slopes, gained.clip(_HOW.least_damping))
         return moved.joined(stayed)
 
     def _slopes(
@@ -142,7 +164,7 @@ class Target:
         if near is not None:
             wanted[np.ix_(near, self.linear)] = False
         row, column = np.nonzero(wanted)
-        step = np.where(z > 0, -_DIFFERENCE, _DIFFERENCE)[row, column]
+        step = np.where(z > 0, -_HOW.difference, _HOW.difference)[row, column]
         points = z[row]
         points[np.arange(len(row)), column] += step
         found = (residual[row] - self.residual(points)) / step[:, None]
@@ -192,13 +214,13 @@ class _Ways(Rows):
 
     @property
     def settled(self) -> BoolArray:
-        return np.asarray((self.hoped < _NO_GAIN) | (self.damping > _MOST_DAMPING))
+        return np.asarray((self.hoped < _HOW.no_gain) | (self.damping > _HOW.most_damping))
 
     @property
     def met(self) -> BoolArray:
         """Return which points (m,) lie beside a higher one, by its standard deviations."""
         sd = np.sqrt(np.einsum("mii->mi", np.linalg.inv(self.hessian)))
-        beside = (np.abs(self.z[:, None] - self.z) < _SAME * sd).all(axis=2)
+        beside = (np.abs(self.z[:, None] - self.z) < _HOW.same * sd).all(axis=2)
         rank = np.argsort(np.argsort(-self.log, kind="stable"))
         return np.asarray((beside & (rank[:, None] > rank)).any(axis=1))
 
@@ -222,7 +244,7 @@ def find_peaks(target: Target, starts: FloatArray, hopeless: float = -np.inf) ->
 
 def _same(one: Peak, other: Peak) -> bool:
     away = np.abs(one.z - other.z) / np.sqrt(np.diag(other.covariance))
-    return bool((away < _SAME).all())
+    return bool((away < _HOW.same).all())
 
 
 def laplace(peaks: Sequence[Peak]) -> float:
