@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.groups import SAME_BELOW, group
 from shm.gap.probabilities import (
+    CALIBRATION,
     SINGLE,
     UNKNOWN,
     ScoredHypothesis,

@@ -16,12 +16,11 @@ import numpy as np
 import scipy
 
 from shm.errors import UsageError
-from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import GapOptions
 from shm.gap.coordinates import scale_free
 from shm.gap.diagnose import examined, tension_estimate
 from shm.gap.groups import SAME_BELOW
-from shm.gap.probabilities import SINGLE, UNKNOWN
+from shm.gap.probabilities import CALIBRATION, SINGLE, UNKNOWN
 from shm.gap.shared_causes import (
     LEAST,
     SCATTERS,

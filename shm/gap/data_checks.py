@@ -18,9 +18,6 @@ from shm.errors import BadInput
 from shm.gap.observations import told_of_rounding
 from shm.inference.data_checks import CheckedData, check_data, mode_name
 from shm.values import FEW_MODES, Hanger, ModalTest
-from shm.values.modes import MOST_SLOPE
-
-SURE_COMMON_SDS = 3.0  # judgement: by chance one test in 370
 
 
 def usable(tests: Sequence[ModalTest], hanger: Hanger) -> CheckedData:
@@ -149,31 +146,10 @@ def _without_shape_sd(tests: Sequence[ModalTest]) -> str:
     )
 
 
-def common_slope(tests: Sequence[ModalTest]) -> tuple[float, float]:
-    """The weighted mean of all modes' `amplitude_slope`, and its standard deviation; inf of none.
-
-    What slips lowers all frequencies, a guide or stretching raises all: together they tell more
-    surely than each.
-    """
-    known = [m for t in tests for m in t.modes if abs(m.amplitude_slope) < MOST_SLOPE]
-    weight = sum(m.amplitude_slope_sd**-2 for m in known if m.amplitude_slope_sd > 0)
-    if not weight:
-        return 0.0, math.inf
-    each = (m.amplitude_slope / m.amplitude_slope_sd**2 for m in known if m.amplitude_slope_sd > 0)
-    return sum(each) / weight, weight**-0.5
-
-
 def _amplitude(tests: Sequence[ModalTest]) -> str:
     changing = [m for test in tests for m in test.modes if m.depends_on_amplitude]
     if not changing:
-        slope, sd = common_slope(tests)
-        if abs(slope) <= SURE_COMMON_SDS * sd:
-            return ""
-        return (
-            f"Something depends on amplitude: all frequencies together are {100 * abs(slope):.2g} "
-            f"% {'lower' if slope < 0 else 'higher'} at that of a hit than at small amplitude "
-            f"({abs(slope) / sd:.0f} standard deviations), though none is surely so by itself."
-        )
+        return ""
     most = max((mode.amplitude_slope for mode in changing), key=abs)
     side = "lower" if most < 0 else "higher"
     which = f"{len(changing)} frequencies depend" if len(changing) > 1 else "One frequency depends"
@@ -202,9 +178,6 @@ def _whose(tests: Sequence[ModalTest]) -> str:
 
 def _listed(names: Sequence[str]) -> str:
     return f"test {names[0]}" if len(names) == 1 else f"tests {', '.join(names)}"
-
-
-_BEAMS = ("beam1", "beam2", "beam3")
 
 
 def told_of_few(tests: Sequence[ModalTest], hanger: Hanger) -> str:

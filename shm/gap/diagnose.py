@@ -5,29 +5,28 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.baseline import choose_baseline
 from shm.gap.contract import Fit, GapOptions, Hypothesis
-from shm.gap.cross_validation import check_hold_out, held_out, shrinkage
 from shm.gap.damping import remark_on_damping
 from shm.gap.data_checks import usable
-from shm.gap.misfit import refuse_misfit
-from shm.gap.next_measurement import ranked
-from shm.gap.numbering import doubt_orders
-from shm.gap.outlier_remarks import (
+from shm.gap.measurement_plan import ranked
+from shm.gap.misfit import doubt_orders, refuse_misfit
+from shm.gap.outliers import (
+    Cleared,
     describe_doubtful,
     describe_outliers,
     describe_set_aside,
+    exclude_gross_errors,
     residuals_with_outliers,
 )
-from shm.gap.outliers import Cleared, exclude_gross_errors
 from shm.gap.places import places
 from shm.gap.problem import GapProblem
-from shm.gap.residuals import residuals, sensor_remarks, trends
-from shm.gap.search import check_effects
+from shm.gap.residuals import check_hold_out, held_out, residuals, sensor_remarks, shrinkage, trends
+from shm.gap.search import Attribution, Explanation, answered, check_effects, possible
 from shm.inference.data_checks import CheckedData
 from shm.inference.mixture import systematic
 from shm.inference.options import Progress, silent
@@ -144,8 +143,9 @@ def _search(
     clear = exclude_gross_errors(
         whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done)
     )
-    refuse_misfit(clear, (*found.other_unit, *doubts))
-    return found, doubts, clear
+    orders = doubt_orders(clear.problem, clear.attribution)
+    refuse_misfit(clear.problem, clear.attribution, (*orders, *found.other_unit, *doubts))
+    return replace(found, remarks=(*found.remarks, *orders)), doubts, clear
 
 
 def _effective_draws(answer: Sequence[tuple[float, Fit]]) -> float:
@@ -188,8 +188,7 @@ def _on_the_way(
     measurement errs by."""
     gross = (*describe_set_aside(clear, aside), *describe_doubtful(doubted))
     measured = sensor_remarks(clear.problem, best)
-    orders = doubt_orders(clear.problem, clear.attribution)
-    return (*found.remarks, *orders, *gross, *measured)
+    return (*found.remarks, *gross, *measured)
 
 
 def _of_another(tests: Sequence[ModalTest], hanger: Hanger) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from shm.gap.contract import Design, Fit
 from shm.gap.noise import same_mode
 from shm.gap.problem import GapProblem
 from shm.gap.residuals import identification_sd
-from shm.values import NAN, FloatArray
+from shm.values import NAN, FloatArray, IntArray
 
 _STEP_IN_SDS = 0.1  # numerical: far from rounding, near enough for slopes to hold
 
@@ -25,14 +25,8 @@ _STEP_IN_SDS = 0.1  # numerical: far from rounding, near enough for slopes to ho
 class Foresight:
     """The normal distribution of new data: `mean` (data,), `covariance` (data, data)."""
 
-    design: Design
     mean: FloatArray
     covariance: FloatArray
-
-    def turned_to(self, other: Foresight) -> Foresight:
-        """Return the same with the sign of each shape that agrees with `other`."""
-        sign = find_signs(self.design, self.mean[None], other.mean)[0]
-        return Foresight(self.design, sign * self.mean, np.outer(sign, sign) * self.covariance)
 
 
 Pattern = Callable[[Design, Design], FloatArray]
@@ -76,6 +70,7 @@ class NewTests:
     """Tests not yet made, and what errors that repeat do to their data.
 
     With a `reading_sd` (a fraction) the last datum is the logarithm of a tension that is read.
+    Shapes have the signs of the first fit's.
     """
 
     def __init__(self, problem: GapProblem, design: Design, reading_sd: float = NAN):
@@ -84,9 +79,10 @@ class NewTests:
         tensions, masses = problem.tensions_of(design), problem.masses_of(design)
         self._of_frequencies = np.hstack([self._section, tensions, masses])
         self._predictions: dict[Fit, tuple[FloatArray, FloatArray]] = {}
+        self._first: FloatArray | None = None
 
-    def foresee(self, fit: Fit, errors: Errors) -> Foresight:
-        """Return the data that `fit` predicts, given the old ones.
+    def foresee(self, fit: Fit, errors: Errors, rows: IntArray | None = None) -> Foresight:
+        """Return the data that `fit` predicts, given the old ones: all, or those of `rows`.
 
         New data err as the present ones do (median). The model error of a mode is the same in the
         new test as in the old ones, so that what the fit left over of a mode is expected again.
@@ -96,23 +92,33 @@ class NewTests:
             self._predictions[fit] = self._predict(fit)
         mean, spread = (each.copy() for each in self._predictions[fit])
         new, size = design.frequencies, design.size
-        sd = [np.median(errors.frequency_sd), errors.shape_sd, self.reading_sd]
-        noise = np.diag(np.repeat(sd, [new, size - new, len(mean) - size]) ** 2)
         was, own = problem.repeated, self._of_frequencies
         shared = errors.between(design, old) + self._section @ was.section.T
         among_old = errors.between(old, old) + was.frequency + np.diag(errors.frequency_sd**2)
         gain = np.linalg.solve(among_old, shared.T).T
         mean[:new] += gain @ (problem.observations.value - fit.predicted)[: old.frequencies]
         spread[:new] -= gain @ (fit.slopes @ _roots(fit.covariance).T)[: old.frequencies]
-        noise[:new, :new] += errors.between(design, design) + own @ own.T - gain @ shared.T
-        noise[new:size, new:size] += self._sensors @ self._sensors.T
-        return Foresight(design, mean, spread @ spread.T + noise)
+        repeated = errors.between(design, design) + own @ own.T - gain @ shared.T
+        rows = np.arange(len(mean)) if rows is None else rows
+        sd = [np.median(errors.frequency_sd), errors.shape_sd, self.reading_sd]
+        variance = np.repeat(sd, [new, size - new, len(mean) - size])[rows] ** 2
+        covariance = spread[rows] @ spread[rows].T + np.diag(variance)
+        frequencies = np.flatnonzero(rows < new)
+        shapes = np.flatnonzero((rows >= new) & (rows < size))
+        loads = self._sensors[rows[shapes] - new]
+        covariance[np.ix_(frequencies, frequencies)] += repeated[
+            np.ix_(rows[frequencies], rows[frequencies])
+        ]
+        covariance[np.ix_(shapes, shapes)] += loads @ loads.T
+        return Foresight(mean[rows], covariance)
 
     def _predict(self, fit: Fit) -> tuple[FloatArray, FloatArray]:
         """Return the prediction (data,) and its change (data, d) along the posterior's roots."""
         around = _around(self.problem, fit, _roots(fit.covariance))
         predicted = self.problem.predict(fit.hypothesis, around, self.design)
-        predicted = predicted * find_signs(self.design, predicted, predicted[0])
+        if self._first is None:
+            self._first = predicted[0].copy()
+        predicted = predicted * find_signs(self.design, predicted, self._first)
         if np.isfinite(self.reading_sd):
             tension_n = self.problem.tension_n(fit.hypothesis, around)
             predicted = np.column_stack([predicted, np.log(tension_n)])

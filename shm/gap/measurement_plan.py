@@ -1,4 +1,4 @@
-"""The next measurements one after the other: what each costs, and what it promises.
+"""What to measure next: what tells the leading explanations apart, and a plan of several steps.
 
 What every explanation foresees of all measurements that could be made is one normal distribution
 of their data, given the old ones (`shm.gap.foresight`); so what a second measurement adds to
@@ -16,11 +16,16 @@ from itertools import product
 import numpy as np
 import scipy
 
-from shm.gap.attribution import WITHIN_REACH, Attribution
 from shm.gap.contract import Fit
-from shm.gap.experiment_design import Proposal, lift_off, proposals, together
-from shm.gap.foresight import Errors, Foresight, NewTests
-from shm.gap.next_measurement import NO_GAP, new_sensors
+from shm.gap.experiment_design import (
+    Proposal,
+    lift_off,
+    measured_already,
+    proposals,
+    together,
+    with_sensors,
+)
+from shm.gap.foresight import Errors, Foresight, NewTests, divergence, find_signs
 from shm.gap.noise import (
     FREQUENCY_SIZES,
     LARGEST_FREQUENCY,
@@ -32,16 +37,129 @@ from shm.gap.noise import (
 )
 from shm.gap.probabilities import families, probabilities
 from shm.gap.problem import GapProblem
-from shm.values import MEASUREMENT_HOURS, NAN, FloatArray, IntArray
+from shm.gap.search import WITHIN_REACH, Attribution
+from shm.values import MEASUREMENT_HOURS, NAN, FloatArray, IntArray, NextMeasurement
 from shm.values.diagnosis import joined, parted
 
-UNKNOWN = "something unknown"
+UNKNOWN, NO_GAP = "something unknown", "no gap"
 ENOUGH = 0.95
 """Of the true explanation: from there on nobody goes out for more."""
 # Judgement: a fifth of a unit of log odds turns 0.5 into 0.55, and a list that a person reads.
 _WORTH_IT, _MOST_STEPS = 0.2, 6
 # Technical: a mean log odds to some 0.1; explanations and places of one that are still in the race.
 _DRAWS, _CONTENDERS, _PLACES, _WAYS, _AS_LIKELY = 32, 8, 3, 12, 3.0
+# Judgement: the leader against three rivals, as far behind as 20,000 to one, and a list that a
+# person reads.
+_IN_THE_LIST, _OUT_OF_THE_RACE, _LISTED = 4, 10.0, 8
+# Judgement: half a unit of log evidence turns even odds into 0.62 and is not worth a day's work;
+# 100 are more than any model's errors leave true.
+_WORTH_A_DAY, _AS_GOOD_AS_CERTAIN = 0.5, 100.0
+# Judgement: every twelfth of the length, which one finds with a tape; two sensors that a person can
+# carry, no nearer than a sixth, half a wave of the sixth mode, lest they see the same.
+_CANDIDATE_PLACES, _NEW_SENSORS, _APART = 11, 2, 1 / 6
+
+
+def ranked(problem: GapProblem, fits: Sequence[Fit]) -> tuple[NextMeasurement, ...]:
+    """Return measurements that separate the first of `fits` from each of the next, best first.
+
+    `fits` are ordered by probability, the baseline among them where no gap is a contender; those
+    with a flexible remainder, or with evidence smaller by a factor of exp(10), are passed over. The
+    expected log Bayes factor is the Kullback-Leibler divergence between what two explanations
+    predict of the new data given the old ones (Lindley 1956; normal approximation), in the
+    direction which expects less: so much is to be expected whichever is true. Of each kind of
+    measurement the best is kept, for the pair that it tells apart best; one that promises less than
+    0.5, or hardly more than the same test once more, is left out. What promises more than 100 is
+    as good as certain: more is not claimed, and the easier comes first.
+    """
+    contenders = _leading(fits)
+    if len(contenders) < 2:
+        return ()
+    leader, *rivals = contenders
+    offered, rows, new = _offered(problem, contenders)
+    errors = Errors.of(problem, leader)
+    seen = [new.foresee(leader, errors, own) for own in rows]
+    found = []
+    for rival in rivals:
+        other = [new.foresee(rival, errors, own) for own in rows]
+        promises = {
+            each: min(divergence(one, two), divergence(two, one))
+            for each, one, two in zip(offered, seen, other, strict=True)
+        }
+        names = leader.hypothesis.name or NO_GAP, rival.hypothesis.name or NO_GAP
+        found += [
+            NextMeasurement(each.what, names, min(promises[each], _AS_GOOD_AS_CERTAIN))
+            for each in _worth_it(promises)
+        ]
+    found.sort(key=lambda measurement: -measurement.expected_log_bayes_factor)
+    distinct: dict[str, NextMeasurement] = {}
+    for measurement in found:
+        distinct.setdefault(measurement.what, measurement)
+    return tuple(distinct.values())[:_LISTED]
+
+
+def _leading(fits: Sequence[Fit]) -> list[Fit]:
+    """Return at most four fits of different effects that are in the race, the leader first."""
+    distinct: dict[str, Fit] = {}
+    for fit in fits:
+        if not fit.hypothesis.flexible:
+            distinct.setdefault(fit.hypothesis.name, fit)
+    best = max((fit.log_evidence for fit in distinct.values()), default=0.0)
+    racing = [f for f in distinct.values() if f.log_evidence > best - _OUT_OF_THE_RACE]
+    return racing[:_IN_THE_LIST]
+
+
+def _worth_it(promises: Mapping[Proposal, float]) -> list[Proposal]:
+    """Return the best of each kind, if it promises enough and more than a repetition."""
+    best = {
+        kind: max((each for each in promises if each.kind == kind), key=promises.__getitem__)
+        for kind in dict.fromkeys(each.kind for each in promises)
+    }
+    repeated = promises[best["repeat"]]
+    return [
+        each
+        for kind, each in best.items()
+        if promises[each] >= _WORTH_A_DAY + repeated * (kind != "repeat")
+    ]
+
+
+def new_sensors(problem: GapProblem, pair: tuple[Fit, Fit]) -> list[Proposal]:
+    """Return sensors where the shapes of the pair differ most; none where there are enough."""
+    design = problem.observations.design
+    if "sensors" in measured_already(design):
+        return []
+    length_m = problem.hanger.length_m
+    shares = np.arange(1, _CANDIDATE_PLACES + 1) / (_CANDIDATE_PLACES + 1)
+    places_m = tuple(float(round(share * length_m, 1)) for share in shares)
+    everywhere = with_sensors(design, places_m).design
+    one, other = (problem.predict(fit.hypothesis, fit.z[None], everywhere) for fit in pair)
+    squares = (one[0] - (other * find_signs(everywhere, other, one[0]))[0]) ** 2
+    by_place = np.bincount(everywhere.shape_place, squares[everywhere.frequencies :])
+    apart = by_place[len(design.places_m) :]
+    chosen: list[int] = []
+    for place in np.argsort(-apart):
+        if all(abs(shares[place] - shares[each]) >= _APART for each in chosen):
+            chosen.append(int(place))
+    return [with_sensors(design, tuple(sorted(places_m[i] for i in chosen[:_NEW_SENSORS])))]
+
+
+def _offered(
+    problem: GapProblem, fits: Sequence[Fit], reading_sd: float = NAN
+) -> tuple[tuple[Proposal, ...], list[IntArray], NewTests]:
+    """Return all that could come next, the rows that each has of all their data, and their tests.
+
+    Sensors where the first of `fits` and another one differ most; a lift-off where a tension is
+    read with an error.
+    """
+    found = [
+        *proposals(problem.design, problem.hanger),
+        *(lift_off(problem.design, problem.hanger) if np.isfinite(reading_sd) else ()),
+        *(each for fit in fits[1:] for each in new_sensors(problem, (fits[0], fit))),
+    ]
+    offered = tuple({each.what: each for each in found}.values())
+    design, rows = together([each.design for each in offered])
+    reads = [each.kind == "lift-off" for each in offered]
+    rows = [np.append(r, design.size) if read else r for r, read in zip(rows, reads, strict=True)]
+    return offered, rows, NewTests(problem, design, reading_sd if any(reads) else NAN)
 
 
 @dataclass(frozen=True)
@@ -176,19 +294,13 @@ class Race:
         """Return the race of the explanations that these data leave a chance."""
         problem, racing = attribution.search.problem, _racing(attribution)
         known = [each.fits[0][1] for each in racing if each.is_known]
-        offered = _offered(problem, known)
-        design, rows = together([each.design for each in offered])
-        reads = [each.kind == "lift-off" for each in offered]
-        rows = [
-            np.append(r, design.size) if read else r for r, read in zip(rows, reads, strict=True)
-        ]
-        reading_sd = problem.hanger.assumptions.tension_reading_sd.value if any(reads) else NAN
-        errors, new = Errors.of(problem, known[0]), NewTests(problem, design, reading_sd)
-        first = new.foresee(known[0], errors)
+        reading_sd = problem.hanger.assumptions.tension_reading_sd.value
+        offered, rows, new = _offered(problem, known, reading_sd)
+        errors = Errors.of(problem, known[0])
         contenders = []
         for each in racing:
             ways = [
-                (weight * share, new.foresee(fit, own).turned_to(first))
+                (weight * share, new.foresee(fit, own))
                 for weight, fit in each.fits
                 for share, own in _ways(problem, fit, errors)
             ]
@@ -260,16 +372,6 @@ def _racing(attribution: Attribution) -> list[Explanation]:
     total = sum(each.probability for each in kept)
     kept = [replace(each, probability=each.probability / total) for each in kept]
     return sorted(kept, key=lambda each: not each.is_known)
-
-
-def _offered(problem: GapProblem, fits: Sequence[Fit]) -> tuple[Proposal, ...]:
-    """Return all that could come next; sensors where the leader and a rival differ most."""
-    found = [
-        *proposals(problem.design, problem.hanger),
-        *lift_off(problem.design, problem.hanger),
-        *(each for fit in fits[1:] for each in new_sensors(problem, (fits[0], fit))),
-    ]
-    return tuple({each.what: each for each in found}.values())
 
 
 def _ways(problem: GapProblem, fit: Fit, usual: Errors) -> list[tuple[float, Errors]]:

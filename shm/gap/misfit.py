@@ -1,46 +1,158 @@
-"""Refuse to diagnose tests that no explanation comes near: of another hanger, or wrongly described.
+"""Doubts that the tests are of this hanger as described: orders that look wrong, and misfit.
 
-A cause, its size and a tension would be named after the least bad of wrong models.
+No effect imitates a slip of whoever numbered the modes. Where no explanation comes near, a cause,
+its size and a tension would be named after the least bad of wrong models.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from shm.errors import BadInput
-from shm.gap.contract import Fit
-from shm.gap.numbering import doubt_orders
-from shm.gap.outliers import Cleared
+from shm.gap.contract import Fit, Hypothesis, Peak
+from shm.gap.posterior import Target, find_peaks
 from shm.gap.problem import GapProblem
+from shm.gap.search import Attribution
 from shm.inference.data_checks import taut_string_tension_n
+from shm.values import PLANES, IntArray
 from shm.values.posterior import NO_TENSION_PERCENT
 from shm.values.rounding import force_unit
 
+FAR_BETTER = 10.0
+"""What other numbers must gain in log evidence on all that was tried: slips are rare."""
 
-def refuse_misfit(found: Cleared, reasons: Sequence[str]) -> None:
+_SHIFTS = {0: "", 1: "one higher", -1: "one lower"}
+
+Shifts = tuple[int, ...]
+
+
+def doubt_orders(problem: GapProblem, attribution: Attribution) -> tuple[str, ...]:
+    """Return a remark where the hanger alone explains the modes far better under other orders.
+
+    Tried are orders one higher or lower, all or from one mode on, and one mode that is none of the
+    hanger's, of either plane or both.
+    """
+    if attribution.leads == "no gap":
+        return ()
+    most = -np.inf
+    best: tuple[_Numbering, Peak] | None = None
+    for each in (*_shifted(problem), *_from_one_on(problem)):
+        if each.problem.near_misfit < problem.near_misfit:  # a fit costs forty times as much
+            peak = _peak(each.problem)
+            log_evidence = peak.log_evidence + each.log_dropped
+            if log_evidence > most:
+                most, best = log_evidence, (each, peak)
+    if best is None or most < max(e.log_evidence for e in attribution.tried) + FAR_BETTER:
+        return ()
+    numbering, peak = best
+    return (
+        f"The orders look wrong: were {numbering.words}, the hanger alone would fit better than "
+        f"any cause does now{_tension(numbering.problem, peak)}. {numbering.asked} If so, number "
+        "them anew and diagnose again.",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Numbering:
+    """The same frequencies by other orders, in `words`; `dropped` are taken for none of its own."""
+
+    words: str
+    problem: GapProblem
+    asked: str = "Was the lowest mode missed, or one counted that is none?"
+    dropped: int = 0
+
+    @property
+    def log_dropped(self) -> float:
+        """A frequency of something else may lie anywhere within two decades, here."""
+        return -self.dropped * float(np.log(np.log(100.0)))
+
+
+def _shifted(problem: GapProblem) -> Iterator[_Numbering]:
+    """All modes of either plane, or of both, numbered one higher or lower."""
+    design = problem.design
+    planes = np.unique(design.frequency_plane)
+    for chosen in product(_SHIFTS, repeat=len(planes)):
+        shifts = np.zeros(len(PLANES), dtype=int)
+        shifts[planes] = chosen
+        order = design.frequency_order + shifts[design.frequency_plane]
+        if shifts.any() and order.min() > 0:
+            yield _Numbering(_words(tuple(shifts)), _numbered(problem, order))
+
+
+def _from_one_on(problem: GapProblem) -> Iterator[_Numbering]:
+    """One mode missed between the others, or one counted that is none; in one plane or both."""
+    design = problem.design
+    planes = np.unique(design.frequency_plane).tolist()
+    for these in [[plane] for plane in planes] + ([planes] if len(planes) > 1 else []):
+        inside = np.isin(design.frequency_plane, these)
+        own = "both planes'" if len(these) > 1 else f"the {PLANES[these[0]]}"
+        for first in np.unique(design.frequency_order[inside]).tolist():
+            above = inside & (design.frequency_order > first)
+            if not above.any():
+                continue
+            up = _numbered(problem, design.frequency_order + above)
+            asked = f"Was a mode missed between {first} and {first + 1}?"
+            yield _Numbering(f"{own} modes above {first} numbered one higher", up, asked)
+            kept = ~(inside & (design.frequency_order == first))
+            down = _numbered(problem.part(kept), (design.frequency_order - above)[kept])
+            yield _Numbering(
+                f"{own} mode {first} left out and those above numbered one lower",
+                down,
+                "Is that mode a damper's, the deck's or another neighbour's?",
+                int(np.sum(~kept)),
+            )
+
+
+def _numbered(problem: GapProblem, order: IntArray) -> GapProblem:
+    design = replace(problem.design, frequency_order=order)
+    observations = replace(problem.observations, design=design)
+    return GapProblem(problem.model, problem.tests, observations)
+
+
+def _peak(problem: GapProblem) -> Peak:
+    """Return the peak of the hanger alone."""
+    return find_peaks(Target(problem, Hypothesis()), problem.near)[0]
+
+
+def _words(shifts: Shifts) -> str:
+    """Return the planes that are numbered otherwise, and how."""
+    by_plane = {plane: _SHIFTS[shift] for plane, shift in zip(PLANES, shifts, strict=True) if shift}
+    if len(by_plane) == len(PLANES) and len(set(by_plane.values())) == 1:
+        return f"the modes of both planes numbered {by_plane[PLANES[0]]}"
+    return " and ".join(f"the {plane} modes numbered {how}" for plane, how in by_plane.items())
+
+
+def _tension(problem: GapProblem, peak: Peak) -> str:
+    """Return the tension that these orders stand for in words; nothing of a bar without any."""
+    if not problem.hanger.nominal_tension_n:
+        return ""
+    tension_n = float(problem.tension_n(Hypothesis(), peak.z[None])[0])
+    return f", at {tension_n / 1e3:.0f} kN"
+
+
+def refuse_misfit(problem: GapProblem, attribution: Attribution, reasons: Sequence[str]) -> None:
     """Raise BadInput where even the best explanation misses the frequencies by far.
 
     `reasons` are sentences on what is wrong with the data. Tried are no gap and each effect and
     pair that was fitted, without excluded outliers.
     """
-    problem = found.problem
-    fits = [each.fit for each in found.attribution.tried if not each.hypothesis.flexible]
+    fits = [each.fit for each in attribution.tried if not each.hypothesis.flexible]
     fitted = [fit for fit in fits if fit and np.isfinite(problem.misfit_percent(fit))]
     best = min(fitted, key=problem.misfit_percent)
     misfit = problem.misfit_percent(best)
     if misfit <= NO_TENSION_PERCENT:
         return
-    hanger, over_tests = problem.hanger, _range_over_tests(problem, found.attribution.baseline)
+    hanger, over_tests = problem.hanger, _range_over_tests(problem, attribution.baseline)
     name = best.hypothesis.name.replace("_", " ") or f"the baseline {problem.model.name}"
     raise BadInput(
         f"no explanation fits the frequencies of hanger {hanger.id}: the best, {name}, misses them "
         f"by {misfit:.0f} % (root mean square){over_tests}. "
         "No cause can be named, and no tension given. "
-        + " ".join(
-            (*doubt_orders(problem, found.attribution), *reasons, *_compare_with_string(problem))
-        ),
+        + " ".join((*reasons, *_compare_with_string(problem))),
         remedy="Check that all tests are of this hanger, the orders of the modes, and diameter, "
         "length and nominal tension.",
     )

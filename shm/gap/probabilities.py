@@ -6,19 +6,158 @@ Hypotheses h are families (one effect or pair, wherever it may act), each with o
 unknown beside it, and something unknown that passes for a family. A family has the same prior
 however many variants it has, so that an effect does not become likelier by being tried in more
 places (Scott and Berger, Ann. Stat. 38, 2010); its evidence is the mean over them.
+
+Trials taught two corrections after the evidence (`calibration.toml`, which
+`tests/benchmarks/gap_calibration.py` writes). An effect's law may be off: corrosion has no edges,
+sockets taper, joints slip by another power. So the data may err about a prediction by an unknown
+fraction of what the effect does beyond what the hanger alone can follow, the same in all tests:
+from mode to mode, or smoothly over the orders. And a share of what is not in the catalogue passes
+for an effect or a pair of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
 
-from shm.gap.calibration import CALIBRATION
-from shm.gap.contract import Fit, Hypothesis, Method
+from shm.errors import BadInput
+from shm.gap.contract import Covariance, Fit, Hypothesis, Method
+from shm.gap.likelihood import Likelihood
+from shm.gap.noise import same_mode, smooth_over_orders
+from shm.gap.problem import GapProblem
+from shm.inference.mixture import normalised
 from shm.values import FloatArray
+
+FILE = Path(__file__).with_name("calibration.toml")
+
+
+class Share(NamedTuple):
+    """Probabilities that an effect's own law is off by so much, and that of something unknown."""
+
+    own: float
+    unknown: float
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """The trial that taught the values, and how many answers spoke for them."""
+
+    trial: str
+    seeds: str
+    cases: str
+    answers: str
+    date: date
+    command: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The values, each explained in the file.
+
+    `mimics_one` and `mimics_two` are shares of what is not in the catalogue; `exact` and `off_by`
+    (by fraction) add to 1.
+    """
+
+    provenance: Provenance
+    mimics_one: float
+    mimics_two: float
+    exact: Share
+    off_by: Mapping[float, Share]
+
+
+def read_calibration(file: Path = FILE) -> Calibration:
+    """Return the values of a file; raises BadInput where it lacks one."""
+    try:
+        return _values(tomllib.loads(file.read_text(encoding="utf-8")))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BadInput(
+            f"not a whole calibration ({error!r}).",
+            file=file,
+            remedy="Write it anew with tests/benchmarks/gap_calibration.py.",
+        ) from error
+
+
+def _values(told: dict[str, Any]) -> Calibration:
+    mimic, law = told["mimic"], told["law"]
+    return Calibration(
+        provenance=Provenance(**told["provenance"]),
+        mimics_one=mimic["one_effect"],
+        mimics_two=mimic["two_effects"],
+        exact=Share(**law["exact"]),
+        off_by={each.pop("fraction"): Share(**each) for each in law["off"]},
+    )
+
+
+CALIBRATION = read_calibration()
+
+
+@dataclass(frozen=True, eq=False)
+class ByLaws:
+    """A fit with effects whose laws may be off.
+
+    `gain` is the gain of its log evidence, `mimic` the gain were it something unknown that passes
+    for the effects. `draws` (n, d) are of the posterior by all laws.
+    """
+
+    gain: float
+    mimic: float
+    draws: FloatArray
+
+
+def allow_for_laws(
+    problem: GapProblem, baseline: Fit, fit: Fit, rng: np.random.Generator
+) -> ByLaws:
+    """Return what a fit gains where its effects' laws may be off, all about it taken as linear."""
+    residual = problem.value - fit.predicted
+    ways = [(CALIBRATION.exact, fit.noise), *_allowances(problem, baseline, fit)]
+    found = [_linear(fit, errors, residual) for _, errors in ways]
+    log = np.array([each for each, *_ in found]) - found[0][0]
+    own, unknown = (
+        np.log([getattr(share, name) for share, _ in ways]) + log for name in Share._fields
+    )
+    chosen = rng.choice(len(ways), size=len(fit.draws), p=normalised(own))
+    draws = fit.draws.copy()
+    for way in np.unique(chosen[chosen > 0]):
+        rows = np.flatnonzero(chosen == way)
+        _, step, inner = found[way]
+        normal = rng.standard_normal((len(rows), len(fit.z)))
+        draws[rows] = fit.z + step + np.linalg.solve(np.linalg.cholesky(inner).T, normal.T).T
+    return ByLaws(
+        float(scipy.special.logsumexp(own)), float(scipy.special.logsumexp(unknown)), draws
+    )
+
+
+def _linear(
+    fit: Fit, errors: Covariance, residual: FloatArray
+) -> tuple[float, FloatArray, FloatArray]:
+    """Return log evidence, step (d,) and curvature (d, d) about a fit by other errors."""
+    likelihood = Likelihood.of(errors, fit.model_error)
+    inner, step, square, followed = likelihood.linear(fit.slopes, residual, fit.z)
+    misfit = square + fit.z @ fit.z - followed
+    log = likelihood.log_height[0] - np.linalg.slogdet(inner)[1] / 2 - misfit / 2
+    return float(log), step, inner
+
+
+def _allowances(problem: GapProblem, baseline: Fit, fit: Fit) -> Iterator[tuple[Share, Covariance]]:
+    design, shift = problem.design, fit.predicted - baseline.predicted
+    count, patterns = design.frequencies, (same_mode(design), smooth_over_orders(design))
+    for fraction, share in CALIBRATION.off_by.items():
+        off = fraction * shift
+        for alike in patterns:
+            errors = replace(
+                fit.noise,
+                frequency=fit.noise.frequency + np.outer(off[:count], off[:count]) * alike,
+                shape=fit.noise.shape + off[count:] ** 2,
+            )
+            yield Share(*(each / len(patterns) for each in share)), errors
+
 
 # Before any data, judgement: who asks for a diagnosis mostly has a gap, and one cause is commoner
 # than two. Trials plant the same mix; where it is another, odds are off by the ratio.

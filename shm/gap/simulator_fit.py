@@ -38,7 +38,7 @@ def fit_hypothesis(
 
 def refit(problem: SimulatorProblem, fit: Fit, rows: BoolArray) -> FloatArray:
     """Return the most probable z by the readings of `rows` (data,) alone, from a fit to all."""
-    return Target(problem.part(rows), fit.hypothesis).climb(fit.z).z
+    return Target(problem.part(rows), fit.hypothesis).climb(fit.z[None])[0].z
 
 
 # Judgement, in a prior's standard deviations: nearer to a bound than a hundredth of the range; so

@@ -32,14 +32,21 @@ from scipy.special import logsumexp
 
 from shm.bridge import load_hanger
 from shm.errors import ShmError
-from shm.gap.attribution import Attribution
 from shm.gap.baseline import choose_baseline
-from shm.gap.calibration import CALIBRATION, FILE, Calibration, Provenance, Share
 from shm.gap.contract import Fit, GapOptions
 from shm.gap.data_checks import usable
-from shm.gap.law_error import _allowances, _linear
 from shm.gap.outliers import Cleared, exclude_gross_errors
+from shm.gap.probabilities import (
+    CALIBRATION,
+    FILE,
+    Calibration,
+    Provenance,
+    Share,
+    _allowances,
+    _linear,
+)
 from shm.gap.problem import GapProblem
+from shm.gap.search import Attribution
 from shm.modes_document import load_modes
 from tests.benchmarks.blind_trial import Truth, make_hanger, plan_hangers
 

@@ -26,7 +26,6 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from shm.assumptions import DEFAULTS  # noqa: E402
-from shm.gap.attribution import Attribution, attribute  # noqa: E402
 from shm.gap.contract import Design, GapOptions  # noqa: E402
 from shm.gap.experiment_design import Proposal  # noqa: E402
 from shm.gap.measurement_plan import (  # noqa: E402
@@ -38,10 +37,11 @@ from shm.gap.measurement_plan import (  # noqa: E402
     log_odds_of,
     planned,
 )
+from shm.gap.search import Attribution, attribute  # noqa: E402
 from shm.models.effects import EFFECTS  # noqa: E402
 from shm.simulate import HangerState, PlantedEffect  # noqa: E402
 from shm.values import MEASUREMENT_HOURS, PLANES, FloatArray, Hanger, ModalTest  # noqa: E402
-from tests.helpers.gap_fits import make_problem  # noqa: E402
+from tests.helpers.gap_campaigns import problem_of  # noqa: E402
 from tests.worlds.simulated.campaign import (  # noqa: E402
     CampaignPlan,
     _realised,
@@ -137,7 +137,7 @@ class Known:
     causes: tuple[str, ...] = CAUSES
 
     def attribution(self, seed: int) -> Attribution:
-        problem = make_problem(self.tests, self.hanger)
+        problem = problem_of(self.tests, self.hanger)
         without = tuple(name for name in EFFECTS if name not in self.causes)
         return attribute(
             problem, GapOptions(without=without, seed=seed), np.random.default_rng(seed)
@@ -249,7 +249,7 @@ def by_plan(now: Attribution, step: int, seed: int) -> tuple[Proposal | None, fl
 def in_order(now: Attribution, step: int, seed: int) -> tuple[Proposal | None, float]:
     """The first kind of the fixed order that was not made yet."""
     fits = [now.baseline, *(each.best.fit for each in now.explanations if each.best.fit)]
-    offered = _offered(now.search.problem, fits[:2])
+    offered, *_ = _offered(now.search.problem, fits[:2])
     able = [each for kind in FIXED for each in offered if each.kind == kind]
     return (able[0], float("nan")) if able else (None, float("nan"))
 

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shm.gap.attribution import Attribution, Explanation, answered, possible
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.probabilities import ScoredHypothesis
+from shm.gap.search import Attribution, Explanation, answered, hardly_behind, possible
 from shm.models.effects import Variant
 from tests.gap import linear_toy as toy
 from tests.helpers.diagnoses import MASS, a_diagnosis
@@ -116,3 +116,18 @@ def test_leading_is_decided_once(
     else:
         assert found.leading is explanations[leading]
         assert shown.leading is shown.causes[leading]
+
+
+@pytest.mark.parametrize(
+    ("log_bayes_factor", "log_fit", "alike"),
+    [(7.5, 9.0, True), (6.5, 9.0, False), (6.5, 11.5, True), (2.5, 12.0, False)],
+)
+def test_a_cause_that_fits_as_well_is_not_told_apart_by_what_its_freedom_costs(
+    log_bayes_factor: float, log_fit: float, alike: bool
+) -> None:
+    best, other = weighed(10.0, 12.0), weighed(log_bayes_factor, log_fit)
+    assert hardly_behind(other, best) == alike
+
+
+def weighed(log_bayes_factor: float, log_fit: float) -> Explanation:
+    return Explanation(ScoredHypothesis(Hypothesis(), 0.0, 0.0), (), 0.1, log_bayes_factor, log_fit)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput
-from shm.gap.calibration import CALIBRATION, FILE, Calibration, Provenance, read_calibration
 from shm.gap.contract import Hypothesis
+from shm.gap.probabilities import CALIBRATION, FILE, Calibration, Provenance, read_calibration
 from shm.gap.search import fit_alone
 from shm.models.effects import Variant
 from tests.benchmarks.blind_trial import GAPPED, Plan, make_hanger

@@ -10,12 +10,11 @@ import pytest
 
 from shm.diagnosis_document import gap_check_document, gap_check_of
 from shm.documents import dump
-from shm.errors import BadInput, UsageError
+from shm.errors import BadInput
 from shm.gap import check as module
-from shm.gap.check import Check, CheckOptions, check_gap, magnitude
+from shm.gap.check import CheckOptions, check_gap, magnitude
 from shm.gap.twin import Twin, usual_tests
 from shm.models.effects import EFFECTS, Variant, parameters_of
-from shm.report.figures.every_figure import gap_check_figures
 from shm.report.gap_check_report import rows
 from shm.simulate import HangerState
 from shm.values import EffectPrior, GapCheck, ModalTest
@@ -238,13 +237,6 @@ def test_without_tests_a_usual_test_is_made() -> None:
     np.testing.assert_allclose(frequencies_hz(twin.tests[:1]), frequencies_hz(truth), rtol=1e-3)
 
 
-def test_an_unknown_effect_is_refused(tests: tuple[ModalTest, ...]) -> None:
-    with pytest.raises(UsageError, match="there is no effect rust"):
-        check_gap(tests, PLAIN, CheckOptions(("rust",)))
-    with pytest.raises(BadInput, match="no test holds a mode"):
-        check_gap([replace(tests[0], modes=())], PLAIN)
-
-
 def test_a_check_is_read_back(
     twin: Twin, tests: tuple[ModalTest, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -255,27 +247,6 @@ def test_a_check_is_read_back(
     assert document["effects"][0]["others"] == ["timebase"]
     assert document["invisible"][0]["effect"] == "load_scale"
     assert_same(gap_check_of(document), found)
-
-
-def test_a_figure_marks_each_diagnosis(
-    twin: Twin, tests: tuple[ModalTest, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    found = checked(twin, tests, monkeypatch, "distributed_mass")
-    (drawn,) = gap_check_figures(found)
-    assert "distributed mass; 4.6 % or more" in drawn.alt
-    labels = [label.get_text() for label in drawn.figure.axes[0].get_yticklabels()]
-    assert labels == ["distributed mass"]
-
-
-def test_a_search_that_was_stopped_counts(
-    twin: Twin, tests: tuple[ModalTest, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "diagnose", names_from(twin, 0.01, "distributed_mass"))
-    job = Check(tests, PLAIN, MASS)
-    found = job.summarise([next(job.run())])
-    assert (found.searches_done, found.searches, found.sound) == (1, 3, ())
-    assert [each.effect for each in found.effects] == ["distributed_mass"]
-    assert not found.is_complete
 
 
 @pytest.mark.slow

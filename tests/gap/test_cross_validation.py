@@ -7,15 +7,10 @@ import pytest
 
 from shm.errors import UsageError
 from shm.gap.contract import Hypothesis, Observations
-from shm.gap.cross_validation import held_out, shrinkage
+from shm.gap.residuals import held_out, shrinkage
 from shm.models.effects import Conditions, Variant
-from shm.simulate import HangerState, PlantedEffect
 from shm.values import AddedMass
-from tests.helpers.gap_fits import fit_hypothesis, make_problem
-from tests.helpers.hangers import HANGER_3
 from tests.helpers.toy_gap import SD, ToyProblem, campaign, design_of, tension
-from tests.worlds.simulated.campaign import CampaignPlan
-from tests.worlds.simulated.campaign import campaign as simulated
 
 MODES = [(plane, order) for plane in (0, 1) for order in range(1, 9)]
 RIGHT = Hypothesis((("bending_stiffness", Variant()),))
@@ -94,13 +89,6 @@ def test_every_order_but_the_outermost_is_held_out_once():
     assert np.array_equal(np.isfinite(found.before_percent), (order > 1) & (order < 8))
 
 
-def test_with_two_orders_each_is_held_out_in_turn():
-    problem = toy((Conditions("t1"),), [(0, 1), (0, 2), (1, 1), (1, 2)], stiffer=0.0)
-    assert held(problem).before.shape[0] == 0
-    twice = toy((Conditions("t1"), Conditions("t2")), [(0, 1), (0, 2), (1, 1), (1, 2)])
-    assert held(twice).before.shape[0] == 2
-
-
 def test_tests_are_held_out_only_while_the_others_still_vary_the_same_conditions():
     """t6 alone has a known mass; without any of the others temperatures and levels still vary."""
     problem = toy(campaign(AddedMass(25.0, 3.6)))
@@ -143,38 +131,3 @@ def test_three_frequencies_or_fewer_cannot_be_held_out_and_say_so_by_nan(modes):
     found = shrunk(toy((Conditions("t1"),), modes), RIGHT)
     assert np.isnan([found.held_out_before_percent, found.held_out_after_percent]).all()
     assert found.rms_before_percent > 0
-
-
-def test_without_a_cause_there_is_nothing_after():
-    problem = toy()
-    fit = problem.fit()
-    without = held_out(problem, fit, None, (), np.random.default_rng(1))
-    found = shrinkage(problem, fit, None, without)
-    assert np.isnan([found.rms_after_percent, found.held_out_after_percent]).all()
-    assert found.held_out_before_percent > 1
-
-
-def test_the_same_seed_holds_out_the_same():
-    conditions = tuple(Conditions(f"t{i}", float(i)) for i in range(10))
-    one, other = (held(toy(conditions)) for _ in range(2))
-    assert np.array_equal(one.after, other.after, equal_nan=True)
-    assert one.after.shape[0] == 9
-
-
-def test_a_planted_clamp_shrinks_what_was_held_out_and_a_wrong_cause_does_not():
-    """Simulated by other means than the model."""
-    plan = CampaignPlan(temperatures_c=(10.0,), amplitudes=(1.0,), mass_share=0.0, shapes=False)
-    clamp = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
-    rng = np.random.default_rng(1)
-    tests = simulated(HANGER_3, HangerState(711e3), (clamp,), plan, rng)
-    problem = make_problem(tests, HANGER_3)
-    before, right, wrong = (
-        fit_hypothesis(problem, hypothesis)
-        for hypothesis in (Hypothesis(), WRONG, Hypothesis((("distributed_mass", Variant()),)))
-    )
-    found = [
-        shrinkage(problem, before, after, held_out(problem, before, after, (), rng))
-        for after in (right, wrong)
-    ]
-    assert found[0].held_out_after_percent < 0.1 * found[0].held_out_before_percent
-    assert found[1].held_out_after_percent > 0.7 * found[1].held_out_before_percent

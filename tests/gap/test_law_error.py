@@ -8,9 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.law_error import ByLaws, allow_for_laws
+from shm.gap.probabilities import CALIBRATION, ByLaws, allow_for_laws
 from shm.gap.problem import GapProblem
 from shm.gap.search import fit_alone
 from shm.models.effects import EFFECTS

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from shm.errors import BadInput
-from shm.gap.attribution import attribute
 from shm.gap.contract import GapOptions
 from shm.gap.diagnose import diagnose
-from shm.gap.numbering import doubt_orders
+from shm.gap.misfit import doubt_orders
+from shm.gap.search import attribute
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import ModalTest
 from tests.helpers.effects import all_but

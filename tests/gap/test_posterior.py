@@ -127,7 +127,7 @@ def test_climb_hopeless_gives_up() -> None:
     of = problem(mirrored, (0, 1))
     of.value = of.value + 50.0
     target = Target(of, ALONE)
-    given_up, whole = target.climb(starts(1.0)[0], 0.0), target.climb(starts(1.0)[0])
+    (given_up,), (whole,) = target.climb(starts(1.0), 0.0), target.climb(starts(1.0))
     assert given_up.log <= whole.log < 0.0
 
 

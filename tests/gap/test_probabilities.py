@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.calibration import CALIBRATION
 from shm.gap.contract import Hypothesis
 from shm.gap.probabilities import (
+    CALIBRATION,
     NO_GAP,
     PAIR,
     SINGLE,

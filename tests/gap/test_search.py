@@ -111,14 +111,6 @@ def test_search_every_effect_and_place_scored() -> None:
     assert search.variants["point_mass"] == 1
 
 
-def test_search_planted_mass_leads() -> None:
-    found = scored(searched(12.0, 3.1)[0])
-    others = [e for h, e in found.items() if len(h.effects) == 1 and h != MASS and not h.flexible]
-    assert found[MASS].fit is not None
-    assert found[MASS].log_evidence > found[ALONE].log_evidence + 5
-    assert all(each.log_evidence < found[MASS].log_evidence - 3 for each in others)
-
-
 def test_search_sound_tries_no_pairs() -> None:
     search, _ = searched()
     found = scored(search)

@@ -9,8 +9,6 @@ from itertools import product
 import numpy as np
 import pytest
 
-from shm.diagnosis_document import bridge_diagnosis_document
-from shm.documents import dump
 from shm.errors import UsageError
 from shm.gap import GapOptions, diagnose_bridge
 from shm.gap.bridge_diagnosis import diagnose_jointly
@@ -179,10 +177,3 @@ def test_the_report_says_who_shares_what_in_plain_words(family: BridgeDiagnosis)
     assert "Distributed mass is shared by hangers 1, 2, 4 and 6 (" in " ".join(text.split())
     assert [each.name for each in bridge_diagnosis_figures(family)] == ["shared"]
     assert max(map(len, text.splitlines())) <= 100
-
-
-def test_its_document_holds_those_of_the_hangers(family: BridgeDiagnosis) -> None:
-    document = bridge_diagnosis_document(family)
-    assert document["schema"] == "shm.bridge_diagnosis/1"
-    assert [each["schema"] for each in document["diagnoses"]] == ["shm.diagnosis/1"] * 6
-    assert dump(document).count('"hanger"') > 6

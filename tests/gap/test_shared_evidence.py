@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.attribution import Attribution, attribute
 from shm.gap.contract import GapOptions
 from shm.gap.probabilities import NO_GAP, SINGLE, UNKNOWN
 from shm.gap.scan import VISIBLE
+from shm.gap.search import Attribution, attribute
 from shm.gap.shared_evidence import STEP, HangerEvidence, weigh_hanger
 from shm.simulate import HangerState, PlantedEffect
 from tests.helpers.diagnoses import a_diagnosis
 from tests.helpers.effects import all_but
-from tests.helpers.gap_fits import make_problem
+from tests.helpers.gap_campaigns import problem_of
 from tests.helpers.hangers import HANGER_3
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
@@ -30,7 +30,7 @@ def weigh(*planted: PlantedEffect) -> tuple[Attribution, HangerEvidence]:
     """Weigh a hanger by a catalogue of one effect."""
     tests = campaign(ROD, HangerState(711e3), planted, PLAN, np.random.default_rng(1))
     options = GapOptions(without=all_but(PLACE[0]), draws=200)
-    found = attribute(make_problem(tests, ROD), options, np.random.default_rng(1))
+    found = attribute(problem_of(tests, hanger=ROD), options, np.random.default_rng(1))
     return found, weigh_hanger(ROD, tests, a_diagnosis(), found, np.random.default_rng(1))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from shm.assumptions import DEFAULTS
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.linear import Linear
+from shm.gap.observations import observed
 from shm.gap.posterior import Target, find_peaks
 from shm.gap.problem import GapProblem
 from shm.gap.sampling import MOST_ROUNDS, Sampling
@@ -30,7 +31,6 @@ from shm.values import (
     Mode,
     ShapePoint,
 )
-from tests.helpers.gap_fits import make_problem
 from tests.helpers.hangers import HANGER_3
 
 TOUCHLESS = DEFAULTS.with_numbers(support_compliance_m_n=0.0, accelerometer_mass_kg=0.0)
@@ -95,7 +95,7 @@ def problem_of(
     tests: Sequence[ModalTest], baseline: str = "beam1", hanger: Hanger = HANGER
 ) -> GapProblem:
     """Return the problem of tests of a hanger with a model class as its baseline."""
-    return make_problem(tests, hanger, baseline)
+    return GapProblem(AsMade(MODELS[baseline](hanger)), tests, observed(tests, hanger))
 
 
 def _points(shape: FloatArray, plane: int, sd: float) -> tuple[ShapePoint, ...]:
@@ -118,8 +118,10 @@ def scan_of(problem: GapProblem, hypothesis: Hypothesis) -> Scan:
 
 
 def fit_of(problem: GapProblem, hypothesis: Hypothesis, draws: int = 400) -> Fit:
-    """Return the sampled fit of an effect, from where a scan of it leads."""
+    """Return the sampled fit of no effect, or of one from where a scan of it leads."""
     before = fit_alone(problem, np.random.default_rng(1))
+    if not hypothesis.effects:
+        return before
     starts = scan_of(problem, hypothesis).starts(problem, before)
     target = Target(problem, hypothesis)
     sampling = Sampling(target, find_peaks(target, starts), np.random.default_rng(1), before)
