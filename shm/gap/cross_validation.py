@@ -11,8 +11,8 @@ import numpy as np
 
 from shm.errors import UsageError
 from shm.gap.contract import Design, Fit
-from shm.gap.likelihood import Likelihood
 from shm.gap.problem import GapProblem
+from shm.inference.likelihood import Likelihood
 from shm.models.effects import Conditions
 from shm.values import NAN, BoolArray, FloatArray, IntArray, Shrinkage
 

@@ -16,10 +16,10 @@ import numpy as np
 import scipy
 
 from shm.gap.calibration import CALIBRATION, Share
-from shm.gap.contract import Covariance, Fit
-from shm.gap.likelihood import Likelihood
+from shm.gap.contract import Fit
 from shm.gap.noise import same_mode, smooth_over_orders
 from shm.gap.problem import GapProblem
+from shm.inference.likelihood import Covariance, Likelihood
 from shm.inference.mixture import normalised
 from shm.values import FloatArray
 

@@ -9,9 +9,10 @@ from itertools import product
 import numpy as np
 
 from shm.gap.attribution import Attribution
-from shm.gap.contract import Hypothesis, Peak
-from shm.gap.posterior import Target, find_peaks
+from shm.gap.contract import Hypothesis
+from shm.gap.posterior import Target
 from shm.gap.problem import GapProblem
+from shm.inference.posterior import Peak, find_peaks
 from shm.values import PLANES, IntArray
 
 FAR_BETTER = 10.0

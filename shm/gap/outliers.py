@@ -19,12 +19,13 @@ import scipy
 
 from shm.gap.attribution import Attribution, answered, attribute
 from shm.gap.contract import Design, Fit, GapOptions, Hypothesis
-from shm.gap.posterior import Target, find_peaks, laplace
+from shm.gap.posterior import Target
 from shm.gap.probabilities import NO_GAP, UNKNOWN, ScoredHypothesis, log_prior
 from shm.gap.problem import GapProblem
 from shm.gap.search import find_starts
 from shm.inference.data_checks import SAME_LEVEL
 from shm.inference.options import Progress, silent
+from shm.inference.posterior import find_peaks, laplace
 from shm.values import BoolArray, FloatArray, IntArray
 
 SURE = 0.9

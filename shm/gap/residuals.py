@@ -15,11 +15,11 @@ from collections.abc import Iterator
 import numpy as np
 import scipy
 
-from shm.gap.contract import Covariance, Design, Fit, Observations
+from shm.gap.contract import Design, Fit, Observations
 from shm.gap.cross_validation import HeldOut
-from shm.gap.likelihood import Likelihood, ShapeErrors
 from shm.gap.problem import GapProblem
 from shm.gap.repeated_errors import SensorError
+from shm.inference.likelihood import Covariance, Likelihood, ShapeErrors
 from shm.values import NAN, PLANES, FloatArray, IntArray, Residual, Scatter, Trend
 
 _LEAST_LEFT = 1e-9  # technical: of a datum that the fit follows altogether

@@ -19,9 +19,9 @@ import scipy
 
 from shm.assumptions import DEFAULTS
 from shm.errors import BadInput, UsageError
-from shm.gap.contract import Covariance, Hypothesis, NoiseNode
-from shm.gap.likelihood import Likelihood
-from shm.values import BoolArray, FloatArray, IntArray
+from shm.gap.contract import Hypothesis
+from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
+from shm.values import BoolArray, FloatArray
 
 Condition: TypeAlias = Mapping[str, float]
 Predict: TypeAlias = Callable[[dict[str, Any], Condition], Mapping[str, Any]]
@@ -179,10 +179,6 @@ class SimulatorProblem:
 
     def dimension(self, hypothesis: Hypothesis) -> int:
         return len(self.priors(hypothesis))
-
-    def linear(self, hypothesis: Hypothesis) -> IntArray:
-        """Return no column: nobody knows in which the simulator is linear."""
-        return np.empty(0, dtype=np.int64)
 
     def likelihood(self, hypothesis: Hypothesis) -> Likelihood:
         return Likelihood(self.flexible_nodes() if hypothesis.flexible else self.nodes())

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.linear import Linear
 from shm.gap.observations import observed
-from shm.gap.posterior import Target, find_peaks
+from shm.gap.posterior import Target
 from shm.gap.problem import GapProblem
 from shm.gap.sampling import approximate
 from shm.gap.scan import scan
 from shm.gap.search import fit_alone
+from shm.inference.linear import Linear
+from shm.inference.posterior import find_peaks
 from shm.models import MODELS, AsMade
 from shm.values import Hanger, ModalTest
 

@@ -11,8 +11,8 @@ from scipy.special import ndtri
 from scipy.stats import multivariate_normal
 
 from shm.inference import UpdateOptions, update
-from shm.inference.likelihood import Likelihood
 from shm.inference.problem import Problem
+from shm.inference.thesis_noise import ThesisLikelihood
 from shm.inference.updating import infer
 from shm.models import THESIS, Model, build
 from shm.values import FloatArray, Posterior
@@ -55,7 +55,7 @@ def test_the_evidence_is_that_of_quadrature(table: str, model: str, repeat: int)
     assert posterior.evaluations < 150_000
 
 
-class KnownNoise(Likelihood):
+class KnownNoise(ThesisLikelihood):
     """Take normal errors of known standard deviation and no model error."""
 
     def whitening(self, sigma: float) -> FloatArray:
