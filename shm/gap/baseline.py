@@ -9,7 +9,7 @@ import numpy as np
 from shm.gap.contract import GapOptions, Observations
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
-from shm.gap.search import fit_alone
+from shm.gap.search import fit_alone, sample_alone
 from shm.inference.mixture import normalised
 from shm.inference.options import Progress, silent
 from shm.inference.updating import log_class_prior
@@ -47,12 +47,12 @@ def choose_baseline(
     log = []
     for each in problems:
         progress(f"baseline {each.model.name}", 0.0)
-        fit = fit_alone(each, rng, options.draws)
-        log.append(fit.log_evidence + log_class_prior(each.model))
+        log.append(sample_alone(each, rng).log_evidence[0] + log_class_prior(each.model))
     share = normalised(np.array(log))
     chosen = problems[int(share.argmax())]
     for of, each in zip(share.tolist(), problems, strict=True):
         if of > _OF_NOTE:
+            fit_alone(each, rng, options.draws)
             chosen.rivals.append((of, each))
     return chosen
 

@@ -9,7 +9,7 @@ import numpy as np
 from shm.gap.contract import Hypothesis
 from shm.inference.likelihood import Likelihood
 from shm.inference.posterior import Density
-from shm.values import FloatArray
+from shm.values import FloatArray, IntArray
 
 
 class Problem(Protocol):
@@ -18,6 +18,9 @@ class Problem(Protocol):
     @property
     def value(self) -> FloatArray:
         """Return the data (data,)."""
+
+    def linear(self, hypothesis: Hypothesis) -> IntArray:
+        """Return the columns in which predictions are nearly linear."""
 
     def dimension(self, hypothesis: Hypothesis) -> int:
         """Return how many parameters there are."""
@@ -37,8 +40,14 @@ class Target(Density):
     ):
         self.problem, self.hypothesis = problem, hypothesis
         self.value = problem.value
-        self.likelihood = likelihood or problem.likelihood(hypothesis)
+        self._likelihood = likelihood or problem.likelihood(hypothesis)
         self.dimension = problem.dimension(hypothesis)
+        self.linear = problem.linear(hypothesis)
+        self.other: IntArray = np.setdiff1d(np.arange(self.dimension), self.linear)
+
+    @property
+    def likelihood(self) -> Likelihood:
+        return self._likelihood
 
     def predict(self, z: FloatArray) -> FloatArray:
         with np.errstate(all="ignore"):

@@ -19,8 +19,10 @@ from shm.gap.repeated_errors import (
     sensor_loads,
     turn_loads,
 )
+from shm.gap.sampling import Sampling
 from shm.inference.described import DescribedCoordinates
 from shm.inference.likelihood import Likelihood
+from shm.inference.posterior import Peak
 from shm.inference.systematic_errors import (
     errors_of_bar,
     felt_by,
@@ -43,14 +45,17 @@ _TENSIONS = np.linspace(-2.5, 2.5, 41)
 _STEP_SD = 0.01  # numerical: of a reading's standard deviation; frequencies are linear over it
 _AT_REST = Conditions(amplitude=0.0)
 _MOST_REPEATED = 3.0  # standard deviations
+_STRAIGHT = 0.1
+"""Numerical: standard deviations of a datum by which a prediction may be off its slope where a
+parameter still counts as linear."""
 
 
 class GapProblem:
     """The tests of one hanger as made, and what hypotheses about it predict of them.
 
     `smallest` holds, for an effect and where it acts, the share of its sizes' ranges that cannot
-    be seen in these data and that their priors therefore leave out (see `shm.gap.scan`). `alone`
-    keeps the posterior without effects; `rivals` are the problems of all model classes
+    be seen in these data and that their priors therefore leave out (see `shm.gap.scan`). `sampling`
+    and `alone` keep the posterior without effects; `rivals` are the problems of all model classes
     of note, itself among them, with their probabilities.
     """
 
@@ -72,6 +77,8 @@ class GapProblem:
         self.described = described or DescribedCoordinates(
             model, unread, wave_n_m, known_tension_sd=known
         )
+        self._linear = self.described.always_linear
+        self.sampling: Sampling | None = None
         self.alone: Fit | None = None
         self.rivals: list[tuple[float, GapProblem]] = []
         self._hangers: dict[Effects, HangerWithEffects] = {}
@@ -84,8 +91,32 @@ class GapProblem:
     def value(self) -> FloatArray:
         return self.observations.value
 
+    def linear(self, hypothesis: Hypothesis) -> IntArray:
+        """Return the columns in which logarithms of frequencies are nearly linear."""
+        return self._linear
+
     def dimension(self, hypothesis: Hypothesis) -> int:
         return self.coordinates(hypothesis).dimension
+
+    def settle(self, peak: Peak) -> None:
+        """Take as linear the terms of the hanger whose influence is so about its peak.
+
+        Over one standard deviation, by the second difference against the likeliest errors.
+        """
+        sd = np.sqrt(np.diag(peak.covariance))
+        candidates = self.described.nearly_linear
+        if not len(candidates):
+            return
+        steps = np.zeros((len(candidates), len(peak.z)))
+        steps[np.arange(len(candidates)), candidates] = sd[candidates]
+        alone = Hypothesis()
+        there, back = (self.predict(alone, peak.z + way * steps) for way in (1, -1))
+        bent = (there + back) / 2 - self.predict(alone, peak.z[None])
+        residual = self.value - self.predict(alone, peak.z[None])
+        node = int(self.likelihood(alone).by_node(residual)[0].argmax())
+        square = self.likelihood(alone).squares(np.nan_to_num(bent, nan=np.inf, posinf=1e3))
+        straight = candidates[square[:, node] < _STRAIGHT**2]
+        self._linear = np.union1d(self.described.always_linear, straight)
 
     # ------------------------------------------------ coordinates and predictions
 

@@ -1,18 +1,342 @@
-"""The fit of a hypothesis, by draws or by normal distributions on its peaks."""
+"""Draws and evidence of one hypothesis by importance sampling about its peaks.
+
+Parameters in which the data are nearly linear are integrated out in closed form at each draw, so
+that only the others are sampled: from t distributions fitted to what is known of the posterior,
+with a share of the prior so that no weight is unbounded (Hesterberg 1995; Cappe et al. 2008). Of
+their draws only some are solved, by chance as a quadratic surrogate of the posterior has it, which
+costs no solution of the model: the chance is known, so that weights stay exact. All draws count,
+each against the mixture of all proposals (Cornuet et al. 2012).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+import scipy
 
 from shm.gap.contract import Fit, Method
 from shm.gap.posterior import Target
-from shm.inference.mixture import normalised
-from shm.inference.options import EMCEE
+from shm.inference.chain import run_chain
+from shm.inference.coordinates import log_normal
+from shm.inference.linear import Linear
+from shm.inference.mixture import (
+    Normal,
+    Pool,
+    Rows,
+    TMixture,
+    normalised,
+    systematic,
+    tempered,
+)
 from shm.inference.posterior import Peak, laplace
-from shm.inference.sampling import sample as sample_density
-from shm.values import NAN, FloatArray
+from shm.values import ENOUGH_EFFECTIVE, BoolArray, FloatArray, IntArray
+
+# Numerical, in standard deviations of a prior: no linear parameter goes farther, and over less its
+# slopes hold.
+_FARTHEST_LINEAR, _SETTLED = 12.0, 0.3
+
+MOST_ROUNDS = 30
+"""Rounds of draws after which importance sampling gives up."""
+
+
+@dataclass(frozen=True)
+class SamplingOptions:
+    """Hold the numbers of the sampler, all of them numerical: weights correct for each.
+
+    A `round` of draws comes from a mixture of at most `parts` t distributions, fitted to a
+    `population` drawn again, `draws_a_part` at least; with shares of the `prior` (more of it
+    `prior_at_first`) and of the `first` mixture, which has peaks at several `widths`, those within
+    `far_below` of the best log density, and `without` of it where the posterior without the last
+    effects is, by `clusters_without` parts. Of `wide_every` rounds one or two do without a
+    surrogate; of the others' `candidates` a round is kept, each with a chance of `least_kept` or
+    more, found by `halvings`. The surrogate's fit has a
+    `least_weight` for all points and a `ridge`. Linear parameters are followed `most_settled` times
+    at most.
+    """
+
+    round: int = 150
+    parts: int = 8
+    population: int = 600
+    draws_a_part: int = 4
+    prior_at_first: float = 0.3
+    prior: float = 0.1
+    first: float = 0.2
+    widths: tuple[float, ...] = (1.0, 2.0)
+    far_below: float = 10.0
+    without: float = 0.4
+    clusters_without: int = 3
+    wide_every: int = 4
+    candidates: int = 3000
+    least_kept: float = 0.01
+    halvings: int = 30
+    least_weight: float = 1e-2
+    ridge: float = 1e-6
+    most_settled: int = 4
+
+
+_HOW = SamplingOptions()
+
+
+@dataclass(frozen=True, eq=False)
+class _Draws(Rows):
+    """Points z (n, d), their linear parameters at their best, by the likeliest error `node` (n,).
+
+    `residual` (n, data) is that with the linear parameters as they go along with the others.
+    """
+
+    z: FloatArray
+    node: IntArray
+    residual: FloatArray
+
+
+class _Collapsed:
+    """A target with its linear parameters integrated out, near one peak."""
+
+    def __init__(self, target: Target, peak: Peak):
+        self.target, self.dimension = target, len(target.other)
+        self.residual, self.slopes = target.view(peak.z)
+        self.linear = Linear(target.likelihood, self.slopes[:, target.linear])
+        own = np.ix_(target.other, target.other)
+        across = peak.covariance[np.ix_(target.linear, target.other)]
+        self._follow = np.linalg.solve(peak.covariance[own], across.T).T
+        self._peak = peak.z
+
+    def along(self, w: FloatArray) -> FloatArray:
+        """Return points (n, d) with others w (n, o) and the linear parameters as at the peak."""
+        target = self.target
+        z = np.tile(self._peak, (len(w), 1))
+        z[:, target.other] = w
+        moved = z[:, target.linear] + (w - self._peak[target.other]) @ self._follow.T
+        z[:, target.linear] = moved.clip(-_FARTHEST_LINEAR, _FARTHEST_LINEAR)
+        return z
+
+    def settle(self, w: FloatArray) -> tuple[_Draws, FloatArray]:
+        """Return points with other parameters w (n, o), and the log of their target density (n,).
+
+        Where the linear parameters go far, the model is solved again there.
+        """
+        columns, z = self.target.linear, self.along(w)
+        start = z[:, columns].copy()
+        residual = self.target.residual(z)
+        log, step, node = self.linear.marginal(residual, start)
+        moved = start + step
+        far = np.flatnonzero((np.abs(step) > _SETTLED).any(axis=1))
+        for _ in range(_HOW.most_settled):
+            if not len(far):
+                break
+            there = z[far].copy()
+            there[:, columns] = moved[far]
+            # As if the slopes held from the start on, so that all points are alike.
+            back = (moved[far] - start[far]) @ self.slopes[:, columns].T
+            residual[far] = self.target.residual(there) + back
+            log[far], step, node[far] = self.linear.marginal(residual[far], start[far])
+            change = np.abs(start[far] + step - moved[far])
+            moved[far] = start[far] + step
+            far = far[(change > _SETTLED).any(axis=1)]
+        z[:, columns] = moved
+        return _Draws(z, node, residual), np.asarray(log + log_normal(w))
+
+    def log_target(self, w: FloatArray, residual: FloatArray) -> FloatArray:
+        """Return the log of the target density (n,) by residuals that are known already."""
+        z = self.along(w)
+        return self.linear.marginal(residual, z[:, self.target.linear])[0] + log_normal(w)
+
+    def scatter(self, draws: _Draws, rng: np.random.Generator) -> FloatArray:
+        """Return the points (n, d) with their linear parameters drawn about their best."""
+        z = draws.z.copy()
+        factor = np.linalg.cholesky(self.linear.covariance)[draws.node]
+        normal = rng.standard_normal((len(z), len(self.target.linear), 1))
+        z[:, self.target.linear] += (factor @ normal)[..., 0]
+        return z
+
+    # ------------------------------------------------ what emcee asks for
+
+    def evaluate(self, w: FloatArray) -> FloatArray:
+        return w
+
+    def log_posterior(self, w: FloatArray) -> FloatArray:
+        found = self.settle(w)[1]
+        return np.where(np.isfinite(found), found, -np.inf)
+
+
+class _Proposal(Protocol):
+    def draw(self, rng: np.random.Generator) -> tuple[FloatArray, int]:
+        """Return draws (n, o) that are to be solved, and of how many."""
+
+    def log_density(self, w: FloatArray) -> FloatArray:
+        """Return the log density (n,) at w (n, o)."""
+
+
+class _Wide:
+    """A mixture of t distributions with a share of the prior."""
+
+    def __init__(self, mixture: TMixture, of_prior: float):
+        self.mixture, self.of_prior = mixture, of_prior
+
+    def draw(self, rng: np.random.Generator) -> tuple[FloatArray, int]:
+        return self.mixture_draws(_HOW.round, rng), _HOW.round
+
+    def mixture_draws(self, n: int, rng: np.random.Generator) -> FloatArray:
+        """Return draws (n, o)."""
+        w = self.mixture.draw(n, rng)
+        prior: BoolArray = rng.random(n) < self.of_prior
+        w[prior] = rng.standard_normal((int(prior.sum()), w.shape[1]))
+        return w
+
+    def log_density(self, w: FloatArray) -> FloatArray:
+        own = np.log1p(-self.of_prior) + self.mixture.log_density(w)
+        return np.asarray(np.logaddexp(own, np.log(self.of_prior) + log_normal(w)))
+
+
+class _Surrogate:
+    """The posterior by a quadratic fit of the residuals at points already solved.
+
+    Of draws of a `wide` proposal those are kept that it finds likely, each by a chance. What the
+    fit is off by, weights of exact solutions correct.
+    """
+
+    def __init__(
+        self,
+        collapsed: _Collapsed,
+        known: _Draws,
+        weights: FloatArray,
+        wide: _Wide,
+        rng: np.random.Generator,
+    ):
+        self._collapsed, self._wide = collapsed, wide
+        other = collapsed.target.other
+        w, weights = known.z[:, other], weights + _HOW.least_weight / len(weights)
+        self._centre = np.average(w, axis=0, weights=weights)
+        self._scale = np.sqrt(np.average((w - self._centre) ** 2, axis=0, weights=weights)) + 1e-6
+        usable = np.isfinite(known.residual).all(axis=1)
+        root = np.sqrt(weights[usable])[:, None]
+        columns = root * self._features(w[usable])
+        gram = columns.T @ columns
+        ridge = _HOW.ridge * np.trace(gram) / len(gram) * np.eye(len(gram))
+        self._fit = np.linalg.solve(gram + ridge, columns.T @ (root * known.residual[usable]))
+        self._log_scale = 0.0
+        self._log_scale = self._scaled(rng)
+
+    def draw(self, rng: np.random.Generator) -> tuple[FloatArray, int]:
+        w = self._wide.mixture_draws(_HOW.candidates, rng)
+        return np.asarray(w[np.log(rng.random(len(w))) < self._log_kept(w)]), len(w)
+
+    def log_density(self, w: FloatArray) -> FloatArray:
+        return np.asarray(self._wide.log_density(w) + self._log_kept(w))
+
+    def _log_kept(self, w: FloatArray) -> FloatArray:
+        """Return the log of the chance (n,) that a candidate is kept."""
+        log = self._log_scale + self._log(w) - self._wide.log_density(w)
+        return np.nan_to_num(log, nan=-np.inf).clip(np.log(_HOW.least_kept), 0.0)
+
+    def _scaled(self, rng: np.random.Generator) -> float:
+        """Return the log scale of chances by which a round of draws is kept."""
+        w = self._wide.mixture_draws(_HOW.candidates, rng)
+        log = np.sort(np.nan_to_num(self._log(w) - self._wide.log_density(w), nan=-np.inf))
+        low, high = -log[-1] - 50.0, -log[-1] + 50.0
+        for _ in range(_HOW.halvings):
+            middle = (low + high) / 2
+            kept = np.exp((middle + log).clip(np.log(_HOW.least_kept), 0.0)).sum()
+            low, high = (low, middle) if kept > _HOW.round else (middle, high)
+        return float(low)
+
+    def _log(self, w: FloatArray) -> FloatArray:
+        return self._collapsed.log_target(w, self._features(w) @ self._fit)
+
+    def _features(self, w: FloatArray) -> FloatArray:
+        """Return one, the places and their products (n, features)."""
+        u = (w - self._centre) / self._scale
+        one, other = np.triu_indices(u.shape[1])
+        return np.hstack([np.ones((len(u), 1)), u, u[:, one] * u[:, other]])
+
+
+class Sampling:
+    """Importance sampling of a hypothesis about `peaks`, the best first, that can be gone on with.
+
+    It is looked for also where a fit `without` its last effects has its draws.
+    """
+
+    def __init__(
+        self,
+        target: Target,
+        peaks: Sequence[Peak],
+        rng: np.random.Generator,
+        without: Fit | None = None,
+    ):
+        self.target, self.peaks, self.rng = target, tuple(peaks), rng
+        self._collapsed = _Collapsed(target, peaks[0])
+        self._pool: Pool[_Proposal, _Draws] = Pool(
+            lambda proposal, batch: proposal.log_density(batch.z[:, target.other])
+        )
+        self._rounds = 0
+        if len(target.other):
+            self._first = _parts(target, peaks, without, rng)
+            self._proposal: _Proposal = _Wide(self._first, _HOW.prior_at_first)
+
+    @property
+    def effective(self) -> float:
+        """Return Kish's effective number of draws."""
+        if not len(self.target.other):
+            return np.inf
+        return self._pool.effective if self._rounds else 0.0
+
+    @property
+    def log_evidence(self) -> tuple[float, float]:
+        """Return the log evidence and its standard error."""
+        if len(self.target.other):
+            return self._pool.log_evidence, self._pool.log_evidence_sd
+        return float(self._collapsed.settle(np.empty((1, 0)))[1][0]), 0.0
+
+    def run(self, enough: float, most_rounds: int) -> None:
+        """Draw until `enough` draws are effective, for so many rounds in all at most."""
+        while self.effective < enough and self._rounds < most_rounds:
+            self._draw()
+
+    def _draw(self) -> None:
+        other = self.target.other
+        w, drawn = self._proposal.draw(self.rng)
+        batch, log = self._collapsed.settle(w)
+        self._pool.add(self._proposal, drawn, batch, log)
+        self._rounds += 1
+        weights = tempered(self._pool.log_weights, 6 * len(other), 0.7, 1e-3)
+        known = self._pool.batch.z[:, other]
+        likely = known[systematic(weights, _HOW.population, self.rng)]
+        clusters = self._first
+        if len(np.unique(likely, axis=0)) > _HOW.draws_a_part * _HOW.parts:
+            clusters = TMixture.of(likely, _HOW.parts, self.rng)
+        refitted = clusters.refitted(known, weights)
+        self._proposal = wide = _Wide(refitted.mixed(self._first, _HOW.first), _HOW.prior)
+        if self._rounds % _HOW.wide_every > 1:
+            self._proposal = _Surrogate(self._collapsed, self._pool.batch, weights, wide, self.rng)
+
+    def fit(self, draws: int) -> Fit:
+        """Return the fit with so many equal draws."""
+        if not len(self.target.other):
+            point, _ = self._collapsed.settle(np.empty((1, 0)))
+            chosen = point.take(np.zeros(draws, dtype=np.int64))
+        else:
+            rows = systematic(normalised(self._pool.log_weights), draws, self.rng)
+            chosen = self._pool.batch.take(rows)
+        found = self.rng.permutation(self._collapsed.scatter(chosen, self.rng))
+        return _fit(self._collapsed, self.peaks, found, self.log_evidence, self.effective)
+
+    def fit_by_chain(self, draws: int) -> Fit:
+        """Return the same by emcee, from where importance sampling has come."""
+        known = self.fit(draws)
+        chain, count, _ = run_chain(self._collapsed, known.draws[:, self.target.other], self.rng)
+        chosen = self._collapsed.settle(chain[self.rng.choice(len(chain), draws)])[0]
+        found = self._collapsed.scatter(chosen, self.rng)
+        return _fit(
+            self._collapsed,
+            self.peaks,
+            found,
+            (known.log_evidence, known.log_evidence_sd),
+            count,
+            "emcee",
+        )
 
 
 def sample(
@@ -20,21 +344,15 @@ def sample(
     peaks: Sequence[Peak],
     draws: int,
     rng: np.random.Generator,
+    enough: float = ENOUGH_EFFECTIVE,
 ) -> Fit:
-    """Return the fit of a hypothesis about `peaks`, the best first, with so many equal draws.
+    """Return the fit of a hypothesis about `peaks`, the best first, with `enough` effective draws.
 
-    Where fewer than 200 are effective, emcee goes on.
+    Where importance sampling does not come to that, emcee goes on.
     """
-    found = sample_density(target, peaks, draws, rng)
-    method: Method = "emcee" if found.method == EMCEE else "sampled"
-    return _fit(
-        target,
-        peaks,
-        found.points.z,
-        (found.log_evidence, found.log_evidence_sd),
-        found.effective_sample_size,
-        method,
-    )
+    sampling = Sampling(target, peaks, rng)
+    sampling.run(enough, MOST_ROUNDS)
+    return sampling.fit(draws) if sampling.effective >= enough else sampling.fit_by_chain(draws)
 
 
 def approximate(
@@ -49,26 +367,63 @@ def approximate(
     found = np.vstack(
         [rng.multivariate_normal(p.z, p.covariance, n) for p, n in zip(peaks, counts, strict=True)]
     )
-    return _fit(target, peaks, found, (laplace(peaks) + beyond, NAN), NAN, "normal")
+    nan = float("nan")
+    log_evidence = laplace(peaks) + beyond, nan
+    return _fit(_Collapsed(target, peaks[0]), peaks, found, log_evidence, nan, "normal")
+
+
+def _parts(
+    target: Target, peaks: Sequence[Peak], without: Fit | None, rng: np.random.Generator
+) -> TMixture:
+    """Return t distributions on the peaks, and where the posterior is without the last effects.
+
+    Of an effect that these data hardly show all small sizes are as likely.
+    """
+    other = target.other
+    near = [each for each in peaks if each.log > peaks[0].log - _HOW.far_below]
+    parts = [
+        Normal(each.z[other], width**2 * each.covariance[np.ix_(other, other)])
+        for each in near
+        for width in _HOW.widths
+    ]
+    shares = scipy.special.softmax([each.log_evidence for each in near for _ in _HOW.widths])
+    first = TMixture(parts, np.maximum(shares, 0.02))
+    if without is None:
+        return first
+    known = without.draws[:, other[other < without.draws.shape[1]]]
+    free = len(other) - known.shape[1]
+    if (
+        not known.shape[1]
+        or len(np.unique(known, axis=0)) < _HOW.draws_a_part * _HOW.clusters_without
+    ):
+        return first
+    wide = TMixture.of(known, _HOW.clusters_without, rng)
+    extended = [
+        Normal(
+            np.append(part.mean, np.zeros(free)),
+            scipy.linalg.block_diag(part.covariance, np.eye(free)),
+        )
+        for part in wide.parts
+    ]
+    return first.mixed(TMixture(extended, wide.shares), _HOW.without)
 
 
 def _fit(
-    target: Target,
+    collapsed: _Collapsed,
     peaks: Sequence[Peak],
     draws: FloatArray,
     log_evidence: tuple[float, float],
-    effective: float,
-    method: Method,
+    count: float,
+    method: Method = "sampled",
 ) -> Fit:
-    best = peaks[0]
-    residual, slopes = target.view(best.z)
+    target, best, residual = collapsed.target, peaks[0], collapsed.residual
     error = target.likelihood.nodes[int(target.likelihood.by_node(residual[None])[0].argmax())]
     return Fit(
         hypothesis=target.hypothesis,
         z=best.z,
         covariance=best.covariance,
-        predicted=target.value - residual,
-        slopes=slopes,
+        predicted=target.problem.value - residual,
+        slopes=collapsed.slopes,
         noise=error.covariance,
         model_error=error.model_error,
         draws=draws,
@@ -77,5 +432,5 @@ def _fit(
         log_evidence_sd=log_evidence[1],
         method=method,
         peaks=tuple(peaks),
-        effective=effective,
+        effective=min(count, float(len(draws))),
     )

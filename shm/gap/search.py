@@ -18,13 +18,13 @@ from shm.gap.law_error import allow_for_laws
 from shm.gap.posterior import Target
 from shm.gap.probabilities import ScoredHypothesis, log_prior
 from shm.gap.problem import GapProblem
-from shm.gap.sampling import approximate, sample
+from shm.gap.sampling import MOST_ROUNDS, Sampling, approximate
 from shm.gap.scan import scan, scan_beside
 from shm.inference.linear import Linear
 from shm.inference.options import Progress, silent
 from shm.inference.posterior import Peak, find_peaks, laplace
 from shm.models.effects import EFFECTS
-from shm.values import FloatArray
+from shm.values import ENOUGH_EFFECTIVE, FloatArray
 
 ALONE = Hypothesis()
 
@@ -40,6 +40,7 @@ _MOST_SCANNED, _MOST_PAIRS = 12, 8
 OF_THE_ANSWER = 0.1
 """Hypotheses with this probability are sampled: the answer rests on them."""
 _MOST_SAMPLED = 5  # numerical: with probabilities above a tenth there are seldom more
+_ROUGHLY = 40, 8  # numerical: effective draws and rounds that tell the classes' evidence apart
 
 
 def hypotheses(problem: GapProblem, without: tuple[str, ...] = ()) -> tuple[Hypothesis, ...]:
@@ -188,8 +189,11 @@ class Search:
                 break
             hypothesis = max(open_, key=lambda h: open_[h])
             self.progress(f"sampling {hypothesis.name or 'something unknown'}", 0.9)
+            without = self.baseline if hypothesis.effects else None
             target, peaks = Target(self.problem, hypothesis), self.fits[hypothesis].peaks
-            self.fits[hypothesis] = sample(target, peaks, self.draws, self.rng)
+            sampling = Sampling(target, peaks, self.rng, without)
+            sampling.run(ENOUGH_EFFECTIVE, MOST_ROUNDS)
+            self.fits[hypothesis] = sampling.fit(self.draws)
 
     def _leading(self, most: int, effects: int) -> list[Fit]:
         """Return the likeliest fit of each of the leading effects, or pairs."""
@@ -226,10 +230,24 @@ def fit_alone(problem: GapProblem, rng: np.random.Generator, draws: int = 1000) 
     Raises BadInput where the model cannot be solved near the data.
     """
     if problem.alone is None:
-        target = Target(problem, ALONE)
-        peaks = find_peaks(target, find_starts(problem))
-        problem.alone = sample(target, peaks, draws, rng)
+        sampling = sample_alone(problem, rng)
+        sampling.run(ENOUGH_EFFECTIVE, MOST_ROUNDS)
+        problem.alone = sampling.fit(draws)
     return problem.alone
+
+
+def sample_alone(problem: GapProblem, rng: np.random.Generator) -> Sampling:
+    """Return the sampling of the hanger without effects, which the problem keeps.
+
+    It has come as far as the evidence takes.
+    """
+    if problem.sampling is not None:
+        return problem.sampling
+    peaks = find_peaks(Target(problem, ALONE), find_starts(problem))
+    problem.settle(peaks[0])
+    problem.sampling = Sampling(Target(problem, ALONE), peaks, rng)
+    problem.sampling.run(*_ROUGHLY)
+    return problem.sampling
 
 
 def find_starts(problem: GapProblem) -> FloatArray:

@@ -3,7 +3,7 @@
     y_i = f(theta, condition_i)[observable_i] + e_i,    theta_j = prior_j(z_j),  z ~ N(0, 1)
 
 Every prior is a map of a standard normal z, as in the diagnosis of hangers, and the errors e are a
-few possibilities of unknown size (`NoiseNode`), so that `shm.gap.likelihood` serves both. What is
+few possibilities of unknown size (`NoiseNode`), so that `shm.inference.likelihood` serves both. What is
 the measurement's own (a gain, an offset) is a parameter of the simulator: it is in every
 hypothesis and competes with none.
 """
@@ -21,7 +21,7 @@ from shm.assumptions import DEFAULTS
 from shm.errors import BadInput, UsageError
 from shm.gap.contract import Hypothesis
 from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
-from shm.values import BoolArray, FloatArray
+from shm.values import BoolArray, FloatArray, IntArray
 
 Condition: TypeAlias = Mapping[str, float]
 Predict: TypeAlias = Callable[[dict[str, Any], Condition], Mapping[str, Any]]
@@ -179,6 +179,10 @@ class SimulatorProblem:
 
     def dimension(self, hypothesis: Hypothesis) -> int:
         return len(self.priors(hypothesis))
+
+    def linear(self, hypothesis: Hypothesis) -> IntArray:
+        """Return no column: nobody knows in which the simulator is linear."""
+        return np.empty(0, dtype=np.int64)
 
     def likelihood(self, hypothesis: Hypothesis) -> Likelihood:
         return Likelihood(self.flexible_nodes() if hypothesis.flexible else self.nodes())

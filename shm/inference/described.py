@@ -37,7 +37,7 @@ from shm.models.as_made import (
     AsMade,
 )
 from shm.models.beam import Beam, Beam3
-from shm.values import PLANES, FloatArray, ModalTest, Plane, Prior
+from shm.values import PLANES, FloatArray, IntArray, ModalTest, Plane, Prior
 
 # c = sqrt(e/mu)/l^2 with e ~ modulus section^2 and mu ~ density section.
 _C = {SECTION: 0.5, DENSITY: -0.5, MODULUS: 0.5, LENGTH: -2.0, BENDING: 0.5}
@@ -311,6 +311,18 @@ class DescribedCoordinates:
     def ends_at(self) -> slice:
         """Return the columns of the ends' scores."""
         return slice(self._cuts[0], self._cuts[1])
+
+    @property
+    def always_linear(self) -> IntArray:
+        """Return the columns in which logarithms of frequencies are nearly linear: the tension and
+        what is seen of the deviations.
+        """
+        return np.append(0, np.arange(self._cuts[2], self.dimension))
+
+    @property
+    def nearly_linear(self) -> IntArray:
+        """Return the columns of the terms, in which they may be."""
+        return np.arange(self._cuts[1], self._cuts[2])
 
     def asked_of_description(self, z: FloatArray) -> FloatArray:
         """Return the scores (n, k) of terms and deviations: what the description is off by."""

@@ -82,9 +82,11 @@ class _Blocks:
     def squares(self, residual: FloatArray) -> FloatArray:
         """Return squares (n, nodes) of residuals (n, F) of these blocks, whitened."""
         if self._rows.shape[1] == 1:
-            return residual[:, self._rows[:, 0]] ** 2 @ self._whitening[:, :, 0, 0].T ** 2
+            return np.asarray(
+                residual[:, self._rows[:, 0]] ** 2 @ self._whitening[:, :, 0, 0].T ** 2
+            )
         white = self._whitening @ residual.T[self._rows]
-        return np.einsum("kbln,kbln->nk", white, white)
+        return np.asarray(np.einsum("kbln,kbln->nk", white, white))
 
     def whitened(self, residual: FloatArray) -> FloatArray:
         """Residuals (n, F) of these blocks, uncorrelated: (nodes, blocks, length, n)."""

@@ -15,7 +15,7 @@ import scipy
 from shm.inference.coordinates import log_normal
 from shm.inference.likelihood import Likelihood
 from shm.inference.mixture import Rows
-from shm.values import FloatArray, IntArray
+from shm.values import BoolArray, FloatArray, IntArray
 
 # Numerical: a climb's steps, the longest in a coordinate, and the gain in log posterior that is
 # none; a slope beyond is a cliff, where two modes change places.
@@ -59,7 +59,11 @@ class Density(ABC):
 
     value: FloatArray
     dimension: int
-    likelihood: Likelihood
+
+    @property
+    @abstractmethod
+    def likelihood(self) -> Likelihood:
+        """Return the likelihood of residuals."""
 
     @abstractmethod
     def predict(self, z: FloatArray) -> FloatArray:
@@ -196,7 +200,7 @@ def climb(
         moved = going[better]
         z[moved], residual[moved], log[moved] = tried[better], there[better], log_there[better]
         damping[going] *= np.where(better, 0.2, 6.0)
-        done = np.asarray(better & (gain < _NO_GAIN))
+        done: BoolArray = np.asarray(better & (gain < _NO_GAIN))
         done |= (damping[going] > _MOST_DAMPING) | (hoped < _NO_GAIN)
         if taken > 3:
             done |= log[going] + 2 * hoped < hopeless

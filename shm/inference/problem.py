@@ -90,7 +90,7 @@ class Problem(Density):
         return np.hstack([found, self.measured.shapes.misfits(self.model, theta)])
 
     @property
-    def likelihood(self) -> Likelihood:  # type: ignore[override]
+    def likelihood(self) -> Likelihood:
         """Return the likelihood of residuals, near the optimum once the noise has settled."""
         return self.measured.likelihood
 
@@ -130,11 +130,6 @@ class Problem(Density):
             return super().slopes(z, directions)
         steps = DIFFERENCE * (np.eye(z.shape[1]) if directions is None else directions.T)
         return self._near(z, steps) / DIFFERENCE
-
-    @property
-    def is_costly(self) -> bool:
-        """Return True where an evaluation costs much more than the closed form of a beam."""
-        return self.model.expensive or (isinstance(self.model, AsMade) and self.model.has_terms)
 
     @property
     def _has_slopes(self) -> bool:

@@ -36,7 +36,7 @@ class Numerics:
     proportion.
     """
 
-    along: int = 64
+    along: int = 160
     along_steps: int = 6
     wider: tuple[float, float] = (10.0, 1.5)
     tempered: float = 0.5

@@ -11,7 +11,7 @@ from shm.assumptions import DEFAULTS
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.posterior import Target
 from shm.gap.problem import GapProblem
-from shm.gap.sampling import sample
+from shm.gap.sampling import MOST_ROUNDS, Sampling
 from shm.gap.scan import Scan, scan
 from shm.gap.search import fit_alone
 from shm.inference.linear import Linear
@@ -21,6 +21,7 @@ from shm.models.as_made import DENSITY, LENGTH, MODULUS, SECTION, TENSION
 from shm.models.effects import Conditions, Variant
 from shm.models.hanger_with_effects import HangerWithEffects
 from shm.values import (
+    ENOUGH_EFFECTIVE,
     NAN,
     PLANES,
     AddedMass,
@@ -122,4 +123,6 @@ def fit_of(problem: GapProblem, hypothesis: Hypothesis, draws: int = 400) -> Fit
     before = fit_alone(problem, np.random.default_rng(1))
     starts = scan_of(problem, hypothesis).starts(problem, before)
     target = Target(problem, hypothesis)
-    return sample(target, find_peaks(target, starts), draws, np.random.default_rng(1))
+    sampling = Sampling(target, find_peaks(target, starts), np.random.default_rng(1), before)
+    sampling.run(ENOUGH_EFFECTIVE, MOST_ROUNDS)
+    return sampling.fit(draws)
