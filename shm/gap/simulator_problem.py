@@ -3,8 +3,8 @@
     y_i = f(theta, condition_i)[observable_i] + e_i,    theta_j = prior_j(z_j),  z ~ N(0, 1)
 
 Every prior is a map of a standard normal z, as in the diagnosis of hangers, and the errors e are a
-few possibilities of unknown size (`NoiseNode`), so that `shm.inference.likelihood` serves both. What is
-the measurement's own (a gain, an offset) is a parameter of the simulator: it is in every
+few possibilities of unknown size (`NoiseNode`), so that `shm.inference.likelihood` serves both.
+What is the measurement's own (a gain, an offset) is a parameter of the simulator: it is in every
 hypothesis and competes with none.
 """
 
