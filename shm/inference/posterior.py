@@ -212,7 +212,7 @@ def _curvature(
     likelihood: Likelihood, residual: FloatArray, slopes: FloatArray, away: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return Gauss and Newton's Hessian (n, d, d) and the gradient (n, d) of the log posterior."""
-    known = np.isfinite(residual).all(axis=1)
+    known = np.asarray(np.isfinite(residual).all(axis=1))
     columns = np.concatenate([slopes, residual[..., None]], axis=2)
     columns = np.where(known[:, None, None], np.nan_to_num(columns), 0.0)
     by_node = likelihood.by_node(columns[..., -1])
