@@ -20,10 +20,9 @@ import numpy as np
 from shm import __version__
 from shm.errors import BadInput, UsageError, needing
 from shm.inference.data_checks import check_for_update
-from shm.inference.field import FieldLikelihood
-from shm.inference.likelihood import Likelihood
 from shm.inference.options import silent
 from shm.inference.problem import Problem
+from shm.inference.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, class_of, parameter_sets
 from shm.values import FloatArray, Hanger, ModalTest, Posterior
 from shm.values.parameter_names import is_logarithm
@@ -232,7 +231,7 @@ def predictive(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hanger)
     """
     if posterior.priors != THESIS:
         return _of_the_field(posterior, tests, hanger)
-    likelihood = Likelihood(tests)
+    likelihood = ThesisLikelihood(tests)
     model = class_of(posterior, hanger)
     sigma, theta = posterior.samples[:, -1], parameter_sets(posterior, model)
     model.prepare(likelihood.highest_order)
@@ -253,9 +252,8 @@ def _of_the_field(posterior: Posterior, tests: Sequence[ModalTest], hanger: Hang
     model = class_of(posterior, hanger)
     used = check_for_update(tests, model)[0] if posterior.remarks else tests
     problem = Problem.of(used, model, silent)
-    likelihood, sigma = problem.likelihood, posterior.samples[:, -1]
-    if isinstance(likelihood, FieldLikelihood):
-        likelihood.settle(problem.model, posterior.most_probable[:-1])
+    likelihood, sigma = problem.measured, posterior.samples[:, -1]
+    likelihood.settle(problem.model, posterior.most_probable[:-1])
     predicted = problem.run(parameter_sets(posterior, model))
     kept = posterior.log_likelihood
     if not np.allclose(likelihood.joint(predicted, sigma), kept, rtol=1e-4, atol=_NATS):

@@ -47,7 +47,7 @@ def choose_baseline(
     log = []
     for each in problems:
         progress(f"baseline {each.model.name}", 0.0)
-        log.append(sample_alone(each, rng).log_evidence + log_class_prior(each.model))
+        log.append(sample_alone(each, rng).log_evidence[0] + log_class_prior(each.model))
     share = normalised(np.array(log))
     chosen = problems[int(share.argmax())]
     for of, each in zip(share.tolist(), problems, strict=True):

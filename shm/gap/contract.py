@@ -14,6 +14,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from shm.assumptions import DEFAULTS, Assumptions
+from shm.inference.likelihood import Covariance
+from shm.inference.posterior import Peak
 from shm.models.effects import Conditions, Survey, Variant
 from shm.values import FloatArray, IntArray
 from shm.values.diagnosis import joined
@@ -130,38 +132,6 @@ class Observations:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Covariance:
-    """Of the data about a prediction: `frequency` (F, F), and of the components of shapes.
-
-    Those err independently with the variances `shape` (S,), and together by k errors: of sensors,
-    which repeat in every mode and test, and of the directions of modes. `shape_loads` (S, k) is
-    what one standard deviation of each does. So the covariance of shapes is
-    diag(shape) + shape_loads shape_loads'.
-    """
-
-    frequency: FloatArray
-    shape: FloatArray
-    shape_loads: FloatArray
-
-    def part(self, frequencies: IntArray, components: IntArray) -> Covariance:
-        """Of some frequencies and some components of shapes, by index."""
-        own = self.frequency[np.ix_(frequencies, frequencies)]
-        return Covariance(own, self.shape[components], self.shape_loads[components])
-
-
-@dataclass(frozen=True, eq=False)
-class NoiseNode:
-    """One possibility of the unknown errors: its covariance and the log of its prior weight.
-
-    The weights of all nodes of a hypothesis add to 1. `model_error` is the fraction it stands for.
-    """
-
-    covariance: Covariance
-    log_weight: float
-    model_error: float
-
-
 @dataclass(frozen=True)
 class Hypothesis:
     """The baseline with no, one or two effects, each with where it acts.
@@ -186,24 +156,6 @@ class Hypothesis:
     def at(self) -> str:
         """Where the effects act, as one."""
         return joined(variant.at for _, variant in self.effects)
-
-
-@dataclass(frozen=True, eq=False)
-class Peak:
-    """One of the most probable points `z` (d,) of a posterior, with the log density there.
-
-    `covariance` (d, d) is that of a normal distribution on it.
-    """
-
-    z: FloatArray
-    log: float
-    covariance: FloatArray
-
-    @property
-    def log_evidence(self) -> float:
-        """Return the log of its integral by Laplace's method (Tierney and Kadane 1986)."""
-        volume = len(self.z) * np.log(2 * np.pi) + np.linalg.slogdet(self.covariance)[1]
-        return float(self.log + volume / 2)
 
 
 @dataclass(frozen=True, eq=False)

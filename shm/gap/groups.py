@@ -10,8 +10,8 @@ import numpy as np
 import scipy
 
 from shm.gap.contract import Fit
-from shm.gap.likelihood import Likelihood
 from shm.gap.posterior import Problem, Target
+from shm.inference.likelihood import Likelihood
 
 SAME_BELOW = 3.0
 """Log Bayes factor, expected or found, under which two causes count as not separable: evidence of

@@ -13,11 +13,12 @@ from itertools import product
 import numpy as np
 
 from shm.errors import BadInput
-from shm.gap.contract import Fit, Hypothesis, Peak
-from shm.gap.posterior import Target, find_peaks
+from shm.gap.contract import Fit, Hypothesis
+from shm.gap.posterior import Target
 from shm.gap.problem import GapProblem
 from shm.gap.search import Attribution
 from shm.inference.data_checks import taut_string_tension_n
+from shm.inference.posterior import Peak, find_peaks
 from shm.values import PLANES, IntArray
 from shm.values.posterior import NO_TENSION_PERCENT
 from shm.values.rounding import force_unit

@@ -31,9 +31,10 @@ from itertools import product
 import numpy as np
 
 from shm.assumptions import DEFAULTS, Assumptions
-from shm.gap.contract import Covariance, Design, NoiseNode, Observations
+from shm.gap.contract import Design, Observations
 from shm.gap.observations import rounding_covariance
 from shm.gap.repeated_errors import Repeated, turned_modes
+from shm.inference.likelihood import Covariance, NoiseNode
 from shm.values import FloatArray, IntArray
 
 # As the general model and other finite elements differ at most (docs/gap.md, what is compared).

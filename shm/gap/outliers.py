@@ -20,12 +20,13 @@ import numpy as np
 import scipy
 
 from shm.gap.contract import Design, Fit, GapOptions, Hypothesis
-from shm.gap.posterior import Target, find_peaks, laplace
+from shm.gap.posterior import Target
 from shm.gap.probabilities import NO_GAP, UNKNOWN, ScoredHypothesis, log_prior
 from shm.gap.problem import GapProblem
 from shm.gap.search import Attribution, answered, attribute, find_starts
 from shm.inference.data_checks import SAME_LEVEL
 from shm.inference.options import Progress, silent
+from shm.inference.posterior import find_peaks, laplace
 from shm.values import NAN, PLANES, BoolArray, FloatArray, IntArray, Outlier, Residual, effect_label
 
 SURE = 0.9

@@ -28,10 +28,10 @@ import numpy as np
 import scipy
 
 from shm.errors import BadInput
-from shm.gap.contract import Covariance, Fit, Hypothesis, Method
-from shm.gap.likelihood import Likelihood
+from shm.gap.contract import Fit, Hypothesis, Method
 from shm.gap.noise import same_mode, smooth_over_orders
 from shm.gap.problem import GapProblem
+from shm.inference.likelihood import Covariance, Likelihood
 from shm.inference.mixture import normalised
 from shm.values import FloatArray
 

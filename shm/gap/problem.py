@@ -8,9 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from shm.gap.contract import Design, Fit, Hypothesis, Observations, Peak
+from shm.gap.contract import Design, Fit, Hypothesis, Observations
 from shm.gap.coordinates import Coordinates, cut
-from shm.gap.likelihood import Likelihood
 from shm.gap.noise import flexible_nodes, nodes
 from shm.gap.repeated_errors import (
     STRETCHES,
@@ -22,6 +21,8 @@ from shm.gap.repeated_errors import (
 )
 from shm.gap.sampling import Sampling
 from shm.inference.described import DescribedCoordinates
+from shm.inference.likelihood import Likelihood
+from shm.inference.posterior import Peak
 from shm.inference.systematic_errors import (
     errors_of_bar,
     felt_by,

@@ -20,10 +20,10 @@ import numpy as np
 import scipy
 
 from shm.errors import UsageError
-from shm.gap.contract import Covariance, Design, Fit, Observations
-from shm.gap.likelihood import Likelihood, ShapeErrors
+from shm.gap.contract import Design, Fit, Observations
 from shm.gap.problem import GapProblem
 from shm.gap.repeated_errors import SensorError
+from shm.inference.likelihood import Covariance, Likelihood, ShapeErrors
 from shm.models.effects import Conditions
 from shm.values import (
     NAN,

@@ -2,9 +2,10 @@
 
 Parameters in which the data are nearly linear are integrated out in closed form at each draw, so
 that only the others are sampled: from t distributions fitted to what is known of the posterior,
-with a share of the prior so that no weight is unbounded (Hesterberg 1995; Cappe et al. 2008), and
-from a quadratic surrogate of it, which costs no solution of the model. All draws count, each
-against the mixture of all proposals (Cornuet et al. 2012).
+with a share of the prior so that no weight is unbounded (Hesterberg 1995; Cappe et al. 2008). Of
+their draws only some are solved, by chance as a quadratic surrogate of the posterior has it, which
+costs no solution of the model: the chance is known, so that weights stay exact. All draws count,
+each against the mixture of all proposals (Cornuet et al. 2012).
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from typing import Protocol
 import numpy as np
 import scipy
 
-from shm.gap.contract import Fit, Method, Peak
-from shm.gap.linear import Linear
-from shm.gap.posterior import FARTHEST_LINEAR, SETTLED, Target, laplace
+from shm.gap.contract import Fit, Method
+from shm.gap.posterior import SETTLED, Target
 from shm.inference.chain import run_chain
 from shm.inference.coordinates import log_normal
+from shm.inference.linear import Linear
 from shm.inference.mixture import (
     Normal,
     Pool,
@@ -30,7 +31,11 @@ from shm.inference.mixture import (
     systematic,
     tempered,
 )
+from shm.inference.posterior import Peak, laplace
 from shm.values import ENOUGH_EFFECTIVE, BoolArray, FloatArray, IntArray
+
+# Numerical, in standard deviations of a prior: no linear parameter goes farther.
+_FARTHEST_LINEAR = 12.0
 
 MOST_ROUNDS = 30
 """Rounds of draws after which importance sampling gives up."""
@@ -44,9 +49,11 @@ class SamplingOptions:
     `population` drawn again, `draws_a_part` at least; with shares of the `prior` (more of it
     `prior_at_first`) and of the `first` mixture, which has peaks at several `widths`, those within
     `far_below` of the best log density, and `without` of it where the posterior without the last
-    effects is, by `clusters_without` parts. One round of `wide_every` two do without a surrogate,
-    from `candidates` of which the others are drawn; the surrogate's fit has a `least_weight` for
-    all points and a `ridge`. Linear parameters are followed `most_settled` times at most.
+    effects is, by `clusters_without` parts. Of `wide_every` rounds one or two do without a
+    surrogate; of the others' `candidates` a round is kept, each with a chance of `least_kept` or
+    more, found by `halvings`. The surrogate's fit has a
+    `least_weight` for all points and a `ridge`. Linear parameters are followed `most_settled` times
+    at most.
     """
 
     round: int = 150
@@ -62,6 +69,8 @@ class SamplingOptions:
     clusters_without: int = 3
     wide_every: int = 4
     candidates: int = 3000
+    least_kept: float = 0.01
+    halvings: int = 30
     least_weight: float = 1e-2
     ridge: float = 1e-6
     most_settled: int = 4
@@ -100,7 +109,7 @@ class _Collapsed:
         z = np.tile(self._peak, (len(w), 1))
         z[:, target.other] = w
         moved = z[:, target.linear] + (w - self._peak[target.other]) @ self._follow.T
-        z[:, target.linear] = moved.clip(-FARTHEST_LINEAR, FARTHEST_LINEAR)
+        z[:, target.linear] = moved.clip(-_FARTHEST_LINEAR, _FARTHEST_LINEAR)
         return z
 
     def settle(self, w: FloatArray) -> tuple[_Draws, FloatArray]:
@@ -153,8 +162,8 @@ class _Collapsed:
 
 
 class _Proposal(Protocol):
-    def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """Return draws (n, o)."""
+    def draw(self, rng: np.random.Generator) -> tuple[FloatArray, int]:
+        """Return draws (n, o) that are to be solved, and of how many."""
 
     def log_density(self, w: FloatArray) -> FloatArray:
         """Return the log density (n,) at w (n, o)."""
@@ -166,7 +175,11 @@ class _Wide:
     def __init__(self, mixture: TMixture, of_prior: float):
         self.mixture, self.of_prior = mixture, of_prior
 
-    def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
+    def draw(self, rng: np.random.Generator) -> tuple[FloatArray, int]:
+        return self.mixture_draws(_HOW.round, rng), _HOW.round
+
+    def mixture_draws(self, n: int, rng: np.random.Generator) -> FloatArray:
+        """Return draws (n, o)."""
         w = self.mixture.draw(n, rng)
         prior: BoolArray = rng.random(n) < self.of_prior
         w[prior] = rng.standard_normal((int(prior.sum()), w.shape[1]))
@@ -180,11 +193,18 @@ class _Wide:
 class _Surrogate:
     """The posterior by a quadratic fit of the residuals at points already solved.
 
-    Draws of a `wide` proposal are weighed by it and drawn again: so it costs no solution of the
-    model. What the fit is off by, weights of exact solutions correct.
+    Of draws of a `wide` proposal those are kept that it finds likely, each by a chance. What the
+    fit is off by, weights of exact solutions correct.
     """
 
-    def __init__(self, collapsed: _Collapsed, known: _Draws, weights: FloatArray, wide: _Wide):
+    def __init__(
+        self,
+        collapsed: _Collapsed,
+        known: _Draws,
+        weights: FloatArray,
+        wide: _Wide,
+        rng: np.random.Generator,
+    ):
         self._collapsed, self._wide = collapsed, wide
         other = collapsed.target.other
         w, weights = known.z[:, other], weights + _HOW.least_weight / len(weights)
@@ -196,16 +216,31 @@ class _Surrogate:
         gram = columns.T @ columns
         ridge = _HOW.ridge * np.trace(gram) / len(gram) * np.eye(len(gram))
         self._fit = np.linalg.solve(gram + ridge, columns.T @ (root * known.residual[usable]))
-        self._log_total = 0.0
+        self._log_scale = 0.0
+        self._log_scale = self._scaled(rng)
 
-    def draw(self, n: int, rng: np.random.Generator) -> FloatArray:
-        w = self._wide.draw(_HOW.candidates, rng)
-        log = self._log(w) - self._wide.log_density(w)
-        self._log_total = float(scipy.special.logsumexp(log) - np.log(len(w)))
-        return np.asarray(w[systematic(normalised(log), n, rng)])
+    def draw(self, rng: np.random.Generator) -> tuple[FloatArray, int]:
+        w = self._wide.mixture_draws(_HOW.candidates, rng)
+        return np.asarray(w[np.log(rng.random(len(w))) < self._log_kept(w)]), len(w)
 
     def log_density(self, w: FloatArray) -> FloatArray:
-        return np.asarray(self._log(w) - self._log_total)
+        return np.asarray(self._wide.log_density(w) + self._log_kept(w))
+
+    def _log_kept(self, w: FloatArray) -> FloatArray:
+        """Return the log of the chance (n,) that a candidate is kept."""
+        log = self._log_scale + self._log(w) - self._wide.log_density(w)
+        return np.nan_to_num(log, nan=-np.inf).clip(np.log(_HOW.least_kept), 0.0)
+
+    def _scaled(self, rng: np.random.Generator) -> float:
+        """Return the log scale of chances by which a round of draws is kept."""
+        w = self._wide.mixture_draws(_HOW.candidates, rng)
+        log = np.sort(np.nan_to_num(self._log(w) - self._wide.log_density(w), nan=-np.inf))
+        low, high = -log[-1] - 50.0, -log[-1] + 50.0
+        for _ in range(_HOW.halvings):
+            middle = (low + high) / 2
+            kept = np.exp((middle + log).clip(np.log(_HOW.least_kept), 0.0)).sum()
+            low, high = (low, middle) if kept > _HOW.round else (middle, high)
+        return float(low)
 
     def _log(self, w: FloatArray) -> FloatArray:
         return self._collapsed.log_target(w, self._features(w) @ self._fit)
@@ -248,11 +283,11 @@ class Sampling:
         return self._pool.effective if self._rounds else 0.0
 
     @property
-    def log_evidence(self) -> float:
-        """Return the log evidence."""
+    def log_evidence(self) -> tuple[float, float]:
+        """Return the log evidence and its standard error."""
         if len(self.target.other):
-            return self._pool.log_evidence
-        return float(self._collapsed.settle(np.empty((1, 0)))[1][0])
+            return self._pool.log_evidence, self._pool.log_evidence_sd
+        return float(self._collapsed.settle(np.empty((1, 0)))[1][0]), 0.0
 
     def run(self, enough: float, most_rounds: int) -> None:
         """Draw until `enough` draws are effective, for so many rounds in all at most."""
@@ -261,8 +296,9 @@ class Sampling:
 
     def _draw(self) -> None:
         other = self.target.other
-        batch, log = self._collapsed.settle(self._proposal.draw(_HOW.round, self.rng))
-        self._pool.add(self._proposal, _HOW.round, batch, log)
+        w, drawn = self._proposal.draw(self.rng)
+        batch, log = self._collapsed.settle(w)
+        self._pool.add(self._proposal, drawn, batch, log)
         self._rounds += 1
         weights = tempered(self._pool.log_weights, 6 * len(other), 0.7, 1e-3)
         known = self._pool.batch.z[:, other]
@@ -273,7 +309,7 @@ class Sampling:
         refitted = clusters.refitted(known, weights)
         self._proposal = wide = _Wide(refitted.mixed(self._first, _HOW.first), _HOW.prior)
         if self._rounds % _HOW.wide_every > 1:
-            self._proposal = _Surrogate(self._collapsed, self._pool.batch, weights, wide)
+            self._proposal = _Surrogate(self._collapsed, self._pool.batch, weights, wide, self.rng)
 
     def fit(self, draws: int) -> Fit:
         """Return the fit with so many equal draws."""
@@ -292,7 +328,14 @@ class Sampling:
         chain, count, _ = run_chain(self._collapsed, known.draws[:, self.target.other], self.rng)
         chosen = self._collapsed.settle(chain[self.rng.choice(len(chain), draws)])[0]
         found = self._collapsed.scatter(chosen, self.rng)
-        return _fit(self._collapsed, self.peaks, found, known.log_evidence, count, "emcee")
+        return _fit(
+            self._collapsed,
+            self.peaks,
+            found,
+            (known.log_evidence, known.log_evidence_sd),
+            count,
+            "emcee",
+        )
 
 
 def sample(
@@ -323,8 +366,8 @@ def approximate(
     found = np.vstack(
         [rng.multivariate_normal(p.z, p.covariance, n) for p, n in zip(peaks, counts, strict=True)]
     )
-    log_evidence = laplace(peaks) + beyond
     nan = float("nan")
+    log_evidence = laplace(peaks) + beyond, nan
     return _fit(_Collapsed(target, peaks[0]), peaks, found, log_evidence, nan, "normal")
 
 
@@ -368,7 +411,7 @@ def _fit(
     collapsed: _Collapsed,
     peaks: Sequence[Peak],
     draws: FloatArray,
-    log_evidence: float,
+    log_evidence: tuple[float, float],
     count: float,
     method: Method = "sampled",
 ) -> Fit:
@@ -384,8 +427,8 @@ def _fit(
         model_error=error.model_error,
         draws=draws,
         log_fit=float(target.likelihood.log(residual[None])[0]),
-        log_evidence=log_evidence,
-        log_evidence_sd=count**-0.5 if count > 0 else np.nan,
+        log_evidence=log_evidence[0],
+        log_evidence_sd=log_evidence[1],
         method=method,
         peaks=tuple(peaks),
         effective=min(count, float(len(draws))),

@@ -12,9 +12,9 @@ import numpy as np
 import scipy
 
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.linear import Linear
 from shm.gap.noise import MEAN_MODEL_ERROR
 from shm.gap.problem import GapProblem
+from shm.inference.linear import Linear
 from shm.values import BoolArray, FloatArray
 
 VISIBLE = 1.5

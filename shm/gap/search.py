@@ -14,10 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shm.errors import BadInput, UsageError
-from shm.gap.contract import Fit, GapOptions, Hypothesis, Peak
+from shm.gap.contract import Fit, GapOptions, Hypothesis
 from shm.gap.groups import SAME_BELOW, group, views_from_peaks
-from shm.gap.linear import Linear
-from shm.gap.posterior import Target, find_peaks, laplace
+from shm.gap.posterior import Target
 from shm.gap.probabilities import (
     Family,
     ScoredHypothesis,
@@ -30,8 +29,10 @@ from shm.gap.problem import GapProblem
 from shm.gap.residuals import predictions, predictive_p_value
 from shm.gap.sampling import MOST_ROUNDS, Sampling, approximate
 from shm.gap.scan import scan, scan_beside
+from shm.inference.linear import Linear
 from shm.inference.mixture import normalised
 from shm.inference.options import Progress, silent
+from shm.inference.posterior import Peak, find_peaks, laplace
 from shm.models.effects import EFFECTS
 from shm.values import ENOUGH_EFFECTIVE, FloatArray, Leads
 from shm.values.leading import MIN_NO_GAP_PROBABILITY, find_leading_cause

@@ -14,11 +14,11 @@ import numpy as np
 
 from shm.gap.contract import Fit, Hypothesis
 from shm.gap.coordinates import scale_free
-from shm.gap.linear import Linear
 from shm.gap.probabilities import NO_GAP, PAIR, SINGLE, UNKNOWN, ScoredHypothesis
 from shm.gap.problem import GapProblem
 from shm.gap.scan import Scan
 from shm.gap.search import Attribution, Search, possible
+from shm.inference.linear import Linear
 from shm.inference.mixture import normalised, systematic
 from shm.models.effects import Parameter, Variant, parameters_of
 from shm.values import BoolArray, Diagnosis, FloatArray, Hanger, ModalTest

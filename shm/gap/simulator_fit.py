@@ -8,9 +8,10 @@ import numpy as np
 import scipy
 
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.posterior import Target, find_peaks
+from shm.gap.posterior import Target
 from shm.gap.sampling import sample
 from shm.gap.simulator_problem import Prior, Reading, SimulatorProblem
+from shm.inference.posterior import climb, find_peaks
 from shm.values import BoolArray, FloatArray
 
 # Numerical: points of the priors among which climbs start, those climbs, draws that are kept.
@@ -38,7 +39,8 @@ def fit_hypothesis(
 
 def refit(problem: SimulatorProblem, fit: Fit, rows: BoolArray) -> FloatArray:
     """Return the most probable z by the readings of `rows` (data,) alone, from a fit to all."""
-    return Target(problem.part(rows), fit.hypothesis).climb(fit.z[None])[0].z
+    z, _ = climb(Target(problem.part(rows), fit.hypothesis), fit.z[None])
+    return np.asarray(z[0])
 
 
 # Judgement, in a prior's standard deviations: nearer to a bound than a hundredth of the range; so

@@ -3,8 +3,8 @@
     y_i = f(theta, condition_i)[observable_i] + e_i,    theta_j = prior_j(z_j),  z ~ N(0, 1)
 
 Every prior is a map of a standard normal z, as in the diagnosis of hangers, and the errors e are a
-few possibilities of unknown size (`NoiseNode`), so that `shm.gap.likelihood` serves both. What is
-the measurement's own (a gain, an offset) is a parameter of the simulator: it is in every
+few possibilities of unknown size (`NoiseNode`), so that `shm.inference.likelihood` serves both.
+What is the measurement's own (a gain, an offset) is a parameter of the simulator: it is in every
 hypothesis and competes with none.
 """
 
@@ -19,8 +19,8 @@ import scipy
 
 from shm.assumptions import DEFAULTS
 from shm.errors import BadInput, UsageError
-from shm.gap.contract import Covariance, Hypothesis, NoiseNode
-from shm.gap.likelihood import Likelihood
+from shm.gap.contract import Hypothesis
+from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
 from shm.values import BoolArray, FloatArray, IntArray
 
 Condition: TypeAlias = Mapping[str, float]

@@ -29,7 +29,8 @@ import numpy as np
 import scipy
 
 from shm.assumptions import Assumptions
-from shm.inference.likelihood import conditions_of, measured, predicted_hz
+from shm.inference.likelihood import Covariance, NoiseNode
+from shm.inference.measured import MeasuredFrequencies, conditions_of, predicted_hz
 from shm.inference.shapes import SHAPES, MeasuredShapes
 from shm.inference.systematic_errors import (
     errors_of_bar,
@@ -42,21 +43,15 @@ from shm.models import AsMade, Model
 from shm.models.as_made import TENSION
 from shm.values import NAN, PLANES, FloatArray, IntArray, ModalTest, Mode
 
-# Numerical: the trapezoidal rule of a bell in steps of h sd is off by 2 exp(-2 pi^2/h^2), 9e-4; a
-# draw is spread over its step, which adds h^2/12 to the variance, 1 %.
-_STEP_IN_SD, _STEP_IN_SD_TO_DRAW = 1.6, 0.4
-
 # Numerical: log likelihoods within 0.06 of those by 25 nodes where data miss by their own standard
 # deviation; where they miss by more tau takes it up. Cost is in proportion.
 _PHI_NODES = 3
-_BLOCK = 400
-"""Misfits taken together, so that intermediate results stay in the processor's cache."""
 
 _UNFELT = 0.1
 """Of the least standard deviation of a datum: loads and tau below that change nothing."""
 
 
-class FieldLikelihood:
+class FieldLikelihood(MeasuredFrequencies):
     """Measured frequencies, one mode in all tests of like conditions together; their likelihood.
 
     `frequency_hz` (data,) are weighted means over tests; `identification_error` (data,) their
@@ -65,12 +60,19 @@ class FieldLikelihood:
     Raises BadInput where the tests hold no mode.
     """
 
+    # Numerical: the trapezoidal rule of a bell in steps of h sd is off by 2 exp(-2 pi^2/h^2), 9e-4;
+    # a draw is spread over its step, which adds h^2/12 to the variance, 1 %.
+    steps = (1.6, 0.4)
+
     def __init__(
         self, tests: Sequence[ModalTest], model: Model, reading: tuple[float, float] | None = None
     ):
-        self.tests = tuple(tests)
+        super().__init__(tests)
         self._assumed = model.hanger.assumptions
-        self.modes = measured(tests)
+        self.sigma_range = (
+            self._assumed.model_error.lower,
+            self._assumed.largest_model_error.value,
+        )
         conditions = conditions_of(tests, model)
         keys = [(m.plane, m.order, c) for m, c in zip(self.modes, conditions, strict=True)]
         distinct = list(dict.fromkeys(keys))
@@ -91,25 +93,15 @@ class FieldLikelihood:
             total**-0.5, [tension_sd] * self.has_reading
         )
         self._phi, self._log_phi = _sd_factors(scatter, len(keys) - len(distinct), self._assumed)
-        jacobian = -float(value.sum()) - len(keys) / 2 * np.log(2 * np.pi)
+        jacobian = -float(value.sum()) - (len(keys) - len(distinct)) / 2 * np.log(2 * np.pi)
         of_means = np.log(total**-0.5).sum() - np.log(sd).sum()
         self._constant = jacobian + float(of_means)
         if reading is not None:
-            self._constant -= np.log(tension) + 0.5 * np.log(2 * np.pi)
+            self._constant -= np.log(tension)
         self.shapes = MeasuredShapes(tests if model.has_shapes else (), model.hanger)
         self._shapes_factor = SHAPES.loose
         self._together = self._goes_together()
-        self._ways: dict[float, tuple[FloatArray, FloatArray]] = {}
         self._shift, self._loads = self._systematic(model, self._typical(model))
-
-    @property
-    def _tau_range(self) -> tuple[float, float]:
-        return self._assumed.model_error.lower, self._assumed.largest_model_error.value
-
-    @property
-    def highest_order(self) -> int:
-        """The highest order of a measured mode, which a model has to reach in each plane."""
-        return int(self._order.max()) + 1
 
     def predict(self, model: Model, theta: FloatArray) -> FloatArray:
         """The model's frequency for each datum (n, frequencies), in Hz, its ends as they usually
@@ -135,10 +127,9 @@ class FieldLikelihood:
         return np.moveaxis(change, 0, -1)
 
     def settle(self, model: Model, theta: FloatArray) -> None:
-        """Takes what is systematic from `theta` (parameters,): one covariance judges all draws."""
+        super().settle(model, theta)
         self._shift, self._loads = self._systematic(model, theta)
         self._shapes_factor = self.shapes.factor(self.shapes.misfits(model, theta[None]))
-        self._ways.clear()
 
     def _typical(self, model: Model) -> FloatArray:
         """Parameters (parameters,) in the middle of the prior, the tension as of a string."""
@@ -186,17 +177,6 @@ class FieldLikelihood:
         own[: self.frequencies] = np.sqrt(own[: self.frequencies] ** 2 + shared)
         return np.append(own, np.full(self.shapes.size, self._shapes_factor))
 
-    def whitening(self, sigma: float) -> FloatArray:
-        """Return the matrix (data, data) that makes misfits independent with standard deviations
-        of 1, for a model error of `sigma`.
-        """
-        covariance = np.diag(self.identification_error**2)
-        shared = self._loads @ self._loads.T
-        covariance[: self.frequencies, : self.frequencies] += sigma**2 * self._together + shared
-        own = np.linalg.inv(np.linalg.cholesky(covariance))
-        of_shapes = np.eye(self.shapes.size) / self._shapes_factor
-        return np.asarray(scipy.linalg.block_diag(own, of_shapes))
-
     def misfit(self, predicted: FloatArray) -> FloatArray:
         """Misfits (n, data): logarithms of predictions, with mean errors of the bar, over
         measurements, and those of shapes as they are.
@@ -205,38 +185,28 @@ class FieldLikelihood:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.hstack([np.log(scalars / self.frequency_hz) + self._shift, shapes])
 
-    def marginal(self, predicted: FloatArray) -> FloatArray:
-        """Log likelihood (n,) of predictions (n, data), tau and phi integrated out."""
-        _, log_share = self._grid(_STEP_IN_SD)
-        joint = self._nodes(predicted, _STEP_IN_SD) + log_share
-        return _log_sum(joint.reshape(len(predicted), -1))
-
-    def joint(self, predicted: FloatArray, sigma: FloatArray) -> FloatArray:
-        """Log likelihood (n,) of predictions (n, data), each with its tau (n,), to a node's."""
-        tau, _ = self._grid(_STEP_IN_SD_TO_DRAW)
-        found = _log_sum(self._nodes(predicted, _STEP_IN_SD_TO_DRAW), axis=2)
-        at = np.log(sigma.clip(tau[0], tau[-1]) / tau[0]) / np.log(tau[1] / tau[0])
-        return np.asarray(found[np.arange(len(found)), np.round(at).astype(int)])
-
-    def draw_sigma(self, predicted: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """tau (n,) from its posterior given each prediction (n, data)."""
-        tau, log_share = self._grid(_STEP_IN_SD_TO_DRAW)
-        joint = _log_sum(self._nodes(predicted, _STEP_IN_SD_TO_DRAW), axis=2) + log_share[:, 0]
-        share = np.exp(joint - scipy.special.logsumexp(joint, axis=1, keepdims=True)).cumsum(axis=1)
-        node = (share < rng.random((len(joint), 1))).sum(axis=1).clip(0, len(tau) - 1)
-        jitter = np.log(tau[1] / tau[0]) * (rng.random(len(node)) - 0.5)
-        return np.asarray((tau[node] * np.exp(jitter)).clip(*self._tau_range))
-
-    def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
-        """The node of the grid with the largest joint likelihood, shape (n,)."""
-        found = _log_sum(self._nodes(predicted, _STEP_IN_SD), axis=2)
-        return np.asarray(self._grid(_STEP_IN_SD)[0][found.argmax(axis=1)])
-
-    def model_error(self, predicted: FloatArray) -> FloatArray:
-        """The misfit's mean square beyond the identification's own, as a tau (n,)."""
-        beyond = self.misfit(predicted) ** 2 - self.fit_error**2
-        beyond = beyond[:, : self.frequencies]
-        return np.asarray(np.sqrt(beyond.mean(axis=1).clip(self._assumed.model_error.lower**2)))
+    def nodes(self, step_in_sd: float) -> list[NoiseNode]:
+        part = slice(self.frequencies)
+        own, together, always = np.zeros((3, len(self.frequency_hz), len(self.frequency_hz)))
+        own[part, part] = np.diag(self.identification_error[part] ** 2)
+        together[part, part] = self._together
+        always[part, part] = self._loads @ self._loads.T
+        if self.has_reading:
+            always[-1, -1] = self.identification_error[-1] ** 2
+        return [
+            NoiseNode(
+                Covariance(
+                    phi**2 * own + tau**2 * together + always,
+                    np.full(self.shapes.size, of_shapes**2),
+                    np.empty((self.shapes.size, 0)),
+                ),
+                float(self._constant + share + log_phi + log_of_shapes),
+                float(tau),
+            )
+            for tau, share in zip(*self.sigma_grid(step_in_sd), strict=True)
+            for phi, log_phi in zip(self._phi, self._log_phi, strict=True)
+            for of_shapes, log_of_shapes in self.shapes.factors
+        ]
 
     def explained(self, predicted: FloatArray) -> FloatArray:
         """Predictions (n, frequencies) from those of the data (n, data), with the sensors,
@@ -256,45 +226,6 @@ class FieldLikelihood:
         """Predictions (n, modes) of every mode of every test, `explained`."""
         return self.explained(predicted)[:, self.of_mode]
 
-    def _nodes(self, predicted: FloatArray, step_in_sd: float) -> FloatArray:
-        """Log likelihood and log weight of phi (n, nodes of tau, nodes of phi)."""
-        own = self.identification_error[: self.frequencies]
-        ways, size = self._directions(step_in_sd)
-        variance = size[:, None] + (self._phi**2)[:, None]
-        constant = self._log_phi - 0.5 * np.log(variance).sum(axis=2) - np.log(own).sum()
-        rest = self.misfit(predicted)[:, : self.frequencies] / own
-        precision = np.swapaxes(1 / variance, 1, 2)
-        found = np.empty((len(rest), *constant.shape))
-        for first in range(0, len(rest), _BLOCK):
-            block = slice(first, first + _BLOCK)
-            # (nodes, block, F) by (nodes, F, phi)
-            along = (rest[block] @ ways) ** 2
-            found[block] = np.moveaxis(-0.5 * along @ precision, 0, 1)
-        others = self._of_reading(predicted)
-        if self.shapes.size:
-            others = others + self.shapes.marginal(predicted[:, len(self.frequency_hz) :])
-        return np.asarray(found + constant + self._constant + others[:, None, None])
-
-    def _directions(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
-        """Eigenvectors (nodes, F, F) and eigenvalues (nodes, F) of all errors but phi's, in those:
-        for each node of tau.
-        """
-        if step_in_sd not in self._ways:
-            own = self.identification_error[: self.frequencies]
-            scale = np.multiply.outer(own, own)
-            tau, _ = self._grid(step_in_sd)
-            shared = self._loads @ self._loads.T / scale
-            size, ways = np.linalg.eigh(tau[:, None, None] ** 2 * (self._together / scale) + shared)
-            self._ways[step_in_sd] = ways, size.clip(0)
-        return self._ways[step_in_sd]
-
-    def _of_reading(self, predicted: FloatArray) -> FloatArray:
-        if not self.has_reading:
-            return np.zeros(len(predicted))
-        variance = self.identification_error[-1] ** 2
-        off = self.misfit(predicted)[:, self.frequencies]
-        return np.asarray(-0.5 * (off**2 / variance + np.log(variance)))
-
     def _goes_together(self) -> FloatArray:
         """Correlation (F, F) of the errors that repeat."""
         log = np.log(self._order + 1.0)
@@ -305,8 +236,7 @@ class FieldLikelihood:
         together = self._assumed.model_error_shared.value
         return np.asarray((1 - together) * own + together * shared)
 
-    def _grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
-        """Nodes (k,) of tau, and the log of each one's share of the prior (k, 1)."""
+    def sigma_grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
         step = step_in_sd / np.sqrt(2 * self.frequencies)
         least = 2 * _UNFELT * float(self.identification_error[: self.frequencies].min())
         smallest, usual = np.log(self._assumed.model_error.bounds)
@@ -322,7 +252,7 @@ class FieldLikelihood:
         share = density * (nodes[1] - nodes[0])
         # The first stands for all that is too small to be felt.
         share[0] = share[0] / 2 + likely * (lowest - smallest) / (usual - smallest)
-        return np.exp(nodes), np.log(share / share.sum())[:, None]
+        return np.exp(nodes), np.log(share / share.sum())
 
 
 def _values(
@@ -361,11 +291,3 @@ def _sd_factors(
     middle = (np.arange(_PHI_NODES) + 0.5) / _PHI_NODES
     nodes = np.interp(middle, share, grid)
     return np.exp(nodes), np.full(_PHI_NODES, total - np.log(_PHI_NODES))
-
-
-def _log_sum(values: FloatArray, axis: int = 1) -> FloatArray:
-    highest = values.max(axis=axis, keepdims=True)
-    highest = np.where(np.isfinite(highest), highest, 0.0)
-    total = np.exp(values - highest).sum(axis=axis)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.squeeze(highest, axis) + np.log(total))

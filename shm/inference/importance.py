@@ -12,22 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from shm.inference.mixture import Pool, effective, normalised, systematic, tempered
-from shm.inference.problem import Points, Problem
+from shm.inference.mixture import Pool, effective, evidence_error, normalised, systematic, tempered
+from shm.inference.posterior import Density
 from shm.inference.valley import Draws, Proposal
 from shm.values import FloatArray
 
-# The standard error of a log evidence: a Bayes factor good to 6 %, of which 3 would be a hint. It
-# is aimed below that, since the effective fraction is only known afterwards, and where an
-# evaluation costs little.
+# The standard error of a log evidence: a Bayes factor good to 6 %, of which 3 would be a hint.
 _ENOUGH_ERROR = 0.06
-_AIMED_ERROR, _AIMED_CHEAPLY = 0.05, 0.025
-_UNSEEN = 1.25  # judgement; the benchmark asks that 90 % of errors stay within twice the claim
 
 # Numerical: the cost of a batch, and of all.
 _TRIAL, _MOST_TRIALS = 400, 8
-_FEWEST, _MOST, _HOPELESS = 1000, 8000, 0.03
-_EXTENSION, _MOST_EXTENSIONS = 2000, 3
+_FIRST, _FEWEST, _HOPELESS = 2.0, 200, 0.03
+_MOST_EXTENSIONS, _LONGEST, _MOST = 3, 3.0, 10_000
 
 _FEWEST_TO_FIT = 10  # effective draws a parameter: fewer make a covariance nearly singular
 _BATCHES = 4  # Gelman and Rubin's few chains: a quarter of the draws each
@@ -48,12 +44,8 @@ class Weighted:
 
     @property
     def log_evidence_sd(self) -> float:
-        """Standard error of `log_evidence`, by the delta method.
-
-        Somewhat widened: draws seldom hold their share of the largest weights.
-        """
-        square_mean = np.sum(np.exp(2 * (self.log_weights - self.log_evidence))) / self.draws
-        return float(_UNSEEN * np.sqrt((square_mean - 1) / self.draws))
+        """Standard error of `log_evidence`."""
+        return evidence_error(self.log_weights, self.draws)
 
     @property
     def effective_sample_size(self) -> float:
@@ -87,59 +79,46 @@ class Weighted:
         return np.asarray(self.points.z[np.argsort(-lots)[:n]])
 
 
-@dataclass(frozen=True, eq=False)
-class Inferred:
-    """Equal draws of the posterior `points` with its evidence, and how they were made."""
-
-    points: Points
-    log_evidence: float
-    log_evidence_sd: float
-    effective_sample_size: float
-    r_hat: float
-    method: str
-
-
-def weigh(problem: Problem, first: Proposal, enough: float, rng: np.random.Generator) -> Weighted:
+def weigh(density: Density, first: Proposal, enough: float, rng: np.random.Generator) -> Weighted:
     """Draw until `enough` draws are effective and the evidence's standard error is 0.06.
 
     Where next to none is effective, the trials are returned: another start is needed.
     """
     proposal, trial = first, _pool()
-    fewest = _FEWEST_TO_FIT * problem.dimension
+    fewest = _FEWEST_TO_FIT * density.dimension
     for _ in range(_MOST_TRIALS):
-        _draw(problem, trial, proposal, _TRIAL, rng)
+        _draw(density, trial, proposal, _TRIAL, rng)
         weights = tempered(trial.log_weights, min(fewest, len(trial.batch.z) / 2))
         proposal = proposal.refitted(trial.batch, weights)
         if trial.effective >= min(enough, fewest):
             break
-    fraction = trial.effective / trial.draws
-    if fraction < _HOPELESS:
+    if trial.effective < _HOPELESS * trial.draws:
         return Weighted(trial.batch, trial.log_weights, trial.draws)
-    final = _final(problem, proposal, fraction, enough, rng)
+    final = _final(density, proposal, enough, rng)
     return Weighted(final.batch, final.log_weights, final.draws)
 
 
 def _final(
-    problem: Problem,
+    density: Density,
     proposal: Proposal,
-    fraction: float,
     enough: float,
     rng: np.random.Generator,
 ) -> Pool[Proposal, Draws]:
-    """Return draws from one proposal, of which a `fraction` is expected to be effective.
+    """Return draws from one proposal, `enough` of them effective.
 
-    Their number is set beforehand: to stop as soon as the weights look even would prefer samples
-    that have missed a large one.
+    A first batch tells how many more are needed. To stop as soon as the weights look even would
+    prefer samples that have missed a large one.
     """
     final = _pool()
-    aimed = _AIMED_ERROR if problem.is_costly else _AIMED_CHEAPLY
-    needed = max(enough, 1 / aimed**2) / fraction
-    _draw(problem, final, proposal, int(np.clip(needed, _FEWEST, _MOST)), rng)
+    _draw(density, final, proposal, int(_FIRST * enough), rng)
     for _ in range(_MOST_EXTENSIONS):
         error = Weighted(final.batch, final.log_weights, final.draws).log_evidence_sd
-        if final.effective >= enough and error <= _ENOUGH_ERROR:
+        short = max(enough / final.effective, (error / _ENOUGH_ERROR) ** 2)
+        if short <= 1 or final.draws >= _MOST:
             break
-        _draw(problem, final, proposal, _EXTENSION, rng)
+        more = int(np.clip((short - 1) * final.draws, _FEWEST, _LONGEST * final.draws))
+        more = min(more, _MOST - final.draws)
+        _draw(density, final, proposal, more, rng)
     return final
 
 
@@ -148,12 +127,12 @@ def _pool() -> Pool[Proposal, Draws]:
 
 
 def _draw(
-    problem: Problem,
+    density: Density,
     pool: Pool[Proposal, Draws],
     proposal: Proposal,
     n: int,
     rng: np.random.Generator,
 ) -> None:
     """Add a batch of `n` draws to the pool."""
-    draws = proposal.draw(problem, n, rng)
-    pool.add(proposal, n, draws, problem.log_posterior(draws))
+    draws = proposal.draw(density, n, rng)
+    pool.add(proposal, n, draws, density.log_posterior(draws))

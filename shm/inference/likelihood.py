@@ -1,168 +1,254 @@
-"""The likelihood of modal tests: f_hat ~ N(f(theta), (sigma f_hat)^2 + sd^2), thesis (4.5).
+"""How likely residuals are when the size of the errors is one of several possibilities.
 
-sigma is the unknown fractional model error, uniform on [0, 1]; sd is the standard deviation of the
-identification where it is known.
-
-sigma is integrated out on a grid that is even in log sigma. The integrand is a bell there, of
-standard deviation 1/sqrt(2 N) for N data: to the sampler the model error costs no dimension.
+The frequencies' covariances fall apart into blocks (as a rule one mode in all tests), which are
+factored once each. What sensors do to all shapes alike is of low rank and follows by Woodbury's
+identity. Possibilities that share a covariance share the work.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
-from shm.errors import BadInput
-from shm.models import Model
-from shm.models.base import Conditions
-from shm.values import PLANES, FloatArray, IntArray, ModalTest, Mode
+from shm.values import FloatArray, IntArray
 
-# Numerical: the trapezoidal rule of a bell in steps of h sd is off by 2 exp(-2 pi^2/h^2), 2e-6; a
-# draw is spread over its step, which adds h^2/12 to the variance, 0.3 %.
-_STEP_IN_SD = 1.2
-_STEP_IN_SD_TO_DRAW = 0.2
 
-# Assumed (judgement): below that a logger's clock, a tenth of a kelvin and the hammer's level move
-# a frequency more than any model of a hanger can follow.
-_SMALLEST_SIGMA = 1e-4
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """Of the data about a prediction: `frequency` (F, F), and of the components of shapes.
+
+    Those err independently with the variances `shape` (S,), and together by k errors: of sensors,
+    which repeat in every mode and test, and of the directions of modes. `shape_loads` (S, k) is
+    what one standard deviation of each does. So the covariance of shapes is
+    diag(shape) + shape_loads shape_loads'.
+    """
+
+    frequency: FloatArray
+    shape: FloatArray
+    shape_loads: FloatArray
+
+    @classmethod
+    def of_frequencies(cls, frequency: FloatArray) -> Covariance:
+        """Return that of data without shapes."""
+        return cls(frequency, np.empty(0), np.empty((0, 0)))
+
+    def part(self, frequencies: IntArray, components: IntArray) -> Covariance:
+        """Return that of some frequencies and some components of shapes, by index."""
+        own = self.frequency[np.ix_(frequencies, frequencies)]
+        return Covariance(own, self.shape[components], self.shape_loads[components])
+
+    def scaled(self, by: float) -> Covariance:
+        """Return that of errors so many times as large."""
+        return Covariance(by**2 * self.frequency, by**2 * self.shape, by * self.shape_loads)
+
+    @property
+    def whitening(self) -> FloatArray:
+        """Return the matrix (data, data) that makes residuals independent, of variance 1."""
+        return np.asarray(np.linalg.inv(self.factor), dtype=np.float64)
+
+    @property
+    def factor(self) -> FloatArray:
+        """Return the Cholesky factor (data, data)."""
+        shapes = np.diag(self.shape) + self.shape_loads @ self.shape_loads.T
+        own = np.linalg.cholesky(self.frequency)
+        return np.asarray(scipy.linalg.block_diag(own, np.linalg.cholesky(shapes)))
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseNode:
+    """One possibility of the unknown errors: its covariance and the log of its prior weight.
+
+    The weights of all nodes of a hypothesis add to 1. `model_error` is the fraction it stands for.
+    """
+
+    covariance: Covariance
+    log_weight: float
+    model_error: float
+
+
+class _Blocks:
+    """All blocks of one length: `rows` (blocks, length) of covariances (nodes, F, F)."""
+
+    def __init__(self, rows: IntArray, covariances: FloatArray):
+        self._rows = rows
+        own = covariances[:, rows[:, :, None], rows[:, None, :]]
+        factors = np.linalg.cholesky(own)
+        self.log_volume = np.log(np.einsum("kbii->kbi", factors)).sum(axis=(1, 2))
+        self._whitening: FloatArray = np.linalg.inv(factors)
+
+    def squares(self, residual: FloatArray) -> FloatArray:
+        """Return squares (n, nodes) of residuals (n, F) of these blocks, whitened."""
+        if self._rows.shape[1] == 1:
+            return np.asarray(
+                residual[:, self._rows[:, 0]] ** 2 @ self._whitening[:, :, 0, 0].T ** 2
+            )
+        white = self._whitening @ residual.T[self._rows]
+        return np.asarray(np.einsum("kbln,kbln->nk", white, white))
+
+    def whitened(self, residual: FloatArray) -> FloatArray:
+        """Residuals (n, F) of these blocks, uncorrelated: (nodes, blocks, length, n)."""
+        return np.asarray(self._whitening @ residual.T[self._rows])
+
+    def add_weighed(self, columns: FloatArray, total: FloatArray) -> None:
+        """Adds C^-1 X of columns X (data, c) to `total` (nodes, F, c)."""
+        white = self._whitening @ columns[self._rows]
+        total[:, self._rows] += np.swapaxes(self._whitening, 2, 3) @ white
+
+
+class ShapeErrors:
+    """Covariances diag(v) + U U' of shapes, K of them, with variances v (S,) and loads U (S, k).
+
+    By Woodbury's identity the inverse is diag(1/v) - T'T with T (k, S) = chol(1 + U'U/v)^-1 U'/v;
+    `log_volume` (K,) is half the log determinant.
+    """
+
+    def __init__(self, covariances: Sequence[Covariance]):
+        variance = np.array([each.shape for each in covariances])
+        loads = np.array([each.shape_loads for each in covariances])
+        self.precision: FloatArray = 1 / variance
+        weighted = np.swapaxes(loads * self.precision[:, :, None], 1, 2)
+        inner = np.linalg.cholesky(np.eye(loads.shape[2]) + weighted @ loads)
+        self._shared: FloatArray = np.linalg.solve(inner, weighted).astype(np.float64)
+        own = np.log(np.einsum("kii->ki", inner)).sum(axis=1)
+        self.log_volume: FloatArray = own + np.log(variance).sum(axis=1) / 2
+
+    def weighed(self, columns: FloatArray) -> FloatArray:
+        """C^-1 X (K, S, c) of columns X (S, c)."""
+        shared = np.swapaxes(self._shared, 1, 2) @ (self._shared @ columns)
+        return np.asarray(self.precision[:, :, None] * columns - shared)
+
+    def squares(self, residual: FloatArray) -> FloatArray:
+        """r' C^-1 r (n, K) of residuals (n, S)."""
+        shared = self._shared @ residual.T
+        return np.asarray(residual**2 @ self.precision.T - np.einsum("kjn,kjn->nk", shared, shared))
+
+    def gram(self, columns: FloatArray) -> FloatArray:
+        """X' C^-1 X (n, K, c, c) of columns X (n, S, c)."""
+        weighted = columns[:, None] * self.precision[:, :, None]
+        shared = self._shared @ columns[:, None]
+        own = np.swapaxes(weighted, 2, 3) @ columns[:, None]
+        return np.asarray(own - np.swapaxes(shared, 2, 3) @ shared)
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """C^-1 X of columns X, by distinct covariance: (distinct, F, c) and (distinct, S, c)."""
+
+    frequency: FloatArray
+    shape: FloatArray
+    frequency_of: IntArray
+    shape_of: IntArray
+
+    def products(self, residual: FloatArray) -> FloatArray:
+        """R C^-1 X (nodes, n, c) of residuals R (n, data)."""
+        split = self.frequency.shape[1]
+        frequency = residual[:, :split] @ self.frequency
+        shape = residual[:, split:] @ self.shape
+        return np.asarray(frequency[self.frequency_of] + shape[self.shape_of])
 
 
 class Likelihood:
-    """Measured frequencies (measurements,) and the likelihood of predictions of them.
+    """The normal likelihood of residuals (n, data), with the nodes integrated out.
 
-    Raises BadInput where the tests hold no mode.
+    `log_height` (nodes,) is the log likelihood and log weight of each node at no residual.
     """
 
-    def __init__(self, tests: Sequence[ModalTest]):
-        self.modes = modes = measured(tests)
-        self.tests = tuple(tests)
-        self.frequency_hz: FloatArray = np.array([mode.frequency_hz for mode in modes])
-        sd_hz: FloatArray = np.array([mode.frequency_sd_hz for mode in modes])
-        self.identification_error: FloatArray = np.nan_to_num(sd_hz, nan=0.0) / self.frequency_hz
-        self._plane = np.array([PLANES.index(mode.plane) for mode in modes])
-        self._order = np.array([mode.order - 1 for mode in modes])
-        self._constant = -np.log(self.frequency_hz).sum() - len(modes) / 2 * np.log(2 * np.pi)
-        self._log_sigma, self._log_share = self._grid(_STEP_IN_SD)
+    def __init__(self, nodes: Sequence[NoiseNode]):
+        self.nodes = tuple(nodes)
+        self.log_weight = np.array([node.log_weight for node in nodes])
+        covariances = [node.covariance for node in nodes]
+        unique, self._frequency_of = _distinct([(each.frequency,) for each in covariances])
+        shapes, self._shape_of = _distinct([(c.shape, c.shape_loads) for c in covariances])
+        self._covariances: FloatArray = np.array([covariances[k].frequency for k in unique])
+        self._shape = ShapeErrors([covariances[k] for k in shapes])
+        self.frequencies = self._covariances.shape[1]
+        self._blocks = [_Blocks(rows, self._covariances) for rows in _rows(self._covariances)]
+        volume = np.sum([each.log_volume for each in self._blocks], axis=0)[self._frequency_of]
+        volume = volume + self._shape.log_volume[self._shape_of]
+        data = self.frequencies + self._shape.precision.shape[1]
+        self.log_height: FloatArray = self.log_weight - volume - data * np.log(2 * np.pi) / 2
 
-    @property
-    def highest_order(self) -> int:
-        """The highest order of a measured mode, which a model has to reach in each plane."""
-        return int(self._order.max()) + 1
+    @classmethod
+    def of(cls, errors: Covariance, model_error: float) -> Likelihood:
+        """That of errors of known size."""
+        return cls([NoiseNode(errors, 0.0, model_error)])
 
-    def predict(self, model: Model, theta: FloatArray) -> FloatArray:
-        """The model's frequency for each measurement, shape (n, measurements).
+    def by_node(self, residual: FloatArray) -> FloatArray:
+        """Log likelihood and log weight of each node, (n, nodes); -inf where it is not finite."""
+        finite = np.asarray(np.isfinite(residual).all(axis=1))
+        squares = self.squares(np.where(finite[:, None], residual, 0.0))
+        return np.where(finite[:, None], self.log_height - squares / 2, -np.inf)
 
-        Tests that the model sees under equal conditions are one evaluation.
+    def log(self, residual: FloatArray) -> FloatArray:
+        """Log likelihood (n,)."""
+        return np.asarray(scipy.special.logsumexp(self.by_node(residual), axis=1))
+
+    def gram(self, columns: FloatArray) -> FloatArray:
+        """X' C^-1 X (n, nodes, c, c) of columns X (n, data, c)."""
+        frequency = self._frequency_gram(columns[:, : self.frequencies])[:, self._frequency_of]
+        shape = self._shape.gram(columns[:, self.frequencies :])[:, self._shape_of]
+        return np.asarray(frequency + shape)
+
+    def linear(
+        self, slopes: FloatArray, residual: FloatArray, z: FloatArray
+    ) -> tuple[FloatArray, FloatArray, float, float]:
+        """About a point z (d,) with its residual (data,), of errors of known size.
+
+        The curvature (d, d), the best step (d,), the square of the residual and what of it the
+        parameters, with standard normal priors, follow in that step.
         """
-        return predicted_hz(
-            model, theta, conditions_of(self.tests, model), self._plane, self._order
-        )
+        gram = self.gram(np.column_stack([slopes, residual])[None])[0, 0]
+        inner, pull = gram[:-1, :-1] + np.eye(len(z)), gram[:-1, -1] - z
+        step = np.linalg.solve(inner, pull)
+        return inner, step, float(gram[-1, -1]), float(pull @ step)
 
-    @property
-    def fit_error(self) -> FloatArray:
-        """Fractional standard deviations (measurements,) of all errors but sigma."""
-        return self.identification_error
+    def weighed(self, columns: FloatArray) -> Weighed:
+        """C^-1 X of columns X (data, c), to take products with many residuals."""
+        frequency = np.zeros((len(self._covariances), self.frequencies, columns.shape[1]))
+        for block in self._blocks:
+            block.add_weighed(columns, frequency)
+        shape = self._shape.weighed(columns[self.frequencies :])
+        return Weighed(frequency, shape, self._frequency_of, self._shape_of)
 
-    def explained(self, predicted: FloatArray) -> FloatArray:
-        """Predictions (n, data) as they are: no error is shared."""
-        return predicted
+    def squares(self, residual: FloatArray) -> FloatArray:
+        """Squared whitened residuals (n, nodes)."""
+        frequency = np.zeros((len(residual), len(self._covariances)))
+        for block in self._blocks:
+            frequency += block.squares(residual[:, : self.frequencies])
+        shape = self._shape.squares(residual[:, self.frequencies :])
+        return np.asarray(frequency[:, self._frequency_of] + shape[:, self._shape_of])
 
-    def by_mode(self, predicted: FloatArray) -> FloatArray:
-        """Predictions (n, modes) of every mode of every test: each is a datum of its own."""
-        return self.explained(predicted)
-
-    def whitening(self, sigma: float) -> FloatArray:
-        """Return the matrix (measurements, measurements) that makes misfits independent with
-        standard deviations of 1, for a model error of `sigma`.
-        """
-        return np.diag(1 / np.hypot(sigma, self.identification_error))
-
-    def misfit(self, predicted: FloatArray) -> FloatArray:
-        """Fractional differences (n, measurements) of predictions from the measurements."""
-        return predicted / self.frequency_hz - 1
-
-    def marginal(self, predicted: FloatArray) -> FloatArray:
-        """Log likelihood (n,) of predictions (n, measurements), sigma integrated out."""
-        joint = self._joint(predicted, np.exp(self._log_sigma)) + self._log_share
-        highest = joint.max(axis=1)
-        return np.asarray(highest + np.log(np.exp(joint - highest[:, None]).sum(axis=1)))
-
-    def joint(self, predicted: FloatArray, sigma: FloatArray) -> FloatArray:
-        """Log likelihood (n,) of predictions (n, measurements), each with its sigma (n,)."""
-        variance = sigma[:, None] ** 2 + self.identification_error**2
-        terms = self.misfit(predicted) ** 2 / variance + np.log(variance)
-        return np.asarray(self._constant - 0.5 * terms.sum(axis=1))
-
-    def draw_sigma(self, predicted: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """sigma (n,) from its posterior given each prediction (n, measurements)."""
-        log_sigma, log_share = self._grid(_STEP_IN_SD_TO_DRAW)
-        joint = self._joint(predicted, np.exp(log_sigma)) + log_share
-        total = scipy.special.logsumexp(joint, axis=1, keepdims=True)
-        shares = np.exp(joint - total).cumsum(axis=1)
-        node = (shares < rng.random((len(joint), 1))).sum(axis=1).clip(0, len(log_sigma) - 1)
-        jitter = (log_sigma[1] - log_sigma[0]) * (rng.random(len(node)) - 0.5)
-        return np.asarray(np.exp((log_sigma[node] + jitter).clip(None, 0.0)))
-
-    def likeliest_sigma(self, predicted: FloatArray) -> FloatArray:
-        """The node of the grid with the largest joint likelihood, shape (n,)."""
-        sigma = np.exp(self._log_sigma)
-        return np.asarray(sigma[self._joint(predicted, sigma).argmax(axis=1)])
-
-    def model_error(self, predicted: FloatArray) -> FloatArray:
-        """The misfit's mean square beyond the identification's own, as a sigma (n,)."""
-        beyond = self.misfit(predicted) ** 2 - self.identification_error**2
-        return np.asarray(np.sqrt(beyond.mean(axis=1).clip(_SMALLEST_SIGMA**2)))
-
-    def _joint(self, predicted: FloatArray, sigma: FloatArray) -> FloatArray:
-        """Log likelihood (n, nodes) for all nodes of `sigma` (nodes,)."""
-        variance = sigma**2 + self.identification_error[:, None] ** 2
-        quadratic = self.misfit(predicted) ** 2 @ (1 / variance)
-        constant = self._constant - 0.5 * np.log(variance).sum(axis=0)
-        return np.asarray(constant - 0.5 * quadratic)
-
-    def _grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
-        """Nodes of log sigma, and the log of each one's share of the uniform prior."""
-        lowest = np.log(_SMALLEST_SIGMA)
-        step = step_in_sd / np.sqrt(2 * len(self.modes))
-        nodes, spacing = np.linspace(lowest, 0.0, int(-lowest / step) + 2, retstep=True)
-        share = np.log(spacing) + nodes
-        share[[0, -1]] -= np.log(2)
-        share[0] = np.logaddexp(share[0], lowest)
-        return nodes, share
+    def _frequency_gram(self, columns: FloatArray) -> FloatArray:
+        """(n, distinct covariances, c, c) of columns (n, F, c)."""
+        n, _, width = columns.shape
+        flat = np.swapaxes(columns, 1, 2).reshape(n * width, self.frequencies)
+        total = np.zeros((len(self._covariances), n, width, width))
+        for block in self._blocks:
+            white = block.whitened(flat).reshape(len(total), -1, n, width)
+            white = white.transpose(0, 2, 3, 1)
+            total += white @ np.swapaxes(white, 2, 3)
+        return np.swapaxes(total, 0, 1)
 
 
-def measured(tests: Sequence[ModalTest]) -> list[Mode]:
-    """The modes that count; raises BadInput where there are none."""
-    modes = [mode for test in tests for mode in test.regular_modes]
-    if not modes:
-        raise BadInput("no measured frequency to update with.", remedy="Give a test with modes.")
-    return modes
+def _rows(covariances: FloatArray) -> list[IntArray]:
+    """Rows of the blocks that no covariance connects, those of one length together."""
+    linked = scipy.sparse.csr_array((covariances != 0).any(axis=0))
+    count, label = scipy.sparse.csgraph.connected_components(linked, directed=False)
+    members = [np.flatnonzero(label == k) for k in range(count)]
+    lengths = sorted({len(rows) for rows in members})
+    return [np.array([m for m in members if len(m) == length]) for length in lengths]
 
 
-def conditions_of(tests: Sequence[ModalTest], model: Model) -> list[Conditions]:
-    """The conditions of each measured mode, as far as the model takes notice of them."""
-    return [each for test in tests for each in [model.conditions(test)] * len(test.regular_modes)]
-
-
-def predicted_hz(
-    model: Model,
-    theta: FloatArray,
-    conditions: Sequence[Conditions],
-    plane: IntArray,
-    order: IntArray,
-) -> FloatArray:
-    """The model's frequencies (n, data) of data each with its conditions, plane and order from 0.
-
-    Data under equal conditions are one evaluation.
-    """
-    rows: dict[Conditions, list[int]] = {}
-    for index, each in enumerate(conditions):
-        rows.setdefault(each, []).append(index)
-    # One measurement after the other, as indexing lays them: sums round alike, to the last bit.
-    predicted, highest = np.empty((len(plane), len(theta))).T, int(order.max()) + 1
-    for each, own in rows.items():
-        found = model.frequencies_at(theta, highest, each)
-        predicted[:, own] = found[:, plane[own], order[own]]
-    return predicted
+def _distinct(arrays: Sequence[tuple[FloatArray, ...]]) -> tuple[list[int], IntArray]:
+    """Indices of those that differ and, for each of all, which of them it is."""
+    found: dict[tuple[bytes, ...], int] = {}
+    kept: list[int] = []
+    index = np.empty(len(arrays), dtype=np.int64)
+    for k, each in enumerate(arrays):
+        index[k] = found.setdefault(tuple(part.tobytes() for part in each), len(found))
+        if index[k] == len(kept):
+            kept.append(k)
+    return kept, index

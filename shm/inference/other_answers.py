@@ -16,9 +16,9 @@ import scipy
 
 from shm.inference.described import DescribedCoordinates
 from shm.inference.options import silent
+from shm.inference.posterior import climb
 from shm.inference.priors import TensionReading
 from shm.inference.problem import Problem
-from shm.inference.search import descend
 from shm.values import NAN, FloatArray, ModalTest
 
 _AS_WELL = 1.0
@@ -58,11 +58,10 @@ def other_answers(problem: Problem, outcome: Outcome, tests: Sequence[ModalTest]
     if not coordinates.ends.felt:
         return off_sd
     fits = _fits(problem, z)
-    sigma = float(np.median(outcome.samples[:, -1]))
     return {
         **off_sd,
         "tension_of_other_orders_n": _tension_of_other_orders_n(
-            problem, z[fits.argmax()], sigma, float(fits.max()), outcome.samples[:, 0], tests
+            problem, z[fits.argmax()], float(fits.max()), outcome.samples[:, 0], tests
         ),
     }
 
@@ -71,7 +70,7 @@ def _fits(problem: Problem, z: FloatArray) -> FloatArray:
     """Return the log likelihood (n,) at `z` (n, d), less half of the square of what the description
     is asked to be off by: all scores but those of tension and ends.
     """
-    likelihood = problem.likelihood.marginal(problem.predict(z))
+    likelihood = problem.measured.marginal(problem.predict(z))
     asked = problem.coordinates.asked_of_description(z)  # type: ignore[union-attr]
     fits = likelihood - 0.5 * (asked**2).sum(axis=1)
     return np.asarray(np.nan_to_num(fits, nan=-np.inf))
@@ -93,7 +92,6 @@ def _description_off_sd(seen: FloatArray) -> float:
 def _tension_of_other_orders_n(
     problem: Problem,
     best: FloatArray,
-    sigma: float,
     fit: float,
     ratio: FloatArray,
     tests: Sequence[ModalTest],
@@ -118,7 +116,7 @@ def _tension_of_other_orders_n(
         start[0, 0] *= (middle / (middle + by)) ** 2
         starts = coordinates.places(start).repeat(len(_STARTS), axis=0)
         starts[:, coordinates.ends_at] = np.array(_STARTS)[:, None]  # type: ignore[union-attr]
-        ends, _ = descend(other, starts, np.full(len(starts), sigma), _STEPS)
+        ends, _ = climb(other, starts, steps=_STEPS)
         fits = _fits(other, ends)
         theta_f = float(coordinates.theta(ends[[fits.argmax()]])[0, 0])
         if fits.max() > fit - _AS_WELL and abs(math.log(theta_f)) < nearest:

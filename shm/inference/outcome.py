@@ -12,16 +12,15 @@ import scipy
 
 from shm.inference.described import DescribedCoordinates
 from shm.inference.field import FieldLikelihood
-from shm.inference.importance import Inferred
 from shm.inference.options import UpdateOptions
 from shm.inference.other_answers import Outcome, other_answers
-from shm.inference.problem import DIFFERENCE, Problem
-from shm.inference.search import descend
+from shm.inference.posterior import DIFFERENCE, climb
+from shm.inference.problem import Problem
+from shm.inference.sampling import Sampled
 from shm.inference.shares_of_variance import with_shares
 from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency
 
 SIGMA = "sigma"
-_LAST_STEPS = 15  # numerical: a climb from the best draw has converged
 
 # Forward difference: root of the 1e-12 to which frequencies are exact (docs/trials/validation.md).
 _FORWARD, _MOST_ROUNDS = 1e-6, 30
@@ -33,7 +32,7 @@ a posterior as flat as the prior puts there."""
 
 def posterior_of(
     problem: Problem,
-    inferred: Inferred,
+    inferred: Sampled,
     tests: Sequence[ModalTest],
     options: UpdateOptions,
     rng: np.random.Generator,
@@ -41,7 +40,7 @@ def posterior_of(
 ) -> Posterior:
     """Return the posterior that equal draws make; `started` is the clock's reading at the begin."""
     points = inferred.points
-    sigma = problem.likelihood.draw_sigma(points.predicted, rng)
+    sigma = problem.measured.draw_sigma(points.predicted, rng)
     theta = problem.coordinates.finished(points.z, rng)
     outcome = Outcome(
         np.column_stack([theta, sigma]),
@@ -66,7 +65,7 @@ def assembled(
 ) -> Posterior:
     """The posterior of equal draws."""
     model, samples = problem.model, outcome.samples
-    likelihood = problem.likelihood
+    likelihood = problem.measured
     log_likelihood = likelihood.joint(outcome.predicted, samples[:, -1])
     most_probable = _most_probable(problem, samples, log_likelihood)
     log_occam = outcome.log_evidence - float(likelihood.marginal(outcome.predicted).max())
@@ -109,9 +108,9 @@ def _most_probable(problem: Problem, samples: FloatArray, log_likelihood: FloatA
         return _highest_in_box(problem, samples[int(log_likelihood.argmax())])
     z = coordinates.places(samples[:, :-1])
     at = int((log_likelihood + coordinates.log_prior(coordinates.fold(z))).argmax())
-    z, _ = descend(problem, z[[at]], samples[[at], -1], _LAST_STEPS)
+    z, _ = climb(problem, z[[at]])
     theta = coordinates.theta(z)
-    return np.append(theta[0], problem.likelihood.likeliest_sigma(problem.run(theta)))
+    return np.append(theta[0], problem.measured.likeliest_sigma(problem.run(theta)))
 
 
 def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
@@ -121,7 +120,7 @@ def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
     tests, whatever the description, the model and what repeats are off by (Gauss and Markov's
     estimate with the prior as one more datum). NaN with the priors of the thesis.
     """
-    coordinates, likelihood = problem.coordinates, problem.likelihood
+    coordinates, likelihood = problem.coordinates, problem.measured
     if not isinstance(coordinates, DescribedCoordinates):
         return math.nan
     places = coordinates.places(outcome.samples[:, :-1])
@@ -156,8 +155,8 @@ def _at_bounds(problem: Problem, samples: FloatArray) -> tuple[str, ...]:
 
 def _misfit_percent(problem: Problem, predicted: FloatArray) -> float:
     """Root mean square of mean predictions over measured frequencies less 1, in per cent."""
-    found = problem.likelihood.explained(predicted).mean(axis=0)
-    off = found / problem.likelihood.frequency_hz[: len(found)] - 1
+    found = problem.measured.explained(predicted).mean(axis=0)
+    off = found / problem.measured.frequency_hz[: len(found)] - 1
     return float(100 * np.sqrt(np.mean(off**2)))
 
 
@@ -166,7 +165,7 @@ def _highest_in_box(problem: Problem, best: FloatArray) -> FloatArray:
 
     The priors are uniform, so that at given sigma the climb is a bounded least-squares fit.
     """
-    likelihood, prior = problem.likelihood, problem.prior
+    likelihood, prior = problem.measured, problem.prior
     width = prior.upper - prior.lower
     noise = np.hypot(best[-1], likelihood.identification_error)
 
@@ -207,7 +206,7 @@ def fitted(
 
 def _predicted(problem: Problem, predicted: FloatArray) -> tuple[PredictedFrequency, ...]:
     """Mean and standard deviation of each measured frequency's prediction, thesis (4.14)."""
-    likelihood = problem.likelihood
+    likelihood = problem.measured
     return tuple(
         PredictedFrequency(
             plane=mode.plane,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
@@ -12,28 +11,18 @@ from shm.inference.coordinates import Coordinates
 from shm.inference.described import DescribedCoordinates
 from shm.inference.field import FieldLikelihood
 from shm.inference.likelihood import Likelihood
-from shm.inference.mixture import Rows
+from shm.inference.measured import MeasuredFrequencies
 from shm.inference.options import Progress
+from shm.inference.posterior import DIFFERENCE, Density
 from shm.inference.priors import Calibration, reading_of
 from shm.inference.shapes import swaps_of
+from shm.inference.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, AsMade, Model
 from shm.models.as_made import TENSION
 from shm.values import FloatArray, ModalTest
 
-DIFFERENCE = 1e-4
-"""Forward difference in z, whose prior has a standard deviation of 1. It steers searches and
-proposals, which weights correct, and is as exact as a first-order repeatability needs."""
 
-
-@dataclass(frozen=True, eq=False)
-class Points(Rows):
-    """Points `z` (n, d) with their predictions `predicted` (n, measurements)."""
-
-    z: FloatArray
-    predicted: FloatArray
-
-
-class Problem:
+class Problem(Density):
     """The prior and the likelihood of one model class and one set of measurements.
 
     A class with the priors of a description has the noise of the field; one with those of the
@@ -43,20 +32,21 @@ class Problem:
     def __init__(
         self,
         model: Model,
-        likelihood: Likelihood | FieldLikelihood,
+        measured: MeasuredFrequencies,
         calibration: Calibration | None = None,
     ):
         self.model = model
-        self.likelihood, self.calibration = likelihood, calibration
+        self.measured, self.calibration = measured, calibration
+        self.value = np.zeros(len(measured.fit_error))
         self.evaluations = 0
         self._settled = False
-        middle = (1 + likelihood.highest_order) / 2
+        middle = (1 + measured.highest_order) / 2
         own = model.wave_stiffness_n_m_rad(middle)
         self.coordinates: Coordinates | DescribedCoordinates
         if isinstance(model, AsMade):
-            self.coordinates = DescribedCoordinates(model, likelihood.tests, own, calibration)
+            self.coordinates = DescribedCoordinates(model, measured.tests, own, calibration)
         else:
-            self.coordinates = Coordinates(model.prior, swaps_of(model, likelihood.tests), own)
+            self.coordinates = Coordinates(model.prior, swaps_of(model, measured.tests), own)
         self.prior = model.prior
         self.dimension = self.coordinates.dimension
 
@@ -76,7 +66,7 @@ class Problem:
             model.refuse(test)
         problem = cls(model, _likelihood(tests, model, calibration), calibration)
         label = f"{model.name}: reduced basis"
-        model.prepare(problem.likelihood.highest_order, lambda done: progress(label, done))
+        model.prepare(problem.measured.highest_order, lambda done: progress(label, done))
         return problem
 
     def predict(self, z: FloatArray) -> FloatArray:
@@ -86,8 +76,8 @@ class Problem:
     def run(self, theta: FloatArray) -> FloatArray:
         """Return predicted frequencies (n, measurements) of parameter sets (n, d)."""
         self.evaluations += len(theta)
-        found = self.likelihood.predict(self.model, theta)
-        if isinstance(self.likelihood, FieldLikelihood) and self.likelihood.has_reading:
+        found = self.measured.predict(self.model, theta)
+        if isinstance(self.measured, FieldLikelihood) and self.measured.has_reading:
             ratio = theta[:, self.model.parameter_names.index(TENSION)]
             tension_n = ratio * self.model.hanger.nominal_tension_n
             found = np.column_stack([found, tension_n])
@@ -95,65 +85,67 @@ class Problem:
 
     def _with_shapes(self, found: FloatArray, theta: FloatArray) -> FloatArray:
         """Return `found` (n, data) with the misfits of shapes behind."""
-        if not isinstance(self.likelihood, FieldLikelihood) or not self.likelihood.shapes.size:
+        if not isinstance(self.measured, FieldLikelihood) or not self.measured.shapes.size:
             return found
-        return np.hstack([found, self.likelihood.shapes.misfits(self.model, theta)])
+        return np.hstack([found, self.measured.shapes.misfits(self.model, theta)])
 
-    def evaluate(self, z: FloatArray) -> Points:
-        """Run the model at `z` (n, d)."""
-        return Points(z, self.predict(z))
+    @property
+    def likelihood(self) -> Likelihood:
+        """Return the likelihood of residuals, near the optimum once the noise has settled."""
+        return self.measured.likelihood
+
+    def residual_of(self, predicted: FloatArray) -> FloatArray:
+        """Return fractional misfits (n, data) of predictions with the other sign."""
+        return -self.measured.misfit(predicted)
+
+    def log_likelihood(self, predicted: FloatArray) -> FloatArray:
+        return self.measured.marginal(predicted)
 
     def settle(self, z: FloatArray) -> None:
         """Take the model's part of the noise's covariance from `z` (d,), the first time: near the
         optimum.
         """
-        if isinstance(self.likelihood, FieldLikelihood) and not self._settled:
-            self.likelihood.settle(self.model, self.coordinates.theta(z[None])[0])
+        if not self._settled:
+            self.measured.settle(self.model, self.coordinates.theta(z[None])[0])
         self._settled = True
 
-    def misfit(self, z: FloatArray) -> FloatArray:
-        """Return fractional misfits (n, measurements) at `z` (n, d); a large one where there is no
-        such mode.
-        """
-        return self.misfit_of(self.coordinates.theta(z))
-
     def misfit_of(self, theta: FloatArray) -> FloatArray:
-        """Return the same (n, measurements) of parameter sets (n, parameters)."""
-        found = self.likelihood.misfit(self.run(theta))
+        """Return fractional misfits (n, data) of parameter sets (n, parameters); a large one where
+        there is no such mode.
+        """
+        found = self.measured.misfit(self.run(theta))
         return np.nan_to_num(found, nan=_NO_MODE, posinf=_NO_MODE, neginf=-_NO_MODE)
 
+    def log_prior(self, z: FloatArray) -> FloatArray:
+        return self.coordinates.log_prior(z)
+
+    def fold(self, z: FloatArray) -> FloatArray:
+        return self.coordinates.fold(z)
+
+    def connect(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
+        return self.coordinates.connect(z, rng)
+
     def slopes(self, z: FloatArray, directions: FloatArray | None = None) -> FloatArray:
-        """Return derivatives (m, measurements, k) of the misfit at `z` (m, d).
-
-        They are along the columns of `directions` (d, k), or by all coordinates.
-        """
+        if not self._has_slopes:
+            return super().slopes(z, directions)
         steps = DIFFERENCE * (np.eye(z.shape[1]) if directions is None else directions.T)
-        if self._has_slopes:
-            return self._near(z, steps) / DIFFERENCE
-        shifted = np.vstack([z, *(z + step for step in steps)])
-        misfit = self.misfit(shifted).reshape(len(steps) + 1, len(z), -1)
-        return np.asarray(np.moveaxis(misfit[1:] - misfit[0], 0, -1) / DIFFERENCE)
-
-    @property
-    def is_costly(self) -> bool:
-        """Return True where an evaluation costs much more than the closed form of a beam."""
-        return self.model.expensive or (isinstance(self.model, AsMade) and self.model.has_terms)
+        return self._near(z, steps) / DIFFERENCE
 
     @property
     def _has_slopes(self) -> bool:
         """Return True where the class gives the frequencies of near parameter sets at once."""
-        likelihood = self.likelihood
+        likelihood = self.measured
         slopes = isinstance(self.model, AsMade) and self.model.has_slopes
         return slopes and isinstance(likelihood, FieldLikelihood) and likelihood.alike_conditions
 
     def _near(self, z: FloatArray, steps: FloatArray) -> FloatArray:
         """Return changes (m, measurements, steps) of the misfit by `steps` (k, d) from `z`."""
         if not len(steps):
-            return np.empty((len(z), len(self.likelihood.fit_error), 0))
+            return np.empty((len(z), len(self.value), 0))
         self.evaluations += len(z)
         theta = self.coordinates.theta(z)
         others = [self.coordinates.theta(z + step) for step in steps]
-        model, likelihood = cast(AsMade, self.model), cast(FieldLikelihood, self.likelihood)
+        model, likelihood = cast(AsMade, self.model), cast(FieldLikelihood, self.measured)
         found = likelihood.changes(model, theta, others)
         if likelihood.has_reading:
             column = self.model.parameter_names.index(TENSION)
@@ -164,24 +156,15 @@ class Problem:
             found = np.concatenate([found, moved], axis=1)
         return np.nan_to_num(found)
 
-    def log_posterior(self, points: Points) -> FloatArray:
-        """Return the log of prior times likelihood (n,); -inf without a prediction."""
-        found = self.coordinates.log_prior(points.z)
-        known = np.isfinite(self.likelihood.misfit(points.predicted)).all(axis=1)
-        found[~known] = -np.inf
-        if known.any():
-            found[known] += self.likelihood.marginal(points.predicted[known])
-        return np.where(np.isnan(found), -np.inf, found)
-
 
 _NO_MODE = 10.0  # of ln f: beyond any data
 
 
 def _likelihood(
     tests: Sequence[ModalTest], model: Model, calibration: Calibration | None
-) -> Likelihood | FieldLikelihood:
+) -> MeasuredFrequencies:
     if model.priors == THESIS:
-        return Likelihood(tests)
+        return ThesisLikelihood(tests)
     reading = reading_of(tests, model.hanger.assumptions)
     if reading is None:
         return FieldLikelihood(tests, model)

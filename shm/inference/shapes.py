@@ -31,8 +31,8 @@ class ShapeOptions:
     says that the shapes are wrong.
     """
 
-    nodes: int = 5
-    gross_nodes: int = 12
+    nodes: int = 3
+    gross_nodes: int = 6
     loose: float = 5.0
     rather_gross: float = 0.5
 
@@ -74,7 +74,7 @@ class MeasuredShapes:
         covariance = np.diag(sd**2) + self._sensors()
         factor = np.linalg.cholesky(self._across @ covariance @ self._across.T)
         self._whitening = scipy.linalg.solve_triangular(factor, self._across, lower=True)
-        self._constant = -np.log(np.diag(factor)).sum() - 0.5 * self.size * np.log(2 * np.pi)
+        self._log_scale = -float(np.log(np.diag(factor)).sum())
         usual, gross = self._factors(np.sqrt(np.diag(factor @ factor.T)))
         self._log_phi = np.log(np.append(usual[0], gross[0]))
         share = hanger.assumptions.gross_error_share.value
@@ -101,9 +101,13 @@ class MeasuredShapes:
             size = (raw * self._value) @ own.T / (raw**2 @ own.T)
         return np.asarray((size[:, self._of] * raw - self._value) @ self._whitening.T)
 
-    def marginal(self, misfits: FloatArray) -> FloatArray:
-        """Return the log likelihood (n,) of misfits (n, size), phi integrated out."""
-        return np.asarray(scipy.special.logsumexp(self._joint(misfits), axis=1))
+    @property
+    def factors(self) -> list[tuple[float, float]]:
+        """Return each phi and the log of its weight, that of the data's scale included."""
+        if not self.size:
+            return [(1.0, 0.0)]
+        weight = self._log_weight + self._log_scale
+        return list(zip(np.exp(self._log_phi).tolist(), weight.tolist(), strict=True))
 
     def factor(self, misfits: FloatArray) -> float:
         """Return the most probable phi of misfits (1, size)."""
@@ -120,7 +124,7 @@ class MeasuredShapes:
         """Return log likelihoods with the weight of each phi (n, nodes)."""
         square = (misfits**2).sum(axis=1)[:, None]
         likelihood = -0.5 * square * np.exp(-2 * self._log_phi) - self.size * self._log_phi
-        return np.asarray(likelihood + self._log_weight + self._constant)
+        return np.asarray(likelihood + self._log_weight)
 
     def _directions(self, shapes: int) -> FloatArray:
         """Return directions (size, components) across each shape, of length 1."""

@@ -1,9 +1,8 @@
 """Posterior of one model class, and the choice among several.
 
-Local fits find the optima; points carried to the data along the valleys through them show where the
-posterior is; adaptive importance sampling gives evidence and draws. Where too few draws are
-effective, emcee continues from the same points. `Posterior.method` says which it was. A known
-posterior gives further starts and nothing else: prior, likelihood and answer are the same.
+Climbs from dispersed starts find the peaks, and the sampler goes on from these
+(`shm.inference.sampling`). `Posterior.method` states how. A known posterior gives further starts
+and nothing else: prior, likelihood and answer are the same.
 """
 
 from __future__ import annotations
@@ -16,31 +15,22 @@ from dataclasses import replace
 import numpy as np
 
 from shm.errors import UsageError
-from shm.inference.chain import run_chain
 from shm.inference.data_checks import check_for_update
 from shm.inference.field import FieldLikelihood
-from shm.inference.importance import Inferred, Weighted, weigh
 from shm.inference.mixture import normalised
-from shm.inference.options import EMCEE, Progress, UpdateOptions, silent
+from shm.inference.options import Progress, UpdateOptions, silent
 from shm.inference.other_answers import reading_off_sd
 from shm.inference.outcome import posterior_of
+from shm.inference.posterior import find_peaks
 from shm.inference.priors import clamped_probability, reading_of
-from shm.inference.problem import Points, Problem
-from shm.inference.search import draw_along, known_places, search
+from shm.inference.problem import Problem
+from shm.inference.sampling import Sampled, sample
 from shm.inference.shapes import SHAPES
-from shm.inference.valley import Proposal, Valley, valleys_through
+from shm.inference.starts import find_starts, known_places
 from shm.models import THESIS, AsMade, Model
-from shm.values import ENOUGH_EFFECTIVE, NAN, FloatArray, ModalTest, Posterior, Selection
+from shm.values import NAN, ModalTest, Posterior, Selection
 
 _DRAWS_WITHOUT_READING = 1000  # for the quartiles
-
-# Numerical: parts of the first mixture; where fewer draws are effective, begin again, and from how
-# many points. Weights correct for all.
-_CLUSTERS = 8
-_ATTEMPTS, _POOR, _AGAIN = 2, 0.3, 160
-
-ENOUGH = 0.5
-"""Effective draws for each sample to keep; fewer repeat draws, more cost in proportion."""
 
 
 def update(
@@ -95,63 +85,32 @@ def infer(
     rng: np.random.Generator,
     progress: Progress = silent,
     known: Posterior | None = None,
-) -> Inferred:
+) -> Sampled:
     """Return draws of the posterior of any `problem`, and its evidence.
 
-    Where fewer than 200 are effective, or a few carry nearly all the weight, emcee continues.
+    Where fewer than 200 are effective, emcee continues.
     """
-    name, samples = problem.model.name, options.samples
-    starts = known_places(problem, known, rng) if known is not None else None
-    fits = search(problem, rng, starts)
+    centres = known_places(problem, known, rng) if known is not None else None
+    peaks = find_peaks(problem, find_starts(problem, rng, centres))
+    # The noise near the peak, which may move it.
+    problem.settle(peaks[0].z)
+    peaks = find_peaks(problem, np.array([peak.z for peak in peaks]))
+    name = problem.model.name
     progress(name, 0.3)
-    points, nearest = draw_along(problem, fits, rng, starts)
-    progress(name, 0.5)
-    for attempt in range(_ATTEMPTS):
-        best = points[[int(problem.log_posterior(problem.evaluate(points)).argmax())]]
-        sigma = float(problem.likelihood.likeliest_sigma(problem.predict(best))[0])
-        valleys = [Valley(problem, points, sigma)]
-        if attempt == 0:
-            valleys = valleys_through(problem, points, nearest, sigma)
-        first = Proposal.through(valleys, points, _CLUSTERS, rng)
-        final = weigh(problem, first, ENOUGH * samples, rng)
-        if final.effective_sample_size > _POOR * samples:
-            break
-        # The posterior is elsewhere than it seemed: start again from where the weight is.
-        points = final.spread(_AGAIN, rng)
-    progress(name, 0.8)
-    enough = final.effective_sample_size >= min(ENOUGH_EFFECTIVE, samples)
-    if enough and options.sampler != EMCEE:
-        drawn: Points = final.resampled(samples, rng).take(rng.permutation(samples))
-        size, r_hat, method = final.effective_sample_size, final.r_hat, "importance"
-    else:
-        drawn, size, r_hat = _continue(problem, final, points, samples, rng)
-        method = EMCEE
-    return Inferred(
-        drawn,
-        final.log_evidence,
-        final.log_evidence_sd,
-        min(size, float(samples)),
-        r_hat,
-        method,
+    return sample(
+        problem,
+        peaks,
+        options.samples,
+        rng,
+        options.sampler,
+        centres,
+        lambda done: progress(name, 0.3 + 0.5 * done),
     )
 
 
-def _continue(
-    problem: Problem, weighted: Weighted, points: FloatArray, samples: int, rng: np.random.Generator
-) -> tuple[Points, float, float]:
-    """Return equal draws by emcee, how many of them are effective, and R-hat.
-
-    Half of the walkers start at weighted draws, half at points along the valley.
-    """
-    drawn = weighted.resampled(len(points), rng).z
-    chain, size, r_hat = run_chain(problem, np.vstack([drawn, points]), rng)
-    chosen = chain[rng.choice(len(chain), samples, replace=len(chain) < samples)]
-    return problem.evaluate(chosen), size, r_hat
-
-
-def _remarks_on_shapes(problem: Problem, inferred: Inferred) -> tuple[str, ...]:
+def _remarks_on_shapes(problem: Problem, inferred: Sampled) -> tuple[str, ...]:
     """Return a remark where no bar that has the frequencies has the mode shapes."""
-    likelihood = problem.likelihood
+    likelihood = problem.measured
     if not isinstance(likelihood, FieldLikelihood) or not likelihood.shapes.size:
         return ()
     misfits = inferred.points.predicted[:, -likelihood.shapes.size :]

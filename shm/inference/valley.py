@@ -17,7 +17,7 @@ import scipy
 
 from shm.inference.coordinates import log_normal
 from shm.inference.mixture import TMixture
-from shm.inference.problem import Points, Problem
+from shm.inference.posterior import Density, Points
 from shm.values import BoolArray, FloatArray, IntArray
 
 
@@ -29,8 +29,9 @@ class Numerics:
     `few` of the points, and `unfelt` where they take less than that. `rounds` from `starts` find
     the directions. The optimum is sought by `gauss_newton` steps with new slopes, each with
     `chords` steps with the same, none longer than `longest_step`, until it is `near_enough` in
-    standard deviations; slopes count as those at the optimum where it was not farther than `far`.
-    It starts where `neighbours` points of the valley lead. A point farther `away` across a valley
+    standard deviations; new slopes count as those at the optimum where it was not farther than
+    `far`. It starts where `neighbours` points of the valley lead, with their slopes. A datum that
+    is not predicted misses by `no_mode`. A point farther `away` across a valley
     is in another one, which has `fewest_points`; at most `most_valleys` are followed. `from_prior`
     is the probability that the free coordinates of a draw come from the prior, so that no weight is
     unbounded, and `least_chance` that of a part of a mixture.
@@ -44,7 +45,7 @@ class Numerics:
     gauss_newton: int = 4
     chords: int = 3
     longest_step: float = 0.7
-    near_enough: float = 0.2
+    near_enough: float = 0.4
     far: float = 1.0
     neighbours: int = 3
     away: float = 10.0
@@ -53,6 +54,7 @@ class Numerics:
     from_prior: float = 0.1
     least_chance: float = 0.01
     least: float = 1e-3
+    no_mode: float = 10.0
 
 
 _SET = Numerics()
@@ -78,19 +80,22 @@ class Draws(Points):
 
 
 class Valley:
-    """The valley of `problem` through `points` (m, d), where noise has the model error `sigma`."""
+    """The valley of a posterior through `points` (m, d).
 
-    def __init__(self, problem: Problem, points: FloatArray, sigma: float):
-        self._problem = problem
-        self._whitening = problem.likelihood.whitening(sigma)
-        slopes = self._whitening @ problem.slopes(points)
+    `whitening` (data, data) makes residuals independent with standard deviations of 1.
+    """
+
+    def __init__(self, density: Density, points: FloatArray, whitening: FloatArray):
+        self._density, self._whitening = density, whitening
+        slopes = whitening @ density.slopes(points)
         self.felt, self._unfelt, self._determined = _split(slopes)
         self.free = np.hstack([self.felt, self._unfelt])
         self._y, self._x = points @ self.free, points @ self._determined
         self._scale = self._y.std(axis=0) + _SET.least
-        along, across = slopes @ self.free, slopes @ self._determined
+        along, self._across = slopes @ self.free, slopes @ self._determined
         # How the optimum of x moves with y, at each point.
-        self._leads = -np.linalg.solve(_precision(across), np.swapaxes(across, 1, 2) @ along)
+        turned = np.swapaxes(self._across, 1, 2)
+        self._leads = -np.linalg.solve(_precision(self._across), turned @ along)
 
     def draw(
         self, y: FloatArray, scale: FloatArray, rng: np.random.Generator
@@ -132,21 +137,28 @@ class Valley:
     def _optimum(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the optimum (n, d) given `y` (n, f), and a Cholesky factor (n, g, g) of the
         precision of the determined coordinates there.
+
+        Slopes are those of the valley's nearest points, and new ones only where these lead nowhere.
         """
-        z = self._start(y)
-        count = self._determined.shape[1]
-        factor = np.broadcast_to(np.eye(count), (len(y), count, count)).copy()
-        rows = np.arange(len(y)) if count else np.arange(0)
-        for _ in range(_SET.gauss_newton):
+        near, weight = self._nearest(y)
+        step = np.einsum("nkgf,nkf->nkg", self._leads[near], y[:, None] - self._y[near])
+        x = (weight[..., None] * (self._x[near] + step.clip(-1, 1))).sum(axis=1)
+        z = y @ self.free.T + x @ self._determined.T
+        across = np.einsum("nk,nkfg->nfg", weight, self._across[near])
+        factor: FloatArray = np.linalg.cholesky(_precision(across)).astype(np.float64)
+        rows = np.arange(len(y) if self.determined else 0)
+        for again in range(_SET.gauss_newton):
             if not len(rows):
                 break
-            across = self._whitening @ self._problem.slopes(z[rows], self._determined)
-            factor[rows] = np.linalg.cholesky(_precision(across))
+            if again:
+                across = self._whitening @ self._density.slopes(z[rows], self._determined)
+                factor[rows] = np.linalg.cholesky(_precision(across))
             begun = z[rows]
             size = self._descend(z, rows, across, factor[rows])
             moved = np.einsum("nhg,nh->ng", factor[rows], (z[rows] - begun) @ self._determined)
             # Slopes of a point that was far from the optimum are not those there.
-            rows = rows[(size > _SET.near_enough) | (np.abs(moved).max(axis=1) > _SET.far)]
+            far = again and np.abs(moved).max(axis=1) > _SET.far
+            rows = rows[(size > _SET.near_enough) | far]
         return z, factor
 
     def _descend(
@@ -162,7 +174,10 @@ class Valley:
             if not len(going):
                 break
             own = rows[going]
-            misfit = self._problem.misfit(z[own]) @ self._whitening.T
+            misfit = -self._density.residual(z[own])
+            none = _SET.no_mode
+            misfit = np.nan_to_num(misfit, nan=none, posinf=none, neginf=-none)
+            misfit = misfit @ self._whitening.T
             gradient = np.einsum("nfg,nf->ng", across[going], misfit) + z[own] @ self._determined
             half = np.linalg.solve(factor[going], gradient[..., None])
             step = -np.linalg.solve(np.swapaxes(factor[going], 1, 2), half)[..., 0]
@@ -174,22 +189,19 @@ class Valley:
             )
         return size
 
-    def _start(self, y: FloatArray) -> FloatArray:
-        """Return the points (n, d) that the valley's nearest points lead to."""
+    def _nearest(self, y: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return the nearest of the valley's points to each y (n, k), and their weights (n, k)."""
         felt = self.felt.shape[1]
-        apart = ((y[:, None] - self._y) / self._scale)[..., :felt]
+        apart = (y[:, None, :felt] - self._y[:, :felt]) / self._scale[:felt]
         square = (apart**2).sum(axis=2)
         count = min(_SET.neighbours, square.shape[1])
         near = np.argpartition(square, count - 1, axis=1)[:, :count]
         weight = 1 / (np.take_along_axis(square, near, axis=1) + _SET.least) ** 2
-        weight /= weight.sum(axis=1, keepdims=True)
-        step = np.einsum("nkgf,nkf->nkg", self._leads[near], y[:, None] - self._y[near])
-        x = (weight[..., None] * (self._x[near] + step.clip(-1, 1))).sum(axis=1)
-        return np.asarray(y @ self.free.T + x @ self._determined.T)
+        return near, weight / weight.sum(axis=1, keepdims=True)
 
 
 def valleys_through(
-    problem: Problem, points: FloatArray, nearest: IntArray, sigma: float
+    density: Density, points: FloatArray, nearest: IntArray, whitening: FloatArray
 ) -> list[Valley]:
     """Return the valleys that hold nearly all `points` (m, d), the most crowded first.
 
@@ -199,9 +211,10 @@ def valleys_through(
     left = np.arange(len(points))
     while len(left) > _SET.fewest_points and len(found) < _SET.most_valleys:
         own = left[nearest[left] == np.bincount(nearest[left]).argmax()]
-        found.append(Valley(problem, points[own if len(own) > _SET.fewest_points else left], sigma))
+        rows = own if len(own) > _SET.fewest_points else left
+        found.append(Valley(density, points[rows], whitening))
         left = left[~found[-1].follows(points[left])]
-    return found or [Valley(problem, points, sigma)]
+    return found or [Valley(density, points, whitening)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +263,7 @@ class Proposal:
         chances, scales = chances / chances.sum(), scales / scales.sum()
         return Proposal(self.valleys, mixtures, chances, scales)
 
-    def draw(self, problem: Problem, n: int, rng: np.random.Generator) -> Draws:
+    def draw(self, density: Density, n: int, rng: np.random.Generator) -> Draws:
         """Return `n` draws."""
         z, square, log_size = [], [], []
         for index, count in enumerate(rng.multinomial(n, self.chances)):
@@ -266,7 +279,7 @@ class Proposal:
             square.append(np.column_stack([each[0] for each in at]))
             log_size.append(np.column_stack([each[1] for each in at]))
         points = np.vstack(z)
-        return Draws(points, problem.predict(points), np.vstack(square), np.vstack(log_size))
+        return Draws(points, density.predict(points), np.vstack(square), np.vstack(log_size))
 
     def log_density(self, draws: Draws) -> FloatArray:
         """Return the log density (n,) at draws."""

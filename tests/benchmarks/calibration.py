@@ -55,7 +55,7 @@ from scipy.stats import chisquare, cramervonmises
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from shm.inference import UpdateOptions, update
-from shm.inference.likelihood import Likelihood
+from shm.inference.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, Model, build
 from shm.values import NAN, PLANES, FloatArray, ModalTest, Mode
 from tests.helpers.hangers import HANGER_3
@@ -174,7 +174,7 @@ def case_of(terms: Terms, number: int) -> Case:
     drawn = values(model, posterior.samples, posterior.log_likelihood)[:: terms.thinning]
     column = len(prior.names)
     drawn = drawn[(terms.low <= drawn[:, column]) & (drawn[:, column] <= terms.high)]
-    likelihood = Likelihood([test])
+    likelihood = ThesisLikelihood([test])
     predicted = likelihood.predict(model, theta[None])
     true_likelihood = likelihood.joint(predicted, np.array([sigma]))
     truth = values(model, np.append(theta, sigma)[None], true_likelihood)[0]

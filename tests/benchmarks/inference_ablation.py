@@ -24,7 +24,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from shm.inference import UpdateOptions, search, update, updating, valley
+from shm.inference import UpdateOptions, sampling, starts, update, valley
 from shm.models import build
 from tests.benchmarks.worlds import hanger_and_tests
 
@@ -51,8 +51,8 @@ def valley_with(**settings: Any) -> Callable[[], Callable[[], None]]:
     return lambda: set_to(valley, "_SET", replace(valley._SET, **settings))
 
 
-def search_with(**settings: Any) -> Callable[[], Callable[[], None]]:
-    return lambda: set_to(search, "_SET", replace(search._SET, **settings))
+def sampling_with(**settings: Any) -> Callable[[], Callable[[], None]]:
+    return lambda: set_to(sampling, "_SET", replace(sampling._SET, **settings))
 
 
 def of_one_width() -> Callable[[], None]:
@@ -64,15 +64,15 @@ def of_one_width() -> Callable[[], None]:
 VARIANTS: dict[str, Callable[[], Callable[[], None]]] = {
     "whole": lambda: lambda: None,
     "whole, other seed": lambda: lambda: None,
-    "one attempt": lambda: set_to(updating, "_ATTEMPTS", 1),
-    "two attempts": lambda: set_to(updating, "_ATTEMPTS", 2),
+    "one attempt": sampling_with(attempts=1),
+    "three attempts": sampling_with(attempts=3),
     "one valley": valley_with(most_valleys=1),
     "two valleys": valley_with(most_valleys=2),
     "one width at first": of_one_width,
     "no draw from the prior": valley_with(from_prior=1e-6),
-    "optima by density alone": search_with(tempered=1.0),
-    "half the starts": search_with(starts=20, followed=12),
-    "half the points along": search_with(along=80),
+    "optima by density alone": sampling_with(tempered=1.0),
+    "half the starts": lambda: set_to(starts, "_STARTS", 6),
+    "half the points along": sampling_with(along=80),
 }
 
 

@@ -6,7 +6,8 @@ import numpy as np
 from scipy import stats
 from scipy.special import logsumexp
 
-from shm.gap.contract import Covariance, Design, Fit, Hypothesis, NoiseNode, Observations
+from shm.gap.contract import Design, Fit, Hypothesis, Observations
+from shm.inference.likelihood import Covariance, NoiseNode
 from shm.models.effects import Conditions, Survey
 from shm.values import PLANES, FloatArray
 

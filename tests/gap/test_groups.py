@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.gap.contract import Covariance, Fit, Hypothesis, Peak
+from shm.gap.contract import Fit, Hypothesis
 from shm.gap.groups import expected_log_bayes_factor, group, views_from_peaks
-from shm.gap.likelihood import Likelihood
+from shm.inference.likelihood import Covariance, Likelihood
+from shm.inference.posterior import Peak
 from shm.values import FloatArray, IntArray
 from tests.gap import linear_toy as toy
 

@@ -10,8 +10,7 @@ from scipy import integrate, stats
 from scipy.special import logsumexp
 
 from shm.assumptions import DEFAULTS
-from shm.gap.contract import Covariance, NoiseNode, Observations
-from shm.gap.likelihood import Likelihood
+from shm.gap.contract import Observations
 from shm.gap.noise import (
     MEAN_MODEL_ERROR,
     MODEL_ERROR_SCALE,
@@ -19,6 +18,7 @@ from shm.gap.noise import (
     nodes,
 )
 from shm.gap.repeated_errors import Repeated
+from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
 from shm.values import FloatArray
 from tests.gap import linear_toy as toy
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from shm.gap.contract import Hypothesis
-from shm.gap.likelihood import Likelihood
 from shm.gap.search import fit_alone
+from shm.inference.likelihood import Likelihood
 from shm.models.base import point_mass
 from shm.models.effects import EFFECTS, Variant
 from shm.models.hanger import solve

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from shm.gap.contract import Hypothesis
-from shm.gap.linear import Linear
 from shm.gap.noise import MEAN_MODEL_ERROR
 from shm.gap.scan import VISIBLE, Scan, scan, scan_beside
 from shm.gap.search import fit_alone
+from shm.inference.linear import Linear
 from shm.models.effects import Variant
 from shm.values import FloatArray
 from tests.helpers.gap_campaigns import campaign, fit_of, problem_of, scan_of

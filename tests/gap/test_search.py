@@ -11,10 +11,10 @@ import pytest
 from shm.errors import UsageError
 from shm.gap import search as searching
 from shm.gap.contract import GapOptions, Hypothesis
-from shm.gap.posterior import laplace
 from shm.gap.probabilities import ScoredHypothesis
 from shm.gap.problem import GapProblem
 from shm.gap.search import ALONE, Search, fit_alone, hypotheses, invisible
+from shm.inference.posterior import laplace
 from shm.models.effects import EFFECTS, Variant
 from shm.simulate import HangerState
 from shm.values import ENOUGH_EFFECTIVE

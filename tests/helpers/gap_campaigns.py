@@ -9,13 +9,14 @@ import numpy as np
 
 from shm.assumptions import DEFAULTS
 from shm.gap.contract import Fit, Hypothesis
-from shm.gap.linear import Linear
 from shm.gap.observations import observed
-from shm.gap.posterior import Target, find_peaks
+from shm.gap.posterior import Target
 from shm.gap.problem import GapProblem
 from shm.gap.sampling import MOST_ROUNDS, Sampling
 from shm.gap.scan import Scan, scan
 from shm.gap.search import fit_alone
+from shm.inference.linear import Linear
+from shm.inference.posterior import find_peaks
 from shm.models import MODELS, AsMade
 from shm.models.as_made import DENSITY, LENGTH, MODULUS, SECTION, TENSION
 from shm.models.effects import Conditions, Variant

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shm.inference import UpdateOptions, update
-from shm.inference.likelihood import Likelihood
+from shm.inference.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, Model, build
 from shm.models.base import Conditions
 from shm.simulate import HangerState
@@ -53,7 +53,7 @@ def test_each_test_is_predicted_under_its_own_conditions() -> None:
     theta = parameters(model, tension_per_kelvin_n_k=-3000.0)
     tests = measured(model, theta, [a_test("a", 10.0), a_test("b", 25.0), a_test("c", 10.0)])
     tests[1] = replace(tests[1], modes=tests[1].modes[3:8])
-    predicted = Likelihood(tests).predict(model, theta)
+    predicted = ThesisLikelihood(tests).predict(model, theta)
     assert predicted.shape == (1, 12 + 5 + 12)
     np.testing.assert_array_equal(predicted[:, :12], predicted[:, 17:])
     warm = model.frequencies_at(theta, 6, Conditions(temperature_shift_k=15.0))
@@ -73,7 +73,7 @@ def test_tests_alike_to_the_class_are_one_evaluation(monkeypatch: pytest.MonkeyP
         return evaluate(theta, modes)
 
     monkeypatch.setattr(model, "frequencies_hz", count)
-    predicted = Likelihood(tests).predict(model, theta)
+    predicted = ThesisLikelihood(tests).predict(model, theta)
     assert asked == [6]
     np.testing.assert_array_equal(predicted[:, :12], predicted[:, 12:])
 
@@ -133,7 +133,7 @@ def test_a_known_mass_moves_a_beam_as_finite_elements_do(name: str) -> None:
 def test_no_tension_is_inferred_from_an_irregular_mode() -> None:
     irregular, regular = Mode("transverse", 1, 7.0, irregular=True), Mode("transverse", 2, 13.85)
     tests = [ModalTest("t1", (irregular, regular), 3), ModalTest("t2", (regular, regular), 3)]
-    likelihood = Likelihood(tests)
+    likelihood = ThesisLikelihood(tests)
     assert likelihood.modes == [regular] * 3
     model = build("beam1", HANGER_3, THESIS)
     assert likelihood.predict(model, parameters(model, theta_L=1.0)).shape == (1, 3)

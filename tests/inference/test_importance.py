@@ -9,11 +9,12 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from shm.documents import posterior_document
-from shm.inference import UpdateOptions, update, updating
+from shm.inference import UpdateOptions, sampling, update
 from shm.inference.chain import run_chain
 from shm.inference.importance import Weighted
 from shm.inference.options import EMCEE, silent
-from shm.inference.problem import Points, Problem
+from shm.inference.posterior import Points
+from shm.inference.problem import Problem
 from shm.inference.valley import Draws
 from shm.models import THESIS, build
 from shm.values import FloatArray, Posterior
@@ -82,13 +83,13 @@ def test_emcee_continues_where_too_few_draws_are_effective(
 ) -> None:
     """Give one draw nearly all the weight, as where a proposal misses a ridge."""
 
-    def poor(problem, proposal, enough, rng):  # type: ignore[no-untyped-def]
-        draws = proposal.draw(problem, 500, rng)
-        log_weights = problem.log_posterior(draws)
+    def poor(density, proposal, enough, rng):  # type: ignore[no-untyped-def]
+        draws = proposal.draw(density, 500, rng)
+        log_weights = density.log_posterior(draws)
         log_weights[log_weights.argmax()] += 30
         return Weighted(draws, log_weights, 500)
 
-    monkeypatch.setattr(updating, "weigh", poor)
+    monkeypatch.setattr(sampling, "weigh", poor)
     found = update(TESTS, BEAM1, UpdateOptions(1000, seed=5))
     assert found.method == "emcee"
     error = 4 * found.tension_n.std() / np.sqrt(found.effective_sample_size)

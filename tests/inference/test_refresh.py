@@ -11,7 +11,7 @@ from shm.errors import BadInput, UsageError
 from shm.inference import UpdateOptions, refresh, select, update
 from shm.inference.options import silent
 from shm.inference.problem import Problem
-from shm.inference.search import known_places
+from shm.inference.starts import known_places
 from shm.models import THESIS, Model, build, parameter_sets
 from shm.models.beam import Beam2
 from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, Posterior

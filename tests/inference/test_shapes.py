@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from shm.inference.options import UpdateOptions
-from shm.inference.problem import DIFFERENCE, Problem
+from shm.inference.posterior import DIFFERENCE
+from shm.inference.problem import Problem
 from shm.inference.shapes import MeasuredShapes, swaps_of
 from shm.inference.updating import update
 from shm.models import AsMade, build
@@ -111,7 +112,7 @@ def test_slopes_are_differences(hanger: Hanger) -> None:
     z = problem.coordinates.draw_prior(2, np.random.default_rng(1))
     found = problem.slopes(z)
     for column, step in enumerate(1e-4 * np.eye(z.shape[1])):
-        centred = (problem.misfit(z + step) - problem.misfit(z - step)) / 2e-4
+        centred = (problem.residual(z - step) - problem.residual(z + step)) / 2e-4
         np.testing.assert_allclose(found[:, :, column], centred, atol=0.02, rtol=2e-3)
     assert DIFFERENCE <= 1e-4
 

@@ -11,8 +11,8 @@ from scipy.special import gammaincc, gammaln, logsumexp
 
 from shm.errors import BadInput, UsageError
 from shm.inference import UpdateOptions, class_probabilities, select, update
-from shm.inference.likelihood import Likelihood
 from shm.inference.outcome import _at_bounds
+from shm.inference.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, Model, build
 from shm.values import PLANES, AddedMass, FloatArray, ModalTest, Mode, Plane
 from tests.helpers.hangers import HANGER_3
@@ -119,7 +119,7 @@ def test_the_most_probable_value_beats_every_sample() -> None:
     model = build("beam2", HANGER_3, THESIS)
     posterior = update(tests, model, UpdateOptions(300))
     best = posterior.most_probable[None]
-    likelihood = Likelihood(tests)
+    likelihood = ThesisLikelihood(tests)
     predicted = likelihood.predict(model, best[:, :-1])
     assert likelihood.joint(predicted, best[:, -1])[0] >= posterior.log_likelihood.max()
 
@@ -184,7 +184,7 @@ def test_what_cannot_be_updated_is_refused_with_a_remedy() -> None:
 
 def test_the_likelihood_is_the_thesis_product_of_normals() -> None:
     """(4.5): f_hat ~ N(f, (sigma f_hat)^2 + sd^2), N_D equal data sets."""
-    likelihood = Likelihood([modal_test({"transverse": [5.0, 12.0]}, sd_hz=0.05)] * 3)
+    likelihood = ThesisLikelihood([modal_test({"transverse": [5.0, 12.0]}, sd_hz=0.05)] * 3)
     value = likelihood.joint(np.array([[5.1, 11.8] * 3]), np.array([0.02]))[0]
     expected = 0.0
     for found, seen in ((5.1, 5.0), (11.8, 12.0)):
@@ -196,7 +196,7 @@ def test_the_likelihood_is_the_thesis_product_of_normals() -> None:
 @pytest.mark.parametrize("sd_hz", [np.nan, 1e-3, 0.5])
 @pytest.mark.parametrize("copies", [1, 10])
 def test_the_model_error_is_integrated_out_exactly(sd_hz: float, copies: int) -> None:
-    likelihood = Likelihood([modal_test(TABLE_1_1, sd_hz)] * copies)
+    likelihood = ThesisLikelihood([modal_test(TABLE_1_1, sd_hz)] * copies)
     predicted = np.array([list(TABLE_1_1["transverse"]) + list(TABLE_1_1["longitudinal"])])
     predicted = np.tile(predicted * (1 + 0.01 * np.sin(np.arange(12))), (1, copies))
     sigma = np.exp(np.linspace(np.log(1e-4), 0, 20001))

@@ -11,6 +11,7 @@ from shm.inference.valley import Proposal, valleys_through
 from shm.values import FloatArray, IntArray
 
 SD = 0.01
+WHITENING = np.array([[1 / SD]])
 
 
 def bend(z: FloatArray) -> FloatArray:
@@ -25,14 +26,9 @@ class BentProblem:
 
     dimension = 4
 
-    class likelihood:  # noqa: N801
-        @staticmethod
-        def whitening(sigma: float) -> FloatArray:
-            return np.array([[1 / SD]])
-
     @staticmethod
-    def misfit(z: FloatArray) -> FloatArray:
-        return bend(z)[:, :1]
+    def residual(z: FloatArray) -> FloatArray:
+        return -bend(z)[:, :1]
 
     @staticmethod
     def slopes(z: FloatArray, directions: FloatArray | None = None) -> FloatArray:
@@ -56,7 +52,7 @@ def points_along(n: int, rng: np.random.Generator) -> FloatArray:
 def proposal() -> Proposal:
     rng = np.random.default_rng(1)
     points = points_along(160, rng)
-    valleys = valleys_through(BentProblem(), points, np.zeros(160, int), SD)  # type: ignore[arg-type]
+    valleys = valleys_through(BentProblem(), points, np.zeros(160, int), WHITENING)  # type: ignore[arg-type]
     assert len(valleys) == 1
     return Proposal.through(valleys, points, 4, rng)
 
@@ -120,8 +116,8 @@ def test_points_in_two_valleys_make_two(proposal: Proposal) -> None:
         """Give z0^2 = 1: two valleys 200 standard deviations apart."""
 
         @staticmethod
-        def misfit(z: FloatArray) -> FloatArray:
-            return z[:, :1] ** 2 - 1
+        def residual(z: FloatArray) -> FloatArray:
+            return 1 - z[:, :1] ** 2
 
         @staticmethod
         def slopes(z: FloatArray, directions: FloatArray | None = None) -> FloatArray:
@@ -133,7 +129,7 @@ def test_points_in_two_valleys_make_two(proposal: Proposal) -> None:
     points = rng.standard_normal((160, 4))
     nearest: IntArray = (np.arange(160) % 3 == 0).astype(int)
     points[:, 0] = np.where(nearest, -1.0, 1.0)
-    valleys = valleys_through(Twins(), points, nearest, SD)  # type: ignore[arg-type]
+    valleys = valleys_through(Twins(), points, nearest, WHITENING)  # type: ignore[arg-type]
     assert len(valleys) == 2
     twins = Proposal.through(valleys, points, 4, rng)
     assert twins.chances == pytest.approx([2 / 3, 1 / 3], abs=0.01)

@@ -17,7 +17,8 @@ from scipy.optimize import brentq
 from shm.bridge import load_hanger
 from shm.errors import BadInput
 from shm.inference.options import silent
-from shm.inference.problem import DIFFERENCE, Problem
+from shm.inference.posterior import DIFFERENCE
+from shm.inference.problem import Problem
 from shm.models import AsMade, build, described
 from shm.models.as_made import FITTING_STIFFNESS, Term, terms_of
 from shm.models.bar_of_terms import GRAVITY_M_S2

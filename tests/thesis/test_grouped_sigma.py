@@ -7,7 +7,7 @@ import pytest
 
 from shm.errors import UsageError
 from shm.inference import UpdateOptions, update
-from shm.inference.likelihood import Likelihood
+from shm.inference.thesis_noise import ThesisLikelihood
 from shm.models import DESCRIPTION, THESIS, build
 from shm.values import PLANES, ModalTest, Mode
 from tests.benchmarks.thesis.grouped_likelihood import GroupedLikelihood, update_grouped
@@ -25,7 +25,7 @@ PREDICTED = HZ * (1 + np.array([[0.01] * 3 + [0.03] * 3, [0.02, -0.01, 0.0, 0.0,
 def test_of_planes_it_is_the_product_of_both_planes_alone() -> None:
     """Problem: errors of 1 % in one plane and 3 % in the other; solution: two data sets apart."""
     alone = [
-        Likelihood([ModalTest("t", TEST.modes[own])]).marginal(PREDICTED[:, own])
+        ThesisLikelihood([ModalTest("t", TEST.modes[own])]).marginal(PREDICTED[:, own])
         for own in (slice(0, 3), slice(3, 6))
     ]
     grouped = GroupedLikelihood([TEST], "plane")
@@ -55,7 +55,9 @@ def test_sigma_stands_for_the_mean_square_of_the_groups() -> None:
 def test_of_groups_of_orders_it_is_the_product_over_both_planes() -> None:
     low, high = [0, 1, 3, 4], [2, 5]
     alone = [
-        Likelihood([ModalTest("t", tuple(TEST.modes[n] for n in own))]).marginal(PREDICTED[:, own])
+        ThesisLikelihood([ModalTest("t", tuple(TEST.modes[n] for n in own))]).marginal(
+            PREDICTED[:, own]
+        )
         for own in (low, high)
     ]
     grouped = GroupedLikelihood([TEST], "1-2,3")

@@ -19,7 +19,7 @@ from importlib.metadata import version
 import numpy as np
 
 import shm
-from shm.inference.likelihood import Likelihood
+from shm.inference.thesis_noise import ThesisLikelihood
 from shm.models import THESIS, build
 from shm.values import FloatArray
 from tests.helpers.evidence_oracle import TABLES, modal_test
@@ -52,7 +52,7 @@ class Target:
         self.tests = [test] * repeat
         self.model = build("beam2", HANGER_3, THESIS)
         self.evaluations = 0
-        self._likelihood = Likelihood(self.tests)
+        self._likelihood = ThesisLikelihood(self.tests)
         self._sampled = sigma == "sampled"
         prior, sampled = self.model.prior, [0.0] * self._sampled
         self.names = [*prior.names, *["sigma"] * self._sampled]

@@ -9,17 +9,17 @@ import numpy as np
 
 from shm.errors import UsageError
 from shm.inference import Progress, UpdateOptions
-from shm.inference.likelihood import Likelihood
 from shm.inference.options import silent
 from shm.inference.outcome import posterior_of
 from shm.inference.problem import Problem
+from shm.inference.thesis_noise import ThesisLikelihood
 from shm.inference.updating import infer
 from shm.models import THESIS, Model
 from shm.values import FloatArray, ModalTest, Posterior, Summary
 from tests.benchmarks.thesis.modal_groups import groups
 
 
-class GroupedLikelihood(Likelihood):
+class GroupedLikelihood(ThesisLikelihood):
     """A model error of its own for each group of modes: thesis (4.7) to (4.12).
 
     Each is uniform on [0, 1] and integrated out by itself, so that the marginal likelihood is a
@@ -31,7 +31,7 @@ class GroupedLikelihood(Likelihood):
         super().__init__(tests)
         self.by_name = groups(self.modes, sigma)
         self._parts = [
-            Likelihood([ModalTest("part", tuple(self.modes[place] for place in own))])
+            ThesisLikelihood([ModalTest("part", tuple(self.modes[place] for place in own))])
             for own in self.by_name.values()
         ]
 

@@ -23,7 +23,8 @@ from shm.inference.mixture import Normal, Rows, normalised
 from shm.inference.options import silent
 from shm.inference.other_answers import Outcome
 from shm.inference.outcome import assembled
-from shm.inference.problem import Points, Problem
+from shm.inference.posterior import Points
+from shm.inference.problem import Problem
 from shm.models import THESIS, Model
 from shm.values import BoolArray, FloatArray, ModalTest, Posterior
 
@@ -87,7 +88,7 @@ def _box(problem: Problem) -> tuple[FloatArray, FloatArray]:
 
 def _run(problem: Problem, theta: FloatArray) -> _Particles:
     predicted = problem.run(theta[:, :-1])
-    return _Particles(theta, predicted, problem.likelihood.joint(predicted, theta[:, -1]))
+    return _Particles(theta, predicted, problem.measured.joint(predicted, theta[:, -1]))
 
 
 def _power_step(log_likelihood: FloatArray, most: float) -> float:

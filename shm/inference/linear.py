@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from shm.gap.likelihood import Likelihood
+from shm.inference.likelihood import Likelihood
 from shm.values import FloatArray, IntArray
 
 _LONGEST = 2.5  # numerical: standard deviations of a prior; over more no slope holds

@@ -7,9 +7,8 @@ import pytest
 from scipy import stats
 from scipy.special import logsumexp
 
-from shm.gap.contract import Covariance, NoiseNode
-from shm.gap.likelihood import Likelihood
-from shm.gap.linear import Linear
+from shm.inference.likelihood import Covariance, Likelihood, NoiseNode
+from shm.inference.linear import Linear
 
 F, S, L = 6, 4, 3
 RNG = np.random.default_rng(2)
