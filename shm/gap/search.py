@@ -49,8 +49,8 @@ SUPPORTED = 2.0
 DROWNED = "Even at its largest it would drown in the errors of these data."
 _MOST_SCANNED, _MOST_PAIRS = 12, 8
 OF_THE_ANSWER = 0.1
-"""Hypotheses with this probability are sampled: the answer rests on them."""
-_MOST_SAMPLED = 5  # numerical: with probabilities above a tenth there are seldom more
+"""Probability that may rest on hypotheses which were not sampled."""
+_MOST_SAMPLED = 5  # numerical: places of one cause are seldom more
 _ROUGHLY = 40, 8  # numerical: effective draws and rounds that tell the classes' evidence apart
 
 
@@ -202,14 +202,10 @@ class Search:
     def sample_probable(self, chance: Callable[[], Mapping[Hypothesis, float]]) -> None:
         """Sample what the answer rests on, by `chance` of each hypothesis, the likeliest first."""
         for _ in range(_MOST_SAMPLED):
-            open_ = {
-                h: p
-                for h, p in chance().items()
-                if p > OF_THE_ANSWER and self.fits[h].method == "normal"
-            }
-            if not open_:
+            rest = {h: p for h, p in chance().items() if self.fits[h].method == "normal"}
+            if sum(rest.values()) < OF_THE_ANSWER:
                 break
-            hypothesis = max(open_, key=lambda h: open_[h])
+            hypothesis = max(rest, key=lambda h: rest[h])
             self.progress(f"sampling {hypothesis.name or 'something unknown'}", 0.9)
             without = self.baseline if hypothesis.effects else None
             target, peaks = Target(self.problem, hypothesis), self.fits[hypothesis].peaks
