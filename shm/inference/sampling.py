@@ -32,8 +32,8 @@ class Numerics:
 
     The first mixture has `clusters` parts. Where less than `poor` of the wanted draws are
     effective, it begins again from `again` points where the weight is, `attempts` times in all.
-    `enough` draws are effective for each sample to keep: fewer repeat draws, more cost in
-    proportion.
+    `enough` draws are effective for each sample to keep, `fewest_effective` in all: fewer repeat
+    draws, more cost in proportion.
     """
 
     along: int = 160
@@ -44,9 +44,10 @@ class Numerics:
     fewest: int = 30
     clusters: int = 8
     attempts: int = 2
-    poor: float = 0.3
+    poor: float = 0.7
     again: int = 100
     enough: float = 0.35
+    fewest_effective: float = 1.5 * ENOUGH_EFFECTIVE
 
 
 _SET = Numerics()
@@ -78,6 +79,7 @@ def sample(
     Where fewer than 200 are effective, emcee continues. Points along the valley begin at draws of
     the prior, or at `centres` (n, d).
     """
+    wanted = max(_SET.enough * samples, _SET.fewest_effective)
     points, nearest = draw_along(density, peaks, rng, centres)
     on_progress(0.4)
     for attempt in range(_SET.attempts):
@@ -87,8 +89,8 @@ def sample(
         if attempt == 0:
             valleys = valleys_through(density, points, nearest, whitening)
         first = Proposal.through(valleys, points, _SET.clusters, rng)
-        final = weigh(density, first, _SET.enough * samples, rng)
-        if final.effective_sample_size > _SET.poor * samples:
+        final = weigh(density, first, wanted, rng)
+        if final.effective_sample_size > _SET.poor * wanted:
             break
         # The posterior is elsewhere than it seemed: start again from where the weight is.
         points = final.spread(_SET.again, rng)

@@ -31,8 +31,8 @@ class ShapeOptions:
     says that the shapes are wrong.
     """
 
-    nodes: int = 3
-    gross_nodes: int = 6
+    nodes: int = 5
+    gross_nodes: int = 12
     loose: float = 5.0
     rather_gross: float = 0.5
 

@@ -42,7 +42,7 @@ class Numerics:
     unfelt: float = 0.02
     rounds: int = 20
     starts: int = 12
-    gauss_newton: int = 4
+    gauss_newton: int = 7
     chords: int = 3
     longest_step: float = 0.7
     near_enough: float = 0.4
