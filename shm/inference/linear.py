@@ -20,7 +20,7 @@ class Linear:
 
     def __init__(self, likelihood: Likelihood, slopes: FloatArray):
         self.likelihood = likelihood
-        self._weighed = likelihood.weighed(slopes)
+        self._slopes, self._weighed = slopes, likelihood.weighed(slopes)
         inner = self._weighed.products(slopes.T) + np.eye(slopes.shape[1])
         self.covariance: FloatArray = np.asarray(np.linalg.inv(inner), dtype=np.float64)
         self._height = likelihood.log_height - np.linalg.slogdet(inner)[1] / 2
@@ -40,8 +40,13 @@ class Linear:
         square = square - (pull * step).sum(axis=2)
         log = np.where(known, self._height[:, None] - square / 2, -np.inf)
         node, rows = log.argmax(axis=0), np.arange(len(z))
-        found = step[node, rows].clip(-_LONGEST, _LONGEST)
-        return scipy.special.logsumexp(log, axis=0), np.where(known[:, None], found, 0.0), node
+        found = step[node, rows]
+        # Digits that cancelled, as where slopes are those of a cliff, never raise the likelihood.
+        left = self.likelihood.squares(residual - found @ self._slopes.T)[rows, node]
+        lost = left + ((z + found) ** 2).sum(axis=1) - square[node, rows]
+        log_marginal = scipy.special.logsumexp(log, axis=0) - np.maximum(lost, 0.0) / 2
+        found = np.where(known[:, None], found.clip(-_LONGEST, _LONGEST), 0.0)
+        return np.where(known, log_marginal, -np.inf), found, node
 
     def visible(self, shift: FloatArray, node: int) -> FloatArray:
         """Return by how many standard deviations shifts (n, data) go beyond what z can follow.
