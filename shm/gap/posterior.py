@@ -99,8 +99,7 @@ class Target:
 
     def view(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the residual (data,) and the prediction's slopes (data, d) at z (d,)."""
-        residual = self.residual(z[None])
-        return residual[0], self._slopes(z[None], residual)[0]
+        return self.residual(z[None])[0], self._slopes(z[None])[0]
 
     def climb(self, starts: FloatArray, hopeless: float = -np.inf) -> list[Peak]:
         """Return the peaks above `starts` z (m, d), all climbed at once; one where ways meet.
@@ -109,7 +108,7 @@ class Target:
         """
         residual = self.residual(starts)
         log = np.asarray(self.likelihood.log(residual) + log_normal(starts))
-        slopes, damping = self._slopes(starts, residual), np.full(len(starts), _HOW.damping)
+        slopes, damping = self._slopes(starts), np.full(len(starts), _HOW.damping)
         ways, found = self._ways(starts, log, residual, slopes, damping), list[Peak]()
         for taken in range(_HOW.steps):
             hopeless = max(hopeless, float(ways.log.max()) - _HOW.far_behind)
@@ -144,31 +143,35 @@ class Target:
             return stayed
         gained = np.where(log[best] - ways.log < _HOW.no_gain, np.inf, damping[best])[up]
         z, residual = tried[best][up], residual.reshape(*damping.shape, -1)[best][up]
-        near = (np.abs(z - ways.z[up])[:, self.linear] <= SETTLED).all(axis=1)
-        slopes = self._slopes(z, residual, ways.slopes[up], near)
+        away = np.abs(z - ways.z[up])
+        near = np.zeros(z.shape, dtype=bool)
+        near[:, self.linear] = (away[:, self.linear] <= SETTLED).all(axis=1)[:, None]
+        near |= (away < _HOW.same * ways.sd[up]).all(axis=1)[:, None]
+        slopes = self._slopes(z, ways.slopes[up], near)
         moved = self._ways(z, log[best][up], residual, slopes, gained.clip(_HOW.least_damping))
         return moved.joined(stayed)
 
     def _slopes(
         self,
         z: FloatArray,
-        residual: FloatArray,
         known: FloatArray | None = None,
         near: BoolArray | None = None,
     ) -> FloatArray:
-        """Return the prediction's slopes (m, data, d) at z (m, d) with residuals (m, data).
+        """Return the prediction's slopes (m, data, d) at z (m, d).
 
-        Slopes `near` by (m,) are taken over by the linear parameters from those `known`.
+        Those of `near` (m, d) points are taken over from those `known`.
         """
-        wanted = np.ones(z.shape, dtype=bool)
-        if near is not None:
-            wanted[np.ix_(near, self.linear)] = False
-        row, column = np.nonzero(wanted)
+        row, column = np.nonzero(np.ones(z.shape, dtype=bool) if near is None else ~near)
+        slopes = np.zeros((*z.shape[:1], len(self.problem.value), z.shape[1]))
+        slopes = slopes if known is None else known.copy()
+        if not len(row):
+            return slopes
         step = np.where(z > 0, -_HOW.difference, _HOW.difference)[row, column]
         points = z[row]
         points[np.arange(len(row)), column] += step
-        found = (residual[row] - self.residual(points)) / step[:, None]
-        slopes = np.zeros((*residual.shape, self.dimension)) if known is None else known.copy()
+        # In one batch: what the others of a batch do to a point is small, but no difference.
+        here, there = np.split(self.residual(np.vstack([z, points])), [len(z)])
+        found = (here[row] - there) / step[:, None]
         slopes[row, :, column] = np.where(np.abs(found) < _STEEPEST, found, 0.0)
         return slopes
 
@@ -207,6 +210,11 @@ class _Ways(Rows):
     damping: FloatArray
 
     @property
+    def sd(self) -> FloatArray:
+        """Return the standard deviations (m, d) of normal distributions there."""
+        return np.asarray(np.sqrt(np.einsum("mii->mi", np.linalg.inv(self.hessian))))
+
+    @property
     def hoped(self) -> FloatArray:
         """Return twice the gain (m,) of the undamped step, were all linear."""
         step = np.linalg.solve(self.hessian, self.gradient[..., None])[..., 0]
@@ -219,8 +227,7 @@ class _Ways(Rows):
     @property
     def met(self) -> BoolArray:
         """Return which points (m,) lie beside a higher one, by its standard deviations."""
-        sd = np.sqrt(np.einsum("mii->mi", np.linalg.inv(self.hessian)))
-        beside = (np.abs(self.z[:, None] - self.z) < _HOW.same * sd).all(axis=2)
+        beside = (np.abs(self.z[:, None] - self.z) < _HOW.same * self.sd).all(axis=2)
         rank = np.argsort(np.argsort(-self.log, kind="stable"))
         return np.asarray((beside & (rank[:, None] > rank)).any(axis=1))
 
