@@ -17,9 +17,6 @@ from shm.inference.posterior import Density
 from shm.inference.valley import Draws, Proposal
 from shm.values import FloatArray
 
-# The standard error of a log evidence: a Bayes factor good to 6 %, of which 3 would be a hint.
-_ENOUGH_ERROR = 0.06
-
 # Numerical: the cost of a batch, and of all.
 _TRIAL, _MOST_TRIALS = 400, 8
 _FIRST, _FEWEST, _HOPELESS = 2.0, 200, 0.03
@@ -80,7 +77,7 @@ class Weighted:
 
 
 def weigh(density: Density, first: Proposal, enough: float, rng: np.random.Generator) -> Weighted:
-    """Draw until `enough` draws are effective and the evidence's standard error is 0.06.
+    """Draw until `enough` draws are effective and the evidence is as certain as asked.
 
     Where next to none is effective, the trials are returned: another start is needed.
     """
@@ -113,7 +110,7 @@ def _final(
     _draw(density, final, proposal, int(_FIRST * enough), rng)
     for _ in range(_MOST_EXTENSIONS):
         error = Weighted(final.batch, final.log_weights, final.draws).log_evidence_sd
-        short = max(enough / final.effective, (error / _ENOUGH_ERROR) ** 2)
+        short = max(enough / final.effective, (error / density.largest_error) ** 2)
         if short <= 1 or final.draws >= _MOST:
             break
         more = int(np.clip((short - 1) * final.draws, _FEWEST, _LONGEST * final.draws))

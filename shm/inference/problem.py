@@ -132,6 +132,11 @@ class Problem(Density):
         return self._near(z, steps) / DIFFERENCE
 
     @property
+    def largest_error(self) -> float:
+        costly = self.model.expensive or (isinstance(self.model, AsMade) and self.model.has_terms)
+        return super().largest_error if costly else 0.02
+
+    @property
     def _has_slopes(self) -> bool:
         """Return True where the class gives the frequencies of near parameter sets at once."""
         likelihood = self.measured

@@ -42,10 +42,10 @@ class Numerics:
     unfelt: float = 0.02
     rounds: int = 20
     starts: int = 12
-    gauss_newton: int = 7
+    gauss_newton: int = 5
     chords: int = 3
     longest_step: float = 0.7
-    near_enough: float = 0.4
+    near_enough: float = 0.2
     far: float = 1.0
     neighbours: int = 3
     away: float = 10.0
@@ -138,7 +138,7 @@ class Valley:
         """Return the optimum (n, d) given `y` (n, f), and a Cholesky factor (n, g, g) of the
         precision of the determined coordinates there.
 
-        Slopes are those of the valley's nearest points, and new ones only where these lead nowhere.
+        The slopes of the valley's nearest points lead there, new ones end there.
         """
         near, weight = self._nearest(y)
         step = np.einsum("nkgf,nkf->nkg", self._leads[near], y[:, None] - self._y[near])
@@ -157,8 +157,8 @@ class Valley:
             size = self._descend(z, rows, across, factor[rows])
             moved = np.einsum("nhg,nh->ng", factor[rows], (z[rows] - begun) @ self._determined)
             # Slopes of a point that was far from the optimum are not those there.
-            far = again and np.abs(moved).max(axis=1) > _SET.far
-            rows = rows[(size > _SET.near_enough) | far]
+            if again:
+                rows = rows[(size > _SET.near_enough) | (np.abs(moved).max(axis=1) > _SET.far)]
         return z, factor
 
     def _descend(
