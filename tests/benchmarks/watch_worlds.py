@@ -56,8 +56,6 @@ ON_A_BRIDGE = 6
 SCENARIOS: dict[str, tuple[str, dict[str, Any]]] = {
     "quiet": ("none", {}),
     "creep": ("none", {}),
-    "step1": ("tension_step", {"size": -0.01}),
-    "step2": ("tension_step", {"size": -0.02}),
     "step3": ("tension_step", {"size": -0.03}),
     "step5": ("tension_step", {"size": -0.05}),
     "step10": ("tension_step", {"size": -0.10}),
@@ -66,7 +64,6 @@ SCENARIOS: dict[str, tuple[str, dict[str, Any]]] = {
     "ramp2": ("tension_ramp", {"size": -0.02}),
     "ramp5": ("tension_ramp", {"size": -0.05}),
     "springs": ("springs", {"size": 1 / 3}),
-    "springs10": ("springs", {"size": 1 / 10}),
     "lamp": ("lamp", {"size": 8.0}),
     "clock": ("clock", {"size": 0.002}),
     "section": ("section_loss", {"size": 0.10}),

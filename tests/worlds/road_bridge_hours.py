@@ -245,7 +245,7 @@ def hourly(
     at = np.arange(first, min(first + round(years * 8766), len(drive.tension)))
     if not len(at) or first < 0:
         raise ValueError(f"this world knows {YEARS:g} years from {EPOCH:%Y-%m-%d} on")
-    tension = np.log(drive.tension[at] * _kept(number, at + 0.5, changes))
+    tension = np.log(drive.tension[at] * _kept(number, at.astype(float) + 0.5, changes))
     softened = SOFTENING_PER_K * (drive.warm_c[at] - REFERENCE_C)
     rng = np.random.default_rng([seed, number, 3])
     noise = rng.uniform(1.0, 2.0, (2, ORDERS))

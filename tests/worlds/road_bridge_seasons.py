@@ -388,7 +388,7 @@ def lasting(
             tension[lost] -= gain / GAINED
             for other in neighbours(lost):
                 tension[other] += gain
-    return tension
+    return np.asarray(tension)
 
 
 def neighbours(number: int) -> list[int]:
