@@ -11,7 +11,7 @@ import numpy as np
 from shm.models.as_made import TENSION, AsMade
 from shm.models.base import Conditions, point_mass
 from shm.models.beam import Beam
-from shm.models.effects import EFFECTS, Parameter, Variant, parameters_of
+from shm.models.effects import EFFECTS, Case, Parameter, Variant, parameters_of
 from shm.models.hanger import HangerModes, PhysicalHanger, solve
 from shm.values import FloatArray
 
@@ -80,7 +80,8 @@ class HangerWithEffects:
         at = self._first
         for (name, variant), count in zip(self.effects, self._counts, strict=True):
             values = theta[:, at : at + count]
-            physical = EFFECTS[name].applied(physical, values, variant, conditions, self.hanger)
+            case = Case(self.hanger, variant, conditions)
+            physical = EFFECTS[name].act(physical, values, case)
             at += count
         physical = self._with_sag(physical, made, theta)
         added = conditions.added_mass

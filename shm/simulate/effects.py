@@ -10,7 +10,7 @@ import numpy as np
 
 from shm.errors import UsageError
 from shm.models.base import Conditions
-from shm.models.effects import EFFECTS, Effect, Survey, Variant
+from shm.models.effects import EFFECTS, Case, Effect, Survey, Variant
 from shm.models.hanger import PhysicalHanger, PointMass
 from shm.values import PLANES, AddedMass, FloatArray, Hanger
 
@@ -44,7 +44,7 @@ def plant_effects(
         effect = _find_effect(planted.name)
         variant = _find_variant(effect, planted.at, hanger, survey)
         values = _order_values(planted, effect, hanger, variant)
-        bar = effect.applied(bar, values, variant, conditions, hanger)
+        bar = effect.act(bar, values, Case(hanger, variant, conditions))
     added = conditions.added_mass
     return bar if added is None else _clamp_mass_on(bar, added)
 

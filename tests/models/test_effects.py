@@ -10,6 +10,7 @@ import pytest
 
 from shm.models.effects import (
     EFFECTS,
+    Case,
     Conditions,
     Survey,
     Variant,
@@ -70,7 +71,8 @@ def acting(
 ) -> PhysicalHanger:
     test = variant.test or conditions.test
     values = at_size(name, variant, zero, shares)
-    return EFFECTS[name].applied(bar(), values, variant, replace(conditions, test=test), HANGER_3)
+    case = Case(HANGER_3, variant, replace(conditions, test=test))
+    return EFFECTS[name].act(bar(), values, case)
 
 
 def felt(physical: PhysicalHanger) -> dict[str, np.ndarray]:

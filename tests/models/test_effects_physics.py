@@ -14,7 +14,7 @@ import pytest
 from scipy.optimize import brentq
 
 from shm.models import THESIS, build
-from shm.models.effects import EFFECTS, Conditions, Survey, Variant, parameters_of
+from shm.models.effects import EFFECTS, Case, Conditions, Survey, Variant, parameters_of
 from shm.models.hanger import HangerModes, PhysicalHanger, solve
 from shm.models.hanger.physical import Zone
 from shm.values import PLANES, Hanger
@@ -43,8 +43,8 @@ def physical(
     bare = PhysicalHanger.clamped(hanger, tension_n, sensors=len(PLACES_M))
     if not name:
         return bare
-    return EFFECTS[name].applied(
-        bare, np.array([values]), place(name, at, hanger), conditions, hanger
+    return EFFECTS[name].act(
+        bare, np.array([values]), Case(hanger, place(name, at, hanger), conditions)
     )
 
 
@@ -77,7 +77,7 @@ def test_a_middling_size_moves_what_the_logger_reports(name: str, variant: Varia
     middle = [one.value(np.array([0.7]))[0] for one in parameters_of(name, ROD, variant)]
     conditions = Conditions(variant.test or "t1", 10.0, 1.0, tension_shift_n=2e4)
     bare = physical()
-    with_effect = EFFECTS[name].applied(bare, np.array([middle]), variant, conditions, ROD)
+    with_effect = EFFECTS[name].act(bare, np.array([middle]), Case(ROD, variant, conditions))
     one, other = solved(bare), solved(with_effect)
     ratio = np.abs(other.frequency_hz / one.frequency_hz - 1).max()
     turned = np.abs(other.shape - one.shape).max()
@@ -107,12 +107,10 @@ def test_each_other_law_of_a_support_swings_at_a_higher_frequency_of_its_own() -
     values = np.array([[4000.0, 3.0], [np.inf, 3.0]])
     ratios = []
     for law in range(1, len(effect.other_laws) + 1):
-        moved = effect.applied(
+        moved = effect.act(
             PhysicalHanger.clamped(ROD, np.full(2, 711e3)),
             values,
-            replace(at, law=law),
-            Conditions("t1"),
-            ROD,
+            Case(ROD, replace(at, law=law), Conditions("t1")),
         )
         (mode,) = moved.support_modes
         mass_kg, compliance = mode.mass_kg[0, 0, 0], mode.compliance_m_n[0, 0, 0]
@@ -138,7 +136,7 @@ def test_a_loss_with_smooth_edges_is_met_best_by_its_law(law: int, edge: float) 
     wanted = solved(replace(physical(), zones=smooth)).frequency_hz
     values = np.array([[1 - left, middle_m, extent_m]])
     found = [
-        solved(effect.applied(physical(), values, replace(at, law=each), Conditions("t1"), ROD))
+        solved(effect.act(physical(), values, Case(ROD, replace(at, law=each), Conditions("t1"))))
         for each in range(len(effect.other_laws) + 1)
     ]
     off = [np.abs(each.frequency_hz / wanted - 1).max() for each in found]
@@ -167,8 +165,8 @@ def test_only_the_joints_part_of_an_end_spring_damps() -> None:
     bare = replace(
         physical(), rotational_compliance_rad_n_m=np.full((1, 2, 2, 2), 3e-7) * np.eye(2)
     )
-    joint = EFFECTS["joint_softening"].applied(
-        bare, np.array([[7.0]]), place("joint_softening", "deck end"), Conditions(), ROD
+    joint = EFFECTS["joint_softening"].act(
+        bare, np.array([[7.0]]), Case(ROD, place("joint_softening", "deck end"))
     )
     np.testing.assert_allclose(joint.joint_loss_factor, [[0.1 * 0.25, 0.0]])
 
@@ -202,7 +200,7 @@ def test_another_law_of_an_effect_does_nearly_the_same(
     """It changes frequencies by some percent of what the effect itself changes."""
     own = physical(name, place_of(name), values)
     variant = replace(place(name, place_of(name)), law=1)
-    other = EFFECTS[name].applied(physical(), np.array([values]), variant, Conditions("t1"), ROD)
+    other = EFFECTS[name].act(physical(), np.array([values]), Case(ROD, variant, Conditions("t1")))
     bare, by_own, by_other = (solved(each).frequency_hz[0] for each in (physical(), own, other))
     apart = np.abs(by_other - by_own).max() / np.abs(by_own - bare).max()
     assert 1e-3 < apart < 0.3

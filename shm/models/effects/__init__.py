@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from shm.errors import BadInput
 from shm.models.base import Conditions
-from shm.models.effects.base import Effect, Parameter, Survey, Variant
+from shm.models.effects.base import Case, Effect, Parameter, Survey, Variant
 from shm.models.effects.of_ends import (
     EffectiveLength,
     RotationalEndFlexibility,
@@ -48,6 +48,7 @@ from shm.values import PLANES, EffectPrior, Hanger
 
 __all__ = [
     "EFFECTS",
+    "Case",
     "Conditions",
     "Effect",
     "Parameter",

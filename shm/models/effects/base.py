@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -59,6 +59,15 @@ class Variant:
     @property
     def key(self) -> str:
         return self.at.replace(", ", ".").replace(" ", "_")
+
+
+@dataclass(frozen=True)
+class Case:
+    """The hanger that an effect acts on, where it acts, and the test's conditions."""
+
+    hanger: Hanger
+    variant: Variant = Variant()
+    conditions: Conditions = field(default_factory=Conditions)
 
 
 @dataclass(frozen=True)
@@ -166,15 +175,8 @@ class Effect:
             raise TypeError(f"{type(self).__name__} declares no parameters.")
         return (self.size,)
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        """The hangers (n) with this effect of `values` (n, parameters) in one test.
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        """Return the bars (n) with this effect of `values` (n, parameters) in one test.
 
         With the size at its `zero` they are the same.
         """

@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models.base import Conditions
 from shm.models.effects import base
-from shm.models.effects.base import GRADUAL, Effect, Parameter, Survey, Variant
+from shm.models.effects.base import GRADUAL, Case, Effect, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger, SupportMode, Zone
 from shm.values import NAN, PLANES, FloatArray, Hanger
 
@@ -57,21 +56,14 @@ class RotationalEndFlexibility(Effect):
             for plane in base.free_planes(variant)
         )
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        compliance = physical.rotational_compliance_rad_n_m.copy()
-        for end in variant.ends:
-            for plane in variant.planes:
-                column = 0 if variant.alike else variant.planes.index(plane)
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        compliance = bar.rotational_compliance_rad_n_m.copy()
+        for end in case.variant.ends:
+            for plane in case.variant.planes:
+                column = 0 if case.variant.alike else case.variant.planes.index(plane)
                 own, added = compliance[:, end, plane, plane], 10.0 ** -values[:, column]
                 compliance[:, end, plane, plane] = np.where(np.isinf(own), added, own + added)
-        return replace(physical, rotational_compliance_rad_n_m=compliance)
+        return replace(bar, rotational_compliance_rad_n_m=compliance)
 
 
 # Judgement: three decades from a support about as soft as the bar to one that gives way by less
@@ -116,20 +108,13 @@ class TranslationalEndFlexibility(Effect):
             for plane in base.free_planes(variant)
         )
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        compliance = physical.translational_compliance_m_n.copy()
-        for end in variant.ends:
-            for plane in variant.planes:
-                column = 0 if variant.alike else variant.planes.index(plane)
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        compliance = bar.translational_compliance_m_n.copy()
+        for end in case.variant.ends:
+            for plane in case.variant.planes:
+                column = 0 if case.variant.alike else case.variant.planes.index(plane)
                 compliance[:, end, plane] += 10.0 ** -values[:, column]
-        return replace(physical, translational_compliance_m_n=compliance)
+        return replace(bar, translational_compliance_m_n=compliance)
 
 
 def _lateral_stiffness_n_m(hanger: Hanger) -> float:
@@ -179,19 +164,12 @@ class EffectiveLength(Effect):
         )
         return (size,)
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        each = values[:, 0] / len(variant.ends)
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        each = values[:, 0] / len(case.variant.ends)
         return replace(
-            physical,
-            deck_end_m=physical.deck_end_m - each * (0 in variant.ends),
-            arch_end_m=physical.arch_end_m + each * (1 in variant.ends),
+            bar,
+            deck_end_m=bar.deck_end_m - each * (0 in case.variant.ends),
+            arch_end_m=bar.arch_end_m + each * (1 in case.variant.ends),
         )
 
 
@@ -244,27 +222,20 @@ class StiffEndZones(Effect):
         )
         return size, ratio
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        deck_m, arch_m = physical.deck_end_m, physical.arch_end_m
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        deck_m, arch_m = bar.deck_end_m, bar.arch_end_m
         reach_m, ratio = values.T
         same = np.ones_like(ratio)
         zones = []
-        for step, times in _steps(ratio, variant.law):
+        for step, times in _steps(ratio, case.variant.law):
             factor = np.ones((len(ratio), len(PLANES)))
-            factor[:, list(variant.planes)] = times[:, None]
+            factor[:, list(case.variant.planes)] = times[:, None]
             both = (
                 Zone(deck_m, deck_m + step * reach_m, factor, same),
                 Zone(arch_m - step * reach_m, arch_m, factor, same),
             )
-            zones += [both[end] for end in variant.ends]
-        return replace(physical, zones=(*physical.zones, *zones))
+            zones += [both[end] for end in case.variant.ends]
+        return replace(bar, zones=(*bar.zones, *zones))
 
 
 def _steps(ratio: FloatArray, law: int) -> list[tuple[float, FloatArray]]:
@@ -342,28 +313,20 @@ class SupportMotion(Effect):
         )
         return size, frequency
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         mass_kg, frequency_hz = values.T
-        where = (slice(None), variant.ends[0], variant.planes[0])
-        first = _mode(physical, where, mass_kg, frequency_hz)
-        physical = replace(
-            physical,
-            translational_compliance_m_n=physical.translational_compliance_m_n
-            + first.compliance_m_n,
-            support_mass_kg=physical.support_mass_kg + first.mass_kg,
+        where = (slice(None), case.variant.ends[0], case.variant.planes[0])
+        first = _mode(bar, where, mass_kg, frequency_hz)
+        bar = replace(
+            bar,
+            translational_compliance_m_n=bar.translational_compliance_m_n + first.compliance_m_n,
+            support_mass_kg=bar.support_mass_kg + first.mass_kg,
         )
-        if not variant.law:
-            return physical
-        faster = _FASTER[variant.law - 1]
-        further = _mode(physical, where, _HEAVIER * mass_kg, faster * frequency_hz)
-        return replace(physical, support_modes=(*physical.support_modes, further))
+        if not case.variant.law:
+            return bar
+        faster = _FASTER[case.variant.law - 1]
+        further = _mode(bar, where, _HEAVIER * mass_kg, faster * frequency_hz)
+        return replace(bar, support_modes=(*bar.support_modes, further))
 
 
 def _mode(

@@ -8,9 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models.base import Conditions
 from shm.models.effects import base
-from shm.models.effects.base import GRADUAL, STEEP, Effect, OverTime, Parameter, Survey, Variant
+from shm.models.effects.base import (
+    GRADUAL,
+    STEEP,
+    Case,
+    Effect,
+    OverTime,
+    Parameter,
+    Survey,
+    Variant,
+)
 from shm.models.hanger.physical import LateralSpring, PhysicalHanger, PointMass
 from shm.values import NAN, FloatArray, Hanger
 
@@ -45,16 +53,9 @@ class DistributedMass(Effect):
         spread="logarithmic",
     )
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        mass = physical.mass_per_length_kg_m * (1 + values[:, 0])
-        return replace(physical, mass_per_length_kg_m=mass)
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        mass = bar.mass_per_length_kg_m * (1 + values[:, 0])
+        return replace(bar, mass_per_length_kg_m=mass)
 
 
 class UnknownPointMass(Effect):
@@ -97,20 +98,13 @@ class UnknownPointMass(Effect):
         )
         return size, base.place_along(hanger)
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         mass_kg, x_m = values.T
-        if not variant.law:
-            return replace(physical, masses=(*physical.masses, PointMass(x_m, mass_kg)))
-        gyration_m = hanger.assumptions.clamp_gyration_m.value
+        if not case.variant.law:
+            return replace(bar, masses=(*bar.masses, PointMass(x_m, mass_kg)))
+        gyration_m = case.hanger.assumptions.clamp_gyration_m.value
         halves = [PointMass(x_m + side * gyration_m, mass_kg / 2) for side in (-1, 1)]
-        return replace(physical, masses=(*physical.masses, *halves))
+        return replace(bar, masses=(*bar.masses, *halves))
 
 
 class PartialMass(Effect):
@@ -154,19 +148,12 @@ class PartialMass(Effect):
         )
         return size, base.place_along(hanger), extent
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         change, middle_m, extent_m = values.T
-        reaches = {1: GRADUAL, 2: STEEP}.get(variant.law, (1.0,))
+        reaches = {1: GRADUAL, 2: STEEP}.get(case.variant.law, (1.0,))
         put_on = (1 + change) ** (1 / len(reaches))
         zones = base.nested_zones(middle_m, extent_m, reaches, np.ones_like(change), put_on)
-        return replace(physical, zones=physical.zones + zones)
+        return replace(bar, zones=bar.zones + zones)
 
 
 class SensorMass(Effect):
@@ -207,19 +194,12 @@ class SensorMass(Effect):
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return (Variant("all sensors", places_m=survey.sensor_places_m),)
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         mass_kg = values[:, 0]
         added = tuple(
-            PointMass(np.full_like(mass_kg, place_m), mass_kg) for place_m in variant.places_m
+            PointMass(np.full_like(mass_kg, place_m), mass_kg) for place_m in case.variant.places_m
         )
-        return replace(physical, masses=physical.masses + added)
+        return replace(bar, masses=bar.masses + added)
 
 
 class IntermediateSupport(Effect):
@@ -253,18 +233,11 @@ class IntermediateSupport(Effect):
         )
         return size, base.place_along(hanger)
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        stiffness = np.zeros_like(physical.bending_stiffness_n_m2)
-        stiffness[:, list(variant.planes)] = values[:, :1]
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        stiffness = np.zeros_like(bar.bending_stiffness_n_m2)
+        stiffness[:, list(case.variant.planes)] = values[:, :1]
         spring = LateralSpring(values[:, 1], stiffness, np.zeros(len(values)))
-        return replace(physical, springs=(*physical.springs, spring))
+        return replace(bar, springs=(*bar.springs, spring))
 
 
 def _lateral_stiffness_n_m(hanger: Hanger) -> float:

@@ -7,9 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models.base import Conditions
 from shm.models.effects import base
-from shm.models.effects.base import GRADUAL, STEEP, Effect, OverTime, Parameter, Survey, Variant
+from shm.models.effects.base import (
+    GRADUAL,
+    STEEP,
+    Case,
+    Effect,
+    OverTime,
+    Parameter,
+    Survey,
+    Variant,
+)
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import NAN, FloatArray, Hanger
 
@@ -60,17 +68,10 @@ class BendingStiffness(Effect):
         round_section = math.isfinite(hanger.diameter_m)
         return (Variant(),) if round_section else base.planes(survey)
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        factor = np.ones_like(physical.bending_stiffness_n_m2)
-        factor[:, list(variant.planes)] += values[:, :1]
-        return replace(physical, bending_stiffness_n_m2=physical.bending_stiffness_n_m2 * factor)
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        factor = np.ones_like(bar.bending_stiffness_n_m2)
+        factor[:, list(case.variant.planes)] += values[:, :1]
+        return replace(bar, bending_stiffness_n_m2=bar.bending_stiffness_n_m2 * factor)
 
 
 class SectionSize(Effect):
@@ -104,21 +105,14 @@ class SectionSize(Effect):
         most=0.9,
     )
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         area = (1 + values[:, 0]) ** 2
         return replace(
-            physical,
-            mass_per_length_kg_m=physical.mass_per_length_kg_m * area,
-            bending_stiffness_n_m2=physical.bending_stiffness_n_m2 * area[:, None] ** 2,
-            shear_compliance_1_n=physical.shear_compliance_1_n / area,
-            rotary_inertia_kg_m=physical.rotary_inertia_kg_m * area**2,
+            bar,
+            mass_per_length_kg_m=bar.mass_per_length_kg_m * area,
+            bending_stiffness_n_m2=bar.bending_stiffness_n_m2 * area[:, None] ** 2,
+            shear_compliance_1_n=bar.shear_compliance_1_n / area,
+            rotary_inertia_kg_m=bar.rotary_inertia_kg_m * area**2,
         )
 
 
@@ -171,20 +165,13 @@ class SectionLoss(Effect):
         )
         return size, base.place_along(hanger), extent
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         loss, middle_m, extent_m = values.T
-        reaches = {1: GRADUAL, 3: STEEP}.get(variant.law, (1.0,))
-        power = 1 if variant.law == 2 else 2
+        reaches = {1: GRADUAL, 3: STEEP}.get(case.variant.law, (1.0,))
+        power = 1 if case.variant.law == 2 else 2
         left = (1 - loss) ** (1 / len(reaches))
         zones = base.nested_zones(middle_m, extent_m, reaches, left**power, left)
-        return replace(physical, zones=physical.zones + zones)
+        return replace(bar, zones=bar.zones + zones)
 
 
 class ShearAndRotaryInertia(Effect):
@@ -215,19 +202,12 @@ class ShearAndRotaryInertia(Effect):
         least=0.0,
     )
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        density_kg_m3 = hanger.mass_per_length_kg_m / hanger.area_m2
-        inertia_kg_m = density_kg_m3 * hanger.second_moment_m4
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        density_kg_m3 = case.hanger.mass_per_length_kg_m / case.hanger.area_m2
+        inertia_kg_m = density_kg_m3 * case.hanger.second_moment_m4
         share = values[:, 0]
         return replace(
-            physical,
-            shear_compliance_1_n=physical.shear_compliance_1_n + share / hanger.shear_stiffness_n,
-            rotary_inertia_kg_m=physical.rotary_inertia_kg_m + share * inertia_kg_m,
+            bar,
+            shear_compliance_1_n=bar.shear_compliance_1_n + share / case.hanger.shear_stiffness_n,
+            rotary_inertia_kg_m=bar.rotary_inertia_kg_m + share * inertia_kg_m,
         )

@@ -10,9 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models.base import Conditions
 from shm.models.effects import base
-from shm.models.effects.base import Effect, OverTime, Parameter, Survey, Variant
+from shm.models.effects.base import Case, Effect, OverTime, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import NAN, FloatArray, Hanger
 
@@ -59,17 +58,10 @@ class Timebase(Effect):
         one = tuple(Variant(f"test {test}", test=test) for test in survey.tests)
         return (Variant("all tests"), *one) if len(one) > 1 else (Variant("all tests"),)
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        if variant.test and variant.test != conditions.test:
-            return physical
-        return replace(physical, clock_factor=physical.clock_factor * (1 + values[:, 0]))
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        if case.variant.test and case.variant.test != case.conditions.test:
+            return bar
+        return replace(bar, clock_factor=bar.clock_factor * (1 + values[:, 0]))
 
 
 _FEWEST_DECIMALS, _MOST_DECIMALS = 2, 9  # technical: a tape's centimetre, and what ends the search
@@ -114,20 +106,12 @@ class SensorMisalignment(Effect):
         )
         return (Variant("all sensors"), *each) if len(places_m) > 1 else each
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        turn = physical.sensor_turn_rad.copy()
-        turned = (
-            slice(None) if variant.sensor is None else slice(variant.sensor, variant.sensor + 1)
-        )
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        turn = bar.sensor_turn_rad.copy()
+        sensor = case.variant.sensor
+        turned = slice(None) if sensor is None else slice(sensor, sensor + 1)
         turn[:, turned] += np.radians(values[:, :1])
-        return replace(physical, sensor_turn_rad=turn)
+        return replace(bar, sensor_turn_rad=turn)
 
 
 def _decimals(places_m: tuple[float, ...]) -> int:
@@ -184,20 +168,13 @@ class SkewedPrincipalAxes(Effect):
         )
         return base.rotational_stiffness("log10_k", hanger), angle
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         angle = np.radians(values[:, 1])
         axis = np.stack([np.cos(angle), np.sin(angle)], axis=1)
         own = 10.0 ** -values[:, 0, None, None] * axis[:, :, None] * axis[:, None, :]
-        compliance = physical.rotational_compliance_rad_n_m.copy()
-        compliance[:, list(variant.ends)] += own[:, None]
-        return replace(physical, rotational_compliance_rad_n_m=compliance)
+        compliance = bar.rotational_compliance_rad_n_m.copy()
+        compliance[:, list(case.variant.ends)] += own[:, None]
+        return replace(bar, rotational_compliance_rad_n_m=compliance)
 
 
 class LoadScale(Effect):
@@ -243,15 +220,8 @@ class LoadScale(Effect):
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return (Variant("all readings"),)
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         error = values[:, 0]
-        known = math.isfinite(hanger.scatter.tension)
-        read_n = physical.tension_n if known else conditions.tension_shift_n
-        return replace(physical, tension_n=physical.tension_n - read_n * error / (1 + error))
+        known = math.isfinite(case.hanger.scatter.tension)
+        read_n = bar.tension_n if known else case.conditions.tension_shift_n
+        return replace(bar, tension_n=bar.tension_n - read_n * error / (1 + error))

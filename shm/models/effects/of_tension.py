@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.models.base import Conditions
 from shm.models.effects import base
-from shm.models.effects.base import Effect, Parameter, Survey, Variant
+from shm.models.effects.base import Case, Effect, Parameter, Survey, Variant
 from shm.models.hanger.physical import PhysicalHanger
 from shm.values import FloatArray, Hanger
 
@@ -67,16 +66,9 @@ class TemperatureTension(Effect):
         )
         return (size,)
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        added_n = values[:, 0] * conditions.temperature_shift_k
-        return replace(physical, tension_n=physical.tension_n + added_n)
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        added_n = values[:, 0] * case.conditions.temperature_shift_k
+        return replace(bar, tension_n=bar.tension_n + added_n)
 
 
 def _range(temperatures_c: tuple[float, ...]) -> float:
@@ -116,17 +108,10 @@ class GeometricHardening(Effect):
             return "It takes a tension between two ends that are held."
         return missing_levels(survey)
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        power = _DYING if variant.law else 2.0
-        factor = 1 + values[:, 0] * conditions.amplitude**power
-        return replace(physical, tension_n=physical.tension_n * factor)
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        power = _DYING if case.variant.law else 2.0
+        factor = 1 + values[:, 0] * case.conditions.amplitude**power
+        return replace(bar, tension_n=bar.tension_n * factor)
 
 
 class JointSoftening(Effect):
@@ -161,24 +146,17 @@ class JointSoftening(Effect):
     def parameters(self, hanger: Hanger, variant: Variant) -> tuple[Parameter, ...]:
         return (base.rotational_stiffness("log10_k_at_reference_level", hanger),)
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        ends = list(variant.ends)
-        power = _SLIP if variant.law else 1.0
-        own = conditions.amplitude**power * 10.0 ** -values[:, 0]
-        compliance = physical.rotational_compliance_rad_n_m.copy()
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        ends = list(case.variant.ends)
+        power = _SLIP if case.variant.law else 1.0
+        own = case.conditions.amplitude**power * 10.0 ** -values[:, 0]
+        compliance = bar.rotational_compliance_rad_n_m.copy()
         compliance[:, ends] += own[:, None, None, None] * np.eye(2)
-        loss = physical.joint_loss_factor.copy()
-        loss[:, ends] += (_LOSS_AT_REFERENCE_LEVEL * conditions.amplitude - loss[:, ends]) * (
+        loss = bar.joint_loss_factor.copy()
+        loss[:, ends] += (_LOSS_AT_REFERENCE_LEVEL * case.conditions.amplitude - loss[:, ends]) * (
             _share(own, compliance[:, ends])
         )
-        return replace(physical, rotational_compliance_rad_n_m=compliance, joint_loss_factor=loss)
+        return replace(bar, rotational_compliance_rad_n_m=compliance, joint_loss_factor=loss)
 
 
 def _share(own: FloatArray, compliance: FloatArray) -> FloatArray:
@@ -225,18 +203,11 @@ class Sag(Effect):
     def variants(self, hanger: Hanger, survey: Survey) -> tuple[Variant, ...]:
         return base.single_planes(survey)
 
-    def applied(
-        self,
-        physical: PhysicalHanger,
-        values: FloatArray,
-        variant: Variant,
-        conditions: Conditions,
-        hanger: Hanger,
-    ) -> PhysicalHanger:
-        parameter = physical.sag_parameter.copy()
-        parameter[:, list(variant.planes)] += values[:, :1]
-        as_it_bends = physical.sags_as_it_bends or variant.law == 1
-        return replace(physical, sag_parameter=parameter, sags_as_it_bends=as_it_bends)
+    def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
+        parameter = bar.sag_parameter.copy()
+        parameter[:, list(case.variant.planes)] += values[:, :1]
+        as_it_bends = bar.sags_as_it_bends or case.variant.law == 1
+        return replace(bar, sag_parameter=parameter, sags_as_it_bends=as_it_bends)
 
 
 def missing_levels(survey: Survey) -> str:
