@@ -258,14 +258,28 @@ class ChangePoint:
             (by_years[1] - start * by_years[0])[:, null, change],
         ]
         own_pull = [pulls[0][:, change], (pulls[1] - start[..., 0] * pulls[0])[:, change]]
-        shape = (len(beginnings), 2, len(self.hypotheses.directions), len(self.options.sizes))
-        found = np.full(shape, -np.inf)
-        sizes = np.array(self.options.sizes)
-        for kind in (STEP, RAMP):
-            turned = np.swapaxes(crossed[kind], 1, 2)
-            information = own[kind] - turned @ covariance @ crossed[kind]
-            left = own_pull[kind] - (turned @ mean[..., None])[..., 0]
-            for d, direction in enumerate(self.hypotheses.directions):
+        moments = tuple(zip(own, crossed, own_pull, strict=True))
+        gains = self._gains(covariance, mean, moments)
+        found = bound[:, None, None, None] + gains
+        return Screen(found, before, since, at_visit, total, pull, moments)
+
+    def _gains(
+        self,
+        covariance: FloatArray,
+        mean: FloatArray,
+        moments: Sequence[tuple[FloatArray, FloatArray, FloatArray]],
+    ) -> FloatArray:
+        """Return what each change (B, kinds, D, sizes) adds to the log evidence, with its prior.
+
+        `covariance` (B, p, p) and `mean` (B, p) are the null's without a change.
+        """
+        directions, sizes = self.hypotheses.directions, np.array(self.options.sizes)
+        found = np.full((len(mean), 2, len(directions), len(sizes)), -np.inf)
+        for kind, (own, crossed, pull) in enumerate(moments):
+            turned = np.swapaxes(crossed, 1, 2)
+            information = own - turned @ covariance @ crossed
+            left = pull - (turned @ mean[..., None])[..., 0]
+            for d, direction in enumerate(directions):
                 if kind == RAMP and not direction.may_ramp:
                     continue
                 inner = direction.factor.T @ information @ direction.factor
@@ -275,9 +289,8 @@ class ChangePoint:
                 grown = 1 + sizes**2 * strength
                 gain = ((sizes * along) ** 2 / grown - np.log(grown)).sum(axis=1) / 2
                 prior = [self._log_prior((0, kind, d, size)) for size in range(len(sizes))]
-                found[:, kind, d] = bound[:, None] + gain + prior
-        moments = tuple(zip(own, crossed, own_pull, strict=True))
-        return Screen(found, before, since, at_visit, total, pull, moments)
+                found[:, kind, d] = gain + prior
+        return found
 
     def _to_refine(self, log_mass: FloatArray) -> list[tuple[int, int, int, int]]:
         """Return the changes to look at closely: the most probable, and those of other causes."""
@@ -349,6 +362,75 @@ class Screen:
         return Fit(float(self.log_evidence[place]), self.labels(at), mean, covariance)
 
 
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """The normal equations of parameters: the null's, and the unit normals of a change.
+
+    `factor` (n + q, r) is that of the change, `gates` (T J,) by how much it has come at each test.
+    """
+
+    sums: Sums
+    factor: FloatArray
+    gates: FloatArray
+    counts: FloatArray
+
+    @cached_property
+    def cross(self) -> FloatArray:
+        """Z'Wy of each test and label (T J, p)."""
+        return self.sums.cross.reshape(self.sums.constant.size, -1)
+
+    @cached_property
+    def precision(self) -> FloatArray:
+        """The prior precision of all parameters."""
+        size, r = self.sums.null, self.factor.shape[1]
+        found = np.zeros((size + r, size + r))
+        found[:size, :size] = self.sums.precision
+        found[size:, size:] = np.eye(r)
+        return found
+
+    def normal_equations(self, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the matrix (S, p, p) and the pull (S, p) with weights (S, T J) of the labels."""
+        (square, crossed, own), size = self.sums.blocks, self.sums.null
+        gated = weight * self.gates
+        matrix = np.tile(self.precision, (len(weight), 1, 1))
+        matrix[:, :size, :size] += np.tensordot(weight, square, 1)
+        pull = np.zeros((len(weight), len(self.precision)))
+        pull[:, :size] = weight @ self.cross[:, :size]
+        if self.factor.shape[1]:
+            corner = np.tensordot(gated, crossed, 1) @ self.factor
+            matrix[:, :size, size:] += corner
+            matrix[:, size:, :size] += np.swapaxes(corner, 1, 2)
+            inner = np.tensordot(gated * self.gates, own, 1)
+            matrix[:, size:, size:] += self.factor.T @ inner @ self.factor
+            pull[:, size:] = (gated @ self.cross[:, size:]) @ self.factor
+        return matrix, pull
+
+    def log_density(self, mean: FloatArray, covariance: FloatArray) -> FloatArray:
+        """Return that of each test and label (S, T J), over parameters of these moments."""
+        (square, crossed, own), size = self.sums.blocks, self.sums.null
+        second = mean[:, :, None] * mean[:, None, :] + covariance
+        found = self.sums.constant.reshape(-1) + mean[:, :size] @ self.cross[:, :size].T
+        found = found - _traces(second[:, :size, :size], square) / 2
+        if self.factor.shape[1]:
+            moved = mean[:, size:] @ self.factor.T
+            both = second[:, :size, size:] @ self.factor.T
+            alone = self.factor @ second[:, size:, size:] @ self.factor.T
+            of_both = moved @ self.cross[:, size:].T - _traces(both, crossed)
+            found = found + self.gates * of_both - self.gates**2 * _traces(alone, own) / 2
+        return np.asarray(found)
+
+    def relabelled(self, labels: FloatArray, log_density: FloatArray) -> FloatArray:
+        """Return labels (S, visits, J) by the density of their tests, and how often each came in
+        the other visits (Asuncion et al. 2009)."""
+        of_tests = log_density.reshape(len(labels), *self.sums.constant.shape)
+        begins = np.flatnonzero(np.diff(self.sums.visit, prepend=-1))
+        seen = labels.sum(axis=1, keepdims=True) - labels
+        found = np.add.reduceat(of_tests, begins, axis=1)
+        found = found + np.log(self.counts + np.maximum(seen, 0.0))
+        found = np.exp(found - found.max(axis=2, keepdims=True))
+        return np.asarray(found / found.sum(axis=2, keepdims=True))
+
+
 def _climb(
     sums: Sums,
     change: tuple[FloatArray, FloatArray] | None,
@@ -361,61 +443,28 @@ def _climb(
     A `change` is its factor (n + q, r) and by how much it has come at each test (T,). `counts` (J,)
     are the prior's of labels.
     """
-    tests, labels_of = sums.constant.shape
-    square, crossed, own = sums.blocks
-    size = sums.null
-    cross = sums.cross.reshape(tests * labels_of, -1)
-    factor, gate = change if change else (np.zeros((own.shape[1], 0)), np.zeros(tests))
-    r = factor.shape[1]
-    gates = np.repeat(gate, labels_of)
-    precision = np.zeros((size + r, size + r))
-    precision[:size, :size] = sums.precision
-    precision[size:, size:] = np.eye(r)
-    log_det = np.linalg.slogdet(sums.precision)[1]
-    begin_visit = np.flatnonzero(np.diff(sums.visit, prepend=-1))
+    tests, kinds = sums.constant.shape
+    none = np.zeros((sums.cross.shape[2] - sums.null, 0)), np.zeros(tests)
+    factor, gate = change or none
+    model = _Model(sums, factor, np.repeat(gate, kinds), counts)
     labels = starts
     for left in range(rounds, -1, -1):
         weight = labels[:, sums.visit].reshape(len(labels), -1)
-        matrix = np.tile(precision, (len(labels), 1, 1))
-        matrix[:, :size, :size] += np.tensordot(weight, square, 1)
-        pull = np.zeros((len(labels), size + r))
-        pull[:, :size] = weight @ cross[:, :size]
-        if r:
-            corner = np.tensordot(weight * gates, crossed, 1) @ factor
-            matrix[:, :size, size:] += corner
-            matrix[:, size:, :size] += np.swapaxes(corner, 1, 2)
-            matrix[:, size:, size:] += factor.T @ np.tensordot(weight * gates**2, own, 1) @ factor
-            pull[:, size:] = ((weight * gates) @ cross[:, size:]) @ factor
-        lower = np.linalg.cholesky(matrix)
-        half = np.linalg.solve(lower, pull[..., None])[..., 0]
+        matrix, pull = model.normal_equations(weight)
         covariance = np.linalg.inv(matrix)
         mean = (covariance @ pull[..., None])[..., 0]
-        seen = labels.sum(axis=1)
-        if not left:
-            break
-        second = mean[:, :, None] * mean[:, None, :] + covariance
-        of_null = second[:, :size, :size].reshape(len(labels), -1)
-        log_density = sums.constant.reshape(-1) + mean[:, :size] @ cross[:, :size].T
-        log_density = log_density - of_null @ square.reshape(len(square), -1).T / 2
-        if r:
-            moved = mean[:, size:] @ factor.T
-            both = (second[:, :size, size:] @ factor.T).reshape(len(labels), -1)
-            alone = (factor @ second[:, size:, size:] @ factor.T).reshape(len(labels), -1)
-            of_both = moved @ cross[:, size:].T - both @ crossed.reshape(len(crossed), -1).T
-            of_change = alone @ own.reshape(len(own), -1).T / 2
-            log_density = log_density + gates * of_both - gates**2 * of_change
-        of_tests = log_density.reshape(len(labels), tests, labels_of)
-        of_visits = np.add.reduceat(of_tests, begin_visit, axis=1)
-        # How often each label came in the other visits (Asuncion et al. 2009).
-        of_visits = of_visits + np.log(counts + np.maximum(seen[:, None] - labels, 0.0))
-        of_visits = of_visits - of_visits.max(axis=2, keepdims=True)
-        labels = np.exp(of_visits)
-        labels = labels / labels.sum(axis=2, keepdims=True)
-    bound = weight @ sums.constant.reshape(-1) + (half**2).sum(axis=1) / 2 + log_det / 2
-    bound -= np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
-    bound += _entropy(labels).sum(axis=1) + _log_dirichlet(counts, seen)
+        if left:
+            labels = model.relabelled(labels, model.log_density(mean, covariance))
+    bound = weight @ sums.constant.reshape(-1) + (pull * mean).sum(axis=1) / 2
+    bound += (np.linalg.slogdet(sums.precision)[1] - np.linalg.slogdet(matrix)[1]) / 2
+    bound += _entropy(labels).sum(axis=1) + _log_dirichlet(counts, labels.sum(axis=1))
     best = int(bound.argmax())
     return Fit(float(bound[best]), labels[best], mean[best], covariance[best])
+
+
+def _traces(moments: FloatArray, blocks: FloatArray) -> FloatArray:
+    """Return the sums of products (S, T J) of moments (S, a, b) and blocks (T J, a, b)."""
+    return np.asarray(moments.reshape(len(moments), -1) @ blocks.reshape(len(blocks), -1).T)
 
 
 def _entropy(labels: FloatArray) -> FloatArray:

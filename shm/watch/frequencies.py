@@ -2,7 +2,7 @@
 
 No beam, no plane, no posterior. Each frequency is a quantity with its own coefficients of
 temperature, frost and excitation. All may move alike (mass, stiffness, a clock), one alone, or each
-by its own amount. The decision is that of the watch of a hanger (`change_point`).
+by its own amount. The decision is that of the watch of a hanger (`changepoint`).
 
 Ambient tests come daily, and most of what moves their frequencies goes on for weeks: moisture,
 ice in the joints, ballast. So tests of three days are pooled, each mode by its median, and all

@@ -149,12 +149,12 @@ class Watcher:
         return history, found
 
     def _outlier_probability(self, evidence: Evidence, probability: float) -> float:
-        """Return the probability that the last visit is an error of the measurement."""
-        is_error = [False, *(each.is_error for each in self.hypotheses.disturbances)]
-        found = float(evidence.null.labels[-1, is_error].sum())
+        """Return the probability that the last visit is disturbed so that it is to be repeated."""
+        is_odd = [False, *(not each.passes for each in self.hypotheses.disturbances)]
+        found = float(evidence.null.labels[-1, is_odd].sum())
         if not (evidence.is_open and evidence.changes):
             return found
-        changed = float(evidence.changes[0].fit.labels[-1, is_error].sum())
+        changed = float(evidence.changes[0].fit.labels[-1, is_odd].sum())
         return probability * changed + (1 - probability) * found
 
     def _against_baseline(self, history: History) -> int:
@@ -187,7 +187,8 @@ class Watcher:
         n, steps = self.hypotheses.n, [each.step_sd for each in self.quantities]
         least = np.concatenate([np.full(n, 1e-5), 1e-3 * np.array(steps)])
         covariance = np.diag(least**2)
-        shares = np.maximum(evidence.shares.sum(axis=(0, 1)), _LEAST_SHARE)
+        shares = evidence.shares.sum(axis=(0, 1))
+        shares[:, 0] = np.maximum(shares[:, 0], _LEAST_SHARE)
         for direction, by_size in zip(evidence.directions, shares, strict=True):
             for share, size in zip(by_size, self.options.sizes, strict=True):
                 covariance += share * size**2 * direction.factor @ direction.factor.T
