@@ -22,9 +22,10 @@ class Disturbance:
 
     `share` is that of visits, before any test. Standard deviations: `tension` of the logarithm of
     the tension; `springs` of each spring, in its steps; `common` of all log frequencies alike;
-    `each` of every log frequency. `stays` is the probability that it is still there at the next
-    visit. An `is_error` one is of the measurement. Unless it `passes` for a matter of course, the
-    test is to be repeated.
+    `each` of every log frequency. What `recurs` is so many times as much, and alike each time: a
+    joint that gives does so to the same place. `stays` is the probability that it is still there
+    at the next visit. An `is_error` one is of the measurement. Unless it `passes` for a matter of
+    course, the test is to be repeated.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Disturbance:
     springs: float = 0.0
     common: float = 0.0
     each: float = 0.0
+    recurs: float = 0.0
     stays: float = 0.0
     is_error: bool = False
     passes: bool = False
@@ -62,10 +64,14 @@ class Disturbance:
 
 
 OF_HANGERS = (
-    Disturbance("a joint gives", 0.12, springs=3.0, each=0.002, stays=0.3, passes=True),
-    Disturbance("a load beside the hanger", 0.03, tension=0.06, each=0.0005, stays=0.3),
+    Disturbance(
+        "a joint gives", 0.06, springs=1.0, each=0.0005, recurs=3.0, stays=0.3, passes=True
+    ),
+    Disturbance(
+        "a load beside the hanger", 0.03, tension=0.06, each=0.0005, stays=0.3, passes=True
+    ),
     Disturbance("another clock or sensors", 0.01, common=0.1, each=0.05, is_error=True),
-    Disturbance("another hanger", 0.004, tension=1.0, springs=10.0, each=0.002, is_error=True),
+    Disturbance("another hanger", 0.01, tension=1.0, springs=10.0, each=0.0005, is_error=True),
     Disturbance("gross", 0.001, common=1.0, each=0.05, is_error=True),
 )
 OF_FREQUENCIES = (

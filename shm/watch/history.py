@@ -233,13 +233,17 @@ class LinearModel:
             shared = shared + together[:, None, None, None] * slow
         own = np.where(np.isfinite(history.variances), history.variances, _ABSENT)
         weight = np.linalg.inv(shared + own[:, None, :, None] * np.eye(n))
-        weighted = weight @ design[:, None]
+        weighted = weight @ design
         of_values = np.einsum("tjik,tk->tji", weight, values)
         constant = np.linalg.slogdet(weight)[1] - np.einsum("tji,ti->tj", of_values, values)
-        null = design.shape[2] - n - hypotheses.q
+        is_error = np.array([False, *(each.is_error for each in hypotheses.disturbances)])
+        begins = np.flatnonzero(np.diff(visit, prepend=-1))
+        checked = begins[begins < self.options.baseline_tests]
+        constant[np.ix_(checked, is_error)] += 2 * np.log(self.options.checked_errors)
+        null = design.shape[3] - n - hypotheses.q
         return Sums(
-            square=np.swapaxes(design, 1, 2)[:, None] @ weighted,
-            cross=np.einsum("tiz,tji->tjz", design, of_values),
+            square=np.swapaxes(design, 2, 3) @ weighted,
+            cross=np.einsum("tjiz,tji->tjz", design, of_values),
             constant=constant / 2,
             null=null,
             precision=self._precision(history),
@@ -248,7 +252,8 @@ class LinearModel:
         )
 
     def _design(self, history: History) -> FloatArray:
-        """Return the columns (T, n, p): of the null, of called changes, of a further change."""
+        """Return the columns (T, J, n, p): of the null, of called changes, of what recurs, of a
+        further change."""
         hypotheses, slopes = self.hypotheses, history.slopes
         tests = history.tests
         level = np.nan_to_num(_levels(history.log_amplitude))[:, None, None]
@@ -268,7 +273,29 @@ class LinearModel:
             parts.append(change * since[:, None, None])
             if is_ramp:
                 parts.append(change * (since * (history.years - years))[:, None, None])
-        return np.concatenate([*parts, change], axis=2)
+        before = np.concatenate(parts, axis=2)[:, None]
+        labels = 1 + len(hypotheses.disturbances)
+        return np.concatenate(
+            [
+                np.broadcast_to(each, (tests, labels, *each.shape[2:]))
+                for each in (before, self._recurring(history), change[:, None])
+            ],
+            axis=3,
+        )
+
+    def _recurring(self, history: History) -> FloatArray:
+        """Return the columns (T, J, n, r) of disturbances that are alike each time."""
+        hypotheses, found = self.hypotheses, []
+        labels = 1 + len(hypotheses.disturbances)
+        for label, each in enumerate(hypotheses.disturbances, 1):
+            if each.recurs:
+                factor = each.recurs * each.factor(hypotheses.quantities, hypotheses.loosening)
+                moved = factor[: hypotheses.n] + history.slopes @ factor[hypotheses.n :]
+                own = np.zeros((history.tests, labels, *moved.shape[1:]))
+                own[:, label] = moved
+                found.append(own)
+        none = np.zeros((history.tests, labels, hypotheses.n, 0))
+        return np.concatenate([none, *found], axis=3)
 
     def _precision(self, history: History) -> FloatArray:
         """Return the prior precision of the null's columns and those of called changes."""
@@ -277,6 +304,7 @@ class LinearModel:
             history.called.tolist(), history.called_precision, strict=True
         ):
             blocks += [precision] * (2 if is_ramp else 1)
+        blocks.append(np.eye(self._recurring(history).shape[3]))
         size = sum(map(len, blocks))
         joint, at = np.zeros((size, size)), 0
         for block in blocks:

@@ -29,6 +29,7 @@ class WatchOptions:
 
     - `sizes`, `size_shares`: of a change, in units of its prior, and how often: what may not be
       missed, what nobody can miss, and what only a mistake that stays does.
+    - `checked_errors`: of errors of the measurement so few pass the check of a baseline.
     - `share_visits`: so many visits say as much of how often each disturbance comes as its table.
     - `least_frequency_shift`: a change that moves no plane's first frequency, nor its mean, by more
       is not detected.
@@ -60,6 +61,7 @@ class WatchOptions:
     baseline_tests: int = 1
     sizes: tuple[float, ...] = (1.0, 6.0, 36.0, 216.0)
     size_shares: tuple[float, ...] = (0.9, 0.09, 0.009, 0.001)
+    checked_errors: float = 0.002
     share_visits: float = 20.0
     scatter_prior_tests: float = 6.0
     scatter_up_to_sds: float = 3.0

@@ -295,7 +295,9 @@ class Summary:
             blocks.append(own)
             if is_ramp:
                 blocks.append((float(years[-1]) - since) * own)
-        return np.hstack(blocks)
+        known = sum(each.shape[1] for each in blocks)
+        recurring = len(self.evidence.null.mean) - known
+        return np.hstack([*blocks, np.zeros((q, recurring))])
 
     def _left_open(self, shifts: FloatArray) -> FloatArray:
         """Return shifts (draws, q) with what the model leaves open: a fraction of each, as the

@@ -158,14 +158,15 @@ class Watcher:
         return probability * changed + (1 - probability) * found
 
     def _against_baseline(self, history: History) -> int:
-        """Return how many sound tests there are since a baseline all of whose tests are disturbed;
+        """Return how many sound visits there are since a baseline all of whose tests are disturbed;
         0 where one is sound."""
         sound: BoolArray = np.asarray(history.sound > 0.5)
         first = self.options.baseline_tests
         is_measured = np.isfinite(history.variances).any(axis=1)
         if sound[:first].any() or not is_measured[:first].any():
             return 0
-        return int((sound & is_measured)[first:].sum())
+        agreeing = np.flatnonzero(sound & is_measured)
+        return len(np.unique(history.visit[agreeing[agreeing >= first]]))
 
     def _with_call(
         self, history: History, evidence: Evidence, change: Change, probability: float

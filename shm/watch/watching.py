@@ -321,7 +321,9 @@ def _explaining(beyond: Sequence[Drift], called: Sequence[Change], now: Change) 
 def _standing(test: WatchedTest, holding: frozenset[Condition], hanger: Hanger) -> list[Drift]:
     """Return what was reported to be beyond its threshold and still is: as sure as it was then."""
     level = hanger.thresholds.alert_probability
-    told = {(each.about, each.way) for each in holding if not each.improbable}
+    told = {
+        (each.about, each.way) for each in holding if each.kind == BEYOND and not each.improbable
+    }
     return [
         replace(each, probability=max(each.probability, level))
         for each in test.drifts
