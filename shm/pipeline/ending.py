@@ -185,9 +185,7 @@ def _left(alert: Alert, test: WatchedTest, hanger: Hanger, gap_stands: GapStands
         return float(test.change.is_baseline_alone)
     is_odd = test.change.outlier_probability > _ODD
     if alert.kinds in _REPEATS:
-        end = hanger.thresholds.end_probability
-        shown = (each.is_clearly_beyond and each.probability >= end for each in test.drifts)
-        return float(is_odd or any(shown))
+        return float(is_odd or any(each.is_clearly_beyond for each in test.drifts))
     if "gap" in alert.kinds and gap_stands(test):
         return 1.0
     if is_odd or not ("gap" in alert.kinds or alert.drifts):

@@ -239,8 +239,8 @@ class ChangePoint:
         total = _until(square)[beginnings][:, null, null] + by_years[0][:, null, null]
         total = total + sums.precision
         pull = _until(cross)[beginnings][:, null] + pulls[0][:, null]
-        covariance = np.linalg.inv(total)
-        mean = (covariance @ pull[..., None])[..., 0]
+        covariance = np.asarray(np.linalg.inv(total), float)
+        mean = np.asarray((covariance @ pull[..., None])[..., 0], float)
         bound = _until(constant)[beginnings] + _onwards(later_constant)[beginnings]
         bound += (pull * mean).sum(axis=1) / 2 - np.linalg.slogdet(total)[1] / 2
         bound += np.linalg.slogdet(sums.precision)[1] / 2
@@ -451,8 +451,8 @@ def _climb(
     for left in range(rounds, -1, -1):
         weight = labels[:, sums.visit].reshape(len(labels), -1)
         matrix, pull = model.normal_equations(weight)
-        covariance = np.linalg.inv(matrix)
-        mean = (covariance @ pull[..., None])[..., 0]
+        covariance = np.asarray(np.linalg.inv(matrix), float)
+        mean = np.asarray((covariance @ pull[..., None])[..., 0], float)
         if left:
             labels = model.relabelled(labels, model.log_density(mean, covariance))
     bound = weight @ sums.constant.reshape(-1) + (pull * mean).sum(axis=1) / 2

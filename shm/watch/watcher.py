@@ -162,7 +162,7 @@ class Watcher:
         0 where one is sound."""
         sound: BoolArray = np.asarray(history.sound > 0.5)
         first = self.options.baseline_tests
-        is_measured = np.isfinite(history.variances).any(axis=1)
+        is_measured: BoolArray = np.asarray(np.isfinite(history.variances).any(axis=1))
         if sound[:first].any() or not is_measured[:first].any():
             return 0
         agreeing = np.flatnonzero(sound & is_measured)
