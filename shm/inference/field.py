@@ -17,8 +17,7 @@ Mode shapes have their own errors (`shm.inference.shapes`).
 Both unknowns are integrated out on a grid: tau in steps of 1.6 standard deviations of what the data
 can tell, phi at equally probable values.
 What physics says of errors that tests share (`shm.inference.systematic_errors`) adds a mean and
-loads U: the covariance is phi^2 S + tau^2 R + U U' with S = diag(s^2). The eigenvectors of
-S^-1/2 (tau^2 R + U U') S^-1/2 serve all phi.
+loads U: the covariance is phi^2 S + tau^2 R + U U' with S = diag(s^2).
 """
 
 from __future__ import annotations
