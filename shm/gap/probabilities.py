@@ -139,8 +139,10 @@ def _linear(
 ) -> tuple[float, FloatArray, FloatArray]:
     """Return log evidence, step (d,) and curvature (d, d) about a fit by other errors."""
     likelihood = Likelihood.of(errors, fit.model_error)
-    inner, step, square, followed = likelihood.linear(fit.slopes, residual, fit.z)
-    misfit = square + fit.z @ fit.z - followed
+    inner, step, *_ = likelihood.linear(fit.slopes, residual, fit.z)
+    # What is left is squared anew: a difference of squares may be nothing but lost digits.
+    left = likelihood.squares((residual - fit.slopes @ step)[None])[0, 0]
+    misfit = left + ((fit.z + step) ** 2).sum()
     log = likelihood.log_height[0] - np.linalg.slogdet(inner)[1] / 2 - misfit / 2
     return float(log), step, inner
 
