@@ -29,6 +29,7 @@ from shm.gap.problem import GapProblem
 from shm.gap.residuals import predictions, predictive_p_value
 from shm.gap.sampling import MOST_ROUNDS, Sampling, approximate
 from shm.gap.scan import scan, scan_beside
+from shm.inference.coordinates import log_normal
 from shm.inference.linear import Linear
 from shm.inference.mixture import normalised
 from shm.inference.options import Progress, silent
@@ -196,7 +197,8 @@ class Search:
             if hypothesis.flexible or self._level(hypothesis) > best - HOPELESS:
                 target = Target(self.problem, hypothesis)
                 found = approximate(target, peaks, self.draws, self.rng, self._beyond)
-                if np.isfinite(found.predicted).all():
+                # Where two modes change places a prediction is one thing in a batch, another alone.
+                if found.log_fit + log_normal(found.z[None])[0] > peaks[0].log - AS_GOOD_A_FIT:
                     self.fits[hypothesis] = found
 
     def sample_probable(self, chance: Callable[[], Mapping[Hypothesis, float]]) -> None:
