@@ -1,4 +1,4 @@
-"""What to measure next: what tells the leading explanations apart, and a plan of several steps.
+"""Next measurements that tell the leading explanations apart, and a plan of several steps.
 
 What every explanation foresees of all measurements that could be made is one normal distribution
 of their data, given the old ones (`shm.gap.foresight`); so what a second measurement adds to

@@ -68,7 +68,7 @@ class Misfit:
         return np.asarray(products - np.einsum("ij,ij->i", left @ self.inner, right))
 
     def parameters(self, deviation: FloatArray) -> FloatArray:
-        """The likeliest parameters z (n, p) for deviations (n, data)."""
+        """Return the likeliest parameters z (n, p) for deviations (n, data)."""
         return np.asarray((deviation / self.sd) @ self.weighted @ self.inner)
 
     @property
@@ -77,11 +77,11 @@ class Misfit:
         return float(self.products(self.deviation[None], self.deviation[None])[0])
 
     def repeated(self, z: FloatArray) -> FloatArray:
-        """What errors that repeat add to predictions (n, data) at parameters z (n, p)."""
+        """Return what repeated errors add to predictions (n, data) at parameters z (n, p)."""
         return np.asarray(z[:, self.own :] @ self.slopes[:, self.own :].T)
 
     def at(self, predicted: FloatArray, z: FloatArray) -> FloatArray:
-        """The chi-square (n,) of predictions (n, data) at parameters z (n, p)."""
+        """Return the chi-square (n,) of predictions (n, data) at parameters z (n, p)."""
         error = (self.value - predicted) / self.sd
         return np.asarray((error**2).sum(axis=1) + (z**2).sum(axis=1))
 
@@ -96,9 +96,10 @@ class Misfit:
 
 @dataclass(frozen=True, eq=False)
 class Change(Rows):
-    """What a cause does at n places: `per_size` (n, data).
+    """Changes of the data by a cause at n places.
 
-    `deviation` (n, data) is that of the data, as in Misfit, from what is expected without it.
+    `per_size` (n, data) is that of a size of 1, `deviation` (n, data) that of the data, as in
+    Misfit, from what is expected without the cause.
     """
 
     deviation: FloatArray
@@ -106,7 +107,7 @@ class Change(Rows):
     largest: float
 
     def sizes(self, misfit: Misfit) -> FloatArray:
-        """The likeliest sizes (n,), from 0 to the largest, the baseline's parameters free."""
+        """Return the likeliest sizes (n,), up to the largest, the baseline's parameters free."""
         square = misfit.products(self.per_size, self.per_size)
         along = misfit.products(self.per_size, self.deviation)
         with np.errstate(over="ignore"):  # a cause that does nothing has no size

@@ -1,5 +1,6 @@
-"""What a fit leaves: the residual of every measured frequency, with which conditions it grows,
-whether the fit would produce data that lie as far off, and what it says of the sensors.
+"""Residuals of a fit: of every frequency, over conditions, held out, and what they say of sensors.
+
+A predictive p-value tells how often the fit would produce data that lie as far off.
 
 Residuals are weighed by the identification's errors alone, not by the model error that a fit may
 have taken up to live with the gap: else a large gap would look like none.

@@ -457,7 +457,7 @@ def _with_groups(
 
 
 def hardly_behind(cause: Explanation, best: Explanation) -> bool:
-    """Whether the data hardly prefer the best cause: by evidence, or else by the prior alone.
+    """Return True where evidence hardly prefers the best cause, or the prior alone does.
 
     A cause of many parameters pays for them, but where it fits as well the data do not speak
     against it.
@@ -468,13 +468,13 @@ def hardly_behind(cause: Explanation, best: Explanation) -> bool:
 
 
 def _reached(cause: Explanation, best: Explanation) -> bool:
-    """Whether these data leave a cause a chance beside the best one."""
+    """Return True where these data leave a cause a chance beside the best one."""
     level = cause.log_bayes_factor
     return hardly_behind(cause, best) or level > max(0.0, best.log_bayes_factor - WITHIN_REACH)
 
 
 def _idle(pair: Explanation, alone: Mapping[str, float]) -> bool:
-    """Whether one effect of a pair explains about as much without the other."""
+    """Return True where one effect of a pair explains about as much without the other."""
     names = [name for name, _ in pair.best.hypothesis.effects]
     singles = [alone[name] for name in names if len(names) > 1]
     return any(single > pair.log_bayes_factor - SUPPORTED for single in singles)

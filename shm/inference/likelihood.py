@@ -1,4 +1,4 @@
-"""How likely residuals are when the size of the errors is one of several possibilities.
+"""Likelihood of residuals whose errors have one of several possible covariances.
 
 The frequencies' covariances fall apart into blocks (as a rule one mode in all tests), which are
 factored once each. What sensors do to all shapes alike is of low rank and follows by Woodbury's
