@@ -1,4 +1,8 @@
-"""The model class that a diagnosis starts from: the one that `select` would prefer."""
+"""The model class that a diagnosis starts from: the one that `select` would prefer.
+
+Where the cause that is found would be part of another class, the diagnosis goes on with that one:
+that a bar shears or that its ends turn is no gap.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shm.gap.contract import GapOptions, Observations
+from shm.gap.contract import GapOptions, Hypothesis, Observations
 from shm.gap.observations import observed
 from shm.gap.problem import GapProblem
 from shm.gap.search import fit_alone, sample_alone
@@ -55,6 +59,23 @@ def choose_baseline(
             fit_alone(each, rng, options.draws)
             chosen.rivals.append((of, each))
     return chosen
+
+
+def find_richer(problem: GapProblem, hypothesis: Hypothesis) -> GapProblem | None:
+    """Return the problem of a beam that has effects of a hypothesis itself, the more the better.
+
+    It has what the beam of `problem` has, too; None where no beam has any of them.
+    """
+    effects, own = {name for name, _ in hypothesis.effects}, set(problem.has_itself)
+    best, most = None, 0
+    for name in applicable(problem.hanger, BEAMS)[0]:
+        other = _problem(name, problem.tests, problem.hanger, problem.observations)
+        shared = len(effects & set(other.has_itself) - own)
+        if own <= set(other.has_itself) and shared > most:
+            best, most = other, shared
+    if best is not None:
+        best.rivals = problem.rivals
+    return best
 
 
 def _problem(

@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from shm.gap.baseline import choose_baseline
+from shm.gap.baseline import choose_baseline, find_richer
 from shm.gap.contract import Fit, GapOptions, Hypothesis
+from shm.gap.coordinates import is_place
 from shm.gap.damping import remark_on_damping
 from shm.gap.data_checks import usable
 from shm.gap.measurement_plan import ranked
@@ -51,6 +52,7 @@ _ATTRIBUTION = 0.85
 
 _OF_NOTE = 0.2  # of the leading probability: what is less moves the answer little
 _TENSION_DRAWS = 4000  # numerical: a 95 % interval to 2 % of its width
+_FEWEST_ASIDE = 20  # numerical: draws that tell a second place with its interval
 _AS_LIKELY = 1.5
 """Places of one effect whose log evidences differ by less are not told apart."""
 
@@ -140,9 +142,16 @@ def _search(
     whole = choose_baseline(found.tests, hanger, options, rng, progress)
     check_hold_out(whole, options.hold_out)
     doubts = _of_another(found.tests, hanger)
-    clear = exclude_gross_errors(
-        whole, options, rng, lambda label, done: progress(label, _ATTRIBUTION * done)
-    )
+
+    def until_found(label: str, done: float) -> None:
+        progress(label, _ATTRIBUTION * done)
+
+    clear = exclude_gross_errors(whole, options, rng, until_found)
+    leading = clear.attribution.leading
+    if leading is not None and not options.baseline:
+        richer = find_richer(whole, leading.best.hypothesis)
+        if richer is not None:
+            clear = exclude_gross_errors(richer, options, rng, until_found)
     orders = doubt_orders(clear.problem, clear.attribution)
     refuse_misfit(clear.problem, clear.attribution, (*orders, *found.other_unit, *doubts))
     return replace(found, remarks=(*found.remarks, *orders)), doubts, clear
@@ -223,21 +232,26 @@ def _states(
 
 
 def _cause(problem: GapProblem, explanation: Explanation) -> Cause:
+    """Return a cause with its sizes; without evidence where a scan has left it far behind."""
     best = explanation.best
+    is_known = best.fit is not None
     return Cause(
         effect=explanation.effect,
         at=best.hypothesis.at,
         probability=explanation.probability,
-        log_bayes_factor=explanation.log_bayes_factor,
-        log_fit=explanation.log_fit,
-        log_occam=explanation.log_occam,
+        log_bayes_factor=explanation.log_bayes_factor if is_known else NAN,
+        log_fit=explanation.log_fit if is_known else NAN,
+        log_occam=explanation.log_occam if is_known else NAN,
         parameters=_estimates(problem, best.posterior) if best.posterior else (),
         method=best.method,
         group=explanation.group,
-        also_at=tuple(
-            each.hypothesis.at
-            for each in explanation.variants
-            if each is not best and each.log_evidence > best.log_evidence - _AS_LIKELY
+        also_at=(
+            *(_other_places(problem, best.posterior) if best.posterior else ()),
+            *(
+                each.hypothesis.at
+                for each in explanation.variants
+                if each is not best and each.log_evidence > best.log_evidence - _AS_LIKELY
+            ),
         ),
     )
 
@@ -245,10 +259,42 @@ def _cause(problem: GapProblem, explanation: Explanation) -> Cause:
 def _estimates(problem: GapProblem, fit: Fit) -> tuple[EffectEstimate, ...]:
     coordinates = problem.coordinates(fit.hypothesis)
     values = coordinates.effect_values(fit.draws)
+    length_m = problem.hanger.length_m
     return tuple(
-        EffectEstimate(each.name, each.unit, *_summary(column))
+        EffectEstimate(
+            each.name,
+            each.unit,
+            *_summary(_split_place(column, length_m)[0] if is_place(each) else column),
+        )
         for each, column in zip(coordinates.effects, values.T, strict=True)
     )
+
+
+def _other_places(problem: GapProblem, fit: Fit) -> tuple[str, ...]:
+    """Return where else along the hanger a local effect is about as likely."""
+    coordinates = problem.coordinates(fit.hypothesis)
+    values = coordinates.effect_values(fit.draws)
+    found = []
+    for each, column in zip(coordinates.effects, values.T, strict=True):
+        if is_place(each):
+            own, other = _split_place(column, problem.hanger.length_m)
+            if len(other) > math.exp(-_AS_LIKELY) * len(own):
+                found.append(f"at {other.mean():.2f} m")
+    return tuple(found)
+
+
+def _split_place(x_m: FloatArray, length_m: float) -> tuple[FloatArray, FloatArray]:
+    """Return the draws (n,) of a place on the likelier side of mid-length, and the others.
+
+    There are no others where the two sides run into each other: that is one place.
+    """
+    sides = x_m[x_m < length_m / 2], x_m[x_m >= length_m / 2]
+    own, other = sorted(sides, key=len, reverse=True)
+    if len(other) < _FEWEST_ASIDE:
+        return own, other[:0]
+    (low, high), (first, last) = (np.quantile(each, [0.05, 0.95]) for each in sides)
+    apart = first - high > (high - low) + (last - first)
+    return (own, other) if apart else (x_m, other[:0])
 
 
 def _contenders(attribution: Attribution) -> list[Fit]:

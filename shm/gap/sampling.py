@@ -21,6 +21,7 @@ from shm.gap.contract import Fit, Method
 from shm.gap.posterior import SETTLED, Target
 from shm.inference.chain import run_chain
 from shm.inference.coordinates import log_normal
+from shm.inference.likelihood import Likelihood
 from shm.inference.linear import Linear
 from shm.inference.mixture import (
     Normal,
@@ -52,7 +53,8 @@ class SamplingOptions:
     effects is, by `clusters_without` parts. Of `wide_every` rounds one or two do without a
     surrogate; of the others' `candidates` a round is kept, each with a chance of `least_kept` or
     more, found by `halvings`. The surrogate's fit has a
-    `least_weight` for all points and a `ridge`. Linear parameters are followed `most_settled` times
+    `least_weight` for all points and a `ridge`, and leaves out errors of a smaller share than
+    `least_of_errors`. Linear parameters are followed `most_settled` times
     at most.
     """
 
@@ -73,6 +75,7 @@ class SamplingOptions:
     halvings: int = 30
     least_weight: float = 1e-2
     ridge: float = 1e-6
+    least_of_errors: float = 1e-2
     most_settled: int = 4
 
 
@@ -92,23 +95,37 @@ class _Draws(Rows):
 
 
 class _Collapsed:
-    """A target with its linear parameters integrated out, near one peak."""
+    """A target with its linear parameters integrated out, near peaks, the best first."""
 
-    def __init__(self, target: Target, peak: Peak):
+    def __init__(self, target: Target, peaks: Sequence[Peak]):
         self.target, self.dimension = target, len(target.other)
-        self.residual, self.slopes = target.view(peak.z)
+        self.residual, self.slopes = target.view(peaks[0].z)
         self.linear = Linear(target.likelihood, self.slopes[:, target.linear])
-        own = np.ix_(target.other, target.other)
-        across = peak.covariance[np.ix_(target.linear, target.other)]
-        self._follow = np.linalg.solve(peak.covariance[own], across.T).T
-        self._peak = peak.z
+        self._peaks = np.array([peak.z for peak in peaks])
+        self._normals = [
+            Normal(peak.z[target.other], peak.covariance[np.ix_(target.other, target.other)])
+            for peak in peaks
+        ]
+        # How the linear parameters follow the others, at each peak.
+        self._follow = np.array(
+            [
+                np.linalg.solve(
+                    peak.covariance[np.ix_(target.other, target.other)],
+                    peak.covariance[np.ix_(target.other, target.linear)],
+                )
+                for peak in peaks
+            ]
+        )
 
     def along(self, w: FloatArray) -> FloatArray:
-        """Return points (n, d) with others w (n, o) and the linear parameters as at the peak."""
+        """Return points (n, d) with others w (n, o), linear parameters as at the nearest peak."""
         target = self.target
-        z = np.tile(self._peak, (len(w), 1))
+        apart = [(normal.whiten(w) ** 2).sum(axis=1) for normal in self._normals]
+        near = np.argmin(apart, axis=0)
+        z = self._peaks[near]
+        away = (w - z[:, target.other])[:, None]
+        moved = z[:, target.linear] + (away @ self._follow[near])[:, 0]
         z[:, target.other] = w
-        moved = z[:, target.linear] + (w - self._peak[target.other]) @ self._follow.T
         z[:, target.linear] = moved.clip(-_FARTHEST_LINEAR, _FARTHEST_LINEAR)
         return z
 
@@ -138,10 +155,15 @@ class _Collapsed:
         z[:, columns] = moved
         return _Draws(z, node, residual), np.asarray(log + log_normal(w))
 
-    def log_target(self, w: FloatArray, residual: FloatArray) -> FloatArray:
-        """Return the log of the target density (n,) by residuals that are known already."""
+    def log_target(self, w: FloatArray, residual: FloatArray, linear: Linear) -> FloatArray:
+        """Return the log of the target density (n,) by residuals and errors that are known."""
         z = self.along(w)
-        return self.linear.marginal(residual, z[:, self.target.linear])[0] + log_normal(w)
+        return linear.marginal(residual, z[:, self.target.linear])[0] + log_normal(w)
+
+    def with_errors(self, nodes: IntArray) -> Linear:
+        """Return the linear parameters where errors are one of these `nodes`."""
+        kept = [self.target.likelihood.nodes[each] for each in nodes]
+        return Linear(Likelihood(kept), self.slopes[:, self.target.linear])
 
     def scatter(self, draws: _Draws, rng: np.random.Generator) -> FloatArray:
         """Return the points (n, d) with their linear parameters drawn about their best."""
@@ -216,6 +238,8 @@ class _Surrogate:
         gram = columns.T @ columns
         ridge = _HOW.ridge * np.trace(gram) / len(gram) * np.eye(len(gram))
         self._fit = np.linalg.solve(gram + ridge, columns.T @ (root * known.residual[usable]))
+        of_node = np.bincount(known.node, weights) / weights.sum()
+        self._linear = collapsed.with_errors(np.flatnonzero(of_node > _HOW.least_of_errors))
         self._log_scale = 0.0
         self._log_scale = self._scaled(rng)
 
@@ -243,7 +267,7 @@ class _Surrogate:
         return float(low)
 
     def _log(self, w: FloatArray) -> FloatArray:
-        return self._collapsed.log_target(w, self._features(w) @ self._fit)
+        return self._collapsed.log_target(w, self._features(w) @ self._fit, self._linear)
 
     def _features(self, w: FloatArray) -> FloatArray:
         """Return one, the places and their products (n, features)."""
@@ -266,7 +290,7 @@ class Sampling:
         without: Fit | None = None,
     ):
         self.target, self.peaks, self.rng = target, tuple(peaks), rng
-        self._collapsed = _Collapsed(target, peaks[0])
+        self._collapsed = _Collapsed(target, peaks)
         self._pool: Pool[_Proposal, _Draws] = Pool(
             lambda proposal, batch: proposal.log_density(batch.z[:, target.other])
         )
@@ -368,7 +392,7 @@ def approximate(
     )
     nan = float("nan")
     log_evidence = laplace(peaks) + beyond, nan
-    return _fit(_Collapsed(target, peaks[0]), peaks, found, log_evidence, nan, "normal")
+    return _fit(_Collapsed(target, peaks), peaks, found, log_evidence, nan, "normal")
 
 
 def _parts(

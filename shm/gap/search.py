@@ -196,10 +196,25 @@ class Search:
         for hypothesis, peaks in climbed.items():
             if hypothesis.flexible or self._level(hypothesis) > best - HOPELESS:
                 target = Target(self.problem, hypothesis)
+                peaks = self._with_mirrored(target, peaks)
+                self.rough[hypothesis] = laplace(peaks)
                 found = approximate(target, peaks, self.draws, self.rng, self._beyond)
                 # Where two modes change places a prediction is one thing in a batch, another alone.
                 if found.log_fit + log_normal(found.z[None])[0] > peaks[0].log - AS_GOOD_A_FIT:
                     self.fits[hypothesis] = found
+
+    def _with_mirrored(self, target: Target, peaks: list[Peak]) -> list[Peak]:
+        """Return the peaks with those at the places mirrored at mid-length, the highest first.
+
+        Frequencies hardly tell the one from the other, so that both belong to the posterior.
+        """
+        places = self.problem.coordinates(target.hypothesis).places
+        if not len(places):
+            return peaks
+        z = np.array([peak.z for peak in peaks])
+        mirrored = z.copy()
+        mirrored[:, places] *= -1
+        return find_peaks(target, np.vstack([z, mirrored])) or peaks
 
     def sample_probable(self, chance: Callable[[], Mapping[Hypothesis, float]]) -> None:
         """Sample what the answer rests on, by `chance` of each hypothesis, the likeliest first."""

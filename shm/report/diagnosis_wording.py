@@ -55,7 +55,7 @@ def _also(cause: Cause) -> str:
     if not cause.also_at:
         return ""
     places = [
-        " and ".join(_place(part) or "everywhere" for part in cause.each_at(at))
+        " and ".join(dict.fromkeys(_place(part) or "everywhere" for part in cause.each_at(at)))
         for at in cause.also_at[:_MOST_PLACES]
     ]
     return f" (about as likely: {formatting.listed(places)})"

@@ -116,7 +116,8 @@ class Cause:
 
     `effect` is the name, or two joined by ` + `, and `at` where the likeliest variant acts.
     `log_bayes_factor` compares it with the baseline, averaged over its variants; `log_fit` is what
-    the best fit gains in log likelihood and `log_occam` what its evidence pays for free parameters.
+    the best fit gains in log likelihood and `log_occam` what its evidence pays for free parameters;
+    they are NaN of a cause that a scan has left far behind.
     `group` is the index of the group of causes that the data cannot tell apart, None for none.
     `method` is how far it was taken: `screened`, `normal` or `sampled`. `also_at` are other places
     at which it is about as likely.

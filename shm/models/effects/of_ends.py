@@ -126,7 +126,7 @@ class EffectiveLength(Effect):
     """The bar vibrates over another length than the one given.
 
     It is held inside of its plate or socket (negative), or beyond the face that the drawing shows
-    (positive). At both ends the change is shared evenly.
+    (positive). At both ends the change is shared evenly. A fitting goes with its end.
     """
 
     name = "effective_length"
@@ -166,11 +166,25 @@ class EffectiveLength(Effect):
 
     def act(self, bar: PhysicalHanger, values: FloatArray, case: Case) -> PhysicalHanger:
         each = values[:, 0] / len(case.variant.ends)
+        deck_m, arch_m = -each * (0 in case.variant.ends), each * (1 in case.variant.ends)
         return replace(
             bar,
-            deck_end_m=bar.deck_end_m - each * (0 in case.variant.ends),
-            arch_end_m=bar.arch_end_m + each * (1 in case.variant.ends),
+            deck_end_m=bar.deck_end_m + deck_m,
+            arch_end_m=bar.arch_end_m + arch_m,
+            zones=tuple(_moved_with_ends(zone, bar, deck_m, arch_m) for zone in bar.zones),
         )
+
+
+def _moved_with_ends(
+    zone: Zone, bar: PhysicalHanger, deck_m: FloatArray, arch_m: FloatArray
+) -> Zone:
+    """Return a zone that moves with the end that it reaches, with both if it reaches both."""
+    near_m = 1e-9 * bar.length_m  # rounding
+    at_deck = zone.start_m <= bar.deck_end_m + near_m
+    at_arch = zone.end_m >= bar.arch_end_m - near_m
+    start_m = np.where(at_deck, deck_m, np.where(at_arch, arch_m, 0.0))
+    end_m = np.where(at_arch, arch_m, np.where(at_deck, deck_m, 0.0))
+    return replace(zone, start_m=zone.start_m + start_m, end_m=zone.end_m + end_m)
 
 
 class StiffEndZones(Effect):

@@ -45,10 +45,10 @@ class Timebase(Effect):
         "clock_error",
         "fraction",
         1e-6,
-        0.05,
+        0.1,
         0.0,
-        "One millionth to 5 %, either way: from a quartz to a nominal rate that the logger "
-        "does not keep.",
+        "One millionth to 10 %, either way: from a quartz to a rate that the logger does not "
+        "keep, or 48 kHz where it was 44.1.",
         spread="logarithmic",
         signed=True,
         most=0.99,
