@@ -293,9 +293,9 @@ _ENDS = (
         math.nan,
         "k L/EI",
         JUDGEMENT,
-        "Rotational spring of an end, its logarithm uniform, in diagnosis and watch (an update has "
-        "the fixity of each kind of end): below 0.03 a first frequency is within 0.3 % of the "
-        "pinned bar's, above 1000 within 0.2 % of the clamped one's.",
+        "Range of an end's rotational spring (its prior is the fixity of each kind of end; sensors "
+        "that stay take its logarithm as uniform): below 0.03 a first frequency is within 0.3 % of "
+        "the pinned bar's, above 1000 within 0.2 % of the clamped one's.",
         lower=0.03,
         upper=1000.0,
         least=1e-6,
@@ -518,7 +518,8 @@ _STRANDS = (
         math.nan,
         "of the solid section",
         "Papailiou (1997), IEEE Trans. Power Delivery 12",
-        "Bending stiffness of a strand at the small amplitudes of a test, where none is stated.",
+        "Bending stiffness of a strand at the small amplitudes of a test, unless `bending_factor` in "
+        "[hanger.scatter] gives the standard deviation of the stated one.",
         lower=0.3,
         upper=1.0,
         least=1e-3,

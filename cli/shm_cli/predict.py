@@ -58,7 +58,8 @@ def command(
     theta_F is tension over nominal tension, theta_L effective over nominal length (both 1 unless
     set), log10_k1 to log10_k4 the end springs: N m/rad for beams (k1, k3 transverse; k2, k4
     longitudinal), N/m per node for solids. A solid class is solved in full, without its reduced
-    basis: a few tenths of a second a parameter set.
+    basis: a few tenths of a second a parameter set. A beam is the bare bar: fittings, kind of ends,
+    inclination and how it was taped count in update and select.
 
     \b
     Example: shm predict beam1 --hanger-file H.toml --set theta_F=1 --set theta_L=0.97

@@ -164,7 +164,7 @@ def _length_by(table: Table) -> LengthBy | Literal[""]:
     """Return how the hanger was taped; empty where the table does not say."""
     if "length_by" not in table:
         return ""
-    remedy = 'Write "faces" (free bar between its fittings), "pins" or "nodes" (system lines).'
+    remedy = 'Write "faces" (over all, fittings included), "pins" or "nodes" (system lines).'
     return cast(LengthBy, table.value("length_by", LengthBy, "is no way to tape a hanger", remedy))
 
 

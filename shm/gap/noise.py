@@ -35,7 +35,6 @@ from shm.gap.contract import Design, Observations
 from shm.gap.observations import rounding_covariance
 from shm.gap.repeated_errors import Repeated, turned_modes
 from shm.inference.likelihood import Covariance, NoiseNode
-from shm.inference.systematic_errors import correlate_model_errors
 from shm.values import FloatArray, IntArray
 
 # As the general model and other finite elements differ at most (docs/gap.md, what is compared).
@@ -76,13 +75,10 @@ def _of_frequencies(
 ) -> list[tuple[FloatArray, float, float]]:
     """Covariances (F, F) of what does not repeat in any case, weights, and the errors they mean."""
     sd = observations.sd[: observations.design.frequencies]
-    known, design = np.isfinite(sd), observations.design
-    together = correlate_model_errors(
-        design.frequency_plane, design.frequency_order, observations.assumed
-    )
+    known, same = np.isfinite(sd), same_mode(observations.design)
     return [
         (
-            errors * np.outer(own, own) + sigma**2 * together,
+            errors * np.outer(own, own) + sigma**2 * same,
             float(of_common * of_factor * of_sigma * of_errors),
             float(sigma if known.any() else common),
         )

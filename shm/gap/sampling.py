@@ -95,9 +95,13 @@ class _Draws(Rows):
 
 
 class _Collapsed:
-    """A target with its linear parameters integrated out, near peaks, the best first."""
+    """A target with its linear parameters integrated out, near peaks, the best first.
+
+    Peaks far below the best one do not count: they have no share of the posterior.
+    """
 
     def __init__(self, target: Target, peaks: Sequence[Peak]):
+        peaks = _near_best(peaks)
         self.target, self.dimension = target, len(target.other)
         self.residual, self.slopes = target.view(peaks[0].z)
         self.linear = Linear(target.likelihood, self.slopes[:, target.linear])
@@ -395,6 +399,11 @@ def approximate(
     return _fit(_Collapsed(target, peaks), peaks, found, log_evidence, nan, "normal")
 
 
+def _near_best(peaks: Sequence[Peak]) -> list[Peak]:
+    """Return the peaks that have a share of the posterior."""
+    return [each for each in peaks if each.log > peaks[0].log - _HOW.far_below]
+
+
 def _parts(
     target: Target, peaks: Sequence[Peak], without: Fit | None, rng: np.random.Generator
 ) -> TMixture:
@@ -403,7 +412,7 @@ def _parts(
     Of an effect that these data hardly show all small sizes are as likely.
     """
     other = target.other
-    near = [each for each in peaks if each.log > peaks[0].log - _HOW.far_below]
+    near = _near_best(peaks)
     parts = [
         Normal(each.z[other], width**2 * each.covariance[np.ix_(other, other)])
         for each in near

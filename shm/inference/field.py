@@ -32,7 +32,6 @@ from shm.inference.likelihood import Covariance, NoiseNode
 from shm.inference.measured import MeasuredFrequencies, conditions_of, predicted_hz
 from shm.inference.shapes import SHAPES, MeasuredShapes
 from shm.inference.systematic_errors import (
-    correlate_model_errors,
     errors_of_bar,
     felt_by,
     loads_of_ends,
@@ -100,9 +99,7 @@ class FieldLikelihood(MeasuredFrequencies):
             self._constant -= np.log(tension)
         self.shapes = MeasuredShapes(tests if model.has_shapes else (), model.hanger)
         self._shapes_factor = SHAPES.loose
-        self._together = correlate_model_errors(
-            self._plane, self._order + 1, self._assumed
-        )
+        self._together = self._goes_together()
         self._shift, self._loads = self._systematic(model, self._typical(model))
 
     def predict(self, model: Model, theta: FloatArray) -> FloatArray:
@@ -227,6 +224,16 @@ class FieldLikelihood(MeasuredFrequencies):
     def by_mode(self, predicted: FloatArray) -> FloatArray:
         """Predictions (n, modes) of every mode of every test, `explained`."""
         return self.explained(predicted)[:, self.of_mode]
+
+    def _goes_together(self) -> FloatArray:
+        """Correlation (F, F) of the errors that repeat."""
+        log = np.log(self._order + 1.0)
+        apart = np.subtract.outer(log, log) / self._assumed.model_error_reach.value
+        plane = np.equal.outer(self._plane, self._plane)
+        own = plane & np.equal.outer(self._order, self._order)
+        shared = np.exp(-0.5 * apart**2) * np.where(plane, 1.0, 0.5)
+        together = self._assumed.model_error_shared.value
+        return np.asarray((1 - together) * own + together * shared)
 
     def sigma_grid(self, step_in_sd: float) -> tuple[FloatArray, FloatArray]:
         step = step_in_sd / np.sqrt(2 * self.frequencies)

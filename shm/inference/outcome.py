@@ -18,6 +18,7 @@ from shm.inference.posterior import DIFFERENCE, climb
 from shm.inference.problem import Problem
 from shm.inference.sampling import Sampled
 from shm.inference.shares_of_variance import with_shares
+from shm.models.as_made import TENSION
 from shm.values import FloatArray, ModalTest, Posterior, PredictedFrequency
 
 SIGMA = "sigma"
@@ -114,11 +115,13 @@ def _most_probable(problem: Problem, samples: FloatArray, log_likelihood: FloatA
 
 
 def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
-    """The standard deviation, in N, with which the same test would give the tension again.
+    """Return the standard deviation, in N, with which one test tells a change of the tension.
 
     To first order about the middle of the draws: the identification's errors alone change between
     tests, whatever the description, the model and what repeats are off by (Gauss and Markov's
-    estimate with the prior as one more datum). NaN with the priors of the thesis.
+    estimate with the prior as one more datum). Where the prior holds an estimate back, it follows
+    a change by a part only, and the errors count for as much more. NaN with the priors of the
+    thesis.
     """
     coordinates, likelihood = problem.coordinates, problem.measured
     if not isinstance(coordinates, DescribedCoordinates):
@@ -136,7 +139,10 @@ def repeatability_sd_n(problem: Problem, outcome: Outcome) -> float:
     step = DIFFERENCE * np.eye(slopes.shape[1])
     tension_n = coordinates.tension_n(np.vstack([middle, middle + step]))
     rise = (tension_n[1:] - tension_n[0]) / DIFFERENCE
-    return float(np.sqrt(((rise @ gain * own[:known]) ** 2).sum()))
+    repeated_n = float(np.sqrt(((rise @ gain * own[:known]) ** 2).sum()))
+    column = coordinates.names.index(TENSION)
+    response = float(rise @ gain @ slopes[:known, column] / rise[column])
+    return repeated_n / response if response > 0 else math.nan
 
 
 def _at_bounds(problem: Problem, samples: FloatArray) -> tuple[str, ...]:

@@ -30,23 +30,6 @@ _PLACES, _FEW_PLACES = 64, 5
 _LEAST_SHARE = 1e-3
 
 
-def correlate_model_errors(
-    plane: IntArray, order: IntArray, assumed: Assumptions = DEFAULTS
-) -> FloatArray:
-    """Return the correlation (F, F) of what a model lacks, alike in all tests of a mode.
-
-    A part is each mode's own, a part goes together in neighbouring orders, half as much across
-    planes: what a model lacks is seldom of one mode alone. `order` is from 1.
-    """
-    log = np.log(order)
-    apart = np.subtract.outer(log, log) / assumed.model_error_reach.value
-    same_plane = np.equal.outer(plane, plane)
-    own = same_plane & np.equal.outer(order, order)
-    shared = np.exp(-0.5 * apart**2) * np.where(same_plane, 1.0, 0.5)
-    together = assumed.model_error_shared.value
-    return np.asarray((1 - together) * own + together * shared)
-
-
 def mean_of_ends(
     ends: Ends, fittings_m: tuple[float, float], assumed: Assumptions = DEFAULTS
 ) -> FloatArray:

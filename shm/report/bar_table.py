@@ -14,7 +14,7 @@ from shm.values.bar_description import BarDescription
 
 NOT_STATED = "not stated"
 _TAPED = {
-    "faces": "between the faces of its fittings",
+    "faces": "over all, fittings included",
     "pins": "pin to pin",
     "nodes": "between system points",
 }

@@ -155,7 +155,11 @@ def write_tension(diagnosis: Diagnosis) -> str:
     if verdict.is_few and (off := _off_percent(after_n)):
         sentences.append(f"So few data decide little: the tension may be off by {off} (95 %).")
     if math.isfinite(after_n.mean):
-        care = ", not to be relied on while the gap is open" if verdict.is_open else ""
+        care = ""
+        if verdict.is_open:
+            care = ", not to be relied on while the gap is open"
+        elif verdict.is_description_off:
+            care = ", not to be relied on while the description may be off"
         told = tension_words(after_n, tension_unit(diagnosis))
         sentences.append(f"{AFTER.capitalize()}, the tension is {told}{care}.")
     if verdict.claim is not None:

@@ -176,7 +176,7 @@ class Posterior(Shown):
     or `textbook`.
     `priors` are those of the `thesis` or of the hanger's `description`. The tension's draws are
     absolute: they hold the uncertainty of the description. `repeatability_sd_n` is the standard
-    deviation, in N, with which the same test repeats it, description held: what counts in shifts.
+    deviation, in N, with which a test tells a change of it while the bar stays as it is.
     `at_bounds` are parameters of which many draws lie at an end of their prior; `misfit_percent`
     is the root mean square of predicted over measured frequencies less 1; `log_occam` the log
     evidence less the largest log likelihood, never above 0 where the sampler did its work.

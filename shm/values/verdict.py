@@ -152,6 +152,9 @@ def judge(diagnosis: Diagnosis) -> GapVerdict:
     found = replace(found, is_within_errors=not doubt.startswith("misses"))
     if alone is not None:
         return replace(found, reason="acts alone", probability=alone.acts_alone)
+    unknown_leads = diagnosis.unexplained_probability > diagnosis.no_gap_probability
+    if unknown_leads and not found.is_within_errors:
+        return replace(found, reason=_UNKNOWN)
     return replace(
         found,
         outcome=Outcome.NO_GAP,

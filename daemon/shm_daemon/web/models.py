@@ -124,7 +124,7 @@ class AveragedTension(BaseModel):
     """The tension over all model classes, each with its probability; its interval is absolute."""
 
     tension_n: Posterior
-    repeatability_sd_n: float | None = Field(description="With which the same test repeats it.")
+    repeatability_sd_n: float | None = Field(description="With which a test tells a change of it.")
     probability_above_limit: float | None = Field(description="Null where no limit is set.")
     probability_slack: float | None = Field(description="Null where no limit is set.")
     caveats: list[str] = Field(description="What keeps it from being taken at its word.")

@@ -44,10 +44,10 @@ class DistributedMass(Effect):
         "mass_change",
         "fraction",
         0.002,
-        0.6,
+        0.3,
         0.0,
-        "0.2 to 60 % of the mass: from a coat of paint to a pipe full of grout or glaze ice; "
-        "things are put on hangers, not taken off.",
+        "0.2 to 30 % of the mass: from a coat of paint to a grouted pipe or glaze ice; things "
+        "are put on hangers, not taken off.",
         spread="logarithmic",
     )
 
