@@ -518,8 +518,8 @@ _STRANDS = (
         math.nan,
         "of the solid section",
         "Papailiou (1997), IEEE Trans. Power Delivery 12",
-        "Bending stiffness of a strand at the small amplitudes of a test, unless `bending_factor` in "
-        "[hanger.scatter] gives the standard deviation of the stated one.",
+        "Bending stiffness of a strand at the small amplitudes of a test, unless `bending_factor` "
+        "in [hanger.scatter] gives the standard deviation of the stated one.",
         lower=0.3,
         upper=1.0,
         least=1e-3,

@@ -126,7 +126,7 @@ class _Collapsed:
         target = self.target
         apart = [(normal.whiten(w) ** 2).sum(axis=1) for normal in self._normals]
         near = np.argmin(apart, axis=0)
-        z = self._peaks[near]
+        z: FloatArray = self._peaks[near]
         away = (w - z[:, target.other])[:, None]
         moved = z[:, target.linear] + (away @ self._follow[near])[:, 0]
         z[:, target.other] = w
