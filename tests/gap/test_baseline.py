@@ -10,10 +10,12 @@ import pytest
 
 from shm.errors import UsageError
 from shm.gap import GapOptions, diagnose
-from shm.gap.baseline import AS_DESCRIBED, choose_baseline
+from shm.gap.baseline import AS_DESCRIBED, choose_baseline, find_richer
+from shm.gap.contract import Hypothesis
+from shm.models.effects import Variant
 from shm.values import PLANES, Diagnosis, Hanger, ModalTest, Mode, Supports
 from tests.helpers.effects import all_but
-from tests.helpers.gap_campaigns import HANGER, campaign
+from tests.helpers.gap_campaigns import HANGER, campaign, problem_of
 from tests.helpers.timoshenko import clamped_frequencies_hz
 
 FIRM = tuple(
@@ -89,3 +91,30 @@ def test_sheared_bar_without_shear_shows_it() -> None:
     found = diagnosed("beam1")
     assert found.leading is not None
     assert "shear_and_rotary_inertia" in found.leading.effect.split(" + ")
+
+
+@pytest.mark.parametrize(
+    ("baseline", "effects", "richer"),
+    [
+        ("beam1", ("shear_and_rotary_inertia", "point_mass"), "beam3"),
+        ("beam2", ("section_loss", "shear_and_rotary_inertia"), "beam3"),
+        ("beam1", ("rotational_end_flexibility",), "beam2"),
+        ("beam1", ("rotational_end_flexibility", "shear_and_rotary_inertia"), "beam3"),
+        ("beam3", ("shear_and_rotary_inertia",), None),
+        ("beam1", ("point_mass",), None),
+    ],
+)
+def test_find_richer(baseline: str, effects: tuple[str, ...], richer: str | None) -> None:
+    """What a beam has itself is no cause of a gap: the diagnosis goes on with that beam."""
+    problem = problem_of(campaign(tests=1), baseline)
+    found = find_richer(problem, Hypothesis(tuple((each, Variant("")) for each in effects)))
+    assert (found.model.name if found else None) == richer
+
+
+def test_diagnose_with_richer_beam() -> None:
+    """A stocky bar with a mass is one of beam3 with a mass, not of beam1 with two causes."""
+    few = all_but("shear_and_rotary_inertia", "point_mass")
+    test = measured(STOCKY)
+    found = diagnose([test], STOCKY, GapOptions(without=few))
+    assert found.baseline == "beam3"
+    assert "shear_and_rotary_inertia" not in [each.effect for each in found.causes]

@@ -14,11 +14,13 @@ from shm.gap import GapOptions, diagnose
 from shm.gap.baseline import BEAMS
 from shm.inference import select
 from shm.models import build
+from shm.models.effects import Variant
 from shm.simulate import HangerState, PlantedEffect
 from shm.values import NAN, Diagnosis, EffectPrior, Hanger, ModalTest
 from shm.values.verdict import Outcome
 from tests.helpers.effects import all_but
 from tests.helpers.gap_campaigns import HANGER as PLAIN
+from tests.helpers.gap_campaigns import campaign as own_campaign
 from tests.worlds.simulated.campaign import CampaignPlan, campaign
 
 CLAMP = PlantedEffect("point_mass", "everywhere", {"mass_kg": 12.0, "x_m": 3.4})
@@ -54,6 +56,19 @@ def test_a_planted_clamp_is_named_with_its_size_and_place(clamped_on: Diagnosis)
     assert size["mass_kg"].mean == pytest.approx(12.0, abs=4 * size["mass_kg"].sd)
     assert size["x_m"].mean == pytest.approx(3.4, abs=4 * size["x_m"].sd)
     assert clamped_on.groups == () or clamped_on.leading.group is not None
+
+
+def test_the_mirror_image_of_a_place_is_named_and_the_size_is_of_one_side() -> None:
+    """Without shapes frequencies tell a place from its mirror image hardly or not at all."""
+    clamp = (("point_mass", Variant()),)
+    unloaded = own_campaign(clamp, (12.0, 3.4), sd=5e-5)[0]
+    leading = diagnose([unloaded], PLAIN, replace(CLAMPS_ALONE, baseline="beam1")).leading
+    assert leading is not None
+    (place,) = (each for each in leading.parameters if each.name == "x_m")
+    (other,) = leading.also_at
+    mirrored_m = PLAIN.length_m - float(other.removeprefix("at ").removesuffix(" m"))
+    assert place.mean == pytest.approx(mirrored_m, abs=0.1)
+    assert place.q95 - place.q05 < 0.5
 
 
 def test_the_gap_shrinks_in_and_out_of_the_fit(clamped_on: Diagnosis) -> None:

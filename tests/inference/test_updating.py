@@ -160,6 +160,24 @@ def test_stated_priors_of_classes_multiply_the_ratio_of_their_evidence() -> None
             select(test, models, class_priors=odd)
 
 
+def test_repeatability_is_no_less_than_the_data_can_tell() -> None:
+    """Of a short stiff bar, whose estimate hardly follows its tension (Cramer and Rao)."""
+    stocky = replace(HANGER_3, plate=None, length_m=2.3, nominal_tension_n=1.4e6)
+    exact, sd = build("beam1", stocky, THESIS), 5e-4
+
+    def frequencies_hz(ratio: float) -> FloatArray:
+        theta = exact.pack({"theta_F": ratio, "theta_L": 1.0})
+        return exact.frequencies_hz(theta[None], 4)[0, 0]
+
+    found_hz = frequencies_hz(1.0)
+    modes = tuple(Mode("transverse", n, hz, sd * hz) for n, hz in enumerate(found_hz.tolist(), 1))
+    test = ModalTest("t1", modes, hanger=3)
+    posterior = update([test], build("beam1", stocky), UpdateOptions(samples=300))
+    rise = np.log(frequencies_hz(1.01) / frequencies_hz(0.99)) / (0.02 * 1.4e6)
+    least_n = sd / np.sqrt((rise**2).sum())
+    assert posterior.repeatability_sd_n > 0.9 * least_n
+
+
 def test_progress_is_heard_from_start_to_end() -> None:
     heard: list[tuple[str, float]] = []
     update(

@@ -209,3 +209,24 @@ def test_another_law_of_an_effect_does_nearly_the_same(
 def place_of(name: str) -> str:
     ends = {"stiff_end_zones": "both ends", "support_motion": "deck end, transverse"}
     return ends.get(name, "everywhere")
+
+
+@pytest.mark.parametrize("change_m", [-0.9, 0.6])
+def test_another_length_takes_its_fitting_along(change_m: float) -> None:
+    """Compare with a bar that was described with that length, fittings and all."""
+
+    def fitted(length_m: float) -> PhysicalHanger:
+        hanger = replace(ROD, length_m=length_m)
+        bar = PhysicalHanger.clamped(hanger, np.array([7e5]), 0)
+        near, far = (np.array([each]) for each in (length_m - 0.7, length_m))
+        stiff = Zone(near, far, np.array([5.0]), np.array([2.0]))
+        return replace(bar, zones=(stiff,))
+
+    at_arch = place("effective_length", "arch end")
+    case = Case(ROD, at_arch, Conditions())
+    moved = EFFECTS["effective_length"].act(fitted(12.0), np.array([[change_m]]), case)
+    found, meant = (
+        solve(each, 8, np.empty(0), shapes=False).frequency_hz
+        for each in (moved, fitted(12.0 + change_m))
+    )
+    np.testing.assert_allclose(found, meant, rtol=1e-7)

@@ -131,6 +131,15 @@ def test_judge_no_gap(diagnosis: Diagnosis, reason: str) -> None:
     assert found.probability == diagnosis.no_gap_probability
 
 
+def test_judge_unknown_leads_beyond_errors() -> None:
+    """A gap by its definition, and most probably of something unknown."""
+    found = judge(replace(without_gap(0.3, rms_z=2.1), unexplained_probability=0.6))
+    assert (found.outcome, found.reason) == (Outcome.UNEXPLAINED, "unknown is more probable")
+    assert found.probability == 0.6
+    within = judge(replace(without_gap(0.3), unexplained_probability=0.6))
+    assert within.outcome is Outcome.NO_GAP
+
+
 def test_judge_no_gap_with_outlier() -> None:
     found = judge(replace(without_gap(0.9), outliers=(GUIDE,)))
     assert (found.outcome, found.reason) == (Outcome.UNEXPLAINED, "acts alone")
