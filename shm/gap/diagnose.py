@@ -52,7 +52,6 @@ _ATTRIBUTION = 0.85
 
 _OF_NOTE = 0.2  # of the leading probability: what is less moves the answer little
 _TENSION_DRAWS = 4000  # numerical: a 95 % interval to 2 % of its width
-_FEWEST_ASIDE = 20  # numerical: draws that tell a second place with its interval
 _AS_LIKELY = 1.5
 """Places of one effect whose log evidences differ by less are not told apart."""
 
@@ -290,8 +289,8 @@ def _split_place(x_m: FloatArray, length_m: float) -> tuple[FloatArray, FloatArr
     """
     sides = x_m[x_m < length_m / 2], x_m[x_m >= length_m / 2]
     own, other = sorted(sides, key=len, reverse=True)
-    if len(other) < _FEWEST_ASIDE:
-        return own, other[:0]
+    if not len(other):
+        return own, other
     (low, high), (first, last) = (np.quantile(each, [0.05, 0.95]) for each in sides)
     apart = first - high > (high - low) + (last - first)
     return (own, other) if apart else (x_m, other[:0])
