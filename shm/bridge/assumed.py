@@ -7,13 +7,12 @@ A row is overridden by its number (`accelerometer_mass_kg = 0.2`), a range by tw
 
 from __future__ import annotations
 
-import difflib
 import math
 from dataclasses import replace
 from typing import Any
 
 from shm.assumptions import DEFAULTS, FILE, Assumption, Assumptions, number_text
-from shm.bridge.table import Table
+from shm.bridge.table import Table, suggest
 
 _ALL_ROWS = "`shm settings --assumptions` lists all."
 _NUMBERS = {
@@ -37,9 +36,7 @@ def assumptions_of(table: Table | None, base: Assumptions, origin: str = FILE) -
 
 def _row(table: Table, key: str, base: Assumptions, origin: str) -> Assumption:
     if key not in base:
-        near = difflib.get_close_matches(key, base, n=1)
-        hint = f"Did you mean {near[0]}? " if near else ""
-        raise table.refusal(f"unknown assumption {key}", hint + _ALL_ROWS)
+        raise table.refusal(f"unknown assumption {key}", suggest(key, base) + _ALL_ROWS)
     row, raw = base[key], table.values[key]
     stated = _numbers(table, row, raw)
     unexplained = f"Stated without a reason; the default is {number_text(DEFAULTS[key])}."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import ipaddress
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,6 +15,12 @@ from shm.documents import Misfit, finite, reader, value_of
 from shm.errors import BadInput
 
 _READER = reader(finite)
+
+
+def suggest(key: str, known: Iterable[str]) -> str:
+    """Return `Did you mean diameter_m? ` for a misspelt key, with the known one nearest to it."""
+    near = difflib.get_close_matches(key, known, n=1)
+    return f"Did you mean {near[0]}? " if near else ""
 
 
 @dataclass(frozen=True)
@@ -36,7 +43,8 @@ class Table:
         """Raise BadInput where a key is none of `known`."""
         names = sorted(known)
         for key in self.values.keys() - set(names):
-            raise self.refusal(f"unknown key {key}", f"Known: {', '.join(names)}.")
+            remedy = f"{suggest(key, names)}Known: {', '.join(names)}."
+            raise self.refusal(f"unknown key {key}", remedy)
 
     def value(
         self,

@@ -99,7 +99,10 @@ def examine_hanger(
 
 def _check(hangers: Sequence[Hanger]) -> None:
     if len(hangers) < LEAST:
-        raise UsageError("a shared cause takes two hangers.", remedy="Give a second one.")
+        raise UsageError(
+            "a shared cause takes two hangers.",
+            remedy="Give a second one, or --hanger-file H.toml for one.",
+        )
     for number, count in Counter(each.id for each in hangers).items():
         if count > 1:
             raise UsageError(
