@@ -23,7 +23,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from shm.errors import DISK_FULL, DamagedRow, ShmError, StoreError, WorkerDied
+from shm.errors import DISK_FULL, ShmError, StoreDamaged, StoreError, WorkerDied
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.intake import Sharing, receive
 from shm.pipeline.jobs import DELIVERIES, DeliveryRefused, Job, Jobs, Notifier, Step, wait_after
@@ -109,7 +109,7 @@ class Flow:
             if hanger.id in selected:
                 competing(hanger, workspace.settings, selected)
         self.workspace = workspace
-        self._judged_again = JudgedAgain(workspace, self.store, self.clock())
+        self._judged_again = JudgedAgain(workspace, self.store)
         heed_limits(workspace, self.store, workspace.bridge.hangers, self.clock())
         self.jobs = Jobs(workspace, self.store, self.clock)
 
@@ -182,14 +182,13 @@ class Flow:
                 return
             try:
                 self._begin(job, self.executor)
-            except DamagedRow as error:
-                self._stop(job, error)
-                damaged |= {job.hanger} - {None}
-            except (ShmError, BrokenExecutor):
-                raise
-            except Exception:  # what one hanger's rows hold must not stop the others
+            except Exception as error:  # what one hanger's rows hold must not stop the others
+                if isinstance(error, ShmError | BrokenExecutor) and not isinstance(
+                    error, StoreDamaged
+                ):
+                    raise
                 log.exception("%s %s cannot begin", *job.key, extra=_about(job))
-                self._hold(job, _AGAIN_S)
+                self._hold(job)
                 damaged |= {job.hanger} - {None}
 
     def _has_room(self, job: Job) -> bool:
@@ -222,9 +221,6 @@ class Flow:
             if error is None:
                 self._keep(running)
                 return
-        except DamagedRow as damage:
-            self._stop(running.job, damage)
-            return
         except StoreError as refusal:
             if refusal.retry_after_s is not None:
                 raise
@@ -237,7 +233,7 @@ class Flow:
             raise
         except Exception:
             log.exception("%s %s: its error cannot be noted", *running.job.key)
-            self._hold(running.job, _AGAIN_S)
+            self._hold(running.job)
 
     def _keep(self, running: Running) -> None:
         kept = running.step.keep(running.future.result())
@@ -263,14 +259,8 @@ class Flow:
         else:
             self._refuse(job, error)
 
-    def _stop(self, job: Job, error: DamagedRow) -> None:
-        """A damaged row stops its hanger alone, until somebody has mended it; that is noted."""
-        self._hold(job, error.retry_after_s or _AGAIN_S)
-        if self.store.upkeep.note_damage(error, self.clock()):
-            log.error("%s %s stands still: %s", *job.key, error, extra=_about(job))
-
-    def _hold(self, job: Job, seconds: float) -> None:
-        until = self.clock() + timedelta(seconds=seconds)
+    def _hold(self, job: Job) -> None:
+        until = self.clock() + timedelta(seconds=_AGAIN_S)
         if job.hanger is None:
             self._postponed.update(dict.fromkeys(job.recordings, until))
         else:

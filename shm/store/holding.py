@@ -15,7 +15,7 @@ from shm.errors import NothingThere, UsageError, sentence
 from shm.modes_document import test_document
 from shm.store.audit import note
 from shm.store.blobs import pack, test_from_document, unpack
-from shm.store.checksums import decoding, loads
+from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.files import in_force, reason_document, write_event, write_step
 from shm.store.list_rows import Decision, HeldTest, Hold
@@ -238,14 +238,12 @@ def confirmed_values(
     doubts = {test.position: test.doubts for test in hold.tests}.get(row.position, ())
     if time is None and not any(doubt.time_unknown for doubt in doubts):
         return {}
-    with decoding(tests, row, row.hanger):
-        test = replace(test_from_document(loads(row.document), row.hanger), time=time)
-        notes = loads(row.notes)
+    test = replace(test_from_document(loads(row.document), row.hanger), time=time)
     return {
         "document": test_document(test),
         "taken_at": time,
         "time": time or row.received_at,
-        "notes": [*notes, time_note(hold, time, who)],
+        "notes": [*loads(row.notes), time_note(hold, time, who)],
     }
 
 
@@ -281,11 +279,7 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
 
 
 def _hold(row: Row[Any]) -> Hold:
-    with decoding(holds, row, row.hanger):
-        return _whole_hold(row, loads(row.document))
-
-
-def _whole_hold(row: Row[Any], document: Mapping[str, Any]) -> Hold:
+    document = loads(row.document)
     return Hold(
         id=row.id,
         recording_id=row.recording_id,

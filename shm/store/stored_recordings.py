@@ -13,7 +13,6 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere, UsageError
 from shm.store.audit import note
-from shm.store.checksums import readable
 from shm.store.database import insert
 from shm.store.decisions import Decisions
 from shm.store.files import (
@@ -22,7 +21,6 @@ from shm.store.files import (
     by_checksum,
     by_former_names,
     by_id,
-    by_row,
     end_recording,
     end_tests,
     in_force,
@@ -114,8 +112,8 @@ class Recordings(Decisions):
         return None if row is None else recording_from(row)
 
     def find(self, which: str) -> tuple[int, str | None]:
-        """The recording that is meant: by its number, by the name of a test of it, by a name that
-        its file, with or without suffix, came under, or by a row of the store, as `posteriors/12`.
+        """The recording that is meant: by its number, by the name of a test of it, or by a name
+        that its file, with or without suffix, came under.
 
         Also the test's name, where it was that. Raises NothingThere, and UsageError where several
         recordings are called so.
@@ -129,7 +127,7 @@ class Recordings(Decisions):
             found = connection.scalars(by_name.order_by(tests.c.recording_id)).all()
             if found:
                 return _single(found, f"{len(found)} hangers have a test {which!r}."), which
-            former = by_row(connection, which) or by_former_names(connection, which)
+            former = by_former_names(connection, which)
         if not former:
             raise NothingThere(f"no recording and no test {which!r}.", remedy="See `shm status`.")
         return _single(former, f"{len(former)} recordings were called {which!r}."), None
@@ -281,7 +279,7 @@ class Recordings(Decisions):
         )
 
     def _recordings(self, query: sa.Select[Any]) -> tuple[StoredRecording, ...]:
-        return tuple(readable(self.rows(query), recording_from))
+        return tuple(map(recording_from, self.rows(query)))
 
 
 def _outcome(connection: Connection, known: Row[Any] | None, file: ReceivedFile) -> Outcome:

@@ -112,8 +112,7 @@ def test_a_recording_is_found_by_number_test_and_file_name(filled_copy: Store) -
     assert [find("2"), find("t2"), find("h3-2.csv"), find("h3-2")] == [
         (2, None), (2, "t2"), (2, None), (2, None),
     ]  # fmt: skip
-    assert find("tests/3") == (4, None)
-    for unknown in ("99", "t9", "tests/99"):
+    for unknown in ("99", "t9"):
         with pytest.raises(NothingThere, match=f"no recording and no test '{unknown}'"):
             find(unknown)
     filled_copy.recordings.receive(a_file(9, file_name="h3-2.csv"), NOW)
