@@ -617,6 +617,13 @@ def test_a_result_is_not_lost_while_the_store_is_busy(
             raise StoreBusy("held", retry_after_s=1.0)
         keep(self, *args)
 
+    load, loaded = steps.load_modes, list[Path]()
+
+    def count(path: Path, limits: Limits) -> tuple[ModalTest, ...]:
+        loaded.append(path)
+        return load(path, limits)
+
+    monkeypatch.setattr(steps, "load_modes", count)
     monkeypatch.setattr(Tests, "save", busy_once)
     with a_flow(workspace) as flow:
         receive_all(flow)
@@ -624,6 +631,7 @@ def test_a_result_is_not_lost_while_the_store_is_busy(
             flow.drain()
         flow.drain()
     assert set(stages(workspace).values()) == {Stage.DONE}
+    assert len(loaded) == 1  # what was computed is not computed again
 
 
 def test_a_result_that_the_store_will_not_have_refuses_its_file(
@@ -641,8 +649,8 @@ def test_a_result_that_the_store_will_not_have_refuses_its_file(
 @pytest.mark.parametrize(
     ("place", "error"),
     [
-        ("shm.pipeline.jobs.judge", KeyError("tension")),
-        ("shm.pipeline.jobs.settled", ValueError("The truth value of an array is ambiguous")),
+        ("shm.pipeline.work.judge", KeyError("tension")),
+        ("shm.pipeline.work.settled", ValueError("The truth value of an array is ambiguous")),
         ("shm.store.stored_posteriors.Posteriors.save", TypeError("not a number")),
     ],
 )
@@ -699,7 +707,7 @@ def test_advance_delivering_raises(untold: Workspace, monkeypatch: pytest.Monkey
     def fail(*_: Any) -> None:
         raise ValueError("no message")
 
-    monkeypatch.setattr("shm.pipeline.jobs.plan", fail)
+    monkeypatch.setattr("shm.pipeline.courier.plan", fail)
     spool(untold, "late", day=90)
     with a_flow(untold, notifier=Postman()) as flow:
         receive_all(flow)
