@@ -111,16 +111,11 @@ class NothingThere(ShmError):
 
 
 class WorkerDied(ShmError):
-    """A process that worked on a file died: of the file, or killed by somebody else.
+    """A process that worked on a file died, by itself or killed; `how`: signal or exit code."""
 
-    `how` is the signal or the exit code; `from_outside` where it was killed, and nothing shows that
-    the file was the reason.
-    """
-
-    def __init__(self, message: str, *, how: str = "", from_outside: bool = False):
+    def __init__(self, message: str, *, how: str = ""):
         super().__init__(message, remedy="It is tried again.")
         self.how = how
-        self.from_outside = from_outside
 
 
 class StoreError(ShmError):

@@ -14,7 +14,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from shm.errors import DISK_FULL, ShmError, StoreDamaged, StoreError, WorkerDied
 from shm.pipeline import Clock, utc_now
@@ -25,11 +25,11 @@ from shm.pipeline.lineage import competing, reason_document
 from shm.pipeline.watching import JudgedAgain
 from shm.pipeline.work import Queue, Task, Work
 from shm.read import sidecar_path
-from shm.store import Death, Deaths, Outcome, Receipt, Store, StoredAlert, Workspace
+from shm.store import Outcome, Receipt, Store, StoredAlert, Workspace
 from shm.store.archive import Meanwhile, nothing
 
-_MOST_DEATHS, _MOST_KILLS = 3, 5
-"""A recording is refused when so many processes died of it, or were killed at it alone in a row."""
+_MOST_DEATHS = 6
+"""A recording is refused when so many processes died at it, whoever ended them."""
 _FIRST_PAUSE_S, _PAUSE_GROWS = 2.0, 4
 """2, 8, 32, 128, 512 s: who kills for less than eleven minutes has no file refused."""
 _LONGEST_PAUSE_S = 86400.0  # judgement: what stands still for a day, somebody has looked at
@@ -44,20 +44,13 @@ log = logging.getLogger(__name__)
 class _Running:
     """A task under way; its work waits to be sent the result, or is to be begun again for that.
 
-    `alone`: in a process that does nothing else.
+    `alone`: nothing else is computed meanwhile, since a process died at it before.
     """
 
     task: Task
     work: Work | None
     future: Future[Any]
     alone: bool
-
-
-@runtime_checkable
-class BeginsFresh(Protocol):
-    """An executor that can run a step in a process which does nothing else, before or after."""
-
-    def submit_fresh(self, fn: Callable[[], Any], /) -> Future[Any]: ...
 
 
 class Flow:
@@ -89,7 +82,7 @@ class Flow:
         """Why recordings wait that something outside keeps from being worked on, by number."""
         deaths = store.recordings.deaths()
         self._suspects = set(deaths)
-        self._postponed = {key: each.last_at + _pause(each) for key, each in deaths.items()}
+        self._postponed = {key: each.last_at + _pause(each.count) for key, each in deaths.items()}
         self.use(workspace)
         workspace.archive.sweep()
 
@@ -186,13 +179,9 @@ class Flow:
         return not self._suspects.isdisjoint(task.recordings)
 
     def _begin(self, task: Task) -> None:
-        work, alone = task.work(), self._is_suspect(task)
-        computation = next(work)
-        if alone and isinstance(self.executor, BeginsFresh):
-            future = self.executor.submit_fresh(computation)
-        else:
-            future = self.executor.submit(computation)
-        self._running[task.key] = _Running(task, work, future, alone)
+        work = task.work()
+        future = self.executor.submit(next(work))
+        self._running[task.key] = _Running(task, work, future, self._is_suspect(task))
         future.add_done_callback(lambda _: self.wake())
 
     def _finish(self, running: _Running) -> None:
@@ -259,26 +248,24 @@ class Flow:
             self.delays.pop(recording_id, None)
 
     def _note_death(self, running: _Running, error: BaseException) -> None:
-        """A process died: of what it worked on, of a neighbour's memory, or somebody killed it.
+        """Count a process that died: by what it worked on, or ended by somebody.
 
-        Its recording is tried again alone, after ever longer pauses, and only what happens to it
-        then is held against it. The store keeps account. Of several recordings at once none is
-        refused, for it cannot be said which it was.
+        The recording is tried again, with nothing else beside it, after ever longer pauses; the
+        store keeps account. Of several recordings at once none is refused, for it cannot be said
+        which it was. A step that lacks memory even alone is refused at once.
         """
         task, now, how = running.task, self.clock(), _how_it_died(error)
         log.warning("%s %s: %s", *task.key, how, extra=task.log_fields)
-        outside = isinstance(error, WorkerDied) and error.from_outside
-        alone = Death.FROM_OUTSIDE if outside else Death.BY_ITSELF
         for recording_id in task.recordings:
-            noted = alone if running.alone else Death.BESIDE_OTHERS
-            self.store.recordings.note_death(recording_id, noted, how, now)
+            self.store.recordings.note_death(recording_id, how, now)
         known = self.store.recordings.deaths()
-        deaths = [known.get(key, Deaths(0, 0, now)) for key in task.recordings]
-        if len(deaths) == 1 and _is_enough(deaths[0]):
-            self._refuse(task, _refusal(deaths[0], how))
+        most = max(known[key].count if key in known else 1 for key in task.recordings)
+        lacks_memory = running.alone and isinstance(error, MemoryError)
+        if len(task.recordings) == 1 and (lacks_memory or most >= _MOST_DEATHS):
+            self._refuse(task, _refusal(most, how))
             return
         self._suspects.update(task.recordings)
-        again_at = now + max(map(_pause, deaths))
+        again_at = now + _pause(most)
         self._postponed.update(dict.fromkeys(task.recordings, again_at))
 
     def _refuse(self, task: Task, error: BaseException) -> None:
@@ -344,27 +331,17 @@ def _how_it_died(error: BaseException) -> str:
     return error.message if isinstance(error, WorkerDied) else "the process that worked on it died."
 
 
-def _is_enough(deaths: Deaths) -> bool:
-    return deaths.by_itself >= _MOST_DEATHS or deaths.from_outside >= _MOST_KILLS
+def _pause(deaths: int) -> timedelta:
+    """Return the wait before the next try: the longer, the more have failed."""
+    seconds = _FIRST_PAUSE_S * _PAUSE_GROWS ** (deaths - 1)
+    return timedelta(seconds=min(seconds, _LONGEST_PAUSE_S))
 
 
-def _pause(deaths: Deaths) -> timedelta:
-    """How long to wait before the next try: the longer, the more tries alone have failed."""
-    failed = max(deaths.by_itself, deaths.from_outside)
-    return timedelta(seconds=min(_FIRST_PAUSE_S * _PAUSE_GROWS**failed, _LONGEST_PAUSE_S))
-
-
-def _refusal(deaths: Deaths, how: str) -> ShmError:
-    """Why a recording is given up of which processes died."""
-    how = how.removesuffix(".")
-    if deaths.by_itself >= _MOST_DEATHS:
-        return ShmError(
-            f"{how}; so it went {deaths.by_itself} times, each time with nothing else at work.",
-            remedy="The file is damaged, too large or made to harm: export it anew from its "
-            "source, or split it. If it is sound, report this with the log.",
-        )
+def _refusal(deaths: int, how: str) -> ShmError:
+    """Return why a recording is given up of which processes died."""
     return ShmError(
-        f"{how}; so it went {deaths.from_outside} times in a row, and to no other file meanwhile.",
-        remedy="Find out who kills it: an operator, or a guard of the memory (`journalctl -k`, "
-        "earlyoom). Then drop the file again.",
+        f"{how.removesuffix('.')}; so it went {deaths} times in a row.",
+        remedy="The file is damaged, too large or made to harm: export it anew from its source, or "
+        "split it. Or somebody kills the processes, as an operator or a guard of the memory "
+        "(`journalctl -k`, earlyoom): find out who, then drop the file again.",
     )

@@ -6,7 +6,6 @@ from shm.store.holding import Judged
 from shm.store.list_rows import (
     AlertRow,
     BaselineGlance,
-    Death,
     Deaths,
     Decision,
     DeliveryRow,
@@ -54,7 +53,7 @@ from shm.store.workspace import Workspace
 
 __all__ = [
     "AGAIN_FROM", "ENDED", "Acknowledgement", "Adoption", "AlertRow", "Archive", "Baseline",
-    "BaselineGlance", "Death", "Deaths", "Decision", "Delivery", "DeliveryRow", "DeliveryState",
+    "BaselineGlance", "Deaths", "Decision", "Delivery", "DeliveryRow", "DeliveryState",
     "EventKind", "FormerPosterior", "FormerTest", "HangerEvent", "HeldTest", "Hold",
     "IdentifiedTest", "Judged", "KeptWatch", "Lineage", "News", "Numbers", "Outcome", "Quarantine",
     "Receipt", "ReceivedFile", "Rerun", "Resolution", "Scope", "Silence", "Stage", "Step", "Store",

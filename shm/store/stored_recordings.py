@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
-from itertools import takewhile
 from typing import Any
 
 import sqlalchemy as sa
@@ -32,7 +31,6 @@ from shm.store.files import (
 from shm.store.holding import standing_discard
 from shm.store.list_rows import (
     ON_THE_WAY,
-    Death,
     Deaths,
     Event,
     Outcome,
@@ -45,6 +43,9 @@ from shm.store.list_rows import (
 from shm.store.reprocessing import redescribe, reopen
 from shm.store.rows import ENDED, OTHER, Stage, counts_by_name
 from shm.store.tables import events, recordings, steps, tests
+
+_DIED = "worker died"
+"""The kind of event of a process that died."""
 
 
 class Recordings(Decisions):
@@ -209,43 +210,28 @@ class Recordings(Decisions):
             before[of_test] = row.at
         return dict(found)
 
-    def note_death(self, recording_id: int, death: Death, message: str, at: datetime) -> None:
-        """Notes that a process that worked on a recording died."""
+    def note_death(self, recording_id: int, message: str, at: datetime) -> None:
+        """Note that a process that worked on a recording died."""
         with self.writing() as connection:
             row = by_id(connection, recording_id)
-            write_event(connection, at, death, row.id, row.file_name, message)
+            write_event(connection, at, _DIED, row.id, row.file_name, message)
 
     def deaths(self) -> dict[int, Deaths]:
-        """What is noted of the recordings that are on their way, since each last moved on."""
+        """Return the deaths at each recording on its way, since it last moved on."""
         moved_at = (
             sa.select(steps.c.recording_id, sa.func.max(steps.c.at).label("at"))
             .group_by(steps.c.recording_id)
             .subquery()
         )
-        noted = (
-            sa.select(events.c.id, events.c.kind, events.c.at, events.c.recording_id)
+        query = (
+            sa.select(events.c.recording_id, sa.func.count(), sa.func.max(events.c.at))
             .join(recordings, recordings.c.id == events.c.recording_id)
             .join(moved_at, moved_at.c.recording_id == events.c.recording_id)
-            .where(events.c.kind.in_(list(Death)), events.c.at >= moved_at.c.at)
+            .where(events.c.kind == _DIED, events.c.at >= moved_at.c.at)
             .where(recordings.c.stage.not_in(ENDED))
-            .order_by(events.c.id)
+            .group_by(events.c.recording_id)
         )
-        not_of_it = events.c.kind.in_((Death.FROM_OUTSIDE, Death.BESIDE_OTHERS))
-        killed = sa.select(events.c.recording_id, events.c.id, events.c.kind).where(not_of_it)
-        killed = killed.order_by(events.c.id.desc())
-        found: dict[int, Deaths] = {}
-        with self.reading() as connection:
-            latest = connection.execute(killed.limit(100)).all()
-            own = takewhile(lambda row: row.recording_id == latest[0].recording_id, latest)
-            in_a_row = {row.id for row in own if row.kind == Death.FROM_OUTSIDE}
-            for row in connection.execute(noted):
-                before = found.get(row.recording_id, Deaths(0, 0, row.at))
-                found[row.recording_id] = Deaths(
-                    before.by_itself + (row.kind == Death.BY_ITSELF),
-                    before.from_outside + (row.id in in_a_row),
-                    row.at,
-                )
-        return found
+        return {row[0]: Deaths(row[1], row[2]) for row in self.rows(query)}
 
     def list_events(
         self,
