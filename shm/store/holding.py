@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.documents import value_of
-from shm.errors import NothingThere, UsageError, sentence
+from shm.errors import UsageError, sentence
 from shm.modes_document import test_document
 from shm.store.audit import note
 from shm.store.blobs import pack, test_from_document, unpack
@@ -190,25 +190,6 @@ def end_hold(connection: Connection, recording_id: int, at: datetime) -> None:
     if row is not None and row.decision is None:
         hold = replace(_hold(row), decision=Decision.REPLACED)
         decide(connection, hold, "shm", "done again", at)
-
-
-def undecided(connection: Connection, recording_id: int) -> Hold:
-    """The hold of a recording that waits for a decision; raises NothingThere or UsageError."""
-    row = _latest(connection, recording_id)
-    if row is None or row.decision is not None:
-        known = sa.select(recordings.c.id).where(recordings.c.id == recording_id)
-        if connection.scalar(known) is None:
-            raise NothingThere(f"no recording {recording_id}.", remedy="See `shm ingest --held`.")
-        if row is None:
-            raise UsageError(
-                f"recording {recording_id} is not held.", remedy="See `shm ingest --held`."
-            )
-        raise UsageError(
-            f"recording {recording_id} is not held: it was {row.decision} by {row.who}.",
-            remedy=f"`shm ingest --discard {recording_id} --why TEXT` takes out what counts, "
-            f"`shm ingest --confirm {recording_id} --why TEXT` takes back what was discarded.",
-        )
-    return _hold(row)
 
 
 def refuse_time(hold: Hold, time: datetime | None, at: datetime) -> None:

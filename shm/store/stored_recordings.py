@@ -13,7 +13,7 @@ from sqlalchemy.engine import Connection, Row
 from shm.errors import NothingThere, UsageError
 from shm.store.audit import note
 from shm.store.database import insert
-from shm.store.decisions import Decisions
+from shm.store.disposition import Dispositions
 from shm.store.files import (
     ARCHIVED,
     STEPS,
@@ -48,7 +48,7 @@ _DIED = "worker died"
 """The kind of event of a process that died."""
 
 
-class Recordings(Decisions):
+class Recordings(Dispositions):
     """Received files: how far each has come, and what people decided of it."""
 
     def receive(self, file: ReceivedFile, at: datetime) -> Receipt:
