@@ -11,7 +11,6 @@ ShmError                      exit code 1
 ├── StoreError                5   the store cannot be used
 │   ├── SchemaOutdated        5   mend: `shm db upgrade`
 │   ├── StoreDamaged          5   its bytes are not those that were written
-│   │   └── DamagedRow        5   one row of it; all others can be used
 │   └── StoreBusy             5   passing: try again after `retry_after_s`
 └── GateNotMet                6   a validation or a blind trial missed its mark
 """
@@ -22,7 +21,6 @@ import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 """Codes of an OSError where a disk, or the share of it that one may use, is full."""
@@ -113,16 +111,11 @@ class NothingThere(ShmError):
 
 
 class WorkerDied(ShmError):
-    """A process that worked on a file died: of the file, or killed by somebody else.
+    """A process that worked on a file died, by itself or killed; `how`: signal or exit code."""
 
-    `how` is the signal or the exit code; `from_outside` where it was killed, and nothing shows that
-    the file was the reason.
-    """
-
-    def __init__(self, message: str, *, how: str = "", from_outside: bool = False):
+    def __init__(self, message: str, *, how: str = ""):
         super().__init__(message, remedy="It is tried again.")
         self.how = how
-        self.from_outside = from_outside
 
 
 class StoreError(ShmError):
@@ -137,25 +130,6 @@ class SchemaOutdated(StoreError):
 
 class StoreDamaged(StoreError):
     """The store holds other bytes than were written into it."""
-
-
-class DamagedRow(StoreDamaged):
-    """One row cannot be read, or is not as it was written: its table, number and hanger.
-
-    All other rows can be used. `hanger` is None where the row is of none, or that is not known.
-    """
-
-    def __init__(self, table: str, id_: object, hanger: int | None, remedy: str):
-        of_hanger = "" if hanger is None else f" of hanger {hanger}"
-        super().__init__(
-            f"row {id_} of {table}{of_hanger} is damaged: it is not as it was written.",
-            remedy=remedy,
-            retry_after_s=60.0,  # it may be healed meanwhile
-        )
-        self.table, self.id, self.hanger = table, id_, hanger
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.table, self.id, self.hanger, self.remedy)
 
 
 class StoreBusy(StoreError):

@@ -71,15 +71,6 @@ def give_back_memory() -> None:
         trim(0)
 
 
-def memory_in_use(pid: int | str = "self") -> int:
-    """Resident memory of a process, in bytes; 0 where the system does not tell, or it has gone."""
-    try:
-        pages = Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]
-    except OSError:
-        return 0
-    return int(pages) * os.sysconf("SC_PAGE_SIZE")
-
-
 @cache
 def memory_of_machine() -> int:
     """Return the memory of the machine or, if smaller, of our control group, in bytes.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
@@ -72,7 +71,6 @@ def upgrade(ctx: click.Context) -> None:
         with waiting("upgrading the store"):
             Store.upgrade(workspace.location)
         with workspace.store() as store, counting_bar() as bar:
-            store.upkeep.drop_damaged()
             hangers = bar.track(workspace.bridge.hangers, description="summing up hangers")
             made = sum(store.posteriors.save_summaries(hanger) for hanger in hangers)
             location = store.location
@@ -84,31 +82,19 @@ def upgrade(ctx: click.Context) -> None:
 
 @command.command()
 @click.option("--archive", "with_archive", is_flag=True, help="Read the raw files too.")
-@click.option(
-    "--accept",
-    "accepted",
-    type=flags.Words(),
-    metavar="WHY",
-    help="The rows that are missing are gone for good: they are missed no more.",
-)
 @flags.json
 @click.pass_context
-def check(ctx: click.Context, with_archive: bool, accepted: str | None) -> None:
+def check(ctx: click.Context, with_archive: bool) -> None:
     """Read all that the store holds, and say whether it is whole; exit code 5 where it is not.
 
-    Rows that somebody took out are missed, by what others say of them, with what makes them again.
-    Those that nothing makes again, and no backup has, are accepted with --accept. With --archive,
-    each raw file must be there with the SHA-256 that it is named by. Two stores with the same rows
-    and checksums hold the same.
+    With --archive, each raw file must be there with the SHA-256 that it is named by. Two stores
+    with the same rows and checksums hold the same.
 
     \b
     Example: shm db check --archive
     """
     workspace = open_workspace(ctx)
     with workspace.store() as store, progress_bar("checking") as tell:
-        if accepted is not None:
-            count = store.upkeep.accept_missing(getpass.getuser(), accepted, datetime.now(UTC))
-            click.echo(f"Accepted as gone for good: {count} rows.", err=True)
         checked, location = check_store(store, tell), store.location
         archive = check_archive(store, workspace.archive, tell) if with_archive else None
     findings = (*checked.findings, *(archive.findings if archive else ()))
@@ -117,14 +103,6 @@ def check(ctx: click.Context, with_archive: bool, accepted: str | None) -> None:
             "store": location,
             "tables": [asdict(each) for each in checked.tables],
             "archive": asdict(archive) if archive else None,
-            "damaged": [
-                {"table": e.table, "id": e.id, "hanger": e.hanger, "remedy": e.remedy}
-                for e in checked.damaged
-            ],
-            "missing": [
-                {"table": e.table, "id": e.id, "message": e.message, "remedy": e.remedy}
-                for e in checked.missing
-            ],
             "troubles": [*checked.troubles, *(archive.troubles if archive else ())],
             "findings": [asdict(each) for each in findings],
         }

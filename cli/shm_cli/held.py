@@ -15,7 +15,7 @@ import rich_click as click
 
 from shm.errors import UsageError
 from shm.pipeline import utc_now
-from shm.store import Decision, Hold, Stage, Store, StoredAlert, Withdrawal, Workspace
+from shm.store import Decision, Exclusion, Hold, Stage, Store, StoredAlert, Workspace
 from shm.store.holding import discarded_reason, taking_back
 from shm_cli import flags
 from shm_cli.common import paragraph, show
@@ -41,7 +41,7 @@ class Decided:
 
     hold: Hold
     alerts: Sequence[StoredAlert] = ()
-    withdrawal: Withdrawal | None = None
+    exclusion: Exclusion | None = None
 
 
 def decide(
@@ -70,21 +70,20 @@ def decide(
             _refuse_part(store.recordings.latest_hold(recording_id), test, decision)
         if not held:
             _refuse_without_reason(store, recording_id, decision, why)
-        withdrawal = None
-        if decision is Decision.DISCARDED and held:
-            return Decided(store.recordings.discard(recording_id, who, why, utc_now()))
+        exclusion = None
         if decision is Decision.DISCARDED:
-            withdrawal = store.recordings.withdraw(recording_id, who, why, utc_now(), test)
-            hold = withdrawal.hold
-        elif held:
-            _refuse_copy_without_reason(store.recordings.latest_hold(recording_id), why)
-            hold = store.recordings.confirm(recording_id, who, why, utc_now(), time)
-            learn_from_answer(workspace, store, hold)
+            exclusion = store.recordings.exclude(recording_id, who, why, utc_now(), test)
+            hold = exclusion.hold
         else:
-            hold = store.recordings.reinstate(recording_id, who, why, utc_now(), time, test)
-        finish_now(workspace, recording_id)
+            if held:
+                _refuse_copy_without_reason(store.recordings.latest_hold(recording_id), why)
+            hold = store.recordings.accept(recording_id, who, why, utc_now(), time, test)
+            if held:
+                learn_from_answer(workspace, store, hold)
+        if hold.decision is not Decision.DISCARDED:  # else nothing is done again
+            finish_now(workspace, recording_id)
         raised = [stored for stored in store.alerts.list_all() if stored.id not in known]
-        return Decided(hold, raised, withdrawal)
+        return Decided(hold, raised, exclusion)
 
 
 def _is_held(store: Store, recording_id: int, test: str | None) -> bool:
@@ -138,10 +137,10 @@ def _refuse_copy_without_reason(hold: Hold | None, why: str) -> None:
 
 def decided_words(decided: Decided, stage: Stage) -> str:
     """What became of it."""
-    hold, withdrawal = decided.hold, decided.withdrawal
+    hold, exclusion = decided.hold, decided.exclusion
     what = f"Recording {hold.recording_id} ({hold.file_name})"
-    if withdrawal is not None:
-        return f"{_withdrawn_words(what, withdrawal)} {taking_back(hold)}"
+    if exclusion is not None and hold.decision is Decision.WITHDRAWN:
+        return f"{_excluded_words(what, exclusion)} {taking_back(hold)}"
     if hold.decision is Decision.DISCARDED and stage is Stage.REFUSED:
         return f"{what} is discarded and counts in nothing. {taking_back(hold)}"
     if hold.decision is Decision.DISCARDED:
@@ -157,19 +156,19 @@ def decided_words(decided: Decided, stage: Stage) -> str:
     return f"{what} {verb} from now on; it is {stage}.{time}"
 
 
-def _withdrawn_words(what: str, withdrawal: Withdrawal) -> str:
-    names = ", ".join(test.name for test in withdrawal.hold.tests)
+def _excluded_words(what: str, exclusion: Exclusion) -> str:
+    names = ", ".join(test.name for test in exclusion.hold.tests)
     said = [f"{what}: {names} is discarded and counts in nothing from now on."]
-    if withdrawal.watched_again:
+    if exclusion.watched_again:
         said.append(
-            f"Later tests that are watched again: {withdrawal.watched_again}; alerts that others "
+            f"Later tests that are watched again: {exclusion.watched_again}; alerts that others "
             "raised stay raised."
         )
-    if withdrawal.of_baseline:
+    if exclusion.of_baseline and exclusion.since is not None:
         said.append(
-            f"The baseline was made from {', '.join(withdrawal.of_baseline)} and stays until you "
-            f"set another: `shm drift rebaseline --hanger {withdrawal.hold.hanger} --since "
-            f"{withdrawal.since:%Y-%m-%d} --why TEXT`."
+            f"The baseline was made from {', '.join(exclusion.of_baseline)} and stays until you "
+            f"set another: `shm drift rebaseline --hanger {exclusion.hold.hanger} --since "
+            f"{exclusion.since:%Y-%m-%d} --why TEXT`."
         )
     return " ".join(said)
 

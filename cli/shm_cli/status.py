@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import rich_click as click
 
 from shm.documents import creep_document
-from shm.errors import DamagedRow
 from shm.models import applicable
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
@@ -31,10 +30,8 @@ from shm.store import (
     Decision,
     DeliveryState,
     Store,
-    StoredTest,
     Workspace,
 )
-from shm.store.checksums import of_readable
 from shm.store.stored_alerts import said_of
 from shm.watch.change_words import frequency_words
 from shm_cli import flags
@@ -92,8 +89,6 @@ def command(ctx: click.Context, which: str | None) -> None:
         if row["left_out"]:
             said = "; ".join(row["left_out"])
             click.echo(paragraph(f"hanger {row['hanger']}: left out of its baseline: {said}"))
-        if row["damage"] is not None:
-            click.echo(f"hanger {row['hanger']} stands still: {row['damage']}")
     for row in document["structures"]:
         click.echo(paragraph(_told_of_structure(row)))
 
@@ -279,15 +274,9 @@ def _structures(
     """Those without a model, of which frequencies alone are watched."""
     latest, rows, undated = store.tests.latest(), [], store.tests.names_without_time()
     for each in workspace.bridge.structures:
-        found, damage, said = latest.get(each.id), None, ""
-        of_baseline: Sequence[StoredTest] = ()
-        try:
-            baseline = store.watch.baseline(each.id)
-            of_baseline = store.tests.of_baseline(baseline) if baseline else ()
-            watched = store.watch.list_detected_and_latest(baseline) if baseline else ()
-            said = frequency_words([one.watched for one in watched], each)
-        except DamagedRow as error:
-            damage = str(error)
+        found, baseline = latest.get(each.id), store.watch.baseline(each.id)
+        of_baseline = store.tests.of_baseline(baseline) if baseline else ()
+        watched = store.watch.list_detected_and_latest(baseline) if baseline else ()
         rows.append(
             {
                 "structure": each.id,
@@ -296,7 +285,7 @@ def _structures(
                 "latest_test": found.time if found else None,
                 "baseline_since": min((test.time for test in of_baseline), default=None),
                 "open_alerts": open_alerts[each.id],
-                "said": damage or said,
+                "said": frequency_words([one.watched for one in watched], each),
                 "dated_by_receipt": list(undated.get(each.id, ())),
             }
         )
@@ -311,18 +300,12 @@ def _hangers(
     held: Mapping[int, int],
 ) -> list[dict[str, Any]]:
     models, latest, rows = store.posteriors.selected_models(), store.tests.latest(), []
-    known_damage = (*store.upkeep.known_damage(), *store.watch.damaged_baselines().values())
-    damage = {each.hanger: str(each) for each in known_damage}
     baselines = store.watch.baselines_in_force(workspace.bridge.hangers)
-    watches = of_readable(store.watch.latest, {})
+    watches = store.watch.latest()
     for hanger in workspace.bridge.hangers:
         found, baseline = latest.get(hanger.id), baselines.get(hanger.id)
-        gap, adopted = None, []
-        try:
-            adopted = [each.adoption.model for each in store.posteriors.list_adoptions(hanger.id)]
-            gap = _gap(store, hanger.id) if adopted else None
-        except DamagedRow as error:
-            damage[hanger.id] = str(error)
+        adopted = [each.adoption.model for each in store.posteriors.list_adoptions(hanger.id)]
+        gap = _gap(store, hanger.id) if adopted else None
         check = baseline.check if baseline else None
         names, reasons = applicable(hanger, [*workspace.settings.model_names, *adopted])
         rows.append(
@@ -345,7 +328,6 @@ def _hangers(
                 "dated_by_receipt": list(lines[hanger.id].undated),
                 "left_out": list(check.left_out) if check else [],
                 "gap": gap,
-                "damage": damage.get(hanger.id),
             }
         )
     return rows

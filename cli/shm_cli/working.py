@@ -12,7 +12,6 @@ import rich_click as click
 
 from shm.errors import NothingThere, StoreBusy
 from shm.pipeline import Flow, utc_now
-from shm.pipeline.jobs import rebuild
 from shm.store import ENDED, Rerun, Stage, Store, Workspace
 from shm_cli.common import counting_bar
 from shm_daemon.execution import children_ended, executor_of
@@ -71,10 +70,8 @@ def send_back(workspace: Workspace, which: str, stage: Stage) -> Rerun:
     """
     with workspace.store() as store:
         recording_id, test = store.recordings.find(which)
-        if stage is Stage.IDENTIFIED or store.upkeep.damaged_tests(recording_id):
+        if stage is Stage.IDENTIFIED:
             _refuse_without_raw_file(workspace, store, recording_id)
-        for made in rebuild(workspace, store, recording_id, utc_now()):
-            click.echo(made, err=True)
         rerun = store.recordings.reprocess(recording_id, stage, utc_now(), test)
     for sentence in sentences(rerun, stage):
         click.echo(sentence, err=True)

@@ -249,13 +249,12 @@ def _age(path: Path, now: datetime) -> timedelta:
 def check_store(examined: Examined) -> Iterator[Finding]:
     """Whether the store is whole, as far as a quick look tells."""
     store = examined.store
-    troubles = (*quick_troubles(store), *(error.message for error in store.upkeep.known_damage()))
+    troubles = quick_troubles(store)
     if troubles:
         yield fault(
             "store",
             f"{store.location} is damaged: {some(list(troubles))}",
-            "`shm db check` names each damaged row and what heals it; else stop the daemon, then "
-            "`shm db restore FILE --replace`.",
+            "Stop the daemon, then `shm db restore FILE --replace`.",
         )
     else:
         held = sum(store.recordings.stage_counts().values())

@@ -16,20 +16,15 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, ParamSpec, TypeVar
 
 from shm.errors import ShmError, WorkerDied
-from shm.resources import KILLING, memory_in_use, memory_of_machine, one_thread_a_process
+from shm.resources import memory_of_machine, one_thread_a_process
 from shm.settings import Settings
 
-_LOOK_S = 0.1  # technical: how seldom memory is read of a step that takes seconds
+_ENDING_S = 0.1  # technical: a process at rest ends within it, once its pipe is closed
 _STILLBORN = 3  # technical: once is chance; each takes a second of imports
 AGAIN_S = 5.0
 """Technical: after so long a place to work in is looked for again; files wait meanwhile."""
 _MOST_OF_MEMORY = 0.8
 """One step may have so much of the machine's memory; beyond, it is told that there is none."""
-_LARGE = 0.4
-"""A process that was killed with so much of the memory was probably killed for that."""
-
-_FORKSERVER_GONE = 255
-"""What multiprocessing says of a process whose end it cannot know."""
 _NOTHING: tuple[Any, BaseException | None] = (None, None)
 
 P = ParamSpec("P")
@@ -55,7 +50,7 @@ def executor_of(settings: Settings) -> Executor:
 
 
 class Workers(Executor):
-    """Processes of our own, each of which does one step at a time and dies for itself alone.
+    """Run each step in one of some processes; one that dies takes no other along.
 
     A step whose process died raises WorkerDied; the others go on, and a new process takes the
     place. Raises ShmError with `retry_after_s` where no process can be begun. `prepare` is called
@@ -70,11 +65,7 @@ class Workers(Executor):
         self._threads.submit(self._begin_early)
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        return self._threads.submit(self._run, partial(fn, *args, **kwargs), fresh=False)
-
-    def submit_fresh(self, fn: Callable[[], T], /) -> Future[T]:
-        """The same in a process that has done nothing before and will do nothing after."""
-        return self._threads.submit(self._run, fn, fresh=True)
+        return self._threads.submit(self._run, partial(fn, *args, **kwargs))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Ends the processes that are at rest; those at work end with their step, or with us.
@@ -91,20 +82,20 @@ class Workers(Executor):
     def _begin_early(self) -> None:
         """The first process imports what it needs while we go on."""
         with suppress(ShmError):
-            self._rest(self._worker(fresh=True))
+            self._rest(self._worker())
 
-    def _worker(self, *, fresh: bool) -> _Worker:
-        """A process at rest, or a new one."""
+    def _worker(self) -> _Worker:
+        """Return a process at rest, or a new one."""
         from shm.pipeline import steps as steps  # before the lock: it can take seconds
 
         with self._changing:
             if self._ended:  # whoever ended us has looked for our processes: none would find it
-                raise WorkerDied("its process was not begun, because all end.", from_outside=True)
-            return self._idle.pop() if self._idle and not fresh else _Worker(self._prepare)
+                raise WorkerDied("its process was not begun, because all end.")
+            return self._idle.pop() if self._idle else _Worker(self._prepare)
 
-    def _run(self, step: Callable[[], T], *, fresh: bool) -> T:
+    def _run(self, step: Callable[[], T]) -> T:
         for _ in range(self._count + _STILLBORN):  # all at rest may have been killed there
-            worker = self._worker(fresh=fresh)
+            worker = self._worker()
             try:
                 found: T = worker.do(step)
             except WorkerDied:
@@ -113,10 +104,7 @@ class Workers(Executor):
             else:
                 return found
             finally:
-                if fresh:
-                    worker.end()
-                else:
-                    self._rest(worker)
+                self._rest(worker)
         raise _none_begins("each ended before it took on a step")
 
     def _rest(self, worker: _Worker) -> None:
@@ -152,40 +140,28 @@ class _Worker:
         return self._process.is_alive()
 
     def do(self, step: Callable[[], Any]) -> Any:
-        """What the step gives or raises; raises WorkerDied."""
-        largest, self.begun = 0, False
+        """Return what the step returns, or raise what it raises; raises WorkerDied."""
+        self.begun = False
         try:
             self._pipe.send(step)
             self.begun = bool(self._pipe.recv())
-            while not wait([self._pipe, self._process.sentinel], _LOOK_S):
-                largest = max(largest, memory_in_use(self._process.pid or 0))
             found, error = self._pipe.recv()
         except (EOFError, ConnectionError):
-            raise self._death(largest) from None
+            raise self._death() from None
         if error is not None:
             raise error
         return found
 
-    def _death(self, largest: int) -> WorkerDied:
+    def _death(self) -> WorkerDied:
         self.end()
-        code, ours = self._process.exitcode or 0, memory_of_machine()
-        killed = -code in KILLING or code == _FORKSERVER_GONE
+        code = self._process.exitcode or 0
         how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-        large = bool(ours) and largest > _LARGE * ours
-        held = (
-            f" when it held {largest / 1e9:.1f} of {ours / 1e9:.1f} GB of memory" if large else ""
-        )
-        said = "was killed" if killed else "died"
-        return WorkerDied(
-            f"the process that worked on it {said} ({how}){held}.",
-            how=how,
-            from_outside=killed and not large,
-        )
+        return WorkerDied(f"the process that worked on it died ({how}).", how=how)
 
     def end(self) -> None:
         """Closes the pipe, which ends a process at rest, and kills one that is not."""
         self._pipe.close()
-        self._process.join(_LOOK_S)
+        self._process.join(_ENDING_S)
         self._process.kill()
         self._process.join()
 

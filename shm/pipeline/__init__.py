@@ -1,7 +1,7 @@
 """The flow: file -> archive -> modal tests -> posterior -> drift, alert -> hooks.
 
-`intake` takes files in, `steps` holds each arrow as a function of values, `jobs` says which steps
-wait, and `flow` begins them, keeps their results and refuses what fails.
+`intake` takes files in, `steps` holds each arrow as a function of values, `work` says which of them
+wait and where results go, `flow` begins them and refuses what fails, `courier` tells hooks.
 """
 
 from collections.abc import Callable
@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from shm.resources import when_asked
 
 if TYPE_CHECKING:
+    from shm.pipeline.courier import DeliveryRefused, Notifier
     from shm.pipeline.flow import Flow
     from shm.pipeline.intake import Sharing
-    from shm.pipeline.jobs import DeliveryRefused, Notifier
 
 __all__ = ["Clock", "DeliveryRefused", "Flow", "Notifier", "Sharing", "utc_now"]
 
@@ -28,6 +28,6 @@ def utc_now() -> datetime:
 
 if not TYPE_CHECKING:
     # The flow brings all readers with it: who only asks the time does without.
-    of_jobs = dict.fromkeys(("DeliveryRefused", "Notifier"), "shm.pipeline.jobs")
+    of_courier = dict.fromkeys(("DeliveryRefused", "Notifier"), "shm.pipeline.courier")
     others = {"Flow": "shm.pipeline.flow", "Sharing": "shm.pipeline.intake"}
-    __getattr__ = when_asked(__name__, {**of_jobs, **others})
+    __getattr__ = when_asked(__name__, {**of_courier, **others})

@@ -10,11 +10,10 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
-from functools import partial
 from typing import TYPE_CHECKING
 
 import shm
-from shm.errors import DamagedRow, NothingThere
+from shm.errors import NothingThere
 from shm.pipeline.lineage import (
     discarded_of_baselines,
     redescribed,
@@ -43,7 +42,6 @@ from shm.store import (
     TrendPoint,
     Workspace,
 )
-from shm.store.checksums import note_damage, of_readable
 from shm.store.stored_alerts import said_of, silenced_until
 from shm.values import TENSION, Change, Drift, Hanger, ResponsePoint, WatchedTest
 from shm.values.bar_description import list_sensors
@@ -133,7 +131,11 @@ def bridge_report(
     return BridgeReport(
         workspace.bridge.name,
         tuple(
-            replace(_with_sensors(workspace, store, line), course=courses.get(line.hanger.id))
+            replace(
+                line,
+                sensors=_sensors(workspace, store, line),
+                course=courses.get(line.hanger.id),
+            )
             for line in lines
         ),
         pattern,
@@ -144,21 +146,6 @@ def bridge_report(
         {"software": software()},
         settings_words(workspace.settings),
     )
-
-
-def _with_sensors(workspace: Workspace, store: Store, line: HangerLine) -> HangerLine:
-    """Return the line with its sensors; the line of a damaged hanger where they cannot be read."""
-    try:
-        return replace(line, sensors=_sensors(workspace, store, line))
-    except DamagedRow as error:
-        note_damage(error)
-        return _damaged_line(line.hanger, error, line.open_alerts)
-
-
-def _damaged_line(hanger: Hanger, damage: DamagedRow, open_alerts: int) -> HangerLine:
-    """Return a line without a status: what would be said of the hanger cannot be read."""
-    message = hanger_message(Known(hanger, damage=str(damage)))
-    return HangerLine(hanger, message, called=str(damage), open_alerts=open_alerts)
 
 
 def _sensors(workspace: Workspace, store: Store, line: HangerLine) -> tuple[ResponsePoint, ...]:
@@ -219,7 +206,6 @@ class HangersNow:
     open_alerts: Mapping[int, int]
     standing: Mapping[int, Sequence[StoredAlert]]
     silences: tuple[Silence, ...]
-    damaged: Mapping[int, DamagedRow]
     warnings: Mapping[int, tuple[str, ...]]
     blind: Mapping[int, Lead]
     undated: Mapping[int, tuple[str, ...]]
@@ -228,11 +214,10 @@ class HangersNow:
     def of(
         cls, workspace: Workspace, store: Store, hangers: Sequence[Hanger], now: datetime
     ) -> HangersNow:
-        damaged = {row.hanger: row for row in store.upkeep.known_damage() if row.hanger is not None}
         every = workspace.bridge.hangers
         now_at = store.posteriors.latest_trends(hangers)
         baselines = store.watch.baselines_in_force(every)  # of neighbours too: one may stand out
-        watches = of_readable(partial(store.watch.latest, hangers=hangers), damaged)
+        watches = store.watch.latest(hangers)
         standing = defaultdict[int, list[StoredAlert]](list)
         silences = store.silences.list_all()
         works = [each for each in silences if each.is_maintenance]
@@ -244,11 +229,10 @@ class HangersNow:
             now_at,
             baselines,
             watches,
-            of_readable(partial(store.watch.detected_changes, hangers=hangers), damaged),
+            store.watch.detected_changes(hangers),
             store.alerts.open_counts(),
             standing,
             tuple(each for each in silences if not each.is_over(now)),
-            damaged,
             warnings_from(
                 every, hangers, baselines, watches, now_at, works, discarded_of_baselines(store)
             ),
@@ -258,8 +242,6 @@ class HangersNow:
 
     def line(self, hanger: Hanger) -> HangerLine:
         opened, point = self.open_alerts.get(hanger.id, 0), self.latest.get(hanger.id)
-        if hanger.id in self.damaged:
-            return _damaged_line(hanger, self.damaged[hanger.id], opened)
         message = hanger_message(self.known(hanger))
         baseline, watched = self.baselines.get(hanger.id), self._watched(hanger)
         called = self.called.get(hanger.id, ())
@@ -287,8 +269,6 @@ class HangersNow:
 
     def known(self, hanger: Hanger) -> Known:
         """Return what the state of a hanger is decided from."""
-        if hanger.id in self.damaged:
-            return Known(hanger, damage=str(self.damaged[hanger.id]))
         point = self.latest.get(hanger.id)
         watched = self._watched(hanger)
         standing = self.standing.get(hanger.id, ())
@@ -365,7 +345,7 @@ def hanger_shifts(store: Store, order: Sequence[int]) -> tuple[HangerShift, ...]
     """The latest known shift of each hanger that has one, in their `order` along the bridge."""
     from shm.watch.neighbours import shifts_of
 
-    latest, before_c = of_readable(store.watch.latest, {}), store.watch.baseline_temperatures()
+    latest, before_c = store.watch.latest(), store.watch.baseline_temperatures()
     compared = [latest[hanger] for hanger in order if hanger in latest]
     drifts = {each.hanger: _known_drifts(store, each) for each in compared}
     changes = {each.hanger: each.watched.temperature_c - before_c[each.hanger] for each in compared}

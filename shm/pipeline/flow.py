@@ -1,6 +1,6 @@
-"""The loop's body: keep what is finished, begin what waits, refuse what fails.
+"""The flow takes files in and works on them: begins what waits, stores results, refuses what fails.
 
-Steps run on the executor; only this process touches the store. A step's result and the mark that
+What is computed runs on the executor; only this process uses the store. A result and the mark that
 it is done are one transaction, and what waits is asked of the store each time: the flow may be
 killed at any instant and simply goes on.
 """
@@ -10,33 +10,26 @@ from __future__ import annotations
 import errno
 import logging
 from collections.abc import Callable
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    Executor,
-    Future,
-    ThreadPoolExecutor,
-    wait,
-)
-from dataclasses import dataclass
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
-from shm.errors import DISK_FULL, DamagedRow, ShmError, StoreError, WorkerDied
+from shm.errors import DISK_FULL, ShmError, StoreDamaged, StoreError, WorkerDied
 from shm.pipeline import Clock, utc_now
+from shm.pipeline.courier import Courier, Notifier, alert_fields
 from shm.pipeline.intake import Sharing, receive
-from shm.pipeline.jobs import DELIVERIES, DeliveryRefused, Job, Jobs, Notifier, Step, wait_after
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import competing, reason_document
 from shm.pipeline.watching import JudgedAgain
+from shm.pipeline.work import Queue, Task, Work
 from shm.read import sidecar_path
-from shm.store import Death, Deaths, Delivery, Outcome, Receipt, Store, StoredAlert, Workspace
+from shm.store import Outcome, Receipt, Store, StoredAlert, Workspace
 from shm.store.archive import Meanwhile, nothing
-from shm.values import Alert
 
-_MOST_DEATHS, _MOST_KILLS = 3, 5
-"""A recording is refused when so many processes died of it, or were killed at it alone in a row."""
+_MOST_DEATHS = 6
+"""A recording is refused when so many processes died at it, whoever ended them."""
 _FIRST_PAUSE_S, _PAUSE_GROWS = 2.0, 4
 """2, 8, 32, 128, 512 s: who kills for less than eleven minutes has no file refused."""
 _LONGEST_PAUSE_S = 86400.0  # judgement: what stands still for a day, somebody has looked at
@@ -44,28 +37,20 @@ _AGAIN_S = 60.0
 _OF_THE_MACHINE = (*DISK_FULL, errno.EROFS, errno.EIO, errno.ENFILE)
 """What a step meets that is no fault of its recording, and passes when somebody sees to it."""
 
-_NO_MORE = (
-    " What it gave with its former sidecar counts no more: correct the sidecar and drop both again."
-)
-
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Running:
-    """A job under way."""
+class _Running:
+    """A task under way; its work waits to be sent the result, or is to be begun again for that.
 
-    job: Job
-    step: Step
+    `alone`: nothing else is computed meanwhile, since a process died at it before.
+    """
+
+    task: Task
+    work: Work | None
     future: Future[Any]
-    alone: bool = False
-
-
-@runtime_checkable
-class BeginsFresh(Protocol):
-    """An executor that can run a step in a process which does nothing else, before or after."""
-
-    def submit_fresh(self, fn: Callable[[], Any], /) -> Future[Any]: ...
+    alone: bool
 
 
 class Flow:
@@ -89,15 +74,15 @@ class Flow:
         meanwhile: Meanwhile = nothing,
     ):
         self.store, self.executor, self.clock, self.lanes = store, executor, clock, lanes
-        self.notifier, self.wake, self.meanwhile = notifier, wake, meanwhile
-        self._running: dict[tuple[str, int], Running] = {}
-        self._couriers = ThreadPoolExecutor(DELIVERIES, thread_name_prefix="hook")
-        self._damaged: dict[int, datetime] = {}  # hangers that stand still, and until when
+        self.wake, self.meanwhile = wake, meanwhile
+        self._courier = Courier(store, notifier, clock, wake)
+        self._running: dict[tuple[str, int], _Running] = {}
+        self._stopped: dict[int, datetime] = {}  # hangers, and until when
         self.delays: dict[int, str] = {}
         """Why recordings wait that something outside keeps from being worked on, by number."""
         deaths = store.recordings.deaths()
         self._suspects = set(deaths)
-        self._postponed = {key: each.last_at + _pause(each) for key, each in deaths.items()}
+        self._postponed = {key: each.last_at + _pause(each.count) for key, each in deaths.items()}
         self.use(workspace)
         workspace.archive.sweep()
 
@@ -109,247 +94,221 @@ class Flow:
             if hanger.id in selected:
                 competing(hanger, workspace.settings, selected)
         self.workspace = workspace
-        self._judged_again = JudgedAgain(workspace, self.store, self.clock())
+        self._judged_again = JudgedAgain(workspace, self.store)
         heed_limits(workspace, self.store, workspace.bridge.hangers, self.clock())
-        self.jobs = Jobs(workspace, self.store, self.clock)
+        self._queue = Queue(workspace, self.store, self.clock)
 
     def close(self) -> None:
         """Abandons what is under way; the store still says that it waits."""
         for running in self._running.values():
             running.future.cancel()
-        self._couriers.shutdown(wait=False, cancel_futures=True)
+        self._courier.close()
 
     def receive(self, path: Path, sharing: Sharing | None = None) -> Receipt:
         """Takes a whole file in; see `shm.pipeline.intake`."""
         now = self.clock()
         receipt = receive(path, self.workspace, self.store, now, sharing, self.meanwhile)
         recording = receipt.recording
-        about = {"recording": recording.id, "file": recording.file.file_name, "stage": "received"}
-        first = recording.file.file_name
-        came_as = f", known as {first}" if Path(first).name != path.name else ""
-        log.info("%s: %s%s", path.name, receipt.outcome, came_as, extra=about)
+        name = recording.file.file_name
+        fields = {"recording": recording.id, "file": name, "stage": "received"}
+        known_as = f", known as {name}" if Path(name).name != path.name else ""
+        log.info("%s: %s%s", path.name, receipt.outcome, known_as, extra=fields)
         return receipt
 
     def drain(self, after_each: Callable[[], object] = lambda: None) -> None:
         """Works until nothing waits that could be done now; calls `after_each` on the way."""
         while self.advance() or self.advance(hurry=True):
             after_each()
-            under_way = [running.future for running in self._running.values()]
-            wait(under_way, return_when=FIRST_COMPLETED)
+            wait(self.under_way, return_when=FIRST_COMPLETED)
+
+    @property
+    def under_way(self) -> list[Future[Any]]:
+        """Return what is being computed, and sent to hooks."""
+        computed = [running.future for running in self._running.values()]
+        return [*computed, *self._courier.under_way]
 
     def advance(self, *, hurry: bool = False) -> bool:
-        """Keeps what is finished, begins what waits; whether anything is under way.
+        """Store what is finished, begin what waits; return True if anything is under way.
 
-        With `hurry` alerts are not held for alike ones: who calls is about to end.
+        With `hurry` alerts are not held for similar ones: who calls is about to end.
         """
         for key, running in list(self._running.items()):
             if running.future.done():
                 self._finish(running)
                 del self._running[key]
         try:
-            self._begin_deliveries(hurry)
+            self._courier.store_outcomes(self.workspace.settings)
+            self._courier.begin(self.workspace, hurry=hurry)
         finally:  # an alert that cannot be sent must not keep files from being worked on
-            self._begin_steps()
-        return bool(self._running)
+            self._begin_tasks()
+        return bool(self.under_way)
 
     def suspects_due_s(self) -> float | None:
         """How long until a recording is tried again whose process died; None without such."""
         times = [self._postponed[key] for key in self._suspects if key in self._postponed]
-        if not times:
-            return None
-        return max(0.0, (min(times) - self.clock()).total_seconds())
+        return max(0.0, (min(times) - self.clock()).total_seconds()) if times else None
 
-    # ------------------------------------------------------------ begin
-
-    def _begin_deliveries(self, hurry: bool) -> None:
-        if self.notifier is not None:
-            self.jobs.begin_messages(hurry=hurry)
-            under_way = [run.job.delivery for run in self._running.values() if run.job.delivery]
-            for job in self.jobs.owed(self.notifier, under_way):
-                self._begin(job, self._couriers)
-
-    def _begin_steps(self) -> None:
+    def _begin_tasks(self) -> None:
         now = self.clock()
-        held = {id_ for id_, until in self._postponed.items() if _still_waits(until, now)}
-        damaged: set[int | None] = {
-            hanger for hanger, until in self._damaged.items() if _still_waits(until, now)
-        }
-        self._judged_again.go_on(now, held, damaged)
-        for job in self.jobs.waiting(2 * self.lanes, held):
-            if job.hanger in damaged or job.key in self._running:
+        postponed = {id_ for id_, until in self._postponed.items() if _still_waits(until, now)}
+        stopped = {id_ for id_, until in self._stopped.items() if _still_waits(until, now)}
+        self._judged_again.go_on(now, postponed, stopped)
+        for task in self._queue.list_waiting(2 * self.lanes, postponed):
+            if task.hanger in stopped or task.key in self._running:
                 continue
-            if not self._has_room(job):
+            if not self._has_room(task):
                 return
             try:
-                self._begin(job, self.executor)
-            except DamagedRow as error:
-                self._stop(job, error)
-                damaged |= {job.hanger} - {None}
-            except (ShmError, BrokenExecutor):
-                raise
-            except Exception:  # what one hanger's rows hold must not stop the others
-                log.exception("%s %s cannot begin", *job.key, extra=_about(job))
-                self._hold(job, _AGAIN_S)
-                damaged |= {job.hanger} - {None}
+                self._begin(task)
+            except Exception as error:  # what one hanger's rows hold must not stop the others
+                passes = isinstance(error, ShmError | BrokenExecutor)
+                if passes and not isinstance(error, StoreDamaged):
+                    raise
+                log.exception("%s %s cannot begin", *task.key, extra=task.log_fields)
+                self._postpone(task)
+                if task.hanger is not None:
+                    stopped.add(task.hanger)
 
-    def _has_room(self, job: Job) -> bool:
-        """Whether a step may begin now; one whose process died before runs alone."""
-        steps = [running.job for running in self._running.values() if not running.job.delivery]
-        suspects = any(self._is_suspect(each) for each in (*steps, job))
-        return len(steps) < self.lanes and not (steps and suspects)
+    def _has_room(self, task: Task) -> bool:
+        """Return True if a task may begin now; one whose process died before runs alone."""
+        others = [running.task for running in self._running.values()]
+        suspect = any(self._is_suspect(each) for each in (*others, task))
+        return len(others) < self.lanes and not (others and suspect)
 
-    def _is_suspect(self, job: Job) -> bool:
-        return not self._suspects.isdisjoint(job.recordings)
+    def _is_suspect(self, task: Task) -> bool:
+        return not self._suspects.isdisjoint(task.recordings)
 
-    def _begin(self, job: Job, executor: Executor) -> None:
-        step, alone = job.prepare(), self._is_suspect(job)
-        if alone and isinstance(executor, BeginsFresh):
-            future = executor.submit_fresh(step.run)
-        else:
-            future = executor.submit(step.run)
-        self._running[job.key] = Running(job, step, future, alone)
+    def _begin(self, task: Task) -> None:
+        work = task.work()
+        future = self.executor.submit(next(work))
+        self._running[task.key] = _Running(task, work, future, self._is_suspect(task))
         future.add_done_callback(lambda _: self.wake())
 
-    # ------------------------------------------------------------ finish
-
-    def _finish(self, running: Running) -> None:
-        """Store the result of a step that has ended, or handle the error that it ended with.
+    def _finish(self, running: _Running) -> None:
+        """Store the result of a task that has ended, or handle the error that it ended with.
 
         Raises StoreError where the store cannot be used now: the result is stored at a later turn.
         """
-        error = running.future.exception()
+        task, error = running.task, running.future.exception()
         try:
             if error is None:
-                self._keep(running)
+                self._store_result(running)
                 return
-        except DamagedRow as damage:
-            self._stop(running.job, damage)
-            return
-        except StoreError as refusal:
-            if refusal.retry_after_s is not None:
+        except Exception as fault:  # one file must not stop the others
+            if isinstance(fault, StoreError) and fault.retry_after_s is not None:
+                self._running[task.key] = replace(running, work=None)
                 raise
-            error = refusal
-        except Exception as fault:  # noqa: BLE001 - one file must not stop the others
             error = fault
         try:
             self._handle_error(running, error)
         except ShmError:
             raise
         except Exception:
-            log.exception("%s %s: its error cannot be noted", *running.job.key)
-            self._hold(running.job, _AGAIN_S)
+            log.exception("%s %s: its error cannot be noted", *task.key)
+            self._postpone(task)
 
-    def _keep(self, running: Running) -> None:
-        kept = running.step.keep(running.future.result())
-        if isinstance(kept, StoredAlert):
-            about = _about_alert(kept.alert)
-            log.warning("alert %s: %s", kept.alert.key, kept.alert.message, extra=about)
-        log.info("%s %d: done", *running.job.key, extra=_about(running.job))
-        self._forget(running.job)
+    def _store_result(self, running: _Running) -> None:
+        task, work = running.task, running.work
+        if work is None:
+            work = task.work()
+            next(work)
+        stored = _end(work, running.future.result())
+        if isinstance(stored, StoredAlert):
+            alert = stored.alert
+            log.warning("alert %s: %s", alert.key, alert.message, extra=alert_fields(alert))
+        log.info("%s %d: done", *task.key, extra=task.log_fields)
+        self._forget(task)
 
-    def _handle_error(self, running: Running, error: BaseException) -> None:
-        job = running.job
-        if job.delivery is not None:
-            self._put_off(job.delivery, job.message or job.delivery.alert, error)
-        elif isinstance(error, BrokenExecutor | WorkerDied | MemoryError):
+    def _handle_error(self, running: _Running, error: BaseException) -> None:
+        task = running.task
+        if isinstance(error, BrokenExecutor | WorkerDied | MemoryError):
             self._note_death(running, error)
         elif (wait_s := _passes_in_s(error)) is not None:
             until = self.clock() + timedelta(seconds=wait_s)
-            self._postponed.update(dict.fromkeys(job.recordings, until))
-            names = ", ".join(map(str, job.recordings))
-            self.delays |= dict.fromkeys(job.recordings, f"recording {names} waits: {error}")
+            self._postponed.update(dict.fromkeys(task.recordings, until))
+            names = ", ".join(map(str, task.recordings))
+            self.delays |= dict.fromkeys(task.recordings, f"recording {names} waits: {error}")
             said = "%s %s is tried again in %.0f s: %s"
-            log.warning(said, *job.key, wait_s, error, extra=_about(job))
+            log.warning(said, *task.key, wait_s, error, extra=task.log_fields)
         else:
-            self._refuse(job, error)
+            self._refuse(task, error)
 
-    def _stop(self, job: Job, error: DamagedRow) -> None:
-        """A damaged row stops its hanger alone, until somebody has mended it; that is noted."""
-        self._hold(job, error.retry_after_s or _AGAIN_S)
-        if self.store.upkeep.note_damage(error, self.clock()):
-            log.error("%s %s stands still: %s", *job.key, error, extra=_about(job))
-
-    def _hold(self, job: Job, seconds: float) -> None:
-        until = self.clock() + timedelta(seconds=seconds)
-        if job.hanger is None:
-            self._postponed.update(dict.fromkeys(job.recordings, until))
+    def _postpone(self, task: Task) -> None:
+        until = self.clock() + timedelta(seconds=_AGAIN_S)
+        if task.hanger is None:
+            self._postponed.update(dict.fromkeys(task.recordings, until))
         else:
-            self._damaged[job.hanger] = until
+            self._stopped[task.hanger] = until
 
-    def _forget(self, job: Job) -> None:
-        """Earlier troubles of a job that has come to an end count no more."""
-        for recording_id in job.recordings:
+    def _forget(self, task: Task) -> None:
+        """Drop earlier troubles of a task that has come to an end."""
+        for recording_id in task.recordings:
             self._suspects.discard(recording_id)
             self._postponed.pop(recording_id, None)
             self.delays.pop(recording_id, None)
 
-    def _note_death(self, running: Running, error: BaseException) -> None:
-        """A process died: of what it worked on, of a neighbour's memory, or somebody killed it.
+    def _note_death(self, running: _Running, error: BaseException) -> None:
+        """Count a process that died: by what it worked on, or ended by somebody.
 
-        Its recording is tried again alone, after ever longer pauses, and only what happens to it
-        then is held against it. The store keeps account. Of several recordings at once none is
-        refused, for it cannot be said which it was.
+        The recording is tried again, with nothing else beside it, after ever longer pauses; the
+        store keeps account. Of several recordings at once none is refused, for it cannot be said
+        which it was. A step that lacks memory even alone is refused at once.
         """
-        job, now = running.job, self.clock()
-        log.warning("%s %s: %s", *job.key, _how_it_died(error), extra=_about(job))
-        outside = isinstance(error, WorkerDied) and error.from_outside
-        death = Death.FROM_OUTSIDE if outside else Death.BY_ITSELF
-        for recording_id in job.recordings:
-            noted = death if running.alone else Death.BESIDE_OTHERS
-            self.store.recordings.note_death(recording_id, noted, _how_it_died(error), now)
+        task, now, how = running.task, self.clock(), _how_it_died(error)
+        log.warning("%s %s: %s", *task.key, how, extra=task.log_fields)
+        for recording_id in task.recordings:
+            self.store.recordings.note_death(recording_id, how, now)
         known = self.store.recordings.deaths()
-        deaths = [known.get(key, Deaths(0, 0, now)) for key in job.recordings]
-        if len(deaths) == 1 and _is_enough(deaths[0]):
-            self._refuse(job, _refusal(deaths[0], error))
+        most = max(known[key].count if key in known else 1 for key in task.recordings)
+        lacks_memory = running.alone and isinstance(error, MemoryError)
+        if len(task.recordings) == 1 and (lacks_memory or most >= _MOST_DEATHS):
+            self._refuse(task, _refusal(most, how))
             return
-        self._suspects.update(job.recordings)
-        again_at = now + max(map(_pause, deaths))
-        self._postponed.update(dict.fromkeys(job.recordings, again_at))
+        self._suspects.update(task.recordings)
+        again_at = now + _pause(most)
+        self._postponed.update(dict.fromkeys(task.recordings, again_at))
 
-    def _refuse(self, job: Job, error: BaseException) -> None:
-        """Lays the files of a failed step in the quarantine, then marks them refused.
+    def _refuse(self, task: Task, error: BaseException) -> None:
+        """Put the files of a failed task into the quarantine, then mark them refused.
 
-        Not where the step was done meanwhile, by a process that serves in place of this one.
+        Not where the task was done meanwhile, by a process that serves in place of this one.
         """
-        self._forget(job)
+        self._forget(task)
         if not isinstance(error, ShmError):
-            log.error("%s %s failed", *job.key, exc_info=error, extra=_about(job))
-        for recording_id in job.recordings:
-            if not self.store.recordings.is_waiting(recording_id, job.stage, job.tests):
-                continue
-            recording, now = self.store.recordings.get(recording_id), self.clock()
-            reason = reason_document(error, recording, now)
-            if self.store.recordings.list_events(Outcome.REDESCRIBED, recording_id=recording_id):
-                reason["remedy"] += _NO_MORE
-            name, archive = recording.file.file_name, self.workspace.archive
-            try:
-                with archive.opened(recording.file) as path:
-                    sidecar = sidecar_path(path)
-                    self.workspace.quarantine.put(path, name, reason, sidecar, self.meanwhile)
-            except StoreError as damage:
-                if damage.retry_after_s is not None:
-                    raise
-                log.error("%s is not laid in the quarantine: %s", name, damage)
-            self.store.recordings.refuse(recording_id, reason, now, job.tests, stage=job.stage)
-            about = {**_about(job), "recording": recording_id, "file": name}
-            why = (reason["message"], reason["remedy"])
-            log.warning("%s is refused: %s %s", name, *why, extra=about)
+            log.error("%s %s failed", *task.key, exc_info=error, extra=task.log_fields)
+        for recording_id in task.recordings:
+            if self.store.recordings.is_waiting(recording_id, task.stage, task.tests):
+                self._refuse_recording(task, recording_id, error)
 
-    def _put_off(self, delivery: Delivery, message: Alert, error: BaseException) -> None:
-        """A delivery that failed is tried again, ever later, until it has failed too often.
+    def _refuse_recording(self, task: Task, recording_id: int, error: BaseException) -> None:
+        recordings, now = self.store.recordings, self.clock()
+        recording = recordings.get(recording_id)
+        name, reason = recording.file.file_name, reason_document(error, recording, now)
+        if recordings.list_events(Outcome.REDESCRIBED, recording_id=recording_id):
+            reason["remedy"] += (
+                " What it gave with its former sidecar counts no more: correct the sidecar and "
+                "drop both again."
+            )
+        try:
+            with self.workspace.archive.opened(recording.file) as path:
+                sidecar = sidecar_path(path)
+                self.workspace.quarantine.put(path, name, reason, sidecar, self.meanwhile)
+        except StoreError as damage:
+            if damage.retry_after_s is not None:
+                raise
+            log.error("%s is not laid in the quarantine: %s", name, damage)
+        recordings.refuse(recording_id, reason, now, task.tests, stage=task.stage)
+        fields = {**task.log_fields, "recording": recording_id, "file": name}
+        log.warning("%s is refused: %s %s", name, reason["message"], reason["remedy"], extra=fields)
 
-        One that the hook refused is given up at once.
-        """
-        settings, now = self.workspace.settings, self.clock()
-        wait = wait_after(delivery.attempts + 1, settings)
-        refused = isinstance(error, DeliveryRefused)
-        again = not refused and delivery.attempts + 1 < settings.hook_attempts
-        next_attempt_at = now + wait if again else None
-        self.store.alerts.save_failure(delivery, str(error), now, next_attempt_at)
-        about = {**_about_alert(message), "hook": delivery.hook}
-        end = "" if again else "; given up: nobody is told of it by this hook"
-        said = "hook %s failed on %s: %s%s"
-        log.warning(said, delivery.hook, message.key, error, end, extra=about)
+
+def _end(work: Work, result: object) -> object:
+    """Return what work returns once it is sent the result of its computation."""
+    try:
+        work.send(result)
+    except StopIteration as end:
+        return end.value
+    raise AssertionError("work computes once")
 
 
 def _still_waits(until: datetime, now: datetime) -> bool:
@@ -372,41 +331,17 @@ def _how_it_died(error: BaseException) -> str:
     return error.message if isinstance(error, WorkerDied) else "the process that worked on it died."
 
 
-def _is_enough(deaths: Deaths) -> bool:
-    return deaths.by_itself >= _MOST_DEATHS or deaths.from_outside >= _MOST_KILLS
+def _pause(deaths: int) -> timedelta:
+    """Return the wait before the next try: the longer, the more have failed."""
+    seconds = _FIRST_PAUSE_S * _PAUSE_GROWS ** (deaths - 1)
+    return timedelta(seconds=min(seconds, _LONGEST_PAUSE_S))
 
 
-def _pause(deaths: Deaths) -> timedelta:
-    """How long to wait before the next try: the longer, the more tries alone have failed."""
-    failed = max(deaths.by_itself, deaths.from_outside)
-    return timedelta(seconds=min(_FIRST_PAUSE_S * _PAUSE_GROWS**failed, _LONGEST_PAUSE_S))
-
-
-def _refusal(deaths: Deaths, error: BaseException) -> ShmError:
-    """Why a recording is given up of which processes died."""
-    how = _how_it_died(error).removesuffix(".")
-    if deaths.by_itself >= _MOST_DEATHS:
-        return ShmError(
-            f"{how}; so it went {deaths.by_itself} times, each time with nothing else at work.",
-            remedy="The file is damaged, too large or made to harm: export it anew from its "
-            "source, or split it. If it is sound, report this with the log.",
-        )
+def _refusal(deaths: int, how: str) -> ShmError:
+    """Return why a recording is given up of which processes died."""
     return ShmError(
-        f"{how}; so it went {deaths.from_outside} times in a row, and to no other file meanwhile.",
-        remedy="Find out who kills it: an operator, or a guard of the memory (`journalctl -k`, "
-        "earlyoom). Then drop the file again.",
+        f"{how.removesuffix('.')}; so it went {deaths} times in a row.",
+        remedy="The file is damaged, too large or made to harm: export it anew from its source, or "
+        "split it. Or somebody kills the processes, as an operator or a guard of the memory "
+        "(`journalctl -k`, earlyoom): find out who, then drop the file again.",
     )
-
-
-def _about(job: Job) -> dict[str, object]:
-    """What a job is about, for those who look for it in the log."""
-    if job.delivery is not None:
-        about = _about_alert(job.message or job.delivery.alert)
-        return {**about, "hook": job.delivery.hook, "stage": job.key[0]}
-    named = {"recording": job.recordings, "hanger": (job.hanger,), "test": job.names}
-    single = {key: ids[0] for key, ids in named.items() if len(ids) == 1 and ids[0] is not None}
-    return {**single, "stage": job.key[0]}
-
-
-def _about_alert(alert: Alert) -> dict[str, object]:
-    return {"alert": alert.key, "hanger": alert.hanger, "test": alert.test}

@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from shm.errors import BadInput, DamagedRow
+from shm.errors import BadInput
 from shm.pipeline.lineage import read_limits
 from shm.plausibility import FIRST_DAY, Candidate, doubts_about, implied_shift, notice_of
 from shm.read.profiles import any_profile, profile_for
@@ -21,14 +21,13 @@ from shm.store import (
     Stage,
     Store,
     StoredRecording,
-    StoredTest,
     Workspace,
 )
 from shm.store.holding import time_note
-from shm.values import Alert, Doubt, Hanger
+from shm.values import Alert, Doubt
 
 _LATEST = 10  # of a hanger's tests: what it does from test to test, without reading years of them
-_LATEST_OF_OTHERS = 2  # of every other hanger's: where its modes lie now
+_OF_OTHERS = 2  # of every other hanger's: where its modes lie now
 
 
 def judge(
@@ -96,11 +95,12 @@ def _candidate(
     item: IdentifiedTest,
     found: Sequence[IdentifiedTest],
 ) -> Candidate:
-    test, hanger = item.test, workspace.bridge.tested(item.test.hanger or 0)
-    earlier = store.tests.latest_before(hanger.id, recording.id, _LATEST)
+    test, tests = item.test, store.tests
+    hanger = workspace.bridge.tested(test.hanger or 0)
+    earlier = tests.latest_before(hanger.id, recording.id, _LATEST)
     baseline = store.watch.baseline(hanger.id, time=_possible(test.time))
-    reference = store.tests.of_baseline(baseline) if baseline else earlier
-    at_once = store.tests.taken_at(hanger.id, test.time, recording.id) if test.time else ()
+    reference = tests.of_baseline(baseline) if baseline else earlier
+    at_once = tests.taken_at(hanger.id, test.time, recording.id) if test.time else ()
     print_ = item.fingerprint
     return Candidate(
         hanger=hanger,
@@ -116,28 +116,20 @@ def _candidate(
         reference=[each.test for each in reference],
         reference_at=max((each.time for each in reference), default=None) if baseline else None,
         earlier=[each.test for each in earlier],
-        arrived=[
-            each.test for each in store.tests.latest_received(hanger.id, recording.id, _LATEST)
-        ],
+        arrived=[each.test for each in tests.latest_received(hanger.id, recording.id, _LATEST)],
         baseline=baseline.posterior if baseline else None,
         fingerprint=print_,
-        copies=store.tests.known_samples(recording.id, hanger.id, print_) if print_ else (),
+        copies=tests.known_samples(recording.id, hanger.id, print_) if print_ else (),
         signals=item.signals,
         others=[
-            (other, [each.test for each in _latest_of(store, other, recording)])
+            (
+                other,
+                [each.test for each in tests.latest_before(other.id, recording.id, _OF_OTHERS)],
+            )
             for other in workspace.bridge.hangers
             if other.id != hanger.id
         ],
     )
-
-
-def _latest_of(store: Store, hanger: Hanger, recording: StoredRecording) -> Sequence[StoredTest]:
-    """Of another hanger; none where a row of it is damaged, which must not stop this one."""
-    try:
-        return store.tests.latest_before(hanger.id, recording.id, _LATEST_OF_OTHERS)
-    except DamagedRow as error:
-        store.upkeep.note_damage(error, recording.received_at)
-        return ()
 
 
 def _possible(time: datetime | None) -> datetime | None:

@@ -90,7 +90,7 @@ def hand_on_day(workspace: Workspace, store: Store, test: ModalTest, at: datetim
         if _hz(store.tests.get(row.id).test) == _hz(test):
             return
         why = "more of this day came late: the whole day takes its place"
-        store.recordings.withdraw(row.recording_id, SHM, why, at)
+        store.recordings.exclude(row.recording_id, SHM, why, at)
     path = workspace.spool / f"{test.id}{MODES_SUFFIX}"
     replace_text(path, dump(modes_document([test])))
     log.info("day of a stream: %s", path.name)

@@ -20,7 +20,7 @@ from math import isnan
 from typing import TYPE_CHECKING
 
 import shm
-from shm.errors import DamagedRow, NothingThere
+from shm.errors import NothingThere
 from shm.pipeline.ending import (
     BEYOND,
     OF_CHANGES,
@@ -135,10 +135,10 @@ class JudgedAgain:
     lost where the process is killed.
     """
 
-    def __init__(self, workspace: Workspace, store: Store, at: datetime):
+    def __init__(self, workspace: Workspace, store: Store):
         self._store, self._judging = store, -1
         self._left: dict[int, tuple[int, str]] = {}
-        latest = _latest(store, at)
+        latest = store.watch.latest()
         for hanger in workspace.bridge.watched:
             if watch := latest.get(hanger.id):
                 why = "; ".join(differences(watch, hanger, workspace.settings))
@@ -187,19 +187,6 @@ def differences(judged: StoredWatch, hanger: Hanger, settings: Settings) -> Iter
     for name, (then, now) in pairs.items():
         if then != now and not isnan(then):
             yield f"{name} {now:.6g} instead of {then:.6g}"
-
-
-def _latest(store: Store, at: datetime) -> dict[int, StoredWatch]:
-    """By hanger, but for those of which a row is damaged: that is noted, and they wait."""
-    damaged: list[int] = []
-    while True:
-        try:
-            return store.watch.latest(damaged)
-        except DamagedRow as error:
-            store.upkeep.note_damage(error, at)
-            if error.hanger is None or error.hanger in damaged:
-                return {}
-            damaged.append(error.hanger)
 
 
 def settled(

@@ -54,8 +54,7 @@ class Known:
     `latest` is when it was tested last, None before the first test; `drifts` are those of that
     test from the baseline in force, `called` the changes detected since, `standing` the alerts
     whose condition has not ended, the oldest first. `notes` say what people did about these.
-    `unwatched` says that nothing has looked at the hanger for too long, `damage` what keeps
-    the results from being read.
+    `unwatched` says that nothing has looked at the hanger for too long.
     """
 
     hanger: Hanger
@@ -69,7 +68,6 @@ class Known:
     warnings: Sequence[str] = ()
     notes: tuple[str, ...] = ()
     unwatched: Lead | None = None
-    damage: str = ""
 
 
 @dataclass(frozen=True)
@@ -197,8 +195,6 @@ def hanger_message(known: Known) -> HangerMessage:
 
 def _decide(known: Known) -> tuple[Status | None, Lead]:
     name = f"Hanger {known.hanger.id}"
-    if known.damage:
-        return None, Lead(f"{name}: its results cannot be read.", "Run `shm doctor` today.")
     if known.latest is None and not known.standing:
         return None, Lead(f"{name}: no test yet.", f"Test it {NEXT_TEST}.")
     faults = known.tension.faults if known.tension else ()

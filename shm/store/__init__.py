@@ -1,12 +1,11 @@
 """Keeps every noun of the flow: tables, verbs, the archive of raw files, schema upgrade."""
 
 from shm.store.archive import Archive, Quarantine
-from shm.store.decisions import Withdrawal
+from shm.store.disposition import Exclusion
 from shm.store.holding import Judged
 from shm.store.list_rows import (
     AlertRow,
     BaselineGlance,
-    Death,
     Deaths,
     Decision,
     DeliveryRow,
@@ -54,10 +53,10 @@ from shm.store.workspace import Workspace
 
 __all__ = [
     "AGAIN_FROM", "ENDED", "Acknowledgement", "Adoption", "AlertRow", "Archive", "Baseline",
-    "BaselineGlance", "Death", "Deaths", "Decision", "Delivery", "DeliveryRow", "DeliveryState",
-    "EventKind", "FormerPosterior", "FormerTest", "HangerEvent", "HeldTest", "Hold",
+    "BaselineGlance", "Deaths", "Decision", "Delivery", "DeliveryRow", "DeliveryState",
+    "EventKind", "Exclusion", "FormerPosterior", "FormerTest", "HangerEvent", "HeldTest", "Hold",
     "IdentifiedTest", "Judged", "KeptWatch", "Lineage", "News", "Numbers", "Outcome", "Quarantine",
     "Receipt", "ReceivedFile", "Rerun", "Resolution", "Scope", "Silence", "Stage", "Step", "Store",
     "StoredAdoption", "StoredAlert", "StoredDiagnosis", "StoredRecording", "StoredSelection",
-    "StoredTest", "StoredToken", "StoredWatch", "TestRow", "TrendPoint", "Withdrawal", "Workspace",
+    "StoredTest", "StoredToken", "StoredWatch", "TestRow", "TrendPoint", "Workspace",
 ]  # fmt: skip

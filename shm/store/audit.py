@@ -15,7 +15,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Engine
 
 from shm.errors import UsageError
-from shm.store.checksums import decoding, loads, readable
+from shm.store.columns import loads
 from shm.store.database import Repository, insert
 from shm.store.people_and_stream_tables import audit, changed_settings
 
@@ -155,12 +155,8 @@ def _current(connection: Connection, *which: sa.ColumnElement[bool]) -> dict[str
     newest = sa.select(sa.func.max(changed_settings.c.id)).group_by(changed_settings.c.key)
     query = sa.select(changed_settings).where(changed_settings.c.id.in_(newest), *which)
     rows = connection.execute(query.order_by(changed_settings.c.key)).all()
-    return {each.key: each for each in readable(rows, _changed) if each.value is not None}
-
-
-def _changed(row: sa.Row[Any]) -> ChangedSetting:
-    with decoding(changed_settings, row):
-        return ChangedSetting(row.key, loads(row.document), row.at, row.who, row.id)
+    changed = (ChangedSetting(r.key, loads(r.document), r.at, r.who, r.id) for r in rows)
+    return {each.key: each for each in changed if each.value is not None}
 
 
 def _overtaken(

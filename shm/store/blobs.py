@@ -14,7 +14,7 @@ import numpy as np
 from shm.documents import number, value_of
 from shm.models import class_units
 from shm.modes_document import MODES_SCHEMA, parse_modes
-from shm.store.checksums import loads
+from shm.store.columns import loads
 from shm.values import (
     Change,
     CreepRate,

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection
 
-from shm.errors import DamagedRow, sentence
+from shm.errors import sentence
 from shm.read.sidecar import SIDECAR_SUFFIX
 from shm.store.archive import Archive, checksum
-from shm.store.checksums import RESTORE
-from shm.store.copying import Rows, TableContent, Tell, contents
+from shm.store.copying import TableContent, Tell, contents
 from shm.store.database import Database
-from shm.store.missing import MissingRow, missing_rows
 from shm.store.schema import changed_objects
 from shm.store.store import Store
 from shm.store.tables import recordings
-from shm.store.upkeep import damaged_among
 
 
 @dataclass(frozen=True)
@@ -36,53 +33,46 @@ class Finding:
 
 @dataclass(frozen=True)
 class CheckedStore:
-    """What every table holds, and what is wrong; nothing is wrong where `troubles` is empty."""
+    """What every table holds, and what is wrong with the file, its references and its schema."""
 
     tables: tuple[TableContent, ...]
-    troubles: tuple[str, ...]
-    damaged: tuple[DamagedRow, ...] = ()
-    missing: tuple[MissingRow, ...] = ()
+    faults: tuple[str, ...] = ()
+    """What SQLite finds wrong with its file."""
+    references: tuple[tuple[str, str], ...] = ()
+    """Rows that refer to a row that is not there, each with the table of that one."""
     changed: tuple[str, ...] = ()
+    """Tables and indexes that are not as the migrations make them."""
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """The troubles, each with its place and its remedy apart."""
-        known = {str(row): _damaged_finding(row) for row in self.damaged}
-        known |= {str(row): _missing_finding(row) for row in self.missing}
-        known |= {
-            _changed(name): Finding("changed schema", name, _CHANGED, _COPY)
-            for name in self.changed
-        }
-        file = "fault of the file"
-        return tuple(
-            known.get(each) or Finding(file, "store", sentence(each), RESTORE)
-            for each in self.troubles
+        """A finding for each fault, broken reference and changed part of the schema."""
+        gone = "it refers to a row of {} that is not there."
+        return (
+            *(
+                Finding("fault of the file", "store", sentence(said), _RESTORE)
+                for said in self.faults
+            ),
+            *(
+                Finding("broken reference", where, gone.format(table), _RESTORE)
+                for where, table in self.references
+            ),
+            *(Finding("changed schema", name, _CHANGED, _COPY) for name in self.changed),
         )
 
     @property
+    def troubles(self) -> tuple[str, ...]:
+        """The same as sentences."""
+        return tuple(map(str, self.findings))
+
+    @property
     def unfit(self) -> tuple[str, ...]:
-        """Troubles for which it cannot be put in another's place: not rows that only are no more,
-        since an older backup may lack more than that, nor a changed schema, which is not copied."""
-        gone = {str(row) for row in self.missing if not row.referred}
-        gone |= set(map(_changed, self.changed))
-        return tuple(each for each in self.troubles if each not in gone)
+        """Troubles for which it cannot be put in another's place; a schema is not copied."""
+        return tuple(str(each) for each in self.findings if each.kind != "changed schema")
 
 
+_RESTORE = "Restore the store from a backup: `shm db restore FILE --replace`."
 _CHANGED = "its schema is not what the migrations make; rows may be read or kept wrongly."
 _COPY = "Write `shm db backup FILE` and restore it with `shm db restore FILE --replace`."
-
-
-def _changed(name: str) -> str:
-    return f"{name}: {_CHANGED} {_COPY}"
-
-
-def _damaged_finding(row: DamagedRow) -> Finding:
-    return Finding("damaged row", f"{row.table}/{row.id}", row.message, row.remedy)
-
-
-def _missing_finding(row: MissingRow) -> Finding:
-    where = row.table if row.id is None else f"{row.table}/{row.id}"
-    return Finding("missing row", where, row.message, row.remedy)
 
 
 @dataclass(frozen=True)
@@ -128,43 +118,22 @@ def file_troubles(missing: Iterable[str], damaged: Iterable[str]) -> tuple[str, 
 
 def quick_troubles(store: Database) -> tuple[str, ...]:
     """What a look at the pages of a SQLite file finds wrong; of a server, nothing."""
-    if store.engine.dialect.name != "sqlite":
-        return ()
     with store.reading() as connection:
-        found = connection.exec_driver_sql("PRAGMA quick_check(5)").scalars().all()
-    return tuple(str(said) for said in found if said != "ok")
+        return _faults(connection, "quick_check(5)")
 
 
 def check_store(store: Database, tell: Tell) -> CheckedStore:
-    """Reads everything that the store holds; raises StoreError where it cannot be read."""
+    """Read everything that the store holds; raises StoreError where it cannot be read."""
     with store.reading() as connection:
         try:
-            structure, missing = tuple(_damage(connection)), missing_rows(connection)
+            faults, references = _faults(connection, "integrity_check"), _references(connection)
             changed = changed_objects(connection)
-        except sa.exc.DatabaseError as error:
+            return CheckedStore(contents(connection, tell), faults, references, changed)
+        except (sa.exc.DatabaseError, ValueError) as error:
             if connection.dialect.name != "sqlite":
                 raise
-            structure, missing, changed = (f"the file is damaged: {error.orig}",), (), ()
-        checked = read_rows(connection, tell, structure)
-        troubles = (*checked.troubles, *map(str, missing), *map(_changed, changed))
-        return replace(checked, troubles=troubles, missing=missing, changed=changed)
-
-
-def read_rows(connection: Connection, tell: Tell, troubles: tuple[str, ...] = ()) -> CheckedStore:
-    """What every table holds, and each row that is not as it was written or cannot be decoded."""
-    rows: list[DamagedRow] = []
-    tables: tuple[TableContent, ...] = ()
-
-    def look(table: sa.Table, some: Rows) -> None:
-        rows.extend(damaged_among(table, some))
-
-    try:
-        tables = contents(connection, tell, look)
-    except sa.exc.DatabaseError as error:
-        if connection.dialect.name != "sqlite":
-            raise
-        troubles = (*troubles, f"the file cannot be read to its end: {error.orig}")
-    return CheckedStore(tables, (*troubles, *map(str, rows)), tuple(rows))
+            cause = getattr(error, "orig", None) or error
+            return CheckedStore((), (f"the file is damaged: {cause}",))
 
 
 def check_archive(store: Store, archive: Archive, tell: Tell) -> CheckedArchive:
@@ -187,10 +156,8 @@ def check_archive(store: Store, archive: Archive, tell: Tell) -> CheckedArchive:
 
 def archived_names(store: Database) -> tuple[str, ...]:
     """Every file of the archive that a recording refers to, sidecars too, each once."""
-    with store.reading() as connection:
-        rows = connection.execute(sa.select(recordings.c.archived_as, recordings.c.sidecar_as))
-        # A flipped bit in the schema may make a name a number.
-    return tuple(sorted({str(name) for row in rows for name in row if name is not None}))
+    rows = store.rows(sa.select(recordings.c.archived_as, recordings.c.sidecar_as))
+    return tuple(sorted({name for row in rows for name in row if name is not None}))
 
 
 def unknown_files(store: Database, archive: Archive) -> tuple[str, ...]:
@@ -214,9 +181,17 @@ def _unreferenced(archive: Archive, names: Collection[str]) -> tuple[str, ...]:
     return tuple(sorted(set(kept) - set(names)))
 
 
-def _damage(connection: Connection) -> list[str]:
+def _faults(connection: Connection, check: str) -> tuple[str, ...]:
     """What SQLite finds wrong with its file; a PostgreSQL server watches over its own pages."""
     if connection.dialect.name != "sqlite":
-        return []
-    found = connection.exec_driver_sql("PRAGMA integrity_check").scalars()
-    return [f"the file is damaged: {said}" for said in found if said != "ok"]
+        return ()
+    found = connection.exec_driver_sql(f"PRAGMA {check}").scalars()
+    return tuple(f"the file is damaged: {said}" for said in found if said != "ok")
+
+
+def _references(connection: Connection) -> tuple[tuple[str, str], ...]:
+    """Rows that refer to one that is not there; a PostgreSQL server allows none."""
+    if connection.dialect.name != "sqlite":
+        return ()
+    broken = connection.exec_driver_sql("PRAGMA foreign_key_check")
+    return tuple((f"{row[0]}/{row[1]}", str(row[2])) for row in broken)

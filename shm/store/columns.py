@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Any
 
@@ -11,10 +11,8 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Dialect
 
 from shm.documents import dump
+from shm.errors import StoreDamaged
 from shm.values import NAN
-
-UNREADABLE_TIME = datetime.min.replace(tzinfo=UTC)
-"""Stands for a time in a damaged row: the row's checksum tells, and other rows are not held up."""
 
 
 class Number(sa.types.TypeDecorator[float]):
@@ -39,19 +37,6 @@ class UtcTime(sa.types.TypeDecorator[datetime]):
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
         return None if value is None else value.astimezone(UTC)
 
-    def result_processor(
-        self, dialect: Dialect, coltype: object
-    ) -> Callable[[Any], datetime | None] | None:
-        process = super().result_processor(dialect, coltype)
-
-        def read(value: Any) -> datetime | None:
-            try:
-                return process(value) if process is not None else value
-            except (ValueError, TypeError):
-                return UNREADABLE_TIME
-
-        return read
-
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
         if value is None:
             return None
@@ -59,16 +44,25 @@ class UtcTime(sa.types.TypeDecorator[datetime]):
 
 
 class Document(sa.types.TypeDecorator[Any]):
-    """A JSON document as text; NaN is null, times are ISO texts.
-
-    It comes back as text: what it says is read where it is compared with the checksum of its row.
-    """
+    """A JSON document as text, as which it comes back; NaN is null, times are ISO texts."""
 
     impl = sa.Text
     cache_ok = True
 
     def process_bind_param(self, value: Any, dialect: Dialect) -> str | None:
         return None if value is None else dump(value)
+
+
+def loads(text: Any) -> Any:
+    """Return a document from its text, None where there is none; raise StoreDamaged of no JSON."""
+    try:
+        return None if text is None else json.loads(text)
+    except ValueError as error:
+        raise StoreDamaged(
+            f"a document of the store cannot be read: {error}.",
+            remedy="Restore it from a backup: `shm db restore FILE --replace`.",
+            retry_after_s=60.0,
+        ) from error
 
 
 metadata = sa.MetaData(

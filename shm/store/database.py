@@ -17,7 +17,6 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Engine
 
 from shm.errors import StoreBusy, StoreDamaged, StoreError
-from shm.store.checksums import forget_damage, look_before_update, seal
 
 _FORM = "postgresql://USER@HOST:5432/DATABASE"
 
@@ -225,7 +224,6 @@ def make_engine(location: str | Path, **options: Any) -> Engine:
     configure, begin = _EVENTS[engine.dialect.name]
     sa.event.listen(engine, "connect", configure)
     sa.event.listen(engine, "begin", begin)
-    sa.event.listen(engine, "before_execute", look_before_update)
     return engine
 
 
@@ -245,12 +243,6 @@ def _configure_sqlite(connection: Any, _record: Any) -> None:
     connection.execute("PRAGMA foreign_keys = ON")
     # A received file leaves the spool after the commit, so a commit must outlast a power cut.
     connection.execute("PRAGMA synchronous = FULL")
-    # A damaged text is told by the checksum of its row; one that is no UTF-8 must not hide others.
-    connection.text_factory = _as_text
-
-
-def _as_text(content: bytes) -> str:
-    return content.decode("utf-8", "replace")
 
 
 def _configure_postgresql(connection: Any, _record: Any) -> None:
@@ -315,9 +307,7 @@ class Repository:
     def writing(self) -> Iterator[Connection]:
         """One transaction, all or nothing; raises StoreBusy or StoreError."""
         with writing(self.engine) as connection:
-            forget_damage(connection)
             yield connection
-            seal(connection)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:

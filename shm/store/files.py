@@ -19,18 +19,11 @@ from shm.errors import NothingThere
 from shm.modes_document import test_document
 from shm.store.archive import suffix_of
 from shm.store.blobs import pack_response
-from shm.store.checksums import decoding, loads
+from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.list_rows import ReceivedFile, StoredRecording
 from shm.store.rows import IdentifiedTest, Stage, StoredTest
-from shm.store.tables import (
-    events,
-    metadata,
-    posterior_tests,
-    recordings,
-    steps,
-    tests,
-)
+from shm.store.tables import events, recordings, steps, tests
 
 ARCHIVED = "archived"
 NOTIFIED = "notified"
@@ -39,9 +32,6 @@ STEPS = frozenset({*Stage, ARCHIVED, NOTIFIED})
 
 RENAMED = "renamed"
 """The kind of event that keeps the former name of a file that came again under another."""
-
-_OF_TEST = ("tests", "watches", "drifts", "posteriors")
-"""Tables of which a row, as `watches/12`, is one test's or was made from tests."""
 
 
 def by_id(connection: Connection, recording_id: int) -> Row[Any]:
@@ -58,18 +48,17 @@ def by_checksum(connection: Connection, sha256: str) -> Row[Any] | None:
 
 
 def recording_from(row: Row[Any]) -> StoredRecording:
-    with decoding(recordings, row, row.hanger):
-        file = ReceivedFile(
-            row.sha256,
-            row.file_name,
-            row.size_bytes,
-            row.arrival,
-            row.archived_as,
-            row.sidecar_as,
-            row.modified_at,
-        )
-        stage, reason = Stage(row.stage), loads(row.reason)
-        return StoredRecording(row.id, file, row.received_at, stage, row.hanger, reason)
+    file = ReceivedFile(
+        row.sha256,
+        row.file_name,
+        row.size_bytes,
+        row.arrival,
+        row.archived_as,
+        row.sidecar_as,
+        row.modified_at,
+    )
+    stage, reason = Stage(row.stage), loads(row.reason)
+    return StoredRecording(row.id, file, row.received_at, stage, row.hanger, reason)
 
 
 def counts(table: sa.Table) -> sa.ColumnElement[bool]:
@@ -149,23 +138,6 @@ def write_event(
 ) -> None:
     about = {"recording_id": recording_id, "file_name": file_name}
     insert(connection, events, {"at": at, "kind": kind, "message": message, **about})
-
-
-def by_row(connection: Connection, which: str) -> list[int]:
-    """The recording of a row, as a message on its damage names it: `watches/12`."""
-    table, _, id_ = which.partition("/")
-    if table not in _OF_TEST or not id_.isdecimal():
-        return []
-    query = sa.select(sa.func.min(tests.c.recording_id))
-    if table == "tests":
-        query = query.where(tests.c.id == int(id_))
-    elif table == "posteriors":
-        query = query.join(posterior_tests).where(posterior_tests.c.posterior_id == int(id_))
-    else:
-        row = metadata.tables[table]
-        query = query.join(row, row.c.test_id == tests.c.id).where(row.c.id == int(id_))
-    found = connection.scalar(query)
-    return [] if found is None else [found]
 
 
 def by_former_names(connection: Connection, which: str) -> list[int]:

@@ -11,11 +11,11 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.documents import value_of
-from shm.errors import NothingThere, UsageError, sentence
+from shm.errors import UsageError, sentence
 from shm.modes_document import test_document
 from shm.store.audit import note
 from shm.store.blobs import pack, test_from_document, unpack
-from shm.store.checksums import decoding, loads
+from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.files import in_force, reason_document, write_event, write_step
 from shm.store.list_rows import Decision, HeldTest, Hold
@@ -192,25 +192,6 @@ def end_hold(connection: Connection, recording_id: int, at: datetime) -> None:
         decide(connection, hold, "shm", "done again", at)
 
 
-def undecided(connection: Connection, recording_id: int) -> Hold:
-    """The hold of a recording that waits for a decision; raises NothingThere or UsageError."""
-    row = _latest(connection, recording_id)
-    if row is None or row.decision is not None:
-        known = sa.select(recordings.c.id).where(recordings.c.id == recording_id)
-        if connection.scalar(known) is None:
-            raise NothingThere(f"no recording {recording_id}.", remedy="See `shm ingest --held`.")
-        if row is None:
-            raise UsageError(
-                f"recording {recording_id} is not held.", remedy="See `shm ingest --held`."
-            )
-        raise UsageError(
-            f"recording {recording_id} is not held: it was {row.decision} by {row.who}.",
-            remedy=f"`shm ingest --discard {recording_id} --why TEXT` takes out what counts, "
-            f"`shm ingest --confirm {recording_id} --why TEXT` takes back what was discarded.",
-        )
-    return _hold(row)
-
-
 def refuse_time(hold: Hold, time: datetime | None, at: datetime) -> None:
     """Raises UsageError where the time that a person gives a held test cannot be right."""
     if time is None:
@@ -238,14 +219,12 @@ def confirmed_values(
     doubts = {test.position: test.doubts for test in hold.tests}.get(row.position, ())
     if time is None and not any(doubt.time_unknown for doubt in doubts):
         return {}
-    with decoding(tests, row, row.hanger):
-        test = replace(test_from_document(loads(row.document), row.hanger), time=time)
-        notes = loads(row.notes)
+    test = replace(test_from_document(loads(row.document), row.hanger), time=time)
     return {
         "document": test_document(test),
         "taken_at": time,
         "time": time or row.received_at,
-        "notes": [*notes, time_note(hold, time, who)],
+        "notes": [*loads(row.notes), time_note(hold, time, who)],
     }
 
 
@@ -281,11 +260,7 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
 
 
 def _hold(row: Row[Any]) -> Hold:
-    with decoding(holds, row, row.hanger):
-        return _whole_hold(row, loads(row.document))
-
-
-def _whole_hold(row: Row[Any], document: Mapping[str, Any]) -> Hold:
+    document = loads(row.document)
     return Hold(
         id=row.id,
         recording_id=row.recording_id,

@@ -115,23 +115,11 @@ class Standing:
     since: datetime
 
 
-class Death(StrEnum):
-    """How a process died that worked on a recording, as a kind of event; the first two: alone."""
-
-    BY_ITSELF = "worker died"
-    FROM_OUTSIDE = "worker killed"
-    BESIDE_OTHERS = "worker died beside others"
-
-
 @dataclass(frozen=True)
 class Deaths:
-    """How often a process that worked on a recording alone died since the recording last moved on.
+    """How many processes died at a recording since it last moved on, and when the last one did."""
 
-    `from_outside` counts those in a row: it begins anew where another recording's was killed.
-    """
-
-    by_itself: int
-    from_outside: int
+    count: int
     last_at: datetime
 
 

@@ -15,7 +15,6 @@ from sqlalchemy.engine import Row
 
 from shm.errors import BadInput, NothingThere, UsageError
 from shm.store.audit import note
-from shm.store.checksums import content_checksum, damaged, decoding, readable
 from shm.store.database import Repository, insert
 from shm.store.people_and_stream_tables import notes
 from shm.values.notes import Note, NoteKind
@@ -26,7 +25,10 @@ _LONGEST_SIDE = 1600  # judgement: it fills a screen, and a crack of a hand's br
 _MOST_PIXELS = 50_000_000  # technical: 150 MB of memory while it is drawn anew
 _LONGEST_TEXT = 2000  # characters, as of what is said to an alert
 _AHEAD = timedelta(days=1)  # a day begins up to 14 h earlier east of Greenwich
-_COLUMNS = tuple(column for column in notes.c if column is not notes.c.photo)
+_COLUMNS = (
+    *(column for column in notes.c if column is not notes.c.photo),
+    notes.c.photo.is_not(None).label("has_photo"),
+)
 _KINDS = ("JPEG", "PNG")
 
 
@@ -67,17 +69,14 @@ class Notes(Repository):
             query = query.where(sa.or_(notes.c.hanger == hanger, notes.c.hanger.is_(None)))
         elif of_bridge:
             query = query.where(notes.c.hanger.is_(None))
-        return tuple(readable(self.rows(query), _note))
+        return tuple(map(_note, self.rows(query)))
 
     def photo(self, number: int) -> bytes:
-        """The photo of a note, a JPEG; raises NothingThere, or DamagedRow where it is damaged."""
-        query = sa.select(notes.c.photo, notes.c.photo_checksum).where(notes.c.id == number)
-        row = self.first(query)
-        if row is None or row.photo is None:
+        """The photo of a note, a JPEG; raises NothingThere."""
+        photo = self.scalar(sa.select(notes.c.photo).where(notes.c.id == number))
+        if photo is None:
             raise NothingThere(f"no photo of a note {number}.", remedy="See `shm note list`.")
-        if row.photo_checksum != content_checksum(row.photo):
-            raise damaged(notes, number)
-        return bytes(row.photo)
+        return bytes(photo)
 
 
 def _checked(text: str, at: datetime, now: datetime) -> str:
@@ -122,8 +121,5 @@ def _unfit(why: str) -> BadInput:
 
 
 def _note(row: Row[tuple[object, ...]]) -> Note:
-    with decoding(notes, row):
-        values = dict(row._mapping)
-        has_photo = values.pop("photo_checksum") is not None
-        del values["checksum"]
-        return Note(**{**values, "kind": NoteKind(values["kind"]), "has_photo": has_photo})
+    values = dict(row._mapping)
+    return Note(**{**values, "kind": NoteKind(values["kind"])})

@@ -12,8 +12,8 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.documents import alert_document, value_of
-from shm.errors import DamagedRow, NothingThere, UsageError
-from shm.store.checksums import decoding, loads, note_damage
+from shm.errors import NothingThere, UsageError
+from shm.store.columns import loads
 from shm.store.database import Repository, insert
 from shm.store.files import NOTIFIED, write_step
 from shm.store.rows import (
@@ -115,7 +115,7 @@ def stored_alert(row: Row[Any]) -> StoredAlert:
     """An alert and its acknowledgement, of a row of `stored_alerts`."""
     return StoredAlert(
         row.id,
-        alert_of(row),
+        _alert_in(row.document),
         row.raised_at,
         acknowledgement_of(row),
         resolution_of(row),
@@ -127,17 +127,6 @@ def stored_alert(row: Row[Any]) -> StoredAlert:
 def _alert_in(text: str) -> Alert:
     """An alert as it was raised; those that stand are asked for again and again."""
     return value_of(Alert, loads(text))
-
-
-def alert_of(row: Row[Any]) -> Alert:
-    """An alert that was raised is told even where its document is damaged: as much as is left."""
-    try:
-        with decoding(alerts, row, row.hanger):
-            return _alert_in(row.document)
-    except DamagedRow as error:
-        note_damage(error)
-        message = f"{row.message} (Details are lost: {error.message})"
-        return Alert(row.key, row.hanger, row.test or "", row.time, message, ())
 
 
 def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:

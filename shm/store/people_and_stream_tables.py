@@ -69,7 +69,6 @@ notes = sa.Table(
     sa.Column("who", sa.Text, nullable=False),
     sa.Column("written_at", UtcTime, nullable=False),
     sa.Column("photo", sa.LargeBinary),
-    sa.Column("photo_checksum", sa.BigInteger),
 )
 
 

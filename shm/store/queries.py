@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -11,7 +11,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.documents import posterior_document, value_of
 from shm.store.blobs import pack_samples, posterior_from, test_from_document
-from shm.store.checksums import decoding, loads
+from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.files import counts, in_force
 from shm.store.list_rows import TestRow
@@ -97,31 +97,29 @@ def compared_with(baseline: Baseline, *, or_of_works: bool = False) -> list[sa.C
 
 
 def read_tests(connection: Connection, query: sa.Select[Any]) -> tuple[StoredTest, ...]:
-    """The tests of a query on `plain_tests`; raises DamagedRow."""
+    """The tests of a query on `plain_tests`."""
     return tuple(_test(row) for row in connection.execute(query))
 
 
 def _test(row: Row[Any]) -> StoredTest:
-    with decoding(tests, row, row.hanger):
-        return StoredTest(
-            id=row.id,
-            recording_id=row.recording_id,
-            key=f"{row.sha256}/{row.position}",
-            hanger=row.hanger,
-            time=row.time,
-            stage=Stage(row.stage),
-            test=test_from_document(loads(row.document), row.hanger),
-            notes=tuple(loads(row.notes)),
-            lineage=lineage_from(row),
-            quality=value_of(tuple[QualityCheck, ...], loads(row.quality) or ()),
-            set_aside=value_of(tuple[ForeignMode, ...], loads(row.set_aside) or ()),
-        )
+    return StoredTest(
+        id=row.id,
+        recording_id=row.recording_id,
+        key=f"{row.sha256}/{row.position}",
+        hanger=row.hanger,
+        time=row.time,
+        stage=Stage(row.stage),
+        test=test_from_document(loads(row.document), row.hanger),
+        notes=tuple(loads(row.notes)),
+        lineage=lineage_from(row),
+        quality=value_of(tuple[QualityCheck, ...], loads(row.quality) or ()),
+        set_aside=value_of(tuple[ForeignMode, ...], loads(row.set_aside) or ()),
+    )
 
 
 def posterior_of_row(row: Row[Any]) -> Posterior:
-    """The posterior of a whole row; raises DamagedRow."""
-    with decoding(posteriors, row, row.hanger):
-        return posterior_from(loads(row.document), row.samples)
+    """The posterior of a whole row."""
+    return posterior_from(loads(row.document), row.samples)
 
 
 _BASELINE = ("id", "set_at", "who", "why", "since")
@@ -232,11 +230,10 @@ def baseline_in_force(hanger: int) -> sa.Select[Any]:
 
 
 def among(
-    hanger: sa.ColumnElement[int], excluding: Collection[int], hangers: Sequence[Hanger] | None
-) -> tuple[sa.ColumnElement[bool], ...]:
-    """Which rows are of `hangers`, or of any where None, and not of those left out."""
-    chosen = (hanger.not_in(excluding),)
-    return chosen if hangers is None else (*chosen, hanger.in_([each.id for each in hangers]))
+    hanger: sa.ColumnElement[int], hangers: Sequence[Hanger] | None
+) -> sa.ColumnElement[bool]:
+    """Which rows are of `hangers`, or of any where None."""
+    return sa.true() if hangers is None else hanger.in_([each.id for each in hangers])
 
 
 def insert_posterior(

@@ -10,8 +10,6 @@ from sqlalchemy.engine import Connection, Engine
 
 from shm.errors import SchemaOutdated, StoreError
 from shm.resources import migrations_folder
-from shm.store.checksums import seal
-from shm.store.copying import note_numbering
 from shm.store.database import make_engine, reading, shown, writing
 from shm.store.tables import SCHEMA
 
@@ -36,8 +34,6 @@ def upgrade(engine: Engine) -> None:
                 f"the store {location} cannot be upgraded: {error}.",
                 remedy="Restore it from a backup.",
             ) from error
-        seal(connection)
-        note_numbering(connection)
 
 
 def check(engine: Engine) -> None:

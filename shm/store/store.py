@@ -32,7 +32,7 @@ class Store(Database):
     `alerts` those that were raised, and their deliveries; `silences` when no hook is told;
     `streams` what permanent sensors said; `people` who signs in by name; `notes` what they saw or
     did; `audit` who changed what; `settings` what the dashboard says beside `bridge.toml`;
-    `upkeep` tokens, copies, backups and the healing of rows.
+    `upkeep` tokens, copies of raw files and backups.
     """
 
     def __init__(self, engine: Engine):

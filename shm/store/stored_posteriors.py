@@ -14,7 +14,7 @@ from sqlalchemy.engine import Connection, Row
 from shm.diagnosis_document import diagnosis_document, diagnosis_of
 from shm.errors import NothingThere, StoreBusy, UsageError
 from shm.store.audit import note
-from shm.store.checksums import decoding, loads
+from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.files import all_at, in_force, move
 from shm.store.queries import (
@@ -175,10 +175,8 @@ class Posteriors(Trends):
         row = self.first(query.order_by(diagnoses.c.id.desc()).limit(1))
         if row is None:
             return None
-        with decoding(diagnoses, row, hanger):
-            document = loads(row.document)
         try:
-            found = diagnosis_of(document)
+            found = diagnosis_of(loads(row.document))
         except (KeyError, TypeError, ValueError):
             log.warning("the diagnosis of hanger %d is of a former version: make it again", hanger)
             return None
@@ -304,12 +302,11 @@ def _entries(connection: Connection, selection_id: int) -> dict[str, int]:
 
 
 def _adoption(row: Row[Any]) -> StoredAdoption:
-    with decoding(adoptions, row, row.hanger):
-        return StoredAdoption(
-            id=row.id,
-            adoption=Adoption(**{name: getattr(row, name) for name in _ADOPTION}),
-            adopted_at=row.adopted_at,
-            undone_at=row.undone_at,
-            undone_why=row.undone_why or "",
-            undone_who=row.undone_who or "",
-        )
+    return StoredAdoption(
+        id=row.id,
+        adoption=Adoption(**{name: getattr(row, name) for name in _ADOPTION}),
+        adopted_at=row.adopted_at,
+        undone_at=row.undone_at,
+        undone_why=row.undone_why or "",
+        undone_who=row.undone_who or "",
+    )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
-from itertools import takewhile
 from typing import Any
 
 import sqlalchemy as sa
@@ -13,16 +12,14 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere, UsageError
 from shm.store.audit import note
-from shm.store.checksums import readable
 from shm.store.database import insert
-from shm.store.decisions import Decisions
+from shm.store.disposition import Dispositions
 from shm.store.files import (
     ARCHIVED,
     STEPS,
     by_checksum,
     by_former_names,
     by_id,
-    by_row,
     end_recording,
     end_tests,
     in_force,
@@ -34,7 +31,6 @@ from shm.store.files import (
 from shm.store.holding import standing_discard
 from shm.store.list_rows import (
     ON_THE_WAY,
-    Death,
     Deaths,
     Event,
     Outcome,
@@ -48,8 +44,11 @@ from shm.store.reprocessing import redescribe, reopen
 from shm.store.rows import ENDED, OTHER, Stage, counts_by_name
 from shm.store.tables import events, recordings, steps, tests
 
+_DIED = "worker died"
+"""The kind of event of a process that died."""
 
-class Recordings(Decisions):
+
+class Recordings(Dispositions):
     """Received files: how far each has come, and what people decided of it."""
 
     def receive(self, file: ReceivedFile, at: datetime) -> Receipt:
@@ -114,8 +113,8 @@ class Recordings(Decisions):
         return None if row is None else recording_from(row)
 
     def find(self, which: str) -> tuple[int, str | None]:
-        """The recording that is meant: by its number, by the name of a test of it, by a name that
-        its file, with or without suffix, came under, or by a row of the store, as `posteriors/12`.
+        """The recording that is meant: by its number, by the name of a test of it, or by a name
+        that its file, with or without suffix, came under.
 
         Also the test's name, where it was that. Raises NothingThere, and UsageError where several
         recordings are called so.
@@ -129,7 +128,7 @@ class Recordings(Decisions):
             found = connection.scalars(by_name.order_by(tests.c.recording_id)).all()
             if found:
                 return _single(found, f"{len(found)} hangers have a test {which!r}."), which
-            former = by_row(connection, which) or by_former_names(connection, which)
+            former = by_former_names(connection, which)
         if not former:
             raise NothingThere(f"no recording and no test {which!r}.", remedy="See `shm status`.")
         return _single(former, f"{len(former)} recordings were called {which!r}."), None
@@ -211,43 +210,28 @@ class Recordings(Decisions):
             before[of_test] = row.at
         return dict(found)
 
-    def note_death(self, recording_id: int, death: Death, message: str, at: datetime) -> None:
-        """Notes that a process that worked on a recording died."""
+    def note_death(self, recording_id: int, message: str, at: datetime) -> None:
+        """Note that a process that worked on a recording died."""
         with self.writing() as connection:
             row = by_id(connection, recording_id)
-            write_event(connection, at, death, row.id, row.file_name, message)
+            write_event(connection, at, _DIED, row.id, row.file_name, message)
 
     def deaths(self) -> dict[int, Deaths]:
-        """What is noted of the recordings that are on their way, since each last moved on."""
+        """Return the deaths at each recording on its way, since it last moved on."""
         moved_at = (
             sa.select(steps.c.recording_id, sa.func.max(steps.c.at).label("at"))
             .group_by(steps.c.recording_id)
             .subquery()
         )
-        noted = (
-            sa.select(events.c.id, events.c.kind, events.c.at, events.c.recording_id)
+        query = (
+            sa.select(events.c.recording_id, sa.func.count(), sa.func.max(events.c.at))
             .join(recordings, recordings.c.id == events.c.recording_id)
             .join(moved_at, moved_at.c.recording_id == events.c.recording_id)
-            .where(events.c.kind.in_(list(Death)), events.c.at >= moved_at.c.at)
+            .where(events.c.kind == _DIED, events.c.at >= moved_at.c.at)
             .where(recordings.c.stage.not_in(ENDED))
-            .order_by(events.c.id)
+            .group_by(events.c.recording_id)
         )
-        not_of_it = events.c.kind.in_((Death.FROM_OUTSIDE, Death.BESIDE_OTHERS))
-        killed = sa.select(events.c.recording_id, events.c.id, events.c.kind).where(not_of_it)
-        killed = killed.order_by(events.c.id.desc())
-        found: dict[int, Deaths] = {}
-        with self.reading() as connection:
-            latest = connection.execute(killed.limit(100)).all()
-            own = takewhile(lambda row: row.recording_id == latest[0].recording_id, latest)
-            in_a_row = {row.id for row in own if row.kind == Death.FROM_OUTSIDE}
-            for row in connection.execute(noted):
-                before = found.get(row.recording_id, Deaths(0, 0, row.at))
-                found[row.recording_id] = Deaths(
-                    before.by_itself + (row.kind == Death.BY_ITSELF),
-                    before.from_outside + (row.id in in_a_row),
-                    row.at,
-                )
-        return found
+        return {row[0]: Deaths(row[1], row[2]) for row in self.rows(query)}
 
     def list_events(
         self,
@@ -281,7 +265,7 @@ class Recordings(Decisions):
         )
 
     def _recordings(self, query: sa.Select[Any]) -> tuple[StoredRecording, ...]:
-        return tuple(readable(self.rows(query), recording_from))
+        return tuple(map(recording_from, self.rows(query)))
 
 
 def _outcome(connection: Connection, known: Row[Any] | None, file: ReceivedFile) -> Outcome:

@@ -12,7 +12,6 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.documents import compact, parse_time
-from shm.store.checksums import decoding, readable, whole
 from shm.store.database import Repository, insert
 from shm.store.outbox import raise_alert, resolve
 from shm.store.people_and_stream_tables import (
@@ -72,7 +71,7 @@ class Streams(Repository):
         table = stream_windows
         within = (table.c.hanger == hanger, table.c.start >= since, table.c.start < until)
         query = sa.select(table).where(*within).order_by(table.c.start, table.c.id)
-        return self._values(table, query, WindowReading)
+        return self._values(query, WindowReading)
 
     def list_spectra(
         self, stream: str, since: datetime, until: datetime, most: int
@@ -82,23 +81,19 @@ class Streams(Repository):
         """
         table = stream_windows
         within = (table.c.stream == stream, table.c.start >= since, table.c.start < until)
-
-        def value(row: Row[Any]) -> tuple[datetime, Sequence[int]]:
-            with decoding(table, row, row.hanger):
-                return row.start, json.loads(row.document)["spectrum_db"]
-
         with self.reading() as connection:
             ids = connection.scalars(sa.select(table.c.id).where(*within).order_by(table.c.start))
             chosen = ids.all()
             some = table.c.id.in_(chosen[:: max(1, -(-len(chosen) // most))])
             rows = connection.execute(sa.select(table).where(some).order_by(table.c.start)).all()
-            return tuple(each for each in readable(rows, value) if each[1])
+        spectra = ((row.start, json.loads(row.document)["spectrum_db"]) for row in rows)
+        return tuple(each for each in spectra if each[1])
 
     def last_window(self, stream: str) -> WindowReading | None:
         """What the latest window of a stream said; None where there is none."""
         table = stream_windows
         query = sa.select(table).where(table.c.stream == stream).order_by(table.c.start.desc())
-        return next(iter(self._values(table, query.limit(1), WindowReading)), None)
+        return next(iter(self._values(query.limit(1), WindowReading)), None)
 
     def last_modes(self, stream: str) -> tuple[Mode, ...]:
         """Return the modes of the latest windows that have any, each as it was seen last.
@@ -119,14 +114,14 @@ class Streams(Repository):
         table = stream_windows
         query = sa.select(table).where(table.c.stream == stream, table.c.has_modes)
         latest = query.order_by(table.c.start.desc()).limit(_LATEST)
-        return self._values(table, latest, WindowReading)
+        return self._values(latest, WindowReading)
 
     def last_hour(self, stream: str) -> PooledReading | None:
         """The latest reading of an hour of a stream."""
         table = pooled_readings
         query = sa.select(table).where(table.c.stream == stream, table.c.period == "hour")
         latest = query.order_by(table.c.start.desc()).limit(1)
-        return next(iter(self._values(table, latest, PooledReading)), None)
+        return next(iter(self._values(latest, PooledReading)), None)
 
     def first_window(self, stream: str) -> datetime | None:
         """When the first window of a stream began; None where there is none."""
@@ -219,7 +214,7 @@ class Streams(Repository):
         table = pooled_readings
         within = (table.c.start >= since, table.c.start < until)
         query = sa.select(table).where(table.c.hanger == hanger, table.c.period == period, *within)
-        return self._values(table, query.order_by(table.c.start, table.c.id), PooledReading)
+        return self._values(query.order_by(table.c.start, table.c.id), PooledReading)
 
     def list_hours_near(
         self, stream: str, times: Sequence[datetime], within: timedelta
@@ -229,7 +224,7 @@ class Streams(Repository):
         near = (table.c.start.between(at - within, at + within) for at in times)
         of_hours = (table.c.stream == stream) & (table.c.period == "hour")
         query = sa.select(table).where(of_hours, sa.or_(sa.false(), *near))
-        return self._values(table, query.order_by(table.c.start), PooledReading)
+        return self._values(query.order_by(table.c.start), PooledReading)
 
     def watch_time(self, hanger: int) -> datetime | None:
         """Up to when the watch of a hanger has seen readings; None where there is none."""
@@ -240,8 +235,8 @@ class Streams(Repository):
         """The watch of a hanger as it was at its last kept time up to `until`, and that time."""
         table = stream_watch_days
         own = sa.select(table).where(table.c.hanger == hanger, table.c.reading_time <= until)
-        rows = self.rows(own.order_by(table.c.reading_time.desc()))
-        return next(((r.reading_time, r.content) for r in rows if whole(table, r)), None)
+        row = self.first(own.order_by(table.c.reading_time.desc()).limit(1))
+        return None if row is None else (row.reading_time, row.content)
 
     def go_back(self, hanger: int, to: datetime, content: bytes) -> None:
         """The watch of a hanger goes on from a state of before."""
@@ -253,10 +248,11 @@ class Streams(Repository):
             connection.execute(sa.delete(days).where(*later))
 
     def watch_state(self, hanger: int) -> bytes | None:
-        """What the watch of a hanger goes on from; None where there is nothing, or only damage."""
-        query = sa.select(stream_watch).where(stream_watch.c.hanger == hanger)
-        row = self.first(query)
-        return row.content if row is not None and whole(stream_watch, row) else None
+        """What the watch of a hanger goes on from; None where there is nothing."""
+        content: bytes | None = self.scalar(
+            sa.select(stream_watch.c.content).where(stream_watch.c.hanger == hanger)
+        )
+        return content
 
     def save_event(self, event: StreamEvent) -> None:
         """Notes something once; what was noted already is not noted again."""
@@ -272,13 +268,12 @@ class Streams(Repository):
         if stream is not None:
             query = query.where(stream_events.c.stream == stream)
         rows = self.rows(query.order_by(stream_events.c.start, stream_events.c.id))
-        return tuple(readable(rows, _event))
+        return tuple(map(_event, rows))
 
     def progress(self, stream: str) -> datetime | None:
         """Up to when the windows of a stream are done; None where none is."""
-        query = sa.select(stream_progress).where(stream_progress.c.stream == stream)
-        row = self.first(query)
-        return row.done_until if row is not None and whole(stream_progress, row) else None
+        progress = stream_progress
+        return self._moment(sa.select(progress.c.done_until).where(progress.c.stream == stream))
 
     def sweep(self, now: datetime, window_days: float) -> None:
         """Takes out windows and events of before so many days, and hours of before `HOURS_KEPT`.
@@ -301,12 +296,8 @@ class Streams(Repository):
         found: datetime | None = self.scalar(query)
         return found
 
-    def _values(self, table: sa.Table, query: sa.Select[Any], kind: type[_T]) -> tuple[_T, ...]:
-        def value(row: Row[Any]) -> _T:
-            with decoding(table, row, row.hanger):
-                return _reading(kind, json.loads(row.document))
-
-        return tuple(readable(self.rows(query), value))
+    def _values(self, query: sa.Select[Any], kind: type[_T]) -> tuple[_T, ...]:
+        return tuple(_reading(kind, json.loads(row.document)) for row in self.rows(query))
 
 
 def _reading(kind: type[_T], document: dict[str, Any]) -> _T:
@@ -350,8 +341,7 @@ def _is_usual(value: Any, usual: Any) -> bool:
 
 
 def _event(row: Row[Any]) -> StreamEvent:
-    with decoding(stream_events, row):
-        return StreamEvent(**{name: getattr(row, name) for name in _EVENT})
+    return StreamEvent(**{name: getattr(row, name) for name in _EVENT})
 
 
 def _replace(connection: Connection, table: sa.Table, row: dict[str, Any], *keys: str) -> None:

@@ -12,10 +12,9 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-from shm.errors import DamagedRow, StoreBusy
+from shm.errors import StoreBusy
 from shm.store.audit import note
 from shm.store.blobs import change_in, watch_document, watch_in
-from shm.store.checksums import damaged, decoding, whole
 from shm.store.columns import Number
 from shm.store.database import insert
 from shm.store.files import all_at, in_force, move
@@ -28,7 +27,6 @@ from shm.store.queries import (
     compared_with,
     insert_baseline,
     insert_posterior,
-    plain_tests,
     read_baseline,
     test_columns,
     test_row,
@@ -50,7 +48,6 @@ from shm.store.tables import (
     baselines,
     drifts,
     posterior_tests,
-    posteriors,
     resolutions,
     tests,
     watch_states,
@@ -105,9 +102,7 @@ class Watch(WatchedAgain):
         """What the watch goes on from at the next test that is compared with a baseline."""
         query = sa.select(watch_states).where(watch_states.c.baseline_id == baseline.id)
         row = self.first(query)
-        if row is None or not whole(watch_states, row):
-            return None  # it may be thrown away at will
-        return KeptWatch(row.key, row.last_test_time, row.content)
+        return None if row is None else KeptWatch(row.key, row.last_test_time, row.content)
 
     def forget_state(self, baseline: Baseline) -> None:
         """Drops what the watch would go on from: it then begins anew at the next test."""
@@ -133,24 +128,6 @@ class Watch(WatchedAgain):
         """The baseline in force of each hanger that has one, in numbers, by hanger."""
         with self.reading() as connection:
             return baselines_in_numbers(connection, hangers)
-
-    def damaged_baselines(self) -> dict[int, DamagedRow]:
-        """By hanger, what is damaged of its baseline in force: a test of it, or the posterior."""
-        made = sa.select(baselines.c.posterior_id).where(baselines.c.id.in_(baselines_now()))
-        of_made = sa.select(posterior_tests.c.test_id).where(
-            posterior_tests.c.posterior_id.in_(made)
-        )
-        asked: dict[sa.Table, sa.Select[Any]] = {
-            tests: plain_tests.where(tests.c.id.in_(of_made)),
-            posteriors: sa.select(posteriors).where(posteriors.c.id.in_(made)),
-        }
-        with self.reading() as connection:
-            return {
-                row.hanger: damaged(table, row.id, row.hanger)
-                for table, query in asked.items()
-                for row in connection.execute(query)
-                if not whole(table, row)
-            }
 
     def baseline_temperatures(self) -> dict[int, float]:
         """Mean temperature of the tests of each baseline in force, by hanger; NaN where unknown."""
@@ -246,13 +223,8 @@ class Watch(WatchedAgain):
         ids = self.scalars(latest)
         return self._watches(ids)
 
-    def latest(
-        self, excluding: Collection[int] = (), hangers: Sequence[Hanger] | None = None
-    ) -> dict[int, StoredWatch]:
-        """What the watch says of the latest test of each hanger (or these) against its baseline.
-
-        Raises DamagedRow, which names a hanger: ask again, `excluding` it.
-        """
+    def latest(self, hangers: Sequence[Hanger] | None = None) -> dict[int, StoredWatch]:
+        """What the watch says of the latest test of each hanger (or these) against its baseline."""
         held = baselines.alias()
         latest = (
             sa.select(watches.c.id)
@@ -265,8 +237,11 @@ class Watch(WatchedAgain):
             .limit(1)
             .scalar_subquery()
         )
-        wanted = held.c.id.in_(baselines_now()), *among(held.c.hanger, excluding, hangers)
-        ids = sa.select(latest).select_from(held).where(*wanted)
+        ids = (
+            sa.select(latest)
+            .select_from(held)
+            .where(held.c.id.in_(baselines_now()), among(held.c.hanger, hangers))
+        )
         found = [id_ for id_ in self.scalars(ids) if id_ is not None]
         return {each.hanger: each for each in self._watches(found)}
 
@@ -276,18 +251,13 @@ class Watch(WatchedAgain):
         return self._watches(chosen)
 
     def detected_changes(
-        self, excluding: Collection[int] = (), hangers: Sequence[Hanger] | None = None
+        self, hangers: Sequence[Hanger] | None = None
     ) -> dict[int, tuple[Change, ...]]:
-        """The changes detected of each (or these) hanger against its baseline in force, by time.
-
-        Raises DamagedRow, which names a hanger: ask again, `excluding` it.
-        """
-        chosen = among(watches.c.hanger, excluding, hangers)
-        query = sa.select(watches).where(*_called(), *chosen)
+        """The changes detected of each (or these) hanger against its baseline in force, by time."""
+        query = sa.select(watches).where(*_called(), among(watches.c.hanger, hangers))
         found = defaultdict[int, list[Change]](list)
         for row in self.rows(query.order_by(watches.c.time, watches.c.id)):
-            with decoding(watches, row, row.hanger):
-                found[row.hanger].append(change_in(row.document))
+            found[row.hanger].append(change_in(row.document))
         return {hanger: tuple(changes) for hanger, changes in found.items()}
 
     def list_detected_and_latest(self, baseline: Baseline) -> tuple[StoredWatch, ...]:
@@ -364,10 +334,7 @@ def _watch_values(
     first: StoredAlert | None,
     level: float,
 ) -> dict[str, Any]:
-    # Names its shifts and its alert, so that one that is gone is missed.
     told = {
-        "shifts": [drift.quantity for drift in found.drifts],
-        "alert": None if raised is None else raised.id,
         "alert_probability": level,
         **({} if first is None else {"joins": first.id}),
     }
@@ -382,10 +349,9 @@ def _watch_values(
 
 
 def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
-    with decoding(watches, row, row.hanger):
-        found, level = watch_in(row.document)
-        found = replace(found, test=row.test, time=row.time, drifts=tuple(shifts))
-        return StoredWatch(row.id, row.hanger, row.baseline_id, found, level)
+    found, level = watch_in(row.document)
+    found = replace(found, test=row.test, time=row.time, drifts=tuple(shifts))
+    return StoredWatch(row.id, row.hanger, row.baseline_id, found, level)
 
 
 def _called(hanger: int | None = None) -> tuple[sa.ColumnElement[bool], ...]:

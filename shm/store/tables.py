@@ -20,7 +20,7 @@ from shm.store.columns import (
 from shm.store.columns import metadata as metadata
 from shm.store.people_and_stream_tables import users as _of_people  # noqa: F401 - all are there
 
-SCHEMA = "0014"
+SCHEMA = "0015"
 
 _OF_TESTS = ("hanger", "time", "stage", "name", "taken_at", "temperature_c")
 
@@ -85,7 +85,6 @@ tests = sa.Table(
     sa.Column("stage", sa.String(16), nullable=False, index=True),
     sa.Column("document", Document, nullable=False),
     sa.Column("frequency_response", sa.LargeBinary),
-    sa.Column("frequency_response_checksum", sa.BigInteger),
     sa.Column("notes", Document, nullable=False),
     sa.Column("quality", Document),
     sa.Column("set_aside", Document),
@@ -366,14 +365,3 @@ tokens = sa.Table(
     sa.Column("last_used_at", UtcTime),
     unique_where("revoked_at", "tokens", "name"),
 )
-
-# Columns that are kept under a checksum of their own, NAME_checksum, by table: see `checksums`.
-APART = {"tests": "frequency_response", "notes": "photo"}
-
-# Of all else in the row. Empty in a row that was written in this transaction: an update empties it,
-# and what commits fills it in. The index holds those that are empty alone.
-for _table in metadata.tables.values():
-    _table.append_column(sa.Column("checksum", sa.BigInteger, onupdate=sa.null()))
-    sa.Index(
-        f"ix_{_table.name}_unsealed", _table.c.checksum, sqlite_where=sa.text("checksum IS NULL")
-    )

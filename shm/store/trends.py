@@ -24,7 +24,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.documents import averaged_document, number, value_of
 from shm.errors import UsageError
-from shm.store.checksums import checksum_of, loads, readable
+from shm.store.columns import loads
 from shm.store.database import Repository
 from shm.store.files import counts, in_force
 from shm.store.list_rows import BaselineGlance, Numbers, TrendPoint
@@ -46,11 +46,7 @@ _HANGERS_KNOWN = 4096  # technical: more than any bridge has
 _OF_TEST = ("id", "name", "hanger", "time", "taken_at", "temperature_c")
 _NAMED = ("stiffness", "parameters")
 _NUMBERS_HELD = 1024  # technical: a page shows some hundred
-_SUMMARY = (
-    summaries.c.key,
-    summaries.c.document.label("summary"),
-    summaries.c.checksum.label("sum"),
-)
+_SUMMARY = summaries.c.key, summaries.c.document.label("summary")
 
 
 class Trends(Repository):
@@ -144,15 +140,13 @@ class Trends(Repository):
         with self.reading() as connection:
             rows = [row for row in connection.execute(query) if row.hanger in known]
             numbers = _numbers(connection, rows, known)
-        # What is damaged has no numbers: it is noted, and `shm db check` names it.
-        read = [row for row in rows if row.posterior_id in numbers]
-        return tuple(_point(row, numbers[row.posterior_id]) for row in read)
+        return tuple(_point(row, numbers[row.posterior_id]) for row in rows)
 
 
 def baselines_in_numbers(
     connection: Connection, hangers: Iterable[Hanger]
 ) -> dict[int, BaselineGlance]:
-    """The baseline in force of each hanger that has one, by hanger; a damaged one is left out."""
+    """The baseline in force of each hanger that has one, by hanger."""
     known = {hanger.id: hanger for hanger in hangers}
     now = baselines_now(next(iter(known)) if len(known) == 1 else None)
     query = (
@@ -168,7 +162,6 @@ def baselines_in_numbers(
     return {
         row.hanger: _baseline(row, made_of[row.posterior_id], numbers[row.posterior_id])
         for row in rows
-        if row.posterior_id in numbers
     }
 
 
@@ -193,9 +186,7 @@ def _numbers(
     selected = selection_numbers(connection)
     keys = {id_: key_of(hanger, selected.get(id_)) for id_, hanger in hangers.items()}
     kept = {
-        row.posterior_id: _from_text(row.summary)
-        for row in rows
-        if row.key == keys[row.hanger] and _is_whole(row)
+        row.posterior_id: _from_text(row.summary) for row in rows if row.key == keys[row.hanger]
     }
     missing = [row.posterior_id for row in rows if row.posterior_id not in kept]
     for begin in range(0, len(missing), _AT_ONCE):
@@ -203,27 +194,19 @@ def _numbers(
     return kept
 
 
-def _is_whole(row: Row[Any]) -> bool:
-    """A damaged summary may be thrown away at will, as any other."""
-    told = {"posterior_id": row.posterior_id, "key": row.key, "document": row.summary}
-    return bool(row.sum == checksum_of(summaries, told))
-
-
 def _made(
     connection: Connection, ids: Sequence[int], hangers: Mapping[int, Hanger]
 ) -> dict[int, Numbers]:
-    """Those that can be made: a damaged posterior, or one of a damaged selection, has none."""
     query = sa.select(posteriors).where(posteriors.c.id.in_(ids))
     compared: dict[int, Selection | None] = {}
-
-    def numbers(row: Row[Any]) -> tuple[int, Numbers]:
+    made = {}
+    for row in connection.execute(query).all():
         if row.hanger not in compared:
             found = selection_of(connection, row.hanger)
             compared[row.hanger] = None if found is None else found.selection
         posterior = posterior_of_row(row)
-        return row.id, summarised(posterior, hangers[row.hanger], compared[row.hanger])
-
-    return dict(readable(connection.execute(query).all(), numbers))
+        made[row.id] = summarised(posterior, hangers[row.hanger], compared[row.hanger])
+    return made
 
 
 def summarised(posterior: Posterior, hanger: Hanger, selection: Selection | None) -> Numbers:
@@ -354,9 +337,6 @@ def _described(document: str) -> Mapping[str, Any] | None:
 
 @lru_cache(_NUMBERS_HELD)
 def _check(document: str) -> BaselineCheck | None:
-    """What was found of the baseline's tests; None of a damaged document."""
-    try:
-        found = loads(document).get("baseline_check")
-        return None if found is None else value_of(BaselineCheck, found)
-    except ValueError:
-        return None
+    """What was found of the baseline's tests."""
+    found = loads(document).get("baseline_check")
+    return None if found is None else value_of(BaselineCheck, found)

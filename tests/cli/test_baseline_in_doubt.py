@@ -39,7 +39,7 @@ def doubted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     ingest(workspace)
     with workspace.store() as store:
         for hold in store.recordings.list_holds():
-            store.recordings.confirm(hold.recording_id, "Ann", "as measured", START)
+            store.recordings.accept(hold.recording_id, "Ann", "as measured", START)
     ingest(workspace)
     return workspace
 

@@ -54,35 +54,27 @@ def test_a_crash_is_told_and_work_left_undone_is_ended_with_the_context() -> Non
 
 
 @pytest.mark.parametrize(
-    ("step", "how", "from_outside"),
+    ("step", "how"),
     few_of(
         [
-            (partial(ctypes.string_at, 8), "SIGSEGV", False),
-            (os.abort, "SIGABRT", False),
-            (partial(os._exit, 3), "exit code 3", False),
-            (partial(signal.raise_signal, signal.SIGTERM), "SIGTERM", True),
-            (partial(signal.raise_signal, signal.SIGKILL), "SIGKILL", True),
+            (partial(ctypes.string_at, 8), "SIGSEGV"),
+            (os.abort, "SIGABRT"),
+            (partial(os._exit, 3), "exit code 3"),
+            (partial(signal.raise_signal, signal.SIGTERM), "SIGTERM"),
+            (partial(signal.raise_signal, signal.SIGKILL), "SIGKILL"),
         ],
         2,
     ),
 )
 def test_a_death_says_how_and_takes_no_neighbour_along(
-    workers: Workers, step: partial[object], how: str, from_outside: bool
+    workers: Workers, step: partial[object], how: str
 ) -> None:
     neighbour = workers.submit(time.sleep, 1.0)
     death = died(workers.submit(step))
-    assert (death.how, death.from_outside) == (how, from_outside)
+    assert death.how == how
     assert how in death.message
     assert neighbour.result(60) is None
     assert workers.submit(os.getpid).result(60)
-
-
-def test_a_fresh_process_has_done_nothing_before_and_does_nothing_after(workers: Workers) -> None:
-    known = {workers.submit(os.getpid).result(60) for _ in range(4)}
-    fresh = [workers.submit_fresh(os.getpid).result(60) for _ in range(2)]
-    later = {workers.submit(os.getpid).result(60) for _ in range(4)}
-    assert len({*fresh}) == 2
-    assert not {*fresh} & (known | later)
 
 
 def test_no_process_is_begun_once_all_end_for_nobody_would_end_it(tmp_path: Path) -> None:
@@ -90,7 +82,7 @@ def test_no_process_is_begun_once_all_end_for_nobody_would_end_it(tmp_path: Path
     with children_ended():
         pool = Workers(1)
         first = pool.submit(_say_and_sleep, at_work)
-        waiting = pool.submit_fresh(os.getpid)
+        waiting = pool.submit(os.getpid)
         while not at_work.exists():
             time.sleep(0.01)
         pool.shutdown(wait=False)
@@ -132,17 +124,20 @@ def _exit() -> None:
 
 
 def test_where_no_process_can_be_begun_no_file_is_to_blame(
-    workers: Workers, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def full(*args: object) -> None:
         raise OSError(11, "Resource temporarily unavailable")
 
-    with monkeypatch.context() as patched:
-        patched.setattr("multiprocessing.context.ForkServerProcess.start", full)
-        with pytest.raises(ShmError, match="no process can be begun") as refusal:
-            workers.submit_fresh(os.getpid).result(60)
-    assert refusal.value.retry_after_s
-    assert workers.submit_fresh(os.getpid).result(60)
+    with children_ended():
+        with monkeypatch.context() as patched:
+            patched.setattr("multiprocessing.context.ForkServerProcess.start", full)
+            workers = Workers(1)
+            with pytest.raises(ShmError, match="no process can be begun") as refusal:
+                workers.submit(os.getpid).result(60)
+        assert refusal.value.retry_after_s
+        assert workers.submit(os.getpid).result(60)
+        workers.shutdown(wait=False)
 
 
 @pytest.mark.slow
@@ -177,20 +172,3 @@ def test_a_step_that_grows_without_end_gets_an_error_before_the_machine_is_full(
 def _less_memory() -> None:
     execution._MOST_OF_MEMORY *= 1e9 / memory_of_machine()
     execution._bound_memory()
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells the memory of others")
-def test_a_process_killed_while_it_held_most_of_the_memory_was_killed_for_that(
-    workers: Workers, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(execution, "memory_of_machine", lambda: 10**9)
-    death = died(workers.submit(_grow_and_be_killed))
-    assert not death.from_outside
-    assert "when it held 0." in death.message
-    assert "of 1.0 GB of memory" in death.message
-
-
-def _grow_and_be_killed() -> None:
-    held = bytearray(b"1") * 500_000_000
-    time.sleep(0.5)
-    os.kill(os.getpid(), len(held) and signal.SIGKILL)

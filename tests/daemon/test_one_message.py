@@ -19,7 +19,6 @@ import pytest
 from click.testing import CliRunner
 
 from shm.documents import alert_document
-from shm.errors import DamagedRow
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import bridge_report
 from shm.pipeline.reporting import hanger_report
@@ -35,7 +34,6 @@ from shm.values.messages import Lead, Urgency
 from shm.watch.alert_text import message_of
 from shm.watch.watching import new_alert
 from shm_cli.main import cli
-from tests.helpers.damaging import damage
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import NOW, a_change, a_file, a_posterior, a_test
 from tests.helpers.web_servers import Served, served
@@ -236,15 +234,6 @@ def _raise(
         raise_alert(connection, None, None, alert, ["mail"], NOW)
 
 
-def _damaged(of: Hangers, hanger: int) -> None:
-    """Its posterior is not as it was written, and the daemon has noted that."""
-    test = of.test(hanger, 0)
-    posterior = of.store.posteriors.latest_trends([replace(HANGER_3, id=hanger)])[hanger]
-    damage(of.workspace, "posteriors", "samples", posterior.posterior_id)
-    error = DamagedRow("posteriors", posterior.posterior_id, test.hanger, "Reprocess it.")
-    of.store.upkeep.note_damage(error, NOW)
-
-
 Make = Callable[[Hangers, int], None]
 STATES: dict[str, tuple[Make, Status | None, Urgency]] = {
     "no test yet": (lambda of, hanger: None, None, "next_test"),
@@ -269,7 +258,6 @@ STATES: dict[str, tuple[Make, Status | None, Urgency]] = {
     "stale": (_stale, Status.UNCLEAR, "week"),
     "held": (_held, Status.WATCH, "week"),
     "stream alone": (_stream_alone, Status.ALERT, "today"),
-    "damaged": (_damaged, None, "today"),
     "ended": (_ended, Status.STEADY, "none"),
 }
 NUMBER_OF = {name: number for number, name in enumerate(STATES, start=1)}
@@ -351,8 +339,6 @@ def test_all_surfaces_say_the_same(
         assert words in home[0]
     if store.tests.list_all(number) and urgency != "none":
         assert words in status[0]
-    if name == "damaged":
-        return
     assert words in _read(client.get(f"/hangers/{number}").text)
     if store.tests.list_all(number):
         report = hanger_report(bridge, store, number, utc_now())
@@ -421,7 +407,7 @@ def rendered(bridge: Workspace, store: Store) -> Iterator[str]:
     yield from (line.message.words for line in report.hangers)
     yield bridge_summary(report)
     for number in NUMBER_OF.values():
-        if store.tests.list_all(number) and number != NUMBER_OF["damaged"]:
+        if store.tests.list_all(number):
             yield summary(hanger_report(bridge, store, number, utc_now()))
     yield from (each.alert.message for each in store.alerts.list_all())
 

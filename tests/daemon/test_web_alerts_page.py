@@ -10,6 +10,7 @@ import pytest
 import sqlalchemy as sa
 
 from shm.store import Workspace
+from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.tables import alerts
 from shm_daemon.web.access import COOKIE
@@ -129,4 +130,5 @@ def copied(bridge: Workspace, alert: int, key: str) -> int:
     """The same alert raised for another reason; its number."""
     with bridge.store() as store, store.writing() as connection:
         row = connection.execute(sa.select(alerts).where(alerts.c.id == alert)).one()
-        return insert(connection, alerts, {**row._mapping, "id": None, "key": key})
+        changed = {"id": None, "key": key, "document": loads(row.document)}
+        return insert(connection, alerts, {**row._mapping, **changed})

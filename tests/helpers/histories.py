@@ -92,10 +92,8 @@ def _held(workspace: Workspace, clock: Clock) -> None:
         _work(workspace, clock)
     with workspace.store() as store:
         first, second, third, *_ = (hold.recording_id for hold in store.recordings.list_holds())
-        store.recordings.confirm(
-            first, "Ann", "clock was dead", clock(), START + timedelta(days=70)
-        )
-        store.recordings.discard(second, "Ann", "of another bridge", clock())
+        store.recordings.accept(first, "Ann", "clock was dead", clock(), START + timedelta(days=70))
+        store.recordings.exclude(second, "Ann", "of another bridge", clock())
         store.recordings.reprocess(third, Stage.IDENTIFIED, clock())
     _work(workspace, clock)
 
@@ -125,8 +123,8 @@ def _taken_out(workspace: Workspace, clock: Clock) -> None:
     with workspace.store() as store:
         for name in ("out2", "out1"):
             clock.pass_by(60)
-            store.recordings.withdraw(store.recordings.find(name)[0], "Ann", "a slip", clock())
-        store.recordings.reinstate(store.recordings.find("out2")[0], "Ann", "no slip", clock())
+            store.recordings.exclude(store.recordings.find(name)[0], "Ann", "a slip", clock())
+        store.recordings.accept(store.recordings.find("out2")[0], "Ann", "no slip", clock())
     _work(workspace, clock)
 
 

@@ -105,7 +105,7 @@ def test_what_is_confirmed_counts_from_its_receipt_where_its_time_is_wrong(
 ) -> None:
     with a_flow(held) as flow:
         at = flow.clock()
-        hold = flow.store.recordings.confirm(2, "Ann", "clock was dead", at)
+        hold = flow.store.recordings.accept(2, "Ann", "clock was dead", at)
         assert (hold.decision, hold.who, hold.why) == (Decision.CONFIRMED, "Ann", "clock was dead")
         flow.drain()
         assert flow.store.recordings.get(2).stage is Stage.DONE
@@ -122,7 +122,7 @@ def test_what_is_confirmed_counts_from_its_receipt_where_its_time_is_wrong(
 
 def test_a_confirmed_test_has_the_time_that_a_person_gave_it(held: Workspace) -> None:
     with a_flow(held) as flow:
-        flow.store.recordings.confirm(2, "Ann", "", flow.clock(), day(30))
+        flow.store.recordings.accept(2, "Ann", "", flow.clock(), day(30))
         flow.drain()
         assert [test.time for test in flow.store.tests.list_all(3)] == [day(0), day(30)]
         flow.store.recordings.reprocess(2, Stage.IDENTIFIED, flow.clock())
@@ -130,17 +130,17 @@ def test_a_confirmed_test_has_the_time_that_a_person_gave_it(held: Workspace) ->
         assert [test.time for test in flow.store.tests.list_all(3)] == [day(0), day(30)]
         assert flow.store.recordings.stage_counts()[Stage.HELD] == 0
         with pytest.raises(UsageError, match="not held: it was confirmed by Ann"):
-            flow.store.recordings.confirm(2, "Bob", "", flow.clock())
+            flow.store.recordings.accept(2, "Bob", "", flow.clock())
 
 
 def test_a_time_yet_to_come_is_given_to_no_test(held: Workspace) -> None:
     with a_flow(held) as flow, pytest.raises(UsageError, match="yet to come"):
-        flow.store.recordings.confirm(2, "Ann", "", flow.clock(), day(9000))
+        flow.store.recordings.accept(2, "Ann", "", flow.clock(), day(9000))
 
 
 def test_what_is_discarded_ends_and_its_raw_file_stays(held: Workspace) -> None:
     with a_flow(held) as flow:
-        flow.store.recordings.discard(2, "Ann", "wrong hanger", flow.clock())
+        flow.store.recordings.exclude(2, "Ann", "wrong hanger", flow.clock())
         flow.drain()
         recording = flow.store.recordings.get(2)
         assert recording.stage is Stage.REFUSED
@@ -157,7 +157,7 @@ def test_what_is_discarded_ends_and_its_raw_file_stays(held: Workspace) -> None:
 def test_what_was_discarded_and_comes_again_stays_discarded(held: Workspace) -> None:
     """It was held again, and asked again, each time that the crew sent its folder."""
     with a_flow(held) as flow:
-        flow.store.recordings.discard(2, "Ann", "of another bridge", flow.clock())
+        flow.store.recordings.exclude(2, "Ann", "of another bridge", flow.clock())
         spool(held, "lost", EPOCH, tension=0.9)
         receipt = flow.receive(held.spool / "lost.modes.json")
         flow.drain()
@@ -171,7 +171,7 @@ def test_what_was_discarded_and_comes_again_stays_discarded(held: Workspace) -> 
 
 def test_a_discarded_file_with_another_sidecar_is_judged_again(held: Workspace) -> None:
     with a_flow(held) as flow:
-        flow.store.recordings.discard(2, "Ann", "", flow.clock())
+        flow.store.recordings.exclude(2, "Ann", "", flow.clock())
         put(held.spool / "lost.modes.toml", "temperature_c = 12.0\n")
         spool(held, "lost", EPOCH, tension=0.9)
         assert flow.receive(held.spool / "lost.modes.json").outcome is Outcome.REOPENED
@@ -181,7 +181,7 @@ def test_a_discarded_file_with_another_sidecar_is_judged_again(held: Workspace) 
 
 def test_what_failed_after_a_discard_is_tried_again(held: Workspace) -> None:
     with a_flow(held) as flow:
-        flow.store.recordings.discard(2, "Ann", "", flow.clock())
+        flow.store.recordings.exclude(2, "Ann", "", flow.clock())
         flow.store.recordings.refuse(2, {"message": "no rate."}, flow.clock())
         spool(held, "lost", EPOCH, tension=0.9)
         assert flow.receive(held.spool / "lost.modes.json").outcome is Outcome.REOPENED
@@ -189,8 +189,8 @@ def test_what_failed_after_a_discard_is_tried_again(held: Workspace) -> None:
 
 def test_what_was_discarded_is_taken_back_with_its_true_time(held: Workspace) -> None:
     with a_flow(held) as flow:
-        flow.store.recordings.discard(2, "Ann", "", flow.clock())
-        hold = flow.store.recordings.reinstate(2, "Bob", "it was right", flow.clock(), day(30))
+        flow.store.recordings.exclude(2, "Ann", "", flow.clock())
+        hold = flow.store.recordings.accept(2, "Bob", "it was right", flow.clock(), day(30))
         flow.drain()
         assert (hold.decision, hold.who) == (Decision.REINSTATED, "Bob")
         recording = flow.store.recordings.get(2)
@@ -216,7 +216,7 @@ def test_what_counts_is_taken_out_and_back_again(counting: Workspace) -> None:
     """Nobody could take out the part that had come before its whole."""
     with a_flow(counting) as flow:
         store = flow.store
-        made = store.recordings.withdraw(4, "Ann", "of hanger 4", flow.clock())
+        made = store.recordings.exclude(4, "Ann", "of hanger 4", flow.clock())
         assert (made.hold.decision, made.of_baseline, made.watched_again) == (
             Decision.WITHDRAWN,
             (),
@@ -239,8 +239,8 @@ def test_what_counts_is_taken_out_and_back_again(counting: Workspace) -> None:
         assert (recording.stage, counting.archive.holds(recording.file)) == (Stage.REFUSED, True)
         assert check_store(store, quiet).troubles == ()
         with pytest.raises(UsageError, match="does not count: it was discarded"):
-            store.recordings.withdraw(4, "Ann", "", flow.clock())
-        store.recordings.reinstate(4, "Ann", "it was of 3", flow.clock())
+            store.recordings.exclude(4, "Ann", "", flow.clock())
+        store.recordings.accept(4, "Ann", "it was of 3", flow.clock())
         flow.drain()
         assert counted(store) == ["t0", "t1", "t2", "t3", "t4"]
         assert [watch.watched.change.called for watch in store.watch.list_all(3)] == [
@@ -251,14 +251,14 @@ def test_what_counts_is_taken_out_and_back_again(counting: Workspace) -> None:
         ]
         assert check_store(store, quiet).troubles == ()
         with pytest.raises(UsageError, match="nothing of recording 4 is held or discarded"):
-            store.recordings.reinstate(4, "Ann", "", flow.clock())
+            store.recordings.accept(4, "Ann", "", flow.clock())
 
 
 def test_the_baseline_of_what_is_taken_out_is_told_of_and_its_posterior_not_shown(
     counting: Workspace,
 ) -> None:
     with counting.store() as store:
-        made = store.recordings.withdraw(1, "Ann", "a part", START)
+        made = store.recordings.exclude(1, "Ann", "a part", START)
         assert (made.of_baseline, made.since, made.watched_again) == (("t0",), day(0), 4)
         assert store.watch.baseline(3) is not None
         assert len(store.posteriors.list_all(3)) == 4
@@ -271,14 +271,14 @@ def test_one_test_of_a_campaign_is_taken_out_and_stays_out(workspace: Workspace)
     ingest(workspace)
     with a_flow(workspace) as flow:
         store = flow.store
-        store.recordings.withdraw(1, "Ann", "a slip", flow.clock(), "b")
+        store.recordings.exclude(1, "Ann", "a slip", flow.clock(), "b")
         flow.drain()
         assert (counted(store), store.recordings.get(1).stage) == (["a", "c"], Stage.DONE)
         store.recordings.reprocess(1, Stage.IDENTIFIED, flow.clock())
         flow.drain()
         assert counted(store) == ["a", "c"]
         assert check_store(store, quiet).troubles == ()
-        store.recordings.reinstate(1, "Ann", "no slip", flow.clock(), test="b")
+        store.recordings.accept(1, "Ann", "no slip", flow.clock(), test="b")
         flow.drain()
         assert counted(store) == ["a", "b", "c"]
         assert check_store(store, quiet).troubles == ()
@@ -301,8 +301,8 @@ def test_the_whole_counts_in_place_of_its_part(workspace: Workspace) -> None:
             in hold.message
         )
         assert ".." not in hold.message
-        flow.store.recordings.withdraw(1, "Ann", "a part", flow.clock())
-        flow.store.recordings.confirm(2, "Ann", "the whole", flow.clock())
+        flow.store.recordings.exclude(1, "Ann", "a part", flow.clock())
+        flow.store.recordings.accept(2, "Ann", "the whole", flow.clock())
         flow.drain()
         assert counted(flow.store) == ["whole"]
         write(replace(whole, channels=tuple(cut[::-1])), workspace.spool / "again.npz")
@@ -324,7 +324,7 @@ def test_the_other_tests_of_a_file_go_on(workspace: Workspace) -> None:
         assert counted(flow.store) == ["a", "c"]
         assert [drift.test for drift in flow.store.watch.list_drifts(3)] == ["c"]
         assert flow.store.recordings.get(1).stage is Stage.HELD
-        flow.store.recordings.confirm(1, "Ann", "", flow.clock())
+        flow.store.recordings.accept(1, "Ann", "", flow.clock())
         flow.drain()
         assert flow.store.recordings.get(1).stage is Stage.DONE
         assert counted(flow.store) == ["a", "c", "b"]
@@ -443,9 +443,9 @@ def test_a_held_recording_that_is_done_again_waits_for_nobody_twice(held: Worksp
 def test_what_is_not_there_cannot_be_confirmed(held: Workspace) -> None:
     with held.store() as store:
         with pytest.raises(NothingThere, match="no recording 9"):
-            store.recordings.confirm(9, "Ann", "", START)
-        with pytest.raises(UsageError, match="recording 1 is not held"):
-            store.recordings.discard(1, "Ann", "", START)
+            store.recordings.accept(9, "Ann", "", START)
+        with pytest.raises(UsageError, match="nothing of recording 1 is held"):
+            store.recordings.accept(1, "Ann", "", START)
 
 
 def test_the_same_bytes_are_a_duplicate_while_they_are_held(held: Workspace) -> None:
@@ -622,5 +622,5 @@ def test_a_copy_of_a_loss_confirms_no_loss(workspace: Workspace) -> None:
         assert "it holds the samples of b.npz (recording 2) again" in notice.message
         assert "--confirm 3" in notice.message
         assert [test.test.id for test in store.tests.list_all(3)] == ["a", "b"]
-        store.recordings.confirm(3, "Ann", "another hit", day(61))
+        store.recordings.accept(3, "Ann", "another hit", day(61))
         assert store.recordings.latest_hold(3).decision is Decision.CONFIRMED  # type: ignore[union-attr]

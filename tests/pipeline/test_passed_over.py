@@ -49,7 +49,7 @@ def test_the_alert_of_a_discarded_test_ends(tmp_path: Path) -> None:
     with workspace.store() as store:
         (alert,) = store.alerts.list_all(3, standing=True)
         recording, _ = store.recordings.find(alert.alert.test)
-        store.recordings.withdraw(recording, "Ada", "of another hanger", utc_now())
+        store.recordings.exclude(recording, "Ada", "of another hanger", utc_now())
         assert store.alerts.list_all(3, standing=True) == ()
         ended = store.alerts.row(alert.id).resolution
     assert ended is not None

@@ -14,7 +14,6 @@ from shm.pipeline.bridge_reporting import hanger_lines
 from shm.pipeline.ending import SHM, is_told, told_by_other, why_over
 from shm.report.hanger_status import Status
 from shm.store import Stage, StoredAlert, Workspace
-from shm.store.missing import missing_rows
 from shm.values import Alert, WatchedTest
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
@@ -53,8 +52,6 @@ def test_a_tension_that_comes_back_resolves_its_alert(bridge: Workspace) -> None
         (found,) = (each for each in store.alerts.list_all() if each.alert.key == raised)
         assert found.resolution is not None
         assert found.resolution.who == "shm"
-        with store.engine.connect() as connection:
-            assert missing_rows(connection) == ()
 
 
 @pytest.mark.parametrize(("lost", "rings"), [(0.2, False), (0.1, True)])
@@ -74,8 +71,6 @@ def test_a_loss_that_a_stream_has_told_rings_again_only_where_tests_show_more(
     if not rings:
         with bridge.store() as store:
             assert [each.alert.key for each in store.alerts.list_all()] == [told.key]
-            with store.engine.connect() as connection:
-                assert missing_rows(connection) == ()
 
 
 def test_a_stream_joins_what_tests_have_told_before_and_not_what_begins_later() -> None:
@@ -104,8 +99,6 @@ def test_tests_within_a_maintenance_window_raise_nothing_and_the_first_after_it_
     with bridge.store() as store:
         assert store.alerts.list_all() == ()
         assert [test.stage for test in store.tests.list_all(3)] == [Stage.WATCHED] * 3
-        with store.engine.connect() as connection:
-            assert missing_rows(connection) == ()
     take(bridge, postman, 60, 0.8)
     take(bridge, postman, 61, 0.8)
     # The first asks to repeat the test that fits none before it.

@@ -118,8 +118,8 @@ def look(workspace: Workspace, clock: Clock, inbox: Inbox) -> None:
 
 def _work(flow: Flow) -> None:
     while flow.advance():
-        for running in flow._running.values():
-            running.future.exception(10)
+        for future in flow.under_way:
+            future.exception(10)
 
 
 def live(workspace: Workspace, clock: Clock, inbox: Inbox, seconds: float, step: float) -> None:

@@ -20,7 +20,7 @@ from tests.helpers.workspaces import make_workspace, put, write_loss, write_test
 def begun(flow: Flow) -> bool:
     """A turn, of which all steps that it has begun are through; whether there were any."""
     busy = flow.advance()
-    wait([running.future for running in flow._running.values()])
+    wait(flow.under_way)
     return busy
 
 

@@ -91,7 +91,6 @@ QUIET = Known(HANGER, tension(702e3), NOW, "t2", drifts=[drift()])
         ),
         ({"is_first": True, "tension": None}, "FIRST", "tension not known by its first", None),
         ({"latest": None}, None, "no test yet.", "Test it at the next planned test."),
-        ({"damage": "row 3"}, None, "its results cannot be read.", "Run `shm doctor` today."),
         (
             {"unwatched": UNWATCHED},
             "UNCLEAR",

@@ -97,7 +97,7 @@ def _hold(store: Store) -> None:
         found = [IdentifiedTest(a_test(f"t{number}", number, hanger=5))]
         store.tests.save(recording.id, found, LINEAGE, NOW, judged)
     later = NOW + timedelta(days=9)
-    store.recordings.confirm(5, "engineer", "battery was flat", later, later)
+    store.recordings.accept(5, "engineer", "battery was flat", later, later)
 
 
 def _update_again(store: Store) -> None:

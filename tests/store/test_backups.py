@@ -153,6 +153,6 @@ def test_a_damaged_backup_is_not_restored(file_store: Store, sqlite: Path, tmp_p
     with connection:
         connection.execute("DELETE FROM posteriors WHERE id = 1")
     connection.close()
-    with pytest.raises(StoreError, match="of posteriors is missing"):
+    with pytest.raises(StoreError, match="refers to a row of posteriors that is not there"):
         restore(sqlite, orphaned, tmp_path / "kept.db", quiet, replace=True)
     assert held(file_store) == before

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sqlalchemy as sa
+from sqlalchemy.engine import RowMapping
 
 from shm.errors import StoreError, UsageError
 from shm.store import Store, copying
@@ -52,7 +54,7 @@ def test_a_copy_that_differs_is_undone(
     Store.create(empty).close()
     written = copying._write
 
-    def altered(connection: sa.Connection, table: sa.Table, rows: copying.Rows) -> None:
+    def altered(connection: sa.Connection, table: sa.Table, rows: Sequence[RowMapping]) -> None:
         written(connection, table, rows)
         if table is posteriors:
             connection.execute(sa.update(posteriors).values(log_evidence=0.5))

@@ -55,7 +55,7 @@ def test_a_full_disk_is_told_and_waited_for(file_store: Store) -> None:
     with file_store.engine.connect() as connection:
         connection.exec_driver_sql("PRAGMA max_page_count = 1")
     with pytest.raises(StoreError, match="disk is full") as caught:
-        file_store.recordings.receive(a_file(1, file_name="x" * 100_000), NOW)
+        file_store.recordings.receive(a_file(1, file_name="x" * 10_000_000), NOW)
     assert caught.value.retry_after_s == 60.0
     assert "Free some space" in str(caught.value)
 

@@ -57,7 +57,7 @@ def test_what_waits_for_a_decision_is_listed_by_hanger(store: Store) -> None:
 
 
 def test_a_held_test_that_is_confirmed_counts_at_the_time_that_is_given(store: Store) -> None:
-    hold = store.recordings.confirm(HELD, "Ada", "it was there", LATER, NOW + DAY)
+    hold = store.recordings.accept(HELD, "Ada", "it was there", LATER, NOW + DAY)
     assert (hold.decision, hold.who, hold.why, hold.time, hold.decided_at) == (
         Decision.CONFIRMED, "Ada", "it was there", NOW + DAY, LATER,
     )  # fmt: skip
@@ -66,11 +66,11 @@ def test_a_held_test_that_is_confirmed_counts_at_the_time_that_is_given(store: S
     (test,) = [each for each in store.tests.list_all(5) if each.test.id == "t6"]
     assert test.test.time == test.time == NOW + DAY
     with pytest.raises(UsageError, match="is not held: it was confirmed by Ada"):
-        store.recordings.confirm(HELD, "Ben", "", LATER)
+        store.recordings.accept(HELD, "Ben", "", LATER)
 
 
 def test_a_test_of_unknown_time_counts_from_its_receipt(store: Store) -> None:
-    store.recordings.confirm(HELD, "Ada", "", LATER)
+    store.recordings.accept(HELD, "Ada", "", LATER)
     (test,) = [each for each in store.tests.list_all(5) if each.test.id == "t6"]
     assert test.test.time is None
     assert test.time == NOW
@@ -78,17 +78,18 @@ def test_a_test_of_unknown_time_counts_from_its_receipt(store: Store) -> None:
 
 def test_a_time_yet_to_come_is_refused_and_nothing_changes(store: Store) -> None:
     with pytest.raises(UsageError, match="yet to come"):
-        store.recordings.confirm(HELD, "Ada", "", LATER, LATER + DAY)
+        store.recordings.accept(HELD, "Ada", "", LATER, LATER + DAY)
     assert stage(store, HELD) == Stage.HELD
-    store.recordings.confirm(HELD, "Ada", "", LATER, LATER)
+    store.recordings.accept(HELD, "Ada", "", LATER, LATER)
 
 
-@pytest.mark.parametrize("verb", ["confirm", "discard"])
-def test_what_is_not_held_is_neither_confirmed_nor_discarded(store: Store, verb: str) -> None:
-    decide = getattr(store.recordings, verb)
+def test_what_counts_is_not_accepted(store: Store) -> None:
+    decide = store.recordings.accept
+    with pytest.raises(NothingThere, match="no recording 99"):
+        store.recordings.exclude(99, "Ada", "", LATER)
     with pytest.raises(NothingThere, match="no recording 99"):
         decide(99, "Ada", "", LATER)
-    with pytest.raises(UsageError, match="recording 2 is not held"):
+    with pytest.raises(UsageError, match="nothing of recording 2 is held"):
         decide(WATCHED, "Ada", "", LATER)
     with pytest.raises(UsageError, match="it was confirmed by engineer") as refused:
         decide(CONFIRMED, "Ada", "", LATER)
@@ -96,7 +97,7 @@ def test_what_is_not_held_is_neither_confirmed_nor_discarded(store: Store, verb:
 
 
 def test_what_is_discarded_says_who_and_why_and_how_to_take_it_back(store: Store) -> None:
-    hold = store.recordings.discard(HELD, "Ada", "a copy", LATER)
+    hold = store.recordings.exclude(HELD, "Ada", "a copy", LATER).hold
     assert hold == store.recordings.discard_in_force(HELD)
     assert (hold.decision, hold.is_in, hold.is_out) == (Decision.DISCARDED, False, True)
     recording = store.recordings.get(HELD)
@@ -112,8 +113,8 @@ def test_what_is_discarded_says_who_and_why_and_how_to_take_it_back(store: Store
 
 
 def test_what_was_discarded_is_reinstated_as_it_would_have_been(store: Store) -> None:
-    store.recordings.discard(HELD, "Ada", "a copy", LATER)
-    hold = store.recordings.reinstate(HELD, "Ben", "no copy", LATER + DAY, NOW + DAY)
+    store.recordings.exclude(HELD, "Ada", "a copy", LATER)
+    hold = store.recordings.accept(HELD, "Ben", "no copy", LATER + DAY, NOW + DAY)
     assert (hold.decision, hold.who, hold.time) == (Decision.REINSTATED, "Ben", NOW + DAY)
     assert hold.is_in
     assert [(each.name, each.doubts[0].check) for each in hold.tests] == [("t6", "copy")]
@@ -122,16 +123,16 @@ def test_what_was_discarded_is_reinstated_as_it_would_have_been(store: Store) ->
     assert counting(store, 5) == ["t6", "t5"]  # in the order of their times
     assert store.recordings.discard_in_force(HELD) is None
     with pytest.raises(UsageError, match="nothing of recording 6 is held or discarded"):
-        store.recordings.reinstate(HELD, "Ben", "", LATER)
+        store.recordings.accept(HELD, "Ben", "", LATER)
     with pytest.raises(UsageError, match="nothing of recording 3 is held or discarded"):
-        store.recordings.reinstate(REFUSED, "Ben", "", LATER)
+        store.recordings.accept(REFUSED, "Ben", "", LATER)
 
 
 def test_what_is_withdrawn_counts_no_more_and_later_tests_are_watched_again(store: Store) -> None:
     _watch_at_its_time(store)
     watched = [each.watched.test for each in store.watch.list_all(3)]
     assert watched == ["t2", "t4"]
-    found = store.recordings.withdraw(WATCHED, "Ada", "the wrong hanger", LATER)
+    found = store.recordings.exclude(WATCHED, "Ada", "the wrong hanger", LATER)
     assert (found.hold.decision, found.hold.who) == (Decision.WITHDRAWN, "Ada")
     assert found.hold.is_out
     assert found.of_baseline == ("t2",)
@@ -147,14 +148,14 @@ def test_what_is_withdrawn_counts_no_more_and_later_tests_are_watched_again(stor
         "discarded on 2026-05-21 by Ada, because: the wrong hanger."
     )
     with pytest.raises(UsageError, match="recording 2 does not count: it was discarded"):
-        store.recordings.withdraw(WATCHED, "Ada", "", LATER)
+        store.recordings.exclude(WATCHED, "Ada", "", LATER)
     with pytest.raises(UsageError, match="recording 3 does not count: it is refused"):
-        store.recordings.withdraw(REFUSED, "Ada", "", LATER)
+        store.recordings.exclude(REFUSED, "Ada", "", LATER)
 
 
 def test_a_withdrawal_is_taken_back(store: Store) -> None:
-    store.recordings.withdraw(WATCHED, "Ada", "", LATER)
-    hold = store.recordings.reinstate(WATCHED, "Ben", "it was right", LATER)
+    store.recordings.exclude(WATCHED, "Ada", "", LATER)
+    hold = store.recordings.accept(WATCHED, "Ben", "it was right", LATER)
     assert [each.name for each in hold.tests] == ["t2"]
     assert counting(store, 3) == ["t1", "t2", "t4"]
     assert stage(store, WATCHED) == Stage.IDENTIFIED
@@ -165,16 +166,16 @@ def test_a_withdrawal_is_taken_back(store: Store) -> None:
 
 def test_a_test_of_another_name_is_not_withdrawn(store: Store) -> None:
     with pytest.raises(UsageError, match="does not count"):
-        store.recordings.withdraw(WATCHED, "Ada", "", LATER, test="t1")
-    store.recordings.withdraw(WATCHED, "Ada", "", LATER, test="t2")
+        store.recordings.exclude(WATCHED, "Ada", "", LATER, test="t1")
+    store.recordings.exclude(WATCHED, "Ada", "", LATER, test="t2")
     with pytest.raises(UsageError, match="nothing of recording"):
-        store.recordings.reinstate(WATCHED, "Ada", "", LATER, test="t1")
-    assert store.recordings.reinstate(WATCHED, "Ada", "", LATER, test="t2").is_in
+        store.recordings.accept(WATCHED, "Ada", "", LATER, test="t1")
+    assert store.recordings.accept(WATCHED, "Ada", "", LATER, test="t2").is_in
 
 
 def test_each_decision_is_noted_with_its_reason(store: Store) -> None:
-    store.recordings.withdraw(WATCHED, "Ada", "the wrong hanger", LATER)
-    store.recordings.discard(HELD, "Ada", "a copy", LATER)
+    store.recordings.exclude(WATCHED, "Ada", "the wrong hanger", LATER)
+    store.recordings.exclude(HELD, "Ada", "a copy", LATER)
     newest = [(row.who, row.action, row.detail) for row in store.audit.list_rows(2)]
     assert newest == [
         ("Ada", "recording discarded", "a copy"),

@@ -7,10 +7,9 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
-import sqlalchemy as sa
 from PIL import Image
 
-from shm.errors import BadInput, DamagedRow, NothingThere, ShmError, UsageError
+from shm.errors import BadInput, NothingThere, ShmError, UsageError
 from shm.store import Store
 from shm.store.notes import LARGEST_PHOTO_BYTES
 from shm.values.notes import NoteKind
@@ -95,12 +94,3 @@ def test_what_cannot_be_is_refused_and_leaves_nothing(
     assert file_store.audit.list_rows() == ()
     with pytest.raises(NothingThere):
         file_store.notes.photo(1)
-
-
-def test_a_damaged_photo_is_told_and_its_note_is_read(file_store: Store) -> None:
-    file_store.notes.add(3, NOW, NoteKind.NOTE, "rust", "anna", NOW, a_photo("PNG"))
-    with file_store.engine.begin() as connection:
-        connection.execute(sa.text("UPDATE notes SET photo = x'00'"))
-    with pytest.raises(DamagedRow):
-        file_store.notes.photo(1)
-    assert len(file_store.notes.list_all(3)) == 1

@@ -175,16 +175,6 @@ def test_a_name_that_several_files_had_is_told_with_their_numbers(store: Store) 
     assert "1, 2" in caught.value.remedy
 
 
-def test_a_row_finds_its_recording(store: Store) -> None:
-    baseline = with_baseline(store)
-    watched(store, second := identified(store, 2), baseline)
-    rows = (f"tests/{second.id}", "watches/1", "drifts/1", "posteriors/2")
-    assert {store.recordings.find(row) for row in rows} == {(second.recording_id, None)}
-    for row in ("watches/9", "alerts/1", "watches/x"):
-        with pytest.raises(NothingThere):
-            store.recordings.find(row)
-
-
 def test_each_stage_that_was_reached_is_a_row(store: Store) -> None:
     baseline = with_baseline(store)
     second = identified(store, 2)

@@ -114,21 +114,6 @@ def test_what_is_old_goes_but_days_stay(store: Store) -> None:
     assert counts == [3, 3, 4]
 
 
-def test_a_damaged_row_hides_no_other(store: Store) -> None:
-    store.streams.save_window(a_window())
-    store.streams.save_window(a_window(10))
-    store.streams.save_pooled(a_reading())
-    store.streams.save_pooled(a_reading(1), b"state")
-    with store.engine.begin() as connection:
-        for table in ("stream_windows", "pooled_readings"):
-            changed = "document = replace(document, '5.8', '5.9')"
-            connection.exec_driver_sql(f"UPDATE {table} SET {changed} WHERE id = 2")
-        connection.exec_driver_sql("UPDATE stream_watch SET hanger = 3, checksum = 1")
-    assert_same(store.streams.list_windows(3, *EVER), (a_window(),))
-    assert_same(store.streams.list_pooled(3, "hour", *EVER), (a_reading(),))
-    assert store.streams.watch_state(3) is None
-
-
 def test_a_stream_says_how_far_it_has_come(file_store: Store) -> None:
     """Of its windows, its hours and days, each by its own start."""
     streams = file_store.streams

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import sqlite3
 from datetime import timedelta
 from pathlib import Path
 
 import pytest
 
-from shm.errors import DamagedRow
-from shm.store import IdentifiedTest, Lineage, Store
+from shm.store import Store
 from shm.store.archive import Archive, Quarantine
 from shm.store.checking import (
     CheckedArchive,
@@ -20,19 +19,10 @@ from shm.store.checking import (
     quick_troubles,
     unknown_files,
 )
-from shm.store.checksums import of_readable
-from shm.store.upkeep import DamagedPosterior
 from tests.helpers.contents import quiet
-from tests.helpers.damaging import change, flipped
-from tests.helpers.nouns import NOW, a_file, a_posterior, a_test
+from tests.helpers.nouns import NOW, a_file
 
 HOUR = timedelta(hours=1)
-GONE = "index ix_posterior_tests_test_id"
-LINEAGE = Lineage("0" * 64, "1" * 64, "0.1.0")
-
-
-def damage(store: Store, table: str, column: str, id_: int) -> None:
-    change(store.engine.url.render_as_string(hide_password=False), table, column, id_, flipped)
 
 
 def test_the_last_backup_is_the_newest(file_store: Store) -> None:
@@ -43,94 +33,6 @@ def test_the_last_backup_is_the_newest(file_store: Store) -> None:
     assert upkeep.last_backup() == (NOW + 2 * HOUR, "/backups/2.db")
     file_store.recordings.receive(a_file(1), NOW + 3 * HOUR)
     assert upkeep.newest_row_at() == NOW + 3 * HOUR
-
-
-def test_damage_is_noted_once_and_known_until_it_is_healed(filled_copy: Store) -> None:
-    upkeep = filled_copy.upkeep
-    error = DamagedRow("tests", 2, 3, "Make it again.")
-    assert upkeep.note_damage(error, NOW)
-    assert not upkeep.note_damage(error, NOW + HOUR)
-    assert upkeep.known_damage() == ()
-    damage(filled_copy, "tests", "document", 2)
-    (found,) = upkeep.known_damage()
-    assert (found.table, found.id, found.hanger) == ("tests", 2, 3)
-    assert found.remedy == "Make it again from the archive: `shm ingest --again tests/2`."
-    assert upkeep.damaged_tests(2) == (2,)
-    assert upkeep.damaged_tests(1) == upkeep.damaged_posteriors(2) == ()
-    again = IdentifiedTest(a_test("t2", 2), notes=("anew",))
-    upkeep.heal_tests([2], [replace(again, position=5)], LINEAGE)
-    assert upkeep.damaged_tests(2) == (2,)
-    upkeep.heal_tests([2], [again], LINEAGE)
-    assert upkeep.damaged_tests(2) == upkeep.known_damage() == ()
-    assert check_store(filled_copy, quiet).troubles == ()
-    assert filled_copy.tests.named(3, "t2").notes == ("anew",)
-
-
-def test_a_damaged_posterior_is_named_with_its_class_and_tests(filled_copy: Store) -> None:
-    upkeep = filled_copy.upkeep
-    damage(filled_copy, "posteriors", "samples", 3)
-    assert upkeep.damaged_posteriors(2) == (DamagedPosterior(3, "beam1", (2,)),)
-    assert upkeep.damaged_posteriors(1) == ()
-    test = filled_copy.tests.named(3, "t2")
-    upkeep.heal_posterior(3, a_posterior("beam1", ("t2",), seed=8), [test], LINEAGE, NOW)
-    assert upkeep.damaged_posteriors(2) == ()
-    assert check_store(filled_copy, quiet).troubles == ()
-
-
-def test_damaged_rows_that_are_made_again_by_themselves_are_thrown_away(filled_copy: Store) -> None:
-    damage(filled_copy, "watches", "document", 1)
-    assert filled_copy.upkeep.drop_damaged() == filled_copy.upkeep.drop_damaged(1) == 0
-    assert [row.table for row in check_store(filled_copy, quiet).damaged] == ["watches"]
-    assert filled_copy.upkeep.drop_damaged(2) == 1
-    assert check_store(filled_copy, quiet).damaged == ()
-
-
-def test_findings_say_of_each_trouble_its_kind_its_place_and_its_remedy(filled_copy: Store) -> None:
-    whole = check_store(filled_copy, quiet)
-    assert whole.findings == whole.unfit == quick_troubles(filled_copy) == ()
-    damage(filled_copy, "tests", "document", 2)
-    with filled_copy.engine.begin() as connection:
-        connection.exec_driver_sql("DROP INDEX ix_posterior_tests_test_id")
-    found = check_store(filled_copy, quiet)
-    kinds = [(each.kind, each.where) for each in found.findings]
-    assert kinds == [("damaged row", "tests/2"), ("changed schema", GONE)]
-    row, schema = found.findings
-    assert str(row).startswith("tests/2: ")
-    assert str(row).endswith("`shm ingest --again tests/2`.")
-    assert "shm db backup FILE" in schema.remedy
-    assert found.unfit == found.troubles[:1]
-    file = CheckedStore((), ("the file is damaged: page 3",)).findings[0]
-    assert (file.kind, file.where, file.what) == (
-        "fault of the file", "store", "the file is damaged: page 3.",
-    )  # fmt: skip
-
-
-def test_hangers_with_damage_are_left_out_and_named() -> None:
-    asked: list[set[int]] = []
-
-    def ask(damaged: object) -> dict[int, str]:
-        asked.append(set(damaged))  # type: ignore[call-overload]
-        for hanger in (3, 5):
-            if hanger not in asked[-1]:
-                raise DamagedRow("watches", hanger, hanger, "")
-        return {4: "fine"}
-
-    damaged: dict[int, DamagedRow] = {}
-    assert of_readable(ask, damaged) == {4: "fine"}
-    assert asked == [set(), {3}, {3, 5}]
-    assert [damaged[hanger].id for hanger in (3, 5)] == [3, 5]
-
-    def of_none(_: object) -> dict[int, str]:
-        raise DamagedRow("events", 1, None, "")
-
-    with pytest.raises(DamagedRow):
-        of_readable(of_none, {})
-
-    def again(_: object) -> dict[int, str]:
-        raise DamagedRow("watches", 3, 3, "")
-
-    with pytest.raises(DamagedRow):
-        of_readable(again, {3: DamagedRow("watches", 3, 3, "")})
 
 
 def test_an_archive_says_what_is_missing_changed_and_of_nobody(
@@ -195,3 +97,26 @@ def test_a_refused_file_is_moved_with_its_reason_and_its_sidecar(tmp_path: Path)
         assert target.read_text() == content
         assert target.with_name(f"{target.name}.reason.json").is_file()
     assert len({path.name for path in quarantine.folder.glob("a*.csv")}) == 2
+
+
+def test_check_store_findings(filled_copy: Store) -> None:
+    """Each has its kind, its place and its remedy; a changed schema keeps no backup out."""
+    whole = check_store(filled_copy, quiet)
+    assert whole.findings == whole.unfit == quick_troubles(filled_copy) == ()
+    with sqlite3.connect(filled_copy.engine.url.database or "") as connection:
+        connection.execute("DELETE FROM posteriors WHERE id = 1")
+        connection.execute("DROP INDEX ix_posterior_tests_test_id")
+    connection.close()
+    found = check_store(filled_copy, quiet)
+    *references, schema = found.findings
+    assert {each.kind for each in references} == {"broken reference"}
+    assert ("posterior_tests/1", "it refers to a row of posteriors that is not there.") in [
+        (each.where, each.what) for each in references
+    ]
+    assert (schema.kind, schema.where) == ("changed schema", "index ix_posterior_tests_test_id")
+    assert "shm db backup FILE" in schema.remedy
+    assert found.unfit == found.troubles[:-1]
+    file = CheckedStore((), ("the file is damaged: page 3",)).findings[0]
+    assert (file.kind, file.where, file.what) == (
+        "fault of the file", "store", "the file is damaged: page 3.",
+    )  # fmt: skip

@@ -165,13 +165,10 @@ def _found(site: Site, *checks: Callable[[Site], Sequence[str | Lead]]) -> list[
 def _store(site: Site) -> list[str]:
     try:
         site.store.alerts.counts()
-        damage = site.store.upkeep.known_damage()
     except ShmError as error:
         log.error("%s", error)
         return ["The store cannot be used."]
-    of_hangers = sorted({each.hanger for each in damage if each.hanger is not None})
-    stopped = [f"Hanger {hanger} stands still: a row of it is damaged." for hanger in of_hangers]
-    return [*stopped, *(["A row of the store is damaged."] if damage and not stopped else [])]
+    return []
 
 
 def _folders(site: Site) -> list[str]:

@@ -220,7 +220,7 @@ def _death(status: int, request: Request, begun: bool) -> ShmError:
     if -status in KILLING:
         how = signal.Signals(-status).name
         what = f"the process that read {Path(request.path).name} was killed ({how})."
-        return WorkerDied(what, how=how, from_outside=True)
+        return WorkerDied(what, how=how)
     if not begun:
         return ShmError(
             "the process that reads files cannot be confined, so that nothing is read.",

@@ -17,7 +17,7 @@ from fastapi.responses import JSONResponse, RedirectResponse
 
 import shm
 from shm.documents import parse_time
-from shm.errors import BadInput, ShmError
+from shm.errors import BadInput, ShmError, UsageError
 from shm.pipeline import utc_now
 from shm.pipeline.intake import learn_from_answer
 from shm.plausibility import refuse_impossible
@@ -94,19 +94,30 @@ def decide(site: AtSite, writer: Writer, recording: Row, told: Form) -> Response
     decisions = site.store.acting_as(who).recordings
     match told.get("action"):
         case "confirm":
+            _refuse_decided(site, recording)
             time = time_in(told, "time")
             refuse_impossible(time, site.workspace.bridge.built)
-            hold = decisions.confirm(recording, who.name, why, now, time)
+            hold = decisions.accept(recording, who.name, why, now, time)
             learn_from_answer(site.workspace, site.store, hold)
         case "discard":
-            decisions.discard(recording, who.name, why, now)
+            _refuse_decided(site, recording)
+            decisions.exclude(recording, who.name, why, now)
         case "withdraw":
-            decisions.withdraw(recording, who.name, why, now, told.get("test"))
+            decisions.exclude(recording, who.name, why, now, told.get("test"))
         case "reinstate":
-            decisions.reinstate(recording, who.name, why, now)
+            decisions.accept(recording, who.name, why, now)
         case _:
             raise BadInput("this is none of the decisions.", remedy="Choose one in the form.")
     return RedirectResponse(f"/operation?decided={recording}#held", 303)
+
+
+def _refuse_decided(site: Site, recording: int) -> None:
+    """Raise UsageError where somebody has decided since the page was shown."""
+    recordings = site.store.recordings
+    hold = recordings.latest_hold(recordings.get(recording).id)
+    if hold is None or hold.decision is not None:
+        now = "not held" if hold is None else f"not held: it was {hold.decision} by {hold.who}"
+        raise UsageError(f"recording {recording} is {now}.", remedy="Load the page again.")
 
 
 @router.get("/operation/examination", include_in_schema=False)

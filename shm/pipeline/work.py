@@ -1,0 +1,218 @@
+"""The work that waits: what is computed for a recording or a test, and where its result is stored.
+
+Each kind of work is one generator: it reads the store, yields what is to be computed elsewhere, is
+sent the result and stores it. Only the thread that runs the flow uses the store.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Collection, Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from functools import partial
+from typing import Any, TypeAlias
+
+from shm.errors import NothingThere
+from shm.models import DESCRIPTION, competing_names
+from shm.pipeline import Clock
+from shm.pipeline.ending import told_by_other
+from shm.pipeline.judging import judge
+from shm.pipeline.limits import heed_limits
+from shm.pipeline.lineage import Taught, identify_lineage, update_terms
+from shm.pipeline.registry import Opens, RemoteFile, WatchResult, registered, run_step
+from shm.pipeline.telling import after_works, works_before
+from shm.pipeline.watching import settled, tests_beside, to_watch
+from shm.store import KeptWatch, Stage, Store, StoredRecording, TestRow, Workspace
+from shm.store.archive import nothing
+from shm.values import WITHOUT_MODEL, Hanger
+from shm.values.stated_tension import averaged_now
+
+Work: TypeAlias = "Generator[Callable[[], Any], Any, object]"
+
+
+@dataclass(frozen=True)
+class Task:
+    """Work that waits: its kind and number, the recordings and tests that it is for.
+
+    `stage` is the stage of these until it is done. `hanger` and `names` of the tests are for the
+    log.
+    """
+
+    kind: str
+    id: int
+    work: Callable[[], Work]
+    recordings: tuple[int, ...]
+    tests: tuple[int, ...] = ()
+    stage: Stage = Stage.RECEIVED
+    hanger: int | None = None
+    names: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """Return what no two tasks share."""
+        return self.kind, self.id
+
+    @property
+    def log_fields(self) -> dict[str, object]:
+        """Return the fields by which the log is searched, those with one value."""
+        named = {"recording": self.recordings, "hanger": (self.hanger,), "test": self.names}
+        single = {key: ids[0] for key, ids in named.items() if len(ids) == 1 and ids[0] is not None}
+        return {**single, "stage": self.kind}
+
+
+@dataclass(frozen=True)
+class Queue:
+    """The tasks of a workspace, asked of its store each time."""
+
+    workspace: Workspace
+    store: Store
+    clock: Clock
+
+    def list_waiting(self, limit: int, excluding: Collection[int]) -> Iterator[Task]:
+        """Yield tasks in the order in which to take them, without the recordings `excluding`.
+
+        A hanger's first selection waits until every received file is identified, so that its
+        earliest tests make the baseline; a watch waits for the files received before its test, so
+        that its result does not depend on which task was the faster.
+        """
+        received = self.store.recordings.list_waiting(limit, excluding=excluding)
+        for each in received:
+            yield Task("identify", each.id, partial(self._identify, each), (each.id,))
+        needed = self.workspace.settings.baseline_tests
+        waiting: defaultdict[int, list[TestRow]] = defaultdict(list)
+        for test in self.store.tests.list_waiting(max(limit, needed), excluding=excluding):
+            waiting[test.hanger].append(test)
+        selected = self.store.posteriors.selected_models()
+        oldest = min((each.id for each in received), default=None)
+        for hanger in self.workspace.bridge.watched:
+            tests = waiting[hanger.id]
+            if hanger.id in selected:
+                yield from self._list_later(hanger, selected[hanger.id], tests, oldest)
+            elif not received and len(tests) >= needed:
+                first = tests[:needed]
+                yield _make_task("select", hanger.id, partial(self._select, hanger, first), first)
+
+    def _list_later(
+        self, hanger: Hanger, model: str, tests: Sequence[TestRow], oldest: int | None
+    ) -> Iterator[Task]:
+        to_update = [test for test in tests if test.stage is Stage.IDENTIFIED]
+        ids = [test.id for test in to_update]
+        weighed = self.store.tests.weighed_among(ids) if len(ids) > 1 else ()
+        for test in to_update:
+            yield _make_task("update", test.id, partial(self._update, hanger, model, test), [test])
+            if test.id in weighed:  # later tests learn from its posterior
+                break
+        # In the order of their times, so that an alert names the first test that shows it.
+        for test in tests[:1]:
+            if test.stage is Stage.UPDATED and (oldest is None or test.recording_id < oldest):
+                yield _make_task("watch", test.id, partial(self._watch, hanger, test), [test])
+
+    def _identify(self, recording: StoredRecording) -> Work:
+        workspace, store = self.workspace, self.store
+        settings = replace(workspace.settings, store="", mqtt_url="")  # both may hold a password
+        archive: Opens = workspace.archive
+        if settings.scheduler:  # workers elsewhere need not see our folders
+            archive = RemoteFile.of(workspace.archive, recording.file, settings.max_file_bytes)
+        selected, step = store.posteriors.selected_models(), registered().identify
+        found = yield partial(
+            run_step, step, recording, archive, workspace.bridge, settings, selected
+        )
+        lineage = identify_lineage(recording, found[0].test.hanger, workspace)
+        found, judged = judge(workspace, store, recording, found)
+        return store.tests.save(recording.id, found, lineage, self.clock(), judged)
+
+    def _select(self, hanger: Hanger, first: Sequence[TestRow]) -> Work:
+        tests, settings = [self.store.tests.get(test.id) for test in first], self.workspace.settings
+        names: tuple[str, ...] = (WITHOUT_MODEL,)
+        if hanger.is_modelled:
+            names = competing_names(hanger, settings.model_names)
+        taught = self._find_taught(hanger, min(test.time for test in tests))
+        terms, lineage = update_terms(hanger, names, tests, settings, taught=taught)
+        plain = [test.test for test in tests]
+        found = yield partial(run_step, registered().select, plain, hanger, names, terms)
+        self.store.posteriors.save_selection(hanger.id, tests, found, lineage, self.clock())
+        self._summarise(hanger)
+        return None
+
+    def _update(self, hanger: Hanger, model: str, row: TestRow) -> Work:
+        store, settings = self.store, self.workspace.settings
+        test, baseline = store.tests.get(row.id), store.watch.baseline(hanger.id, model)
+        # Not the latest posterior: a result must not depend on which tests were computed before.
+        known = baseline.posterior if baseline else None
+        taught = self._find_taught(hanger, test.time)
+        terms, lineage = update_terms(hanger, [model], [test], settings, known, taught)
+        # A test of the baseline, done again, would be compared with what it has made itself.
+        own = store.watch.baseline(hanger.id, model, test.time)
+        to_watch = own is None or test.test.id not in own.posterior.tests
+        step = registered().update
+        found = yield partial(run_step, step, test.test, hanger, model, known, terms)
+        store.posteriors.save(test, found, lineage, self.clock(), to_watch=to_watch)
+        self._summarise(hanger)
+        return None
+
+    def _watch(self, hanger: Hanger, row: TestRow) -> Work:
+        store, settings = self.store, self.workspace.settings
+        test, silences = store.tests.get(row.id), store.silences.list_all()
+        if any(each.is_maintenance and each.covers(hanger.id, test.time) for each in silences):
+            yield nothing
+            store.watch.pass_over(test, self.clock())
+            return None
+        current = store.posteriors.of_test(test)
+        # Of the test's own class: another may have been adopted, or dropped, since its update.
+        baseline = store.watch.baseline(hanger.id, current.model, test.time)
+        if baseline is None:
+            raise NothingThere(f"hanger {hanger.id} has no baseline.", remedy="Run `shm doctor`.")
+        hooks = [hook.name for hook in self.workspace.bridge.hooks]
+        needed = to_watch(store, baseline, test)
+        tests = (needed.baseline_tests, needed.later)
+        selection = store.posteriors.selection(hanger.id)
+        compared = None if selection is None else selection.selection
+        tension = averaged_now(current, compared, hanger.limits) if hanger.is_modelled else None
+        beside = tests_beside(store, baseline, test)
+        years = settings.false_call_years
+        of_test = (baseline, tests, current, hanger, years, needed.kept, tension, beside)
+        found: WatchResult | None = yield partial(run_step, registered().watch, *of_test)
+        if found is None:  # the test still waits, to be watched from the baseline on
+            store.watch.forget_state(baseline)
+            return None
+        watched, alert, state = *found[:2], KeptWatch(needed.key, test.time, found[2])
+        if alert is not None and silences:
+            earlier = [each.alert for each in store.alerts.list_all(hanger.id)]
+            works = works_before(alert, silences, earlier)
+            alert = alert if works is None else after_works(alert, works)
+        ended, alert = settled(store, hanger, baseline, test, (watched, alert, found[3]))
+        first = told_by_other(alert, store.alerts.list_all(hanger.id), of_stream=True)
+        stored = (test, baseline, watched, None if first else alert, hooks, self.clock())
+        level = hanger.thresholds.alert_probability
+        return store.watch.save(*stored, state, ended, first, level)
+
+    def _summarise(self, hanger: Hanger) -> None:
+        if hanger.is_modelled:
+            self.store.posteriors.save_summaries(hanger)
+            heed_limits(self.workspace, self.store, [hanger], self.clock())
+
+    def _find_taught(self, hanger: Hanger, before: datetime) -> Taught | None:
+        """Return the last time before then that its tension was read, else a sibling's."""
+        if self.workspace.settings.priors != DESCRIPTION:
+            return None
+        siblings = [
+            each.id
+            for each in self.workspace.bridge.hangers
+            if hanger.family and each.family == hanger.family and each.id != hanger.id
+        ]
+        own = self.store.tests.latest_weighed([hanger.id], before)
+        weighed = own or (self.store.tests.latest_weighed(siblings, before) if siblings else None)
+        if weighed is None:
+            return None
+        try:
+            posterior = self.store.posteriors.of_test(weighed)
+        except NothingThere:  # not through updating yet
+            return None
+        return Taught(posterior, own is not None)
+
+
+def _make_task(kind: str, id_: int, work: Callable[[], Work], tests: Sequence[TestRow]) -> Task:
+    recordings = tuple(dict.fromkeys(test.recording_id for test in tests))
+    ids, names = tuple(test.id for test in tests), tuple(test.name for test in tests)
+    return Task(kind, id_, work, recordings, ids, tests[0].stage, tests[0].hanger, names)

@@ -1,0 +1,36 @@
+"""Write the golden files of the contract of store, flow and daemon.
+
+    python tests/contracts/write_store_golden.py
+
+Write a file again only where the contract itself is changed, with a line in CHANGELOG.md; a file
+that is there is left as it is.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "cli"), str(ROOT / "daemon")]
+
+from shm.documents import dump  # noqa: E402
+from tests.contracts import store_calls as calls  # noqa: E402
+
+
+def main() -> None:
+    """Write each golden file that is missing."""
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["SHM_CACHE"] = str(Path(folder) / "cache")
+        made = calls.run_all(calls.make_bridge(Path(folder)))
+    for name, document in made.items():
+        path = calls.FOLDER / f"{name}.json"
+        if not path.exists():
+            path.write_text(dump(document), encoding="utf-8")
+            print(f"{path.name}: {path.stat().st_size / 1000:.1f} kB")
+
+
+if __name__ == "__main__":
+    main()
