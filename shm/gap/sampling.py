@@ -49,7 +49,8 @@ class SamplingOptions:
     A `round` of draws comes from a mixture of at most `parts` t distributions, fitted to a
     `population` drawn again, `draws_a_part` at least; with shares of the `prior` (more of it
     `prior_at_first`) and of the `first` mixture, which has peaks at several `widths`, those within
-    `far_below` of the best log density, and `without` of it where the posterior without the last
+    `far_below` of the best log density (peaks `lobes_apart` standard deviations away are other
+    lobes), and `without` of it where the posterior without the last
     effects is, by `clusters_without` parts. Of `wide_every` rounds one or two do without a
     surrogate; of the others' `candidates` a round is kept, each with a chance of `least_kept` or
     more, found by `halvings`. The surrogate's fit has a
@@ -67,6 +68,7 @@ class SamplingOptions:
     first: float = 0.2
     widths: tuple[float, ...] = (1.0, 2.0)
     far_below: float = 10.0
+    lobes_apart: float = 8.0
     without: float = 0.4
     clusters_without: int = 3
     wide_every: int = 4
@@ -95,41 +97,23 @@ class _Draws(Rows):
 
 
 class _Collapsed:
-    """A target with its linear parameters integrated out, near peaks, the best first.
+    """A target with its linear parameters integrated out, near one peak."""
 
-    Peaks far below the best one do not count: they have no share of the posterior.
-    """
-
-    def __init__(self, target: Target, peaks: Sequence[Peak]):
-        peaks = _near_best(peaks)
+    def __init__(self, target: Target, peak: Peak):
         self.target, self.dimension = target, len(target.other)
-        self.residual, self.slopes = target.view(peaks[0].z)
+        self.residual, self.slopes = target.view(peak.z)
         self.linear = Linear(target.likelihood, self.slopes[:, target.linear])
-        self._peaks = np.array([peak.z for peak in peaks])
-        self._normals = [
-            Normal(peak.z[target.other], peak.covariance[np.ix_(target.other, target.other)])
-            for peak in peaks
-        ]
-        # How the linear parameters follow the others, at each peak.
-        self._follow = np.array(
-            [
-                np.linalg.solve(
-                    peak.covariance[np.ix_(target.other, target.other)],
-                    peak.covariance[np.ix_(target.other, target.linear)],
-                )
-                for peak in peaks
-            ]
-        )
+        own = np.ix_(target.other, target.other)
+        across = peak.covariance[np.ix_(target.linear, target.other)]
+        self._follow = np.linalg.solve(peak.covariance[own], across.T).T
+        self._peak = peak.z
 
     def along(self, w: FloatArray) -> FloatArray:
-        """Return points (n, d) with others w (n, o), linear parameters as at the nearest peak."""
+        """Return points (n, d) with others w (n, o) and the linear parameters as at the peak."""
         target = self.target
-        apart = [(normal.whiten(w) ** 2).sum(axis=1) for normal in self._normals]
-        near = np.argmin(apart, axis=0)
-        z: FloatArray = self._peaks[near]
-        away = (w - z[:, target.other])[:, None]
-        moved = z[:, target.linear] + (away @ self._follow[near])[:, 0]
+        z = np.tile(self._peak, (len(w), 1))
         z[:, target.other] = w
+        moved = z[:, target.linear] + (w - self._peak[target.other]) @ self._follow.T
         z[:, target.linear] = moved.clip(-_FARTHEST_LINEAR, _FARTHEST_LINEAR)
         return z
 
@@ -280,10 +264,59 @@ class _Surrogate:
         return np.hstack([np.ones((len(u), 1)), u, u[:, one] * u[:, other]])
 
 
+class _Lobes:
+    """The parts of a posterior that lie apart, each with its peak, the best first.
+
+    A place and its mirror image are two. They are alike but for size and shape, so that draws of
+    the best one, and its share, tell those of the others by normal distributions on the peaks.
+    """
+
+    def __init__(self, target: Target, peaks: Sequence[Peak]):
+        self._other = target.other
+        self.peaks: list[Peak] = []
+        self._normals: list[Normal] = []
+        for peak in peaks:
+            own = np.ix_(self._other, self._other)
+            normal = Normal(peak.z[self._other], peak.covariance[own])
+            is_apart = all(_apart(normal, each) > _HOW.lobes_apart for each in self._normals)
+            if is_apart and peak.log > peaks[0].log - _HOW.far_below:
+                self.peaks.append(peak)
+                self._normals.append(normal)
+        self._log = np.array([peak.log_evidence for peak in self.peaks])
+
+    @property
+    def log_beyond(self) -> float:
+        """Return the log of the whole evidence over that of the best lobe."""
+        return float(scipy.special.logsumexp(self._log - self._log[0]))
+
+    def nearest(self, w: FloatArray) -> IntArray:
+        """Return the lobe (n,) that others w (n, o) are nearest to, from 0."""
+        square = [(normal.whiten(w) ** 2).sum(axis=1) for normal in self._normals]
+        return np.asarray(np.argmin(square, axis=0))
+
+    def spread(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return draws z (n, d) of the best lobe with their share of them moved to each other."""
+        moved, of = z.copy(), rng.choice(len(self.peaks), len(z), p=normalised(self._log))
+        best = self.peaks[0]
+        for index, peak in enumerate(self.peaks[1:], start=1):
+            here, there = (np.linalg.cholesky(each.covariance) for each in (best, peak))
+            white = np.linalg.solve(here, (z[of == index] - best.z).T)
+            moved[of == index] = peak.z + (there @ white).T
+        return moved
+
+
+def _apart(one: Normal, other: Normal) -> float:
+    """Return how far two centres are, in standard deviations of the nearer."""
+    return min(
+        float(np.linalg.norm(one.whiten(other.mean))), float(np.linalg.norm(other.whiten(one.mean)))
+    )
+
+
 class Sampling:
     """Importance sampling of a hypothesis about `peaks`, the best first, that can be gone on with.
 
-    It is looked for also where a fit `without` its last effects has its draws.
+    It is looked for also where a fit `without` its last effects has its draws. Of lobes that lie
+    apart the best one is sampled.
     """
 
     def __init__(
@@ -294,13 +327,16 @@ class Sampling:
         without: Fit | None = None,
     ):
         self.target, self.peaks, self.rng = target, tuple(peaks), rng
-        self._collapsed = _Collapsed(target, peaks)
+        self._collapsed = _Collapsed(target, peaks[0])
+        self._lobes = _Lobes(target, peaks)
         self._pool: Pool[_Proposal, _Draws] = Pool(
             lambda proposal, batch: proposal.log_density(batch.z[:, target.other])
         )
         self._rounds = 0
         if len(target.other):
-            self._first = _parts(target, peaks, without, rng)
+            about = self._lobes.nearest(np.array([peak.z[target.other] for peak in peaks])) == 0
+            own = [peak for peak, is_own in zip(peaks, about, strict=True) if is_own]
+            self._first = _parts(target, own, without, rng)
             self._proposal: _Proposal = _Wide(self._first, _HOW.prior_at_first)
 
     @property
@@ -314,7 +350,8 @@ class Sampling:
     def log_evidence(self) -> tuple[float, float]:
         """Return the log evidence and its standard error."""
         if len(self.target.other):
-            return self._pool.log_evidence, self._pool.log_evidence_sd
+            log_evidence = self._pool.log_evidence + self._lobes.log_beyond
+            return log_evidence, self._pool.log_evidence_sd
         return float(self._collapsed.settle(np.empty((1, 0)))[1][0]), 0.0
 
     def run(self, enough: float, most_rounds: int) -> None:
@@ -326,6 +363,7 @@ class Sampling:
         other = self.target.other
         w, drawn = self._proposal.draw(self.rng)
         batch, log = self._collapsed.settle(w)
+        log = np.where(self._lobes.nearest(w) == 0, log, -np.inf)
         self._pool.add(self._proposal, drawn, batch, log)
         self._rounds += 1
         weights = tempered(self._pool.log_weights, 6 * len(other), 0.7, 1e-3)
@@ -348,6 +386,8 @@ class Sampling:
             rows = systematic(normalised(self._pool.log_weights), draws, self.rng)
             chosen = self._pool.batch.take(rows)
         found = self.rng.permutation(self._collapsed.scatter(chosen, self.rng))
+        if len(self._lobes.peaks) > 1:
+            found = self._lobes.spread(found, self.rng)
         return _fit(self._collapsed, self.peaks, found, self.log_evidence, self.effective)
 
     def fit_by_chain(self, draws: int) -> Fit:
@@ -396,12 +436,7 @@ def approximate(
     )
     nan = float("nan")
     log_evidence = laplace(peaks) + beyond, nan
-    return _fit(_Collapsed(target, peaks), peaks, found, log_evidence, nan, "normal")
-
-
-def _near_best(peaks: Sequence[Peak]) -> list[Peak]:
-    """Return the peaks that have a share of the posterior."""
-    return [each for each in peaks if each.log > peaks[0].log - _HOW.far_below]
+    return _fit(_Collapsed(target, peaks[0]), peaks, found, log_evidence, nan, "normal")
 
 
 def _parts(
@@ -412,7 +447,7 @@ def _parts(
     Of an effect that these data hardly show all small sizes are as likely.
     """
     other = target.other
-    near = _near_best(peaks)
+    near = [each for each in peaks if each.log > peaks[0].log - _HOW.far_below]
     parts = [
         Normal(each.z[other], width**2 * each.covariance[np.ix_(other, other)])
         for each in near
