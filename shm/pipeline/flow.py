@@ -194,6 +194,10 @@ class Flow:
             if error is None:
                 self._store_result(running)
                 return
+        except StoreDamaged:  # what one hanger's rows hold must not stop the others
+            log.exception("%s %s cannot be stored", *task.key, extra=task.log_fields)
+            self._postpone(task)
+            return
         except Exception as fault:  # one file must not stop the others
             if isinstance(fault, StoreError) and fault.retry_after_s is not None:
                 self._running[task.key] = replace(running, work=None)

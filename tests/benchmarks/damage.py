@@ -7,7 +7,7 @@ and the copy is read by an independent reader (Python's sqlite3, without shm): w
 same rows of the same tables, the bit held no content (a free page, slack, a page's own
 administration) and is counted apart, found or not. Every flip in the archive changes content and
 must be found; of flips in rows it is counted how many are, since rows have no checksums (decision
-record 0020).
+record 0016).
 Now and then the daemon runs on the damaged copy, with a new file in its spool.
 """
 

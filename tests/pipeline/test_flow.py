@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import pkgutil
+import sqlite3
 import threading
 import time
 from collections.abc import Sequence
@@ -657,6 +658,31 @@ def test_advance_storing_raises(
     assert list(stages(workspace).values()) == [Stage.DONE, Stage.REFUSED, Stage.DONE, Stage.DONE]
     reason = json.loads((workspace.folder / "quarantine/t2.modes.json.reason.json").read_text())
     assert repr(error) in reason["message"]
+
+
+@pytest.mark.parametrize(
+    ("table", "stage"), [("posteriors", Stage.RECEIVED), ("alerts", Stage.UPDATED)]
+)
+def test_advance_reads_no_json(tmp_path: Path, table: str, stage: Stage) -> None:
+    """A document that cannot be read stops its hanger, before or after a step, and no other."""
+    workspace = make_workspace(tmp_path / "bridge", hangers=(3, 4))
+    write_loss(workspace.spool, workspace)
+    ingest(workspace)
+    with a_flow(workspace, clock=(clock := Clock())) as flow:
+        with sqlite3.connect(workspace.database) as connection:
+            connection.execute(f"UPDATE {table} SET document = '{{'")
+        connection.close()
+        spool(workspace, "later", day=90)
+        receive_all(flow)
+        flow.drain()
+        write_test(workspace.spool / "other.modes.json", workspace, hanger=4)
+        receive_all(flow)
+        flow.drain()
+        clock.pass_by(61)
+        flow.drain()
+        found = stages(workspace)
+        assert (found["later.modes.json"], found["other.modes.json"]) == (stage, Stage.DONE)
+    assert list(workspace.quarantine.folder.iterdir()) == []
 
 
 def test_advance_refusing_raises(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
