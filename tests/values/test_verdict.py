@@ -131,6 +131,14 @@ def test_judge_no_gap(diagnosis: Diagnosis, reason: str) -> None:
     assert found.probability == diagnosis.no_gap_probability
 
 
+def test_judge_cause_of_shapes() -> None:
+    """A turned sensor changes no frequency, and is claimed all the same."""
+    none_nearer = Shrinkage(0.1, 0.1001, NAN, NAN)
+    turned = replace(LED, shrinkage=none_nearer, causes=(cause("sensor_misalignment", 0.9),))
+    assert judge(turned).outcome is Outcome.EXPLAINED
+    assert judge(replace(LED, shrinkage=none_nearer)).reason == "no nearer"
+
+
 def test_judge_unknown_leads_beyond_errors() -> None:
     """A gap by its definition, and most probably of something unknown."""
     found = judge(replace(without_gap(0.3, rms_z=2.1), unexplained_probability=0.6))
