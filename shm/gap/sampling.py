@@ -50,8 +50,8 @@ class SamplingOptions:
     `population` drawn again, `draws_a_part` at least; with shares of the `prior` (more of it
     `prior_at_first`) and of the `first` mixture, which has peaks at several `widths`, those within
     `far_below` of the best log density (peaks `lobes_apart` standard deviations away are other
-    lobes), and `without` of it where the posterior without the last
-    effects is, by `clusters_without` parts. Of `wide_every` rounds one or two do without a
+    lobes, if the logs of their volumes differ by less than `lobes_unlike`), and `without` of it
+    where the posterior without the last effects is, by `clusters_without` parts. Of `wide_every` rounds one or two do without a
     surrogate; of the others' `candidates` a round is kept, each with a chance of `least_kept` or
     more, found by `halvings`. The surrogate's fit has a
     `least_weight` for all points and a `ridge`, and leaves out errors of a smaller share than
@@ -69,6 +69,7 @@ class SamplingOptions:
     widths: tuple[float, ...] = (1.0, 2.0)
     far_below: float = 10.0
     lobes_apart: float = 8.0
+    lobes_unlike: float = 1.0
     without: float = 0.4
     clusters_without: int = 3
     wide_every: int = 4
@@ -97,23 +98,41 @@ class _Draws(Rows):
 
 
 class _Collapsed:
-    """A target with its linear parameters integrated out, near one peak."""
+    """A target with its linear parameters integrated out, near peaks, the best first.
 
-    def __init__(self, target: Target, peak: Peak):
+    Peaks far below the best one do not count: they have no share of the posterior.
+    """
+
+    def __init__(self, target: Target, peaks: Sequence[Peak]):
+        peaks = _near_best(peaks)
         self.target, self.dimension = target, len(target.other)
-        self.residual, self.slopes = target.view(peak.z)
+        self.residual, self.slopes = target.view(peaks[0].z)
         self.linear = Linear(target.likelihood, self.slopes[:, target.linear])
-        own = np.ix_(target.other, target.other)
-        across = peak.covariance[np.ix_(target.linear, target.other)]
-        self._follow = np.linalg.solve(peak.covariance[own], across.T).T
-        self._peak = peak.z
+        self._peaks = np.array([peak.z for peak in peaks])
+        self._normals = [
+            Normal(peak.z[target.other], peak.covariance[np.ix_(target.other, target.other)])
+            for peak in peaks
+        ]
+        # How the linear parameters follow the others, at each peak.
+        self._follow = np.array(
+            [
+                np.linalg.solve(
+                    peak.covariance[np.ix_(target.other, target.other)],
+                    peak.covariance[np.ix_(target.other, target.linear)],
+                )
+                for peak in peaks
+            ]
+        )
 
     def along(self, w: FloatArray) -> FloatArray:
-        """Return points (n, d) with others w (n, o) and the linear parameters as at the peak."""
+        """Return points (n, d) with others w (n, o), linear parameters as at the nearest peak."""
         target = self.target
-        z = np.tile(self._peak, (len(w), 1))
+        apart = [(normal.whiten(w) ** 2).sum(axis=1) for normal in self._normals]
+        near = np.argmin(apart, axis=0)
+        z: FloatArray = self._peaks[near]
+        away = (w - z[:, target.other])[:, None]
+        moved = z[:, target.linear] + (away @ self._follow[near])[:, 0]
         z[:, target.other] = w
-        moved = z[:, target.linear] + (w - self._peak[target.other]) @ self._follow.T
         z[:, target.linear] = moved.clip(-_FARTHEST_LINEAR, _FARTHEST_LINEAR)
         return z
 
@@ -279,7 +298,11 @@ class _Lobes:
             own = np.ix_(self._other, self._other)
             normal = Normal(peak.z[self._other], peak.covariance[own])
             is_apart = all(_apart(normal, each) > _HOW.lobes_apart for each in self._normals)
-            if is_apart and peak.log > peaks[0].log - _HOW.far_below:
+            volume = [each.log_evidence - each.log for each in (peak, peaks[0])]
+            is_alike = abs(volume[0] - volume[1]) < _HOW.lobes_unlike
+            if peak is peaks[0] or (
+                is_apart and is_alike and peak.log > peaks[0].log - _HOW.far_below
+            ):
                 self.peaks.append(peak)
                 self._normals.append(normal)
         self._log = np.array([peak.log_evidence for peak in self.peaks])
@@ -327,15 +350,15 @@ class Sampling:
         without: Fit | None = None,
     ):
         self.target, self.peaks, self.rng = target, tuple(peaks), rng
-        self._collapsed = _Collapsed(target, peaks[0])
         self._lobes = _Lobes(target, peaks)
+        about = self._lobes.nearest(np.array([peak.z[target.other] for peak in peaks])) == 0
+        own = [peak for peak, is_own in zip(peaks, about, strict=True) if is_own]
+        self._collapsed = _Collapsed(target, own)
         self._pool: Pool[_Proposal, _Draws] = Pool(
             lambda proposal, batch: proposal.log_density(batch.z[:, target.other])
         )
         self._rounds = 0
         if len(target.other):
-            about = self._lobes.nearest(np.array([peak.z[target.other] for peak in peaks])) == 0
-            own = [peak for peak, is_own in zip(peaks, about, strict=True) if is_own]
             self._first = _parts(target, own, without, rng)
             self._proposal: _Proposal = _Wide(self._first, _HOW.prior_at_first)
 
@@ -436,7 +459,12 @@ def approximate(
     )
     nan = float("nan")
     log_evidence = laplace(peaks) + beyond, nan
-    return _fit(_Collapsed(target, peaks[0]), peaks, found, log_evidence, nan, "normal")
+    return _fit(_Collapsed(target, peaks), peaks, found, log_evidence, nan, "normal")
+
+
+def _near_best(peaks: Sequence[Peak]) -> list[Peak]:
+    """Return the peaks that have a share of the posterior."""
+    return [each for each in peaks if each.log > peaks[0].log - _HOW.far_below]
 
 
 def _parts(
@@ -447,7 +475,7 @@ def _parts(
     Of an effect that these data hardly show all small sizes are as likely.
     """
     other = target.other
-    near = [each for each in peaks if each.log > peaks[0].log - _HOW.far_below]
+    near = _near_best(peaks)
     parts = [
         Normal(each.z[other], width**2 * each.covariance[np.ix_(other, other)])
         for each in near
