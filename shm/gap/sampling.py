@@ -51,7 +51,8 @@ class SamplingOptions:
     `prior_at_first`) and of the `first` mixture, which has peaks at several `widths`, those within
     `far_below` of the best log density (peaks `lobes_apart` standard deviations away are other
     lobes, if the logs of their volumes differ by less than `lobes_unlike`), and `without` of it
-    where the posterior without the last effects is, by `clusters_without` parts. Of `wide_every` rounds one or two do without a
+    where the posterior without the last effects is, by `clusters_without` parts. Of `wide_every`
+    rounds one or two do without a
     surrogate; of the others' `candidates` a round is kept, each with a chance of `least_kept` or
     more, found by `halvings`. The surrogate's fit has a
     `least_weight` for all points and a `ridge`, and leaves out errors of a smaller share than
