@@ -31,8 +31,8 @@ LEAST_SD = 3e-5
 _MEMORY_READINGS = 120.0  # judgement: five days of what modes differ by, ten times a night's
 _DEGREES = 4.0  # judgement: of Student's t, as robust regressions take (Lange et al. 1989)
 _ROUNDS = 4  # technical: of reweighting, from the weighted median on
-_APART, _LEAST_APART = 5.0, 3
-"""Judgement: in spreads, from when on a mode is told from that of the other plane; in how many."""
+_LEAST_APART, _SURELY, _ELSEWHERE_SD = 3, 5.0, 0.01
+"""Judgement: modes, and log odds, that tell planes exchanged; what else moves each mode by 1 %."""
 _HALVES = np.array([0.5, -0.5])  # by definition: of a contrast, in each of PLANES
 _CLIP = 4.0  # sds: what a mode may add to its spread at once
 _STEP = 0.01  # technical: of the tension, for a slope by central differences
@@ -165,24 +165,33 @@ class ModeTable:
         level = np.append(self.level, more.level - moved)
         return replace(self, modes=(*self.modes, *more.modes), level=level, **parts)
 
-    def are_exchanged(self, modes: Sequence[Mode], shift: float) -> bool | None:
-        """Whether each mode lies where that of the other plane does, at a tension moved by `shift`.
+    def are_exchanged(self, modes: Sequence[Mode]) -> bool | None:
+        """Return whether each mode lies where that of the other plane does, at any tension.
 
-        None where too few are told apart.
+        None where the modes do not tell: too few, too close, or where neither is the case.
         """
-        level = dict(zip(self.modes, self.level + self.tension * shift, strict=True))
-        spread = dict(zip(self.modes, np.sqrt(self.spread), strict=True))
-        nearer = []
-        for mode, log_hz in zip(modes, _measured(modes)[0], strict=True):
-            own = mode.plane, mode.order
-            other = _other(mode).plane, mode.order
-            apart = abs(level[other] - level[own]) if {own, other} <= level.keys() else 0.0
-            if apart > _APART * max(spread.get(own, 0.0), spread.get(other, 0.0), LEAST_SD):
-                off, otherwise = abs(log_hz - level[own]), abs(log_hz - level[other])
-                nearer.append((otherwise < off / 2) - float(off < otherwise / 2))
-        if len(nearer) < _LEAST_APART:
+        place = {mode: index for index, mode in enumerate(self.modes)}
+        own = [(mode.plane, mode.order) for mode in modes]
+        other = [(_other(mode).plane, mode.order) for mode in modes]
+        both = [n for n in range(len(modes)) if {own[n], other[n]} <= place.keys()]
+        if len(both) < _LEAST_APART:
             return None
-        return float(np.mean(nearer)) > 0.5
+        log_hz = _measured([modes[n] for n in both])[0]
+        straight, crossed = (
+            self._weigh(log_hz, [place[keys[n]] for n in both]) for keys in (own, other)
+        )
+        neither = -len(both) * math.log(_ELSEWHERE_SD)
+        if max(straight, crossed) < neither or abs(crossed - straight) < _SURELY:
+            return None
+        return crossed > straight
+
+    def _weigh(self, log_hz: FloatArray, at: Sequence[int]) -> float:
+        """Return the log likelihood of modes in these places of the table, at the best tension."""
+        slope, variance = self.tension[at], np.maximum(self.spread[at], LEAST_SD**2)
+        off = log_hz - self.level[at]
+        left = off - slope * _read_plane(off, variance, slope)[0]
+        tails = (_DEGREES + 1) * np.log1p(left**2 / (_DEGREES * variance))
+        return -float(np.sum(tails + np.log(variance))) / 2
 
     def softer(self, assumed: Assumptions) -> FloatArray:
         """Return by what ln f goes with a kelvin, as steel softens."""

@@ -198,15 +198,13 @@ def gone_back(earlier: bytes, newest: bytes) -> bytes:
     return replace(state, settled_day=settled, standing=standing).to_bytes()
 
 
-def as_mounted(
-    state: StreamState, modes: tuple[Mode, ...], shift: float
-) -> tuple[StreamState, tuple[Mode, ...]]:
+def as_mounted(state: StreamState, modes: tuple[Mode, ...]) -> tuple[StreamState, tuple[Mode, ...]]:
     """The modes in the planes that were always theirs, where those of the sensors are exchanged."""
-    found = None if state.is_learning else state.table.are_exchanged(modes, shift)
+    found = None if state.is_learning else state.table.are_exchanged(modes)
     hours = state.exchanged_hours
-    if found or (found is None and hours >= HOURS_EXCHANGED):
+    if found:
         hours = hours + 1 if hours < HOURS_EXCHANGED else _SURELY_EXCHANGED
-    else:
+    elif found is not None:
         hours = hours - 1 if hours > HOURS_EXCHANGED + 1 else 0
     return replace(state, exchanged_hours=hours), exchanged(modes) if hours else modes
 
@@ -229,10 +227,9 @@ def windows_as_mounted(
     state = None if kept is None else StreamState.from_bytes(kept)
     if state is None or state.is_learning:
         return readings
-    table, zero = state.table, state.zero
     return [
         replace(each, modes=exchanged(each.modes))
-        if table.are_exchanged(each.modes, zero)
+        if state.table.are_exchanged(each.modes)
         else each
         for each in readings
     ]

@@ -164,7 +164,7 @@ class StreamWatch:
         state, conditions, extra = with_conditions(state, reading, day)
         bank = state.bank.advanced(day, condition_sd(self.hanger.assumptions))
         expected = bank.along(bank.design(conditions))[0]
-        state, modes = as_mounted(state, modes, expected)
+        state, modes = as_mounted(state, modes)
         contrast = state.contrast.advanced(day, NO_CONDITIONS)
         between = contrast.along(_compensated(contrast))
         table = state.table.with_new(self.baseline, self.hanger, modes, expected, between[0])
@@ -376,7 +376,7 @@ def daily_shift(kept: bytes, hours: Sequence[PooledReading]) -> tuple[float, flo
     seen, between = [], state.contrast.along(_compensated(state.contrast))
     for reading in hours:
         modes = usable(reading)
-        if state.table.are_exchanged(modes, state.zero):
+        if state.table.are_exchanged(modes):
             modes = exchanged(modes)
         known = [mode for mode in modes if (mode.plane, mode.order) in state.table.modes]
         if known:
