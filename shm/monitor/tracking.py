@@ -15,7 +15,7 @@ from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.planes import shape_points
 from shm.monitor.close_modes import Band, BandFit, CloseModes, directions, lines_of
 from shm.monitor.sensor_health import exchanged
-from shm.monitor.spectrum import ALONE, REACH, Peaks, Stretch
+from shm.monitor.spectrum import ALONE, REACH, Peaks, Stretch, found_peaks
 from shm.monitor.windows import Judged, judged
 from shm.values import (
     NAN,
@@ -47,6 +47,7 @@ Two close modes that were taken for one had up to seven times the damping of eac
 _LEAK = 0.01  # judgement: of the power; sensors that are 6 degrees off
 _FLOOR = 0.2  # quantile of the lines of a band, as shm/identify/quality/of_ambient.py
 _STEPS_WITHOUT = 6  # technical: from the fit with the mode; what is gained later is small
+_LEAST_ALIKE = 3  # judgement: modes of a plane that moved by themselves; two agree by chance
 _SAME = 3.0  # standard deviations
 _REVIEW_S, _REVIEW_FEW_S, _FEW = 12 * 3600, 3600, 2
 """judgement: how often modes are sought that were missed at first, by day and by night; each hour
@@ -97,7 +98,11 @@ def read_window(
 
 
 def _has(modes: Sequence[Mode], known: Mode) -> bool:
-    return any((m.plane, m.order) == (known.plane, known.order) for m in modes)
+    return any(_is(mode, known) for mode in modes)
+
+
+def _is(mode: Mode, known: Mode) -> bool:
+    return (mode.plane, mode.order) == (known.plane, known.order)
 
 
 def _is_reviewed(known: Sequence[Mode], window: Window) -> bool:
@@ -226,10 +231,56 @@ def _from_scratch(
 
 
 def tracked(found: Judged, known: Sequence[Mode], options: IdentifyOptions) -> tuple[Mode, ...]:
-    """The known modes that are proven in the window, in their order."""
-    peaks = found.peaks
-    if peaks is None:
+    """Return the known modes that are proven in the window, in their order.
+
+    A plane of which most are lost is followed by itself: its ends move its modes alone.
+    """
+    if found.peaks is None:
         return ()
+    modes = _prove(found, found.peaks, known, options)
+    for plane in PLANES:
+        own = [index for index, mode in enumerate(known) if mode.plane == plane]
+        lost = 2 * sum(_has(modes, known[index]) for index in own) <= len(own)
+        stays = any(mode.plane != plane for mode in modes)
+        if lost and stays and len(own) >= _LEAST_ALIKE:
+            moved = _move_plane(found, found.peaks, known, own)
+            apart = _prove(found, moved, known, options)
+            if len(apart) > len(modes) and _are_moved_alike(
+                [(known[index], mode) for index in own for mode in apart if _is(mode, known[index])]
+            ):
+                modes = apart
+    return modes
+
+
+def _move_plane(found: Judged, peaks: Peaks, known: Sequence[Mode], own: Sequence[int]) -> Peaks:
+    """Return the peaks with those of one plane's modes where they suit these best."""
+    alone = found_peaks(
+        found.stretches, found.channels, [known[index] for index in own], peaks.noise
+    )
+    expected, hz = peaks.expected_hz.copy(), peaks.frequency_hz.copy()
+    height, shapes = peaks.height_db.copy(), peaks.shapes.copy()
+    expected[own], hz[own] = alone.frequency_hz, alone.frequency_hz
+    height[own], shapes[:, own] = alone.height_db, alone.shapes
+    return replace(peaks, expected_hz=expected, frequency_hz=hz, height_db=height, shapes=shapes)
+
+
+def _are_moved_alike(pairs: Sequence[tuple[Mode, Mode]]) -> bool:
+    """Return True if modes of one plane, before and after, have moved as ends move them.
+
+    That is by fractions that change evenly with the order; peaks of the deck lie anywhere.
+    """
+    if len(pairs) < _LEAST_ALIKE:
+        return False
+    order = np.array([before.order for before, _ in pairs])
+    moved = np.log([after.frequency_hz / before.frequency_hz for before, after in pairs])
+    line = np.polyval(np.polyfit(order, moved, 1), order)
+    return bool(np.all(np.abs(moved - line) <= ALONE / 2) and np.ptp(np.sign(moved)) == 0)
+
+
+def _prove(
+    found: Judged, peaks: Peaks, known: Sequence[Mode], options: IdentifyOptions
+) -> tuple[Mode, ...]:
+    """Return the known modes that are proven near their peaks, in their order."""
     seen = [index for index in peaks.seen if peaks.height_db[index] > 0]
     half_hz = _half_hz(peaks, found.stretches)
     modes: dict[int, Mode] = {}
