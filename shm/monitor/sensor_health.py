@@ -28,6 +28,8 @@ _LEAST_EARLIER, _DRIFT = 6, 8.0
 """judgement: an hour of windows, and a change of their median by so many usual deviations, which
 takes 8 normal ones: no chance of noise, and more than a day's temperature moves a sensor in it."""
 _HOUR = 6  # windows: a quiet quarter of an hour hides the modes of a sound sensor, too
+_LEAST_TIME, _LEAST_WINDOWS = timedelta(hours=1), 3
+"""Judgement: likewise; of a logger that records a few minutes of each hour, three hours."""
 SEEN_BEFORE = timedelta(days=3)
 """What the windows without modes are compared with: as long as the watch learns."""
 _LEAST_BEFORE = 36  # judgement: six hours of windows, which have met more than one level of motion
@@ -162,10 +164,10 @@ def _find_loss(
     what: str,
     channel: str,
 ) -> StreamEvent | None:
-    """Return the event that the modes of the last windows are lost, if one of three things holds.
+    """Return the event that the modes of the last windows are lost, if one of these holds.
 
-    For an hour, fewer than half the usual modes, though at this level they are visible; for an
-    hour, no mode and less motion than ever; for a day, no mode.
+    For an hour, fewer than half the usual modes or none, though at this level as many are visible;
+    for an hour, no mode and less motion than ever; for a day, no mode.
     """
     rows = [each for each in rows if math.isfinite(each.window.level_m_s2)]
     sound = [
@@ -181,18 +183,19 @@ def _find_loss(
     end = now.start + timedelta(seconds=now.duration_s)
     if going_on := [each for each in reported if each.end > few[0].window.start]:
         return replace(going_on[-1], start=now.start, end=end)
-    if len(few) < _HOUR:
+    if not _is_lasting(few):
         return None
     none = _tail(few, lambda each: each.n_modes > 0)
     before = [each for each in sound if each.window.start < few[0].window.start]
     is_known = sum(1 for each in before if each.n_modes) >= _LEAST_BEFORE
     level = float(np.median([each.window.level_m_s2 for each in few]))
     lowest = min(each.window.level_m_s2 for each in before) if is_known else math.nan
-    since = few
-    if not (is_known and _are_visible(before, level, usual)):
+    since: Sequence[_Row] = few
+    if not (is_known and _are_visible(before, level, usual / 2)):
         since = none
+    if since is none and not (is_known and _is_lasting(none) and _are_visible(before, level, 0.0)):
         highest = max((each.window.level_m_s2 for each in none), default=math.nan)
-        fallen = len(none) >= _HOUR and highest < _FALLEN * lowest
+        fallen = _is_lasting(none) and highest < _FALLEN * lowest
         if not fallen and not (none and end - none[0].window.start >= _BLIND):
             return None
     first = since[0].window
@@ -204,14 +207,23 @@ def _find_loss(
     return StreamEvent(now.stream, "lost modes", first.start, end, detail, channel)
 
 
+def _is_lasting(rows: Sequence[_Row]) -> bool:
+    """Return True if windows are enough, and long enough, to tell a loss from a quiet quarter."""
+    if len(rows) < _LEAST_WINDOWS:
+        return False
+    last = rows[-1].window
+    end = last.start + timedelta(seconds=last.duration_s)
+    return end - rows[0].window.start >= _LEAST_TIME
+
+
 def _are_visible(
     before: Sequence[_Row],
     level_m_s2: float,
-    usual: float,
+    n_modes: float,
     enough: float = 0.95,
     visible_db: float = 10.0,
 ) -> bool:
-    """Return True if `enough` of the earlier windows that were as quiet had most of their modes.
+    """Return True if `enough` of the earlier windows that were as quiet had more than `n_modes`.
 
     Where hardly any was as quiet, the quietest count whose peaks would have been `visible_db` high
     at this level.
@@ -222,7 +234,7 @@ def _are_visible(
         height_db = each.window.signal_to_noise_db + quieter_db
         if quieter_db < 0 and (math.isnan(height_db) or len(found) >= _HOUR):
             continue
-        found.append(2 * each.n_modes > usual and (quieter_db >= 0 or height_db >= visible_db))
+        found.append(each.n_modes > n_modes and (quieter_db >= 0 or height_db >= visible_db))
     return len(found) >= _HOUR and float(np.mean(found)) >= enough
 
 

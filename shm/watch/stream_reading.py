@@ -1,4 +1,4 @@
-"""A pooled reading of a permanent sensor: how far the tension has moved, by the modes of each plane.
+"""A pooled reading of a permanent sensor: how far the tension has moved, by each plane's modes.
 
 The change of each mode's log frequency over its sensitivity d ln f / d ln T is a change of tension;
 the modes of a plane together give it by robust weighted least squares, so that one that went astray
@@ -241,12 +241,14 @@ class SeenReading:
 
     `off` (n,) are the modes' own changes of ln f, warmth of steel taken off. `contrast` is what the
     modes of the first plane say of ln T less what those of the other do; NaN without either plane.
+    `by_plane` is what each plane says of the shift, as much apart as expected.
     """
 
     shift: float
     variance: float
     off: FloatArray
     left: FloatArray
+    by_plane: FloatArray
     contrast: float = math.nan
     contrast_variance: float = math.inf
 
@@ -295,14 +297,15 @@ def _read(
             shift[place], own[place] = _read_plane(off[seen], variance[seen], slope[seen])
             left[seen] = off[seen] - slope[seen] * shift[place]
     weight = (1 / own) / (1 / own).sum()
-    mean = float(weight @ (shift - expected[0] * _HALVES))
+    by_plane = np.where(np.isfinite(own), shift - expected[0] * _HALVES, np.nan)
+    mean = float(weight @ np.nan_to_num(by_plane))
     total = 1 / float((1 / own).sum()) + (float(weight @ _HALVES) * expected[1]) ** 2
     if not np.isfinite(own).all():
-        return SeenReading(mean, total, off, left)
+        return SeenReading(mean, total, off, left, by_plane)
     contrast = float(shift[0] - shift[1])
     both = float(own.sum())
     misfit = (contrast - expected[0]) ** 2 / (both + expected[1] ** 2)
-    return SeenReading(mean, total * max(misfit, 1.0), off, left, contrast, both)
+    return SeenReading(mean, total * max(misfit, 1.0), off, left, by_plane, contrast, both)
 
 
 def _read_plane(y: FloatArray, v: FloatArray, s: FloatArray) -> tuple[float, float]:

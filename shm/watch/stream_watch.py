@@ -362,7 +362,7 @@ def _find_contradiction(state: StreamState, seen: SeenReading, conditions: Float
     between, sd = state.contrast.along(_compensated(state.contrast))
     apart = abs(seen.contrast - between)
     if apart > CLIP * math.hypot(sd, math.sqrt(seen.contrast_variance)):
-        reach = max(reach, off + apart / 2)
+        reach = float(np.nanmax(np.abs(seen.by_plane - expected)))
     return reach
 
 
