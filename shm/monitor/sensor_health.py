@@ -28,8 +28,6 @@ _LEAST_EARLIER, _DRIFT = 6, 8.0
 """judgement: an hour of windows, and a change of their median by so many usual deviations, which
 takes 8 normal ones: no chance of noise, and more than a day's temperature moves a sensor in it."""
 _HOUR = 6  # windows: a quiet quarter of an hour hides the modes of a sound sensor, too
-_LEAST_TIME, _LEAST_WINDOWS = timedelta(hours=1), 3
-"""Judgement: likewise; of a logger that records a few minutes of each hour, three hours."""
 SEEN_BEFORE = timedelta(days=3)
 """What the windows without modes are compared with: as long as the watch learns."""
 _LEAST_BEFORE = 36  # judgement: six hours of windows, which have met more than one level of motion
@@ -207,13 +205,16 @@ def _find_loss(
     return StreamEvent(now.stream, "lost modes", first.start, end, detail, channel)
 
 
-def _is_lasting(rows: Sequence[_Row]) -> bool:
-    """Return True if windows are enough, and long enough, to tell a loss from a quiet quarter."""
-    if len(rows) < _LEAST_WINDOWS:
+def _is_lasting(rows: Sequence[_Row], least: int = 3, hours: float = 1.0) -> bool:
+    """Return True if windows are enough, and long enough, to tell a loss from a quiet quarter.
+
+    Of a logger that records a few minutes of each hour, `least` windows are as many hours.
+    """
+    if len(rows) < least:
         return False
     last = rows[-1].window
     end = last.start + timedelta(seconds=last.duration_s)
-    return end - rows[0].window.start >= _LEAST_TIME
+    return end - rows[0].window.start >= timedelta(hours=hours)
 
 
 def _are_visible(

@@ -47,7 +47,6 @@ Two close modes that were taken for one had up to seven times the damping of eac
 _LEAK = 0.01  # judgement: of the power; sensors that are 6 degrees off
 _FLOOR = 0.2  # quantile of the lines of a band, as shm/identify/quality/of_ambient.py
 _STEPS_WITHOUT = 6  # technical: from the fit with the mode; what is gained later is small
-_LEAST_ALIKE = 3  # judgement: modes of a plane that moved by themselves; two agree by chance
 _SAME = 3.0  # standard deviations
 _REVIEW_S, _REVIEW_FEW_S, _FEW = 12 * 3600, 3600, 2
 """judgement: how often modes are sought that were missed at first, by day and by night; each hour
@@ -242,7 +241,7 @@ def tracked(found: Judged, known: Sequence[Mode], options: IdentifyOptions) -> t
         own = [index for index, mode in enumerate(known) if mode.plane == plane]
         lost = 2 * sum(_has(modes, known[index]) for index in own) <= len(own)
         stays = any(mode.plane != plane for mode in modes)
-        if lost and stays and len(own) >= _LEAST_ALIKE:
+        if lost and stays:
             moved = _move_plane(found, found.peaks, known, own)
             apart = _prove(found, moved, known, options)
             if len(apart) > len(modes) and _are_moved_alike(
@@ -264,12 +263,12 @@ def _move_plane(found: Judged, peaks: Peaks, known: Sequence[Mode], own: Sequenc
     return replace(peaks, expected_hz=expected, frequency_hz=hz, height_db=height, shapes=shapes)
 
 
-def _are_moved_alike(pairs: Sequence[tuple[Mode, Mode]]) -> bool:
+def _are_moved_alike(pairs: Sequence[tuple[Mode, Mode]], least: int = 3) -> bool:
     """Return True if modes of one plane, before and after, have moved as ends move them.
 
     That is by fractions that change evenly with the order; peaks of the deck lie anywhere.
     """
-    if len(pairs) < _LEAST_ALIKE:
+    if len(pairs) < least:
         return False
     order = np.array([before.order for before, _ in pairs])
     moved = np.log([after.frequency_hz / before.frequency_hz for before, after in pairs])

@@ -31,8 +31,6 @@ LEAST_SD = 3e-5
 _MEMORY_READINGS = 120.0  # judgement: five days of what modes differ by, ten times a night's
 _DEGREES = 4.0  # judgement: of Student's t, as robust regressions take (Lange et al. 1989)
 _ROUNDS = 4  # technical: of reweighting, from the weighted median on
-_LEAST_APART, _SURELY, _ELSEWHERE_SD = 3, 5.0, 0.01
-"""Judgement: modes, and log odds, that tell planes exchanged; what else moves each mode by 1 %."""
 _HALVES = np.array([0.5, -0.5])  # by definition: of a contrast, in each of PLANES
 _CLIP = 4.0  # sds: what a mode may add to its spread at once
 _STEP = 0.01  # technical: of the tension, for a slope by central differences
@@ -165,23 +163,30 @@ class ModeTable:
         level = np.append(self.level, more.level - moved)
         return replace(self, modes=(*self.modes, *more.modes), level=level, **parts)
 
-    def are_exchanged(self, modes: Sequence[Mode]) -> bool | None:
+    def are_exchanged(
+        self,
+        modes: Sequence[Mode],
+        least: int = 3,
+        surely: float = 5.0,
+        elsewhere_sd: float = 0.01,
+    ) -> bool | None:
         """Return whether each mode lies where that of the other plane does, at any tension.
 
-        None where the modes do not tell: too few, too close, or where neither is the case.
+        None where the modes do not tell: fewer than `least`, log odds below `surely`, or where modes
+        that lie anywhere, within `elsewhere_sd` of ln f, are more likely than either.
         """
         place = {mode: index for index, mode in enumerate(self.modes)}
         own = [(mode.plane, mode.order) for mode in modes]
         other = [(_other(mode).plane, mode.order) for mode in modes]
         both = [n for n in range(len(modes)) if {own[n], other[n]} <= place.keys()]
-        if len(both) < _LEAST_APART:
+        if len(both) < least:
             return None
         log_hz = _measured([modes[n] for n in both])[0]
         straight, crossed = (
             self._weigh(log_hz, [place[keys[n]] for n in both]) for keys in (own, other)
         )
-        neither = -len(both) * math.log(_ELSEWHERE_SD)
-        if max(straight, crossed) < neither or abs(crossed - straight) < _SURELY:
+        neither = -len(both) * math.log(elsewhere_sd)
+        if max(straight, crossed) < neither or abs(crossed - straight) < surely:
             return None
         return crossed > straight
 

@@ -60,8 +60,6 @@ from shm.watch.watching import after
 _VERSION = "stream-watch-1"
 _DAY_SD = 1.25e-4  # of ln f: what a mode keeps for a day, by joints that seat anew. Judgement
 _EVENTS: dict[str, StreamEventKind] = {TIME_BASE: "clock drift", SWAPPED: "swapped"}
-_SHARE_APART = 0.2
-"""Of changes, those of one plane alone: ends and sensors, as the priors of causes have them."""
 _HOURS_OF_A_FAULT = 8  # judgement: of which a mistaken mode spoils one or two
 _CALLS_KEPT = 8  # technical: of changes that were told, so that what is kept stays bounded
 
@@ -71,12 +69,14 @@ class StreamOptions:
     """`limit_years` is the mean time to a false call, a hanger's own `false_call_years` goes first.
 
     Less than `least_shift` of the tension is not told; `learning_days` are the baseline.
+    `share_of_one_plane` of all changes are of one plane's ends or sensors, as the causes' priors say.
     """
 
     limit_years: float = 100.0
     change_rate_per_year: float = 0.02
     least_shift: float = 0.005
     learning_days: float = 3.0
+    share_of_one_plane: float = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +260,8 @@ class StreamWatch:
         """Return the evidence of any change, that of one plane's, and whether it is mostly that."""
         of_tension = state.bank.evidence(self.options.least_shift)
         apart = state.contrast.evidence(self.options.least_shift)
-        shares = (1 - _SHARE_APART) * of_tension.years, _SHARE_APART * apart.years
+        share = self.options.share_of_one_plane
+        shares = (1 - share) * of_tension.years, share * apart.years
         is_apart = shares[1] > shares[0]
         return replace(apart if is_apart else of_tension, years=sum(shares)), apart, is_apart
 
