@@ -172,8 +172,8 @@ class ModeTable:
     ) -> bool | None:
         """Return whether each mode lies where that of the other plane does, at any tension.
 
-        None where the modes do not tell: fewer than `least`, log odds below `surely`, or where modes
-        that lie anywhere, within `elsewhere_sd` of ln f, are more likely than either.
+        None where the modes do not tell: fewer than `least`, log odds below `surely`, or where
+        modes anywhere within `elsewhere_sd` of ln f are more likely than either.
         """
         place = {mode: index for index, mode in enumerate(self.modes)}
         own = [(mode.plane, mode.order) for mode in modes]

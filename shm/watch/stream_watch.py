@@ -69,7 +69,7 @@ class StreamOptions:
     """`limit_years` is the mean time to a false call, a hanger's own `false_call_years` goes first.
 
     Less than `least_shift` of the tension is not told; `learning_days` are the baseline.
-    `share_of_one_plane` of all changes are of one plane's ends or sensors, as the causes' priors say.
+    `share_of_one_plane` of all changes are of one plane alone, as the causes' priors have it.
     """
 
     limit_years: float = 100.0
