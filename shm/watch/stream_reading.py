@@ -181,10 +181,12 @@ class ModeTable:
         both = [n for n in range(len(modes)) if {own[n], other[n]} <= place.keys()]
         if len(both) < least:
             return None
+        here, there = ([place[keys[n]] for n in both] for keys in (own, other))
+        spread = np.maximum(np.maximum(self.spread[here], self.spread[there]), LEAST_SD**2)
+        if np.sum((self.level[here] - self.level[there]) ** 2 / spread) < 8 * surely:
+            return None  # chance alone would tell them exchanged in some hour
         log_hz = _measured([modes[n] for n in both])[0]
-        straight, crossed = (
-            self._weigh(log_hz, [place[keys[n]] for n in both]) for keys in (own, other)
-        )
+        straight, crossed = (self._weigh(log_hz, at) for at in (here, there))
         neither = -len(both) * math.log(elsewhere_sd)
         if max(straight, crossed) < neither or abs(crossed - straight) < surely:
             return None

@@ -202,7 +202,7 @@ def as_mounted(state: StreamState, modes: tuple[Mode, ...]) -> tuple[StreamState
     """The modes in the planes that were always theirs, where those of the sensors are exchanged."""
     found = None if state.is_learning else state.table.are_exchanged(modes)
     hours = state.exchanged_hours
-    if found:
+    if found or (found is None and hours >= HOURS_EXCHANGED):
         hours = hours + 1 if hours < HOURS_EXCHANGED else _SURELY_EXCHANGED
     elif found is not None:
         hours = hours - 1 if hours > HOURS_EXCHANGED + 1 else 0
