@@ -36,7 +36,7 @@ if TYPE_CHECKING:
         WatchedTest,
     )
     from shm.watch import DatedTest
-    from shm.watch.agreement import Way
+    from shm.watch.conditions import Way
 
 
 @dataclass(frozen=True)

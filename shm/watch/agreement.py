@@ -20,25 +20,24 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import partial
-from typing import Literal
 
 import numpy as np
+import scipy
 
 from shm.values import TENSION, Alert, Beside, Drift, Hanger, ModalTest, WatchedQuantity
 from shm.values.drift import threshold_of
 from shm.watch.alert_text import alert_of, message_of_agreeing
+from shm.watch.conditions import NO_LOAD, Way, way_of
 from shm.watch.options import WatchOptions
-from shm.watch.persistence import LARGE
 from shm.watch.quantities import shift_of, value_at
 from shm.watch.readings import Reader
-from shm.watch.shift_mixture import Shift, beyond, shift_of_mixture
 
-CLEAR = 3.0
+_CLEAR = 3.0
 """Standard deviations from the baseline, temperature and scatter included: one good test in 740
 lies that far to one side, fewer than are blunders."""
 
-BY_A_LOAD = 0.1
-"""Of the tension (judgement): a lift or a lorry that stands beside the hanger."""
+_LARGE = 0.04
+"""Of a log frequency (judgement): no load that passes does as much, but a blunder may."""
 
 _PULL_STEPS = 10.0
 """Standard deviation, in steps, of what a test does not see: far beyond any threshold."""
@@ -52,7 +51,8 @@ _APART = timedelta(days=3)
 _LEAST = 0.01
 """Of a frequency, in the mean: decades of an end that is as good as clamped move nothing."""
 
-Way = Literal["up", "down"]
+_DRAWS = scipy.special.ndtri((np.arange(500) + 0.5) / 500)
+"""Evenly spread draws of a standard normal."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def agreement(
             and (
                 run[0][0].id in unwatched
                 or _is_later(run[0][0], newest[0])
-                or (is_no_load(quantity, mine) and not _is_later(newest[0], run[0][0]))
+                or (_is_no_load(quantity, mine) and not _is_later(newest[0], run[0][0]))
             )
         ]
         is_old = any(_agree(mine, each[j]) for each in known)
@@ -115,11 +115,11 @@ def agreement(
     return None
 
 
-def is_no_load(quantity: WatchedQuantity, shown: Shown) -> bool:
+def _is_no_load(quantity: WatchedQuantity, shown: Shown) -> bool:
     """Whether a quantity is further off than by any load that stands on the deck."""
     if quantity.name == TENSION:
-        return bool(abs(shift_of(quantity, shown.mean)) > BY_A_LOAD)
-    return shown.moves > LARGE
+        return bool(abs(shift_of(quantity, shown.mean)) > NO_LOAD)
+    return shown.moves > _LARGE
 
 
 def _known_before(
@@ -133,22 +133,12 @@ def _known_before(
         for test in tests
         if _is_later(newest, test) and test.id not in {*beside.held, *beside.of_works}
     }
-    return [read_alone(reader, test, options) for test in earlier.values()]
+    return [_read_alone(reader, test, options) for test in earlier.values()]
 
 
 def _is_later(newest: ModalTest, other: ModalTest) -> bool:
     """Whether the newest was a later visit than the other, by their own clocks."""
     return newest.time is not None and other.time is not None and newest.time - other.time >= _APART
-
-
-def are_of_two_visits(*tests: ModalTest) -> bool:
-    """Whether by their own clocks some of the tests were a later visit than others."""
-    return any(_is_later(one, other) for one in tests for other in tests)
-
-
-def way_of(shift: float) -> Way:
-    """To which side a shift goes."""
-    return "down" if shift < 0 else "up"
 
 
 def _run(
@@ -174,7 +164,7 @@ def _have_told(beside: Beside, run: Sequence[tuple[ModalTest, Shown]], are_later
 
 def _agree(one: Shown, other: Shown) -> bool:
     apart = abs(one.mean - other.mean)
-    return one.mean * other.mean > 0 and apart < CLEAR * math.sqrt(one.variance + other.variance)
+    return one.mean * other.mean > 0 and apart < _CLEAR * math.sqrt(one.variance + other.variance)
 
 
 def _shown(
@@ -182,15 +172,15 @@ def _shown(
 ) -> list[Shown | None]:
     """What a test shows of each quantity; None where that is not clear, or below its threshold."""
     found: list[Shown | None] = []
-    for quantity, each in zip(reader.quantities, read_alone(reader, test, options), strict=True):
+    for quantity, each in zip(reader.quantities, _read_alone(reader, test, options), strict=True):
         is_beyond = abs(shift_of(quantity, each.mean)) >= threshold_of(quantity.name, hanger)
-        is_clear = abs(each.mean) >= CLEAR * math.sqrt(each.variance)
+        is_clear = abs(each.mean) >= _CLEAR * math.sqrt(each.variance)
         is_felt = each.moves >= _LEAST
         found.append(each if is_beyond and is_clear and is_felt else None)
     return found
 
 
-def read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[Shown]:
+def _read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[Shown]:
     """With all that makes tests of an unchanged hanger differ: errors, scatter, temperature."""
     reading = reader.reading(test, datetime.max)
     pull = [1 / (_PULL_STEPS * each.step_sd) ** 2 for each in reader.quantities]
@@ -203,7 +193,7 @@ def read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[S
     if reading.modes is not None:
         slopes = reading.modes.slopes[np.isfinite(reading.modes.variances)].mean(axis=0)
     for j, quantity in enumerate(reader.quantities):
-        scatter = scatter_of(quantity)
+        scatter = _scatter_of(quantity)
         per_kelvin = (
             options.tension_per_kelvin_sd
             if quantity.name == TENSION
@@ -216,7 +206,7 @@ def read_alone(reader: Reader, test: ModalTest, options: WatchOptions) -> list[S
     return found
 
 
-def scatter_of(quantity: WatchedQuantity) -> float:
+def _scatter_of(quantity: WatchedQuantity) -> float:
     """Standard deviation of a test of an unchanged hanger beyond its errors, in the coordinate."""
     return _SCATTER if quantity.name == TENSION else _SCATTER_OF_STEP * quantity.step_sd
 
@@ -227,7 +217,7 @@ def drifts_of(
     """What tests of one state show by themselves, whatever was known before: how far each quantity
     is off the baseline of `reader`."""
     options = WatchOptions.of(hanger.assumptions)
-    read = [read_alone(reader, test, options) for test, _ in tests]
+    read = [_read_alone(reader, test, options) for test, _ in tests]
     return tuple(
         _drift(quantity, tests[-1], shown, hanger)
         for quantity, shown in zip(reader.quantities, zip(*read, strict=True), strict=True)
@@ -244,16 +234,7 @@ def _drift(
     weights = [1 / each.variance for each in alike]
     x = float(np.average([each.mean for each in alike], weights=weights))
     sd = math.sqrt(max(each.variance for each in alike))
-    return drift_of(quantity, newest, Shift(x, sd), hanger)
-
-
-def drift_of(
-    quantity: WatchedQuantity, newest: tuple[ModalTest, datetime], read: Shift, hanger: Hanger
-) -> Drift:
-    """What tests `read` of a quantity, in the coordinate, as a shift from the baseline."""
-    alone = np.ones(1)
-    at = alone * read.mean, alone * read.sd
-    shift = shift_of_mixture(quantity, alone, *at)
+    shift = shift_of(quantity, x + sd * _DRAWS)
     threshold = threshold_of(quantity.name, hanger)
     return Drift(
         hanger=hanger.id,
@@ -261,9 +242,9 @@ def drift_of(
         time=newest[1],
         quantity=quantity.name,
         baseline=quantity.baseline,
-        value=value_at(quantity, read.mean),
-        shift_mean=shift.mean,
-        shift_sd=shift.sd,
+        value=value_at(quantity, x),
+        shift_mean=float(shift.mean()),
+        shift_sd=float(shift.std()),
         threshold=threshold,
-        probability=beyond(quantity, alone, *at, threshold),
+        probability=float(max((shift > threshold).mean(), (shift < -threshold).mean())),
     )

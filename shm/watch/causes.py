@@ -22,7 +22,8 @@ from shm.models import Model
 from shm.models.end_effects import coupled_bar
 from shm.models.hanger import PointMass, solve
 from shm.models.hanger.physical import Zone
-from shm.values import PLANES, TENSION, End, FloatArray, Hanger, IntArray, WatchedQuantity
+from shm.values import PLANES, TENSION, End, FloatArray, Hanger, Plane, WatchedQuantity
+from shm.watch.disturbances import OF_HANGERS, Disturbance
 from shm.watch.options import WatchOptions
 from shm.watch.quantities import MeasuredMode
 
@@ -41,44 +42,6 @@ class Direction:
     members: tuple[int, ...]
     log_prior: float
     may_ramp: bool = True
-
-
-@dataclass(frozen=True, eq=False)
-class Told:
-    """A called change: the test at which it began, its time, and whether it goes on.
-
-    `precision` (n + q, n + q) is that of its size before the tests after the call: which causes
-    called it.
-    """
-
-    first: int
-    years: float
-    is_ramp: bool
-    precision: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """What stands where in the columns of a test: `n` modes, `q` quantities, then covariates.
-
-    `prior_sd` (columns,) are those of the null's parameters; the quantities' own columns are no
-    part of it, since the modes' levels hold them.
-    """
-
-    n: int
-    q: int
-    prior_sd: FloatArray
-
-    @property
-    def null(self) -> IntArray:
-        """The columns of the null."""
-        covariates = np.arange(self.n + self.q, len(self.prior_sd))
-        return np.concatenate([np.arange(self.n), covariates])
-
-    @property
-    def change(self) -> slice:
-        """The columns of which a change is made."""
-        return slice(0, self.n + self.q)
 
 
 POINT_MASS, SECTION_LOSS, TIMEBASE = "point_mass", "section_loss", "timebase"
@@ -212,38 +175,63 @@ def _columns_on(
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
-    """What is watched: the layout of columns, directions of change, and scatters.
+class Hypotheses:
+    """What may happen to the modes (n), in their `planes`, and `quantities` (q) of a hanger.
 
-    Tests scatter along the quantities' slopes and along `scattering` (n, c) by variances (q + c,)
-    that are learnt, `scatter_variance` before any test; each of `scales` (K,) times that. Along
-    `wander` (n, w) they differ slowly: all tests within `wander_years` of one have it alike.
-    Quantities go with the temperature by `thermal_laws` coefficients each.
+    - `null_sd` (p,): prior standard deviations without a change: of the modes' levels (n), of how
+      quantities go with the temperature by each of `thermal_laws` (q each) and with the excitation
+      (q), of how the bending stiffness does along `stiffening` (n,), and of creep a year.
+    - `directions`: the ways to change.
+    - Tests of one state scatter along the quantities' slopes and along `scattering` (n, c), by
+      variances (q + c,), `scatter_variance` before any test; along `wander` (n, w) they do slowly:
+      all tests within `wander_years` alike.
+    - `disturbances`: the ways in which a visit is disturbed; `loosening` (n, k) is along which a
+      joint gives beside the slopes of its spring, a step of each.
+    - A change matters by what it does to each plane's first frequency and to its mean; to
+      `every_mode` of a structure of which no model says which matters.
     """
 
-    layout: Layout
-    directions: tuple[Direction, ...]
+    planes: tuple[Plane, ...]
     quantities: tuple[WatchedQuantity, ...]
+    null_sd: FloatArray
+    directions: tuple[Direction, ...]
     scattering: FloatArray
-    stiffening: FloatArray
     scatter_variance: FloatArray
-    scales: FloatArray
+    stiffening: FloatArray
+    disturbances: tuple[Disturbance, ...]
+    loosening: FloatArray
+    every_mode: bool = False
     wander: FloatArray = field(default_factory=lambda: np.zeros((1, 0)))
     wander_years: float = 0.0
     thermal_laws: int = 1
 
+    @property
+    def n(self) -> int:
+        """How many modes there are."""
+        return len(self.planes)
+
+    @property
+    def q(self) -> int:
+        """How many quantities there are."""
+        return len(self.quantities)
+
+    @property
+    def thermal(self) -> slice:
+        """The null's columns that go with the temperature."""
+        return slice(self.n, self.n + self.thermal_laws * self.q)
+
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """All that may be told to have moved: the quantities, then the causes."""
+        """All that may have changed: the quantities, then the causes."""
         causes = dict.fromkeys(each.name for each in self.directions if not each.members)
         return (*(each.name for each in self.quantities), *causes)
 
 
-def structure_of(
+def hypotheses_of(
     quantities: Sequence[WatchedQuantity], columns: Columns, options: WatchOptions
-) -> Structure:
-    """The hypotheses of a hanger."""
-    n, q = len(columns.modes), len(quantities)
+) -> Hypotheses:
+    """Return what may happen to a hanger."""
+    n = len(columns.modes)
     steps = np.array([each.step_sd for each in quantities])
     is_tension = np.array([each.name == TENSION for each in quantities])
     per_kelvin = np.where(
@@ -254,43 +242,41 @@ def structure_of(
         options.tension_per_amplitude_sd,
         options.spring_per_amplitude_sd_of_step * steps,
     )
-    prior_sd = np.concatenate(
-        [
-            np.ones(n),
-            steps,
-            per_kelvin,
-            per_amplitude,
-            [options.bending_per_amplitude_sd],
-            [options.creep_per_year_sd],
-        ]
-    )
-    scattering, sds = _scattering(quantities, columns, options)
-    return Structure(
-        layout=Layout(n, q, prior_sd),
-        directions=tuple(_directions(quantities, columns)),
+    others = [options.bending_per_amplitude_sd, options.creep_per_year_sd]
+    loosening = np.vstack([np.zeros((0, n)), *columns.loosening]).T
+    scattering, sds = _scattering(quantities, columns, loosening, options)
+    return Hypotheses(
+        planes=tuple(plane for plane, _ in columns.modes),
         quantities=tuple(quantities),
+        null_sd=np.concatenate([np.ones(n), per_kelvin, per_amplitude, others]),
+        directions=tuple(_directions(quantities, columns)),
         scattering=scattering,
-        stiffening=columns.by_cause[BENDING_STIFFNESS][0, 0] / _STIFFER,
         scatter_variance=sds**2,
-        scales=np.array(options.scatter_scales),
+        stiffening=columns.by_cause[BENDING_STIFFNESS][0, 0] / _STIFFER,
+        disturbances=OF_HANGERS,
+        loosening=loosening,
     )
 
 
 def _scattering(
-    quantities: Sequence[WatchedQuantity], columns: Columns, options: WatchOptions
+    quantities: Sequence[WatchedQuantity],
+    columns: Columns,
+    loosening: FloatArray,
+    options: WatchOptions,
 ) -> tuple[FloatArray, FloatArray]:
-    """What tests of one state scatter along beside the quantities (n, c), and the standard
-    deviations (q + c,) of both before any test."""
+    """Return what tests of one state scatter along beside the quantities (n, c), and the prior
+    standard deviations (q + c,) of both.
+
+    A joint that gives for a day does so along what it does as it loosens.
+    """
     n = len(columns.modes)
     steps = np.array([each.step_sd for each in quantities])
     is_tension = np.array([each.name == TENSION for each in quantities])
     strength, axes = np.linalg.eigh(columns.sensors)
     kept = strength > _SEEN_OF_SENSORS * strength[-1]
-    # A joint that gives for a day does so along what it does as it loosens.
-    loosening = np.vstack([np.zeros((0, n)), *columns.loosening])
     scattering = np.hstack(
         [
-            options.spring_scatter_of_step * loosening.T,
+            options.spring_scatter_of_step * loosening,
             axes[:, kept] * np.sqrt(strength[kept]),
             columns.by_cause[BENDING_STIFFNESS][0].T,
             np.ones((n, 1)),
@@ -300,7 +286,7 @@ def _scattering(
     sds = np.concatenate(
         [
             np.where(is_tension, options.tension_scatter, options.spring_scatter_of_step * steps),
-            np.ones(len(loosening) + int(kept.sum())),
+            np.ones(loosening.shape[1] + int(kept.sum())),
             [options.bending_scatter / _STIFFER, options.clock_scatter],
             np.full(n, options.mode_scatter),
         ]

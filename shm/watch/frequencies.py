@@ -2,7 +2,7 @@
 
 No beam, no plane, no posterior. Each frequency is a quantity with its own coefficients of
 temperature, frost and excitation. All may move alike (mass, stiffness, a clock), one alone, or each
-by its own amount. The decision is that of the watch of a hanger (`change_point`).
+by its own amount. The decision is that of the watch of a hanger (`changepoint`).
 
 Ambient tests come daily, and most of what moves their frequencies goes on for weeks: moisture,
 ice in the joints, ballast. So tests of three days are pooled, each mode by its median, and all
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
 
@@ -22,12 +22,18 @@ import scipy
 
 from shm.assumptions import DEFAULTS
 from shm.errors import BadInput
-from shm.values import FREQUENCY, FloatArray, ModalTest, ModeReading, Reading, WatchedQuantity
-from shm.watch.causes import UNEXPLAINED, Columns, Direction, Layout, Structure
-from shm.watch.change_point import Evidence
-from shm.watch.options import DAYS_PER_YEAR, Warmth, WatchOptions, reference_of
+from shm.values import (
+    FREQUENCY,
+    PLANES,
+    ModalTest,
+    ModeReading,
+    Reading,
+    WatchedQuantity,
+)
+from shm.watch.causes import UNEXPLAINED, Columns, Direction, Hypotheses
+from shm.watch.disturbances import OF_FREQUENCIES
+from shm.watch.options import DAYS_PER_YEAR, WatchOptions, reference_of
 from shm.watch.quantities import MeasuredMode
-from shm.watch.state_sums import StateSums, WatchState
 from shm.watch.watcher import Watcher
 
 POOLED_DAYS = 3.0  # judgement: short beside three weeks in which an owner wants to know, and cheap
@@ -42,7 +48,6 @@ _WANDER, _WANDER_OF_A_MODE = 1e-3, 5e-4  # judgement: moisture; Magalhaes et al.
 _WANDER_DAYS = 45.0  # judgement: as long as a deck takes to dry
 _SCATTER, _SCATTER_OF_A_MODE = 5e-4, 5e-4  # before any test: traffic; the identification
 _ALLOWANCE = 1e-4  # as of a hanger's tests (`readings`)
-_FROST_SPREAD_K = 2.0  # of frost where no thermometer was read: judgement, a mild winter's days
 # Judgement: of what lasts, loads, stiffness of the whole and clocks are half; a local damage moves
 # several modes, each by its own amount, more often than one alone.
 _ALIKE_SHARE, _ALONE_SHARE, _EACH_SHARE = 0.5, 0.2, 0.3
@@ -144,56 +149,46 @@ def _quantity(mode: MeasuredMode, level: float) -> WatchedQuantity:
     )
 
 
-def structure_of_frequencies(n: int, options: WatchOptions) -> Structure:
-    """The hypotheses of `n` frequencies."""
+def hypotheses_of_frequencies(
+    quantities: Sequence[WatchedQuantity], options: WatchOptions
+) -> Hypotheses:
+    """Return what may happen to the frequencies of a structure without a model."""
+    n = len(quantities)
     ones = np.ones(n)
-    prior_sd = np.concatenate(
+    null_sd = np.concatenate(
         [
             ones,
-            _STEP * ones,
             _PER_KELVIN_SD * ones,
             _PER_KELVIN_OF_FROST_SD * ones,
             options.tension_per_amplitude_sd * ones,
             [1.0, _CREEP_PER_YEAR_SD],  # nothing stiffens with the excitation beside the modes
         ]
     )
-    own = np.vstack([np.zeros((n, n)), _STEP * np.eye(n)])
-    each = np.vstack([_STEP * np.eye(n), np.zeros((n, n))])
-    directions = [
-        Direction("alike", own.sum(axis=1, keepdims=True), tuple(range(n)), math.log(_ALIKE_SHARE))
-    ]
+    each_alone = np.vstack([np.zeros((n, n)), _STEP * np.eye(n)])
+    each_its_way = np.vstack([_STEP * np.eye(n), np.zeros((n, n))])
+    alike = each_alone.sum(axis=1, keepdims=True)
+    directions = [Direction("alike", alike, tuple(range(n)), math.log(_ALIKE_SHARE))]
     if n > 1:
         directions += [
-            Direction("alone", own[:, [j]], (j,), math.log(_ALONE_SHARE / n)) for j in range(n)
+            Direction("alone", each_alone[:, [j]], (j,), math.log(_ALONE_SHARE / n))
+            for j in range(n)
         ]
-        directions.append(Direction(UNEXPLAINED, each, (), math.log(_EACH_SHARE)))
-    wander = np.hstack([_WANDER * ones[:, None], _WANDER_OF_A_MODE * np.eye(n)])
-    return Structure(
-        layout=Layout(n, n, prior_sd),
+        directions.append(Direction(UNEXPLAINED, each_its_way, (), math.log(_EACH_SHARE)))
+    return Hypotheses(
+        planes=tuple(each.plane or PLANES[0] for each in quantities),
+        quantities=tuple(quantities),
+        null_sd=null_sd,
         directions=tuple(directions),
-        quantities=(),
         scattering=ones[:, None],
         scatter_variance=np.append(np.full(n, _SCATTER_OF_A_MODE), _SCATTER) ** 2,
-        scales=np.array(options.scatter_scales),
         stiffening=np.zeros(n),
-        wander=wander,
+        disturbances=OF_FREQUENCIES,
+        loosening=np.zeros((n, 0)),
+        every_mode=True,
+        wander=np.hstack([_WANDER * ones[:, None], _WANDER_OF_A_MODE * np.eye(n)]),
         wander_years=_WANDER_DAYS / DAYS_PER_YEAR,
         thermal_laws=2,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class FrequencySums(StateSums):
-    """What the tests of such a structure are to the evidence."""
-
-    def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
-        return self._warmth(state), frost_of(state.temperature_c, self.options.thermometer_sd_k)
-
-    def effects(self, state: WatchState) -> tuple[FloatArray, FloatArray]:
-        """Each frequency counts: which of them matters no model says."""
-        n = self.structure.layout.n
-        every = np.hstack([np.eye(n), np.eye(n)])
-        return every, every
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,30 +196,6 @@ class FrequencyWatcher(Watcher):
     """Watches the frequencies of one structure."""
 
     @cached_property
-    def structure(self) -> Structure:
-        """The hypotheses."""
-        found = structure_of_frequencies(len(self.quantities), self.options)
-        return replace(found, quantities=self.quantities)
-
-    @cached_property
-    def sums(self) -> StateSums:
-        """What the tests of a state are to the evidence."""
-        return FrequencySums(self.quantities, self.columns.modes, self.structure, self.options)
-
-    def _creep(self, evidence: Evidence) -> None:
-        """It is allowed for, and of no interest."""
-
-
-def frost_of(temperatures_c: FloatArray, thermometer_sd_k: float) -> Warmth:
-    """Kelvin below 0 C of tests at `temperatures_c` (T,), 0 above it, as far as one knows.
-
-    The deck follows the air in its own time, so that near 0 C its mean is what counts.
-    """
-    known = np.isfinite(temperatures_c)
-    scaled = np.where(known, temperatures_c, 0.0) / thermometer_sd_k
-    below = scipy.special.ndtr(-scaled)
-    density = np.exp(-(scaled**2) / 2) / math.sqrt(2 * math.pi)
-    kelvin = thermometer_sd_k * (scaled * below - density)
-    kelvin = np.where(known, kelvin, kelvin[known].mean() if known.any() else 0.0)
-    sd = np.where(known, thermometer_sd_k * below, _FROST_SPREAD_K)
-    return Warmth(kelvin, sd, np.ones(len(known)))
+    def hypotheses(self) -> Hypotheses:
+        """What may happen to the structure."""
+        return hypotheses_of_frequencies(self.quantities, self.options)

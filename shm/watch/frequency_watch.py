@@ -18,11 +18,11 @@ from shm.documents import dump, value_of
 from shm.errors import BadInput
 from shm.modes_document import modes_document, parse_modes
 from shm.values import NAN, WITHOUT_MODEL, Alert, Hanger, ModalTest, Posterior, Reading, WatchedTest
-from shm.watch.alert_state import AlertState
+from shm.watch.conditions import State
 from shm.watch.frequencies import POOLED_DAYS, FrequencyReader, FrequencyWatcher
+from shm.watch.history import History
 from shm.watch.options import WatchOptions
-from shm.watch.state_sums import WatchState
-from shm.watch.watching import DatedTest, Newest, after, options_of
+from shm.watch.watching import DatedTest, Newest, next_alert, options_of
 
 _POOL = timedelta(days=POOLED_DAYS)
 
@@ -42,8 +42,8 @@ class _Pool:
 class _Watching:
     """A watch under way: what is known of the pools before, and the pool that grows."""
 
-    state: WatchState
-    told: AlertState
+    state: History
+    told: State
     pool: _Pool
     last: WatchedTest
 
@@ -67,11 +67,11 @@ class FrequencyWatch:
 
     def begin(self) -> _Watching:
         """After the baseline."""
-        state, watch = self._watcher.begin([self._reading(each) for each in self._pools])
-        told = AlertState()
-        for found in watch.tests:
-            told, _ = after(told, found, self._hanger)
-        return _Watching(state, told, _Pool(), watch.tests[-1])
+        state, begun = self._watcher.begin([self._reading(each) for each in self._pools])
+        told = State()
+        for found in begun:
+            told, _ = next_alert(told, found, self._hanger)
+        return _Watching(state, told, _Pool(), begun[-1])
 
     def after(self, now: _Watching, dated: DatedTest) -> tuple[_Watching, Alert | None]:
         """After one more test, and the alert that it calls for.
@@ -96,11 +96,11 @@ class FrequencyWatch:
                 state, complete = self._watcher.after(state, self._reading(pool.tests))
                 if not is_looked_at:
                     found = complete
-                    told, alert = after(told, _as_of(found, test, time), self._hanger)
+                    told, alert = next_alert(told, _as_of(found, test, time), self._hanger)
             pool = _Pool(((test, time),))
             if is_looked_at or not is_dense:
                 with_it, found = self._watcher.after(state, self._reading(pool.tests))
-                told, later = after(told, _as_of(found, test, time), self._hanger)
+                told, later = next_alert(told, _as_of(found, test, time), self._hanger)
                 pool, alert = replace(pool, seen=1), later or alert
                 if found.change.called:  # once: the pool ends with the test that called it
                     state, pool = with_it, _Pool()
@@ -116,20 +116,20 @@ class FrequencyWatch:
             "last": asdict(now.last),
         }
         text = json.dumps(beside, default=datetime.isoformat)
-        return replace(now.state, told=text).to_bytes()
+        return replace(now.state, conditions=text).to_bytes()
 
     def resume(self, kept: bytes) -> _Watching | None:
         """None where it was another watch that kept it."""
-        state = WatchState.from_bytes(kept)
+        state = History.from_bytes(kept)
         if state.key != self._watcher.key:
             return None
         try:
-            beside = json.loads(state.told)
+            beside = json.loads(state.conditions)
             tests = parse_modes(beside["pool"]) if beside["times"] else ()
             times = value_of(tuple[datetime, ...], beside["times"])
             return _Watching(
                 state,
-                AlertState.from_text(beside["told"]),
+                State.from_text(beside["told"]),
                 _Pool(tuple(zip(tests, times, strict=True)), int(beside["seen"])),
                 value_of(WatchedTest, beside["last"]),
             )

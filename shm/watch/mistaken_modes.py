@@ -15,7 +15,7 @@ off, the tests do not fit the baseline.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
@@ -23,19 +23,12 @@ from itertools import combinations
 import numpy as np
 
 from shm.values import (
-    Alert,
-    AlertKind,
     BoolArray,
     FloatArray,
-    Hanger,
-    Plane,
     Reading,
     RepeatedMistake,
-    WatchedTest,
 )
 from shm.values.drift import ENOUGH_FITS
-from shm.values.rounding import listed
-from shm.watch.alert_text import alert_of
 from shm.watch.quantities import MeasuredMode
 
 # Of routine modes so many are mistaken: judgement, of hammer tests that were checked by hand.
@@ -155,41 +148,6 @@ class _Problem:
         return np.asarray(np.linalg.solve(matrix, self.pull[~mistaken].sum(axis=0)))
 
 
-def notice_words(mistaken: Sequence[RepeatedMistake], hanger: Hanger) -> str:
-    """The notice of them."""
-    return f"Hanger {hanger.id}: {' '.join(_words(mistaken))}"
-
-
-def warning_words(mistaken: Sequence[RepeatedMistake], hanger: Hanger) -> str:
-    """The same as one of several warnings of a report, without the reason."""
-    return f"Hanger {hanger.id}: {' '.join(_words(mistaken)[:2])}"
-
-
-def _words(mistaken: Sequence[RepeatedMistake]) -> tuple[str, str, str]:
-    """State, action and why."""
-    since = f"{min(each.since for each in mistaken):%Y-%m-%d}"
-    if any(each.is_misfit for each in mistaken):
-        return _of_misfit(since)
-    names, many = [str(each) for each in mistaken], len(mistaken) > 1
-    have, numbers, them = ("have", "their numbers", "them") if many else ("has", "its number", "it")
-    return (
-        f"{listed(names)} {have} not fitted the other modes since {since}.",
-        f"Check {numbers} at the next planned test.",
-        f"The watch leaves {them} out: another order or a machine's tone may be taken for {them}, "
-        "or one end alone has loosened.",
-    )
-
-
-def _of_misfit(since: str) -> tuple[str, str, str]:
-    return (
-        f"since {since} more of its modes miss the baseline's than one wrong number explains.",
-        "At the next planned test, compare how the modes were numbered then and now, and "
-        "look for new fittings.",
-        "No tension and no end stiffness of the baseline's model explains them, so these tests "
-        "count for little until another baseline is set (`shm drift rebaseline`).",
-    )
-
-
 # Of a log frequency: more than sensors, joints and traffic do to a mode by itself (judgement).
 _OFF = 0.01
 
@@ -234,27 +192,3 @@ def off_the_baseline(reading: Reading) -> BoolArray:
     can_tell = measured.sum() > len(reading.mean) + 1
     are_too_many = can_tell and off.sum() > MOST_MISTAKEN * measured.sum()
     return off if are_too_many else np.zeros(len(off), bool)
-
-
-def news_of(
-    mistaken: Sequence[RepeatedMistake], noted: Collection[tuple[Plane, int]]
-) -> tuple[RepeatedMistake, ...]:
-    """The modes that a notice is due for, `noted` being those of which one was given.
-
-    A further mode of tests that do not fit is no further cause.
-    """
-    notable = [each for each in mistaken if each.is_notable]
-    is_told = any((each.plane, each.order) in noted for each in notable if each.is_misfit)
-    return tuple(
-        each
-        for each in notable
-        if (each.plane, each.order) not in noted and not (is_told and each.is_misfit)
-    )
-
-
-def notice_of(test: WatchedTest, hanger: Hanger, news: Sequence[RepeatedMistake]) -> Alert:
-    """A notice of the modes `news` that tests keep having wrong."""
-    kind: AlertKind = "check the modes"
-    names = "+".join(f"{each.plane}-{each.order}" for each in news)
-    what = f"{kind.replace(' ', '-')}:{names}"
-    return alert_of(hanger, (test.test, test.time), what, notice_words(news, hanger), (kind,))

@@ -9,6 +9,7 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
+import scipy
 
 from shm.assumptions import DEFAULTS, Assumptions
 from shm.errors import UsageError
@@ -18,27 +19,35 @@ from shm.values.drift import OF_ONE_VISIT
 
 @dataclass(frozen=True)
 class WatchOptions:
-    """Limits and priors of the sequential test.
+    """What the watch takes for granted: limits, priors, and how much it computes.
 
-    `limit_years` is the mean time to a false call of one hanger, or less than it. The `scatter`
-    tuples are what tests may differ by beyond what identification explains: fractions of the
-    tension, and shares of a spring's `step_sd`; which pair of them holds is learnt.
-    Temperature coefficients have mean 0 and the sds given, of the tension a fraction per kelvin, of
-    a spring a share of its `step_sd` per kelvin; likewise per unit of log amplitude, of the bending
-    stiffness a share. The first `baseline_tests` readings are taken to
-    precede every change. `beginnings` is how many possible beginnings of a change are kept.
-    `most_of_one_test` is the share of the limit that no test exceeds by itself, however wild.
+    `limit_years` is the mean time to a false detection of one hanger, or less than it. The
+    `scatter` standard deviations are of tests beyond what identification explains: fractions of the
+    tension, and of a spring's `step_sd`. Temperature coefficients have mean 0: of the tension a
+    fraction per kelvin, of a spring a fraction of its `step_sd`; likewise per unit of log
+    amplitude. The first `baseline_tests` readings precede every change.
+
+    - `sizes`, `size_shares`: of a change, in units of its prior, and how often: what may not be
+      missed, what nobody can miss, and what only a mistake that stays does.
+    - `checked_errors`: of errors of the measurement so few pass the check of a baseline.
+    - `share_visits`: so many visits say as much of how often each disturbance comes as its table.
+    - `least_frequency_shift`: a change that moves no plane's first frequency, nor its mean, by more
+      is not detected.
+    - `scatter_prior_tests`: so many tests say as much of the scatter as what is assumed; of a
+      difference all counts up to `scatter_up_to_sds`, nothing from `change_from_sds` on.
+    - `unnamed_nats`: causes whose evidence is within 20 to 1 are named together.
+    - `beginnings`, `refined`, `rounds`, `leading`, `draws`: how many beginnings of a change are
+      looked at, how many changes closely, by how many rounds of the labels, of how many a summary
+      is made, and of how many samples.
     """
 
     limit_years: float = 100.0
     change_rate_per_year: float = DEFAULTS.change_rate_per_year.value
-    outlier_probability: float = DEFAULTS.outlier_probability.value
     tension_scatter: float = DEFAULTS.tension_scatter.value
     spring_scatter_of_step: float = DEFAULTS.spring_scatter_of_step.value
     bending_scatter: float = DEFAULTS.bending_scatter.value
     clock_scatter: float = DEFAULTS.clock_scatter.value
     mode_scatter: float = DEFAULTS.mode_scatter.value
-    scatter_scales: tuple[float, ...] = (0.6, 1.0, 1.6, 2.6)
     tension_per_kelvin_sd: float = DEFAULTS.tension_per_kelvin_sd.value
     spring_per_kelvin_sd_of_step: float = DEFAULTS.spring_per_kelvin_sd_of_step.value
     tension_per_amplitude_sd: float = DEFAULTS.tension_per_amplitude_sd.value
@@ -49,9 +58,21 @@ class WatchOptions:
     thermometer_sd_k: float = DEFAULTS.thermometer_sd_k.value
     unknown_log_amplitude_sd: float = DEFAULTS.unknown_log_amplitude_sd.value
     least_frequency_shift: float = 0.006
-    most_of_one_test: float = 0.2
     baseline_tests: int = 1
+    sizes: tuple[float, ...] = (1.0, 6.0, 36.0, 216.0)
+    size_shares: tuple[float, ...] = (0.9, 0.09, 0.009, 0.001)
+    checked_errors: float = 0.002
+    share_visits: float = 20.0
+    scatter_prior_tests: float = 6.0
+    scatter_up_to_sds: float = 3.0
+    change_from_sds: float = 6.0
+    scatter_rounds: int = 4
+    unnamed_nats: float = 3.0
     beginnings: int = 60
+    refined: int = 8
+    rounds: int = 4
+    leading: int = 24
+    draws: int = 500
 
     @classmethod
     def of(cls, assumed: Assumptions, **given: Any) -> WatchOptions:
@@ -60,18 +81,15 @@ class WatchOptions:
         return cls(**{**rows, **given})
 
     def __post_init__(self) -> None:
-        if not self.scatter_scales:
-            raise UsageError("The watch needs one scale of the scatter at least.")
         if self.baseline_tests < 1:
             raise UsageError("The watch needs one baseline test at least.")
-        if not 0 < self.outlier_probability < 1:
-            raise UsageError("The probability of an outlier must lie between 0 and 1.")
         if self.limit_years <= 0 or self.change_rate_per_year <= 0:
             raise UsageError("The watch's limit and rate of changes must be more than 0.")
 
 
 DAYS_PER_YEAR = 365.25  # Julian
 OF_ONE_VISIT_YEARS = OF_ONE_VISIT.total_seconds() / 86400 / DAYS_PER_YEAR
+_FROST_SPREAD_K = 2.0  # of frost where no thermometer was read: judgement, a mild winter's days
 _SEASON_YEARS = 60 / DAYS_PER_YEAR  # judgement: so many days are of one season
 
 
@@ -108,6 +126,21 @@ def warmth_of(
     lately = (years[:, None] >= years) & (years > years[:, None] - _SEASON_YEARS) & ~known
     in_order = np.tril(lately)  # of tests at the very same time those before
     return Warmth(kelvin, of_each, np.where(known, 1.0, in_order.sum(axis=1)))
+
+
+def frost_of(temperatures_c: FloatArray, thermometer_sd_k: float) -> Warmth:
+    """Return kelvin below 0 C of tests at `temperatures_c` (T,), 0 above it, as far as known.
+
+    The deck follows the air in its own time, so that near 0 C its mean is what counts.
+    """
+    known = np.isfinite(temperatures_c)
+    scaled = np.where(known, temperatures_c, 0.0) / thermometer_sd_k
+    below = scipy.special.ndtr(-scaled)
+    density = np.exp(-(scaled**2) / 2) / math.sqrt(2 * math.pi)
+    kelvin = thermometer_sd_k * (scaled * below - density)
+    kelvin = np.where(known, kelvin, kelvin[known].mean() if known.any() else 0.0)
+    sd = np.where(known, thermometer_sd_k * below, _FROST_SPREAD_K)
+    return Warmth(kelvin, sd, np.ones(len(known)))
 
 
 def years_between(first: datetime, second: datetime) -> float:

@@ -20,7 +20,7 @@ from shm.assumptions import DEFAULTS, Assumptions
 from shm.errors import BadInput
 from shm.values import NAN, FloatArray, Mode
 from shm.values.stream import PooledReading, WindowReading
-from shm.watch.alert_state import AlertState
+from shm.watch.conditions import State
 from shm.watch.stream_filter import FEATURES, Bank
 from shm.watch.stream_reading import ModeTable, SeenReading, exchanged
 from shm.watch.stream_thermometer import Believed, Thermometer, believed
@@ -78,7 +78,7 @@ class StreamState:
     is_learning: bool = True
     called_from: float = 0.0
     called_shift: float = 0.0
-    told: AlertState = field(default_factory=AlertState)
+    told: State = field(default_factory=State)
     standing: tuple[str, ...] = ()
     exchanged_hours: int = 0
     settled_day: float = 0.0
@@ -142,7 +142,7 @@ class StreamState:
                 start=datetime.fromisoformat(head["start"]),
                 table=ModeTable(modes=modes, tension_n=head["tension_n"], **parts["table"]),
                 bank=Bank(day=head["day"], watched=head["watched"], **parts["bank"]),
-                told=AlertState.from_text(head["told"]),
+                told=State.from_text(head["told"]),
                 thermometer=Thermometer(**head.get("thermometer", {})),
                 **{name: head[name] for name in _SCALARS if name in head},
                 **parts["state"],

@@ -50,7 +50,7 @@ from shm.watch.stream_state import (
     with_conditions,
     with_ring,
 )
-from shm.watch.watching import after
+from shm.watch.watching import next_alert
 
 _VERSION = "stream-watch-1"
 _DAY_SD = 1.25e-4  # of ln f: what a mode keeps for a day, by joints that seat anew. Judgement
@@ -211,7 +211,7 @@ class StreamWatch:
                 )
                 state = _changed(state, evidence)
         test = self._watched_test(state, evidence, moved, reading, end)
-        told, alert = after(state.told, test, self.hanger)
+        told, alert = next_alert(state.told, test, self.hanger)
         told = replace(told, called=told.called[-_CALLS_KEPT:])
         standing = (*state.standing, alert.key) if alert else state.standing
         stands = alert or told.beyond or told.called or state.bank.day < state.settled_day

@@ -1,4 +1,4 @@
-"""The watch of one hanger, test by test: what stands after each rests on the tests up to it alone.
+"""The watch of one hanger, test by test: each result rests on the tests up to it alone.
 
 After a call the called change is part of what is known, and a further one is looked for.
 """
@@ -7,39 +7,23 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from shm.errors import BadInput, UsageError
-from shm.values import (
-    Change,
-    CreepRate,
-    FloatArray,
-    Hanger,
-    IntArray,
-    Reading,
-    WatchedQuantity,
-    WatchedTest,
-)
-from shm.values.drift import ENOUGH_AGAINST
-from shm.watch.causes import Columns, Structure, Told, structure_of
-from shm.watch.change_point import Evidence, evidence_of, log_probability_of_called
-from shm.watch.isolated_tests import counted, outlier_probability
-from shm.watch.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of, years_between
-from shm.watch.persistence import what_stays
-from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
-from shm.watch.state_sums import StateSums, WatchState, begun_of, size_of
+from shm.values import BoolArray, Change, FloatArray, Hanger, Reading, WatchedQuantity, WatchedTest
+from shm.watch.causes import Columns, Hypotheses, hypotheses_of
+from shm.watch.changepoint import ChangePoint, Evidence
+from shm.watch.history import History, LinearModel
+from shm.watch.options import WatchOptions, reference_of
+from shm.watch.summary import Summary
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
-_VERSION = 13
-_LOOKED_AT = 0.1  # technical: of the limit: below it nobody asks which cause it was
-# Technical: what a test says goes nearly in proportion to its weight.
-_MOST_REPEATS, _NEARLY = 6, 0.5
+_VERSION = 14
+_LEAST_SHARE = 1e-6  # judgement: of a cause in a call, which later tests may yet speak for
 _CLEARLY_NATS = 3.0  # 20 to 1
 
 
@@ -77,267 +61,153 @@ class Watcher:
 
     @cached_property
     def key(self) -> str:
-        """Names what a state rests on beside the readings: the rules, options and quantities."""
-        given = [_VERSION, asdict(self.options), [_told(each) for each in self.quantities]]
+        """Names what a history rests on beside the readings: version, options and quantities."""
+        given = [_VERSION, asdict(self.options), [_digest(each) for each in self.quantities]]
         return hashlib.sha256(json.dumps(given).encode()).hexdigest()
 
     @cached_property
-    def structure(self) -> Structure:
-        """The hypotheses."""
-        return structure_of(self.quantities, self.columns, self.options)
+    def hypotheses(self) -> Hypotheses:
+        """What may happen to the hanger."""
+        return hypotheses_of(self.quantities, self.columns, self.options)
 
     @cached_property
-    def sums(self) -> StateSums:
-        """What the tests of a state are to the evidence."""
-        return StateSums(self.quantities, self.columns.modes, self.structure, self.options)
+    def model(self) -> LinearModel:
+        """The linear model of the tests."""
+        return LinearModel(self.hypotheses, self.options)
 
-    def begin(self, readings: Sequence[Reading]) -> tuple[WatchState, Watch]:
-        """The state after the readings of the baseline, by time, and a result for each of them.
+    def begin(self, readings: Sequence[Reading]) -> tuple[History, tuple[WatchedTest, ...]]:
+        """Return the history of the readings of the baseline, by time, and a result for each.
 
         Raises UsageError where these are more than the options' `baseline_tests`, or none. Where
-        they are fewer, the state cannot go on.
+        they are fewer, the history cannot go on.
         """
         if not 0 < len(readings) <= self.options.baseline_tests:
             raise UsageError(
                 f"The watch was to begin with {len(readings)} readings; its baseline has "
                 f"{self.options.baseline_tests}."
             )
-        time, n, q = readings[0].time, self.structure.layout.n, self.structure.layout.q
-        state = WatchState.before_any(
-            self.key,
-            time,
-            reference_of([reading.temperature_c for reading in readings]),
-            (n, q),
-            self.structure.layout.prior_sd[n + q :][: q * self.structure.thermal_laws],
-            self.structure.scatter_variance,
-        )
+        reference_c = reference_of([reading.temperature_c for reading in readings])
+        history = History.before_any(self.key, readings[0].time, reference_c, self.hypotheses)
         tests = []
         for reading in readings:
-            state, found = self._next(state, reading)
+            history, found = self._advance(history, reading)
             tests.append(found)
-        return state, Watch(tuple(tests), ())
+        return history, tuple(tests)
 
-    def after(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
-        """The state after one more reading, and the result.
+    def after(self, history: History, reading: Reading) -> tuple[History, WatchedTest]:
+        """Return the history with one more reading, and the result.
 
         Raises BadInput where the reading is older than the last, or of other quantities, UsageError
-        where the state is that of another watch, or its baseline is not complete.
+        where the history is that of another watch, or its baseline is not complete.
         """
-        if state.key != self.key or state.tests < self.options.baseline_tests:
+        if history.key != self.key or history.tests < self.options.baseline_tests:
             raise UsageError(
                 "This state of a watch is not of this hanger, baseline and options.",
                 remedy="Begin the watch anew.",
             )
-        return self._next(state, reading)
+        return self._advance(history, reading)
 
-    def _next(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
-        if reading.time < state.last_time:
+    def _advance(self, history: History, reading: Reading) -> tuple[History, WatchedTest]:
+        if reading.time < history.last_time:
             raise BadInput(
                 f"The watch was given test {reading.test} after one that is later.",
                 remedy="Sort the tests by time.",
             )
-        state = self._rejudged(self._with(state, reading))
-        state, evidence = self._bounded(state)
-        rows = _counting(state)
-        if not state.counted[-1]:
-            evidence = self._evidence(state, rows)
-        evidence, causes, against = self._bounded_by_what_stays(state, evidence)
-        if against >= ENOUGH_AGAINST:
-            # Else everything since would be one change, and hide the next.
-            state = self._without_baseline(state)
-            evidence = self._evidence(state, _counting(state))
-            evidence, causes, _ = self._bounded_by_what_stays(state, evidence)
-        own = slice(self.options.baseline_tests)
-        if np.isfinite(state.variances[own]).any() and not state.counted[own].any():
-            against = int(state.counted.sum())
-            # How far it is since the baseline stays open all the same.
-            whole = self._with_baseline(state)
-            since = self._evidence(whole, _counting(whole))
-            since, all_causes, _ = self._bounded_by_what_stays(whole, since)
-        else:
-            since, all_causes = evidence, causes
-        found = self._said(state, reading, (evidence, causes, against), (since, all_causes))
-        coefficients, coefficient_sd = self._coefficients(evidence)
-        if found.change.called and state.counted[-1]:
-            still = state.still_same * (1 - probability_of_change(evidence, self.options))
-            call = begun_of(causes, _counting(state), found.change)
-            begun = np.append(state.called, [call], axis=0)
-            sizes = np.append(state.called_precision, [size_of(causes)], axis=0)
-            state = replace(state, called=begun, called_precision=sizes, still_same=still)
-        state = replace(state, coefficients=coefficients, coefficient_sd=coefficient_sd)
-        return state, found
-
-    def _bounded_by_what_stays(
-        self, state: WatchState, evidence: Evidence
-    ) -> tuple[Evidence, Evidence, int]:
-        """As far as it stays, by which causes are weighed, and tests against the baseline."""
-        if evidence.log_evidence <= math.log(_LOOKED_AT * self.options.limit_years):
-            return evidence, evidence, 0
-        # How sure it is that anything changed is bounded; which cause it was is for all to say.
-        rows = _counting(state)
-        causes = evidence
-        if (state.weight[rows] != 1).any():
-            causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
-        course = self.sums.course(state, rows, causes.called)
-        stays = what_stays(causes, course, self.options.limit_years)
-        bounded = replace(evidence, log_most=stays.log_years)
-        return bounded, causes, 0 if causes.called else stays.against_baseline
-
-    def _without_baseline(self, state: WatchState) -> WatchState:
-        """The state in which a baseline that stands alone does not count."""
-        counted = state.counted.copy()
-        counted[: self.options.baseline_tests] = False
-        return replace(state, counted=counted)
-
-    def _with_baseline(self, state: WatchState) -> WatchState:
-        counted = state.counted.copy()
-        counted[: self.options.baseline_tests] = True
-        none = state.called[:0], state.called_precision[:0]
-        return replace(state, counted=counted, called=none[0], called_precision=none[1])
-
-    def _said(
-        self,
-        state: WatchState,
-        reading: Reading,
-        changes: tuple[Evidence, Evidence, int],
-        shifts: tuple[Evidence, Evidence],
-    ) -> WatchedTest:
-        """What people are told after the newest test: by the evidence of changes, that by which
-        causes are weighed, and tests against the baseline; and of shifts since the baseline."""
-        evidence, causes, against_baseline = changes
-        of_baseline = float(state.years[: self.options.baseline_tests].mean())
-        subject = Subject(
-            self.quantities,
-            self.hanger,
-            self.options,
-            state.start,
-            of_baseline,
-            *self.sums.effects(state),
+        history = history.with_reading(reading)
+        history = replace(history, scatter_variance=self.model.scatter(history))
+        history = self._reclassified(history)
+        first = max([self.options.baseline_tests, *(int(n) + 1 for n in history.called[:, 0])])
+        search = ChangePoint(self.hypotheses, self.options)
+        evidence = search.evidence(self.model.sums(history), history.labels, first)
+        thermal, null = self.hypotheses.thermal, evidence.null
+        history = replace(
+            history,
+            labels=null.labels,
+            coefficients=null.mean[thermal],
+            coefficient_sd=np.sqrt(np.maximum(np.diag(null.covariance)[thermal], 0.0)),
         )
-        outlier = self._outlier(state, state.tests - 1)
-        return WatchedTest(
+        summary = Summary(
+            self.hypotheses,
+            self.options,
+            self.hanger,
+            history,
+            evidence,
+            self.model.effects(history),
+        )
+        outlier = self._outlier_probability(evidence, summary.probability)
+        change = summary.change(reading, outlier, self._against_baseline(history))
+        found = WatchedTest(
             test=reading.test,
             time=reading.time,
             temperature_c=reading.temperature_c,
-            drifts=drifted(
-                subject, *shifts, reading, is_baseline=state.tests <= self.options.baseline_tests
-            ),
-            change=changed(
-                subject,
-                evidence,
-                causes,
-                reading,
-                1 - state.still_same,
-                outlier,
-                against_baseline=against_baseline,
-            ),
-            creep_per_year=self._creep(evidence),
+            drifts=summary.drifts(reading),
+            change=change,
+            creep_per_year=summary.creep(),
+        )
+        if change.called:
+            history = self._with_call(history, evidence, change, summary.probability)
+        return history, found
+
+    def _outlier_probability(self, evidence: Evidence, probability: float) -> float:
+        """Return the probability that the last visit is disturbed so that it is to be repeated."""
+        is_odd = [False, *(not each.passes for each in self.hypotheses.disturbances)]
+        found = float(evidence.null.labels[-1, is_odd].sum())
+        if not (evidence.is_open and evidence.changes):
+            return found
+        changed = float(evidence.changes[0].fit.labels[-1, is_odd].sum())
+        return probability * changed + (1 - probability) * found
+
+    def _against_baseline(self, history: History) -> int:
+        """Return how many sound visits there are since a baseline all of whose tests are disturbed;
+        0 where one is sound."""
+        sound: BoolArray = np.asarray(history.sound > 0.5)
+        first = self.options.baseline_tests
+        is_measured: BoolArray = np.asarray(np.isfinite(history.variances).any(axis=1))
+        if sound[:first].any() or not is_measured[:first].any():
+            return 0
+        agreeing = np.flatnonzero(sound & is_measured)
+        return len(np.unique(history.visit[agreeing[agreeing >= first]]))
+
+    def _with_call(
+        self, history: History, evidence: Evidence, change: Change, probability: float
+    ) -> History:
+        """Return the history in which a called change is part of what is known."""
+        at = int(evidence.shares.sum(axis=(1, 2, 3)).argmax())
+        first = int(evidence.beginnings[at])
+        begun = [float(first), float(evidence.years[first - 1]), float(change.sudden < 0.5)]
+        return replace(
+            history,
+            labels=evidence.changes[0].fit.labels,
+            called=np.append(history.called, [begun], axis=0),
+            called_precision=np.append(history.called_precision, [self._size(evidence)], axis=0),
+            unchanged=history.unchanged * (1 - probability),
         )
 
-    def _bounded(self, state: WatchState) -> tuple[WatchState, Evidence]:
-        """The newest visit with what is left of its weight: alone it speaks for no change by more
-        than it may, whether it counts by now or only once another agrees with it. And the evidence
-        as if it counted."""
-        visit = state.years >= state.years[-1] - OF_ONE_VISIT_YEARS
-        rows = np.union1d(np.flatnonzero(state.counted), [state.tests - 1])
-        most = math.log(self.options.most_of_one_test * self.options.limit_years)
-        evidence = self._evidence(state, rows)
-        for _ in range(_MOST_REPEATS):
-            factor, mass = evidence.of_last_visit
-            if mass <= most + _NEARLY:
-                break
-            weight = state.weight.copy()
-            weight[visit] *= max(factor - (mass - most), _NEARLY) / factor
-            state = replace(state, weight=weight)
-            evidence = self._evidence(state, rows)
-        return state, evidence
+    def _size(self, evidence: Evidence) -> FloatArray:
+        """Return the precision (n + q, n + q) of a called change: each cause as probable as now."""
+        n, steps = self.hypotheses.n, [each.step_sd for each in self.quantities]
+        least = np.concatenate([np.full(n, 1e-5), 1e-3 * np.array(steps)])
+        covariance = np.diag(least**2)
+        shares = evidence.shares.sum(axis=(0, 1))
+        shares[:, 0] = np.maximum(shares[:, 0], _LEAST_SHARE)
+        for direction, by_size in zip(evidence.directions, shares, strict=True):
+            for share, size in zip(by_size, self.options.sizes, strict=True):
+                covariance += share * size**2 * direction.factor @ direction.factor.T
+        return np.asarray(np.linalg.inv(covariance))
 
-    def _with(self, state: WatchState, reading: Reading) -> WatchState:
-        """The state with one more test in it, and who counts now."""
-        n, q = self.structure.layout.n, self.structure.layout.q
-        if reading.mean.shape != (q,):
-            raise BadInput(f"The reading of test {reading.test} is not of {q} quantities.")
-        years = years_between(state.start, reading.time)
-        known = [value for value in (state.reference_c, reading.temperature_c) if value == value]
-        modes = reading.modes
-        values = np.zeros(n) if modes is None else modes.values
-        variances = np.full(n, np.inf) if modes is None else modes.variances
-        slopes = np.zeros((n, q)) if modes is None else modes.slopes
-        softening = np.zeros(n) if modes is None else modes.per_kelvin
-        level = math.log(reading.amplitude) if reading.amplitude > 0 else math.nan
-        rows = {
-            "values": values,
-            "variances": variances,
-            "slopes": slopes,
-            "per_kelvin": softening,
-            "years": years,
-            "temperature_c": reading.temperature_c,
-            "log_amplitude": level,
-            "weight": 1.0,
-        }
-        grown: dict[str, Any] = {
-            name: np.concatenate([getattr(state, name), np.asarray(row)[None]])
-            for name, row in rows.items()
-        }
-        reference_c = known[0] if known else math.nan
-        later = replace(state, last_time=reading.time, reference_c=reference_c, **grown)
-        counts = counted(self.sums.seen(later), state.counted, self.options.baseline_tests)
-        later = replace(later, counted=counts)
-        return replace(later, scatter_variance=self.sums.scatter(later))
-
-    def _rejudged(self, state: WatchState) -> WatchState:
-        """The last called change a step or a ramp, as the tests since make clear.
-
-        At the call a ramp has hardly begun: frozen as a step, all that comes later would be new.
-        """
-        if not len(state.called):
-            return state
-        other = replace(state, called=state.called.copy())
+    def _reclassified(self, history: History) -> History:
+        """Return the history with the last called change as a step or a ramp, as the tests since
+        make clear: at its call a ramp has hardly begun."""
+        if not len(history.called):
+            return history
+        other = replace(history, called=history.called.copy())
         other.called[-1, 2] = 1 - other.called[-1, 2]
-        rows = _counting(state)
-        sums, years = self.sums.sums(state, rows), state.years[rows]
+        search = ChangePoint(self.hypotheses, self.options)
         as_it_is, otherwise = (
-            log_probability_of_called(sums, years, self.structure.layout, _called(each, rows))
-            for each in (state, other)
+            search.fit_null(self.model.sums(each), each.labels).log_evidence
+            for each in (history, other)
         )
-        return other if otherwise - as_it_is > _CLEARLY_NATS else state
-
-    def _evidence(self, state: WatchState, rows: IntArray) -> Evidence:
-        """Of the tests `rows`."""
-        first = int((rows < self.options.baseline_tests).sum())
-        return evidence_of(
-            self.sums.sums(state, rows),
-            state.years[rows],
-            max(first, 1),
-            self.structure.layout,
-            self.structure.directions,
-            _called(state, rows),
-            self.options.beginnings,
-        )
-
-    def _coefficients(self, evidence: Evidence) -> tuple[FloatArray, FloatArray]:
-        """How far each quantity goes with a kelvin (laws q,), its sd; by the likeliest scatter."""
-        n, count = self.structure.layout.n, self.structure.layout.q * self.structure.thermal_laws
-        likeliest, own = int(evidence.log_null.argmax()), slice(n, n + count)
-        variance = np.diag(evidence.null_covariance[likeliest])[own]
-        return np.asarray(evidence.null_mean[likeliest, own]), np.sqrt(np.maximum(variance, 0.0))
-
-    def _creep(self, evidence: Evidence) -> CreepRate | None:
-        """The tension's creep if nothing but what was called changes; None where that is unlikely.
-
-        It is the last covariate of the null, before the called changes.
-        """
-        if probability_of_change(evidence, self.options) > 0.5:
-            return None
-        at, weights = len(self.structure.layout.null) - 1, np.exp(evidence.log_null)
-        means, variances = evidence.null_mean[:, at], evidence.null_covariance[:, at, at]
-        mean = float(weights @ means)
-        variance = float(weights @ (variances + (means - mean) ** 2))
-        return CreepRate(mean, math.sqrt(variance), self.options.creep_per_year_sd)
-
-    def _outlier(self, state: WatchState, test: int) -> float:
-        prior = self.options.outlier_probability
-        return outlier_probability(self.sums.seen(state), state.counted, test, prior)
+        return other if otherwise - as_it_is > _CLEARLY_NATS else history
 
 
 def watched(
@@ -347,7 +217,7 @@ def watched(
     hanger: Hanger,
     options: WatchOptions | None = None,
 ) -> Watch:
-    """One result a reading, each of which rests on the readings up to it alone.
+    """Return a result for each reading, which rests on the readings up to it alone.
 
     The same as a Watcher finds test by test. Raises BadInput where readings are not in the order of
     time or not of these quantities.
@@ -356,38 +226,22 @@ def watched(
     if not readings:
         return Watch((), ())
     count = watcher.options.baseline_tests
-    state, begun = watcher.begin(readings[:count])
-    tests = list(begun.tests)
+    history, begun = watcher.begin(readings[:count])
+    tests = list(begun)
     for reading in readings[count:]:
-        state, found = watcher.after(state, reading)
+        history, found = watcher.after(history, reading)
         tests.append(found)
     return watch_of(tests)
 
 
 def watch_of(tests: Sequence[WatchedTest]) -> Watch:
-    """The results of a watch, with the changes that they call."""
+    """Return the results of a watch with the changes that they call."""
     calls = (Call(n, test.change) for n, test in enumerate(tests) if test.change.called)
     return Watch(tuple(tests), tuple(calls))
 
 
-def _counting(state: WatchState) -> IntArray:
-    """The tests that count; as long as none does, the newest, which then says nothing."""
-    rows = np.flatnonzero(state.counted)
-    return rows if len(rows) else np.array([state.tests - 1])
-
-
-def _called(state: WatchState, rows: IntArray) -> list[Told]:
-    """The called changes, as the tests `rows` see them."""
-    return [
-        Told(int(np.searchsorted(rows, first)), years, bool(is_ramp), precision)
-        for (first, years, is_ramp), precision in zip(
-            state.called.tolist(), state.called_precision, strict=True
-        )
-    ]
-
-
-def _told(quantity: WatchedQuantity) -> list[object]:
-    """All of a quantity, its table as a digest."""
+def _digest(quantity: WatchedQuantity) -> list[object]:
+    """Return all of a quantity, its table as a digest."""
     table = np.array([quantity.coordinates, quantity.values]).tobytes()
     plain = (getattr(quantity, name) for name in ("name", "baseline", "step_sd", "end", "plane"))
     return [*plain, *quantity.parameters, hashlib.sha256(table).hexdigest()]

@@ -1,16 +1,4 @@
-"""The watch of one hanger as a whole: tests read, put through the sequential test, decided on.
-
-When an owner is told: from what the watch says after each test to at most one alert a test.
-
-Four rules. A change is called by the sequential test, whose rate of false calls is known: `sudden
-change` or `slow drift`. A quantity is `beyond threshold` once the probability of that reaches the
-level which the owner asked for. Two tests that agree are told whatever their clocks say, where
-neither of the former rules has (`agreement`). A test that agrees with none before it is a notice:
-repeat it; three of them in a row are an alert. A condition that stands is told once. It ends when
-its probability falls below half that level, and only then can it be told again, so that a
-probability which hovers about the level does not ring every week. A change that was called and then
-passes the threshold is told again, since the owner must now do something else. A mode that three
-tests in a row have wrong is a notice, once: its number may be.
+"""The watch of a hanger: tests read, put through the engine, and at most one alert a test.
 
 All is derived from the sequence of tests, so that the same tests give the same alerts.
 """
@@ -35,29 +23,31 @@ from shm.values import (
     RepeatedMistake,
     WatchedTest,
 )
-from shm.watch.agreement import Way, agreement, way_of
-from shm.watch.alert_state import AlertState, conditions, still, with_beyond
+from shm.watch.agreement import agreement
 from shm.watch.alert_text import alert_of, message_of
 from shm.watch.change_words import CAUSES, suspects
-from shm.watch.isolated_tests import (
-    FEW_TESTS,
-    FIRST_TESTS,
-    alert_of_baseline,
-    first_tests_against,
-    message_of_odd,
+from shm.watch.conditions import (
+    BASELINE,
+    BEYOND,
+    CALLS,
+    DISAGREE,
+    MODES,
+    REPEAT,
+    Condition,
+    State,
+    Way,
+    conditions,
+    way_of,
 )
-from shm.watch.mistaken_modes import news_of, notice_of, repeated_mistakes
+from shm.watch.history import History
+from shm.watch.mistaken_modes import repeated_mistakes
+from shm.watch.notices import alert_of_baseline, message_of_odd, notice_of
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
-from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watch, Watcher, watch_of, watched
 
 DatedTest = tuple[ModalTest, datetime]
 """A test, and its own time or that of its receipt."""
-_BEYOND: AlertKind = "beyond threshold"
-_REPEAT: AlertKind = "repeat the test"
-_ODD = 0.9  # nine to one: a notice that is wrong costs a test
-_ODD_IN_A_ROW = 3  # tests that fit nothing: no longer bad luck
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,35 +150,43 @@ def watch_newest(
     watcher = Watcher(reader.quantities, reader.columns, hanger, options)
     if kept is None:
         readings = [reader.reading(test, time) for test, time in baseline_tests]
-        state, watch = watcher.begin(readings)
-        told, alert = AlertState(), None
-        for found in watch.tests:
-            told, alert = after(told, found, hanger)
+        history, begun = watcher.begin(readings)
+        state, alert = State(), None
+        for found in begun:
+            state, alert = next_alert(state, found, hanger)
     else:
-        state = WatchState.from_bytes(kept)
-        if state.key != watcher.key:
+        history = History.from_bytes(kept)
+        if history.key != watcher.key:
             return None
-        told = AlertState.from_text(state.told)
+        state = State.from_text(history.conditions)
     since = max(time for _, time in baseline_tests)
     for test, time in later:
         reading = reader.reading(test, max(time, since))
-        state, found = watcher.after(state, reading)
-        found = replace(found, mistaken=repeated_mistakes(told.mistaken, reading, reader.modes))
-        told, alert = after(told, found, hanger)
+        history, found = watcher.after(history, reading)
+        found = replace(found, mistaken=repeated_mistakes(state.mistaken, reading, reader.modes))
+        state, alert = next_alert(state, found, hanger)
     # A second test that agrees answers the notice that asks for one.
-    if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
-        agreed = agreement(reader, later[-1], beside, hanger, options, told.beyond)
-        are_first = state.tests - len(baseline_tests) <= FIRST_TESTS
-        is_told = told.alone or bool(told.beyond)
-        if agreed is None and are_first and len(baseline_tests) <= FEW_TESTS and not is_told:
-            agreed = first_tests_against(reader, later[-1], beside, hanger, options)
-            told = replace(told, alone=told.alone or agreed is not None)
+    if (alert is None or alert.kinds == (REPEAT,)) and beside is not None and later:
+        agreed = agreement(reader, later[-1], beside, hanger, options, state.beyond)
         if agreed is not None:
-            two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
-            alert, told = agreed, with_beyond(told, agreed.drifts, agreed.time)
-            told = replace(told, agreed=told.agreed | two_told)
-    kept = replace(state, told=told.to_text()).to_bytes()
-    return Newest(found, alert, kept, frozenset(told.beyond))
+            alert, state = agreed, _with_agreed(state, agreed)
+    kept = replace(history, conditions=state.to_text()).to_bytes()
+    return Newest(found, alert, kept, frozenset(state.beyond))
+
+
+def _with_agreed(state: State, alert: Alert) -> State:
+    """Return the state with what two tests that agree have reported."""
+    news = frozenset(
+        Condition(
+            BEYOND,
+            each.quantity,
+            way_of(each.shift_mean),
+            since=alert.time,
+            improbable=True,
+        )
+        for each in alert.drifts
+    )
+    return replace(state, standing=state.standing - news | news)
 
 
 def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> WatchOptions:
@@ -198,176 +196,143 @@ def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> Wa
     return replace(options, baseline_tests=baseline_tests, limit_years=limit_years)
 
 
-@dataclass(frozen=True)
-class _News:
-    """What a test adds: shifts that are beyond their threshold by now, and whether it is a call."""
-
-    beyond: tuple[Drift, ...]
-    call: bool
-
-
 def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
-    """The alert that the newest of the tests of a hanger calls for, beyond those told before.
+    """Return the alert that the newest of the tests of a hanger calls for, beyond those before.
 
     `watched` are all its tests since the baseline, the oldest first. The alert's key names hanger,
     rules, quantity, way and test: the same whenever it is asked for.
     """
-    told, alert = AlertState(), None
+    state, alert = State(), None
     for test in watched:
-        told, alert = after(told, test, hanger)
+        state, alert = next_alert(state, test, hanger)
     return alert
 
 
-def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertState, Alert | None]:
-    """What stands after one more test, and the alert that it calls for, if any."""
-    level = hanger.thresholds.alert_probability
-    standing = still(told, test, hanger.thresholds.end_probability)
-    news = _news(standing, test, level)
-    call = test.time if news.call else standing.call
-    called = (*standing.called, test.change) if test.change.called else standing.called
-    odd = standing.odd + 1 if test.change.outlier_probability > _ODD else 0
-    change = test.change if news.call else _explaining(news.beyond, called, test.change)
-    is_further = news.call and bool(standing.called)
-    alert = _alert(news, change, test, hanger, standing, is_further=is_further)
-    alone = told.alone
-    since_baseline: tuple[Drift, ...] = ()
-    if alert is None and test.change.is_baseline_alone and not (alone or standing.beyond):
-        alert, alone = alert_of_baseline(test, hanger), True
-        since_baseline = alert.drifts
-    alert = alert or _of_odd(test, hanger, odd)
-    wrong = frozenset((each.plane, each.order) for each in test.mistaken if each.is_notable)
-    noted = told.noted & wrong
-    explained = any(each.moved and each.moved[0].quantity in CAUSES for each in called)
-    if alert is None and not explained and (new := news_of(test.mistaken, noted)):
-        # It waits while there is worse to tell; a mass or lost section is why modes go astray.
-        alert, noted = notice_of(test, hanger, new), wrong
-    stands = replace(
-        with_beyond(standing, (*news.beyond, *since_baseline), test.time),
-        call=call,
-        called=called,
-        odd=odd,
-        mistaken=test.mistaken,
-        noted=noted,
-        alone=alone,
-        # Improbable to the watch, as what two tests tell: it ends once the shift has come back.
-        agreed=standing.agreed | conditions(since_baseline),
-    )
-    return stands, alert
-
-
-def _of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> Alert | None:
-    """Of a test that fits nothing: a notice of the first, an alert of the third in a row."""
-    if in_a_row not in (1, _ODD_IN_A_ROW):
-        return None
-    kind: AlertKind = _REPEAT if in_a_row == 1 else "tests disagree"
-    said = message_of_odd(test, hanger, in_a_row)
-    return alert_of(hanger, (test.test, test.time), kind.replace(" ", "-"), said, (kind,))
-
-
 def alerts_of(watched: Sequence[WatchedTest], hanger: Hanger) -> tuple[Alert, ...]:
-    """All alerts of a history, the oldest test first: what `new_alert` says after each test."""
-    told, alerts = AlertState(), []
+    """Return all alerts of a history, the oldest test first."""
+    state, alerts = State(), []
     for test in watched:
-        told, alert = after(told, test, hanger)
+        state, alert = next_alert(state, test, hanger)
         alerts += [alert] if alert else []
     return tuple(alerts)
 
 
-def _news(standing: AlertState, test: WatchedTest, level: float) -> _News:
-    call = test.change.called and not _is_known(standing, test.change)
+def next_alert(state: State, test: WatchedTest, hanger: Hanger) -> tuple[State, Alert | None]:
+    """Return the state after one more test, and the alert of what is new in it, if anything is.
+
+    The gravest is reported; what waits behind it is reported at a later test that shows it.
+    """
+    before = state
+    state = state.with_test(test)
+    holding = conditions(state, hanger.thresholds, test.time)
+    news = holding - state.standing
+    alert, reported = None, frozenset[Condition]()
+    for kinds in ((BEYOND, *CALLS), (BASELINE,), (REPEAT, DISAGREE), (MODES,)):
+        reported = frozenset(each for each in news if each.kind in kinds)
+        if kinds == (MODES,) and _explains_modes(state):
+            reported = frozenset()  # a mass or lost section is why modes go astray
+        if reported:
+            alert = _alert(before, state, reported, holding, hanger)
+            break
+    return state.with_reported(holding, reported), alert
+
+
+def _explains_modes(state: State) -> bool:
+    """Return whether a detected change is why modes do not fit."""
+    return any(each.moved and each.moved[0].quantity in CAUSES for each in state.called)
+
+
+def _alert(
+    before: State,
+    state: State,
+    news: frozenset[Condition],
+    holding: frozenset[Condition],
+    hanger: Hanger,
+) -> Alert:
+    """Return the alert of conditions that are new."""
+    test, kinds = state.latest, {each.kind for each in news}
+    assert test is not None
+    name = test.test, test.time
+    if BASELINE in kinds or any(each.improbable for each in news):
+        return alert_of_baseline(test, hanger, BASELINE if BASELINE in kinds else BEYOND)
+    if kinds & {REPEAT, DISAGREE}:
+        kind: AlertKind = DISAGREE if DISAGREE in kinds else REPEAT
+        said = message_of_odd(test, hanger, state.odd)
+        return alert_of(hanger, name, kind.replace(" ", "-"), said, (kind,))
+    if MODES in kinds:
+        told = {each.about for each in news}
+        wrong = [
+            each
+            for each in test.mistaken
+            if each.is_notable
+            and (("test" in told and each.is_misfit) or f"{each.plane}-{each.order}" in told)
+        ]
+        return notice_of(test, hanger, wrong)
+    return _alert_of_change(before, state, news, holding, hanger)
+
+
+def _alert_of_change(
+    before: State,
+    state: State,
+    news: frozenset[Condition],
+    holding: frozenset[Condition],
+    hanger: Hanger,
+) -> Alert:
+    """Return the alert of a detected change, or of shifts beyond their thresholds."""
+    test = state.latest
+    assert test is not None
+    call = next((each for each in news if each.kind in CALLS), None)
     drifts = test.told if call else test.drifts
-    beyond = tuple(
-        drift
-        for drift in drifts
-        if drift.probability >= level
-        and (drift.quantity, way_of(drift.shift_mean)) not in standing.beyond
+    new = {(each.about, each.way) for each in news if each.kind == BEYOND}
+    beyond = tuple(each for each in drifts if (each.quantity, way_of(each.shift_mean)) in new)
+    called = (*before.called, test.change) if test.change.called else before.called
+    change = test.change if call else _explaining(beyond, called, test.change)
+    kinds: tuple[AlertKind, ...] = ((BEYOND,) if beyond else ()) + ((call.kind,) if call else ())
+    said = message_of(
+        test,
+        hanger,
+        change,
+        beyond,
+        is_call=call is not None,
+        is_further=call is not None and bool(before.called),
+        standing=_standing(test, holding - news, hanger),
     )
-    return _News(beyond, call)
-
-
-def _is_known(standing: AlertState, change: Change) -> bool:
-    """Whether a called change began before an alert that stands, and so is what that one told."""
-    told = [] if standing.call is None else [standing.call]
-    named = _suspects(change)
-    told += [at for (quantity, _), at in standing.beyond.items() if quantity in named]
-    return any(change.began_by <= at for at in told)
-
-
-def _suspects(change: Change) -> tuple[str, ...]:
-    """What may have changed: the likeliest quantity, those with it, then those like it."""
-    return tuple(each.quantity for each in suspects(change))
+    first = beyond[0] if beyond else test.change.moved[0] if test.change.moved else None
+    lead = f"{first.quantity}-{way_of(first.shift_mean)}" if first else "unknown"
+    what = f"{'+'.join(kinds)}:{lead}".replace(" ", "-")
+    return alert_of(
+        hanger, (test.test, test.time), what, said, kinds, beyond or _suspected(test), change
+    )
 
 
 def _explaining(beyond: Sequence[Drift], called: Sequence[Change], now: Change) -> Change | None:
-    """The last called change of the same way as a shift; None where none is known to explain it."""
+    """Return the last called change of the same way as a shift; None where none explains it."""
     if not called:
         return now if now.probability > 0.5 else None
     shifts = {(drift.quantity, way_of(drift.shift_mean)) for drift in beyond}
     for change in reversed(called):
-        suspects = {
-            (moved.quantity, way_of(moved.shift_mean))
-            for moved in change.moved
-            if moved.quantity in _suspects(change)
-        }
-        if shifts & suspects:
+        moved = {(each.quantity, way_of(each.shift_mean)) for each in suspects(change)}
+        if shifts & moved:
             chances = now.probability, now.outlier_probability
             return replace(change, probability=chances[0], outlier_probability=chances[1])
     return None
 
 
-def _alert(
-    news: _News,
-    change: Change | None,
-    test: WatchedTest,
-    hanger: Hanger,
-    standing: AlertState,
-    *,
-    is_further: bool,
-) -> Alert | None:
-    kinds: tuple[AlertKind, ...] = ((_BEYOND,) if news.beyond else ()) + (
-        (_kind(test.change),) if news.call else ()
-    )
-    if not kinds:
-        return None
-    said = message_of(
-        test,
-        hanger,
-        change,
-        news.beyond,
-        is_call=news.call,
-        is_further=is_further,
-        standing=_standing(test, standing, hanger),
-    )
-    what = f"{'+'.join(kinds).replace(' ', '-')}:{_first_moved(news, test).replace(' ', '-')}"
-    drifts = news.beyond or _suspected(test)
-    return alert_of(hanger, (test.test, test.time), what, said, kinds, drifts, change)
-
-
-def _standing(test: WatchedTest, standing: AlertState, hanger: Hanger) -> list[Drift]:
-    """What was said to be beyond its threshold and still is: as sure as it was then."""
+def _standing(test: WatchedTest, holding: frozenset[Condition], hanger: Hanger) -> list[Drift]:
+    """Return what was reported to be beyond its threshold and still is: as sure as it was then."""
     level = hanger.thresholds.alert_probability
+    told = {
+        (each.about, each.way) for each in holding if each.kind == BEYOND and not each.improbable
+    }
     return [
         replace(each, probability=max(each.probability, level))
         for each in test.drifts
-        if (each.quantity, way_of(each.shift_mean)) in standing.beyond.keys() - standing.agreed
+        if (each.quantity, way_of(each.shift_mean)) in told
     ]
 
 
-def _kind(change: Change) -> AlertKind:
-    return "sudden change" if change.sudden >= 0.5 else "slow drift"
-
-
 def _suspected(test: WatchedTest) -> tuple[Drift, ...]:
-    """The shifts of what may have changed."""
+    """Return the shifts of what may have changed."""
     by_name = {drift.quantity: drift for drift in test.drifts}
-    return tuple(by_name[name] for name in _suspects(test.change) if name in by_name)
-
-
-def _first_moved(news: _News, test: WatchedTest) -> str:
-    """The quantity that is told first, and its way."""
-    if news.beyond:
-        return f"{news.beyond[0].quantity}-{way_of(news.beyond[0].shift_mean)}"
-    if test.change.moved:
-        first = test.change.moved[0]
-        return f"{first.quantity}-{way_of(first.shift_mean)}"
-    return "unknown"
+    names = [each.quantity for each in suspects(test.change)]
+    return tuple(by_name[name] for name in names if name in by_name)

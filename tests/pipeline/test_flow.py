@@ -194,7 +194,7 @@ def test_a_slow_loss_is_told_once_by_the_test_that_detects_it_beyond_its_thresho
     with workspace.store() as store:
         (stored,) = store.alerts.list_all()
         assert stored.alert.key == (
-            "hanger-3:beyond-threshold+slow-drift:tension-down:t6:baseline-1"
+            "hanger-3:beyond-threshold+slow-drift:tension-down:t5:baseline-1"
         )
         assert postman.told == [("mail", stored.alert.key)]
         assert [each.state for each in store.alerts.list_deliveries()] == [DeliveryState.DELIVERED]

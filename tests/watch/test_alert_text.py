@@ -21,10 +21,10 @@ from shm.values import (
     WatchedTest,
 )
 from shm.values.messages import Lead
-from shm.watch.alert_state import AlertState
 from shm.watch.change_words import shift_words
-from shm.watch.isolated_tests import message_of_odd
-from shm.watch.watching import after, alerts_of, new_alert
+from shm.watch.conditions import State
+from shm.watch.notices import message_of_odd
+from shm.watch.watching import alerts_of, new_alert, next_alert
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_drift, a_watched_test
 
@@ -541,21 +541,21 @@ def test_one_and_several_that_explain_the_data_alike_are_told_as_alternatives() 
 
 
 def test_what_was_told_comes_back_from_its_text() -> None:
-    stands = AlertState()
-    assert AlertState.from_text("") == AlertState.from_text(stands.to_text()) == stands
+    stands = State()
+    assert State.from_text("") == State.from_text(stands.to_text()) == stands
     joint = change(called=True, moved=_joint("log10_k1", "log10_k2"))
     for test in (day(1), day(2, joint), day(3, change(called=True, began=2), probability=0.99)):
-        stands, _ = after(stands, test, HANGER_3)
+        stands, _ = next_alert(stands, test, HANGER_3)
     assert stands.beyond
     assert len(stands.called) == 2
-    assert AlertState.from_text(stands.to_text()) == stands
+    assert State.from_text(stands.to_text()) == replace(stands, latest=None)
 
 
 def test_going_on_from_the_text_gives_the_alerts_of_the_history() -> None:
     history = [day(1), day(2, change(called=True)), day(3, probability=0.99), day(4), day(5)]
     text, alerts = "", []
     for test in history:
-        stands, alert = after(AlertState.from_text(text), test, HANGER_3)
+        stands, alert = next_alert(State.from_text(text), test, HANGER_3)
         text = stands.to_text()
         alerts += [alert] if alert else []
     assert tuple(alerts) == alerts_of(history, HANGER_3)
@@ -565,7 +565,7 @@ def test_going_on_from_the_text_gives_the_alerts_of_the_history() -> None:
 @pytest.mark.parametrize("text", ["{", "{}", "[]", '{"beyond": [1], "call": null, "called": []}'])
 def test_a_text_that_tells_nothing_is_refused(text: str) -> None:
     with pytest.raises(BadInput, match="cannot be read"):
-        AlertState.from_text(text)
+        State.from_text(text)
 
 
 def test_of_a_called_change_all_tell_the_probability_that_its_alert_tells() -> None:

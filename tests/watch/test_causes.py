@@ -21,7 +21,7 @@ from shm.watch.causes import (
     SECTION_LOSS,
     TIMEBASE,
     UNEXPLAINED,
-    structure_of,
+    hypotheses_of,
 )
 from shm.watch.options import WatchOptions
 from tests.helpers.hangers import HANGER_3
@@ -115,12 +115,12 @@ def test_a_clock_moves_all_modes_alike_and_sensors_lower_them() -> None:
 
 @pytest.mark.parametrize("quantities", [TENSION_ALONE, PLANES_ALONE, BOTH_ENDS])
 def test_the_prior_of_all_causes_together_is_one(quantities: tuple) -> None:  # type: ignore[type-arg]
-    structure = structure_of(quantities, columns(), WatchOptions())
+    found = hypotheses_of(quantities, columns(), WatchOptions())
     chances: dict[str, float] = {}
-    for each in structure.directions:
+    for each in found.directions:
         chances[each.name] = chances.get(each.name, 0.0) + np.exp(each.log_prior)
 
     assert sum(chances.values()) == pytest.approx(1.0)
     assert chances[UNEXPLAINED] == pytest.approx(0.07)
-    assert len(structure.scatter_variance) == len(quantities) + structure.scattering.shape[1]
-    assert set(structure.names) >= {each.name for each in quantities} | {POINT_MASS, TIMEBASE}
+    assert len(found.scatter_variance) == len(quantities) + found.scattering.shape[1]
+    assert set(found.names) >= {each.name for each in quantities} | {POINT_MASS, TIMEBASE}

@@ -31,7 +31,6 @@ def measure_statistics(beginnings: int, hangers: int) -> FloatArray:
         limit_years=math.inf,
         tension_scatter=0.003,
         spring_scatter_of_step=0.06,
-        scatter_scales=(1.0,),
         beginnings=beginnings,
     )
     found = []

@@ -13,8 +13,9 @@ import pytest
 from shm.errors import BadInput
 from shm.values import Hanger, ModalTest, Mode
 from shm.watch import WatchedFrequencies, WatchOptions, watch_frequencies
-from shm.watch.frequencies import FrequencyReader, frost_of
+from shm.watch.frequencies import FrequencyReader
 from shm.watch.frequency_watch import FrequencyWatch, measured_levels
+from shm.watch.options import frost_of
 
 START = datetime(2026, 5, 1, 12, tzinfo=UTC)
 MODES = (("transverse", 1, 2.0), ("longitudinal", 1, 2.12), ("transverse", 2, 4.1))

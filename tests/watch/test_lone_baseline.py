@@ -14,8 +14,8 @@ from shm.pipeline.ending import why_over
 from shm.values import Alert, Beside, Drift, ModalTest, WatchedTest
 from shm.watch import WatchOptions, watch_newest
 from shm.watch.baseline_check import check_baseline
-from shm.watch.isolated_tests import alert_of_baseline
-from shm.watch.watching import DatedTest
+from shm.watch.conditions import State
+from shm.watch.watching import DatedTest, next_alert
 from tests.helpers.modelled_tests import misnamed
 from tests.helpers.nouns import a_change
 from tests.watch.test_agreement import BEGIN, HANGER, a_test, baseline_of
@@ -123,6 +123,13 @@ def alone(*drifts: Drift) -> WatchedTest:
     return WatchedTest("t3", BEGIN, 10.0, drifts, replace(change, against_baseline=3))
 
 
+def alert_of_baseline(test: WatchedTest) -> Alert:
+    """Return the alert of a baseline that stands alone."""
+    _, alert = next_alert(State(), test, HANGER)
+    assert alert is not None
+    return alert
+
+
 def drift(quantity: str, mean: float, sd: float) -> Drift:
     threshold = 0.05 if quantity == "tension" else 0.5
     return Drift(
@@ -132,7 +139,7 @@ def drift(quantity: str, mean: float, sd: float) -> Drift:
 
 def test_a_baseline_that_stands_alone_is_an_alert_of_what_clearly_moved() -> None:
     moved = alone(drift("log10_k1", -0.3, 0.2), drift("tension", -0.18, 0.01))
-    alert = alert_of_baseline(moved, HANGER)
+    alert = alert_of_baseline(moved)
     assert alert.kinds == ("beyond threshold",)
     assert [each.quantity for each in alert.drifts] == ["tension"]
     assert "either tension fell by 18.0 ± 1.6 %" in alert.message
@@ -142,7 +149,7 @@ def test_a_baseline_that_stands_alone_is_an_alert_of_what_clearly_moved() -> Non
 def test_the_alert_stays_while_one_test_is_disturbed_and_ends_once_the_shift_has_come_back() -> (
     None
 ):
-    alert = alert_of_baseline(alone(drift("tension", -0.18, 0.01)), HANGER)
+    alert = alert_of_baseline(alone(drift("tension", -0.18, 0.01)))
 
     def later(mean: float, weeks: int) -> WatchedTest:
         test = alone(replace(drift("tension", mean, 0.01), probability=0.001))
@@ -160,9 +167,9 @@ def test_the_alert_stays_while_one_test_is_disturbed_and_ends_once_the_shift_has
 
 
 def test_what_a_load_may_do_is_a_notice_that_says_both() -> None:
-    small = alert_of_baseline(alone(drift("tension", -0.08, 0.005)), HANGER)
+    small = alert_of_baseline(alone(drift("tension", -0.08, 0.005)))
     assert small.kinds == ("check the baseline",)
     assert "either tension fell by 8.00 ± 0.82 %" in small.message
-    none = alert_of_baseline(alone(drift("tension", -0.02, 0.02)), HANGER)
+    none = alert_of_baseline(alone(drift("tension", -0.02, 0.02)))
     assert none.kinds == ("check the baseline",)
     assert none.drifts == ()

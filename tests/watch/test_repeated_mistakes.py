@@ -10,10 +10,11 @@ import pytest
 
 from shm.pipeline.ending import why_over
 from shm.values import ModeReading, Reading, RepeatedMistake, WatchedTest
-from shm.watch.alert_state import AlertState
+from shm.watch.conditions import MODES as CHECK_MODES
+from shm.watch.conditions import Condition, State
 from shm.watch.mistaken_modes import repeated_mistakes
 from shm.watch.quantities import MeasuredMode
-from shm.watch.watching import after
+from shm.watch.watching import next_alert
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.nouns import a_change
 
@@ -67,7 +68,7 @@ EIGHT: list[MeasuredMode] = [("transverse", order) for order in range(1, 9)]
 
 
 def test_tests_that_do_not_fit_the_baseline_are_one_notice_which_names_no_mode() -> None:
-    told, mistaken, alerts = AlertState(), (), []
+    told, mistaken, alerts = State(), (), []
     for number in range(8):
         each = misfitting(number)
         if number == 4:  # a further mode
@@ -76,7 +77,7 @@ def test_tests_that_do_not_fit_the_baseline_are_one_notice_which_names_no_mode()
             each = replace(each, modes=replace(each.modes, values=off))
         mistaken = repeated_mistakes(mistaken, each, EIGHT)
         test = replace(watched(number, 0), mistaken=mistaken)
-        told, alert = after(told, test, HANGER_3)
+        told, alert = next_alert(told, test, HANGER_3)
         alerts += [(number, alert)] if alert else []
     ((number, alert),) = alerts
     assert number == 2
@@ -93,12 +94,12 @@ def watched(number: int, tests: int) -> WatchedTest:
 
 def rung(wrong: str) -> list[int]:
     """In which tests a notice of the second mode came, `x` being those that have it wrong."""
-    told, mistaken, rings = AlertState(), (), []
+    told, mistaken, rings = State(), (), []
     for number, each in enumerate(wrong):
         mistaken = repeated_mistakes(mistaken, reading(number, f".{each}."), MODES)
         test = replace(watched(number, 0), mistaken=mistaken)
-        told, alert = after(told, test, HANGER_3)
-        told = AlertState.from_text(told.to_text())
+        told, alert = next_alert(told, test, HANGER_3)
+        told = State.from_text(told.to_text())
         rings += [number] if alert else []
     return rings
 
@@ -115,8 +116,8 @@ def test_it_is_given_again_once_the_mode_was_right_in_six_tests_in_a_row() -> No
 def test_a_further_mode_is_a_further_notice_that_names_it_alone() -> None:
     first = RepeatedMistake("transverse", 3, START, 5)
     other = RepeatedMistake("longitudinal", 1, START, 3)
-    _, alert = after(
-        AlertState(noted=frozenset({("transverse", 3)})),
+    _, alert = next_alert(
+        State(frozenset({Condition(CHECK_MODES, "transverse-3")})),
         replace(watched(6, 0), mistaken=(other, first)),
         HANGER_3,
     )
@@ -126,7 +127,7 @@ def test_a_further_mode_is_a_further_notice_that_names_it_alone() -> None:
 
 @pytest.mark.parametrize(("tests", "ends"), [(4, False), (1, True), (0, True)])
 def test_the_notice_ends_once_the_mode_fits_again(tests: int, ends: bool) -> None:
-    _, alert = after(AlertState(), watched(2, 3), HANGER_3)
+    _, alert = next_alert(State(), watched(2, 3), HANGER_3)
     assert alert is not None
     later = [watched(number, tests) for number in (3, 6)]
     assert not why_over(alert, later[:1], HANGER_3, gap_stands=lambda _: False)

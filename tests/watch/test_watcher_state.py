@@ -10,8 +10,8 @@ import pytest
 
 from shm.errors import BadInput, UsageError
 from shm.values import Reading, WatchedTest
+from shm.watch.history import History as Kept
 from shm.watch.options import WatchOptions
-from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watcher
 from tests.helpers.comparing import assert_same
 from tests.helpers.hangers import HANGER_3
@@ -44,12 +44,12 @@ def softened(given: Reading) -> Reading:
     return replace(given, modes=replace(given.modes, per_kelvin=per_kelvin))
 
 
-def by_kept_states(given: list[Reading]) -> tuple[WatchState, list[WatchedTest]]:
+def by_kept_states(given: list[Reading]) -> tuple[Kept, list[WatchedTest]]:
     """Each test of a watch that knows of the earlier ones by bytes alone."""
     state, begun = WATCHER.begin(given[: OPTIONS.baseline_tests])
-    tests = list(begun.tests)
+    tests = list(begun)
     for reading in given[OPTIONS.baseline_tests :]:
-        kept = WatchState.from_bytes(state.to_bytes())
+        kept = Kept.from_bytes(state.to_bytes())
         again = watcher(PLANES_ALONE, OPTIONS)
         state, found = again.after(kept, reading)
         tests.append(found)
@@ -70,11 +70,11 @@ def test_a_state_knows_how_far_it_has_come_and_what_was_told() -> None:
     given = readings(8)
     state, _ = by_kept_states(given)
 
-    kept = WatchState.from_bytes(replace(state, told='{"beyond": "Zürich"}').to_bytes())
+    kept = Kept.from_bytes(replace(state, conditions='{"beyond": "Zürich"}').to_bytes())
 
     assert kept.tests == 8
     assert kept.last_time == given[-1].time
-    assert kept.told == '{"beyond": "Zürich"}'
+    assert kept.conditions == '{"beyond": "Zürich"}'
 
 
 def test_the_key_goes_with_options_and_quantities_but_not_with_thresholds() -> None:
@@ -112,7 +112,7 @@ def test_a_state_of_another_watch_or_an_older_test_is_refused() -> None:
 @pytest.mark.parametrize("content", [b"", b"not a state", b"PK\x03\x04 broken"])
 def test_content_that_is_no_state_is_refused(content: bytes) -> None:
     with pytest.raises(BadInput, match="cannot be read"):
-        WatchState.from_bytes(content)
+        Kept.from_bytes(content)
 
 
 def test_a_state_cut_short_is_refused() -> None:
@@ -120,4 +120,4 @@ def test_a_state_cut_short_is_refused() -> None:
     content = state.to_bytes()
 
     with pytest.raises(BadInput, match="cannot be read"):
-        WatchState.from_bytes(content[: len(content) // 2])
+        Kept.from_bytes(content[: len(content) // 2])
