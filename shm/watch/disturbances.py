@@ -72,7 +72,7 @@ OF_HANGERS = (
     ),
     Disturbance("another clock or sensors", 0.01, common=0.1, each=0.05, is_error=True),
     Disturbance("another hanger", 0.01, tension=1.0, springs=10.0, each=0.0005, is_error=True),
-    Disturbance("gross", 0.001, common=1.0, each=0.05, is_error=True),
+    Disturbance("orders mistaken", 0.01, common=1.0, each=0.3, is_error=True),
 )
 OF_FREQUENCIES = (
     Disturbance("another clock or mode", 0.01, common=0.1, each=0.05, is_error=True),

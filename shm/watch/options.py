@@ -80,6 +80,11 @@ class WatchOptions:
         rows = {each.name: assumed[each.name].value for each in fields(cls) if each.name in assumed}
         return cls(**{**rows, **given})
 
+    @property
+    def checked_tests(self) -> int:
+        """How many tests of the baseline are checked against each other: none of two or one."""
+        return self.baseline_tests if self.baseline_tests > 2 else 0
+
     def __post_init__(self) -> None:
         if self.baseline_tests < 1:
             raise UsageError("The watch needs one baseline test at least.")
