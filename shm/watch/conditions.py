@@ -197,12 +197,15 @@ def _beyond(test: WatchedTest, level: float, *, is_call: bool) -> Iterator[Condi
 
 def _baseline(test: WatchedTest) -> Iterator[Condition]:
     """Yield that the baseline does not fit: a loss kept for a notice is silent for as long as
-    nobody looks, so that a shift of the tension that no load explains is beyond its threshold."""
+    nobody looks, so that a shift of the tension that no load explains is beyond its threshold,
+    where it is likelier the tension than anything else that changed if the baseline was sound."""
     if not test.change.is_baseline_alone:
         return
+    moved = {each.quantity: each.probability for each in test.change.moved}
     for drift in test.drifts:
         is_far = abs(drift.shift_mean) > max(NO_LOAD, drift.threshold)
-        if drift.quantity == TENSION and drift.is_clearly_beyond and is_far:
+        is_likeliest = moved.get(TENSION, 1.0) > 0.5
+        if drift.quantity == TENSION and drift.is_clearly_beyond and is_far and is_likeliest:
             yield Condition(BEYOND, TENSION, way_of(drift.shift_mean), improbable=True)
             return
     yield Condition(BASELINE)

@@ -238,7 +238,8 @@ class LinearModel:
         constant = np.linalg.slogdet(weight)[1] - np.einsum("tji,ti->tj", of_values, values)
         is_error = np.array([False, *(each.is_error for each in hypotheses.disturbances)])
         begins = np.flatnonzero(np.diff(visit, prepend=-1))
-        checked = begins[begins < self.options.checked_tests]
+        ends = np.append(begins[1:], history.tests)
+        checked = begins[ends <= self.options.baseline_tests]
         constant[np.ix_(checked, is_error)] += 2 * np.log(self.options.checked_errors)
         null = design.shape[3] - n - hypotheses.q
         return Sums(

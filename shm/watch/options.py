@@ -61,7 +61,7 @@ class WatchOptions:
     baseline_tests: int = 1
     sizes: tuple[float, ...] = (1.0, 6.0, 36.0, 216.0)
     size_shares: tuple[float, ...] = (0.9, 0.09, 0.009, 0.001)
-    checked_errors: float = 0.002
+    checked_errors: float = 0.006
     share_visits: float = 20.0
     scatter_prior_tests: float = 6.0
     scatter_up_to_sds: float = 3.0
@@ -79,11 +79,6 @@ class WatchOptions:
         """Return options with what is assumed of a hanger, but for those that are given."""
         rows = {each.name: assumed[each.name].value for each in fields(cls) if each.name in assumed}
         return cls(**{**rows, **given})
-
-    @property
-    def checked_tests(self) -> int:
-        """How many tests of the baseline are checked against each other: none of two or one."""
-        return self.baseline_tests if self.baseline_tests > 2 else 0
 
     def __post_init__(self) -> None:
         if self.baseline_tests < 1:
