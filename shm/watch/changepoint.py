@@ -174,17 +174,24 @@ class ChangePoint:
     # ------------------------------------------------------------ no change
 
     def fit_null(self, sums: Sums, known: FloatArray) -> Fit:
-        """Return the best fit without a change of several beginnings: the labels found before; the
-        last one to three visits, or the first, disturbed in each way."""
+        """Return the best fit without a change of several beginnings: the labels found before;
+        the last one to three visits, or the first, disturbed; all but the first or the last."""
         prior = np.tile(self._counts / self._counts.sum(), (sums.visits, 1))
         before = prior.copy()
         before[: len(known)] = known[: sums.visits]
         starts = [before, prior]
-        for label in range(1, len(self._counts)):
+        # A visit that says nothing finds its own label; what recurs is found from itself alone.
+        widest = len(self._counts) - 1
+        recurring = [n for n, each in enumerate(self.hypotheses.disturbances, 1) if each.recurs]
+        for label in (widest, *recurring):
             for visits in (slice(-1, None), slice(-2, None), slice(-3, None), slice(0, 1)):
                 start = before.copy()
                 start[visits] = self._surely(label)
                 starts.append(start)
+        for trusted in (0, -1):
+            start = np.tile(self._surely(widest), (sums.visits, 1))
+            start[trusted] = self._surely(0)
+            starts.append(start)
         return _climb(sums, None, np.array(starts), self._counts, 1 + self.options.rounds)
 
     def _log_null(self, sums: Sums, null: Fit) -> float:
@@ -438,7 +445,8 @@ def _climb(
     counts: FloatArray,
     rounds: int,
 ) -> Fit:
-    """Return the best fit from several beginnings (S, visits, J) of the labels.
+    """Return the best fit from several beginnings (S, visits, J) of the labels, with the evidence of
+    all that end in other labels: each is a bound over its own.
 
     A `change` is its factor (n + q, r) and by how much it has come at each test (T,). `counts` (J,)
     are the prior's of labels.
@@ -459,7 +467,9 @@ def _climb(
     bound += (np.linalg.slogdet(sums.precision)[1] - np.linalg.slogdet(matrix)[1]) / 2
     bound += _entropy(labels).sum(axis=1) + _log_dirichlet(counts, labels.sum(axis=1))
     best = int(bound.argmax())
-    return Fit(float(bound[best]), labels[best], mean[best], covariance[best])
+    apart = np.unique(labels.argmax(axis=2), axis=0, return_inverse=True)[1].ravel()
+    each = [float(bound[apart == one].max()) for one in range(int(apart.max()) + 1)]
+    return Fit(log_sum(np.array(each)), labels[best], mean[best], covariance[best])
 
 
 def _traces(moments: FloatArray, blocks: FloatArray) -> FloatArray:

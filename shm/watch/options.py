@@ -61,7 +61,7 @@ class WatchOptions:
     baseline_tests: int = 1
     sizes: tuple[float, ...] = (1.0, 6.0, 36.0, 216.0)
     size_shares: tuple[float, ...] = (0.9, 0.09, 0.009, 0.001)
-    checked_errors: float = 0.006
+    checked_errors: float = 0.12
     share_visits: float = 20.0
     scatter_prior_tests: float = 6.0
     scatter_up_to_sds: float = 3.0
