@@ -121,6 +121,11 @@ class ChangePoint:
         shares = np.array([each.share for each in self.hypotheses.disturbances])
         return self.options.share_visits * np.append(1 - shares.sum(), shares)
 
+    @cached_property
+    def _is_error(self) -> BoolArray:
+        """Which labels (J,) are errors of the measurement."""
+        return np.array([False, *(each.is_error for each in self.hypotheses.disturbances)])
+
     def _surely(self, label: int) -> FloatArray:
         """Return labels (J,) that are sure: a hundredth of a sound one would outweigh all others,
         for its errors are a thousandth of a disturbance's."""
@@ -153,9 +158,11 @@ class ChangePoint:
             stayed = self._log_null(sums, null) - null.log_evidence
             waited, log_mass = waited - stayed, log_mass - stayed
             for place in self._to_refine(log_mass):
-                fits[place] = fit = self._refine(sums, beginnings, place, screens)
+                fit = self._refine(sums, beginnings, place, screens)
                 refined = fit.log_evidence + self._log_prior(place) + waited[place[0]]
-                log_mass[place] = max(log_mass[place], refined)
+                before = fit.labels[: sums.visit[beginnings[place[0]]], ~self._is_error]
+                if before.sum() > 0.5 and refined > log_mass[place]:
+                    fits[place], log_mass[place] = fit, refined
         changes = []
         for place in _largest(log_mass, self.options.leading):
             if place not in fits:
@@ -224,8 +231,7 @@ class ChangePoint:
         """
         sound = np.zeros_like(labels)
         sound[:, 0] = 1.0
-        errors = [False, *(each.is_error for each in self.hypotheses.disturbances)]
-        is_error = labels[:, errors].sum(axis=1, keepdims=True) > 0.5
+        is_error = labels[:, self._is_error].sum(axis=1, keepdims=True) > 0.5
         chosen = [(labels, sound)]
         if is_error.any():
             chosen.append((labels, np.where(is_error, labels, sound)))
@@ -267,6 +273,8 @@ class ChangePoint:
         own_pull = [pulls[0][:, change], (pulls[1] - start[..., 0] * pulls[0])[:, change]]
         moments = tuple(zip(own, crossed, own_pull, strict=True))
         gains = self._gains(covariance, mean, moments)
+        # What follows on errors alone is no change: nothing is known of before.
+        bound[_until(before[:, ~self._is_error].sum(axis=1))[at_visit] < 0.5] = -np.inf
         found = bound[:, None, None, None] + gains
         return Screen(found, before, since, at_visit, total, pull, moments)
 

@@ -156,6 +156,12 @@ class Summary:
         """Return the weighed changes in some directions."""
         return [each for each in self.evidence.changes if part[each.place[2]]]
 
+    def _has_sound_baseline(self, change: Weighed) -> bool:
+        """Return whether one visit of the baseline at least is sound if this has changed: else
+        nothing is known of how far it is from there."""
+        visits = self.history.visit[: self.options.baseline_tests]
+        return bool((change.fit.labels[visits, 0] > 0.5).any())
+
     def _company(self, name: str, part: BoolArray) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return what moves with a name in its most probable direction; and what does as well
         without it, but for what only adds to another such."""
@@ -195,7 +201,8 @@ class Summary:
                 beyond = beyond + self.probability * self._beyond(anything, j, threshold)
             own = none
             if not self._has_called:
-                own = self._draw(self._changes_of(self._part(quantity.name)))
+                changes = self._changes_of(self._part(quantity.name))
+                own = self._draw([each for each in changes if self._has_sound_baseline(each)])
             if self._has_called and self._has_changes:
                 is_changed = np.arange(len(none.shift)) < self.probability * len(none.shift)
                 shift = np.where(is_changed, anything.shift[:, j], none.shift[:, j])
