@@ -149,9 +149,13 @@ class Watcher:
         return history, found
 
     def _outlier_probability(self, evidence: Evidence, probability: float) -> float:
-        """Return the probability that the last visit is disturbed so that it is to be repeated."""
-        is_odd = [False, *(not each.passes for each in self.hypotheses.disturbances)]
-        found = float(evidence.null.labels[-1, is_odd].sum())
+        """Return the probability that the last visit is disturbed so that it is to be repeated:
+        so that it does not pass, or at all while no visit is sound."""
+        labels = evidence.null.labels
+        is_any_sound = bool((labels[:, 0] > 0.5).any())
+        passes = [each.passes and is_any_sound for each in self.hypotheses.disturbances]
+        is_odd = ~np.array([True, *passes])
+        found = float(labels[-1, is_odd].sum())
         if not (evidence.is_open and evidence.changes):
             return found
         changed = float(evidence.changes[0].fit.labels[-1, is_odd].sum())
