@@ -453,8 +453,8 @@ def _climb(
     counts: FloatArray,
     rounds: int,
 ) -> Fit:
-    """Return the best fit from several beginnings (S, visits, J) of the labels, with the evidence of
-    all that end in other labels: each is a bound over its own.
+    """Return the best fit from several beginnings (S, visits, J) of the labels, with the evidence
+    of all that end in other labels: each is a bound over its own.
 
     A `change` is its factor (n + q, r) and by how much it has come at each test (T,). `counts` (J,)
     are the prior's of labels.
