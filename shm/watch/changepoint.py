@@ -203,22 +203,23 @@ class ChangePoint:
 
     def _log_null(self, sums: Sums, null: Fit) -> float:
         """Return the log evidence of no change, with that of disturbances which were still there
-        at the last visit."""
+        at the last visit: they came as often as this hanger's do, up to `spell_visits` ago."""
         found, last = [null.log_evidence], sums.visits - 1
-        begins = np.flatnonzero(sums.visit == last - 1)
-        if last < 2:
-            return null.log_evidence
-        labels = null.labels.copy()
-        labels[-2:] = self._surely(0)
-        for each in self.hypotheses.disturbances:
-            if not each.stays:
-                continue
-            factor = each.factor(self.hypotheses.quantities, self.hypotheses.loosening)
-            prior = math.log(each.share * each.stays / len(begins))
-            for begin in begins.tolist():
-                change = factor, np.where(np.arange(len(sums.years)) >= begin, 1.0, 0.0)
-                fit = _climb(sums, change, labels[None], self._counts, self.options.rounds)
-                found.append(fit.log_evidence + prior)
+        for visits in range(1, min(self.options.spell_visits, last)):
+            begins = np.flatnonzero(sums.visit == last - visits)
+            labels = null.labels.copy()
+            labels[-visits - 1 :] = self._surely(0)
+            seen = self._counts + labels[: -visits - 1].sum(axis=0)
+            share = seen / seen.sum()
+            for label, each in enumerate(self.hypotheses.disturbances, 1):
+                if not each.stays:
+                    continue
+                factor = each.factor(self.hypotheses.quantities, self.hypotheses.loosening)
+                prior = math.log(share[label] * each.stays**visits / len(begins))
+                for begin in begins.tolist():
+                    change = factor, np.where(np.arange(len(sums.years)) >= begin, 1.0, 0.0)
+                    fit = _climb(sums, change, labels[None], self._counts, self.options.rounds)
+                    found.append(fit.log_evidence + prior)
         return log_sum(np.array(found))
 
     # ------------------------------------------------------------ changes
@@ -453,8 +454,8 @@ def _climb(
     counts: FloatArray,
     rounds: int,
 ) -> Fit:
-    """Return the best fit from several beginnings (S, visits, J) of the labels, with the evidence of
-    all that end in other labels: each is a bound over its own.
+    """Return the best fit from several beginnings (S, visits, J) of the labels, with the evidence
+    of all that end in other labels: each is a bound over its own.
 
     A `change` is its factor (n + q, r) and by how much it has come at each test (T,). `counts` (J,)
     are the prior's of labels.

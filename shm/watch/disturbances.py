@@ -68,7 +68,7 @@ OF_HANGERS = (
         "a joint gives", 0.06, springs=1.0, each=0.0005, recurs=3.0, stays=0.3, passes=True
     ),
     Disturbance(
-        "a load beside the hanger", 0.03, tension=0.05, each=0.0005, stays=0.3, passes=True
+        "a load beside the hanger", 0.03, tension=0.05, each=0.0005, stays=0.08, passes=True
     ),
     Disturbance("another clock or sensors", 0.01, common=0.1, each=0.05, is_error=True),
     Disturbance("another hanger", 0.01, tension=0.2, springs=10.0, each=0.0005, is_error=True),

@@ -31,6 +31,7 @@ class WatchOptions:
       missed, what nobody can miss, and what only a mistake that stays does.
     - `checked_errors`: of errors of the measurement so few pass the check of a baseline.
     - `share_visits`: so many visits say as much of how often each disturbance comes as its table.
+    - `spell_visits`: so many visits at most may one disturbance last, as a windy fortnight.
     - `least_frequency_shift`: a change that moves no plane's first frequency, nor its mean, by more
       is not detected.
     - `scatter_prior_tests`: so many tests say as much of the scatter as what is assumed; of a
@@ -63,6 +64,7 @@ class WatchOptions:
     size_shares: tuple[float, ...] = (0.9, 0.09, 0.009, 0.001)
     checked_errors: float = 0.12
     share_visits: float = 20.0
+    spell_visits: int = 3
     scatter_prior_tests: float = 6.0
     scatter_up_to_sds: float = 3.0
     change_from_sds: float = 6.0
