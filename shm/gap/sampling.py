@@ -50,14 +50,12 @@ class SamplingOptions:
     `population` drawn again, `draws_a_part` at least; with shares of the `prior` (more of it
     `prior_at_first`) and of the `first` mixture, which has peaks at several `widths`, those within
     `far_below` of the best log density (peaks `lobes_apart` standard deviations away are other
-    lobes, if the logs of their volumes differ by less than `lobes_unlike`), and `without` of it
-    where the posterior without the last effects is, by `clusters_without` parts. Of `wide_every`
-    rounds one or two do without a
-    surrogate; of the others' `candidates` a round is kept, each with a chance of `least_kept` or
-    more, found by `halvings`. The surrogate's fit has a
-    `least_weight` for all points and a `ridge`, and leaves out errors of a smaller share than
-    `least_of_errors`. Linear parameters are followed `most_settled` times
-    at most.
+    lobes), and `without` of it where the posterior without the last effects is, by
+    `clusters_without` parts. Of `wide_every` rounds one or two do without a surrogate; of the
+    others' `candidates` a round is kept, each with a chance of `least_kept` or more, found by
+    `halvings`. The surrogate's fit has a `least_weight` for all points and a `ridge`, and leaves
+    out errors of a smaller share than `least_of_errors`. Linear parameters are followed
+    `most_settled` times at most.
     """
 
     round: int = 150
@@ -70,7 +68,6 @@ class SamplingOptions:
     widths: tuple[float, ...] = (1.0, 2.0)
     far_below: float = 10.0
     lobes_apart: float = 8.0
-    lobes_unlike: float = 1.0
     without: float = 0.4
     clusters_without: int = 3
     wide_every: int = 4
@@ -105,15 +102,12 @@ class _Collapsed:
     """
 
     def __init__(self, target: Target, peaks: Sequence[Peak]):
-        peaks = _near_best(peaks)
+        peaks = _choose_near_best(peaks)
         self.target, self.dimension = target, len(target.other)
         self.residual, self.slopes = target.view(peaks[0].z)
         self.linear = Linear(target.likelihood, self.slopes[:, target.linear])
         self._peaks = np.array([peak.z for peak in peaks])
-        self._normals = [
-            Normal(peak.z[target.other], peak.covariance[np.ix_(target.other, target.other)])
-            for peak in peaks
-        ]
+        self._normals = [_normal_of(peak, target.other) for peak in peaks]
         # How the linear parameters follow the others, at each peak.
         self._follow = np.array(
             [
@@ -128,8 +122,7 @@ class _Collapsed:
     def along(self, w: FloatArray) -> FloatArray:
         """Return points (n, d) with others w (n, o), linear parameters as at the nearest peak."""
         target = self.target
-        apart = [(normal.whiten(w) ** 2).sum(axis=1) for normal in self._normals]
-        near = np.argmin(apart, axis=0)
+        near = _find_nearest(self._normals, w)
         z: FloatArray = self._peaks[near]
         away = (w - z[:, target.other])[:, None]
         moved = z[:, target.linear] + (away @ self._follow[near])[:, 0]
@@ -285,25 +278,18 @@ class _Surrogate:
 
 
 class _Lobes:
-    """The parts of a posterior that lie apart, each with its peak, the best first.
+    """Hold the parts of a posterior that lie apart, each with its peak, the best first.
 
     A place and its mirror image are two. They are alike but for size and shape, so that draws of
     the best one, and its share, tell those of the others by normal distributions on the peaks.
     """
 
     def __init__(self, target: Target, peaks: Sequence[Peak]):
-        self._other = target.other
         self.peaks: list[Peak] = []
         self._normals: list[Normal] = []
-        for peak in peaks:
-            own = np.ix_(self._other, self._other)
-            normal = Normal(peak.z[self._other], peak.covariance[own])
-            is_apart = all(_apart(normal, each) > _HOW.lobes_apart for each in self._normals)
-            volume = [each.log_evidence - each.log for each in (peak, peaks[0])]
-            is_alike = abs(volume[0] - volume[1]) < _HOW.lobes_unlike
-            if peak is peaks[0] or (
-                is_apart and is_alike and peak.log > peaks[0].log - _HOW.far_below
-            ):
+        for peak in _choose_near_best(peaks):
+            normal = _normal_of(peak, target.other)
+            if all(_measure_distance(normal, each) > _HOW.lobes_apart for each in self._normals):
                 self.peaks.append(peak)
                 self._normals.append(normal)
         self._log = np.array([peak.log_evidence for peak in self.peaks])
@@ -315,8 +301,7 @@ class _Lobes:
 
     def nearest(self, w: FloatArray) -> IntArray:
         """Return the lobe (n,) that others w (n, o) are nearest to, from 0."""
-        square = [(normal.whiten(w) ** 2).sum(axis=1) for normal in self._normals]
-        return np.asarray(np.argmin(square, axis=0))
+        return _find_nearest(self._normals, w)
 
     def spread(self, z: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return draws z (n, d) of the best lobe with their share of them moved to each other."""
@@ -329,8 +314,19 @@ class _Lobes:
         return moved
 
 
-def _apart(one: Normal, other: Normal) -> float:
-    """Return how far two centres are, in standard deviations of the nearer."""
+def _normal_of(peak: Peak, columns: IntArray) -> Normal:
+    """Return the normal distribution on a peak, of some of its columns."""
+    return Normal(peak.z[columns], peak.covariance[np.ix_(columns, columns)])
+
+
+def _find_nearest(normals: Sequence[Normal], w: FloatArray) -> IntArray:
+    """Return the index (n,) of the centre nearest to w (n, o), in standard deviations of each."""
+    square = [(normal.whiten(w) ** 2).sum(axis=1) for normal in normals]
+    return np.asarray(np.argmin(square, axis=0))
+
+
+def _measure_distance(one: Normal, other: Normal) -> float:
+    """Return the distance of two centres in standard deviations, the shorter of both views."""
     return min(
         float(np.linalg.norm(one.whiten(other.mean))), float(np.linalg.norm(other.whiten(one.mean)))
     )
@@ -463,7 +459,7 @@ def approximate(
     return _fit(_Collapsed(target, peaks), peaks, found, log_evidence, nan, "normal")
 
 
-def _near_best(peaks: Sequence[Peak]) -> list[Peak]:
+def _choose_near_best(peaks: Sequence[Peak]) -> list[Peak]:
     """Return the peaks that have a share of the posterior."""
     return [each for each in peaks if each.log > peaks[0].log - _HOW.far_below]
 
@@ -476,7 +472,7 @@ def _parts(
     Of an effect that these data hardly show all small sizes are as likely.
     """
     other = target.other
-    near = _near_best(peaks)
+    near = _choose_near_best(peaks)
     parts = [
         Normal(each.z[other], width**2 * each.covariance[np.ix_(other, other)])
         for each in near
