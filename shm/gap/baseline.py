@@ -62,9 +62,9 @@ def choose_baseline(
 
 
 def find_richer(problem: GapProblem, hypothesis: Hypothesis) -> GapProblem | None:
-    """Return the problem of a beam that has effects of a hypothesis itself, the more the better.
+    """Return the problem of the beam that has most effects of a hypothesis as its own parameters.
 
-    It has what the beam of `problem` has, too; None where no beam has any of them.
+    It has those of the beam of `problem`, too. None where no beam has any effect more.
     """
     effects, own = {name for name, _ in hypothesis.effects}, set(problem.has_itself)
     best, most = None, 0

@@ -142,15 +142,15 @@ def _search(
     check_hold_out(whole, options.hold_out)
     doubts = _of_another(found.tests, hanger)
 
-    def until_found(label: str, done: float) -> None:
+    def report(label: str, done: float) -> None:
         progress(label, _ATTRIBUTION * done)
 
-    clear = exclude_gross_errors(whole, options, rng, until_found)
+    clear = exclude_gross_errors(whole, options, rng, report)
     leading = clear.attribution.leading
     if leading is not None and not options.baseline:
         richer = find_richer(whole, leading.best.hypothesis)
         if richer is not None:
-            clear = exclude_gross_errors(richer, options, rng, until_found)
+            clear = exclude_gross_errors(richer, options, rng, report)
     orders = doubt_orders(clear.problem, clear.attribution)
     refuse_misfit(clear.problem, clear.attribution, (*orders, *found.other_unit, *doubts))
     return replace(found, remarks=(*found.remarks, *orders)), doubts, clear
@@ -245,7 +245,7 @@ def _cause(problem: GapProblem, explanation: Explanation) -> Cause:
         method=best.method,
         group=explanation.group,
         also_at=(
-            *(_other_places(problem, best.posterior) if best.posterior else ()),
+            *(_list_other_places(problem, best.posterior) if best.posterior else ()),
             *(
                 each.hypothesis.at
                 for each in explanation.variants
@@ -269,7 +269,7 @@ def _estimates(problem: GapProblem, fit: Fit) -> tuple[EffectEstimate, ...]:
     )
 
 
-def _other_places(problem: GapProblem, fit: Fit) -> tuple[str, ...]:
+def _list_other_places(problem: GapProblem, fit: Fit) -> tuple[str, ...]:
     """Return where else along the hanger a local effect is about as likely."""
     coordinates = problem.coordinates(fit.hypothesis)
     values = coordinates.effect_values(fit.draws)

@@ -33,7 +33,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class CheckedStore:
-    """What every table holds, and what is wrong with the file, its references and its schema."""
+    """Hold the content of every table, and the faults of file, references and schema."""
 
     tables: tuple[TableContent, ...]
     faults: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""Which tests count: a person accepts or excludes them, or has them done again.
+"""Decide which tests count: a person accepts or excludes them, or has them done again.
 
 Nothing is deleted: raw file, test and results stay, and each decision can be taken back.
 """
@@ -65,12 +65,12 @@ class Dispositions(Repository):
     """The part of `Recordings` by which people decide what counts."""
 
     def list_holds(self, hanger: int | None = None) -> tuple[Hold, ...]:
-        """What nobody has decided on yet, the oldest first; of one hanger where named."""
+        """Return the holds that nobody has decided on, the oldest first; of one hanger if named."""
         with self.reading() as connection:
             return open_holds(connection, hanger)
 
     def latest_hold(self, recording_id: int) -> Hold | None:
-        """Why a recording is or was last held, and what a person made of it."""
+        """Return the last hold of a recording with its reason and decision, None if it had none."""
         with self.reading() as connection:
             return latest_hold(connection, recording_id)
 
@@ -258,7 +258,7 @@ def _chosen(
 
 def _end_or_advance(connection: Connection, recording: Row[Any], hold: Hold, at: datetime) -> None:
     """End a recording of which a decision left no test; else move it on without that test."""
-    if connection.scalar(_left(recording.id)):
+    if connection.scalar(_count_left(recording.id)):
         still_held = sa.update(recordings).where(
             recordings.c.id == recording.id, recordings.c.stage == Stage.HELD
         )
@@ -269,8 +269,8 @@ def _end_or_advance(connection: Connection, recording: Row[Any], hold: Hold, at:
         end_recording(connection, recording.id, reason, at)
 
 
-def _left(recording_id: int) -> sa.Select[Any]:
-    """How many tests of a recording count or are held."""
+def _count_left(recording_id: int) -> sa.Select[Any]:
+    """Return the query for the number of tests of a recording that count or are held."""
     own = (tests.c.recording_id == recording_id) & in_force(tests)
     return sa.select(sa.func.count()).where(own, tests.c.stage != Stage.REFUSED)
 
@@ -319,7 +319,7 @@ def _decide(
 
 
 def _weighed(connection: Connection, chosen: Sequence[Row[Any]]) -> bool:
-    """Whether the tension was read at one of the tests, which taught later ones."""
+    """Return True where the tension was read at one of the tests: later ones learnt from it."""
     query = sa.select(tests.c.id).where(tests.c.id.in_([row.id for row in chosen]), WEIGHED)
     return connection.execute(query).first() is not None
 

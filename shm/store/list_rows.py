@@ -117,7 +117,7 @@ class Standing:
 
 @dataclass(frozen=True)
 class Deaths:
-    """How many processes died at a recording since it last moved on, and when the last one did."""
+    """Count the processes that died at a recording since it last moved on, the last `last_at`."""
 
     count: int
     last_at: datetime

@@ -232,7 +232,7 @@ def baseline_in_force(hanger: int) -> sa.Select[Any]:
 def among(
     hanger: sa.ColumnElement[int], hangers: Sequence[Hanger] | None
 ) -> sa.ColumnElement[bool]:
-    """Which rows are of `hangers`, or of any where None."""
+    """Return the condition that a row is of one of `hangers`, or of any where None."""
     return sa.true() if hangers is None else hanger.in_([each.id for each in hangers])
 
 

@@ -248,7 +248,7 @@ class Streams(Repository):
             connection.execute(sa.delete(days).where(*later))
 
     def watch_state(self, hanger: int) -> bytes | None:
-        """What the watch of a hanger goes on from; None where there is nothing."""
+        """Return the kept state of the watch of a hanger's sensors, None where there is none."""
         content: bytes | None = self.scalar(
             sa.select(stream_watch.c.content).where(stream_watch.c.hanger == hanger)
         )

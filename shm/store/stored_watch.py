@@ -224,7 +224,7 @@ class Watch(WatchedAgain):
         return self._watches(ids)
 
     def latest(self, hangers: Sequence[Hanger] | None = None) -> dict[int, StoredWatch]:
-        """What the watch says of the latest test of each hanger (or these) against its baseline."""
+        """Return the watch of the latest test of each hanger (or these) against its baseline."""
         held = baselines.alias()
         latest = (
             sa.select(watches.c.id)

@@ -337,6 +337,6 @@ def _described(document: str) -> Mapping[str, Any] | None:
 
 @lru_cache(_NUMBERS_HELD)
 def _check(document: str) -> BaselineCheck | None:
-    """What was found of the baseline's tests."""
+    """Return the check of the baseline's tests."""
     found = loads(document).get("baseline_check")
     return None if found is None else value_of(BaselineCheck, found)

@@ -1,4 +1,4 @@
-"""What keeps the store in order: tokens, copies of raw files, backups."""
+"""Keep the store in order: tokens, copies of raw files, backups."""
 
 from __future__ import annotations
 

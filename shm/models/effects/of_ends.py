@@ -171,14 +171,14 @@ class EffectiveLength(Effect):
             bar,
             deck_end_m=bar.deck_end_m + deck_m,
             arch_end_m=bar.arch_end_m + arch_m,
-            zones=tuple(_moved_with_ends(zone, bar, deck_m, arch_m) for zone in bar.zones),
+            zones=tuple(_move_with_ends(zone, bar, deck_m, arch_m) for zone in bar.zones),
         )
 
 
-def _moved_with_ends(
+def _move_with_ends(
     zone: Zone, bar: PhysicalHanger, deck_m: FloatArray, arch_m: FloatArray
 ) -> Zone:
-    """Return a zone that moves with the end that it reaches, with both if it reaches both."""
+    """Move a zone with the end that it reaches, with both if it reaches both."""
     near_m = 1e-9 * bar.length_m  # rounding
     at_deck = zone.start_m <= bar.deck_end_m + near_m
     at_arch = zone.end_m >= bar.arch_end_m - near_m
