@@ -350,7 +350,7 @@ def turn(bar: Bar, values: Values, scene: Scene) -> Bar:
 
 
 def clock_ranges(hanger: Hanger, where: Where) -> dict[str, Range]:
-    return {"clock_error": Range(1e-6, 0.05, 0.0, logarithmic=True, signed=True)}
+    return {"clock_error": Range(1e-6, 0.1, 0.0, logarithmic=True, signed=True)}
 
 
 def clock(bar: Bar, values: Values, scene: Scene) -> Bar:
