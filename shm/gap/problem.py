@@ -24,11 +24,12 @@ from shm.inference.described import DescribedCoordinates
 from shm.inference.likelihood import Likelihood
 from shm.inference.posterior import Peak
 from shm.inference.systematic_errors import (
-    errors_of_bar,
+    Ends,
+    errors_of_sensors,
     felt_by,
+    loads_of_ends,
     loads_of_radii,
     mean_of_ends,
-    shared_loads,
 )
 from shm.models import AsMade
 from shm.models.as_made import BENDING
@@ -252,11 +253,18 @@ class GapProblem:
         section = section_loads(design, alike, self.hanger)
         if not self.hanger.as_hanger:
             return section
-        frequency_hz = np.exp(self._predicted_near(design)[: design.frequencies])
-        shared = shared_loads(
-            self.hanger, design.frequency_plane, design.frequency_order, frequency_hz
+        ends = self._ends_of(design)
+        _, sensors = errors_of_sensors(self.hanger, felt_by(ends[0]), _sensor_places_m(self.design))
+        survey = np.column_stack([self.design.frequency_plane, self.design.frequency_order])
+        supports = loads_of_ends(
+            ends,
+            self.model.stiff_ends_m,
+            design.frequency_plane,
+            design.frequency_order,
+            self.hanger.assumptions,
+            np.unique(survey, axis=0),
         )
-        return np.hstack([section, shared])
+        return np.hstack([section, sensors, supports])
 
     @cached_property
     def _usual(self) -> FloatArray:
@@ -267,15 +275,20 @@ class GapProblem:
         found = np.zeros(design.size)
         if not self.hanger.as_hanger:
             return found
-        theta, plane = self.described.theta(self.near), design.frequency_plane
-        near = self._predicted((), theta, design, ShapeScaling.of(design, self.hanger.length_m))
-        frequency_hz = np.exp(near[:, : design.frequencies])
-        ends = self.model.end_waves(theta, frequency_hz, plane)
-        places = tuple(design.places_m[place] for place in np.unique(design.shape_place))
-        sensors, _ = errors_of_bar(self.hanger, design.frequency_order, felt_by(ends[0]), places)
+        ends = self._ends_of(design)
+        sensors, _ = errors_of_sensors(self.hanger, felt_by(ends[0]), _sensor_places_m(design))
         supports = mean_of_ends(ends, self.model.stiff_ends_m, self.hanger.assumptions)[0]
         found[: design.frequencies] = sensors + supports
         return found
+
+    def _ends_of(self, design: Design) -> Ends:
+        """Return the waves at the ends in the modes of a design, of the baseline near the data."""
+        theta, scaling = (
+            self.described.theta(self.near),
+            ShapeScaling.of(design, self.hanger.length_m),
+        )
+        frequency_hz = np.exp(self._predicted((), theta, design, scaling)[:, : design.frequencies])
+        return self.model.end_waves(theta, frequency_hz, design.frequency_plane)
 
     def sensors_of(self, design: Design) -> FloatArray:
         """What errors of sensors do to the shapes of a new design: loads (S, k)."""
@@ -401,3 +414,7 @@ class GapProblem:
         conditions = [design.conditions[test] for test in tests]
         orders, shapes = int(design.frequency_order.max()), len(design.shape_mode) > 0
         return zip(tests, composed.modes_of_tests(theta, conditions, orders, shapes), strict=True)
+
+
+def _sensor_places_m(design: Design) -> tuple[float, ...]:
+    return tuple(design.places_m[place] for place in np.unique(design.shape_place))

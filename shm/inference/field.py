@@ -32,10 +32,11 @@ from shm.inference.likelihood import Covariance, NoiseNode
 from shm.inference.measured import MeasuredFrequencies, conditions_of, predicted_hz
 from shm.inference.shapes import SHAPES, MeasuredShapes
 from shm.inference.systematic_errors import (
-    errors_of_bar,
+    errors_of_sensors,
     felt_by,
     loads_of_ends,
     loads_of_radii,
+    loads_of_section,
     mean_of_ends,
 )
 from shm.models import AsMade, Model
@@ -144,11 +145,12 @@ class FieldLikelihood(MeasuredFrequencies):
         measured = self.frequency_hz[None, : self.frequencies]
         ends = model.end_waves(theta[None], measured, self._plane)
         places = tuple(sorted({point.x_m for mode in self.modes for point in mode.shape}))
-        mean, loads = errors_of_bar(model.hanger, self._order + 1, felt_by(ends[0]), places)
+        mean, sensors = errors_of_sensors(model.hanger, felt_by(ends[0]), places)
+        section = loads_of_section(model.hanger, self._order + 1)
         of_ends = loads_of_ends(ends, model.stiff_ends_m, self._plane, self._order, self._assumed)
         masses = [each.added_mass for each in self._conditions]
         of_masses = loads_of_radii(masses, self._log_with_radius(model, theta), self._assumed)
-        loads = np.hstack([loads, of_ends, of_masses])
+        loads = np.hstack([sensors, section, of_ends, of_masses])
         smallest = self._assumed.model_error.lower
         least = max(self.identification_error[: self.frequencies].min(), smallest)
         left, size, _ = np.linalg.svd(loads, full_matrices=False)

@@ -22,9 +22,8 @@ from shm.values import AddedMass, FloatArray, Hanger, IntArray
 Ends: TypeAlias = tuple[EndWaves, EndWaves]
 """The deck's and the arch's."""
 
-# Numerical: 64 places within a person's reach are a tenth of a half wave apart at order 15; 5,
-# which make as many loads whatever the data, are two a half wave at order 6.
-_PLACES, _FEW_PLACES = 64, 5
+# Numerical: 16 places within a person's reach are a fifth of a half wave apart at order 10 of 7 m.
+_PLACES = 16
 
 # Numerical: left out is a thousandth of the section's scatter, or of the sensors' largest variance.
 _LEAST_SHARE = 1e-3
@@ -49,9 +48,12 @@ def loads_of_ends(
     plane: IntArray,
     order: IntArray,
     assumed: Assumptions = DEFAULTS,
+    modes: IntArray | None = None,
 ) -> FloatArray:
-    """Loads (F, k) of the same, of one parameter set: each end by itself, and what the first order
-    leaves of each mode.
+    """Return loads (F, k) of the same, of one parameter set: each end by itself, and what the first
+    order leaves of each mode.
+
+    `modes` (n, 2) are the planes and orders that have such a load, all that occur if not stated.
     """
     shares, loads, left = _by_plane(plane, assumed), [], []
     support, rigid = assumed.support_compliance_m_n, assumed.fitting_rigidity
@@ -66,25 +68,10 @@ def loads_of_ends(
             loads += [heavier.sd * weighed[:, None] * shares]
             left += [rigid.value * stiffened, heavier.value * weighed]
     mode = np.column_stack([plane, order])
-    same = (mode[:, None] == np.unique(mode, axis=0)).all(axis=2)
+    modes = np.unique(mode, axis=0) if modes is None else modes
+    same = (mode[:, None] == modes).all(axis=2)
     beyond = assumed.end_details_model_error.value * np.sqrt(np.square(left).sum(axis=0))
     return np.hstack([*loads, beyond[:, None] * same])
-
-
-def errors_of_bar(
-    hanger: Hanger,
-    order: IntArray,
-    felt: Callable[[FloatArray], FloatArray],
-    places_m: tuple[float, ...] = (),
-) -> tuple[FloatArray, FloatArray]:
-    """The mean (F,) of what sensors do to ln of frequencies of these orders (from 1), and the loads
-    (F, k) of sensors and section.
-
-    `felt` says of places in m what a sensor there that weighs as much as the bar does, (F, places);
-    `places_m` are the sensors' where they are known.
-    """
-    mean, sensor = _sensors(hanger, felt, places_m)
-    return mean, np.hstack([sensor, _section(hanger, order)])
 
 
 def felt_by(deck: EndWaves) -> Callable[[FloatArray], FloatArray]:
@@ -97,23 +84,6 @@ def felt_by(deck: EndWaves) -> Callable[[FloatArray], FloatArray]:
         return -(np.column_stack([deck.deflection(float(x))[0] for x in x_m]) ** 2)
 
     return felt
-
-
-def shared_loads(
-    hanger: Hanger, plane: IntArray, order: IntArray, frequency_hz: FloatArray
-) -> FloatArray:
-    """Loads (F, k) of sensors and of both supports together, about no such error, k whatever the
-    data are.
-
-    For a hypothesis among whose rivals a heavy sensor or a support that gives way are: the mean is
-    theirs to claim.
-    """
-    felt = _share(hanger) * _of_string(hanger, order, _within_reach_m(hanger, _FEW_PLACES))
-    assumed = hanger.assumptions
-    sensor = assumed.accelerometer_mass_kg.rms / np.sqrt(_FEW_PLACES) * felt
-    give_sd_m_n = assumed.support_compliance_m_n.sd
-    size = np.sqrt(2) * give_sd_m_n * _lowered(hanger, order, frequency_hz)
-    return np.hstack([sensor, -size[:, None] * _by_plane(plane, assumed)])
 
 
 def loads_of_radii(
@@ -138,11 +108,6 @@ def loads_of_radii(
     return np.asarray(np.where(own, change[:, None], 0.0))
 
 
-def _of_string(hanger: Hanger, order: IntArray, x_m: FloatArray) -> FloatArray:
-    """By which ln f of a pinned string changes by a mass as large as its own (F, places)."""
-    return np.asarray(-(np.sin(np.pi * np.outer(order, x_m / hanger.length_m)) ** 2))
-
-
 def _share(hanger: Hanger) -> float:
     """A kilogram as a share of the bar's mass; less where a usual sensor would be more than its
     share of a light bar.
@@ -161,14 +126,6 @@ def _within_reach_m(hanger: Hanger, count: int) -> FloatArray:
     return np.asarray(low + (high - low) * (np.arange(count) + 0.5) / count)
 
 
-def _lowered(hanger: Hanger, order: IntArray, frequency_hz: FloatArray) -> FloatArray:
-    """By which part a pinned bar's frequency falls per m/N that a support of its plane gives way:
-    4 m L f^2/n^2, its reaction being m omega^2/q of the amplitude.
-    """
-    mass_kg = hanger.mass_per_length_kg_m * hanger.length_m
-    return np.asarray(4 * mass_kg * (frequency_hz / order) ** 2)
-
-
 def _by_plane(plane: IntArray, assumed: Assumptions) -> FloatArray:
     """Shares (F, 3) of what the planes have in common and each for itself."""
     shared = assumed.end_details_shared.value
@@ -176,8 +133,8 @@ def _by_plane(plane: IntArray, assumed: Assumptions) -> FloatArray:
     return np.column_stack([np.sqrt(shared) * np.ones(len(plane)), own])
 
 
-def _section(hanger: Hanger, order: IntArray) -> FloatArray:
-    """Loads (F, orders) of a section that wanders along the bar about its mean.
+def loads_of_section(hanger: Hanger, order: IntArray) -> FloatArray:
+    """Return loads (F, orders) of a section that wanders along the bar about its mean.
 
     Of an area 1 + a(x), mode n changes by half of the mean of a(x) cos(2 n pi x/L) in a string, by
     up to 1.5 times it between clamped ends, and is taken to change by once it; the variance of the
@@ -192,17 +149,20 @@ def _section(hanger: Hanger, order: IntArray) -> FloatArray:
     return np.asarray((order[:, None] == distinct[kept]) * size[kept])
 
 
-def _sensors(
+def errors_of_sensors(
     hanger: Hanger, felt: Callable[[FloatArray], FloatArray], places_m: tuple[float, ...]
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean (F,) and loads (F, k) of the sensors' mass."""
+    """Return the mean (F,) of what the sensors' mass does to ln of frequencies, and loads (F, k).
+
+    `felt` says of places in m what a sensor there that weighs as much as the bar does, (F, places);
+    `places_m` are the sensors' where they are known. Where none is, one sensor is anywhere within
+    reach, at the same place in all tests. k depends on `places_m` alone.
+    """
     mass_kg = hanger.assumptions.accelerometer_mass_kg
     if places_m:
         each = _share(hanger) * felt(np.array(places_m))
         return mass_kg.value * each.sum(axis=1), np.asarray(mass_kg.sd * each)
     each = _share(hanger) * felt(_within_reach_m(hanger, _PLACES))
-    mean = mass_kg.value * each.mean(axis=1)
-    square = mass_kg.rms**2 * each @ each.T / _PLACES
-    variance, ways = np.linalg.eigh(square - np.outer(mean, mean))
-    kept = variance > _LEAST_SHARE * variance.max()
-    return mean, np.asarray(ways[:, kept] * np.sqrt(variance[kept]))
+    mean = each.mean(axis=1)
+    apart = np.hstack([mass_kg.value * (each - mean[:, None]), mass_kg.sd * each])
+    return mass_kg.value * mean, np.asarray(apart / np.sqrt(_PLACES))

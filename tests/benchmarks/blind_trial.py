@@ -26,7 +26,7 @@ import secrets
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,9 +98,22 @@ def make_hanger(plan: Plan, seed: int, folder: Path) -> Truth:
         other = world.sound_hangers(seed, plan.index + 1)[plan.index]
         other.write(folder)
         truth = {key: other.truth[key] for key in ("tension_n", "kind")}
-        truth |= {"causes": [], "inherent": {}}
+        truth |= {"causes": [], "inherent": find_warm_tension(other.truth)}
     accepted = sorted({name for each in truth["causes"] for name in each["accepted"]})
     return {"hanger": plan.name, "world": plan.world, "accepted": accepted, **truth}
+
+
+def find_warm_tension(truth: Mapping[str, Any]) -> Truth:
+    """Return by how many standard errors a sound hanger's tension is seen to follow temperature.
+
+    The tension of a spectral hanger does. As of a string: half of its change in each frequency.
+    """
+    tension_n = np.array(truth.get("test_tension_n", ()))
+    if len(tension_n) < 2:
+        return {}
+    change = (tension_n / tension_n.mean() - 1) / 2 / truth["frequency_sd"]
+    size = float(np.sqrt(sum(truth["modes"].values()) * np.sum(change**2)))
+    return {"temperature_tension": size} if size >= gapped_hangers.INHERENT else {}
 
 
 # ---------------------------------------------------------------- the seal

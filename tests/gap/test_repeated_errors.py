@@ -17,7 +17,7 @@ from shm.gap.repeated_errors import (
     section_loads,
     section_ways,
 )
-from shm.inference.systematic_errors import shared_loads
+from shm.inference.systematic_errors import errors_of_sensors, felt_by, loads_of_ends
 from shm.models.hanger import Zone, solve
 from shm.simulate import HangerState
 from shm.values import AddedMass, FloatArray
@@ -152,8 +152,12 @@ def test_a_bar_of_one_section_has_no_loads_but_those_of_sensors_and_supports() -
     theta = found.described.theta(found.near)
     bars = found.model.physical(np.repeat(theta, STRETCHES + 1, axis=0))
     assert not section_loads(design, bars, hanger).any()
+    plane, order = design.frequency_plane, design.frequency_order
     frequency_hz = np.exp(found.observations.value[: design.frequencies])
-    own = shared_loads(hanger, design.frequency_plane, design.frequency_order, frequency_hz)
+    ends = found.model.end_waves(theta, frequency_hz[None], plane)
+    places_m = tuple(design.places_m[place] for place in np.unique(design.shape_place))
+    _, sensors = errors_of_sensors(hanger, felt_by(ends[0]), places_m)
+    own = np.hstack([sensors, loads_of_ends(ends, (0.0, 0.0), plane, order)])
     np.testing.assert_allclose(found.repeated.frequency, own @ own.T, rtol=0.1, atol=1e-12)
 
 

@@ -12,7 +12,13 @@ from scipy.stats import t
 from shm.assumptions import DEFAULTS
 from shm.errors import BadInput
 from shm.inference.field import FieldLikelihood
-from shm.inference.systematic_errors import errors_of_bar, felt_by, loads_of_ends, mean_of_ends
+from shm.inference.systematic_errors import (
+    errors_of_sensors,
+    felt_by,
+    loads_of_ends,
+    loads_of_section,
+    mean_of_ends,
+)
 from shm.models import build
 from shm.models.base import Conditions
 from shm.values import NAN, PLANES, AddedMass, FloatArray, ModalTest, Mode, Plane
@@ -69,8 +75,9 @@ def brute_force(tests: list[ModalTest], nodes: int = 50) -> float:
     likelihood = FieldLikelihood(tests, MODEL)
     typical = likelihood._typical(MODEL)[None]
     ends = MODEL.end_waves(typical, seen[None], plane)
-    mean, loads = errors_of_bar(MODEL.hanger, order, felt_by(ends[0]))
-    loads = np.hstack([loads, loads_of_ends(ends, (0.0, 0.0), plane, order)])
+    mean, sensors = errors_of_sensors(MODEL.hanger, felt_by(ends[0]), ())
+    section = loads_of_section(MODEL.hanger, order)
+    loads = np.hstack([sensors, section, loads_of_ends(ends, (0.0, 0.0), plane, order)])
     mean = mean + mean_of_ends(MODEL.end_waves(THETA, exact[None], plane), (0.0, 0.0))[0]
     rest = np.log(seen / exact) - mean
     same = np.equal.outer(plane, plane)

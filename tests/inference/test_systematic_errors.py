@@ -11,11 +11,11 @@ import pytest
 from shm.assumptions import DEFAULTS
 from shm.gap.repeated_errors import STRETCHES, section_loads
 from shm.inference.systematic_errors import (
-    errors_of_bar,
+    errors_of_sensors,
     felt_by,
     loads_of_ends,
+    loads_of_section,
     mean_of_ends,
-    shared_loads,
 )
 from shm.models.end_effects import EndWaves
 from shm.models.hanger import PhysicalHanger, PointMass
@@ -59,7 +59,8 @@ def ends(hanger: Hanger) -> tuple[EndWaves, EndWaves]:
 
 def found(hanger: Hanger, places_m: tuple[float, ...] = ()) -> tuple[FloatArray, FloatArray]:
     """Mean and loads of one plane, of sensors and section."""
-    return errors_of_bar(hanger, ORDERS, felt_by(ends(hanger)[0]), places_m)
+    mean, loads = errors_of_sensors(hanger, felt_by(ends(hanger)[0]), places_m)
+    return mean, np.hstack([loads, loads_of_section(hanger, ORDERS)])
 
 
 @pytest.mark.parametrize("x_m", [0.9, 1.7, 3.1])
@@ -152,18 +153,21 @@ def test_a_section_that_wanders_moves_modes_as_much_as_the_general_models() -> N
     assert np.all(np.diff(size) < 0)
 
 
-def test_a_diagnosis_has_the_same_errors_about_none_whatever_its_data() -> None:
-    """Second moments of sensor and supports are kept: their mean is a rival's to claim."""
-    bare = frequencies_hz(pinned(SLIM), len(ORDERS))[0, 0]
-    plane = np.zeros(len(ORDERS), dtype=int)
-    loads = shared_loads(SLIM, plane, ORDERS, bare)
-    few = shared_loads(SLIM, plane[:2], ORDERS[:2], bare[:2])
-    np.testing.assert_allclose(few, loads[:2])
-    drawn = sensors_anywhere(SLIM)
-    whole_kg = SLIM.mass_per_length_kg_m * SLIM.length_m
-    give = np.sqrt(2) * GIVE.sd * 4 * whole_kg * (bare / ORDERS) ** 2
-    exact = (drawn**2).mean(axis=0) + give**2
-    np.testing.assert_allclose(np.diag(loads @ loads.T), exact, rtol=0.15)
+def test_loads_of_sensors_and_ends_have_the_same_columns_whatever_modes_are_asked_for() -> None:
+    """What two sets of modes have in common is the product of their loads."""
+    both, few = (np.array([[0, order] for order in ORDERS[:count]]) for count in (6, 2))
+    one, _ = ends(SLIM)
+    cut = replace(
+        one, **{name: getattr(one, name)[:, :2] for name in ("q", "p", "sin", "cos", "clamped")}
+    )
+    for places_m in ((), (0.9, 3.1)):
+        whole, part = (errors_of_sensors(SLIM, felt_by(each), places_m)[1] for each in (one, cut))
+        np.testing.assert_allclose(part, whole[:2])
+    whole, part = (
+        loads_of_ends((each, each), (0.0, 0.0), *modes.T, modes=both)
+        for each, modes in ((one, both), (cut, few))
+    )
+    np.testing.assert_allclose(part, whole[:2])
 
 
 def test_a_short_bar_has_its_sensor_not_beyond_its_middle() -> None:

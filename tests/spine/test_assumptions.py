@@ -21,7 +21,7 @@ from shm.gap.noise import nodes
 from shm.gap.observations import observed
 from shm.inference.field import FieldLikelihood
 from shm.inference.priors import SPRINGS, Ends, TensionPrior, reading_of
-from shm.inference.systematic_errors import errors_of_bar
+from shm.inference.systematic_errors import errors_of_sensors
 from shm.models import described
 from shm.models.effects import EFFECTS, Variant
 from shm.pipeline.lineage import redescribed
@@ -234,7 +234,7 @@ def largest_unstated_sd(hanger: Hanger) -> float:
 
 REACHED: dict[str, tuple[Hanger, float | tuple[float, float], Callable[[Hanger], float], float]] = {
     "accelerometer_mass_kg": (
-        HANGER_3, 0.1, lambda h: float(errors_of_bar(h, np.arange(1, 3), felt, (3.0,))[0][0]), 2.0,
+        HANGER_3, 0.1, lambda h: float(errors_of_sensors(h, felt, (3.0,))[0][0]), 2.0,
     ),
     "accelerometers_on_bar": (HANGER_3, 4.0, mounted_kg, 2.0),
     "unstated_frequency_sd": (HANGER_3, 6e-4, unstated_sd, 2.0),
