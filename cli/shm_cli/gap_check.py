@@ -13,7 +13,7 @@ import rich_click as click
 from rich.text import Text
 
 from shm.diagnosis_document import gap_check_document
-from shm.errors import BadInput, NothingThere
+from shm.errors import BadInput, NothingThere, UsageError
 from shm.gap.check import Check, CheckOptions
 from shm.report.figures.every_figure import gap_check_figures
 from shm.report.gap_check_report import HEADINGS, check_text, introduction, rows
@@ -104,7 +104,12 @@ def check(
             f"{figure} is no name of a picture.", remedy="Let it end in .svg or in .png."
         )
     tests, hanger = _measured(ctx, file, hanger_file, hanger_id, count)
-    chosen = tuple(name.strip() for name in effects.split(",")) if effects else ()
+    chosen = () if effects is None else tuple(name.strip() for name in effects.split(","))
+    if not all(chosen):
+        raise UsageError(
+            f"--effects {effects!r} names no effect, or has a comma too many.",
+            remedy="Name some of `shm gap effects`, say point_mass,timebase.",
+        )
     options = CheckOptions(chosen, baseline, seeds, sound, seed=seed)
     job = Check(tests, hanger, options)
     click.echo(_expected(job, processes), err=True)

@@ -73,8 +73,10 @@ class GapWatch:
         now = "no test since" if math.isnan(self.now_percent) else f"{self.now_percent:.2f} % now"
         grown = ", grown: diagnose it again" if self.has_grown else ""
         before = f"gap {_percent(made.gap_before_percent)} rms before adoption"
+        no_nearer = made.gap_percent >= made.gap_before_percent
+        doubt = "Doubtful, the model comes no nearer to the tests: " if no_nearer else ""
         return (
-            f"{made.baseline_model} with {made.effect} ({made.at}), adopted "
+            f"{doubt}{made.baseline_model} with {made.effect} ({made.at}), adopted "
             f"{self.adopted.adopted_at:%Y-%m-%d}: {before}, {_percent(made.gap_percent)} with it, "
             f"{now}{grown}."
         )

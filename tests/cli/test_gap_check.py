@@ -106,6 +106,7 @@ def test_check_takes_a_usual_test_where_none_is(
     ("more", "code", "said"),
     [
         (["--effects", "rust"], 2, "there is no effect rust"),
+        (["--effects", ""], 2, "names no effect"),
         (["--figure", "c.pdf"], 3, "no name of a picture"),
         (["--baseline", "beam9"], 2, "beam9"),
         (["--seeds", "0"], 2, "--seeds"),

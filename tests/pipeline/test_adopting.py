@@ -14,9 +14,9 @@ from shm.errors import BadInput, NothingThere, UsageError
 from shm.inference import UpdateOptions
 from shm.models import Model, build
 from shm.pipeline import adopting, steps
-from shm.pipeline.adopting import Wish, adopt, adopted_name, gap_watch
+from shm.pipeline.adopting import GapWatch, Wish, adopt, adopted_name, gap_watch
 from shm.pipeline.reporting import hanger_report
-from shm.store import Lineage, Store, StoredAdoption, Workspace
+from shm.store import Adoption, Lineage, Store, StoredAdoption, Workspace
 from shm.values import ModalTest, Posterior, PredictedFrequency
 from tests.helpers import quick_update
 from tests.helpers.diagnoses import MASS, WARMTH, a_diagnosis
@@ -344,6 +344,16 @@ def test_adopting_with_the_real_sampler_closes_the_gap(
     made = adopted(begun, "bending_stiffness", at=["everywhere"])
     assert made.adoption.model == STIFFNESS
     assert made.adoption.gap_percent < 0.05
+
+
+def test_an_effect_that_comes_no_nearer_to_the_tests_is_doubtful() -> None:
+    clamp = Adoption(3, MASS_MODEL, "beam1", "point_mass", "everywhere", "", "", 0.3, 0.1)
+    nearer, no_nearer = (
+        str(GapWatch(StoredAdoption(1, replace(clamp, gap_percent=gap), START), math.nan, False))
+        for gap in (0.1, 0.3)
+    )
+    assert "Doubtful" not in nearer
+    assert no_nearer.startswith("Doubtful, the model comes no nearer to the tests: beam1 with")
 
 
 def test_a_workspace_with_the_adoption_ingests_with_any_executor(tmp_path: Any) -> None:
