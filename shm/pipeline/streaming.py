@@ -14,7 +14,7 @@ import logging
 from collections import defaultdict, deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from queue import SimpleQueue
@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING, Any
 from shm.documents import format_time
 from shm.errors import ShmError, StoreError
 from shm.pipeline import Clock, utc_now
-from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day, is_told_already
+from shm.pipeline.reconcile import Condition, is_same_event, reconcile
+from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day
 from shm.pipeline.unheard import (
     compare_thermometers,
     heed_silences,
@@ -31,7 +32,7 @@ from shm.pipeline.unheard import (
     list_unread,
     note_blindness,
 )
-from shm.store import Store, Workspace
+from shm.store import Reconciled, Store, Workspace
 from shm.store.archive import nothing
 from shm.store.ring import ring_of
 from shm.store.ring_files import PERIOD
@@ -61,6 +62,7 @@ _HEED = timedelta(minutes=10)  # technical: silences are told by the day
 _LOOKED_BACK = timedelta(days=10)
 """Judgement: for what was noticed as a change began; what is told later is a slow one."""
 
+_OVER = "the sensors do not show it any more"
 _EVER = datetime.min.replace(tzinfo=UTC)
 
 log = logging.getLogger(__name__)
@@ -392,29 +394,39 @@ class Streaming:
 
     def _keep_pooled(self, stream: Stream, period: Period, start: datetime, found: Pooled) -> None:
         self._pooled[stream.name, period] = end = start + PERIODS[period]
+        settled = self._settled.get(stream.name, _EVER)
         for event in found.events:
             self.store.streams.save_event(event)
         if found.reading is None:
             return
         if found.test is not None:
             hand_on_day(self.workspace, self.store, found.test, self.clock())
-        is_told = found.alert is None
         if found.alert is not None:
-            again = end <= self._settled.get(stream.name, _EVER)
-            is_told = is_told_already(self.store, found.alert, of_stream=again)
             why = f"alert {found.alert.key}"
             self.ring.keep(stream.name, end - _KEPT_BEFORE_ALERT, end, why)
         hooks = [hook.name for hook in self.workspace.bridge.hooks]
-        raised = self.store.streams.save_pooled(
-            found.reading,
-            found.kept or None,
-            None if is_told else found.alert,
-            hooks,
-            self.clock(),
-            found.ended,
-        )
-        if raised is not None:
+        changes = self._reconciled(stream.hanger, found, is_again=end <= settled)
+        kept = found.kept or None
+        for raised in self.store.streams.save_pooled(
+            found.reading, kept, changes, hooks, self.clock()
+        ):
             log.warning("alert %s: %s", raised.alert.key, raised.alert.message)
+
+    def _reconciled(self, hanger: int, found: Pooled, *, is_again: bool) -> Reconciled:
+        """Return which alerts an hour opens and closes; where hours are gone over again, none that
+        they have raised before others of them came late."""
+        if found.alert is None and not found.ended:
+            return Reconciled()
+        alerts = self.store.alerts.list_all(hanger)
+        is_open = [each for each in alerts if each.resolution is None]
+        known = [each for each in alerts if each.baseline_id is None] if is_again else []
+        over = [each.alert for each in is_open if each.alert.key in found.ended]
+        conditions = [Condition(each, "over", _OVER) for each in over]
+        conditions += [Condition(found.alert, "holds")] if found.alert else []
+        changes = reconcile(is_open, conditions)
+        if found.alert and any(is_same_event(each.alert, found.alert) for each in known):
+            changes = replace(changes, to_open=())
+        return changes
 
     def _give_up_pool(
         self, stream: Stream, period: Period, start: datetime, error: BaseException

@@ -21,8 +21,10 @@ from shm.store.rows import (
     Delivery,
     DeliveryState,
     News,
+    Reconciled,
     Resolution,
     StoredAlert,
+    StoredTest,
     counts_by_name,
 )
 from shm.store.tables import acknowledgements, alerts, deliveries, resolutions, steps, tests
@@ -66,6 +68,34 @@ def raise_alert(
     for hook in hooks:
         insert(connection, deliveries, _owed(alert_id, hook, News.RAISED, at))
     return StoredAlert(alert_id, alert, at, baseline_id=baseline_id)
+
+
+def settle(
+    connection: Connection,
+    changes: Reconciled,
+    hooks: Sequence[str],
+    at: datetime,
+    test: StoredTest | None = None,
+    baseline_id: int | None = None,
+) -> tuple[StoredAlert, ...]:
+    """Close and open alerts; return those that are new.
+
+    With a `test` they are against a baseline, and each belongs to the test that it names.
+    """
+    for alert_id, why in changes.to_close.items():
+        resolve(connection, alert_id, "shm", why, at)
+    raised = []
+    for alert in changes.to_open:
+        test_id = None if test is None else _named(connection, alert, test)
+        raised.append(raise_alert(connection, test_id, baseline_id, alert, hooks, at))
+    return tuple(each for each in raised if each is not None)
+
+
+def _named(connection: Connection, alert: Alert, test: StoredTest) -> int:
+    """Return the number of the test that an alert names, of `test` where there is no such."""
+    own = (tests.c.hanger == alert.hanger) & (tests.c.name == alert.test)
+    found = connection.scalar(sa.select(tests.c.id).where(own, tests.c.superseded_at.is_(None)))
+    return test.id if found is None else int(found)
 
 
 def resolve(connection: Connection, alert_id: int, who: str, why: str, at: datetime) -> bool:
@@ -115,7 +145,7 @@ def stored_alert(row: Row[Any]) -> StoredAlert:
     """An alert and its acknowledgement, of a row of `stored_alerts`."""
     return StoredAlert(
         row.id,
-        _alert_in(row.document),
+        alert_from(row.document),
         row.raised_at,
         acknowledgement_of(row),
         resolution_of(row),
@@ -124,7 +154,7 @@ def stored_alert(row: Row[Any]) -> StoredAlert:
 
 
 @lru_cache(_HELD)
-def _alert_in(text: str) -> Alert:
+def alert_from(text: str) -> Alert:
     """An alert as it was raised; those that stand are asked for again and again."""
     return value_of(Alert, loads(text))
 

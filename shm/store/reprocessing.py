@@ -220,15 +220,11 @@ class WatchedAgain(Repository):
         own = (watches.c.test_id == test.id) & (watches.c.baseline_id == baseline.id)
         return self.first(sa.select(watches.c.id).where(own)) is not None
 
-    def is_last(self, test: StoredTest, baseline: Baseline) -> bool:
-        """Whether no later test that counts has ever been compared with a baseline."""
-        query = (
-            sa.select(tests.c.id)
-            .join(watches)
-            .where(watches.c.baseline_id == baseline.id, tests.c.stage != Stage.REFUSED)
-            .where(in_force(tests), tests.c.time > test.time)
-        )
-        return self.first(query) is None
+    def is_caught_up(self, test: StoredTest, baseline: Baseline) -> bool:
+        """Return True where no other test waits to be compared with a baseline once more."""
+        waiting = tests.c.stage.in_([Stage.IDENTIFIED, Stage.UPDATED]) & in_force(tests)
+        query = sa.select(tests.c.id).join(watches).where(watches.c.baseline_id == baseline.id)
+        return self.first(query.where(waiting, tests.c.id != test.id)) is None
 
 
 def send_back(

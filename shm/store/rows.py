@@ -246,7 +246,8 @@ class StoredAdoption:
 class StoredWatch:
     """What the watch said after a test, and the baseline it was compared with.
 
-    `alert_probability` is by how much its alert was judged; NaN of a former version.
+    `alert_probability` is by how much its alert was judged; NaN of a former version. `called` is
+    the alert that it called for, raised or not; None of a former version, too.
     """
 
     id: int
@@ -254,6 +255,7 @@ class StoredWatch:
     baseline_id: int
     watched: WatchedTest
     alert_probability: float = NAN
+    called: Alert | None = None
 
 
 @dataclass(frozen=True)
@@ -307,6 +309,14 @@ class StoredAlert:
     def is_open(self) -> bool:
         """Whether it waits for somebody: it stands, and nobody has acknowledged it."""
         return self.acknowledgement is None and self.resolution is None
+
+
+@dataclass(frozen=True)
+class Reconciled:
+    """Alerts to open, and the numbers of open ones to close, each with the reason."""
+
+    to_open: tuple[Alert, ...] = ()
+    to_close: Mapping[int, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

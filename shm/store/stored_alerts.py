@@ -6,7 +6,7 @@ Silences and maintenance windows: who wants which hooks' messages held back, whe
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from datetime import datetime
 from typing import Any
@@ -22,13 +22,13 @@ from shm.store.outbox import (
     Deliveries,
     acknowledgement_of,
     alert_in,
-    raise_alert,
     resolution_of,
     resolve,
+    settle,
     stored_alert,
     stored_alerts,
 )
-from shm.store.rows import Acknowledgement, DeliveryState, News, Silence, StoredAlert
+from shm.store.rows import Acknowledgement, DeliveryState, News, Reconciled, Silence, StoredAlert
 from shm.store.tables import (
     acknowledgements,
     adoptions,
@@ -38,7 +38,6 @@ from shm.store.tables import (
     resolutions,
     silences,
 )
-from shm.values import Alert
 
 _is_open = acknowledgements.c.id.is_(None) & resolutions.c.id.is_(None)
 """Of `stored_alerts`, and of whatever joins both tables: what `StoredAlert.is_open` says."""
@@ -117,16 +116,12 @@ class Alerts(Deliveries):
             note(connection, at, "alert resolved", _said_of(found), why, who)
             return alert_in(connection, alert_id)
 
-    def settle(
-        self, alert: Alert | None, hooks: Sequence[str], ended: Mapping[int, str], at: datetime
-    ) -> None:
-        """Ends alerts of these numbers, for these reasons, and raises one that no test's watch
-        raises."""
+    def settle(self, changes: Reconciled, hooks: Sequence[str], at: datetime) -> None:
+        """Close and open alerts that no test's watch raises."""
+        if not changes.to_open and not changes.to_close:
+            return
         with self.writing() as connection:
-            for alert_id, why in ended.items():
-                resolve(connection, alert_id, "shm", why, at)
-            if alert is not None:
-                raise_alert(connection, None, None, alert, hooks, at)
+            settle(connection, changes, hooks, at)
 
     def acknowledge(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
         """Notes that somebody has seen an alert to its end; the alert with that note.

@@ -13,7 +13,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.documents import compact, parse_time
 from shm.store.database import Repository, insert
-from shm.store.outbox import raise_alert, resolve
+from shm.store.outbox import settle
 from shm.store.people_and_stream_tables import (
     pooled_readings,
     stream_events,
@@ -22,9 +22,8 @@ from shm.store.people_and_stream_tables import (
     stream_watch_days,
     stream_windows,
 )
-from shm.store.rows import StoredAlert
-from shm.store.tables import alerts
-from shm.values import NAN, Alert, Plane, ShapePoint
+from shm.store.rows import Reconciled, StoredAlert
+from shm.values import NAN, Plane, ShapePoint
 from shm.values.modes import Mode
 from shm.values.stream import (
     PERIODS,
@@ -44,7 +43,7 @@ _DAYS_BACK = 10
 _LATEST = 36
 """Windows of a train-free night: a mode that traffic hides for some hours is not forgotten."""
 _EVENT = tuple(field.name for field in fields(StreamEvent))
-_OVER = "the sensors do not show it any more"
+_NO_CHANGE = Reconciled()
 _T = TypeVar("_T", WindowReading, PooledReading)
 
 
@@ -180,16 +179,15 @@ class Streams(Repository):
         self,
         reading: PooledReading,
         kept: bytes | None = None,
-        alert: Alert | None = None,
+        changes: Reconciled = _NO_CHANGE,
         hooks: Sequence[str] = (),
         at: datetime | None = None,
-        ended: Sequence[str] = (),
-    ) -> StoredAlert | None:
-        """Keeps a reading of an hour or a day, in the place of the one of then before.
+    ) -> tuple[StoredAlert, ...]:
+        """Store a reading of an hour or a day, in the place of the one of then before.
 
-        `kept` is what the watch of the hanger goes on from. The alert, where it is a new one, is
-        owed to `hooks` from `at` on (the reading's end where nothing is said), and given back.
-        `ended` are the keys of alerts whose condition the reading shows to be over.
+        `kept` is what the watch of the hanger goes on from, `changes` are alerts that it opens and
+        closes; those that are new are owed to `hooks` from `at` on (the reading's end where nothing
+        is said), and returned.
         """
         end = reading.start + PERIODS[reading.period]
         row = {name: getattr(reading, name) for name in ("stream", "hanger", "period", "start")}
@@ -200,12 +198,7 @@ class Streams(Repository):
                 state = {"hanger": reading.hanger, "reading_time": end, "content": kept}
                 _replace(connection, stream_watch, state, "hanger")
                 _keep_day(connection, state)
-            of_keys = sa.select(alerts.c.id).where(alerts.c.key.in_(ended)).order_by(alerts.c.id)
-            for alert_id in connection.scalars(of_keys).all() if ended else ():
-                resolve(connection, alert_id, "shm", _OVER, at or end)
-            if alert is None:
-                return None
-            return raise_alert(connection, None, None, alert, hooks, at or end)
+            return settle(connection, changes, hooks, at or end)
 
     def list_pooled(
         self, hanger: int, period: Period, since: datetime, until: datetime

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import fields, replace
 from datetime import datetime
-from types import MappingProxyType
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
+from shm.documents import alert_document
 from shm.errors import StoreBusy
 from shm.store.audit import note
 from shm.store.blobs import change_in, watch_document, watch_in
@@ -19,7 +19,7 @@ from shm.store.columns import Number
 from shm.store.database import insert
 from shm.store.files import all_at, in_force, move
 from shm.store.list_rows import BaselineGlance, TestRow
-from shm.store.outbox import raise_alert, resolve
+from shm.store.outbox import resolve, settle
 from shm.store.queries import (
     among,
     baseline_in_force,
@@ -37,6 +37,7 @@ from shm.store.rows import (
     Baseline,
     KeptWatch,
     Lineage,
+    Reconciled,
     Stage,
     StoredAlert,
     StoredTest,
@@ -71,30 +72,26 @@ class Watch(WatchedAgain):
         hooks: Sequence[str],
         at: datetime,
         state: KeptWatch | None = None,
-        ended: Mapping[int, str] = MappingProxyType({}),
-        first: StoredAlert | None = None,
+        changes: Reconciled | None = None,
         level: float = NAN,
-    ) -> StoredAlert | None:
-        """Keeps what the watch made of a test; the alert where it is a new one, else None.
+    ) -> tuple[StoredAlert, ...]:
+        """Store what the watch made of a test; return the alerts that are new.
 
-        An alert whose key was raised before is the same standing condition and is not raised again.
-        `state` is what the watch goes on from at the next test. `ended` are the numbers of alerts
-        whose condition this test ends, with the reason; `first` is the alert of a stream that has
-        told what this test shows, and which the test joins; from `level` on an alert was wanted.
+        `alert` is what the test calls for; `changes` are the alerts that it opens and closes, by
+        default it opens that one. `state` is what the watch goes on from at the next test; from
+        `level` on an alert was wanted.
         """
+        if changes is None:
+            changes = Reconciled(() if alert is None else (alert,))
         with self.writing() as connection:
             if not all_at(connection, [test], Stage.UPDATED):
-                return None
+                return ()
             for drift in found.drifts:
                 insert(connection, drifts, _drift_values(drift, test, baseline))
-            raised = None
-            if alert is not None:
-                raised = raise_alert(connection, test.id, baseline.id, alert, hooks, at)
-            insert(connection, watches, _watch_values(found, test, baseline, raised, first, level))
+            insert(connection, watches, _watch_values(found, test, baseline, alert, level))
+            raised = settle(connection, changes, hooks, at, test, baseline.id)
             if state is not None:
                 _keep_state(connection, baseline, state)
-            for alert_id, why in ended.items():
-                resolve(connection, alert_id, "shm", why, at)
             move(connection, [test], Stage.WATCHED, at)
             return raised
 
@@ -327,31 +324,23 @@ def _drift(row: Row[Any]) -> Drift:
 
 
 def _watch_values(
-    found: WatchedTest,
-    test: StoredTest,
-    baseline: Baseline,
-    raised: StoredAlert | None,
-    first: StoredAlert | None,
-    level: float,
+    found: WatchedTest, test: StoredTest, baseline: Baseline, alert: Alert | None, level: float
 ) -> dict[str, Any]:
-    told = {
-        "alert_probability": level,
-        **({} if first is None else {"joins": first.id}),
-    }
+    called = {"alert_probability": level, "alert": alert and alert_document(alert)}
     return {
         "test_id": test.id,
         "baseline_id": baseline.id,
         "hanger": test.hanger,
         "time": found.time,
-        "document": {**watch_document(found), **told},
+        "document": {**watch_document(found), **called},
         "called": found.change.called,
     }
 
 
 def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
-    found, level = watch_in(row.document)
+    found, level, called = watch_in(row.document)
     found = replace(found, test=row.test, time=row.time, drifts=tuple(shifts))
-    return StoredWatch(row.id, row.hanger, row.baseline_id, found, level)
+    return StoredWatch(row.id, row.hanger, row.baseline_id, found, level, called)
 
 
 def _called(hanger: int | None = None) -> tuple[sa.ColumnElement[bool], ...]:

@@ -8,7 +8,7 @@ from datetime import timedelta
 import pytest
 
 from shm.errors import NothingThere, UsageError
-from shm.store import DeliveryState, Store
+from shm.store import DeliveryState, Reconciled, Store
 from shm.store.rows import News
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import a_reading
@@ -21,8 +21,8 @@ GIVEN_UP, NOT_NEEDED = DeliveryState.GIVEN_UP, DeliveryState.NOT_NEEDED
 def raised(store: Store, number: int, *hooks: str) -> int:
     """An alert of a stream, owed to hooks from its own hour on."""
     alert = replace(an_alert(f"hanger-3:{number}"), test="")
-    made = store.streams.save_pooled(a_reading(number), None, alert, hooks, NOW + number * HOUR)
-    assert made is not None
+    opens, at = Reconciled((alert,)), NOW + number * HOUR
+    (made,) = store.streams.save_pooled(a_reading(number), None, opens, hooks, at)
     return made.id
 
 
@@ -123,8 +123,8 @@ def test_who_was_told_of_an_alert_is_told_of_its_end_once(file_store: Store) -> 
 
 def test_an_alert_of_a_key_is_raised_once(file_store: Store) -> None:
     raised(file_store, 1, "mail")
-    again = replace(an_alert("hanger-3:1"), test="")
-    assert file_store.streams.save_pooled(a_reading(5), None, again, ("mail",), NOW) is None
+    again = Reconciled((replace(an_alert("hanger-3:1"), test=""),))
+    assert file_store.streams.save_pooled(a_reading(5), None, again, ("mail",), NOW) == ()
     assert len(file_store.alerts.list_deliveries()) == 1
 
 

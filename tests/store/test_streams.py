@@ -9,7 +9,7 @@ import pytest
 import sqlalchemy as sa
 
 from shm.errors import StoreError
-from shm.store import DeliveryState, Store
+from shm.store import DeliveryState, Reconciled, Store
 from shm.store.people_and_stream_tables import stream_windows
 from tests.helpers.comparing import assert_same
 from tests.helpers.nouns import NOW, an_alert
@@ -58,17 +58,17 @@ def test_modes_are_kept_without_what_is_not_known(store: Store) -> None:
 
 def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) -> None:
     alert = replace(an_alert(), key="hanger-3:stream", test="", drifts=())
-    assert store.streams.save_pooled(a_reading(-1)) is None
-    raised = store.streams.save_pooled(a_reading(), b"state", alert, ["mail"])
-    assert raised is not None
+    assert store.streams.save_pooled(a_reading(-1)) == ()
+    opens = Reconciled((alert,))
+    (raised,) = store.streams.save_pooled(a_reading(), b"state", opens, ["mail"])
     assert raised.raised_at == NOW + timedelta(hours=1)
     assert store.streams.watch_state(3) == b"state"
     assert_same(store.streams.list_pooled(3, "hour", *EVER), (a_reading(-1), a_reading()))
     (owed,) = store.alerts.list_deliveries()
     assert (owed.hook, owed.stored.alert.key) == ("mail", "hanger-3:stream")
-    again = store.streams.save_pooled(a_reading(1), b"later", alert, ["mail"], NOW)
-    assert (again, store.streams.watch_state(3)) == (None, b"later")
-    store.streams.save_pooled(a_reading(2), b"over", ended=["hanger-3:stream"])
+    again = store.streams.save_pooled(a_reading(1), b"later", opens, ["mail"], NOW)
+    assert (again, store.streams.watch_state(3)) == ((), b"later")
+    store.streams.save_pooled(a_reading(2), b"over", Reconciled((), {raised.id: "over"}))
     (over,) = store.alerts.list_all(3, standing=False)
     assert over.resolution is not None
     assert over.resolution.at == NOW + timedelta(hours=3)
@@ -76,7 +76,7 @@ def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) ->
 
 def test_an_alert_of_a_stream_is_delivered_though_no_test_raised_it(store: Store) -> None:
     alert = replace(an_alert(), key="hanger-3:stream", test="", drifts=())
-    store.streams.save_pooled(a_reading(), None, alert, ["mail"], NOW)
+    store.streams.save_pooled(a_reading(), None, Reconciled((alert,)), ["mail"], NOW)
     assert [row.hanger for row in store.alerts.list_rows()] == [3]
     (owed,) = store.alerts.list_due_deliveries(NOW, 10)
     store.alerts.save_delivery(owed, NOW)
@@ -87,7 +87,7 @@ def test_an_alert_of_a_stream_is_delivered_though_no_test_raised_it(store: Store
 def test_nothing_of_a_reading_is_kept_where_its_alert_cannot_be(store: Store) -> None:
     alert = replace(an_alert(), key=None)  # type: ignore[arg-type]
     with pytest.raises(StoreError):
-        store.streams.save_pooled(a_reading(), b"state", alert)
+        store.streams.save_pooled(a_reading(), b"state", Reconciled((alert,)))
     assert store.streams.watch_state(3) is None
     assert store.streams.list_pooled(3, "hour", *EVER) == ()
 

@@ -51,7 +51,9 @@ def updated(store: Store) -> list[StoredTest]:
 def watch(
     store: Store, test: StoredTest, alert: Alert | None = None, *hooks: str
 ) -> StoredAlert | None:
-    return store.watch.save(test, baseline(store), a_watched_test(test.test.id), alert, hooks, NOW)
+    found = a_watched_test(test.test.id)
+    raised = store.watch.save(test, baseline(store), found, alert, hooks, NOW)
+    return raised[0] if raised else None
 
 
 def baseline(store: Store) -> Baseline:
