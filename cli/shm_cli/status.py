@@ -342,10 +342,10 @@ def show_stages(ctx: click.Context, which: str) -> None:
         recording_id, _ = store.recordings.find(which)
         recording = store.recordings.get(recording_id)
         steps, tests = (
-            store.recordings.list_steps(recording_id),
+            store.journal.list_steps(recording_id),
             store.tests.list_former(recording_id),
         )
-        noticed = store.recordings.list_events(recording_id=recording_id)
+        noticed = store.journal.list_events(recording_id=recording_id)
         other_names = [
             n for n in store.recordings.names_of(recording_id) if n != recording.file.file_name
         ]

@@ -288,7 +288,7 @@ class Flow:
         recordings, now = self.store.recordings, self.clock()
         recording = recordings.get(recording_id)
         name, reason = recording.file.file_name, reason_document(error, recording, now)
-        if recordings.list_events(Outcome.REDESCRIBED, recording_id=recording_id):
+        if self.store.journal.list_events(Outcome.REDESCRIBED, recording_id=recording_id):
             reason["remedy"] += (
                 " What it gave with its former sidecar counts no more: correct the sidecar and "
                 "drop both again."

@@ -160,7 +160,7 @@ class JudgedAgain:
     def _send_back(self, hanger: int, at: datetime) -> int:
         baseline_id, why = self._left.pop(hanger)
         self._judging = hanger
-        count = self._store.watch.judge_again(hanger, baseline_id, why, at)
+        count = self._store.watch.rerun(hanger, baseline_id, why, at)
         said = "hanger %d: %d tests are judged again, %d hangers are left: %s"
         log.info(said, hanger, count, len(self._left), why)
         return count

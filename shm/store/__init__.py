@@ -24,7 +24,7 @@ from shm.store.list_rows import (
     TrendPoint,
 )
 from shm.store.people import Scope, StoredToken
-from shm.store.reprocessing import AGAIN_FROM
+from shm.store.rerun import AGAIN_FROM
 from shm.store.rows import (
     ENDED,
     Acknowledgement,

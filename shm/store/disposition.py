@@ -14,7 +14,6 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError, sentence
-from shm.store.audit import note
 from shm.store.database import Repository, insert
 from shm.store.files import (
     advance_recordings,
@@ -23,8 +22,6 @@ from shm.store.files import (
     end_recording,
     end_tests,
     in_force,
-    write_event,
-    write_step,
 )
 from shm.store.holding import (
     confirmed_values,
@@ -38,11 +35,13 @@ from shm.store.holding import (
     refuse_time,
     standing_discard,
     taking_back,
+    write_decision,
 )
+from shm.store.journal import write
 from shm.store.list_rows import Decision, HeldTest, Hold, Rerun
 from shm.store.outbox import resolve
 from shm.store.queries import WEIGHED
-from shm.store.reprocessing import of_baselines, reprocess, send_back, supersede_results
+from shm.store.rerun import of_baselines, rerun_recording, rerun_watched, supersede_results
 from shm.store.rows import Stage
 from shm.store.tables import alerts, holds, recordings, tests, watches
 
@@ -156,19 +155,16 @@ class Dispositions(Repository):
             names = tuple(sorted(row.name for row in rows if row.id in own))
             return Exclusion(hold, names, min(row.time for row in rows), again)
 
-    def reprocess(
-        self, recording_id: int, stage: Stage, at: datetime, test: str | None = None
+    def rerun(
+        self, recording_id: int, from_stage: Stage, at: datetime, test: str | None = None
     ) -> Rerun:
-        """Sends a recording back so that `stage` is reached anew; what came of it is superseded.
+        """Send a recording back so that a stage is reached anew; what came of it is superseded.
 
         A file is always identified as a whole; from a later stage on it may be one `test` alone.
         Raises NothingThere, and UsageError where the recording has not come so far.
         """
         with self.writing() as connection:
-            made = reprocess(connection, recording_id, stage, at, test)
-            subject = test or by_id(connection, recording_id).file_name
-            note(connection, at, "recording done again", subject, f"from {stage}")
-            return made
+            return rerun_recording(connection, recording_id, from_stage, at, test)
 
 
 def _held(
@@ -232,7 +228,7 @@ def _let_count(
         values = confirmed_values(connection, row, hold, hold.time, who)
         this = sa.update(tests).where(tests.c.id == row.id)
         connection.execute(this.values(stage=Stage.IDENTIFIED, **values))
-        write_step(connection, row.recording_id, Stage.IDENTIFIED, at, row.id)
+        write(connection, at, Stage.IDENTIFIED, row.recording_id, row.id)
 
 
 def _decided_with(
@@ -312,9 +308,7 @@ def _decide(
     row = {"recording_id": recording.id, "held_at": at, "document": document}
     made = {"decision": hold.decision, "decided_at": at, "who": who, "why": why, "time": hold.time}
     insert(connection, holds, {**row, **made})
-    write_event(connection, at, str(hold.decision), recording.id, recording.file_name, message)
-    subject = f"{recording.file_name}: {names}"
-    note(connection, at, f"recording {hold.decision}", subject, why, who)
+    write_decision(connection, hold, who, f"{names}: {why}" if why else names, at)
     return holds_of(connection, recording.id)[-1]
 
 
@@ -336,5 +330,5 @@ def _watch_again(
     for hanger in {row.hanger for row in chosen}:
         since = min(row.time for row in chosen if row.hanger == hanger)
         later = (watches.c.time >= since) & tests.c.id.not_in(ids)
-        count += send_back(connection, hanger, later, stage, at)
+        count += rerun_watched(connection, hanger, later, stage, at)
     return count

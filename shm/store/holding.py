@@ -13,20 +13,20 @@ from sqlalchemy.engine import Connection, Row
 from shm.documents import value_of
 from shm.errors import UsageError, sentence
 from shm.modes_document import test_document
-from shm.store.audit import note
 from shm.store.blobs import pack, test_from_document, unpack
 from shm.store.columns import loads
 from shm.store.database import insert
-from shm.store.files import in_force, reason_document, write_event, write_step
+from shm.store.files import in_force, reason_document
+from shm.store.journal import REFUSED, write
 from shm.store.list_rows import Decision, HeldTest, Hold
 from shm.store.outbox import raise_alert, resolve
 from shm.store.rows import Stage, StoredAlert
 from shm.store.tables import (
     acknowledgements,
     alerts,
-    events,
     fingerprints,
     holds,
+    journal,
     recordings,
     tests,
 )
@@ -73,7 +73,6 @@ def keep_judgement(
     reason = reason_of(recording, judged.notice.message, at)
     by_id = recordings.c.id == recording.id
     connection.execute(sa.update(recordings).where(by_id).values(reason=reason))
-    write_event(connection, at, "held", recording.id, recording.file_name, reason["message"])
     notice = replace(judged.notice, key=notice_key(judged.notice.hanger, hold_id))
     leading = held[notice.test]
     return raise_alert(connection, leading, None, notice, judged.hooks, at)
@@ -120,7 +119,7 @@ def _mark(
     here = own & (tests.c.position == position)
     number: int = connection.scalars(sa.select(tests.c.id).where(here)).one()
     connection.execute(sa.update(tests).where(here).values(stage=stage))
-    write_step(connection, recording_id, stage, at, number)
+    write(connection, at, stage, recording_id, number)
     return number
 
 
@@ -162,12 +161,13 @@ def standing_discard(connection: Connection, recording: Row[Any]) -> Hold | None
     hold = None if row is None else _hold(row)
     if hold is None or not hold.is_out:
         return None
-    refusals = sa.select(events.c.kind).where(
-        events.c.recording_id == recording.id,
-        events.c.kind.in_(["refused", Decision.DISCARDED, Decision.WITHDRAWN]),
+    refusals = sa.select(journal.c.kind).where(
+        journal.c.recording_id == recording.id,
+        journal.c.subject != "",
+        journal.c.kind.in_([REFUSED, Decision.DISCARDED, Decision.WITHDRAWN]),
     )
-    latest = connection.scalar(refusals.order_by(events.c.id.desc()).limit(1))
-    return None if latest == "refused" else hold
+    latest = connection.scalar(refusals.order_by(journal.c.id.desc()).limit(1))
+    return None if latest == REFUSED else hold
 
 
 def discarded_reason(hold: Hold) -> str:
@@ -254,9 +254,14 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
     notice = connection.scalar(sa.select(alerts.c.id).where(alerts.c.key == key))
     if notice is not None:
         resolve(connection, notice, who, told, at)
-    write_event(connection, at, str(hold.decision), hold.recording_id, hold.file_name, told)
-    note(connection, at, f"recording {hold.decision}", hold.file_name, why, who)
+    write_decision(connection, hold, who, why, at)
     return replace(hold, decided_at=at, who=who, why=why)
+
+
+def write_decision(connection: Connection, hold: Hold, who: str, why: str, at: datetime) -> None:
+    """Write into the journal what a person, or a rerun, made of a recording."""
+    kind, about = str(hold.decision), hold.recording_id
+    write(connection, at, kind, about, subject=hold.file_name, detail=why, who=who)
 
 
 def _hold(row: Row[Any]) -> Hold:

@@ -15,7 +15,7 @@ from shm.documents import alert_document, value_of
 from shm.errors import NothingThere, UsageError
 from shm.store.columns import loads
 from shm.store.database import Repository, insert
-from shm.store.files import NOTIFIED, write_step
+from shm.store.journal import NOTIFIED, write
 from shm.store.rows import (
     Acknowledgement,
     Delivery,
@@ -27,7 +27,7 @@ from shm.store.rows import (
     StoredTest,
     counts_by_name,
 )
-from shm.store.tables import acknowledgements, alerts, deliveries, resolutions, steps, tests
+from shm.store.tables import acknowledgements, alerts, deliveries, journal, resolutions, tests
 from shm.values import Alert
 
 _HELD = 1024  # technical: those that stand on a large bridge, of some kilobytes each
@@ -350,11 +350,11 @@ def _note_notified(connection: Connection, delivery_id: int, at: datetime) -> No
     if row is None:  # raised by readings of a stream
         return
     if _notified_steps(connection, row.id) < _told_alerts(connection, row.id):
-        write_step(connection, row.recording_id, NOTIFIED, at, row.id)
+        write(connection, at, NOTIFIED, row.recording_id, row.id)
 
 
 def _notified_steps(connection: Connection, test_id: int) -> int:
-    of_test = (steps.c.test_id == test_id) & (steps.c.stage == NOTIFIED)
+    of_test = (journal.c.test_id == test_id) & (journal.c.kind == NOTIFIED)
     return int(connection.scalar(sa.select(sa.func.count()).where(of_test)) or 0)
 
 

@@ -15,8 +15,8 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere, UsageError
-from shm.store.audit import note
 from shm.store.database import Repository, insert
+from shm.store.journal import note
 from shm.store.list_rows import AlertRow, DeliveryRow, EventKind, HangerEvent
 from shm.store.outbox import (
     Deliveries,

@@ -13,10 +13,10 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.diagnosis_document import diagnosis_document, diagnosis_of
 from shm.errors import NothingThere, StoreBusy, UsageError
-from shm.store.audit import note
 from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.files import all_at, in_force, move
+from shm.store.journal import note
 from shm.store.queries import (
     counted_tests,
     hidden,

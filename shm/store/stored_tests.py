@@ -13,8 +13,9 @@ from sqlalchemy.engine import Connection, Row
 from shm.errors import NothingThere
 from shm.store.blobs import unpack_response
 from shm.store.database import Repository, insert
-from shm.store.files import advance_recordings, counts, in_force, test_contents, write_step
+from shm.store.files import advance_recordings, counts, in_force, test_contents
 from shm.store.holding import Judged, fingerprint_from, keep_judgement
+from shm.store.journal import write
 from shm.store.list_rows import LatestTest, TestRow
 from shm.store.queries import (
     WEIGHED,
@@ -76,7 +77,7 @@ class Tests(Repository):
             for item in (item for item in found if item.position not in kept):
                 values = {**_test_values(connection, item, recording), **lineage.columns}
                 test_id = insert(connection, tests, {**values, "identified_at": at})
-                write_step(connection, recording_id, Stage.IDENTIFIED, at, test_id)
+                write(connection, at, Stage.IDENTIFIED, recording_id, test_id)
             hanger = found[0].test.hanger
             by_id = recordings.c.id == recording_id
             connection.execute(sa.update(recordings).where(by_id).values(hanger=hanger))

@@ -13,11 +13,11 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.documents import alert_document
 from shm.errors import StoreBusy
-from shm.store.audit import note
 from shm.store.blobs import change_in, watch_document, watch_in
 from shm.store.columns import Number
-from shm.store.database import insert
+from shm.store.database import Repository, insert
 from shm.store.files import all_at, in_force, move
+from shm.store.journal import note
 from shm.store.list_rows import BaselineGlance, TestRow
 from shm.store.outbox import resolve, settle
 from shm.store.queries import (
@@ -31,7 +31,7 @@ from shm.store.queries import (
     test_columns,
     test_row,
 )
-from shm.store.reprocessing import WatchedAgain
+from shm.store.rerun import rerun_watched
 from shm.store.rows import (
     Acknowledgement,
     Baseline,
@@ -60,7 +60,7 @@ from shm.values import NAN, Alert, Change, Drift, Hanger, Posterior, WatchedTest
 _DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")
 
 
-class Watch(WatchedAgain):
+class Watch(Repository):
     """What the watch said, and the baselines it compares with."""
 
     def save(
@@ -94,6 +94,32 @@ class Watch(WatchedAgain):
                 _keep_state(connection, baseline, state)
             move(connection, [test], Stage.WATCHED, at)
             return raised
+
+    def pass_over(self, test: StoredTest, at: datetime) -> None:
+        """Compare a test within a maintenance window with nothing."""
+        with self.writing() as connection:
+            if all_at(connection, [test], Stage.UPDATED):
+                move(connection, [test], Stage.WATCHED, at)
+
+    def rerun(self, hanger: int, baseline_id: int, why: str, at: datetime) -> int:
+        """Send back what was compared with a baseline, to be judged anew; return how many tests."""
+        with self.writing() as connection:
+            which = watches.c.baseline_id == baseline_id
+            count = rerun_watched(connection, hanger, which, Stage.WATCHED, at)
+            if count:
+                note(connection, at, "tests judged again", f"hanger {hanger}", why, "shm")
+            return count
+
+    def is_again(self, test: StoredTest, baseline: Baseline) -> bool:
+        """Return True where a test has been compared with a baseline before."""
+        own = (watches.c.test_id == test.id) & (watches.c.baseline_id == baseline.id)
+        return self.first(sa.select(watches.c.id).where(own)) is not None
+
+    def is_caught_up(self, test: StoredTest, baseline: Baseline) -> bool:
+        """Return True where no other test waits to be compared with a baseline once more."""
+        waiting = tests.c.stage.in_([Stage.IDENTIFIED, Stage.UPDATED]) & in_force(tests)
+        query = sa.select(tests.c.id).join(watches).where(watches.c.baseline_id == baseline.id)
+        return self.first(query.where(waiting, tests.c.id != test.id)) is None
 
     def state(self, baseline: Baseline) -> KeptWatch | None:
         """What the watch goes on from at the next test that is compared with a baseline."""

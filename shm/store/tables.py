@@ -20,7 +20,7 @@ from shm.store.columns import (
 from shm.store.columns import metadata as metadata
 from shm.store.people_and_stream_tables import users as _of_people  # noqa: F401 - all are there
 
-SCHEMA = "0015"
+SCHEMA = "0016"
 
 _OF_TESTS = ("hanger", "time", "stage", "name", "taken_at", "temperature_c")
 
@@ -314,28 +314,22 @@ adoptions = sa.Table(
     sa.Column("undone_who", sa.Text),
 )
 
-# Things noticed on the way that change no result: the same file twice, a refused file tried again.
-events = sa.Table(
-    "events",
+# What happened to what, when, by whom, why and with which shm: each stage that a recording or a
+# test has reached, what was noticed on the way, what people changed. Written in the same
+# transaction as what it tells of, never changed. `who` is empty of what nobody asked for; `via` is
+# the way that a change came: page, API, command line. `version` is empty where it is not known.
+journal = sa.Table(
+    "journal",
     metadata,
     identity(),
-    sa.Column("at", UtcTime, nullable=False),
-    sa.Column("kind", sa.String(32), nullable=False),
-    reference("recordings", nullable=True),
-    sa.Column("file_name", sa.Text, nullable=False),
-    sa.Column("message", sa.Text, nullable=False),
-)
-
-# Each stage that a recording or one of its tests has reached, when, and with which shm (empty where
-# that is not known); written in the same transaction as what brought it there, never changed.
-steps = sa.Table(
-    "steps",
-    metadata,
-    identity(),
-    reference("recordings"),
-    reference("tests", nullable=True),
-    sa.Column("stage", sa.String(16), nullable=False),
     sa.Column("at", UtcTime, nullable=False, index=True),
+    sa.Column("kind", sa.String(64), nullable=False),
+    reference("recordings", nullable=True),
+    reference("tests", nullable=True),
+    sa.Column("subject", sa.Text, nullable=False),
+    sa.Column("detail", sa.Text, nullable=False),
+    sa.Column("who", sa.Text),
+    sa.Column("via", sa.String(16)),
     sa.Column("version", sa.String(32)),
     sa.Index(None, "recording_id"),
     sa.Index(None, "test_id"),

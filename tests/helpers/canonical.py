@@ -10,14 +10,15 @@ from typing import Any
 import sqlalchemy as sa
 
 from shm.store import Store
+from shm.store.journal import is_step
 from shm.store.tables import (
     alerts,
     deliveries,
     drifts,
+    journal,
     posterior_tests,
     posteriors,
     recordings,
-    steps,
     tests,
     watches,
 )
@@ -41,9 +42,9 @@ def canonical(store: Store) -> dict[str, list[str]]:
         "watches": named.add_columns(*watches.c).select_from(watches.join(tests)),
         "alerts": sa.select(alerts),
         "deliveries": sa.select(deliveries.c.hook, deliveries.c.state, alerts.c.key).join(alerts),
-        "steps": sa.select(steps.c.stage, recordings.c.sha256, tests.c.name).select_from(
-            steps.join(recordings).outerjoin(tests)
-        ),
+        "steps": sa.select(journal.c.kind, recordings.c.sha256, tests.c.name)
+        .select_from(journal.join(recordings).outerjoin(tests, tests.c.id == journal.c.test_id))
+        .where(is_step),
     }
     found: defaultdict[str, list[str]] = defaultdict(list)
     with store.reading() as connection:

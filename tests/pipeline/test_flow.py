@@ -287,7 +287,7 @@ def test_the_same_file_twice_is_one_recording_and_leaves_the_spool(workspace: Wo
     assert len(stages(workspace)) == 1
     with workspace.store() as store:
         assert len(store.tests.list_all()) == 1
-        assert [event.kind for event in store.recordings.list_events()] == [
+        assert [event.kind for event in store.journal.list_events()] == [
             "duplicate",
             "duplicate",
         ]
@@ -548,7 +548,7 @@ def test_a_recording_that_moves_on_is_no_suspect_any_more(workspace: Workspace) 
         clock.pass_by(1.0)
         assert set(stages(workspace).values()) == {Stage.DONE}
         assert flow.store.recordings.deaths() == {}
-        assert [event.kind for event in flow.store.recordings.list_events()] == ["worker died"] * 4
+        assert [event.kind for event in flow.store.journal.list_events()] == ["worker died"] * 4
 
 
 def test_a_file_that_needs_more_memory_than_there_is_is_refused_and_says_so(

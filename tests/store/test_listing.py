@@ -126,7 +126,7 @@ def test_a_name_that_is_not_there_names_the_latest(file_store: Store) -> None:
 
 def test_what_was_superseded_or_refused_is_not_listed(file_store: Store) -> None:
     first, second = identified(file_store, 1), identified(file_store, 2)
-    file_store.recordings.reprocess(first.recording_id, Stage.IDENTIFIED, NOW)
+    file_store.recordings.rerun(first.recording_id, Stage.IDENTIFIED, NOW)
     file_store.recordings.refuse(second.recording_id, {"message": "no."}, NOW, [second.id])
     assert file_store.tests.list_rows(3) == ()
     with pytest.raises(NothingThere):

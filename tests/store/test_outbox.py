@@ -138,7 +138,7 @@ def test_an_alert_that_was_acknowledged_keeps_who_did(file_store: Store) -> None
     assert ended.acknowledgement is not None
     assert (ended.acknowledgement.who, ended.acknowledgement.why) == ("Ada", "seen")
     assert alerts.counts() == (0, 1)
-    noted = [(row.who, row.action, row.detail) for row in file_store.audit.list_rows()]
+    noted = [(row.who, row.action, row.detail) for row in file_store.journal.list_changes()]
     assert noted == [("Ben", "alert resolved", "over"), ("Ada", "alert acknowledged", "seen")]
 
 
@@ -146,9 +146,9 @@ def test_a_test_is_through_when_no_hook_is_owed_its_alert(filled_copy: Store) ->
     """Once, however many hooks there are."""
     store = filled_copy
     (first,) = (e for e in store.alerts.list_deliveries() if e.stored.alert.test == "t2")
-    before = [step.stage for step in store.recordings.list_steps(2)]
+    before = [step.stage for step in store.journal.list_steps(2)]
     store.alerts.save_delivery(first, NOW + HOUR)
-    after = [step.stage for step in store.recordings.list_steps(2)]
+    after = [step.stage for step in store.journal.list_steps(2)]
     assert after == [*before, "notified"]
 
 
@@ -174,7 +174,7 @@ def test_a_changed_setting_holds_until_it_is_given_back(file_store: Store) -> No
     assert current["settings.samples"].is_of(4)
     settings.change("settings.samples", None, "Ada", NOW)
     assert list(settings.list_current()) == ["hanger.3.thresholds.alert_probability"]
-    told = [(row.subject, row.detail) for row in file_store.audit.list_rows(2)]
+    told = [(row.subject, row.detail) for row in file_store.journal.list_changes(2)]
     assert told == [
         ("settings samples", "from 2000 to not set, back to bridge.toml"),
         ("settings samples", "from 4000 to 2000"),

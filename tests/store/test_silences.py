@@ -35,7 +35,8 @@ def test_a_silence_is_kept_as_it_was_made_and_ended(file_store: Store) -> None:
     assert silences.list_all() == (ended, later)
     assert silences.list_current(NOW) == (ended, later)
     assert silences.list_current(half) == (later,)
-    said = [(row.who, row.action, row.subject, row.detail) for row in file_store.audit.list_rows()]
+    rows = file_store.journal.list_changes()
+    said = [(row.who, row.action, row.subject, row.detail) for row in rows]
     assert said == [
         ("Ben", "maintenance window ended", f"maintenance window {made.id}, hanger 3", ""),
         (

@@ -87,15 +87,13 @@ def test_deaths_count_since_a_recording_moved_on_and_while_it_is_on_its_way(
         1: Deaths(2, NOW + 2 * HOUR),
         2: Deaths(1, NOW + HOUR),
     }
-    kinds = [
-        (each.kind, each.message) for each in file_store.recordings.list_events(recording_id=2)
-    ]
+    kinds = [(each.kind, each.message) for each in file_store.journal.list_events(recording_id=2)]
     assert kinds == [("worker died", "killed")]
 
 
 def test_a_file_that_was_too_large_leaves_its_name_and_no_recording(file_store: Store) -> None:
     file_store.recordings.refuse_unread("big.csv", "5 GB.", NOW)
-    (event,) = file_store.recordings.list_events()
+    (event,) = file_store.journal.list_events()
     assert (event.kind, event.file_name, event.message, event.at, event.recording_id) == (
         "refused", "big.csv", "5 GB.", NOW, None,
     )  # fmt: skip

@@ -111,7 +111,7 @@ def without_samples(store: Store) -> None:
 
 
 def sent_back(store: Store) -> None:
-    store.recordings.reprocess(store.tests.list_all(3)[1].recording_id, Stage.UPDATED, NOW)
+    store.recordings.rerun(store.tests.list_all(3)[1].recording_id, Stage.UPDATED, NOW)
 
 
 def sent_back_and_done_again(store: Store) -> None:

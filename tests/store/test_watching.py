@@ -167,7 +167,7 @@ def test_a_delivery_that_two_have_made_is_ended_once(
     store.alerts.save_failure(owed, "no answer", NOW, NOW)
     (ended,) = store.alerts.list_deliveries()
     assert (ended.state, ended.attempts, ended.last_error) == (DeliveryState.DELIVERED, 1, "")
-    reached = [step.stage for step in store.recordings.list_steps(updated[0].recording_id)]
+    reached = [step.stage for step in store.journal.list_steps(updated[0].recording_id)]
     assert reached.count("notified") == 1
 
 
