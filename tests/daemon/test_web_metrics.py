@@ -18,7 +18,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from shm.pipeline import utc_now
 from shm.store import Workspace, list_rows, rows
 from shm.store.columns import Number, UtcTime
-from shm.store.journal import NOTIFIED
+from shm.store.journal import NOTIFIED, STEPS
 from shm.store.tables import metadata
 from shm_daemon.heartbeat import beat
 from tests.helpers.slow import few_of
@@ -57,7 +57,7 @@ def names() -> set[str]:
         if issubclass(kind, StrEnum)
     }
     said = {str(member) for kind in kinds for member in kind}
-    return said | files.STEPS | {"made by a newer version", "", 'a "quoted"\nname'}
+    return said | STEPS | {"made by a newer version", "", 'a "quoted"\nname'}
 
 
 def odd_values(column: sa.Column[object]) -> Iterator[object]:
