@@ -22,17 +22,14 @@ def heed_limits(
     workspace: Workspace, store: Store, hangers: Iterable[Hanger], at: datetime
 ) -> None:
     """Open and close what the limits of hangers call for, by the latest test of each."""
-    standing = store.alerts.list_all(standing=True)
-    told = {each.alert.hanger for each in standing if _KIND in each.alert.kinds}
-    modelled = (each for each in hangers if each.is_modelled)
-    asked = [each for each in modelled if each.id in told or any(_limits(each))]
-    points = store.posteriors.latest_trends(asked) if asked else {}
     hooks = [hook.name for hook in workspace.bridge.hooks]
-    for hanger in asked:
-        if (point := points.get(hanger.id)) is not None:
-            known = [e for e in store.alerts.list_all(hanger.id) if _KIND in e.alert.kinds]
+    for hanger in (each for each in hangers if each.is_modelled):
+        known = [e for e in store.alerts.list_all(hanger.id) if _KIND in e.alert.kinds]
+        is_open = [each for each in known if each.resolution is None]
+        if not is_open and not any(_limits(hanger)):
+            continue
+        if (point := store.posteriors.latest_trends([hanger]).get(hanger.id)) is not None:
             conditions = list(_conditions(store, hanger, point, known))
-            is_open = [each for each in known if each.resolution is None]
             store.alerts.settle(reconcile(is_open, conditions), hooks, at)
 
 

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import shm
 from shm.errors import NothingThere
 from shm.pipeline.conditions import Evidence, conditions_of, is_gap_larger
+from shm.pipeline.faults import contained
 from shm.pipeline.reconcile import reconcile
 from shm.settings import Settings
 from shm.store import (
@@ -133,13 +134,9 @@ class JudgedAgain:
     """
 
     def __init__(self, workspace: Workspace, store: Store):
-        self._store, self._judging = store, -1
+        self._workspace, self._store, self._judging = workspace, store, -1
+        self._unread = list(workspace.bridge.watched)
         self._left: dict[int, tuple[int, str]] = {}
-        latest = store.watch.latest()
-        for hanger in workspace.bridge.watched:
-            if watch := latest.get(hanger.id):
-                why = "; ".join(differences(watch, hanger, workspace.settings))
-                self._left |= {hanger.id: (watch.baseline_id, why)} if why else {}
 
     def go_on(
         self, at: datetime, held: Collection[int] = (), damaged: Collection[int | None] = ()
@@ -147,6 +144,10 @@ class JudgedAgain:
         """Sends the next back where it is time; recordings that are held and hangers that stand
         still are not waited for.
         """
+        while self._unread:
+            with contained(log, "hanger %d cannot be judged again", self._unread[-1].id):
+                self._note_differences(self._unread[-1])
+            self._unread.pop()
         if not self._left:
             return
         waiting = {test.hanger for test in self._store.tests.list_waiting(1, excluding=held)}
@@ -156,6 +157,12 @@ class JudgedAgain:
             hanger = next(iter(self._left))
             if self._send_back(hanger, at):
                 return
+
+    def _note_differences(self, hanger: Hanger) -> None:
+        watch = self._store.watch.latest([hanger]).get(hanger.id)
+        why = "; ".join(differences(watch, hanger, self._workspace.settings)) if watch else ""
+        if watch and why:
+            self._left[hanger.id] = watch.baseline_id, why
 
     def _send_back(self, hanger: int, at: datetime) -> int:
         baseline_id, why = self._left.pop(hanger)

@@ -22,12 +22,12 @@ from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import Opens, RemoteFile, WatchResult, registered, run_step
 from shm.pipeline.telling import after_works, works_before
 from shm.pipeline.watching import reconciled, tests_beside, to_watch
-from shm.store import KeptWatch, Stage, Store, StoredRecording, TestRow, Workspace
+from shm.store import KeptWatch, Stage, Store, StoredAlert, StoredRecording, TestRow, Workspace
 from shm.store.archive import nothing
 from shm.values import WITHOUT_MODEL, Hanger
 from shm.values.stated_tension import averaged_now
 
-Work: TypeAlias = "Generator[Callable[[], Any], Any, object]"
+Work: TypeAlias = "Generator[Callable[[], Any], Any, Sequence[StoredAlert] | None]"
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,8 @@ class Queue:
         )
         lineage = identify_lineage(recording, found[0].test.hanger, workspace)
         found, judged = judge(workspace, store, recording, found)
-        return store.tests.save(recording.id, found, lineage, self.clock(), judged)
+        notice = store.tests.save(recording.id, found, lineage, self.clock(), judged)
+        return None if notice is None else (notice,)
 
     def _select(self, hanger: Hanger, first: Sequence[TestRow]) -> Work:
         tests, settings = [self.store.tests.get(test.id) for test in first], self.workspace.settings

@@ -815,3 +815,33 @@ def test_a_result_says_from_what_and_how_it_was_made(
     assert (test.input_sha256 == other_test.input_sha256) is same_input
     assert (test.settings_sha256 == other_test.settings_sha256) is same_settings
     assert (posterior == other_posterior) is (not changed)
+
+
+def test_documents_that_cannot_be_read_stop_their_hanger_and_not_the_beginning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    quick_update.stand_in(monkeypatch.setattr)
+    bridge = make_workspace(tmp_path / "bridge", hangers=(3, 4), hooks={"mail": ["true"]})
+    for hanger in (3, 4):
+        for day, tension in ((0, 1.0), (30, 1.0), (60, 0.8), (61, 0.8)):
+            path = bridge.spool / f"h{hanger}-{day}.modes.json"
+            write_test(path, bridge, hanger=hanger, day=day, tension=tension)
+    with a_flow(bridge, notifier=Postman()) as flow:
+        receive_all(flow)
+        flow.drain()
+        assert {each.alert.hanger for each in flow.store.alerts.list_all()} == {3, 4}
+    with sqlite3.connect(bridge.database) as connection:
+        for table in ("alerts", "watches", "posteriors", "tests"):
+            connection.execute(f"UPDATE {table} SET document = 'no' WHERE hanger = 3")
+    connection.close()
+    for hanger in (3, 4):
+        path = bridge.spool / f"h{hanger}-90.modes.json"
+        write_test(path, bridge, hanger=hanger, day=90, tension=0.8)
+    with a_flow(bridge, notifier=Postman()) as flow:  # thresholds and limits read each hanger's
+        bridge.change_setting(flow.store, "settings.false_call_years", 50.0, flow.clock(), "Meier")
+        flow.use(bridge.reopened())
+        receive_all(flow)
+        flow.drain()
+        assert flow.store.tests.named(4, "h4-90").stage is Stage.WATCHED
+        assert flow.store.watch.latest([bridge.bridge.hanger(4)])[4].watched.test == "h4-90"
+    assert "hanger 3 cannot be judged again" in caplog.text
