@@ -97,7 +97,7 @@ def _candidate(
 ) -> Candidate:
     test, tests = item.test, store.tests
     hanger = workspace.bridge.tested(test.hanger or 0)
-    earlier = tests.latest_before(hanger.id, recording.id, _LATEST)
+    earlier = tests.list_latest(hanger.id, recording.id, _LATEST)
     baseline = store.watch.baseline(hanger.id, time=_possible(test.time))
     reference = tests.of_baseline(baseline) if baseline else earlier
     at_once = tests.taken_at(hanger.id, test.time, recording.id) if test.time else ()
@@ -116,7 +116,10 @@ def _candidate(
         reference=[each.test for each in reference],
         reference_at=max((each.time for each in reference), default=None) if baseline else None,
         earlier=[each.test for each in earlier],
-        arrived=[each.test for each in tests.latest_received(hanger.id, recording.id, _LATEST)],
+        arrived=[
+            each.test
+            for each in tests.list_latest(hanger.id, recording.id, _LATEST, as_received=True)
+        ],
         baseline=baseline.posterior if baseline else None,
         fingerprint=print_,
         copies=tests.known_samples(recording.id, hanger.id, print_) if print_ else (),
@@ -124,7 +127,7 @@ def _candidate(
         others=[
             (
                 other,
-                [each.test for each in tests.latest_before(other.id, recording.id, _OF_OTHERS)],
+                [each.test for each in tests.list_latest(other.id, recording.id, _OF_OTHERS)],
             )
             for other in workspace.bridge.hangers
             if other.id != hanger.id

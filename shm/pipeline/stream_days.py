@@ -15,7 +15,7 @@ from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX
 from shm.store.ring_files import PERIOD
 from shm.values import ModalTest, Posterior
-from shm.values.stream import PERIODS, Stream
+from shm.values.stream import PERIODS, Stream, period_start
 
 _OWN_DAYS = 7  # judgement: by then every class has been selected and the watch has learnt
 
@@ -68,9 +68,10 @@ def baseline_of(store: Store, stream: Stream) -> Posterior | None:
     found = store.watch.baseline(stream.hanger)
     if found is None:
         return None
-    first = store.streams.first_day(stream.name)
-    if first is None:
+    pooled = store.streams.pooled_range(stream.name)
+    if pooled is None:
         return found.posterior
+    first = period_start(pooled[0], PERIODS["day"])
     days = (first + n * PERIODS["day"] for n in range(_OWN_DAYS))
     own = tuple(f"{stream.name}-{day:%Y-%m-%d}" for day in days)
     is_own = all(test.startswith(own) for test in found.posterior.tests)

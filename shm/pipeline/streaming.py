@@ -36,6 +36,7 @@ from shm.store import Reconciled, Store, Workspace
 from shm.store.archive import nothing
 from shm.store.ring import ring_of
 from shm.store.ring_files import PERIOD
+from shm.values import Mode, Plane
 from shm.values.stream import (
     PERIODS,
     Period,
@@ -199,11 +200,11 @@ class Streaming:
         changed = self.store.streams.first_unpooled(name, since)
         if changed is not None:
             self._changed[name] = changed
-        last = self.store.streams.last_pooled(name, "hour")
-        watched = self.store.streams.watch_time(stream.hanger)
-        if last is not None and watched is not None and watched <= last:
+        hours = self.store.streams.pooled_range(name, "hour")
+        watched = self._watched_until(stream)
+        if hours is not None and watched is not None and watched <= hours[1]:
             self._pooled[name, "hour"] = watched
-            self._settled[name] = last + PERIODS["hour"]
+            self._settled[name] = hours[1] + PERIODS["hour"]
         if done is not None:
             self._done[name] = done
         for start in list_unread(self.workspace, self.ring, self.store, name, self.clock()):
@@ -217,15 +218,20 @@ class Streaming:
         """
         name, streams = stream.name, self.store.streams
         starts = {each: period_start(changed, length) for each, length in PERIODS.items()}
-        watched, newest = streams.watch_time(stream.hanger), streams.watch_state(stream.hanger)
-        before = streams.watch_before(stream.hanger, starts["hour"])
-        if watched and newest and before and starts["hour"] < watched:
-            streams.go_back(stream.hanger, before[0], gone_back(before[1], newest))
-            starts["hour"] = before[0]
-            self._settled[name] = max(watched, self._settled.get(name, watched))
+        newest = streams.watch(stream.hanger)
+        before = streams.watch(stream.hanger, starts["hour"])
+        if newest and before and starts["hour"] < newest.time:
+            content = gone_back(before.content, newest.content)
+            streams.go_back(stream.hanger, before.time, content)
+            starts["hour"] = before.time
+            self._settled[name] = max(newest.time, self._settled.get(name, newest.time))
         for period, start in starts.items():
             former = self._pooled.get((name, period), start)
             self._pooled[name, period] = min(former, start)
+
+    def _watched_until(self, stream: Stream) -> datetime | None:
+        watch = self.store.streams.watch(stream.hanger)
+        return None if watch is None else watch.time
 
     def _next_window(self, name: str) -> datetime | None:
         """The next ten minutes that are whole, or not waited for any more; late ones last."""
@@ -246,17 +252,18 @@ class Streaming:
 
         hanger = self.workspace.bridge.tested(stream.hanger)
         options = identify_options(self.workspace.settings, self.workspace.bridge)
+        known = self.store.streams.latest_with_modes(stream.name)
         self._submit(
             stream.name,
             partial(
                 read_stream_window,
                 self.ring.read(stream.name, start, start + WINDOW),
                 stream,
-                self.store.streams.last_modes(stream.name),
+                last_modes(known),
                 hanger,
                 options,
                 tuple(self._offsets[stream.name]),
-                self.store.streams.has_followed_modes(stream.name),
+                any(each.how == "tracked" for each in known),
             ),
             partial(self._keep_window, stream),
             partial(self._give_up_window, stream, start),
@@ -283,16 +290,16 @@ class Streaming:
         end = start + PERIODS[period]
         known = self.store.streams.list_pooled(stream.hanger, period, start, end)
         if any(each.stream == stream.name for each in known):
-            watched = self.store.streams.watch_time(stream.hanger)
+            watched = self._watched_until(stream)
             if period != "hour" or watched is None or start < watched:
                 return False
         return bool(self._windows(stream, start, PERIODS[period]))
 
     def _pooled_until(self, stream: Stream, period: Period, length: timedelta) -> datetime | None:
         """The end of the last reading of a period; the first window's period where none is."""
-        last = self.store.streams.last_pooled(stream.name, period)
-        if last is not None:
-            return last + length
+        pooled = self.store.streams.pooled_range(stream.name, period)
+        if pooled is not None:
+            return pooled[1] + length
         first = self.store.streams.first_window(stream.name)
         return None if first is None else period_start(first, length)
 
@@ -306,7 +313,7 @@ class Streaming:
         from shm.pipeline.stream_steps import pool_stream
 
         hanger = self.workspace.bridge.tested(stream.hanger)
-        watched = self.store.streams.watch_time(stream.hanger)
+        watch = self.store.streams.watch(stream.hanger)
         self._submit(
             stream.name,
             partial(
@@ -316,10 +323,10 @@ class Streaming:
                 start,
                 hanger,
                 baseline_of(self.store, stream),
-                self.store.streams.watch_state(stream.hanger),
+                watch and watch.content,
                 self.workspace.settings.false_call_years,
                 self._recent_events(stream, start) if period == "hour" else (),
-                is_watched=period == "hour" and (watched is None or start >= watched),
+                is_watched=period == "hour" and (watch is None or start >= watch.time),
             ),
             partial(self._keep_pooled, stream, period, start),
             partial(self._give_up_pool, stream, period, start),
@@ -432,3 +439,15 @@ class Streaming:
         self, stream: Stream, period: Period, start: datetime, error: BaseException
     ) -> None:
         self._pooled[stream.name, period] = start + PERIODS[period]
+
+
+def last_modes(readings: Sequence[WindowReading]) -> tuple[Mode, ...]:
+    """Return the modes of windows, the last first, each as it was seen last.
+
+    A mode that one window hides is looked for again in the next.
+    """
+    found: dict[tuple[Plane, int], Mode] = {}
+    for reading in readings:
+        for mode in reading.modes:
+            found.setdefault((mode.plane, mode.order), mode)
+    return tuple(sorted(found.values(), key=lambda mode: mode.frequency_hz))

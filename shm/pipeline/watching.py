@@ -214,7 +214,8 @@ def reconciled(
     if is_again:
         stored = store.watch.list_all(hanger.id, baseline.id)
     else:
-        stored = store.watch.list_recent(baseline, _RECENT_TESTS) if known else ()
+        recent = _RECENT_TESTS if known else 0
+        stored = store.watch.list_all(hanger.id, baseline.id, last=recent)
     tests = sorted([*(each.watched for each in stored), watched], key=lambda each: each.time)
     called = _called(stored, known) if is_again else []
 

@@ -158,7 +158,7 @@ class Queue:
             yield nothing
             store.watch.pass_over(test, self.clock())
             return None
-        current = store.posteriors.of_test(test)
+        current = store.posteriors.get(test.hanger, test.test.id)
         # Of the test's own class: another may have been adopted, or dropped, since its update.
         baseline = store.watch.baseline(hanger.id, current.model, test.time)
         if baseline is None:
@@ -205,7 +205,7 @@ class Queue:
         if weighed is None:
             return None
         try:
-            posterior = self.store.posteriors.of_test(weighed)
+            posterior = self.store.posteriors.get(weighed.hanger, weighed.test.id)
         except NothingThere:  # not through updating yet
             return None
         return Taught(posterior, own is not None)

@@ -183,23 +183,25 @@ _any_waits = sa.select(sa.exists().where(deliveries.c.state == DeliveryState.WAI
 class Deliveries(Repository):
     """What hooks are owed; a part of the repository of alerts."""
 
-    def list_deliveries(self, state: DeliveryState | None = None) -> tuple[Delivery, ...]:
-        """The outbox: what was told to which hook, or is still owed."""
+    def list_deliveries(
+        self,
+        state: DeliveryState | None = None,
+        *,
+        unsent: bool = False,
+        messages: Collection[int] | None = None,
+    ) -> tuple[Delivery, ...]:
+        """Return what was told to which hook, or is still owed, in the order in which it was owed.
+
+        Of one state; those `unsent` alone, whose first attempt has not begun; or of `messages`.
+        """
         query = _outbox.order_by(deliveries.c.id)
         if state is not None:
             query = query.where(deliveries.c.state == state)
+        if unsent:
+            query = query.where(deliveries.c.message_id.is_(None))
+        if messages is not None:
+            query = query.where(deliveries.c.message_id.in_(messages))
         return self._deliveries(query)
-
-    def list_unsent(self) -> tuple[Delivery, ...]:
-        """Deliveries whose first attempt has not begun, in the order in which they were owed."""
-        waiting = deliveries.c.state == DeliveryState.WAITING
-        query = _outbox.where(waiting, deliveries.c.message_id.is_(None))
-        return self._deliveries(query.order_by(deliveries.c.id))
-
-    def list_of_messages(self, message_ids: Collection[int]) -> tuple[Delivery, ...]:
-        """The deliveries of messages, in their order."""
-        query = _outbox.where(deliveries.c.message_id.in_(message_ids))
-        return self._deliveries(query.order_by(deliveries.c.id))
 
     def begin_messages(
         self, messages: Sequence[Sequence[int]], not_needed: Mapping[int, str], at: datetime

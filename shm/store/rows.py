@@ -347,9 +347,13 @@ class Silence:
         """Whether it is not in force and will not be: one may end before it begins."""
         return self.until <= max(at, self.starts_at)
 
+    def is_in_force(self, at: datetime) -> bool:
+        """Return True from its beginning to its end."""
+        return self.starts_at <= at < self.until
+
     def covers(self, hanger: int, at: datetime) -> bool:
         """Whether it is in force for a hanger at a time; its end is not part of it."""
-        return self.hanger in (None, hanger) and self.starts_at <= at < self.until
+        return self.hanger in (None, hanger) and self.is_in_force(at)
 
 
 @dataclass(frozen=True)

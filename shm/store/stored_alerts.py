@@ -318,14 +318,6 @@ class Silences(Repository):
         """All that were ever made, the oldest first."""
         return tuple(map(_silence, self.rows(sa.select(*_COLUMNS).order_by(silences.c.id))))
 
-    def list_current(self, at: datetime) -> tuple[Silence, ...]:
-        """Those in force at a time or yet to come."""
-        return tuple(each for each in self.list_all() if not each.is_over(at))
-
-    def list_in_force(self, at: datetime) -> tuple[Silence, ...]:
-        """Those in force at a time."""
-        return tuple(each for each in self.list_current(at) if each.starts_at <= at)
-
 
 def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> datetime | None:
     """When hooks are told of a hanger again, silences one after the other; None where they are."""

@@ -36,7 +36,6 @@ from shm.store.rows import (
     Stage,
     StoredAdoption,
     StoredDiagnosis,
-    StoredPosterior,
     StoredSelection,
     StoredTest,
 )
@@ -114,18 +113,6 @@ class Posteriors(Trends):
             what = f"hanger {hanger}" + (f", test {test}" if test else "")
             raise NothingThere(f"no posterior of {what} yet.", remedy="Ingest a test of it.")
         return posterior_of_row(row)
-
-    def of_test(self, test: StoredTest) -> Posterior:
-        """The posterior of a test known by its row; raises NothingThere."""
-        return self.get(test.hanger, test.test.id)
-
-    def list_all(self, hanger: int) -> tuple[StoredPosterior, ...]:
-        """The posteriors of a hanger in its selected class, by time."""
-        query = _shown(hanger)
-        return tuple(
-            StoredPosterior(row.id, posterior_of_row(row), row.time, lineage_from(row))
-            for row in self.rows(query.order_by(posteriors.c.time, posteriors.c.id))
-        )
 
     def history(self, hanger: int) -> tuple[tuple[StoredTest, Posterior], ...]:
         """Each test of a hanger that has a posterior, with it, by time."""

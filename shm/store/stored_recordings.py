@@ -121,18 +121,6 @@ class Recordings(Dispositions):
             raise NothingThere(f"no recording and no test {which!r}.", remedy="See `shm status`.")
         return _single(former, f"{len(former)} recordings were called {which!r}."), None
 
-    def names_of(self, recording_id: int) -> tuple[str, ...]:
-        """Every name that the file of a recording came under: the present one, then the others."""
-        own = sa.select(recordings.c.file_name).where(recordings.c.id == recording_id)
-        other = sa.select(journal.c.subject).where(
-            journal.c.recording_id == recording_id, journal.c.subject != ""
-        )
-        with self.reading() as connection:
-            present = connection.scalars(own).all()
-            return tuple(
-                dict.fromkeys([*present, *connection.scalars(other.order_by(journal.c.id))])
-            )
-
     def list_all(self, stage: Stage | None = None) -> tuple[StoredRecording, ...]:
         """All recordings, or those at one stage, as they came in."""
         query = sa.select(recordings).order_by(recordings.c.id)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from datetime import datetime, timedelta
 from typing import Any, TypeVar
 
@@ -23,7 +23,7 @@ from shm.store.people_and_stream_tables import (
     stream_windows,
 )
 from shm.store.rows import Reconciled, StoredAlert
-from shm.values import NAN, Plane, ShapePoint
+from shm.values import NAN, ShapePoint
 from shm.values.modes import Mode
 from shm.values.stream import (
     PERIODS,
@@ -45,6 +45,14 @@ _LATEST = 36
 _EVENT = tuple(field.name for field in fields(StreamEvent))
 _NO_CHANGE = Reconciled()
 _T = TypeVar("_T", WindowReading, PooledReading)
+
+
+@dataclass(frozen=True)
+class KeptStreamWatch:
+    """What the watch of a hanger's sensors goes on from, and up to when it has seen readings."""
+
+    time: datetime
+    content: bytes
 
 
 class Streams(Repository):
@@ -94,33 +102,12 @@ class Streams(Repository):
         query = sa.select(table).where(table.c.stream == stream).order_by(table.c.start.desc())
         return next(iter(self._values(query.limit(1), WindowReading)), None)
 
-    def last_modes(self, stream: str) -> tuple[Mode, ...]:
-        """Return the modes of the latest windows that have any, each as it was seen last.
-
-        A mode that one window hides is looked for again in the next.
-        """
-        found: dict[tuple[Plane, int], Mode] = {}
-        for reading in self._latest_with_modes(stream):
-            for mode in reading.modes:
-                found.setdefault((mode.plane, mode.order), mode)
-        return tuple(sorted(found.values(), key=lambda mode: mode.frequency_hz))
-
-    def has_followed_modes(self, stream: str) -> bool:
-        """Return True if one of the latest windows followed modes that an earlier one had found."""
-        return any(each.how == "tracked" for each in self._latest_with_modes(stream))
-
-    def _latest_with_modes(self, stream: str) -> tuple[WindowReading, ...]:
+    def latest_with_modes(self, stream: str) -> tuple[WindowReading, ...]:
+        """Return the latest windows of a stream that have modes, the last first."""
         table = stream_windows
         query = sa.select(table).where(table.c.stream == stream, table.c.has_modes)
         latest = query.order_by(table.c.start.desc()).limit(_LATEST)
         return self._values(latest, WindowReading)
-
-    def last_hour(self, stream: str) -> PooledReading | None:
-        """The latest reading of an hour of a stream."""
-        table = pooled_readings
-        query = sa.select(table).where(table.c.stream == stream, table.c.period == "hour")
-        latest = query.order_by(table.c.start.desc()).limit(1)
-        return next(iter(self._values(latest, PooledReading)), None)
 
     def first_window(self, stream: str) -> datetime | None:
         """When the first window of a stream began; None where there is none."""
@@ -160,20 +147,17 @@ class Streams(Repository):
                     return start
         return None
 
-    def first_day(self, stream: str) -> datetime | None:
-        """When the first day of a stream began of which anything is pooled; None without any."""
-        table = pooled_readings
-        query = sa.select(sa.func.min(table.c.start)).where(table.c.stream == stream)
-        first = self._moment(query)
-        return None if first is None else period_start(first, PERIODS["day"])
-
-    def last_pooled(self, stream: str, period: Period) -> datetime | None:
-        """When the latest reading of a period began; None where there is none."""
-        table = pooled_readings
-        query = sa.select(sa.func.max(table.c.start)).where(
-            table.c.stream == stream, table.c.period == period
-        )
-        return self._moment(query)
+    def pooled_range(
+        self, stream: str, period: Period | None = None
+    ) -> tuple[datetime, datetime] | None:
+        """Return when the first and the latest reading of a period, or of any, began."""
+        start = pooled_readings.c.start
+        query = sa.select(sa.func.min(start), sa.func.max(start))
+        query = query.where(pooled_readings.c.stream == stream)
+        if period is not None:
+            query = query.where(pooled_readings.c.period == period)
+        first, last = self.first(query)
+        return None if first is None else (first, last)
 
     def save_pooled(
         self,
@@ -219,17 +203,15 @@ class Streams(Repository):
         query = sa.select(table).where(of_hours, sa.or_(sa.false(), *near))
         return self._values(query.order_by(table.c.start), PooledReading)
 
-    def watch_time(self, hanger: int) -> datetime | None:
-        """Up to when the watch of a hanger has seen readings; None where there is none."""
-        table = stream_watch
-        return self._moment(sa.select(table.c.reading_time).where(table.c.hanger == hanger))
-
-    def watch_before(self, hanger: int, until: datetime) -> tuple[datetime, bytes] | None:
-        """The watch of a hanger as it was at its last kept time up to `until`, and that time."""
-        table = stream_watch_days
-        own = sa.select(table).where(table.c.hanger == hanger, table.c.reading_time <= until)
+    def watch(self, hanger: int, until: datetime | None = None) -> KeptStreamWatch | None:
+        """Return what the watch of a hanger's sensors goes on from; with `until` as it was at the
+        last kept time up to then."""
+        table = stream_watch if until is None else stream_watch_days
+        own = sa.select(table.c.reading_time, table.c.content).where(table.c.hanger == hanger)
+        if until is not None:
+            own = own.where(table.c.reading_time <= until)
         row = self.first(own.order_by(table.c.reading_time.desc()).limit(1))
-        return None if row is None else (row.reading_time, row.content)
+        return None if row is None else KeptStreamWatch(*row)
 
     def go_back(self, hanger: int, to: datetime, content: bytes) -> None:
         """The watch of a hanger goes on from a state of before."""
@@ -239,13 +221,6 @@ class Streams(Repository):
         with self.writing() as connection:
             _replace(connection, stream_watch, state, "hanger")
             connection.execute(sa.delete(days).where(*later))
-
-    def watch_state(self, hanger: int) -> bytes | None:
-        """Return the kept state of the watch of a hanger's sensors, None where there is none."""
-        content: bytes | None = self.scalar(
-            sa.select(stream_watch.c.content).where(stream_watch.c.hanger == hanger)
-        )
-        return content
 
     def save_event(self, event: StreamEvent) -> None:
         """Notes something once; what was noted already is not noted again."""

@@ -228,23 +228,19 @@ class Watch(Repository):
         return tuple(_drift(row) for row in self.rows(query.order_by(drifts.c.time, drifts.c.id)))
 
     def list_all(
-        self, hanger: int | None = None, baseline_id: int | None = None
+        self, hanger: int | None = None, baseline_id: int | None = None, *, last: int | None = None
     ) -> tuple[StoredWatch, ...]:
-        """What the watch said after each test, by time; of one hanger or baseline where named."""
+        """Return what the watch said after each test, or after the `last` so many, by time; of one
+        hanger or baseline where named."""
         query = sa.select(watches.c.id).where(in_force(watches))
         if hanger is not None:
             query = query.where(watches.c.hanger == hanger)
         if baseline_id is not None:
             query = query.where(watches.c.baseline_id == baseline_id)
-        return self._watches(query)
-
-    def list_recent(self, baseline: Baseline, limit: int) -> tuple[StoredWatch, ...]:
-        """The last so many watches against a baseline, by time."""
-        of_one = watches.c.hanger == baseline.hanger, watches.c.baseline_id == baseline.id
-        query = sa.select(watches.c.id).where(*of_one, in_force(watches))
-        latest = query.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(limit)
-        ids = self.scalars(latest)
-        return self._watches(ids)
+        if last is None:
+            return self._watches(query)
+        latest = query.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(last)
+        return self._watches(self.scalars(latest))
 
     def latest(self, hangers: Sequence[Hanger] | None = None) -> dict[int, StoredWatch]:
         """Return the watch of the latest test of each hanger (or these) against its baseline."""
@@ -268,11 +264,6 @@ class Watch(Repository):
         found = [id_ for id_ in self.scalars(ids) if id_ is not None]
         return {each.hanger: each for each in self._watches(found)}
 
-    def list_detected(self, hanger: int) -> tuple[StoredWatch, ...]:
-        """The watches of a hanger that detected a change from its baseline in force, by time."""
-        chosen = sa.select(watches.c.id).where(watches.c.hanger == hanger, *_called(hanger))
-        return self._watches(chosen)
-
     def detected_changes(
         self, hangers: Sequence[Hanger] | None = None
     ) -> dict[int, tuple[Change, ...]]:
@@ -283,12 +274,11 @@ class Watch(Repository):
             found[row.hanger].append(change_in(row.document))
         return {hanger: tuple(changes) for hanger, changes in found.items()}
 
-    def list_detected_and_latest(self, baseline: Baseline) -> tuple[StoredWatch, ...]:
-        """The watches that detected a change from a baseline, and the latest of it, by time."""
+    def list_detected(self, hanger: int, baseline_id: int) -> tuple[StoredWatch, ...]:
+        """Return the watches that detected a change from a baseline, and the latest of it, by
+        time."""
         against = sa.select(watches.c.id).where(
-            watches.c.hanger == baseline.hanger,
-            watches.c.baseline_id == baseline.id,
-            in_force(watches),
+            watches.c.hanger == hanger, watches.c.baseline_id == baseline_id, in_force(watches)
         )
         latest = against.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(1)
         with self.reading() as connection:

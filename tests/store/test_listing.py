@@ -154,13 +154,9 @@ def test_a_watch_against_a_baseline_of_before_is_not_the_latest(file_store: Stor
     posterior = a_posterior("beam1", ("t2",))
     file_store.watch.rebaseline(baseline, posterior, chosen, record, LINEAGE, NOW)
     assert file_store.watch.latest() == {}
-    assert (
-        file_store.watch.list_detected(3)
-        == file_store.watch.list_detected_and_latest(baseline_of(file_store))
-        == ()
-    )
+    assert file_store.watch.list_detected(3, baseline_of(file_store).id) == ()
     assert file_store.watch.detected_changes() == {}
-    told = file_store.watch.list_detected_and_latest(baseline)
+    told = file_store.watch.list_detected(3, baseline.id)
     assert [each.watched.test for each in told] == ["t2"]
 
 
@@ -172,21 +168,20 @@ def test_only_called_changes_are_listed_as_called(store: Store) -> None:
     watched(store, other, 6, 1.0)
     called = [each for each in store.watch.list_all() if each.watched.change.called]
     assert [each.watched.test for each in called] == ["t3", "t4"]
-    assert [each.id for each in store.watch.list_detected(3)] == [each.id for each in called]
+    detected = store.watch.list_detected(3, baseline.id)
+    assert [each.id for each in detected] == [each.id for each in called]
     assert store.watch.detected_changes() == {3: tuple(each.watched.change for each in called)}
-    assert store.watch.list_detected(4) == ()
+    assert not any(e.watched.change.called for e in store.watch.list_detected(4, other.id))
 
 
 def test_calls_and_the_latest_watch_tell_what_there_is_to_tell(store: Store) -> None:
     baseline = with_baseline(store)
     for number, evidence_years in ((2, 1.0), (3, 350.0), (4, 1.0), (5, 1.0)):
         watched(store, baseline, number, evidence_years)
-    found = [
-        (each.id, each.watched.test) for each in store.watch.list_detected_and_latest(baseline)
-    ]
+    found = [(each.id, each.watched.test) for each in store.watch.list_detected(3, baseline.id)]
     assert found == [(2, "t3"), (4, "t5")]
     assert (
-        store.watch.list_detected_and_latest(baseline)[-1].watched.drifts
+        store.watch.list_detected(3, baseline.id)[-1].watched.drifts
         == store.watch.list_drifts(3)[-1:]
         != ()
     )

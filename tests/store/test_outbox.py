@@ -38,7 +38,7 @@ def test_messages_keep_the_deliveries_that_they_were_made_of(file_store: Store) 
     alerts = file_store.alerts
     alerts.begin_messages((), {}, NOW)
     first, second, third = (raised(file_store, n, "mail") for n in (1, 2, 3))
-    assert [each.id for each in alerts.list_unsent()] == [1, 2, 3]
+    assert [each.id for each in alerts.list_deliveries(WAITING, unsent=True)] == [1, 2, 3]
     assert due(file_store, 2) == [1, 2]
     assert due(file_store, 2, begun=True) == []
     alerts.begin_messages([[2, 1]], {3: "resolved before"}, NOW + 5 * HOUR)
@@ -49,15 +49,15 @@ def test_messages_keep_the_deliveries_that_they_were_made_of(file_store: Store) 
     ]
     left_out = alerts.list_deliveries(NOT_NEEDED)[0]
     assert (left_out.last_error, left_out.ended_at) == ("resolved before", NOW + 5 * HOUR)
-    assert alerts.list_unsent() == ()
-    assert [each.id for each in alerts.list_of_messages([1])] == [1, 2]
+    assert alerts.list_deliveries(WAITING, unsent=True) == ()
+    assert [each.id for each in alerts.list_deliveries(messages=[1])] == [1, 2]
     assert due(file_store, 5) == due(file_store, 5, begun=True) == [1]
     assert due(file_store, 4) == due(file_store, 5, excluding=[1]) == []
     alerts.begin_messages([[1], [2]], {1: "too late", 3: "too late"}, NOW + 6 * HOUR)
     assert [each[2:] for each in states(file_store)] == [
         (WAITING, 1), (WAITING, 1), (NOT_NEEDED, None),
     ]  # fmt: skip
-    alerts.save_delivery(alerts.list_of_messages([1])[0], NOW + 7 * HOUR)
+    alerts.save_delivery(alerts.list_deliveries(messages=[1])[0], NOW + 7 * HOUR)
     assert [each[2] for each in states(file_store)] == [DELIVERED, DELIVERED, NOT_NEEDED]
     counts = {state: n for state, n in alerts.delivery_counts().items() if n}
     assert counts == {DELIVERED: 2, NOT_NEEDED: 1}

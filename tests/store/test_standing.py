@@ -111,16 +111,17 @@ def test_a_recording_is_found_by_number_test_and_file_name(filled_copy: Store) -
     filled_copy.recordings.receive(a_file(9, file_name="h3-2.csv"), NOW)
     with pytest.raises(UsageError, match="2 recordings were called"):
         find("h3-2.csv")
-    assert filled_copy.recordings.names_of(1) == ("h3-1.csv",)
 
 
 def test_the_latest_tests_of_a_hanger_by_time_and_by_receipt(file_store: Store) -> None:
     for number, day in ((1, 5), (2, 1), (3, 3), (4, 2)):
         identified(file_store, number, day)
     identified(file_store, 5, 9, hanger=4)
-    latest = file_store.tests.latest_before, file_store.tests.latest_received
-    assert [names(each(3, 99, 3)) for each in latest] == [["t4", "t3", "t1"], ["t2", "t3", "t4"]]
-    assert [names(each(3, 3, 9)) for each in latest] == [["t2", "t4", "t1"], ["t1", "t2", "t4"]]
+    latest = file_store.tests.list_latest
+    assert names(latest(3, 99, 3)) == ["t4", "t3", "t1"]
+    assert names(latest(3, 99, 3, as_received=True)) == ["t2", "t3", "t4"]
+    assert names(latest(3, 3, 9)) == ["t2", "t4", "t1"]
+    assert names(latest(3, 3, 9, as_received=True)) == ["t1", "t2", "t4"]
     told = {h: (each.tests, each.time) for h, each in file_store.tests.latest().items()}
     assert told == {3: (4, NOW + 5 * DAY), 4: (1, NOW + 9 * DAY)}
 
@@ -190,6 +191,6 @@ def test_watched_tests_are_listed_page_by_page(file_store: Store) -> None:
     fourth = file_store.tests.named(3, "t4")
     before = file_store.watch.list_watched(baseline, fourth)
     assert [each.name for each in before] == ["t3", "t5"]
-    recent = file_store.watch.list_recent(baseline, 2)
+    recent = file_store.watch.list_all(3, baseline.id, last=2)
     assert [each.watched.test for each in recent] == ["t4", "t2"]
     assert [each.watched.test for each in file_store.watch.list_all(3)] == ["t3", "t5", "t4", "t2"]

@@ -72,7 +72,11 @@ def alerts_page(
         open_count=sum(counts.values()) if hanger is None else counts.get(hanger, 0),
         is_first=open_before is None and noted_before is None,
         hanger=hanger,
-        silences=[(each.id, _sentence(each)) for each in site.store.silences.list_current(now)],
+        silences=[
+            (each.id, _sentence(each))
+            for each in site.store.silences.list_all()
+            if not each.is_over(now)
+        ],
         hangers=[
             (h.id, formatting.hanger_name(h.id, h.name)) for h in site.workspace.bridge.watched
         ],
