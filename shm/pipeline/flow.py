@@ -154,10 +154,10 @@ class Flow:
         postponed = {id_ for id_, until in self._postponed.items() if _still_waits(until, now)}
         stopped = {id_ for id_, until in self._stopped.items() if _still_waits(until, now)}
         while self._limits_to_apply:
-            hanger = self._limits_to_apply[-1]
+            hanger = self._limits_to_apply[0]
             with contained(log, "limits of hanger %d cannot be applied", hanger.id):
                 heed_limits(self.workspace, self.store, [hanger], now)
-            self._limits_to_apply.pop()
+            self._limits_to_apply.pop(0)
         self._judged_again.go_on(now, postponed, stopped)
         for task in self._queue.list_waiting(2 * self.lanes, postponed):
             if task.hanger in stopped or task.key in self._running:

@@ -145,9 +145,9 @@ class JudgedAgain:
         still are not waited for.
         """
         while self._unread:
-            with contained(log, "hanger %d cannot be judged again", self._unread[-1].id):
-                self._note_differences(self._unread[-1])
-            self._unread.pop()
+            with contained(log, "hanger %d cannot be judged again", self._unread[0].id):
+                self._note_differences(self._unread[0])
+            self._unread.pop(0)
         if not self._left:
             return
         waiting = {test.hanger for test in self._store.tests.list_waiting(1, excluding=held)}
