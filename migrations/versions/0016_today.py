@@ -65,6 +65,9 @@ def upgrade() -> None:
         if table.name in columns:
             _copy(table, columns[table.name])
     _fill_journal(columns)
+    for prefix, former_table in (("noted", "acknowledgements"), ("ended", "resolutions")):
+        if former_table in columns:
+            _note_on_alerts(prefix, former_table)
     if "taken_at" not in columns["tests"]:
         _note_conditions()
     for each in reversed(tables):
@@ -128,6 +131,14 @@ def _fill_journal(former: Collection[str]) -> None:
         f"INSERT INTO journal ({_ENTRY}) SELECT {_ENTRY} FROM ({entries}) AS found "  # noqa: S608
         "ORDER BY at, source, id"
     )
+
+
+def _note_on_alerts(prefix: str, table: str) -> None:
+    found = ", ".join(
+        f"{prefix}_{name} = (SELECT {name} FROM old_{table} WHERE alert_id = alerts.id)"  # noqa: S608
+        for name in ("at", "who", "why")
+    )
+    op.execute(f"UPDATE alerts SET {found}")  # noqa: S608
 
 
 def _note_conditions() -> None:

@@ -19,10 +19,9 @@ from shm.store.database import insert
 from shm.store.files import in_force, reason_document
 from shm.store.journal import REFUSED, write
 from shm.store.list_rows import Decision, HeldTest, Hold
-from shm.store.outbox import raise_alert, resolve
+from shm.store.outbox import acknowledge, raise_alert, resolve
 from shm.store.rows import Stage, StoredAlert
 from shm.store.tables import (
-    acknowledgements,
     alerts,
     fingerprints,
     holds,
@@ -241,18 +240,9 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
     connection.execute(sa.update(holds).where(holds.c.id == hold.id).values(**made))
     told = f"{hold.decision}" + (f": {why}" if why else "")
     key = notice_key(hold.hanger, hold.id)
-    open_notice = (
-        sa.select(alerts.c.id)
-        .outerjoin(acknowledgements)
-        .where(alerts.c.key == key, acknowledgements.c.id.is_(None))
-    )
-    alert_id = connection.scalar(open_notice)
-    if alert_id is not None:
-        insert(
-            connection, acknowledgements, {"alert_id": alert_id, "who": who, "why": told, "at": at}
-        )
     notice = connection.scalar(sa.select(alerts.c.id).where(alerts.c.key == key))
     if notice is not None:
+        acknowledge(connection, notice, who, told, at)
         resolve(connection, notice, who, told, at)
     write_decision(connection, hold, who, why, at)
     return replace(hold, decided_at=at, who=who, why=why)

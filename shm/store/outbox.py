@@ -27,21 +27,12 @@ from shm.store.rows import (
     StoredTest,
     counts_by_name,
 )
-from shm.store.tables import acknowledgements, alerts, deliveries, journal, resolutions, tests
+from shm.store.tables import alerts, deliveries, journal, tests
 from shm.values import Alert
 
 _HELD = 1024  # technical: those that stand on a large bridge, of some kilobytes each
 
-stored_alerts = sa.select(
-    alerts,
-    tests.c.name.label("test"),
-    *(acknowledgements.c[name].label(f"ack_{name}") for name in ("who", "why", "at")),
-    *(resolutions.c[name].label(f"end_{name}") for name in ("who", "why", "at")),
-).select_from(
-    alerts.outerjoin(acknowledgements)
-    .outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
-    .outerjoin(tests, tests.c.id == alerts.c.test_id)
-)
+stored_alerts = sa.select(alerts)
 
 
 def raise_alert(
@@ -103,10 +94,8 @@ def resolve(connection: Connection, alert_id: int, who: str, why: str, at: datet
 
     Each hook that was told of the alert is owed that news.
     """
-    known = sa.select(resolutions.c.id).where(resolutions.c.alert_id == alert_id)
-    if connection.execute(known).first() is not None:
+    if not _note_on(connection, alert_id, "ended", who, why, at):
         return False
-    insert(connection, resolutions, vars(Resolution(alert_id, who, why, at)))
     told = sa.select(deliveries.c.hook).where(
         deliveries.c.alert_id == alert_id,
         deliveries.c.news == News.RAISED,
@@ -117,9 +106,22 @@ def resolve(connection: Connection, alert_id: int, who: str, why: str, at: datet
     return True
 
 
+def acknowledge(connection: Connection, alert_id: int, who: str, why: str, at: datetime) -> bool:
+    """Note that somebody has seen an alert; return False where that is noted already."""
+    return _note_on(connection, alert_id, "noted", who, why, at)
+
+
+def _note_on(
+    connection: Connection, alert_id: int, prefix: str, who: str, why: str, at: datetime
+) -> bool:
+    once = (alerts.c.id == alert_id) & alerts.c[f"{prefix}_at"].is_(None)
+    note = {f"{prefix}_at": at, f"{prefix}_who": who, f"{prefix}_why": why}
+    return bool(connection.execute(sa.update(alerts).where(once).values(**note)).rowcount)
+
+
 def owe_resolution(connection: Connection, alert_id: int, hook: str, at: datetime) -> None:
     """A hook that was told of an alert after its condition ended is owed that news too."""
-    ended = sa.select(resolutions.c.id).where(resolutions.c.alert_id == alert_id)
+    ended = sa.select(alerts.c.id).where(alerts.c.id == alert_id, alerts.c.ended_at.is_not(None))
     owed = sa.select(deliveries.c.id).where(
         deliveries.c.alert_id == alert_id,
         deliveries.c.hook == hook,
@@ -161,16 +163,16 @@ def alert_from(text: str) -> Alert:
 
 def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:
     """Who took note of an alert, of a row of `stored_alerts`; None while it is open."""
-    if row.ack_at is None:
+    if row.noted_at is None:
         return None
-    return Acknowledgement(row.id, row.ack_who, row.ack_why, row.ack_at)
+    return Acknowledgement(row.id, row.noted_who, row.noted_why, row.noted_at)
 
 
 def resolution_of(row: Row[Any]) -> Resolution | None:
     """How the condition of an alert ended, of a row of `stored_alerts`; None while it stands."""
-    if row.end_at is None:
+    if row.ended_at is None:
         return None
-    return Resolution(row.id, row.end_who, row.end_why, row.end_at)
+    return Resolution(row.id, row.ended_who, row.ended_why, row.ended_at)
 
 
 _OWED = tuple(field.name for field in fields(Delivery) if field.name != "stored")

@@ -20,6 +20,7 @@ from shm.store.journal import note
 from shm.store.list_rows import AlertRow, DeliveryRow, EventKind, HangerEvent
 from shm.store.outbox import (
     Deliveries,
+    acknowledge,
     acknowledgement_of,
     alert_in,
     resolution_of,
@@ -30,18 +31,16 @@ from shm.store.outbox import (
 )
 from shm.store.rows import Acknowledgement, DeliveryState, News, Reconciled, Silence, StoredAlert
 from shm.store.tables import (
-    acknowledgements,
     adoptions,
     alerts,
     baselines,
     deliveries,
-    resolutions,
     silences,
 )
 
-_is_open = acknowledgements.c.id.is_(None) & resolutions.c.id.is_(None)
-"""Of `stored_alerts`, and of whatever joins both tables: what `StoredAlert.is_open` says."""
-_closed_at = sa.func.coalesce(acknowledgements.c.at, resolutions.c.at)
+_is_open = alerts.c.noted_at.is_(None) & alerts.c.ended_at.is_(None)
+"""What `StoredAlert.is_open` says."""
+_closed_at = sa.func.coalesce(alerts.c.noted_at, alerts.c.ended_at)
 
 
 class Alerts(Deliveries):
@@ -60,7 +59,7 @@ class Alerts(Deliveries):
         """
         query = stored_alerts.order_by(alerts.c.id)
         if standing is not None:
-            query = query.where(resolutions.c.id.is_(None) == standing)
+            query = query.where(alerts.c.ended_at.is_(None) == standing)
         if hanger is not None:
             query = query.where(alerts.c.hanger == hanger)
         if baseline_id is not None:
@@ -110,9 +109,7 @@ class Alerts(Deliveries):
                 raise UsageError(
                     f"alert {alert_id} is resolved already.", remedy="See `shm alerts`."
                 )
-            if found.acknowledgement is None:
-                noted = Acknowledgement(alert_id, who, why, at)
-                insert(connection, acknowledgements, vars(noted))
+            acknowledge(connection, alert_id, who, why, at)
             note(connection, at, "alert resolved", _said_of(found), why, who)
             return alert_in(connection, alert_id)
 
@@ -136,14 +133,13 @@ class Alerts(Deliveries):
                     f"{alert.acknowledgement.at:%Y-%m-%d} already.",
                     remedy="See `shm alerts`.",
                 )
-            noted = Acknowledgement(alert_id, who, why, at)
-            insert(connection, acknowledgements, vars(noted))
+            acknowledge(connection, alert_id, who, why, at)
             note(connection, at, "alert acknowledged", _said_of(alert), why, who)
-        return replace(alert, acknowledgement=noted)
+        return replace(alert, acknowledgement=Acknowledgement(alert_id, who, why, at))
 
     def counts(self) -> tuple[int, int]:
         """How many alerts are open, and how many were acknowledged."""
-        noted = self.scalar(sa.select(sa.func.count()).select_from(acknowledgements))
+        noted = self.scalar(sa.select(sa.func.count(alerts.c.noted_at)))
         return sum(self.open_counts().values()), int(noted or 0)
 
     def open_counts(self) -> dict[int, int]:
@@ -151,12 +147,7 @@ class Alerts(Deliveries):
 
         The only place where they are counted: whoever states a number of them asks here.
         """
-        query = (
-            sa.select(alerts.c.hanger, sa.func.count())
-            .select_from(alerts)
-            .outerjoin(acknowledgements, acknowledgements.c.alert_id == alerts.c.id)
-            .outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
-        )
+        query = sa.select(alerts.c.hanger, sa.func.count())
         rows = self.rows(query.where(_is_open).group_by(alerts.c.hanger))
         return {row[0]: int(row[1]) for row in rows}
 
@@ -185,10 +176,9 @@ def _is_after(alert_id: int, *, is_open: bool | None) -> sa.ColumnElement[bool]:
     older = alerts.c.id < alert_id
     if is_open is not False:
         return older
-    tables = alerts.outerjoin(acknowledgements, acknowledgements.c.alert_id == alerts.c.id)
-    tables = tables.outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
-    at = sa.select(_closed_at).select_from(tables).where(alerts.c.id == alert_id)
-    of_one = at.correlate(None).scalar_subquery()
+    one = alerts.alias()
+    closed_at = sa.func.coalesce(one.c.noted_at, one.c.ended_at)
+    of_one = sa.select(closed_at).where(one.c.id == alert_id).scalar_subquery()
     return (_closed_at < of_one) | ((_closed_at == of_one) & older)
 
 
@@ -224,7 +214,7 @@ def _row(row: Row[Any], owed: tuple[DeliveryRow, ...]) -> AlertRow:
 
 
 def _events(hanger: int) -> dict[EventKind, sa.Select[Any]]:
-    noted = sa.select(acknowledgements).join(alerts).where(alerts.c.hanger == hanger)
+    noted = _named(alerts, "noted_at", "noted_who", "noted_why")
     undone = _named(adoptions, "undone_at", "undone_who", "undone_why")
     raised = sa.select(
         alerts.c.id,
@@ -237,7 +227,7 @@ def _events(hanger: int) -> dict[EventKind, sa.Select[Any]]:
         EventKind.ADOPTED: _of(hanger, adoptions, _named(adoptions, "adopted_at", "who", "why")),
         EventKind.UNDONE: _of(hanger, adoptions, undone.where(adoptions.c.undone_at.is_not(None))),
         EventKind.ALERT: _of(hanger, alerts, raised),
-        EventKind.ACKNOWLEDGED: noted,
+        EventKind.ACKNOWLEDGED: _of(hanger, alerts, noted.where(alerts.c.noted_at.is_not(None))),
     }
 
 

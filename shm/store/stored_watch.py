@@ -19,7 +19,7 @@ from shm.store.database import Repository, insert
 from shm.store.files import all_at, in_force, move
 from shm.store.journal import note
 from shm.store.list_rows import BaselineGlance, TestRow
-from shm.store.outbox import resolve, settle
+from shm.store.outbox import acknowledge, resolve, settle
 from shm.store.queries import (
     among,
     baseline_in_force,
@@ -33,7 +33,6 @@ from shm.store.queries import (
 )
 from shm.store.rerun import rerun_watched
 from shm.store.rows import (
-    Acknowledgement,
     Baseline,
     KeptWatch,
     Lineage,
@@ -44,12 +43,10 @@ from shm.store.rows import (
     StoredWatch,
 )
 from shm.store.tables import (
-    acknowledgements,
     alerts,
     baselines,
     drifts,
     posterior_tests,
-    resolutions,
     tests,
     watch_states,
     watches,
@@ -190,19 +187,16 @@ class Watch(Repository):
                 alerts.c.hanger == hanger,
                 sa.or_(
                     alerts.c.baseline_id == before.id,
-                    alerts.c.baseline_id.is_not(None)
-                    & alerts.c.id.not_in(sa.select(acknowledgements.c.alert_id)),
+                    alerts.c.baseline_id.is_not(None) & alerts.c.noted_at.is_(None),
                 ),
-                alerts.c.id.not_in(sa.select(resolutions.c.alert_id)),
+                alerts.c.ended_at.is_(None),
             )
-            acknowledged = set(connection.scalars(sa.select(acknowledgements.c.alert_id)))
             for alert_id in connection.scalars(stands.order_by(alerts.c.id)).all():
                 if explained is not None and alert_id not in explained:
                     continue
                 resolve(connection, alert_id, who, f"new baseline: {why}", at)
-                if explained is not None and alert_id not in acknowledged:
-                    noted = Acknowledgement(alert_id, who, f"explained by: {why}", at)
-                    insert(connection, acknowledgements, vars(noted))
+                if explained is not None:
+                    acknowledge(connection, alert_id, who, f"explained by: {why}", at)
             note(connection, at, "baseline set", f"hanger {hanger}", why, who)
         return Baseline(id_, hanger, posterior, at, who, why, since)
 

@@ -219,7 +219,8 @@ watch_states = sa.Table(
 )
 
 # `baseline_id` is empty of the notice that a test is held: it was compared with nothing. `test_id`
-# is empty of what the readings of a stream raised.
+# is empty of what the readings of a stream raised. `noted`: who has taken note of it, when, and
+# what they say to it, once. `ended`: when its condition ended, and who found that, shm or a person.
 alerts = sa.Table(
     "alerts",
     metadata,
@@ -232,13 +233,9 @@ alerts = sa.Table(
     sa.Column("raised_at", UtcTime, nullable=False),
     sa.Column("message", sa.Text, nullable=False),
     sa.Column("document", Document, nullable=False),
+    *note_on_alert("noted"),
+    *note_on_alert("ended"),
 )
-
-# Who has taken note of an alert, when, and what they say to it: once an alert.
-acknowledgements = sa.Table("acknowledgements", metadata, identity(), *note_on_alert())
-
-# When the condition that an alert tells of ended, and who found that: `shm`, or a person.
-resolutions = sa.Table("resolutions", metadata, identity(), *note_on_alert())
 
 # From when until when hooks are not told of a hanger, of all where `hanger` is empty. A maintenance
 # window (`is_maintenance`) also keeps tests of then from the watch. `ended_at` is when a person
