@@ -4,11 +4,9 @@ from shm.store.archive import Archive, Quarantine
 from shm.store.disposition import Exclusion
 from shm.store.holding import Judged
 from shm.store.list_rows import (
-    AlertRow,
     BaselineGlance,
     Deaths,
     Decision,
-    DeliveryRow,
     EventKind,
     HangerEvent,
     HeldTest,
@@ -53,8 +51,8 @@ from shm.store.store import Store
 from shm.store.workspace import Workspace
 
 __all__ = [
-    "AGAIN_FROM", "ENDED", "Acknowledgement", "Adoption", "AlertRow", "Archive", "Baseline",
-    "BaselineGlance", "Deaths", "Decision", "Delivery", "DeliveryRow", "DeliveryState",
+    "AGAIN_FROM", "ENDED", "Acknowledgement", "Adoption", "Archive", "Baseline",
+    "BaselineGlance", "Deaths", "Decision", "Delivery", "DeliveryState",
     "EventKind", "Exclusion", "FormerPosterior", "FormerTest", "HangerEvent", "HeldTest", "Hold",
     "IdentifiedTest", "Judged", "KeptWatch", "Lineage", "News", "Numbers", "Outcome", "Quarantine",
     "Receipt", "ReceivedFile", "Reconciled", "Rerun", "Resolution", "Scope", "Silence", "Stage",

@@ -191,10 +191,11 @@ class Deliveries(Repository):
         *,
         unsent: bool = False,
         messages: Collection[int] | None = None,
+        alert_ids: Collection[int] | None = None,
     ) -> tuple[Delivery, ...]:
         """Return what was told to which hook, or is still owed, in the order in which it was owed.
 
-        Of one state; those `unsent` alone, whose first attempt has not begun; or of `messages`.
+        Of one state; those `unsent`, whose first attempt has not begun; of messages or alerts.
         """
         query = _outbox.order_by(deliveries.c.id)
         if state is not None:
@@ -203,6 +204,8 @@ class Deliveries(Repository):
             query = query.where(deliveries.c.message_id.is_(None))
         if messages is not None:
             query = query.where(deliveries.c.message_id.in_(messages))
+        if alert_ids is not None:
+            query = query.where(deliveries.c.alert_id.in_(alert_ids))
         return self._deliveries(query)
 
     def begin_messages(

@@ -5,36 +5,32 @@ Silences and maintenance windows: who wants which hooks' messages held back, whe
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Connection, Row
+from sqlalchemy.engine import Row
 
 from shm.errors import NothingThere, UsageError
 from shm.store.database import Repository, insert
 from shm.store.journal import note
-from shm.store.list_rows import AlertRow, DeliveryRow, EventKind, HangerEvent
+from shm.store.list_rows import EventKind, HangerEvent
 from shm.store.outbox import (
     Deliveries,
     acknowledge,
-    acknowledgement_of,
     alert_in,
-    resolution_of,
     resolve,
     settle,
     stored_alert,
     stored_alerts,
 )
-from shm.store.rows import Acknowledgement, DeliveryState, News, Reconciled, Silence, StoredAlert
+from shm.store.rows import Acknowledgement, Reconciled, Silence, StoredAlert
 from shm.store.tables import (
     adoptions,
     alerts,
     baselines,
-    deliveries,
     silences,
 )
 
@@ -66,14 +62,14 @@ class Alerts(Deliveries):
             query = query.where(alerts.c.baseline_id == baseline_id)
         return tuple(stored_alert(row) for row in self.rows(query))
 
-    def list_rows(
+    def list_page(
         self,
         hanger: int | None = None,
         *,
         is_open: bool | None = None,
         limit: int | None = None,
         before: int | None = None,
-    ) -> tuple[AlertRow, ...]:
+    ) -> tuple[StoredAlert, ...]:
         """Alerts, the newest first; `before` is the number of the alert to go on after.
 
         Only those that are open, or that are acknowledged or resolved, where `is_open` tells; the
@@ -89,14 +85,12 @@ class Alerts(Deliveries):
             query = query.where(_is_open if is_open else sa.not_(_is_open))
         if before is not None:
             query = query.where(_is_after(before, is_open=is_open))
-        return self._alert_rows(query.limit(limit))
+        return tuple(stored_alert(row) for row in self.rows(query.limit(limit)))
 
-    def row(self, alert_id: int) -> AlertRow:
-        """One alert; raises NothingThere."""
-        found = self._alert_rows(stored_alerts.where(alerts.c.id == alert_id))
-        if not found:
-            raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
-        return found[0]
+    def get(self, alert_id: int) -> StoredAlert:
+        """Return one alert; raise NothingThere."""
+        with self.reading() as connection:
+            return alert_in(connection, alert_id)
 
     def resolve(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
         """Notes that the condition of an alert ended, and acknowledges it where nobody has.
@@ -164,15 +158,9 @@ class Alerts(Deliveries):
         late = (event for event in found if since is None or event.at >= since)
         return tuple(sorted(late, key=lambda event: event.at))
 
-    def _alert_rows(self, query: sa.Select[Any]) -> tuple[AlertRow, ...]:
-        with self.reading() as connection:
-            rows = connection.execute(query).all()
-            owed = _deliveries_of(connection, query)
-        return tuple(_row(row, tuple(owed[row.id])) for row in rows)
-
 
 def _is_after(alert_id: int, *, is_open: bool | None) -> sa.ColumnElement[bool]:
-    """Which alerts stand after one in a list of `list_rows`."""
+    """Which alerts stand after one in a list of `list_page`."""
     older = alerts.c.id < alert_id
     if is_open is not False:
         return older
@@ -180,37 +168,6 @@ def _is_after(alert_id: int, *, is_open: bool | None) -> sa.ColumnElement[bool]:
     closed_at = sa.func.coalesce(one.c.noted_at, one.c.ended_at)
     of_one = sa.select(closed_at).where(one.c.id == alert_id).scalar_subquery()
     return (_closed_at < of_one) | ((_closed_at == of_one) & older)
-
-
-def _deliveries_of(
-    connection: Connection, chosen: sa.Select[Any]
-) -> defaultdict[int, list[DeliveryRow]]:
-    """Of the alerts that are chosen, by alert."""
-    ids = sa.select(chosen.subquery().c.id)
-    query = sa.select(deliveries).where(deliveries.c.alert_id.in_(ids)).order_by(deliveries.c.id)
-    found = defaultdict[int, list[DeliveryRow]](list)
-    for row in connection.execute(query):
-        one = DeliveryRow(
-            row.hook, DeliveryState(row.state), row.attempts, row.last_error, News(row.news)
-        )
-        found[row.alert_id].append(one)
-    return found
-
-
-def _row(row: Row[Any], owed: tuple[DeliveryRow, ...]) -> AlertRow:
-    alert = stored_alert(row).alert
-    return AlertRow(
-        id=row.id,
-        hanger=row.hanger,
-        raised_at=row.raised_at,
-        test=alert.test,
-        test_time=row.time,
-        kinds=alert.kinds,
-        message=alert.message,
-        acknowledgement=acknowledgement_of(row),
-        deliveries=owed,
-        resolution=resolution_of(row),
-    )
 
 
 def _events(hanger: int) -> dict[EventKind, sa.Select[Any]]:

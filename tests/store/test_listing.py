@@ -12,14 +12,13 @@ import sqlalchemy as sa
 
 from shm.errors import NothingThere
 from shm.store import (
-    AlertRow,
     Baseline,
-    DeliveryRow,
     EventKind,
     IdentifiedTest,
     Lineage,
     Stage,
     Store,
+    StoredAlert,
     StoredTest,
     StoredWatch,
     TestRow,
@@ -207,11 +206,11 @@ def test_a_resolved_alert_is_open_no_more_whoever_took_note(store: Store) -> Non
     store.alerts.acknowledge(3, "engineer", "seen", NOW + timedelta(days=1))
     assert store.alerts.open_counts() == {3: 2, 4: 1}
     assert store.alerts.counts() == (3, 1)
-    opened, others = (store.alerts.list_rows(is_open=each) for each in (True, False))
+    opened, others = (store.alerts.list_page(is_open=each) for each in (True, False))
     assert numbers(opened) == [5, 4, 1]
     assert numbers(others) == [6, 3, 2]
-    assert numbers(store.alerts.list_rows(is_open=False, before=6)) == [3, 2]
-    assert numbers(store.alerts.list_rows(is_open=False, before=3)) == [2]
+    assert numbers(store.alerts.list_page(is_open=False, before=6)) == [3, 2]
+    assert numbers(store.alerts.list_page(is_open=False, before=3)) == [2]
     assert [each.id for each in store.alerts.list_all() if each.is_open] == [1, 4, 5]
 
 
@@ -223,47 +222,43 @@ def raise_alerts(store: Store) -> None:
             watched(store, baseline, 10 * hanger + number)
 
 
-def numbers(rows: tuple[AlertRow, ...]) -> list[int]:
+def numbers(rows: tuple[StoredAlert, ...]) -> list[int]:
     return [row.id for row in rows]
 
 
 def test_alerts_are_listed_page_by_page_newest_first(store: Store) -> None:
     raise_alerts(store)
-    first = store.alerts.list_rows(limit=4)
-    second = store.alerts.list_rows(limit=4, before=first[-1].id)
+    first = store.alerts.list_page(limit=4)
+    second = store.alerts.list_page(limit=4, before=first[-1].id)
     assert numbers((*first, *second)) == [6, 5, 4, 3, 2, 1]
-    assert numbers(store.alerts.list_rows()) == [6, 5, 4, 3, 2, 1]
-    assert numbers(store.alerts.list_rows(3, limit=2)) == [4, 3]
-    assert store.alerts.list_rows(5) == store.alerts.list_rows(before=1) == ()
+    assert numbers(store.alerts.list_page()) == [6, 5, 4, 3, 2, 1]
+    assert numbers(store.alerts.list_page(3, limit=2)) == [4, 3]
+    assert store.alerts.list_page(5) == store.alerts.list_page(before=1) == ()
 
 
 def test_acknowledged_alerts_stand_in_the_order_in_which_they_were(store: Store) -> None:
     raise_alerts(store)
     for days, alert in enumerate((4, 1, 5)):
         store.alerts.acknowledge(alert, "engineer", "seen", NOW + timedelta(days=days))
-    assert numbers(store.alerts.list_rows(is_open=True)) == [6, 3, 2]
-    assert numbers(store.alerts.list_rows(3, is_open=True, before=3)) == [2]
-    assert numbers(store.alerts.list_rows(is_open=False)) == [5, 1, 4]
-    assert numbers(store.alerts.list_rows(is_open=False, limit=1, before=5)) == [1]
-    assert numbers(store.alerts.list_rows(is_open=False, before=1)) == [4]
+    assert numbers(store.alerts.list_page(is_open=True)) == [6, 3, 2]
+    assert numbers(store.alerts.list_page(3, is_open=True, before=3)) == [2]
+    assert numbers(store.alerts.list_page(is_open=False)) == [5, 1, 4]
+    assert numbers(store.alerts.list_page(is_open=False, limit=1, before=5)) == [1]
+    assert numbers(store.alerts.list_page(is_open=False, before=1)) == [4]
 
 
-def test_a_row_says_what_the_alert_says_and_who_was_told(store: Store) -> None:
+def test_one_alert_is_read_with_who_was_told(store: Store) -> None:
     raise_alerts(store)
     noted = store.alerts.acknowledge(2, "engineer", "seen", NOW)
     (delivery,) = (each for each in store.alerts.list_deliveries() if each.alert == noted.alert)
     store.alerts.save_failure(delivery, "no power", NOW, NOW)
     (owed,) = (each for each in store.alerts.list_deliveries() if each.alert == noted.alert)
-    row = store.alerts.row(2)
-    alert = noted.alert
-    assert (row.hanger, row.test, row.kinds) == (alert.hanger, alert.test, alert.kinds)
-    assert (row.raised_at, row.message) == (noted.raised_at, alert.message)
-    assert row.acknowledgement == noted.acknowledgement
-    assert row.deliveries == (DeliveryRow("mail", owed.state, 1, "no power"),)
-    assert row in store.alerts.list_rows(3)
-    assert replace(row, id=1) != store.alerts.row(1)
+    assert store.alerts.get(2) == noted
+    assert noted in store.alerts.list_page(3)
+    assert store.alerts.list_deliveries(alert_ids=[2]) == (owed,)
+    assert (owed.attempts, owed.last_error) == (1, "no power")
     with pytest.raises(NothingThere, match="no alert 9"):
-        store.alerts.row(9)
+        store.alerts.get(9)
 
 
 def test_what_happened_to_a_hanger_stands_in_the_order_of_time(filled: Store) -> None:

@@ -85,7 +85,7 @@ def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) ->
 def test_an_alert_of_a_stream_is_delivered_though_no_test_raised_it(store: Store) -> None:
     alert = replace(an_alert(), key="hanger-3:stream", test="", drifts=())
     store.streams.save_pooled(a_reading(), None, Reconciled((alert,)), ["mail"], NOW)
-    assert [row.hanger for row in store.alerts.list_rows()] == [3]
+    assert [row.alert.hanger for row in store.alerts.list_page()] == [3]
     (owed,) = store.alerts.list_due_deliveries(NOW, 10)
     store.alerts.save_delivery(owed, NOW)
     (told,) = store.alerts.list_deliveries()
