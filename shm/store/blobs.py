@@ -140,7 +140,7 @@ def watch_in(text: str) -> tuple[WatchedTest, float, Alert | None]:
     # Documents of former versions tell nothing of mistaken modes.
     mistaken = value_of(tuple[RepeatedMistake, ...], document.get("mistaken", []))
     found = WatchedTest("", _NO_TIME, temperature_c, (), change_in(text), creep, mistaken)
-    called = document.get("alert")
+    called = document.get("calls_for")
     alert = value_of(Alert, called) if called else None
     return found, number(document.get("alert_probability")), alert
 

@@ -336,7 +336,7 @@ def _drift(row: Row[Any]) -> Drift:
 def _watch_values(
     found: WatchedTest, test: StoredTest, baseline: Baseline, alert: Alert | None, level: float
 ) -> dict[str, Any]:
-    called = {"alert_probability": level, "alert": alert and alert_document(alert)}
+    called = {"alert_probability": level, "calls_for": alert and alert_document(alert)}
     return {
         "test_id": test.id,
         "baseline_id": baseline.id,

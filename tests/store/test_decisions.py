@@ -179,5 +179,5 @@ def test_each_decision_is_noted_with_its_reason(store: Store) -> None:
     newest = [(row.who, row.action, row.detail) for row in store.journal.list_changes(2)]
     assert newest == [
         ("Ada", "recording discarded", "a copy"),
-        ("Ada", "recording withdrawn", "the wrong hanger"),
+        ("Ada", "recording withdrawn", "t2: the wrong hanger"),
     ]

@@ -53,6 +53,8 @@ def copy_to_server(path: Path, url: str) -> None:
                 column.type = sa.DateTime(timezone=True)
             if isinstance(column.type, sa.BLOB):
                 column.type = sa.LargeBinary()
+            if isinstance(column.type, sa.Float):
+                column.type = sa.Double()
             column.server_default = None
     with reading(source) as rows, writing(target) as connection:
         tables.create_all(connection)
