@@ -6,7 +6,7 @@ Nothing is deleted: raw file, test and results stay, and each decision can be ta
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any
 
@@ -14,7 +14,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError, sentence
-from shm.store.database import Repository, insert
+from shm.store.database import Repository
 from shm.store.files import (
     advance_recordings,
     by_id,
@@ -29,13 +29,13 @@ from shm.store.holding import (
     discarded_reason,
     held_rows,
     holds_of,
+    insert_hold,
     latest_hold,
     open_holds,
     reason_of,
     refuse_time,
     standing_discard,
     taking_back,
-    write_decision,
 )
 from shm.store.journal import write
 from shm.store.list_rows import Decision, HeldTest, Hold, Rerun
@@ -43,7 +43,7 @@ from shm.store.outbox import resolve
 from shm.store.queries import WEIGHED
 from shm.store.rerun import of_baselines, rerun_recording, rerun_watched, supersede_results
 from shm.store.rows import Stage
-from shm.store.tables import alerts, holds, recordings, tests, watches
+from shm.store.tables import alerts, recordings, tests, watches
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Dispositions(Repository):
             else:
                 hold = replace(hold, decision=Decision.CONFIRMED, time=time)
             refuse_time(hold, time, at)
-            hold = _decide(connection, recording, hold, who, why, at)
+            hold = _decide(connection, hold, who, why, at)
             _let_count(connection, rows, hold, who, at)
             connection.execute(own.values(reason=None))
             advance_recordings(connection, [recording_id], at)
@@ -133,7 +133,7 @@ class Dispositions(Repository):
             if hold is not None:
                 hold = replace(hold, decision=Decision.DISCARDED)
                 end_tests(connection, recording_id, [row.id for row in rows], at)
-                hold = _decide(connection, recording, hold, who, why, at)
+                hold = _decide(connection, hold, who, why, at)
                 _end_or_advance(connection, recording, hold, at)
                 return Exclusion(hold)
             rows = _chosen(connection, recording_id, counts(tests), test)
@@ -150,7 +150,7 @@ class Dispositions(Repository):
             again = _watch_again(connection, rows, weighed, at)
             named = [HeldTest(row.position, row.name, ()) for row in rows]
             hold = _unheld(recording, Decision.WITHDRAWN, named)
-            hold = _decide(connection, recording, hold, who, why, at)
+            hold = _decide(connection, hold, who, why, at)
             _end_or_advance(connection, recording, hold, at)
             names = tuple(sorted(row.name for row in rows if row.id in own))
             return Exclusion(hold, names, min(row.time for row in rows), again)
@@ -292,24 +292,14 @@ def _unheld(
     )
 
 
-def _decide(
-    connection: Connection, recording: Row[Any], hold: Hold, who: str, why: str, at: datetime
-) -> Hold:
+def _decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime) -> Hold:
     """Store a decision: of a hold, whose notice ends with it, or of what was never held."""
-    if hold.id:
-        return decide(connection, hold, who, why, at)
-    names = ", ".join(test.name for test in hold.tests)
-    message = sentence(f"{hold.decision} by {who}: {names}" + (f": {why}" if why else ""))
-    document = {
-        "message": message,
-        "sidecar_as": hold.sidecar_as,
-        "tests": [asdict(test) for test in hold.tests],
-    }
-    row = {"recording_id": recording.id, "held_at": at, "document": document}
-    made = {"decision": hold.decision, "decided_at": at, "who": who, "why": why, "time": hold.time}
-    insert(connection, holds, {**row, **made})
-    write_decision(connection, hold, who, f"{names}: {why}" if why else names, at)
-    return holds_of(connection, recording.id)[-1]
+    if not hold.id:
+        names = ", ".join(test.name for test in hold.tests)
+        message = sentence(f"{hold.decision} by {who}: {names}" + (f": {why}" if why else ""))
+        hold = replace(hold, message=message, held_at=at)
+        hold = replace(hold, id=insert_hold(connection, hold))
+    return decide(connection, hold, who, why, at)
 
 
 def _weighed(connection: Connection, chosen: Sequence[Row[Any]]) -> bool:

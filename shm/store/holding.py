@@ -62,19 +62,23 @@ def keep_judgement(
     if judged.notice is None:
         return None
     held = _hold_tests(connection, recording.id, judged.held, at)
-    document = {
-        "message": judged.notice.message,
-        "sidecar_as": judged.sidecar_as,
-        "tests": [asdict(test) for test in judged.held],
-    }
-    row = {"recording_id": recording.id, "held_at": at, "document": document}
-    hold_id = insert(connection, holds, row)
+    own = (recording.id, recording.file_name, recording.hanger, at)
+    hold = Hold(0, *own, judged.notice.message, judged.held, judged.sidecar_as)
+    hold_id = insert_hold(connection, hold)
     reason = reason_of(recording, judged.notice.message, at)
     by_id = recordings.c.id == recording.id
     connection.execute(sa.update(recordings).where(by_id).values(reason=reason))
     notice = replace(judged.notice, key=notice_key(judged.notice.hanger, hold_id))
     leading = held[notice.test]
     return raise_alert(connection, leading, None, notice, judged.hooks, at)
+
+
+def insert_hold(connection: Connection, hold: Hold) -> int:
+    """Store what is held, or a decision of what was not; return its number."""
+    tests = [asdict(test) for test in hold.tests]
+    document = {"message": hold.message, "sidecar_as": hold.sidecar_as, "tests": tests}
+    row = {"recording_id": hold.recording_id, "held_at": hold.held_at, "document": document}
+    return insert(connection, holds, row)
 
 
 def notice_key(hanger: int, hold_id: int) -> str:
@@ -244,14 +248,14 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
     if notice is not None:
         acknowledge(connection, notice, who, told, at)
         resolve(connection, notice, who, told, at)
-    write_decision(connection, hold, who, why, at)
+    if hold.decision in (Decision.WITHDRAWN, Decision.REINSTATED):
+        names = ", ".join(test.name for test in hold.tests)
+        told = f"{names}: {why}" if why else names
+    else:
+        told = why
+    subject, about = hold.file_name, hold.recording_id
+    write(connection, at, str(hold.decision), about, None, subject, told, who)
     return replace(hold, decided_at=at, who=who, why=why)
-
-
-def write_decision(connection: Connection, hold: Hold, who: str, why: str, at: datetime) -> None:
-    """Write into the journal what a person, or a rerun, made of a recording."""
-    kind, about = str(hold.decision), hold.recording_id
-    write(connection, at, kind, about, subject=hold.file_name, detail=why, who=who)
 
 
 def _hold(row: Row[Any]) -> Hold:
