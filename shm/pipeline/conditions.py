@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from shm.pipeline.reconcile import (
     OF_CHANGES,
@@ -61,16 +62,15 @@ def conditions_of(
 
 
 def _conditions(known: Sequence[StoredAlert], found: Evidence) -> Iterator[Condition]:
-    is_open, resolved = [], []
     ended = [each for each in known if each.resolution]
-    for each in known:
-        over = each.resolution is None and (why_over(each.alert, found) or _why_closed(each, found))
-        if over:
+    # What other thresholds closed may be called for again.
+    resolved = [each for each in ended if not _is_closed(each)]
+    is_open: list[StoredAlert] = []
+    for each in (each for each in known if not each.resolution):
+        if over := why_over(each.alert, found) or _why_closed(each, found):
             yield Condition(each.alert, "over", over)
-        elif each.resolution is None:
+        else:
             is_open.append(each)
-        elif not _is_closed(each):  # what other thresholds closed may be called for again
-            resolved.append(each)
     for alert in found.called:
         if found.is_again and set(alert.kinds) & OF_CHANGES:
             if not why_over(alert, found) and not _is_past(alert, resolved):
@@ -168,10 +168,14 @@ def _shown_again(
         known |= own
         since = alert.time if end.who == SHM else end.at
         later = [test for test in found.tests if test.time > since]
-        shown = _agreeing(later, lambda test, of=alert: _left(of, test, found) >= level)
+        shown = _agreeing(later, partial(_is_shown, alert, found, level))
         if len(shown) > 1:
             return _anew(stored, shown, found.hanger)
     return None
+
+
+def _is_shown(alert: Alert, found: Evidence, level: float, test: WatchedTest) -> bool:
+    return _left(alert, test, found) >= level
 
 
 def _agreeing(

@@ -46,7 +46,8 @@ def reconcile(open_alerts: Iterable[StoredAlert], conditions: Sequence[Condition
     tells of it that stays open or is opened with it.
     """
     over = {each.alert.key: each.why for each in conditions if each.state == "over"}
-    to_close, left = {}, list[StoredAlert]()
+    to_close: dict[int, str] = {}
+    left: list[StoredAlert] = []
     for each in open_alerts:
         if each.alert.key in over:
             to_close[each.id] = over[each.alert.key]
@@ -60,9 +61,10 @@ def reconcile(open_alerts: Iterable[StoredAlert], conditions: Sequence[Condition
 
 
 def _is_told(condition: Condition, opened: Sequence[Alert], left: Sequence[StoredAlert]) -> bool:
-    same = [each.alert for each in left if each.baseline_id == condition.baseline_id]
-    other = (each.alert for each in left if each.baseline_id != condition.baseline_id)
-    alert = condition.alert
+    alert, own = condition.alert, condition.baseline_id
+    same = [each.alert for each in left if each.baseline_id == own]
+    # Of tests and of sensors; what was raised against another baseline is another event.
+    other = (each.alert for each in left if (each.baseline_id is None) != (own is None))
     return tells([*opened, *same], alert) or any(is_same_event(each, alert) for each in other)
 
 

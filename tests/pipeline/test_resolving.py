@@ -88,6 +88,8 @@ def test_what_another_source_has_told_is_not_opened_again_and_what_begins_later_
     up = a_change(moved=(replace(a_change().moved[0], shift_mean=0.08),))
     assert is_opened(replace(alert, change=up))
     assert is_opened(replace(alert, kinds=("gap",)))
+    other_baseline = Condition(alert, "holds", baseline_id=2)
+    assert reconcile([of_test], [other_baseline]).to_open == (alert,)
     # Of the same source the size does not count, but when it began.
     began = replace(a_change(), began_by=NOW + timedelta(days=2))
     assert is_opened(replace(alert, change=began), of_test_too=True)
