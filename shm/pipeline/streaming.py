@@ -431,7 +431,11 @@ class Streaming:
         conditions = [Condition(each, "over", _OVER) for each in over]
         conditions += [Condition(found.alert, "holds")] if found.alert else []
         changes = reconcile(is_open, conditions)
-        if found.alert and any(is_same_event(each.alert, found.alert) for each in known):
+        if found.alert and any(
+            set(found.alert.kinds) <= set(each.alert.kinds)
+            and is_same_event(each.alert, found.alert)
+            for each in known
+        ):
             changes = replace(changes, to_open=())
         return changes
 
