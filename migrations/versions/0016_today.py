@@ -51,7 +51,7 @@ _FIRST_STEPS = (
 
 
 def upgrade() -> None:
-    """Keep the rows; the store needs twice its size while it is upgraded."""
+    """Copy the rows; a SQLite file and its log grow to four times its size meanwhile."""
     connection = op.get_bind()
     former = sa.MetaData()
     former.reflect(connection)
