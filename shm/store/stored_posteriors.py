@@ -36,6 +36,7 @@ from shm.store.rows import (
     Stage,
     StoredAdoption,
     StoredDiagnosis,
+    StoredPosterior,
     StoredSelection,
     StoredTest,
 )
@@ -113,6 +114,14 @@ class Posteriors(Trends):
             what = f"hanger {hanger}" + (f", test {test}" if test else "")
             raise NothingThere(f"no posterior of {what} yet.", remedy="Ingest a test of it.")
         return posterior_of_row(row)
+
+    def list_all(self, hanger: int) -> tuple[StoredPosterior, ...]:
+        """Return the posteriors of a hanger in its selected class, by time."""
+        query = _shown(hanger)
+        return tuple(
+            StoredPosterior(row.id, posterior_of_row(row), row.time, lineage_from(row))
+            for row in self.rows(query.order_by(posteriors.c.time, posteriors.c.id))
+        )
 
     def history(self, hanger: int) -> tuple[tuple[StoredTest, Posterior], ...]:
         """Each test of a hanger that has a posterior, with it, by time."""
