@@ -56,6 +56,9 @@ def copy_to_server(path: Path, url: str) -> None:
             if isinstance(column.type, sa.Float):
                 column.type = sa.Double()
             column.server_default = None
+        for index in table.indexes:
+            where = index.dialect_options["sqlite"]["where"]
+            index.dialect_options["postgresql"]["where"] = where
     with reading(source) as rows, writing(target) as connection:
         tables.create_all(connection)
         for table in tables.sorted_tables:
