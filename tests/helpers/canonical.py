@@ -24,7 +24,7 @@ from shm.store.tables import (
 )
 
 _TIMES = {"time", "received_at", "identified_at", "updated_at", "raised_at", "ended_at", "at"}
-_TIMES |= {"modified_at"}
+_TIMES |= {"modified_at", "noted_at"}
 _ROWS = {"id", "recording_id", "test_id", "baseline_id", "alert_id", "arrival", "seconds"}
 _ROWS |= {"checksum"}  # of all else in the row, its times too
 
