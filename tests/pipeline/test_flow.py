@@ -634,7 +634,7 @@ def test_a_result_that_the_store_will_not_have_refuses_its_file(
     ("place", "error"),
     [
         ("shm.pipeline.work.judge", KeyError("tension")),
-        ("shm.pipeline.work.settled", ValueError("The truth value of an array is ambiguous")),
+        ("shm.pipeline.work.reconciled", ValueError("The truth value of an array is ambiguous")),
         ("shm.store.stored_posteriors.Posteriors.save", TypeError("not a number")),
     ],
 )
