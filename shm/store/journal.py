@@ -31,9 +31,9 @@ AGAIN, REMOVED, BACKUP, DIED = "again", "removed", "backup", "worker died"
 RENAMED = "renamed"
 """Keeps the former name of a file that came again under another."""
 
-_ACTIONS = {
-    **{decision: f"recording {decision}" for decision in Decision},
-    **dict.fromkeys((Stage.RECEIVED, *Outcome), "recording taken in"),
+_ACTIONS: dict[str, str] = {
+    **{str(decision): f"recording {decision}" for decision in Decision},
+    **dict.fromkeys([str(Stage.RECEIVED), *map(str, Outcome)], "recording taken in"),
     AGAIN: "recording done again",
     REMOVED: "raw file removed",
 }
