@@ -32,8 +32,7 @@ def database(postgresql: Databases) -> Iterator[str]:
 
 @pytest.mark.parametrize("released", OLDER, ids=lambda path: path.stem)
 def test_a_server_upgrades_as_a_file_does(released: Path, database: str, tmp_path: Path) -> None:
-    path = Path(shutil.copyfile(released, tmp_path / "released.db"))
-    copy_to_server(path, database)
+    path = as_of(released, database, tmp_path)
     for location in (path, database):
         Store.upgrade(location)
     with Store.open(path) as of_file, Store.open(database) as of_server:
@@ -42,8 +41,14 @@ def test_a_server_upgrades_as_a_file_does(released: Path, database: str, tmp_pat
         of_server.journal.note(datetime.now(UTC), "note written", "it numbers on")
 
 
-def copy_to_server(path: Path, url: str) -> None:
-    """Make the tables of a file on a server, as that schema had them there, and fill them."""
+def as_of(released: Path, url: str, folder: Path) -> Path:
+    """Make an empty database one of a released schema; return a copy of the file that filled it."""
+    path = Path(shutil.copyfile(released, folder / "released.db"))
+    _copy_to_server(path, url)
+    return path
+
+
+def _copy_to_server(path: Path, url: str) -> None:
     source, target = make_engine(path), make_engine(url)
     tables = sa.MetaData()
     tables.reflect(source)
