@@ -78,8 +78,8 @@ def _conditions(known: Sequence[StoredAlert], found: Evidence) -> Iterator[Condi
                 yield Condition(with_free_key(replace(alert, message=said), ended), "holds")
         elif alert.test == found.newest and all(alert.key != each.alert.key for each in known):
             yield Condition(alert, "holds")
-    if (alert := _shown_again(resolved, is_open, found)) is not None:
-        yield Condition(alert, "holds")
+    if (anew := _shown_again(resolved, is_open, found)) is not None:
+        yield Condition(anew, "holds")
 
 
 def why_over(alert: Alert, found: Evidence) -> str:

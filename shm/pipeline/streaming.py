@@ -323,7 +323,7 @@ class Streaming:
                 start,
                 hanger,
                 baseline_of(self.store, stream),
-                watch and watch.content,
+                None if watch is None else watch.content,
                 self.workspace.settings.false_call_years,
                 self._recent_events(stream, start) if period == "hour" else (),
                 is_watched=period == "hour" and (watch is None or start >= watch.time),

@@ -180,13 +180,13 @@ def advance_recordings(connection: Connection, ids: Collection[int], at: datetim
             .values(stage=stage)
         )
         if moved.rowcount:
-            why = _why_held(connection, recording_id) if stage is Stage.HELD else {}
-            write(connection, at, stage, recording_id, **why)
+            subject, why = _why_held(connection, recording_id) if stage is Stage.HELD else ("", "")
+            write(connection, at, stage, recording_id, subject=subject, detail=why)
 
 
-def _why_held(connection: Connection, recording_id: int) -> dict[str, str]:
+def _why_held(connection: Connection, recording_id: int) -> tuple[str, str]:
     row = by_id(connection, recording_id)
-    return {"subject": row.file_name, "detail": loads(row.reason)["message"]}
+    return row.file_name, loads(row.reason)["message"]
 
 
 def test_contents(item: IdentifiedTest, name: str) -> dict[str, Any]:

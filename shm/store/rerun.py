@@ -36,7 +36,7 @@ _BEFORE = {Stage.UPDATED: Stage.IDENTIFIED, Stage.WATCHED: Stage.UPDATED}
 
 
 def rerun(
-    connection: Connection, chosen: Sequence[Row[Any]], from_stage: Stage, at: datetime
+    connection: Connection, chosen: Sequence[Any], from_stage: Stage, at: datetime
 ) -> tuple[int, int]:
     """Send tests back so that a stage is reached anew; return how many posteriors and watches are
     superseded.
