@@ -163,7 +163,7 @@ def table(title: str, *columns: str) -> Table:
 def open_workspace(ctx: click.Context, **flags: object) -> Workspace:
     """The workspace of the command; `flags` are settings given on the command line."""
     from shm.store import Workspace
-    from shm.store.audit import COMMAND_LINE, Actor
+    from shm.store.journal import COMMAND_LINE, Actor
 
     opened = Workspace.open(ctx.obj, flags)
     return replace(opened, actor=Actor(getpass.getuser(), COMMAND_LINE))

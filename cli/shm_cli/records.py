@@ -109,7 +109,7 @@ def audit(ctx: click.Context, limit: int | None) -> None:
     Example: shm audit --limit 20
     """
     with opened_store(ctx) as (_, store):
-        rows = store.audit.list_rows(limit)
+        rows = store.journal.list_changes(limit)
     if flags.wants_json() or not rows:
         answer({"changes": [vars(each) for each in rows]}, "Nothing was changed.")
         return

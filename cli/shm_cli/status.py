@@ -241,7 +241,7 @@ def _status(workspace: Workspace, store: Store) -> dict[str, Any]:
         "deliveries": deliveries,
         "waiting_deliveries": deliveries[DeliveryState.WAITING],
         "quiet_hours": _quiet(workspace, store, now),
-        "silences": [said_of(each) for each in store.silences.list_in_force(now)],
+        "silences": [said_of(each) for each in store.silences.list_all() if each.is_in_force(now)],
         "streams": [each.words for each in stream_leads(workspace, store, now)],
         "disk_free_bytes": shutil.disk_usage(workspace.folder).free,
         "held": [hold_document(hold) for hold in held],
@@ -276,7 +276,7 @@ def _structures(
     for each in workspace.bridge.structures:
         found, baseline = latest.get(each.id), store.watch.baseline(each.id)
         of_baseline = store.tests.of_baseline(baseline) if baseline else ()
-        watched = store.watch.list_detected_and_latest(baseline) if baseline else ()
+        watched = store.watch.list_detected(baseline.hanger, baseline.id) if baseline else ()
         rows.append(
             {
                 "structure": each.id,
@@ -342,13 +342,12 @@ def show_stages(ctx: click.Context, which: str) -> None:
         recording_id, _ = store.recordings.find(which)
         recording = store.recordings.get(recording_id)
         steps, tests = (
-            store.recordings.list_steps(recording_id),
+            store.journal.list_steps(recording_id),
             store.tests.list_former(recording_id),
         )
-        noticed = store.recordings.list_events(recording_id=recording_id)
-        other_names = [
-            n for n in store.recordings.names_of(recording_id) if n != recording.file.file_name
-        ]
+        noticed = store.journal.list_events(recording_id=recording_id)
+        names = dict.fromkeys(event.file_name for event in noticed)
+        other_names = [name for name in names if name != recording.file.file_name]
     if flags.wants_json():
         show(
             {

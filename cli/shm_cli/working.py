@@ -72,7 +72,7 @@ def send_back(workspace: Workspace, which: str, stage: Stage) -> Rerun:
         recording_id, test = store.recordings.find(which)
         if stage is Stage.IDENTIFIED:
             _refuse_without_raw_file(workspace, store, recording_id)
-        rerun = store.recordings.reprocess(recording_id, stage, utc_now(), test)
+        rerun = store.recordings.rerun(recording_id, stage, utc_now(), test)
     for sentence in sentences(rerun, stage):
         click.echo(sentence, err=True)
     finish_now(workspace, recording_id)

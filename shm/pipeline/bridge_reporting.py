@@ -326,7 +326,7 @@ def latest_drifts(store: Store, hanger: int) -> tuple[Drift, ...]:
     None where no test has been compared with it, as after the hanger was given a new one.
     """
     baseline = store.watch.baseline(hanger)
-    told = store.watch.list_detected_and_latest(baseline) if baseline else ()
+    told = store.watch.list_detected(baseline.hanger, baseline.id) if baseline else ()
     return told[-1].watched.told if told else ()
 
 

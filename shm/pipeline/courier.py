@@ -87,7 +87,7 @@ class Courier:
 
     def _begin_messages(self, workspace: Workspace, hurry: bool) -> None:
         """Decide which alerts go to which hook now, as one message or alone, and store that."""
-        unsent = self._store.alerts.list_unsent()
+        unsent = self._store.alerts.list_deliveries(DeliveryState.WAITING, unsent=True)
         if not unsent:
             return
         window_s, now = workspace.settings.alert_grouping_seconds, self._clock()
@@ -106,7 +106,7 @@ class Courier:
         waits = _list_waits(workspace.settings)
         due = alerts.list_due_deliveries(now, 2 * _THREADS, excluded, waits, begun=True)
         parts: defaultdict[int | None, list[Delivery]] = defaultdict(list)
-        for part in alerts.list_of_messages([each.id for each in due]) if due else ():
+        for part in alerts.list_deliveries(messages=[each.id for each in due]) if due else ():
             parts[part.message_id].append(part)
         found = []
         for delivery in due:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import errno
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
@@ -19,6 +19,7 @@ from typing import Any
 from shm.errors import DISK_FULL, ShmError, StoreDamaged, StoreError, WorkerDied
 from shm.pipeline import Clock, utc_now
 from shm.pipeline.courier import Courier, Notifier, alert_fields
+from shm.pipeline.faults import contained
 from shm.pipeline.intake import Sharing, receive
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import competing, reason_document
@@ -95,7 +96,7 @@ class Flow:
                 competing(hanger, workspace.settings, selected)
         self.workspace = workspace
         self._judged_again = JudgedAgain(workspace, self.store)
-        heed_limits(workspace, self.store, workspace.bridge.hangers, self.clock())
+        self._limits_to_apply = list(workspace.bridge.hangers)
         self._queue = Queue(workspace, self.store, self.clock)
 
     def close(self) -> None:
@@ -152,19 +153,22 @@ class Flow:
         now = self.clock()
         postponed = {id_ for id_, until in self._postponed.items() if _still_waits(until, now)}
         stopped = {id_ for id_, until in self._stopped.items() if _still_waits(until, now)}
+        while self._limits_to_apply:
+            hanger = self._limits_to_apply[0]
+            with contained(log, "limits of hanger %d cannot be applied", hanger.id):
+                heed_limits(self.workspace, self.store, [hanger], now)
+            self._limits_to_apply.pop(0)
         self._judged_again.go_on(now, postponed, stopped)
         for task in self._queue.list_waiting(2 * self.lanes, postponed):
             if task.hanger in stopped or task.key in self._running:
                 continue
             if not self._has_room(task):
                 return
-            try:
+            begun = False
+            with contained(log, "%s %s cannot begin", *task.key):
                 self._begin(task)
-            except Exception as error:  # what one hanger's rows hold must not stop the others
-                passes = isinstance(error, ShmError | BrokenExecutor)
-                if passes and not isinstance(error, StoreDamaged):
-                    raise
-                log.exception("%s %s cannot begin", *task.key, extra=task.log_fields)
+                begun = True
+            if not begun:
                 self._postpone(task)
                 if task.hanger is not None:
                     stopped.add(task.hanger)
@@ -217,8 +221,7 @@ class Flow:
             work = task.work()
             next(work)
         stored = _end(work, running.future.result())
-        if isinstance(stored, StoredAlert):
-            alert = stored.alert
+        for alert in (each.alert for each in stored or ()):
             log.warning("alert %s: %s", alert.key, alert.message, extra=alert_fields(alert))
         log.info("%s %d: done", *task.key, extra=task.log_fields)
         self._forget(task)
@@ -288,7 +291,7 @@ class Flow:
         recordings, now = self.store.recordings, self.clock()
         recording = recordings.get(recording_id)
         name, reason = recording.file.file_name, reason_document(error, recording, now)
-        if recordings.list_events(Outcome.REDESCRIBED, recording_id=recording_id):
+        if self.store.journal.list_events(Outcome.REDESCRIBED, recording_id=recording_id):
             reason["remedy"] += (
                 " What it gave with its former sidecar counts no more: correct the sidecar and "
                 "drop both again."
@@ -306,12 +309,13 @@ class Flow:
         log.warning("%s is refused: %s %s", name, reason["message"], reason["remedy"], extra=fields)
 
 
-def _end(work: Work, result: object) -> object:
-    """Return what work returns once it is sent the result of its computation."""
+def _end(work: Work, result: object) -> Sequence[StoredAlert] | None:
+    """Return the alerts that work has raised once it is sent the result of its computation."""
     try:
         work.send(result)
     except StopIteration as end:
-        return end.value
+        raised: Sequence[StoredAlert] | None = end.value
+        return raised
     raise AssertionError("work computes once")
 
 

@@ -208,7 +208,7 @@ def _set_aside(
     """Lays what is too large in the quarantine, unread: nobody knows its checksum."""
     reason = reason_document(name, None, error.message, error.remedy, at)
     lies = workspace.quarantine.move(path, name, reason, sidecar_path(path))
-    said = {event.message for event in store.recordings.list_events("refused", file_name=name)}
+    said = {event.message for event in store.journal.list_events("refused", file_name=name)}
     if lies != path or error.message not in said:  # what stays is met at each start
         store.recordings.refuse_unread(name, error.message, at)
 

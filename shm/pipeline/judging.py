@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -9,6 +10,7 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from shm.errors import BadInput
+from shm.pipeline.faults import contained
 from shm.pipeline.lineage import read_limits
 from shm.plausibility import FIRST_DAY, Candidate, doubts_about, implied_shift, notice_of
 from shm.read.profiles import any_profile, profile_for
@@ -21,11 +23,13 @@ from shm.store import (
     Stage,
     Store,
     StoredRecording,
+    StoredTest,
     Workspace,
 )
 from shm.store.holding import time_note
-from shm.values import Alert, Doubt
+from shm.values import Alert, Doubt, Hanger, ModalTest
 
+log = logging.getLogger(__name__)
 _LATEST = 10  # of a hanger's tests: what it does from test to test, without reading years of them
 _OF_OTHERS = 2  # of every other hanger's: where its modes lie now
 
@@ -97,7 +101,7 @@ def _candidate(
 ) -> Candidate:
     test, tests = item.test, store.tests
     hanger = workspace.bridge.tested(test.hanger or 0)
-    earlier = tests.latest_before(hanger.id, recording.id, _LATEST)
+    earlier = tests.list_latest(hanger.id, recording.id, _LATEST)
     baseline = store.watch.baseline(hanger.id, time=_possible(test.time))
     reference = tests.of_baseline(baseline) if baseline else earlier
     at_once = tests.taken_at(hanger.id, test.time, recording.id) if test.time else ()
@@ -116,20 +120,30 @@ def _candidate(
         reference=[each.test for each in reference],
         reference_at=max((each.time for each in reference), default=None) if baseline else None,
         earlier=[each.test for each in earlier],
-        arrived=[each.test for each in tests.latest_received(hanger.id, recording.id, _LATEST)],
+        arrived=[
+            each.test
+            for each in tests.list_latest(hanger.id, recording.id, _LATEST, as_received=True)
+        ],
         baseline=baseline.posterior if baseline else None,
         fingerprint=print_,
         copies=tests.known_samples(recording.id, hanger.id, print_) if print_ else (),
         signals=item.signals,
         others=[
-            (
-                other,
-                [each.test for each in tests.latest_before(other.id, recording.id, _OF_OTHERS)],
-            )
+            (other, _latest_of_other(store, other, recording))
             for other in workspace.bridge.hangers
             if other.id != hanger.id
         ],
     )
+
+
+def _latest_of_other(
+    store: Store, other: Hanger, recording: StoredRecording
+) -> Sequence[ModalTest]:
+    """Return the latest tests of another hanger; none where these cannot be read."""
+    found: Sequence[StoredTest] = ()
+    with contained(log, "tests of hanger %d cannot be compared with", other.id):
+        found = store.tests.list_latest(other.id, recording.id, _OF_OTHERS)
+    return [each.test for each in found]
 
 
 def _possible(time: datetime | None) -> datetime | None:

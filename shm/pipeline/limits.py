@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime
 from math import isclose, isfinite, isnan
 
-from shm.pipeline.ending import SHM
+from shm.pipeline.reconcile import SHM, Condition, reconcile
 from shm.store import Store, StoredAlert, Workspace
 from shm.store.list_rows import TrendPoint
 from shm.values import Alert, AlertKind, Averaged, CrossedLimit, Hanger
@@ -21,26 +21,34 @@ _KIND: AlertKind = "limit"
 def heed_limits(
     workspace: Workspace, store: Store, hangers: Iterable[Hanger], at: datetime
 ) -> None:
-    """Raises and ends what the limits of hangers call for, by the latest test of each."""
-    standing = store.alerts.list_all(standing=True)
-    told = {each.alert.hanger for each in standing if _KIND in each.alert.kinds}
-    modelled = (each for each in hangers if each.is_modelled)
-    asked = [each for each in modelled if each.id in told or any(_limits(each))]
-    points = store.posteriors.latest_trends(asked) if asked else {}
+    """Open and close what the limits of hangers call for, by the latest test of each."""
     hooks = [hook.name for hook in workspace.bridge.hooks]
-    for hanger in asked:
-        if (point := points.get(hanger.id)) is None:
+    for hanger in (each for each in hangers if each.is_modelled):
+        known = [e for e in store.alerts.list_all(hanger.id) if _KIND in e.alert.kinds]
+        is_open = [each for each in known if each.resolution is None]
+        if not is_open and not any(_limits(hanger)):
             continue
-        alerts = store.alerts.list_all(hanger.id)
-        own = [each for each in alerts if _KIND in each.alert.kinds]
-        ended = dict(_ended(own, hanger, point))
-        for limit in _limits(hanger):
-            alert = _alert(store, hanger, limit, point, own)
-            if alert or ended:
-                store.alerts.settle(alert, hooks, ended, at)
-                ended = {}
-        if ended:
-            store.alerts.settle(None, hooks, ended, at)
+        if (point := store.posteriors.latest_trends([hanger]).get(hanger.id)) is not None:
+            conditions = list(_conditions(store, hanger, point, known))
+            store.alerts.settle(reconcile(is_open, conditions), hooks, at)
+
+
+def _conditions(
+    store: Store, hanger: Hanger, point: TrendPoint, known: Sequence[StoredAlert]
+) -> Iterator[Condition]:
+    limits, thresholds = tuple(_limits(hanger)), hanger.thresholds
+    for each in known:
+        if each.resolution is None and not any(_is_of(each.alert, limit) for limit in limits):
+            yield Condition(each.alert, "over", "the limit has been changed")
+    for limit in limits:
+        probability = _probability(point.averaged, limit.side)
+        same = [each for each in known if _is_of(each.alert, limit)]
+        for each in same:
+            if each.resolution is None and probability < thresholds.end_probability:
+                yield Condition(each.alert, "over", f"test {point.test} has it within the limit")
+        is_told = same and not _is_another_crossing(store, hanger, same[-1])
+        if probability >= thresholds.alert_probability and not is_told:
+            yield Condition(_alert(hanger, limit, point, same), "holds")
 
 
 def _limits(hanger: Hanger) -> Iterator[CrossedLimit]:
@@ -56,32 +64,12 @@ def _probability(averaged: Averaged, side: str) -> float:
     return averaged.probability_above_limit if side == "above" else averaged.probability_slack
 
 
-def _ended(
-    own: Sequence[StoredAlert], hanger: Hanger, point: TrendPoint
-) -> Iterator[tuple[int, str]]:
-    limits = tuple(_limits(hanger))
-    for each in own:
-        if each.resolution is not None:
-            continue
-        if not any(_is_of(each.alert, limit) for limit in limits):
-            yield each.id, "the limit has been changed"
-        elif _probability(point.averaged, _side(each.alert)) < hanger.thresholds.end_probability:
-            yield each.id, f"test {point.test} has it within the limit"
-
-
 def _alert(
-    store: Store, hanger: Hanger, limit: CrossedLimit, point: TrendPoint, own: Sequence[StoredAlert]
-) -> Alert | None:
-    """Make the alert that a limit is crossed; None where it is not, or was told."""
-    probability, level = (
-        _probability(point.averaged, limit.side),
-        hanger.thresholds.alert_probability,
-    )
-    same = [each for each in own if _is_of(each.alert, limit)]
-    if not probability >= level or (same and not _is_another_crossing(store, hanger, same[-1])):
-        return None
+    hanger: Hanger, limit: CrossedLimit, point: TrendPoint, same: Sequence[StoredAlert]
+) -> Alert:
     from shm.report.hanger_status import off_limits  # it computes: not before it is needed
 
+    probability = _probability(point.averaged, limit.side)
     lead = off_limits(hanger, point.averaged)
     key = f"hanger-{hanger.id}:{_KIND}:{limit.side}-{limit.tension_n:.12g}:{point.test_id}"
     key += f":again-{same[-1].id}" if same else ""
@@ -101,8 +89,8 @@ def _alert(
 
 
 def _is_another_crossing(store: Store, hanger: Hanger, last: StoredAlert) -> bool:
-    """Whether the tension was back since the last alert: what a person has resolved while it was
-    beyond its limit is not told again."""
+    """Return True where the tension was back since the last alert: what a person has resolved while
+    it was beyond its limit is not told again."""
     if last.resolution is None:
         return False
     if last.resolution.who == SHM:

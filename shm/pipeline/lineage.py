@@ -24,7 +24,7 @@ from shm.assumptions import DEFAULTS, number_text
 from shm.documents import dump
 from shm.errors import BadInput, ShmError
 from shm.models import Model, build, competing_names
-from shm.pipeline.ending import SHM
+from shm.pipeline.reconcile import SHM
 from shm.read import Limits
 from shm.settings import TABLE, Settings
 from shm.store import (

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
         WatchedTest,
     )
     from shm.watch import DatedTest
-    from shm.watch.agreement import Way
 
 
 @dataclass(frozen=True)
@@ -81,9 +80,8 @@ class RemoteFile:
 Opens: TypeAlias = "Archive | RemoteFile"
 """What shows a received file under the name it came with."""
 
-WatchResult: TypeAlias = "tuple[WatchedTest, Alert | None, bytes, frozenset[tuple[str, Way]]]"
-"""What the watch says, the alert that it calls for, what to keep, and what stands beyond its
-threshold."""
+WatchResult: TypeAlias = "tuple[WatchedTest, Alert | None, bytes]"
+"""What the watch says, the alert that it calls for, and what to keep."""
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -208,7 +208,7 @@ def _acknowledged(alerts: Sequence[StoredAlert]) -> dict[str, str]:
 
 def _watched_against(store: Store, baseline: Baseline | None) -> tuple[WatchedTest, ...]:
     """The watches that call a change, and the latest one."""
-    found = store.watch.list_detected_and_latest(baseline) if baseline else ()
+    found = store.watch.list_detected(baseline.hanger, baseline.id) if baseline else ()
     return tuple(each.watched for each in found)
 
 

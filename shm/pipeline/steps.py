@@ -208,4 +208,4 @@ def watch_test(
         alert = joined(alert, gap)
     # A new baseline makes a standing condition a new one.
     alert = alert and replace(alert, key=f"{alert.key}:baseline-{baseline.id}", tension=tension)
-    return found.test, alert, found.kept, found.beyond
+    return found.test, alert, found.kept

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from shm.documents import dump
 from shm.modes_document import modes_document
 from shm.pipeline import Clock
-from shm.pipeline.ending import SHM, told_by_other
+from shm.pipeline.reconcile import SHM
 from shm.read.atomic import replace_text
 from shm.store import Store, Workspace
 from shm.store.archive import MODES_SUFFIX
 from shm.store.ring_files import PERIOD
-from shm.values import Alert, ModalTest, Posterior
-from shm.values.stream import PERIODS, Stream
+from shm.values import ModalTest, Posterior
+from shm.values.stream import PERIODS, Stream, period_start
 
 _OWN_DAYS = 7  # judgement: by then every class has been selected and the watch has learnt
 
@@ -68,9 +68,10 @@ def baseline_of(store: Store, stream: Stream) -> Posterior | None:
     found = store.watch.baseline(stream.hanger)
     if found is None:
         return None
-    first = store.streams.first_day(stream.name)
-    if first is None:
+    pooled = store.streams.pooled_range(stream.name)
+    if pooled is None:
         return found.posterior
+    first = period_start(pooled[0], PERIODS["day"])
     days = (first + n * PERIODS["day"] for n in range(_OWN_DAYS))
     own = tuple(f"{stream.name}-{day:%Y-%m-%d}" for day in days)
     is_own = all(test.startswith(own) for test in found.posterior.tests)
@@ -98,18 +99,3 @@ def hand_on_day(workspace: Workspace, store: Store, test: ModalTest, at: datetim
 
 def _hz(test: ModalTest) -> list[float]:
     return [mode.frequency_hz for mode in test.modes]
-
-
-def is_told_already(store: Store, alert: Alert, *, of_stream: bool) -> bool:
-    """Whether a hammer test, or a day as one, was first to tell it; where hours are gone over
-    again, also whether they told it themselves before others of them came late (`of_stream`).
-    """
-    stored = store.alerts.list_all(alert.hanger)
-    first = told_by_other(alert, stored, of_stream=False)
-    if first is None and of_stream:
-        kinds = set(alert.kinds)
-        own = [replace(each, resolution=None) for each in stored if kinds <= set(each.alert.kinds)]
-        first = told_by_other(alert, own, of_stream=True)
-    if first is not None:
-        log.info("alert %s is that of %s", alert.key, first.alert.key)
-    return first is not None

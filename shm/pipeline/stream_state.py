@@ -99,7 +99,7 @@ def _state(
         apart_s=_lately_s(state.apart_s, now),
         ring_bytes=ring.size_bytes(stream.name),
         window=window,
-        hour=store.streams.last_hour(stream.name),
+        hour=_last_hour(store, stream),
         events=joined(events),
     )
 
@@ -149,20 +149,29 @@ def _lately_s(seconds: Mapping[str, float], now: datetime) -> float:
     return sum(each for start, each in seconds.items() if parse_time(start) >= since)
 
 
+def _last_hour(store: Store, stream: Stream) -> PooledReading | None:
+    hours = store.streams.pooled_range(stream.name, "hour")
+    if hours is None:
+        return None
+    found = store.streams.list_pooled(stream.hanger, "hour", hours[1], hours[1] + PERIODS["hour"])
+    return next((each for each in found if each.stream == stream.name), None)
+
+
 def against_hammer(store: Store, stream: Stream) -> AmbientBias:
     """What a stream's frequencies differ by from those of the latest hammer tests made while it
     ran.
     """
-    last = store.streams.last_pooled(stream.name, "hour")
-    if last is None:
+    hours = store.streams.pooled_range(stream.name, "hour")
+    if hours is None:
         return ambient_bias(stream.hanger, (), ())
+    last = hours[1]
     own = [
         row.id
         for row in store.tests.list_rows(stream.hanger, _ROWS_SEEN)
         if row.time <= last + TOGETHER
         and not row.name.startswith(f"{stream.name}-{row.time:%Y-%m-%d}")  # a day of its own
     ][:_TESTS_COMPARED]
-    tests = [each.test for each in store.tests.list_numbered(own)]
+    tests = [each.test for each in store.tests.list_all(ids=own)]
     times = [test.time for test in tests if test.time is not None]
     return ambient_bias(
         stream.hanger, tests, store.streams.list_hours_near(stream.name, times, TOGETHER)

@@ -14,7 +14,7 @@ import logging
 from collections import defaultdict, deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from queue import SimpleQueue
@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING, Any
 from shm.documents import format_time
 from shm.errors import ShmError, StoreError
 from shm.pipeline import Clock, utc_now
-from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day, is_told_already
+from shm.pipeline.reconcile import Condition, is_same_event, reconcile
+from shm.pipeline.stream_days import RestOfDays, baseline_of, hand_on_day
 from shm.pipeline.unheard import (
     compare_thermometers,
     heed_silences,
@@ -31,10 +32,11 @@ from shm.pipeline.unheard import (
     list_unread,
     note_blindness,
 )
-from shm.store import Store, Workspace
+from shm.store import Reconciled, Store, Workspace
 from shm.store.archive import nothing
 from shm.store.ring import ring_of
 from shm.store.ring_files import PERIOD
+from shm.values import Mode, Plane
 from shm.values.stream import (
     PERIODS,
     Period,
@@ -61,6 +63,7 @@ _HEED = timedelta(minutes=10)  # technical: silences are told by the day
 _LOOKED_BACK = timedelta(days=10)
 """Judgement: for what was noticed as a change began; what is told later is a slow one."""
 
+_OVER = "the sensors do not show it any more"
 _EVER = datetime.min.replace(tzinfo=UTC)
 
 log = logging.getLogger(__name__)
@@ -197,11 +200,11 @@ class Streaming:
         changed = self.store.streams.first_unpooled(name, since)
         if changed is not None:
             self._changed[name] = changed
-        last = self.store.streams.last_pooled(name, "hour")
-        watched = self.store.streams.watch_time(stream.hanger)
-        if last is not None and watched is not None and watched <= last:
+        hours = self.store.streams.pooled_range(name, "hour")
+        watched = self._watched_until(stream)
+        if hours is not None and watched is not None and watched <= hours[1]:
             self._pooled[name, "hour"] = watched
-            self._settled[name] = last + PERIODS["hour"]
+            self._settled[name] = hours[1] + PERIODS["hour"]
         if done is not None:
             self._done[name] = done
         for start in list_unread(self.workspace, self.ring, self.store, name, self.clock()):
@@ -215,15 +218,20 @@ class Streaming:
         """
         name, streams = stream.name, self.store.streams
         starts = {each: period_start(changed, length) for each, length in PERIODS.items()}
-        watched, newest = streams.watch_time(stream.hanger), streams.watch_state(stream.hanger)
-        before = streams.watch_before(stream.hanger, starts["hour"])
-        if watched and newest and before and starts["hour"] < watched:
-            streams.go_back(stream.hanger, before[0], gone_back(before[1], newest))
-            starts["hour"] = before[0]
-            self._settled[name] = max(watched, self._settled.get(name, watched))
+        newest = streams.watch(stream.hanger)
+        before = streams.watch(stream.hanger, starts["hour"])
+        if newest and before and starts["hour"] < newest.time:
+            content = gone_back(before.content, newest.content)
+            streams.go_back(stream.hanger, before.time, content)
+            starts["hour"] = before.time
+            self._settled[name] = max(newest.time, self._settled.get(name, newest.time))
         for period, start in starts.items():
             former = self._pooled.get((name, period), start)
             self._pooled[name, period] = min(former, start)
+
+    def _watched_until(self, stream: Stream) -> datetime | None:
+        watch = self.store.streams.watch(stream.hanger)
+        return None if watch is None else watch.time
 
     def _next_window(self, name: str) -> datetime | None:
         """The next ten minutes that are whole, or not waited for any more; late ones last."""
@@ -244,17 +252,18 @@ class Streaming:
 
         hanger = self.workspace.bridge.tested(stream.hanger)
         options = identify_options(self.workspace.settings, self.workspace.bridge)
+        known = self.store.streams.latest_with_modes(stream.name)
         self._submit(
             stream.name,
             partial(
                 read_stream_window,
                 self.ring.read(stream.name, start, start + WINDOW),
                 stream,
-                self.store.streams.last_modes(stream.name),
+                last_modes(known),
                 hanger,
                 options,
                 tuple(self._offsets[stream.name]),
-                self.store.streams.has_followed_modes(stream.name),
+                any(each.how == "tracked" for each in known),
             ),
             partial(self._keep_window, stream),
             partial(self._give_up_window, stream, start),
@@ -281,16 +290,16 @@ class Streaming:
         end = start + PERIODS[period]
         known = self.store.streams.list_pooled(stream.hanger, period, start, end)
         if any(each.stream == stream.name for each in known):
-            watched = self.store.streams.watch_time(stream.hanger)
+            watched = self._watched_until(stream)
             if period != "hour" or watched is None or start < watched:
                 return False
         return bool(self._windows(stream, start, PERIODS[period]))
 
     def _pooled_until(self, stream: Stream, period: Period, length: timedelta) -> datetime | None:
         """The end of the last reading of a period; the first window's period where none is."""
-        last = self.store.streams.last_pooled(stream.name, period)
-        if last is not None:
-            return last + length
+        pooled = self.store.streams.pooled_range(stream.name, period)
+        if pooled is not None:
+            return pooled[1] + length
         first = self.store.streams.first_window(stream.name)
         return None if first is None else period_start(first, length)
 
@@ -304,7 +313,7 @@ class Streaming:
         from shm.pipeline.stream_steps import pool_stream
 
         hanger = self.workspace.bridge.tested(stream.hanger)
-        watched = self.store.streams.watch_time(stream.hanger)
+        watch = self.store.streams.watch(stream.hanger)
         self._submit(
             stream.name,
             partial(
@@ -314,10 +323,10 @@ class Streaming:
                 start,
                 hanger,
                 baseline_of(self.store, stream),
-                self.store.streams.watch_state(stream.hanger),
+                None if watch is None else watch.content,
                 self.workspace.settings.false_call_years,
                 self._recent_events(stream, start) if period == "hour" else (),
-                is_watched=period == "hour" and (watched is None or start >= watched),
+                is_watched=period == "hour" and (watch is None or start >= watch.time),
             ),
             partial(self._keep_pooled, stream, period, start),
             partial(self._give_up_pool, stream, period, start),
@@ -392,31 +401,57 @@ class Streaming:
 
     def _keep_pooled(self, stream: Stream, period: Period, start: datetime, found: Pooled) -> None:
         self._pooled[stream.name, period] = end = start + PERIODS[period]
+        settled = self._settled.get(stream.name, _EVER)
         for event in found.events:
             self.store.streams.save_event(event)
         if found.reading is None:
             return
         if found.test is not None:
             hand_on_day(self.workspace, self.store, found.test, self.clock())
-        is_told = found.alert is None
         if found.alert is not None:
-            again = end <= self._settled.get(stream.name, _EVER)
-            is_told = is_told_already(self.store, found.alert, of_stream=again)
             why = f"alert {found.alert.key}"
             self.ring.keep(stream.name, end - _KEPT_BEFORE_ALERT, end, why)
         hooks = [hook.name for hook in self.workspace.bridge.hooks]
-        raised = self.store.streams.save_pooled(
-            found.reading,
-            found.kept or None,
-            None if is_told else found.alert,
-            hooks,
-            self.clock(),
-            found.ended,
-        )
-        if raised is not None:
+        changes = self._reconciled(stream.hanger, found, is_again=end <= settled)
+        kept = found.kept or None
+        for raised in self.store.streams.save_pooled(
+            found.reading, kept, changes, hooks, self.clock()
+        ):
             log.warning("alert %s: %s", raised.alert.key, raised.alert.message)
+
+    def _reconciled(self, hanger: int, found: Pooled, *, is_again: bool) -> Reconciled:
+        """Return which alerts an hour opens and closes; where hours are gone over again, none that
+        they have raised before others of them came late."""
+        if found.alert is None and not found.ended:
+            return Reconciled()
+        alerts = self.store.alerts.list_all(hanger)
+        is_open = [each for each in alerts if each.resolution is None]
+        known = [each for each in alerts if each.baseline_id is None] if is_again else []
+        over = [each.alert for each in is_open if each.alert.key in found.ended]
+        conditions = [Condition(each, "over", _OVER) for each in over]
+        conditions += [Condition(found.alert, "holds")] if found.alert else []
+        changes = reconcile(is_open, conditions)
+        if found.alert and any(
+            set(found.alert.kinds) <= set(each.alert.kinds)
+            and is_same_event(each.alert, found.alert)
+            for each in known
+        ):
+            changes = replace(changes, to_open=())
+        return changes
 
     def _give_up_pool(
         self, stream: Stream, period: Period, start: datetime, error: BaseException
     ) -> None:
         self._pooled[stream.name, period] = start + PERIODS[period]
+
+
+def last_modes(readings: Sequence[WindowReading]) -> tuple[Mode, ...]:
+    """Return the modes of windows, the last first, each as it was seen last.
+
+    A mode that one window hides is looked for again in the next.
+    """
+    found: dict[tuple[Plane, int], Mode] = {}
+    for reading in readings:
+        for mode in reading.modes:
+            found.setdefault((mode.plane, mode.order), mode)
+    return tuple(sorted(found.values(), key=lambda mode: mode.frequency_hz))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Literal
 
+from shm.pipeline.reconcile import Condition, reconcile
 from shm.store import Store, StoredAlert, Workspace
 from shm.values import Alert, AlertKind
 from shm.values.messages import WEEK, Lead
@@ -243,21 +244,22 @@ _LONG = timedelta(hours=26)
 
 
 def heed_silences(workspace: Workspace, store: Store, at: datetime) -> None:
-    """Raises and ends what streams call for that say nothing."""
+    """Open and close what streams call for that say nothing."""
     found = {each.stream.name: each for each in heard(workspace, store, at)}
     standing = [each for each in store.alerts.list_all(standing=True) if _KIND in each.alert.kinds]
-    ended = {each.id: why for each in standing if (why := _why_ended(each, found))}
+    conditions = [
+        Condition(each.alert, "over", why) for each in standing if (why := _why_ended(each, found))
+    ]
     told = {_told(each) for each in standing}
-    hooks = [hook.name for hook in workspace.bridge.hooks]
-    if ended:
-        store.alerts.settle(None, hooks, ended, at)
     for name, each in found.items():
         word, last = _WORD.get(each.state, ""), each.last_sample
         if not word or last is None or (word, name) in told:
             continue
         since = last if word == "silent" else _blind_since(store, name, at)
         if at - since > _LONG:
-            store.alerts.settle(_alert(each, word, since), hooks, {}, at)
+            conditions.append(Condition(_alert(each, word, since), "holds"))
+    hooks = [hook.name for hook in workspace.bridge.hooks]
+    store.alerts.settle(reconcile(standing, conditions), hooks, at)
 
 
 def _blind_since(store: Store, name: str, at: datetime) -> datetime:

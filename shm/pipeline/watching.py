@@ -1,6 +1,4 @@
-"""Which tests the watch goes over, what a watched test raises and ends, which are judged again.
-
-Nothing here imports what computes, so that the daemon itself begins quickly and stays small.
+"""Which tests the watch goes over, which are judged again, and the alerts that follow.
 
 A threshold judges the stored tests too: at once they are compared with their baseline again. A loss
 that only the new one calls is raised; an alert that no test is beyond any more is closed, and says
@@ -13,27 +11,28 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from math import isnan
 from typing import TYPE_CHECKING
 
 import shm
 from shm.errors import NothingThere
-from shm.pipeline.ending import (
-    BEYOND,
-    OF_CHANGES,
-    SHM,
-    gap_stands,
-    is_told,
-    message_anew,
-    seen_again,
-    tells,
-    why_over,
-)
+from shm.pipeline.conditions import Evidence, conditions_of, is_gap_larger
+from shm.pipeline.faults import contained
+from shm.pipeline.reconcile import reconcile
 from shm.settings import Settings
-from shm.store import Baseline, Stage, Store, StoredAlert, StoredTest, TestRow, Workspace
+from shm.store import (
+    Baseline,
+    Reconciled,
+    Stage,
+    Store,
+    StoredAlert,
+    StoredTest,
+    TestRow,
+    Workspace,
+)
 from shm.store.rows import StoredWatch
 from shm.values import Alert, Beside, Hanger, ModalTest, WatchedTest
 from shm.values.drift import threshold_of
@@ -122,7 +121,6 @@ def _key(tests: Sequence[TestRow], newest: StoredTest | None = None) -> str:
 
 
 _RECENT_TESTS = 64  # technical: two visits of so many tests each are none of hammer tests
-_CLOSED = "judged again with the thresholds in force"
 
 log = logging.getLogger(__name__)
 
@@ -136,13 +134,9 @@ class JudgedAgain:
     """
 
     def __init__(self, workspace: Workspace, store: Store):
-        self._store, self._judging = store, -1
+        self._workspace, self._store, self._judging = workspace, store, -1
+        self._unread = list(workspace.bridge.watched)
         self._left: dict[int, tuple[int, str]] = {}
-        latest = store.watch.latest()
-        for hanger in workspace.bridge.watched:
-            if watch := latest.get(hanger.id):
-                why = "; ".join(differences(watch, hanger, workspace.settings))
-                self._left |= {hanger.id: (watch.baseline_id, why)} if why else {}
 
     def go_on(
         self, at: datetime, held: Collection[int] = (), damaged: Collection[int | None] = ()
@@ -150,6 +144,10 @@ class JudgedAgain:
         """Sends the next back where it is time; recordings that are held and hangers that stand
         still are not waited for.
         """
+        while self._unread:
+            with contained(log, "hanger %d cannot be judged again", self._unread[0].id):
+                self._note_differences(self._unread[0])
+            self._unread.pop(0)
         if not self._left:
             return
         waiting = {test.hanger for test in self._store.tests.list_waiting(1, excluding=held)}
@@ -160,10 +158,16 @@ class JudgedAgain:
             if self._send_back(hanger, at):
                 return
 
+    def _note_differences(self, hanger: Hanger) -> None:
+        watch = self._store.watch.latest([hanger]).get(hanger.id)
+        why = "; ".join(differences(watch, hanger, self._workspace.settings)) if watch else ""
+        if watch and why:
+            self._left[hanger.id] = watch.baseline_id, why
+
     def _send_back(self, hanger: int, at: datetime) -> int:
         baseline_id, why = self._left.pop(hanger)
         self._judging = hanger
-        count = self._store.watch.judge_again(hanger, baseline_id, why, at)
+        count = self._store.watch.rerun(hanger, baseline_id, why, at)
         said = "hanger %d: %d tests are judged again, %d hangers are left: %s"
         log.info(said, hanger, count, len(self._left), why)
         return count
@@ -189,138 +193,47 @@ def differences(judged: StoredWatch, hanger: Hanger, settings: Settings) -> Iter
             yield f"{name} {now:.6g} instead of {then:.6g}"
 
 
-def settled(
+def reconciled(
     store: Store,
     hanger: Hanger,
     baseline: Baseline,
     test: StoredTest,
-    found: tuple[WatchedTest, Alert | None, frozenset[tuple[str, str]]],
-) -> tuple[dict[int, str], Alert | None]:
-    """Which alerts a test ends, and why; and the one to raise: that of the watch, unless the same
-    was told, or else a resolved one that is seen again.
+    found: tuple[WatchedTest, Alert | None],
+) -> Reconciled:
+    """Return which alerts to open and to close once a test was compared with a baseline.
 
-    `found` is what the watch says, its alert, and what stands beyond its threshold. Of tests that
-    are done again only the last can end anything: those between are of the past.
+    `found` is what the watch says, and the alert that it calls for. While other tests of the hanger
+    wait to be compared once more nothing is decided: what there is lies in the past.
     """
-    watched, alert, beyond = found
-    standing = store.alerts.list_all(hanger.id, baseline.id, standing=True)
-    resolved = store.alerts.list_all(hanger.id, baseline.id, standing=False)
+    if not store.watch.is_caught_up(test, baseline):
+        return Reconciled()
+    alerts = store.alerts.list_all(hanger.id)
+    known = [each for each in alerts if each.baseline_id == baseline.id]
+    watched, alert = found
     is_again = store.watch.is_again(test, baseline)
-    if alert and is_again:
-        said = f"{alert.message} Raised when the stored tests were judged again."
-        alert = replace(alert, message=said)
-    if not standing and not resolved:
-        return {}, alert
-    closed = [each for each in resolved if _is_closed(each)]
-    resolved = tuple(each for each in resolved if not _is_closed(each))
-    if alert and is_again:
-        alert = _with_own_key(alert, closed)
-    if is_again and not store.watch.is_last(test, baseline):
-        known = [*standing, *_of_the_past(alert, resolved)]
-        alert = alert and _news(alert, known)
-        return _replaced(alert, standing), alert
-    before = [each.watched for each in store.watch.list_recent(baseline, _RECENT_TESTS)]
-    tests = sorted([*before, watched], key=lambda each: each.time)
+    if is_again:
+        stored = store.watch.list_all(hanger.id, baseline.id)
+    else:
+        recent = _RECENT_TESTS if known else 0
+        stored = store.watch.list_all(hanger.id, baseline.id, last=recent)
+    tests = sorted([*(each.watched for each in stored), watched], key=lambda each: each.time)
+    called = _called(stored, known) if is_again else []
 
-    def stands(test: WatchedTest) -> bool:
+    def is_gap_left(test: WatchedTest) -> bool:
         try:
             current = store.posteriors.get(hanger.id, test.test)
         except NothingThere:  # of a class that was dropped: not known to have ended
             return True
-        return gap_stands(baseline.posterior, current)
+        return is_gap_larger(baseline.posterior, current)
 
-    ended = {
-        each.id: why
-        for each in standing
-        if (why := why_over(each.alert, tests, hanger, gap_stands=stands))
-        or (is_again and (why := _why_closed(each.alert, tests, hanger, beyond)))
-    }
-    if is_again and any(each.change.called for each in tests):
-        alert = alert or _detected_still(standing, ended, watched, hanger)
-    # The gap's alert has one key for good: what was raised before is raised no second time.
-    if alert and alert.key not in {each.alert.key for each in (*standing, *resolved)}:
-        left = [each for each in standing if each.id not in ended]
-        past = _of_the_past(alert, resolved) if is_again else []
-        alert = _news(alert, [*left, *past])
-        return ended | (_replaced(alert, standing) if is_again else {}), alert
-    return ended, seen_again(resolved, standing, tests, hanger, gap_stands=stands) or alert
+    called += [alert] if alert else []
+    evidence = Evidence(hanger, tests, watched.test, is_gap_left, called, is_again)
+    is_open = [each for each in alerts if each.resolution is None]
+    return reconcile(is_open, conditions_of(known, evidence, baseline.id))
 
 
-def _news(alert: Alert, known: Sequence[StoredAlert]) -> Alert | None:
-    told = [each.alert for each in known]
-    return None if is_told(alert, told) else alert
-
-
-def _of_the_past(alert: Alert | None, resolved: Sequence[StoredAlert]) -> list[StoredAlert]:
-    """Resolved alerts that a test done again must not raise anew: a person has looked into it
-    since, or it was told of that test or a later one and has ended."""
-    return [
-        each
-        for each in resolved
-        if alert and (end := each.resolution)
-        if alert.time <= (each.alert.time if end.who == SHM else end.at)
-    ]
-
-
-def _why_closed(
-    alert: Alert, tests: Sequence[WatchedTest], hanger: Hanger, beyond: frozenset[tuple[str, str]]
-) -> str:
-    """Why an alert would not have been raised by what is in force now; empty where it would."""
-    kinds = set(alert.kinds)
-    if not kinds <= OF_CHANGES:
-        return ""
-    if BEYOND not in kinds and any(each.change.called for each in tests):
-        return ""
-    told = {(each.quantity, "down" if each.shift_mean < 0 else "up") for each in alert.drifts}
-    if BEYOND in kinds and told & beyond:
-        return ""
-    limits = hanger.thresholds
-    return (
-        f"{_CLOSED} (tension {100 * limits.tension_shift_fraction:.3g} %, end stiffness "
-        f"{limits.stiffness_shift_decades:.3g} decades, probability "
-        f"{limits.alert_probability:.3g}): its tests are not beyond them"
-    )
-
-
-def _is_closed(stored: StoredAlert) -> bool:
-    """Whether other thresholds have closed an alert, not the hanger's tests or a person."""
-    return stored.resolution is not None and stored.resolution.why.startswith(_CLOSED)
-
-
-def _with_own_key(alert: Alert, closed: Sequence[StoredAlert]) -> Alert:
-    """An alert that other thresholds have closed may be raised again: under another key."""
-    same = [each.id for each in closed if each.alert.key.partition(":again-")[0] == alert.key]
-    return replace(alert, key=f"{alert.key}:again-{max(same)}") if same else alert
-
-
-def _replaced(alert: Alert | None, standing: Sequence[StoredAlert]) -> dict[int, str]:
-    """What stands of a change that is now raised as beyond its threshold: one alert a loss."""
-    if alert is None or BEYOND not in alert.kinds:
-        return {}
-    told = [each for each in standing if set(each.alert.kinds) <= OF_CHANGES - {BEYOND}]
-    why = f"{_CLOSED}: another alert tells that it is beyond its threshold"
-    return {each.id: why for each in told if tells(each.alert, alert.change)}
-
-
-def _detected_still(
-    standing: Sequence[StoredAlert], ended: Mapping[int, str], test: WatchedTest, hanger: Hanger
-) -> Alert | None:
-    """What is left of an alert that is not beyond its threshold any more: the change."""
-    for stored in standing:
-        alert, why = stored.alert, ended.get(stored.id, "")
-        if not why.startswith(_CLOSED) or alert.change is None or set(alert.kinds) == {BEYOND}:
-            continue
-        if any(tells(each.alert, alert.change) for each in standing if each.id not in ended):
-            continue
-        told = {each.quantity for each in alert.drifts}
-        drifts = tuple(each for each in test.drifts if each.quantity in told)
-        return replace(
-            alert,
-            key=f"{alert.key.partition(':again-')[0]}:again-{stored.id}",
-            test=test.test,
-            time=test.time,
-            drifts=drifts,
-            kinds=tuple(each for each in alert.kinds if each != BEYOND),
-            message=f"{message_anew(alert, drifts, test, hanger)} It replaces alert {stored.id}.",
-        )
-    return None
+def _called(stored: Sequence[StoredWatch], known: Sequence[StoredAlert]) -> list[Alert]:
+    """Return what tests in force call for; of watches of former versions, what they raised."""
+    raised = {each.alert.test: each.alert for each in known}
+    called = (each.called or raised.get(each.watched.test) for each in stored)
+    return [each for each in called if each is not None]

@@ -16,19 +16,18 @@ from typing import Any, TypeAlias
 from shm.errors import NothingThere
 from shm.models import DESCRIPTION, competing_names
 from shm.pipeline import Clock
-from shm.pipeline.ending import told_by_other
 from shm.pipeline.judging import judge
 from shm.pipeline.limits import heed_limits
 from shm.pipeline.lineage import Taught, identify_lineage, update_terms
 from shm.pipeline.registry import Opens, RemoteFile, WatchResult, registered, run_step
 from shm.pipeline.telling import after_works, works_before
-from shm.pipeline.watching import settled, tests_beside, to_watch
-from shm.store import KeptWatch, Stage, Store, StoredRecording, TestRow, Workspace
+from shm.pipeline.watching import reconciled, tests_beside, to_watch
+from shm.store import KeptWatch, Stage, Store, StoredAlert, StoredRecording, TestRow, Workspace
 from shm.store.archive import nothing
 from shm.values import WITHOUT_MODEL, Hanger
 from shm.values.stated_tension import averaged_now
 
-Work: TypeAlias = "Generator[Callable[[], Any], Any, object]"
+Work: TypeAlias = "Generator[Callable[[], Any], Any, Sequence[StoredAlert] | None]"
 
 
 @dataclass(frozen=True)
@@ -120,7 +119,8 @@ class Queue:
         )
         lineage = identify_lineage(recording, found[0].test.hanger, workspace)
         found, judged = judge(workspace, store, recording, found)
-        return store.tests.save(recording.id, found, lineage, self.clock(), judged)
+        notice = store.tests.save(recording.id, found, lineage, self.clock(), judged)
+        return None if notice is None else (notice,)
 
     def _select(self, hanger: Hanger, first: Sequence[TestRow]) -> Work:
         tests, settings = [self.store.tests.get(test.id) for test in first], self.workspace.settings
@@ -158,7 +158,7 @@ class Queue:
             yield nothing
             store.watch.pass_over(test, self.clock())
             return None
-        current = store.posteriors.of_test(test)
+        current = store.posteriors.get(test.hanger, test.test.id)
         # Of the test's own class: another may have been adopted, or dropped, since its update.
         baseline = store.watch.baseline(hanger.id, current.model, test.time)
         if baseline is None:
@@ -176,16 +176,15 @@ class Queue:
         if found is None:  # the test still waits, to be watched from the baseline on
             store.watch.forget_state(baseline)
             return None
-        watched, alert, state = *found[:2], KeptWatch(needed.key, test.time, found[2])
+        watched, alert, kept = found
         if alert is not None and silences:
             earlier = [each.alert for each in store.alerts.list_all(hanger.id)]
             works = works_before(alert, silences, earlier)
             alert = alert if works is None else after_works(alert, works)
-        ended, alert = settled(store, hanger, baseline, test, (watched, alert, found[3]))
-        first = told_by_other(alert, store.alerts.list_all(hanger.id), of_stream=True)
-        stored = (test, baseline, watched, None if first else alert, hooks, self.clock())
-        level = hanger.thresholds.alert_probability
-        return store.watch.save(*stored, state, ended, first, level)
+        changes = reconciled(store, hanger, baseline, test, (watched, alert))
+        stored = (test, baseline, watched, alert, hooks, self.clock())
+        state, level = KeptWatch(needed.key, test.time, kept), hanger.thresholds.alert_probability
+        return store.watch.save(*stored, state, changes, level)
 
     def _summarise(self, hanger: Hanger) -> None:
         if hanger.is_modelled:
@@ -206,7 +205,7 @@ class Queue:
         if weighed is None:
             return None
         try:
-            posterior = self.store.posteriors.of_test(weighed)
+            posterior = self.store.posteriors.get(weighed.hanger, weighed.test.id)
         except NothingThere:  # not through updating yet
             return None
         return Taught(posterior, own is not None)

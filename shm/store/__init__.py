@@ -4,11 +4,9 @@ from shm.store.archive import Archive, Quarantine
 from shm.store.disposition import Exclusion
 from shm.store.holding import Judged
 from shm.store.list_rows import (
-    AlertRow,
     BaselineGlance,
     Deaths,
     Decision,
-    DeliveryRow,
     EventKind,
     HangerEvent,
     HeldTest,
@@ -24,7 +22,7 @@ from shm.store.list_rows import (
     TrendPoint,
 )
 from shm.store.people import Scope, StoredToken
-from shm.store.reprocessing import AGAIN_FROM
+from shm.store.rerun import AGAIN_FROM
 from shm.store.rows import (
     ENDED,
     Acknowledgement,
@@ -38,6 +36,7 @@ from shm.store.rows import (
     KeptWatch,
     Lineage,
     News,
+    Reconciled,
     Resolution,
     Silence,
     Stage,
@@ -52,11 +51,12 @@ from shm.store.store import Store
 from shm.store.workspace import Workspace
 
 __all__ = [
-    "AGAIN_FROM", "ENDED", "Acknowledgement", "Adoption", "AlertRow", "Archive", "Baseline",
-    "BaselineGlance", "Deaths", "Decision", "Delivery", "DeliveryRow", "DeliveryState",
+    "AGAIN_FROM", "ENDED", "Acknowledgement", "Adoption", "Archive", "Baseline",
+    "BaselineGlance", "Deaths", "Decision", "Delivery", "DeliveryState",
     "EventKind", "Exclusion", "FormerPosterior", "FormerTest", "HangerEvent", "HeldTest", "Hold",
     "IdentifiedTest", "Judged", "KeptWatch", "Lineage", "News", "Numbers", "Outcome", "Quarantine",
-    "Receipt", "ReceivedFile", "Rerun", "Resolution", "Scope", "Silence", "Stage", "Step", "Store",
-    "StoredAdoption", "StoredAlert", "StoredDiagnosis", "StoredRecording", "StoredSelection",
-    "StoredTest", "StoredToken", "StoredWatch", "TestRow", "TrendPoint", "Workspace",
+    "Receipt", "ReceivedFile", "Reconciled", "Rerun", "Resolution", "Scope", "Silence", "Stage",
+    "Step", "Store", "StoredAdoption", "StoredAlert", "StoredDiagnosis", "StoredRecording",
+    "StoredSelection", "StoredTest", "StoredToken", "StoredWatch", "TestRow", "TrendPoint",
+    "Workspace",
 ]  # fmt: skip

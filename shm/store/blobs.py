@@ -16,6 +16,7 @@ from shm.models import class_units
 from shm.modes_document import MODES_SCHEMA, parse_modes
 from shm.store.columns import loads
 from shm.values import (
+    Alert,
     Change,
     CreepRate,
     FrequencyResponse,
@@ -128,9 +129,9 @@ def watch_document(watched: WatchedTest) -> dict[str, Any]:
 
 
 @lru_cache(_HELD)
-def watch_in(text: str) -> tuple[WatchedTest, float]:
+def watch_in(text: str) -> tuple[WatchedTest, float, Alert | None]:
     """The watch after a test back from its document, for its test, time and drifts to be put in,
-    and the alert probability that it was judged with.
+    the alert probability that it was judged with, and the alert that it called for.
     """
     document = loads(text)
     temperature_c = number(document["temperature_c"])
@@ -139,7 +140,9 @@ def watch_in(text: str) -> tuple[WatchedTest, float]:
     # Documents of former versions tell nothing of mistaken modes.
     mistaken = value_of(tuple[RepeatedMistake, ...], document.get("mistaken", []))
     found = WatchedTest("", _NO_TIME, temperature_c, (), change_in(text), creep, mistaken)
-    return found, number(document.get("alert_probability"))
+    called = document.get("calls_for")
+    alert = value_of(Alert, called) if called else None
+    return found, number(document.get("alert_probability")), alert
 
 
 @lru_cache(_HELD)

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
+from zipfile import BadZipFile
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Connection
+from sqlalchemy.engine import Connection, RowMapping
 
-from shm.errors import sentence
+from shm.errors import StoreDamaged, sentence
 from shm.read.sidecar import SIDECAR_SUFFIX
 from shm.store.archive import Archive, checksum
+from shm.store.blobs import unpack
+from shm.store.columns import Document, loads
 from shm.store.copying import TableContent, Tell, contents
 from shm.store.database import Database
 from shm.store.schema import changed_objects
 from shm.store.store import Store
-from shm.store.tables import recordings
+from shm.store.tables import fingerprints, posteriors, recordings, tests
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,8 @@ class CheckedStore:
     """Rows that refer to a row that is not there, each with the table of that one."""
     changed: tuple[str, ...] = ()
     """Tables and indexes that are not as the migrations make them."""
+    unreadable: tuple[tuple[str, str], ...] = ()
+    """Rows of which a document or packed arrays cannot be read, each with the columns."""
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -57,6 +65,10 @@ class CheckedStore:
                 for where, table in self.references
             ),
             *(Finding("changed schema", name, _CHANGED, _COPY) for name in self.changed),
+            *(
+                Finding("unreadable row", where, f"its {what} cannot be read.", _RESTORE)
+                for where, what in self.unreadable
+            ),
         )
 
     @property
@@ -66,8 +78,12 @@ class CheckedStore:
 
     @property
     def unfit(self) -> tuple[str, ...]:
-        """Troubles for which it cannot be put in another's place; a schema is not copied."""
-        return tuple(str(each) for each in self.findings if each.kind != "changed schema")
+        """Troubles for which it cannot be put in another's place; a schema is not copied, and a
+        row that cannot be read stops its hanger alone."""
+        return tuple(str(each) for each in self.findings if each.kind not in _ALLOWED)
+
+
+_ALLOWED = ("changed schema", "unreadable row")
 
 
 _RESTORE = "Restore the store from a backup: `shm db restore FILE --replace`."
@@ -127,13 +143,38 @@ def check_store(store: Database, tell: Tell) -> CheckedStore:
     with store.reading() as connection:
         try:
             faults, references = _faults(connection, "integrity_check"), _references(connection)
-            changed = changed_objects(connection)
-            return CheckedStore(contents(connection, tell), faults, references, changed)
+            changed, unreadable = changed_objects(connection), list[tuple[str, str]]()
+            tables = contents(connection, tell, partial(_note_unreadable, unreadable))
+            return CheckedStore(tables, faults, references, changed, tuple(unreadable))
         except (sa.exc.DatabaseError, ValueError) as error:
             if connection.dialect.name != "sqlite":
                 raise
             cause = getattr(error, "orig", None) or error
             return CheckedStore((), (f"the file is damaged: {cause}",))
+
+
+def _note_unreadable(
+    found: list[tuple[str, str]], table: sa.Table, rows: Sequence[RowMapping]
+) -> None:
+    for row in rows:
+        columns = [c.name for c in table.c if not _is_readable(c, row[c.name])]
+        if columns:
+            key = ",".join(str(row[column.name]) for column in table.primary_key)
+            found.append((f"{table.name}/{key}", " and ".join(columns)))
+
+
+def _is_readable(column: sa.Column[Any], value: Any) -> bool:
+    try:
+        if value is not None and isinstance(column.type, Document):
+            loads(value)
+        elif value is not None and column in _PACKED:
+            unpack(bytes(value))  # each array has a checksum
+    except (StoreDamaged, ValueError, OSError, KeyError, EOFError, BadZipFile, zlib.error):
+        return False
+    return True
+
+
+_PACKED = {posteriors.c.samples, tests.c.frequency_response, fingerprints.c.shapes}
 
 
 def check_archive(store: Store, archive: Archive, tell: Tell) -> CheckedArchive:

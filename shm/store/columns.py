@@ -94,14 +94,10 @@ def lineage() -> tuple[sa.Column[str], ...]:
     )
 
 
-def note_on_alert() -> tuple[sa.Column[Any], ...]:
+def note_on_alert(prefix: str) -> tuple[sa.Column[Any], ...]:
     """What is noted on an alert once: when, by whom and why."""
-    return (
-        sa.Column("alert_id", sa.ForeignKey("alerts.id"), nullable=False, unique=True),
-        sa.Column("at", UtcTime, nullable=False),
-        sa.Column("who", sa.Text, nullable=False),
-        sa.Column("why", sa.Text, nullable=False),
-    )
+    names = ("at", "who", "why")
+    return tuple(sa.Column(f"{prefix}_{n}", UtcTime if n == "at" else sa.Text) for n in names)
 
 
 def model() -> sa.Column[str]:

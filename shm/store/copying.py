@@ -38,10 +38,17 @@ def row_counts(connection: Connection) -> dict[str, int]:
     return counted
 
 
-def contents(connection: Connection, tell: Tell) -> tuple[TableContent, ...]:
-    """Read every row of every table; raise ValueError where one cannot be decoded."""
+def contents(
+    connection: Connection,
+    tell: Tell,
+    use: Callable[[sa.Table, Sequence[RowMapping]], object] = lambda *_: None,
+) -> tuple[TableContent, ...]:
+    """Read every row of every table and `use` some at a time; raise ValueError where one cannot be
+    decoded."""
     progress = _Progress(tell, "reading rows", sum(row_counts(connection).values()))
-    return tuple(_read(connection, table, progress) for table in metadata.sorted_tables)
+    return tuple(
+        _read(connection, table, progress, partial(use, table)) for table in metadata.sorted_tables
+    )
 
 
 def copy_rows(source: Connection, target: Connection, tell: Tell) -> tuple[TableContent, ...]:

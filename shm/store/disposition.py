@@ -6,7 +6,7 @@ Nothing is deleted: raw file, test and results stay, and each decision can be ta
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any
 
@@ -14,8 +14,7 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import UsageError, sentence
-from shm.store.audit import note
-from shm.store.database import Repository, insert
+from shm.store.database import Repository
 from shm.store.files import (
     advance_recordings,
     by_id,
@@ -23,8 +22,6 @@ from shm.store.files import (
     end_recording,
     end_tests,
     in_force,
-    write_event,
-    write_step,
 )
 from shm.store.holding import (
     confirmed_values,
@@ -32,6 +29,7 @@ from shm.store.holding import (
     discarded_reason,
     held_rows,
     holds_of,
+    insert_hold,
     latest_hold,
     open_holds,
     reason_of,
@@ -39,12 +37,13 @@ from shm.store.holding import (
     standing_discard,
     taking_back,
 )
+from shm.store.journal import write
 from shm.store.list_rows import Decision, HeldTest, Hold, Rerun
 from shm.store.outbox import resolve
 from shm.store.queries import WEIGHED
-from shm.store.reprocessing import of_baselines, reprocess, send_back, supersede_results
+from shm.store.rerun import of_baselines, rerun_recording, rerun_watched, supersede_results
 from shm.store.rows import Stage
-from shm.store.tables import alerts, holds, recordings, tests, watches
+from shm.store.tables import alerts, recordings, tests, watches
 
 
 @dataclass(frozen=True)
@@ -110,7 +109,7 @@ class Dispositions(Repository):
             else:
                 hold = replace(hold, decision=Decision.CONFIRMED, time=time)
             refuse_time(hold, time, at)
-            hold = _decide(connection, recording, hold, who, why, at)
+            hold = _decide(connection, hold, who, why, at)
             _let_count(connection, rows, hold, who, at)
             connection.execute(own.values(reason=None))
             advance_recordings(connection, [recording_id], at)
@@ -134,7 +133,7 @@ class Dispositions(Repository):
             if hold is not None:
                 hold = replace(hold, decision=Decision.DISCARDED)
                 end_tests(connection, recording_id, [row.id for row in rows], at)
-                hold = _decide(connection, recording, hold, who, why, at)
+                hold = _decide(connection, hold, who, why, at)
                 _end_or_advance(connection, recording, hold, at)
                 return Exclusion(hold)
             rows = _chosen(connection, recording_id, counts(tests), test)
@@ -151,24 +150,21 @@ class Dispositions(Repository):
             again = _watch_again(connection, rows, weighed, at)
             named = [HeldTest(row.position, row.name, ()) for row in rows]
             hold = _unheld(recording, Decision.WITHDRAWN, named)
-            hold = _decide(connection, recording, hold, who, why, at)
+            hold = _decide(connection, hold, who, why, at)
             _end_or_advance(connection, recording, hold, at)
             names = tuple(sorted(row.name for row in rows if row.id in own))
             return Exclusion(hold, names, min(row.time for row in rows), again)
 
-    def reprocess(
-        self, recording_id: int, stage: Stage, at: datetime, test: str | None = None
+    def rerun(
+        self, recording_id: int, from_stage: Stage, at: datetime, test: str | None = None
     ) -> Rerun:
-        """Sends a recording back so that `stage` is reached anew; what came of it is superseded.
+        """Send a recording back so that a stage is reached anew; what came of it is superseded.
 
         A file is always identified as a whole; from a later stage on it may be one `test` alone.
         Raises NothingThere, and UsageError where the recording has not come so far.
         """
         with self.writing() as connection:
-            made = reprocess(connection, recording_id, stage, at, test)
-            subject = test or by_id(connection, recording_id).file_name
-            note(connection, at, "recording done again", subject, f"from {stage}")
-            return made
+            return rerun_recording(connection, recording_id, from_stage, at, test)
 
 
 def _held(
@@ -232,7 +228,7 @@ def _let_count(
         values = confirmed_values(connection, row, hold, hold.time, who)
         this = sa.update(tests).where(tests.c.id == row.id)
         connection.execute(this.values(stage=Stage.IDENTIFIED, **values))
-        write_step(connection, row.recording_id, Stage.IDENTIFIED, at, row.id)
+        write(connection, at, Stage.IDENTIFIED, row.recording_id, row.id)
 
 
 def _decided_with(
@@ -296,26 +292,14 @@ def _unheld(
     )
 
 
-def _decide(
-    connection: Connection, recording: Row[Any], hold: Hold, who: str, why: str, at: datetime
-) -> Hold:
+def _decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime) -> Hold:
     """Store a decision: of a hold, whose notice ends with it, or of what was never held."""
-    if hold.id:
-        return decide(connection, hold, who, why, at)
-    names = ", ".join(test.name for test in hold.tests)
-    message = sentence(f"{hold.decision} by {who}: {names}" + (f": {why}" if why else ""))
-    document = {
-        "message": message,
-        "sidecar_as": hold.sidecar_as,
-        "tests": [asdict(test) for test in hold.tests],
-    }
-    row = {"recording_id": recording.id, "held_at": at, "document": document}
-    made = {"decision": hold.decision, "decided_at": at, "who": who, "why": why, "time": hold.time}
-    insert(connection, holds, {**row, **made})
-    write_event(connection, at, str(hold.decision), recording.id, recording.file_name, message)
-    subject = f"{recording.file_name}: {names}"
-    note(connection, at, f"recording {hold.decision}", subject, why, who)
-    return holds_of(connection, recording.id)[-1]
+    if not hold.id:
+        names = ", ".join(test.name for test in hold.tests)
+        message = sentence(f"{hold.decision} by {who}: {names}" + (f": {why}" if why else ""))
+        hold = replace(hold, message=message, held_at=at)
+        hold = replace(hold, id=insert_hold(connection, hold))
+    return decide(connection, hold, who, why, at)
 
 
 def _weighed(connection: Connection, chosen: Sequence[Row[Any]]) -> bool:
@@ -336,5 +320,5 @@ def _watch_again(
     for hanger in {row.hanger for row in chosen}:
         since = min(row.time for row in chosen if row.hanger == hanger)
         later = (watches.c.time >= since) & tests.c.id.not_in(ids)
-        count += send_back(connection, hanger, later, stage, at)
+        count += rerun_watched(connection, hanger, later, stage, at)
     return count

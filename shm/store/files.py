@@ -14,24 +14,15 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
-import shm
 from shm.errors import NothingThere
 from shm.modes_document import test_document
 from shm.store.archive import suffix_of
 from shm.store.blobs import pack_response
 from shm.store.columns import loads
-from shm.store.database import insert
+from shm.store.journal import RENAMED, write
 from shm.store.list_rows import ReceivedFile, StoredRecording
 from shm.store.rows import IdentifiedTest, Stage, StoredTest
-from shm.store.tables import events, recordings, steps, tests
-
-ARCHIVED = "archived"
-NOTIFIED = "notified"
-STEPS = frozenset({*Stage, ARCHIVED, NOTIFIED})
-"""Names of all steps that this version writes."""
-
-RENAMED = "renamed"
-"""The kind of event that keeps the former name of a file that came again under another."""
+from shm.store.tables import journal, recordings, tests
 
 
 def by_id(connection: Connection, recording_id: int) -> Row[Any]:
@@ -75,16 +66,21 @@ def begin_again(connection: Connection, recording_id: int, at: datetime) -> None
     """A recording waits to be identified as if it had just come in."""
     own = sa.update(recordings).where(recordings.c.id == recording_id)
     connection.execute(own.values(stage=Stage.RECEIVED, reason=None))
-    write_step(connection, recording_id, Stage.RECEIVED, at)
+    write(connection, at, Stage.RECEIVED, recording_id)
 
 
 def end_recording(
-    connection: Connection, recording_id: int, reason: Mapping[str, Any], at: datetime
+    connection: Connection,
+    recording_id: int,
+    reason: Mapping[str, Any],
+    at: datetime,
+    subject: str = "",
 ) -> None:
-    """A recording is refused, with a reason."""
+    """A recording is refused, with a reason; of a file with a fault `subject` is its name."""
     own = sa.update(recordings).where(recordings.c.id == recording_id)
     connection.execute(own.values(stage=Stage.REFUSED, reason=dict(reason)))
-    write_step(connection, recording_id, Stage.REFUSED, at)
+    detail = str(reason.get("message", "")) if subject else ""
+    write(connection, at, Stage.REFUSED, recording_id, subject=subject, detail=detail)
 
 
 def reason_document(
@@ -110,34 +106,14 @@ def end_tests(
     chosen = sa.update(tests).where(tests.c.id.in_(test_ids))
     connection.execute(chosen.values(stage=Stage.REFUSED))
     for test_id in test_ids:
-        write_step(connection, recording_id, Stage.REFUSED, at, test_id)
+        write(connection, at, Stage.REFUSED, recording_id, test_id)
 
 
 def note_name(connection: Connection, known: Row[Any], file_name: str, at: datetime) -> None:
     """Keeps the former name of a file that comes again under another: it is found by both."""
     if known.file_name != file_name:
         said = f"called {file_name} from now on."
-        write_event(connection, at, RENAMED, known.id, known.file_name, said)
-
-
-def write_step(
-    connection: Connection, recording_id: int, stage: str, at: datetime, test_id: int | None = None
-) -> None:
-    """Notes, within the caller's transaction, that a recording or one of its tests came so far."""
-    row = {"recording_id": recording_id, "test_id": test_id, "stage": stage, "at": at}
-    connection.execute(sa.insert(steps).values(**row, version=shm.__version__))
-
-
-def write_event(
-    connection: Connection,
-    at: datetime,
-    kind: str,
-    recording_id: int | None,
-    file_name: str,
-    message: str,
-) -> None:
-    about = {"recording_id": recording_id, "file_name": file_name}
-    insert(connection, events, {"at": at, "kind": kind, "message": message, **about})
+        write(connection, at, RENAMED, known.id, subject=known.file_name, detail=said)
 
 
 def by_former_names(connection: Connection, which: str) -> list[int]:
@@ -145,8 +121,8 @@ def by_former_names(connection: Connection, which: str) -> list[int]:
     superseded = sa.select(tests.c.recording_id).where(tests.c.name == which)
     found = set(connection.scalars(superseded))
     files = sa.select(recordings.c.id, recordings.c.file_name).union(
-        sa.select(events.c.recording_id, events.c.file_name).where(
-            events.c.recording_id.is_not(None)
+        sa.select(journal.c.recording_id, journal.c.subject).where(
+            journal.c.recording_id.is_not(None), journal.c.subject != ""
         )
     )
     rows = files.subquery()
@@ -184,7 +160,7 @@ def move_numbers(
     """The same of tests by their numbers, each with that of its recording."""
     connection.execute(sa.update(tests).where(tests.c.id.in_(list(chosen))).values(stage=stage))
     for test_id, recording_id in chosen.items():
-        write_step(connection, recording_id, stage, at, test_id)
+        write(connection, at, stage, recording_id, test_id)
     advance_recordings(connection, sorted(set(chosen.values())), at)
 
 
@@ -204,7 +180,13 @@ def advance_recordings(connection: Connection, ids: Collection[int], at: datetim
             .values(stage=stage)
         )
         if moved.rowcount:
-            write_step(connection, recording_id, stage, at)
+            subject, why = _why_held(connection, recording_id) if stage is Stage.HELD else ("", "")
+            write(connection, at, stage, recording_id, subject=subject, detail=why)
+
+
+def _why_held(connection: Connection, recording_id: int) -> tuple[str, str]:
+    row = by_id(connection, recording_id)
+    return row.file_name, loads(row.reason)["message"]
 
 
 def test_contents(item: IdentifiedTest, name: str) -> dict[str, Any]:

@@ -13,20 +13,19 @@ from sqlalchemy.engine import Connection, Row
 from shm.documents import value_of
 from shm.errors import UsageError, sentence
 from shm.modes_document import test_document
-from shm.store.audit import note
 from shm.store.blobs import pack, test_from_document, unpack
 from shm.store.columns import loads
 from shm.store.database import insert
-from shm.store.files import in_force, reason_document, write_event, write_step
+from shm.store.files import in_force, reason_document
+from shm.store.journal import REFUSED, write
 from shm.store.list_rows import Decision, HeldTest, Hold
-from shm.store.outbox import raise_alert, resolve
+from shm.store.outbox import acknowledge, raise_alert, resolve
 from shm.store.rows import Stage, StoredAlert
 from shm.store.tables import (
-    acknowledgements,
     alerts,
-    events,
     fingerprints,
     holds,
+    journal,
     recordings,
     tests,
 )
@@ -63,20 +62,23 @@ def keep_judgement(
     if judged.notice is None:
         return None
     held = _hold_tests(connection, recording.id, judged.held, at)
-    document = {
-        "message": judged.notice.message,
-        "sidecar_as": judged.sidecar_as,
-        "tests": [asdict(test) for test in judged.held],
-    }
-    row = {"recording_id": recording.id, "held_at": at, "document": document}
-    hold_id = insert(connection, holds, row)
+    own = (recording.id, recording.file_name, recording.hanger, at)
+    hold = Hold(0, *own, judged.notice.message, judged.held, judged.sidecar_as)
+    hold_id = insert_hold(connection, hold)
     reason = reason_of(recording, judged.notice.message, at)
     by_id = recordings.c.id == recording.id
     connection.execute(sa.update(recordings).where(by_id).values(reason=reason))
-    write_event(connection, at, "held", recording.id, recording.file_name, reason["message"])
     notice = replace(judged.notice, key=notice_key(judged.notice.hanger, hold_id))
     leading = held[notice.test]
     return raise_alert(connection, leading, None, notice, judged.hooks, at)
+
+
+def insert_hold(connection: Connection, hold: Hold) -> int:
+    """Store what is held, or a decision of what was not; return its number."""
+    tests = [asdict(test) for test in hold.tests]
+    document = {"message": hold.message, "sidecar_as": hold.sidecar_as, "tests": tests}
+    row = {"recording_id": hold.recording_id, "held_at": hold.held_at, "document": document}
+    return insert(connection, holds, row)
 
 
 def notice_key(hanger: int, hold_id: int) -> str:
@@ -120,7 +122,7 @@ def _mark(
     here = own & (tests.c.position == position)
     number: int = connection.scalars(sa.select(tests.c.id).where(here)).one()
     connection.execute(sa.update(tests).where(here).values(stage=stage))
-    write_step(connection, recording_id, stage, at, number)
+    write(connection, at, stage, recording_id, number)
     return number
 
 
@@ -162,12 +164,13 @@ def standing_discard(connection: Connection, recording: Row[Any]) -> Hold | None
     hold = None if row is None else _hold(row)
     if hold is None or not hold.is_out:
         return None
-    refusals = sa.select(events.c.kind).where(
-        events.c.recording_id == recording.id,
-        events.c.kind.in_(["refused", Decision.DISCARDED, Decision.WITHDRAWN]),
+    refusals = sa.select(journal.c.kind).where(
+        journal.c.recording_id == recording.id,
+        journal.c.subject != "",
+        journal.c.kind.in_([REFUSED, Decision.DISCARDED, Decision.WITHDRAWN]),
     )
-    latest = connection.scalar(refusals.order_by(events.c.id.desc()).limit(1))
-    return None if latest == "refused" else hold
+    latest = connection.scalar(refusals.order_by(journal.c.id.desc()).limit(1))
+    return None if latest == REFUSED else hold
 
 
 def discarded_reason(hold: Hold) -> str:
@@ -241,21 +244,17 @@ def decide(connection: Connection, hold: Hold, who: str, why: str, at: datetime)
     connection.execute(sa.update(holds).where(holds.c.id == hold.id).values(**made))
     told = f"{hold.decision}" + (f": {why}" if why else "")
     key = notice_key(hold.hanger, hold.id)
-    open_notice = (
-        sa.select(alerts.c.id)
-        .outerjoin(acknowledgements)
-        .where(alerts.c.key == key, acknowledgements.c.id.is_(None))
-    )
-    alert_id = connection.scalar(open_notice)
-    if alert_id is not None:
-        insert(
-            connection, acknowledgements, {"alert_id": alert_id, "who": who, "why": told, "at": at}
-        )
     notice = connection.scalar(sa.select(alerts.c.id).where(alerts.c.key == key))
     if notice is not None:
+        acknowledge(connection, notice, who, told, at)
         resolve(connection, notice, who, told, at)
-    write_event(connection, at, str(hold.decision), hold.recording_id, hold.file_name, told)
-    note(connection, at, f"recording {hold.decision}", hold.file_name, why, who)
+    if hold.decision in (Decision.WITHDRAWN, Decision.REINSTATED):
+        names = ", ".join(test.name for test in hold.tests)
+        told = f"{names}: {why}" if why else names
+    else:
+        told = why
+    subject, about = hold.file_name, hold.recording_id
+    write(connection, at, str(hold.decision), about, None, subject, told, who)
     return replace(hold, decided_at=at, who=who, why=why)
 
 

@@ -10,7 +10,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
-from shm.store.rows import Acknowledgement, DeliveryState, News, Resolution, Stage
+from shm.store.rows import Stage
 from shm.values import NAN, Averaged, BaselineCheck, Doubt, Summary
 
 ON_THE_WAY = (Stage.RECEIVED, Stage.IDENTIFIED, Stage.UPDATED, Stage.WATCHED)
@@ -272,33 +272,6 @@ class BaselineGlance(Numbers):
     check: BaselineCheck | None = None
     begins_at: datetime | None = None
     described: Mapping[str, Any] | None = None
-
-
-@dataclass(frozen=True)
-class DeliveryRow:
-    """One alert on its way to one hook: how that went."""
-
-    hook: str
-    state: DeliveryState
-    attempts: int
-    last_error: str
-    news: News = News.RAISED
-
-
-@dataclass(frozen=True)
-class AlertRow:
-    """An alert without its shifts; `StoredAlert.is_open` says which are open."""
-
-    id: int
-    hanger: int
-    raised_at: datetime
-    test: str
-    test_time: datetime
-    kinds: tuple[str, ...]
-    message: str
-    acknowledgement: Acknowledgement | None
-    deliveries: tuple[DeliveryRow, ...]
-    resolution: Resolution | None = None
 
 
 class EventKind(StrEnum):

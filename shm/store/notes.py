@@ -14,8 +14,8 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Row
 
 from shm.errors import BadInput, NothingThere, UsageError
-from shm.store.audit import note
 from shm.store.database import Repository, insert
+from shm.store.journal import note
 from shm.store.people_and_stream_tables import notes
 from shm.values.notes import Note, NoteKind
 

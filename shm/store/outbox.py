@@ -15,31 +15,24 @@ from shm.documents import alert_document, value_of
 from shm.errors import NothingThere, UsageError
 from shm.store.columns import loads
 from shm.store.database import Repository, insert
-from shm.store.files import NOTIFIED, write_step
+from shm.store.journal import NOTIFIED, write
 from shm.store.rows import (
     Acknowledgement,
     Delivery,
     DeliveryState,
     News,
+    Reconciled,
     Resolution,
     StoredAlert,
+    StoredTest,
     counts_by_name,
 )
-from shm.store.tables import acknowledgements, alerts, deliveries, resolutions, steps, tests
+from shm.store.tables import alerts, deliveries, journal, tests
 from shm.values import Alert
 
 _HELD = 1024  # technical: those that stand on a large bridge, of some kilobytes each
 
-stored_alerts = sa.select(
-    alerts,
-    tests.c.name.label("test"),
-    *(acknowledgements.c[name].label(f"ack_{name}") for name in ("who", "why", "at")),
-    *(resolutions.c[name].label(f"end_{name}") for name in ("who", "why", "at")),
-).select_from(
-    alerts.outerjoin(acknowledgements)
-    .outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
-    .outerjoin(tests, tests.c.id == alerts.c.test_id)
-)
+stored_alerts = sa.select(alerts)
 
 
 def raise_alert(
@@ -68,15 +61,41 @@ def raise_alert(
     return StoredAlert(alert_id, alert, at, baseline_id=baseline_id)
 
 
+def settle(
+    connection: Connection,
+    changes: Reconciled,
+    hooks: Sequence[str],
+    at: datetime,
+    test: StoredTest | None = None,
+    baseline_id: int | None = None,
+) -> tuple[StoredAlert, ...]:
+    """Close and open alerts; return those that are new.
+
+    With a `test` they are against a baseline, and each belongs to the test that it names.
+    """
+    for alert_id, why in changes.to_close.items():
+        resolve(connection, alert_id, "shm", why, at)
+    raised = []
+    for alert in changes.to_open:
+        test_id = None if test is None else _named(connection, alert, test)
+        raised.append(raise_alert(connection, test_id, baseline_id, alert, hooks, at))
+    return tuple(each for each in raised if each is not None)
+
+
+def _named(connection: Connection, alert: Alert, test: StoredTest) -> int:
+    """Return the number of the test that an alert names, of `test` where there is no such."""
+    own = (tests.c.hanger == alert.hanger) & (tests.c.name == alert.test)
+    found = connection.scalar(sa.select(tests.c.id).where(own, tests.c.superseded_at.is_(None)))
+    return test.id if found is None else int(found)
+
+
 def resolve(connection: Connection, alert_id: int, who: str, why: str, at: datetime) -> bool:
     """Notes that the condition of an alert ended; False where that is noted already.
 
     Each hook that was told of the alert is owed that news.
     """
-    known = sa.select(resolutions.c.id).where(resolutions.c.alert_id == alert_id)
-    if connection.execute(known).first() is not None:
+    if not _note_on(connection, alert_id, "ended", who, why, at):
         return False
-    insert(connection, resolutions, vars(Resolution(alert_id, who, why, at)))
     told = sa.select(deliveries.c.hook).where(
         deliveries.c.alert_id == alert_id,
         deliveries.c.news == News.RAISED,
@@ -87,9 +106,22 @@ def resolve(connection: Connection, alert_id: int, who: str, why: str, at: datet
     return True
 
 
+def acknowledge(connection: Connection, alert_id: int, who: str, why: str, at: datetime) -> bool:
+    """Note that somebody has seen an alert; return False where that is noted already."""
+    return _note_on(connection, alert_id, "noted", who, why, at)
+
+
+def _note_on(
+    connection: Connection, alert_id: int, prefix: str, who: str, why: str, at: datetime
+) -> bool:
+    once = (alerts.c.id == alert_id) & alerts.c[f"{prefix}_at"].is_(None)
+    note = {f"{prefix}_at": at, f"{prefix}_who": who, f"{prefix}_why": why}
+    return bool(connection.execute(sa.update(alerts).where(once).values(**note)).rowcount)
+
+
 def owe_resolution(connection: Connection, alert_id: int, hook: str, at: datetime) -> None:
     """A hook that was told of an alert after its condition ended is owed that news too."""
-    ended = sa.select(resolutions.c.id).where(resolutions.c.alert_id == alert_id)
+    ended = sa.select(alerts.c.id).where(alerts.c.id == alert_id, alerts.c.ended_at.is_not(None))
     owed = sa.select(deliveries.c.id).where(
         deliveries.c.alert_id == alert_id,
         deliveries.c.hook == hook,
@@ -115,7 +147,7 @@ def stored_alert(row: Row[Any]) -> StoredAlert:
     """An alert and its acknowledgement, of a row of `stored_alerts`."""
     return StoredAlert(
         row.id,
-        _alert_in(row.document),
+        alert_from(row.document),
         row.raised_at,
         acknowledgement_of(row),
         resolution_of(row),
@@ -124,23 +156,23 @@ def stored_alert(row: Row[Any]) -> StoredAlert:
 
 
 @lru_cache(_HELD)
-def _alert_in(text: str) -> Alert:
+def alert_from(text: str) -> Alert:
     """An alert as it was raised; those that stand are asked for again and again."""
     return value_of(Alert, loads(text))
 
 
 def acknowledgement_of(row: Row[Any]) -> Acknowledgement | None:
     """Who took note of an alert, of a row of `stored_alerts`; None while it is open."""
-    if row.ack_at is None:
+    if row.noted_at is None:
         return None
-    return Acknowledgement(row.id, row.ack_who, row.ack_why, row.ack_at)
+    return Acknowledgement(row.id, row.noted_who, row.noted_why, row.noted_at)
 
 
 def resolution_of(row: Row[Any]) -> Resolution | None:
     """How the condition of an alert ended, of a row of `stored_alerts`; None while it stands."""
-    if row.end_at is None:
+    if row.ended_at is None:
         return None
-    return Resolution(row.id, row.end_who, row.end_why, row.end_at)
+    return Resolution(row.id, row.ended_who, row.ended_why, row.ended_at)
 
 
 _OWED = tuple(field.name for field in fields(Delivery) if field.name != "stored")
@@ -153,23 +185,28 @@ _any_waits = sa.select(sa.exists().where(deliveries.c.state == DeliveryState.WAI
 class Deliveries(Repository):
     """What hooks are owed; a part of the repository of alerts."""
 
-    def list_deliveries(self, state: DeliveryState | None = None) -> tuple[Delivery, ...]:
-        """The outbox: what was told to which hook, or is still owed."""
+    def list_deliveries(
+        self,
+        state: DeliveryState | None = None,
+        *,
+        unsent: bool = False,
+        messages: Collection[int] | None = None,
+        alert_ids: Collection[int] | None = None,
+    ) -> tuple[Delivery, ...]:
+        """Return what was told to which hook, or is still owed, in the order in which it was owed.
+
+        Of one state; those `unsent`, whose first attempt has not begun; of messages or alerts.
+        """
         query = _outbox.order_by(deliveries.c.id)
         if state is not None:
             query = query.where(deliveries.c.state == state)
+        if unsent:
+            query = query.where(deliveries.c.message_id.is_(None))
+        if messages is not None:
+            query = query.where(deliveries.c.message_id.in_(messages))
+        if alert_ids is not None:
+            query = query.where(deliveries.c.alert_id.in_(alert_ids))
         return self._deliveries(query)
-
-    def list_unsent(self) -> tuple[Delivery, ...]:
-        """Deliveries whose first attempt has not begun, in the order in which they were owed."""
-        waiting = deliveries.c.state == DeliveryState.WAITING
-        query = _outbox.where(waiting, deliveries.c.message_id.is_(None))
-        return self._deliveries(query.order_by(deliveries.c.id))
-
-    def list_of_messages(self, message_ids: Collection[int]) -> tuple[Delivery, ...]:
-        """The deliveries of messages, in their order."""
-        query = _outbox.where(deliveries.c.message_id.in_(message_ids))
-        return self._deliveries(query.order_by(deliveries.c.id))
 
     def begin_messages(
         self, messages: Sequence[Sequence[int]], not_needed: Mapping[int, str], at: datetime
@@ -320,11 +357,11 @@ def _note_notified(connection: Connection, delivery_id: int, at: datetime) -> No
     if row is None:  # raised by readings of a stream
         return
     if _notified_steps(connection, row.id) < _told_alerts(connection, row.id):
-        write_step(connection, row.recording_id, NOTIFIED, at, row.id)
+        write(connection, at, NOTIFIED, row.recording_id, row.id)
 
 
 def _notified_steps(connection: Connection, test_id: int) -> int:
-    of_test = (steps.c.test_id == test_id) & (steps.c.stage == NOTIFIED)
+    of_test = (journal.c.test_id == test_id) & (journal.c.kind == NOTIFIED)
     return int(connection.scalar(sa.select(sa.func.count()).where(of_test)) or 0)
 
 

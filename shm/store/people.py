@@ -19,8 +19,8 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere, UsageError
-from shm.store.audit import note
 from shm.store.database import Repository, insert
+from shm.store.journal import note
 from shm.store.people_and_stream_tables import sessions, users
 from shm.store.tables import tokens
 

@@ -31,19 +31,6 @@ sessions = sa.Table(
     sa.Column("ended_at", UtcTime),
 )
 
-# Who changed what. `via` is the way it came: page, API, command line.
-audit = sa.Table(
-    "audit",
-    metadata,
-    identity(),
-    sa.Column("at", UtcTime, nullable=False),
-    sa.Column("who", sa.Text, nullable=False),
-    sa.Column("via", sa.String(16), nullable=False),
-    sa.Column("action", sa.String(64), nullable=False),
-    sa.Column("subject", sa.Text, nullable=False),
-    sa.Column("detail", sa.Text, nullable=False),
-)
-
 # What the settings page says beside `bridge.toml`. The newest row of a key holds; one without a
 # document gives the key back to `bridge.toml`.
 changed_settings = sa.Table(

@@ -246,7 +246,8 @@ class StoredAdoption:
 class StoredWatch:
     """What the watch said after a test, and the baseline it was compared with.
 
-    `alert_probability` is by how much its alert was judged; NaN of a former version.
+    `alert_probability` is by how much its alert was judged; NaN of a former version. `called` is
+    the alert that it called for, raised or not; None of a former version, too.
     """
 
     id: int
@@ -254,6 +255,7 @@ class StoredWatch:
     baseline_id: int
     watched: WatchedTest
     alert_probability: float = NAN
+    called: Alert | None = None
 
 
 @dataclass(frozen=True)
@@ -310,6 +312,14 @@ class StoredAlert:
 
 
 @dataclass(frozen=True)
+class Reconciled:
+    """Alerts to open, and the numbers of open ones to close, each with the reason."""
+
+    to_open: tuple[Alert, ...] = ()
+    to_close: Mapping[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Silence:
     """From when until when no hook is told of a hanger, or of any where `hanger` is None.
 
@@ -337,9 +347,13 @@ class Silence:
         """Whether it is not in force and will not be: one may end before it begins."""
         return self.until <= max(at, self.starts_at)
 
+    def is_in_force(self, at: datetime) -> bool:
+        """Return True from its beginning to its end."""
+        return self.starts_at <= at < self.until
+
     def covers(self, hanger: int, at: datetime) -> bool:
         """Whether it is in force for a hanger at a time; its end is not part of it."""
-        return self.hanger in (None, hanger) and self.starts_at <= at < self.until
+        return self.hanger in (None, hanger) and self.is_in_force(at)
 
 
 @dataclass(frozen=True)

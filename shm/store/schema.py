@@ -13,6 +13,9 @@ from shm.resources import migrations_folder
 from shm.store.database import make_engine, reading, shown, writing
 from shm.store.tables import SCHEMA
 
+_RELEASED = ("0014", "0015")
+"""Schemas besides the first that the one step to today's takes: of 1.0.0, and of what followed."""
+
 
 def upgrade(engine: Engine) -> None:
     """Brings an empty or older database to the present schema, in one transaction."""
@@ -23,7 +26,15 @@ def upgrade(engine: Engine) -> None:
 
     location = shown(engine.url)
     with writing(engine) as connection:
-        _refuse_newer(_version(connection), location)
+        found = _version(connection)
+        _refuse_newer(found, location)
+        if found in _RELEASED:
+            connection.execute(sa.text("UPDATE alembic_version SET version_num = '0001'"))
+        elif found not in (None, "0001", SCHEMA):
+            raise StoreError(
+                f"the store {location} has schema {found}, which no release of shm had.",
+                remedy="Run `shm db upgrade` of shm 1.0.0 on it first, or restore a backup.",
+            )
         config = Config()
         config.set_main_option("script_location", str(migrations_folder()))
         config.attributes["connection"] = connection

@@ -10,8 +10,9 @@ from sqlalchemy.engine import Engine
 
 from shm.errors import NothingThere
 from shm.store import schema
-from shm.store.audit import Actor, Audit, ChangedSettings, acting_as
+from shm.store.changed_settings import ChangedSettings
 from shm.store.database import Database, make_engine
+from shm.store.journal import Actor, Journal, acting_as
 from shm.store.notes import Notes
 from shm.store.people import People
 from shm.store.stored_alerts import Alerts, Silences
@@ -31,8 +32,8 @@ class Store(Database):
     selections, diagnoses and adoptions; `watch` what it said after each test, and its baselines;
     `alerts` those that were raised, and their deliveries; `silences` when no hook is told;
     `streams` what permanent sensors said; `people` who signs in by name; `notes` what they saw or
-    did; `audit` who changed what; `settings` what the dashboard says beside `bridge.toml`;
-    `upkeep` tokens, copies of raw files and backups.
+    did; `journal` what happened, and who changed what; `settings` what the dashboard says beside
+    `bridge.toml`; `upkeep` tokens, copies of raw files and backups.
     """
 
     def __init__(self, engine: Engine):
@@ -46,7 +47,7 @@ class Store(Database):
         self.streams = Streams(engine)
         self.people = People(engine)
         self.notes = Notes(engine)
-        self.audit = Audit(engine)
+        self.journal = Journal(engine)
         self.settings = ChangedSettings(engine)
         self.upkeep = Upkeep(engine)
 

@@ -5,44 +5,38 @@ Silences and maintenance windows: who wants which hooks' messages held back, whe
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
-from sqlalchemy.engine import Connection, Row
+from sqlalchemy.engine import Row
 
 from shm.errors import NothingThere, UsageError
-from shm.store.audit import note
 from shm.store.database import Repository, insert
-from shm.store.list_rows import AlertRow, DeliveryRow, EventKind, HangerEvent
+from shm.store.journal import note
+from shm.store.list_rows import EventKind, HangerEvent
 from shm.store.outbox import (
     Deliveries,
-    acknowledgement_of,
+    acknowledge,
     alert_in,
-    raise_alert,
-    resolution_of,
     resolve,
+    settle,
     stored_alert,
     stored_alerts,
 )
-from shm.store.rows import Acknowledgement, DeliveryState, News, Silence, StoredAlert
+from shm.store.rows import Acknowledgement, Reconciled, Silence, StoredAlert
 from shm.store.tables import (
-    acknowledgements,
     adoptions,
     alerts,
     baselines,
-    deliveries,
-    resolutions,
     silences,
 )
-from shm.values import Alert
 
-_is_open = acknowledgements.c.id.is_(None) & resolutions.c.id.is_(None)
-"""Of `stored_alerts`, and of whatever joins both tables: what `StoredAlert.is_open` says."""
-_closed_at = sa.func.coalesce(acknowledgements.c.at, resolutions.c.at)
+_is_open = alerts.c.noted_at.is_(None) & alerts.c.ended_at.is_(None)
+"""What `StoredAlert.is_open` says."""
+_closed_at = sa.func.coalesce(alerts.c.noted_at, alerts.c.ended_at)
 
 
 class Alerts(Deliveries):
@@ -61,21 +55,21 @@ class Alerts(Deliveries):
         """
         query = stored_alerts.order_by(alerts.c.id)
         if standing is not None:
-            query = query.where(resolutions.c.id.is_(None) == standing)
+            query = query.where(alerts.c.ended_at.is_(None) == standing)
         if hanger is not None:
             query = query.where(alerts.c.hanger == hanger)
         if baseline_id is not None:
             query = query.where(alerts.c.baseline_id == baseline_id)
         return tuple(stored_alert(row) for row in self.rows(query))
 
-    def list_rows(
+    def list_page(
         self,
         hanger: int | None = None,
         *,
         is_open: bool | None = None,
         limit: int | None = None,
         before: int | None = None,
-    ) -> tuple[AlertRow, ...]:
+    ) -> tuple[StoredAlert, ...]:
         """Alerts, the newest first; `before` is the number of the alert to go on after.
 
         Only those that are open, or that are acknowledged or resolved, where `is_open` tells; the
@@ -91,14 +85,12 @@ class Alerts(Deliveries):
             query = query.where(_is_open if is_open else sa.not_(_is_open))
         if before is not None:
             query = query.where(_is_after(before, is_open=is_open))
-        return self._alert_rows(query.limit(limit))
+        return tuple(stored_alert(row) for row in self.rows(query.limit(limit)))
 
-    def row(self, alert_id: int) -> AlertRow:
-        """One alert; raises NothingThere."""
-        found = self._alert_rows(stored_alerts.where(alerts.c.id == alert_id))
-        if not found:
-            raise NothingThere(f"no alert {alert_id}.", remedy="See `shm alerts`.")
-        return found[0]
+    def get(self, alert_id: int) -> StoredAlert:
+        """Return one alert; raise NothingThere."""
+        with self.reading() as connection:
+            return alert_in(connection, alert_id)
 
     def resolve(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
         """Notes that the condition of an alert ended, and acknowledges it where nobody has.
@@ -111,22 +103,16 @@ class Alerts(Deliveries):
                 raise UsageError(
                     f"alert {alert_id} is resolved already.", remedy="See `shm alerts`."
                 )
-            if found.acknowledgement is None:
-                noted = Acknowledgement(alert_id, who, why, at)
-                insert(connection, acknowledgements, vars(noted))
+            acknowledge(connection, alert_id, who, why, at)
             note(connection, at, "alert resolved", _said_of(found), why, who)
             return alert_in(connection, alert_id)
 
-    def settle(
-        self, alert: Alert | None, hooks: Sequence[str], ended: Mapping[int, str], at: datetime
-    ) -> None:
-        """Ends alerts of these numbers, for these reasons, and raises one that no test's watch
-        raises."""
+    def settle(self, changes: Reconciled, hooks: Sequence[str], at: datetime) -> None:
+        """Close and open alerts that no test's watch raises."""
+        if not changes.to_open and not changes.to_close:
+            return
         with self.writing() as connection:
-            for alert_id, why in ended.items():
-                resolve(connection, alert_id, "shm", why, at)
-            if alert is not None:
-                raise_alert(connection, None, None, alert, hooks, at)
+            settle(connection, changes, hooks, at)
 
     def acknowledge(self, alert_id: int, who: str, why: str, at: datetime) -> StoredAlert:
         """Notes that somebody has seen an alert to its end; the alert with that note.
@@ -141,14 +127,13 @@ class Alerts(Deliveries):
                     f"{alert.acknowledgement.at:%Y-%m-%d} already.",
                     remedy="See `shm alerts`.",
                 )
-            noted = Acknowledgement(alert_id, who, why, at)
-            insert(connection, acknowledgements, vars(noted))
+            acknowledge(connection, alert_id, who, why, at)
             note(connection, at, "alert acknowledged", _said_of(alert), why, who)
-        return replace(alert, acknowledgement=noted)
+        return replace(alert, acknowledgement=Acknowledgement(alert_id, who, why, at))
 
     def counts(self) -> tuple[int, int]:
         """How many alerts are open, and how many were acknowledged."""
-        noted = self.scalar(sa.select(sa.func.count()).select_from(acknowledgements))
+        noted = self.scalar(sa.select(sa.func.count(alerts.c.noted_at)))
         return sum(self.open_counts().values()), int(noted or 0)
 
     def open_counts(self) -> dict[int, int]:
@@ -156,12 +141,7 @@ class Alerts(Deliveries):
 
         The only place where they are counted: whoever states a number of them asks here.
         """
-        query = (
-            sa.select(alerts.c.hanger, sa.func.count())
-            .select_from(alerts)
-            .outerjoin(acknowledgements, acknowledgements.c.alert_id == alerts.c.id)
-            .outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
-        )
+        query = sa.select(alerts.c.hanger, sa.func.count())
         rows = self.rows(query.where(_is_open).group_by(alerts.c.hanger))
         return {row[0]: int(row[1]) for row in rows}
 
@@ -178,58 +158,20 @@ class Alerts(Deliveries):
         late = (event for event in found if since is None or event.at >= since)
         return tuple(sorted(late, key=lambda event: event.at))
 
-    def _alert_rows(self, query: sa.Select[Any]) -> tuple[AlertRow, ...]:
-        with self.reading() as connection:
-            rows = connection.execute(query).all()
-            owed = _deliveries_of(connection, query)
-        return tuple(_row(row, tuple(owed[row.id])) for row in rows)
-
 
 def _is_after(alert_id: int, *, is_open: bool | None) -> sa.ColumnElement[bool]:
-    """Which alerts stand after one in a list of `list_rows`."""
+    """Which alerts stand after one in a list of `list_page`."""
     older = alerts.c.id < alert_id
     if is_open is not False:
         return older
-    tables = alerts.outerjoin(acknowledgements, acknowledgements.c.alert_id == alerts.c.id)
-    tables = tables.outerjoin(resolutions, resolutions.c.alert_id == alerts.c.id)
-    at = sa.select(_closed_at).select_from(tables).where(alerts.c.id == alert_id)
-    of_one = at.correlate(None).scalar_subquery()
+    one = alerts.alias()
+    closed_at = sa.func.coalesce(one.c.noted_at, one.c.ended_at)
+    of_one = sa.select(closed_at).where(one.c.id == alert_id).scalar_subquery()
     return (_closed_at < of_one) | ((_closed_at == of_one) & older)
 
 
-def _deliveries_of(
-    connection: Connection, chosen: sa.Select[Any]
-) -> defaultdict[int, list[DeliveryRow]]:
-    """Of the alerts that are chosen, by alert."""
-    ids = sa.select(chosen.subquery().c.id)
-    query = sa.select(deliveries).where(deliveries.c.alert_id.in_(ids)).order_by(deliveries.c.id)
-    found = defaultdict[int, list[DeliveryRow]](list)
-    for row in connection.execute(query):
-        one = DeliveryRow(
-            row.hook, DeliveryState(row.state), row.attempts, row.last_error, News(row.news)
-        )
-        found[row.alert_id].append(one)
-    return found
-
-
-def _row(row: Row[Any], owed: tuple[DeliveryRow, ...]) -> AlertRow:
-    alert = stored_alert(row).alert
-    return AlertRow(
-        id=row.id,
-        hanger=row.hanger,
-        raised_at=row.raised_at,
-        test=alert.test,
-        test_time=row.time,
-        kinds=alert.kinds,
-        message=alert.message,
-        acknowledgement=acknowledgement_of(row),
-        deliveries=owed,
-        resolution=resolution_of(row),
-    )
-
-
 def _events(hanger: int) -> dict[EventKind, sa.Select[Any]]:
-    noted = sa.select(acknowledgements).join(alerts).where(alerts.c.hanger == hanger)
+    noted = _named(alerts, "noted_at", "noted_who", "noted_why")
     undone = _named(adoptions, "undone_at", "undone_who", "undone_why")
     raised = sa.select(
         alerts.c.id,
@@ -242,7 +184,7 @@ def _events(hanger: int) -> dict[EventKind, sa.Select[Any]]:
         EventKind.ADOPTED: _of(hanger, adoptions, _named(adoptions, "adopted_at", "who", "why")),
         EventKind.UNDONE: _of(hanger, adoptions, undone.where(adoptions.c.undone_at.is_not(None))),
         EventKind.ALERT: _of(hanger, alerts, raised),
-        EventKind.ACKNOWLEDGED: noted,
+        EventKind.ACKNOWLEDGED: _of(hanger, alerts, noted.where(alerts.c.noted_at.is_not(None))),
     }
 
 
@@ -322,14 +264,6 @@ class Silences(Repository):
     def list_all(self) -> tuple[Silence, ...]:
         """All that were ever made, the oldest first."""
         return tuple(map(_silence, self.rows(sa.select(*_COLUMNS).order_by(silences.c.id))))
-
-    def list_current(self, at: datetime) -> tuple[Silence, ...]:
-        """Those in force at a time or yet to come."""
-        return tuple(each for each in self.list_all() if not each.is_over(at))
-
-    def list_in_force(self, at: datetime) -> tuple[Silence, ...]:
-        """Those in force at a time."""
-        return tuple(each for each in self.list_current(at) if each.starts_at <= at)
 
 
 def silenced_until(silences: tuple[Silence, ...], hanger: int, at: datetime) -> datetime | None:

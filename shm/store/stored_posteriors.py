@@ -13,10 +13,10 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.diagnosis_document import diagnosis_document, diagnosis_of
 from shm.errors import NothingThere, StoreBusy, UsageError
-from shm.store.audit import note
 from shm.store.columns import loads
 from shm.store.database import insert
 from shm.store.files import all_at, in_force, move
+from shm.store.journal import note
 from shm.store.queries import (
     counted_tests,
     hidden,
@@ -115,12 +115,8 @@ class Posteriors(Trends):
             raise NothingThere(f"no posterior of {what} yet.", remedy="Ingest a test of it.")
         return posterior_of_row(row)
 
-    def of_test(self, test: StoredTest) -> Posterior:
-        """The posterior of a test known by its row; raises NothingThere."""
-        return self.get(test.hanger, test.test.id)
-
     def list_all(self, hanger: int) -> tuple[StoredPosterior, ...]:
-        """The posteriors of a hanger in its selected class, by time."""
+        """Return the posteriors of a hanger in its selected class, by time."""
         query = _shown(hanger)
         return tuple(
             StoredPosterior(row.id, posterior_of_row(row), row.time, lineage_from(row))

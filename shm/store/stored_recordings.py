@@ -11,12 +11,9 @@ import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
 from shm.errors import NothingThere, UsageError
-from shm.store.audit import note
 from shm.store.database import insert
 from shm.store.disposition import Dispositions
 from shm.store.files import (
-    ARCHIVED,
-    STEPS,
     by_checksum,
     by_former_names,
     by_id,
@@ -25,27 +22,21 @@ from shm.store.files import (
     in_force,
     note_name,
     recording_from,
-    write_event,
-    write_step,
 )
 from shm.store.holding import standing_discard
+from shm.store.journal import ARCHIVED, DIED, REFUSED, is_step, write
 from shm.store.list_rows import (
     ON_THE_WAY,
     Deaths,
-    Event,
     Outcome,
     Receipt,
     ReceivedFile,
     Standing,
-    Step,
     StoredRecording,
 )
-from shm.store.reprocessing import redescribe, reopen
-from shm.store.rows import ENDED, OTHER, Stage, counts_by_name
-from shm.store.tables import events, recordings, steps, tests
-
-_DIED = "worker died"
-"""The kind of event of a process that died."""
+from shm.store.rerun import redescribe, reopen
+from shm.store.rows import ENDED, Stage, counts_by_name
+from shm.store.tables import journal, recordings, tests
 
 
 class Recordings(Dispositions):
@@ -64,7 +55,6 @@ class Recordings(Dispositions):
             else:
                 row_id = known.id
                 _notice(connection, known, file, outcome, at)
-            note(connection, at, "recording taken in", file.file_name, str(outcome))
             return Receipt(outcome, recording_from(by_id(connection, row_id)))
 
     def refuse(
@@ -86,15 +76,13 @@ class Recordings(Dispositions):
             if stage is not None and not _waits(connection, row, stage, test_ids):
                 return
             test_ids = _own(connection, recording_id, test_ids)
-            end_recording(connection, recording_id, reason, at)
+            end_recording(connection, recording_id, reason, at, row.file_name)
             end_tests(connection, recording_id, test_ids, at)
-            message = str(reason.get("message", ""))
-            write_event(connection, at, "refused", row.id, row.file_name, message)
 
     def refuse_unread(self, file_name: str, message: str, at: datetime) -> None:
         """Notes that a file was refused for its size, of which nothing else is known."""
         with self.writing() as connection:
-            write_event(connection, at, "refused", None, file_name, message)
+            write(connection, at, REFUSED, subject=file_name, detail=message)
 
     def is_waiting(self, recording_id: int, stage: Stage, test_ids: Collection[int] = ()) -> bool:
         """Whether a recording, or its tests where some are named, are still at a stage."""
@@ -133,16 +121,6 @@ class Recordings(Dispositions):
             raise NothingThere(f"no recording and no test {which!r}.", remedy="See `shm status`.")
         return _single(former, f"{len(former)} recordings were called {which!r}."), None
 
-    def names_of(self, recording_id: int) -> tuple[str, ...]:
-        """Every name that the file of a recording came under: the present one, then the others."""
-        own = sa.select(recordings.c.file_name).where(recordings.c.id == recording_id)
-        other = sa.select(events.c.file_name).where(events.c.recording_id == recording_id)
-        with self.reading() as connection:
-            present = connection.scalars(own).all()
-            return tuple(
-                dict.fromkeys([*present, *connection.scalars(other.order_by(events.c.id))])
-            )
-
     def list_all(self, stage: Stage | None = None) -> tuple[StoredRecording, ...]:
         """All recordings, or those at one stage, as they came in."""
         query = sa.select(recordings).order_by(recordings.c.id)
@@ -160,10 +138,10 @@ class Recordings(Dispositions):
 
     def list_under_way(self) -> tuple[Standing, ...]:
         """The recordings that are not through, and since when each stands where it stands."""
-        reached = sa.func.max(steps.c.at).label("reached_at")
+        reached = sa.func.max(journal.c.at).label("reached_at")
         query = (
             sa.select(recordings, reached)
-            .outerjoin(steps, steps.c.recording_id == recordings.c.id)
+            .outerjoin(journal, (journal.c.recording_id == recordings.c.id) & is_step)
             .where(recordings.c.stage.in_(ON_THE_WAY))
             .group_by(recordings.c.id)
             .order_by(recordings.c.id)
@@ -194,19 +172,17 @@ class Recordings(Dispositions):
     def stage_seconds(self, since: datetime) -> dict[str, list[float]]:
         """How long after the stage before each step was reached, of steps made since then.
 
-        By the name of the step, which need be no `Stage`; a name that this version does not know
-        is `OTHER`, so that what reads it has few names to keep.
+        By the name of the step, which need be no `Stage`.
         """
-        lately = sa.select(steps.c.recording_id).where(steps.c.at >= since)
-        query = sa.select(steps).where(steps.c.recording_id.in_(lately)).order_by(steps.c.id)
+        lately = sa.select(journal.c.recording_id).where(is_step, journal.c.at >= since)
+        query = sa.select(journal).where(journal.c.recording_id.in_(lately), is_step)
         found: defaultdict[str, list[float]] = defaultdict(list)
         before: dict[tuple[int, int | None], datetime] = {}
-        for row in self.rows(query):
+        for row in self.rows(query.order_by(journal.c.id)):
             of_file, of_test = (row.recording_id, None), (row.recording_id, row.test_id)
             began = before.get(of_test) or before.get(of_file)
-            if began is not None and row.at >= since and row.stage != Stage.RECEIVED:
-                name = row.stage if row.stage in STEPS else OTHER
-                found[name].append((row.at - began).total_seconds())
+            if began is not None and row.at >= since and row.kind != Stage.RECEIVED:
+                found[row.kind].append((row.at - began).total_seconds())
             before[of_test] = row.at
         return dict(found)
 
@@ -214,55 +190,26 @@ class Recordings(Dispositions):
         """Note that a process that worked on a recording died."""
         with self.writing() as connection:
             row = by_id(connection, recording_id)
-            write_event(connection, at, _DIED, row.id, row.file_name, message)
+            write(connection, at, DIED, row.id, subject=row.file_name, detail=message)
 
     def deaths(self) -> dict[int, Deaths]:
         """Return the deaths at each recording on its way, since it last moved on."""
         moved_at = (
-            sa.select(steps.c.recording_id, sa.func.max(steps.c.at).label("at"))
-            .group_by(steps.c.recording_id)
+            sa.select(journal.c.recording_id, sa.func.max(journal.c.at).label("at"))
+            .where(is_step)
+            .group_by(journal.c.recording_id)
             .subquery()
         )
+        own = journal.c.recording_id
         query = (
-            sa.select(events.c.recording_id, sa.func.count(), sa.func.max(events.c.at))
-            .join(recordings, recordings.c.id == events.c.recording_id)
-            .join(moved_at, moved_at.c.recording_id == events.c.recording_id)
-            .where(events.c.kind == _DIED, events.c.at >= moved_at.c.at)
+            sa.select(own, sa.func.count(), sa.func.max(journal.c.at))
+            .join(recordings, recordings.c.id == own)
+            .join(moved_at, moved_at.c.recording_id == own)
+            .where(journal.c.kind == DIED, journal.c.at >= moved_at.c.at)
             .where(recordings.c.stage.not_in(ENDED))
-            .group_by(events.c.recording_id)
+            .group_by(own)
         )
         return {row[0]: Deaths(row[1], row[2]) for row in self.rows(query)}
-
-    def list_events(
-        self,
-        kind: str | None = None,
-        *,
-        recording_id: int | None = None,
-        file_name: str | None = None,
-    ) -> tuple[Event, ...]:
-        """What was noticed on the way, oldest first; `kind` as duplicate or refused.
-
-        Of one recording, or of what came under one name, where that is given.
-        """
-        query = sa.select(events).order_by(events.c.id)
-        wanted = {"kind": kind, "recording_id": recording_id, "file_name": file_name}
-        for name, value in wanted.items():
-            if value is not None:
-                query = query.where(events.c[name] == value)
-        rows = self.rows(query)
-        return tuple(Event(r.at, r.kind, r.file_name, r.message, r.recording_id) for r in rows)
-
-    def list_steps(self, recording_id: int) -> tuple[Step, ...]:
-        """The stages that a recording and its tests have reached, in that order."""
-        query = (
-            sa.select(steps, tests.c.name)
-            .outerjoin(tests)
-            .where(steps.c.recording_id == recording_id)
-            .order_by(steps.c.id)
-        )
-        return tuple(
-            Step(row.stage, row.at, row.version, row.test_id, row.name) for row in self.rows(query)
-        )
 
     def _recordings(self, query: sa.Select[Any]) -> tuple[StoredRecording, ...]:
         return tuple(map(recording_from, self.rows(query)))
@@ -283,8 +230,8 @@ def _outcome(connection: Connection, known: Row[Any] | None, file: ReceivedFile)
 def _enter(connection: Connection, file: ReceivedFile, at: datetime) -> int:
     values = {**vars(file), "received_at": at, "stage": Stage.RECEIVED}
     row_id = insert(connection, recordings, values)
-    write_step(connection, row_id, ARCHIVED, at)
-    write_step(connection, row_id, Stage.RECEIVED, at)
+    write(connection, at, ARCHIVED, row_id)
+    write(connection, at, Stage.RECEIVED, row_id, subject=file.file_name, who="")
     return row_id
 
 
@@ -303,7 +250,7 @@ def _notice(
         message = f"the same file as {known.file_name}, which was discarded and stays so."
     elif outcome is Outcome.REDESCRIBED:
         message = redescribe(connection, known, file, at)
-    write_event(connection, at, outcome, known.id, file.file_name, message)
+    write(connection, at, outcome, known.id, subject=file.file_name, detail=message, who="")
 
 
 def _waits(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from datetime import datetime, timedelta
 from typing import Any, TypeVar
 
@@ -13,7 +13,7 @@ from sqlalchemy.engine import Connection, Row
 
 from shm.documents import compact, parse_time
 from shm.store.database import Repository, insert
-from shm.store.outbox import raise_alert, resolve
+from shm.store.outbox import settle
 from shm.store.people_and_stream_tables import (
     pooled_readings,
     stream_events,
@@ -22,9 +22,8 @@ from shm.store.people_and_stream_tables import (
     stream_watch_days,
     stream_windows,
 )
-from shm.store.rows import StoredAlert
-from shm.store.tables import alerts
-from shm.values import NAN, Alert, Plane, ShapePoint
+from shm.store.rows import Reconciled, StoredAlert
+from shm.values import NAN, ShapePoint
 from shm.values.modes import Mode
 from shm.values.stream import (
     PERIODS,
@@ -44,8 +43,16 @@ _DAYS_BACK = 10
 _LATEST = 36
 """Windows of a train-free night: a mode that traffic hides for some hours is not forgotten."""
 _EVENT = tuple(field.name for field in fields(StreamEvent))
-_OVER = "the sensors do not show it any more"
+_NO_CHANGE = Reconciled()
 _T = TypeVar("_T", WindowReading, PooledReading)
+
+
+@dataclass(frozen=True)
+class KeptStreamWatch:
+    """What the watch of a hanger's sensors goes on from, and up to when it has seen readings."""
+
+    time: datetime
+    content: bytes
 
 
 class Streams(Repository):
@@ -95,33 +102,12 @@ class Streams(Repository):
         query = sa.select(table).where(table.c.stream == stream).order_by(table.c.start.desc())
         return next(iter(self._values(query.limit(1), WindowReading)), None)
 
-    def last_modes(self, stream: str) -> tuple[Mode, ...]:
-        """Return the modes of the latest windows that have any, each as it was seen last.
-
-        A mode that one window hides is looked for again in the next.
-        """
-        found: dict[tuple[Plane, int], Mode] = {}
-        for reading in self._latest_with_modes(stream):
-            for mode in reading.modes:
-                found.setdefault((mode.plane, mode.order), mode)
-        return tuple(sorted(found.values(), key=lambda mode: mode.frequency_hz))
-
-    def has_followed_modes(self, stream: str) -> bool:
-        """Return True if one of the latest windows followed modes that an earlier one had found."""
-        return any(each.how == "tracked" for each in self._latest_with_modes(stream))
-
-    def _latest_with_modes(self, stream: str) -> tuple[WindowReading, ...]:
+    def latest_with_modes(self, stream: str) -> tuple[WindowReading, ...]:
+        """Return the latest windows of a stream that have modes, the last first."""
         table = stream_windows
         query = sa.select(table).where(table.c.stream == stream, table.c.has_modes)
         latest = query.order_by(table.c.start.desc()).limit(_LATEST)
         return self._values(latest, WindowReading)
-
-    def last_hour(self, stream: str) -> PooledReading | None:
-        """The latest reading of an hour of a stream."""
-        table = pooled_readings
-        query = sa.select(table).where(table.c.stream == stream, table.c.period == "hour")
-        latest = query.order_by(table.c.start.desc()).limit(1)
-        return next(iter(self._values(latest, PooledReading)), None)
 
     def first_window(self, stream: str) -> datetime | None:
         """When the first window of a stream began; None where there is none."""
@@ -161,35 +147,31 @@ class Streams(Repository):
                     return start
         return None
 
-    def first_day(self, stream: str) -> datetime | None:
-        """When the first day of a stream began of which anything is pooled; None without any."""
-        table = pooled_readings
-        query = sa.select(sa.func.min(table.c.start)).where(table.c.stream == stream)
-        first = self._moment(query)
-        return None if first is None else period_start(first, PERIODS["day"])
-
-    def last_pooled(self, stream: str, period: Period) -> datetime | None:
-        """When the latest reading of a period began; None where there is none."""
-        table = pooled_readings
-        query = sa.select(sa.func.max(table.c.start)).where(
-            table.c.stream == stream, table.c.period == period
-        )
-        return self._moment(query)
+    def pooled_range(
+        self, stream: str, period: Period | None = None
+    ) -> tuple[datetime, datetime] | None:
+        """Return when the first and the latest reading of a period, or of any, began."""
+        start = pooled_readings.c.start
+        query = sa.select(sa.func.min(start), sa.func.max(start))
+        query = query.where(pooled_readings.c.stream == stream)
+        if period is not None:
+            query = query.where(pooled_readings.c.period == period)
+        first, last = self.first(query)
+        return None if first is None else (first, last)
 
     def save_pooled(
         self,
         reading: PooledReading,
         kept: bytes | None = None,
-        alert: Alert | None = None,
+        changes: Reconciled = _NO_CHANGE,
         hooks: Sequence[str] = (),
         at: datetime | None = None,
-        ended: Sequence[str] = (),
-    ) -> StoredAlert | None:
-        """Keeps a reading of an hour or a day, in the place of the one of then before.
+    ) -> tuple[StoredAlert, ...]:
+        """Store a reading of an hour or a day, in the place of the one of then before.
 
-        `kept` is what the watch of the hanger goes on from. The alert, where it is a new one, is
-        owed to `hooks` from `at` on (the reading's end where nothing is said), and given back.
-        `ended` are the keys of alerts whose condition the reading shows to be over.
+        `kept` is what the watch of the hanger goes on from, `changes` are alerts that it opens and
+        closes; those that are new are owed to `hooks` from `at` on (the reading's end where nothing
+        is said), and returned.
         """
         end = reading.start + PERIODS[reading.period]
         row = {name: getattr(reading, name) for name in ("stream", "hanger", "period", "start")}
@@ -200,12 +182,7 @@ class Streams(Repository):
                 state = {"hanger": reading.hanger, "reading_time": end, "content": kept}
                 _replace(connection, stream_watch, state, "hanger")
                 _keep_day(connection, state)
-            of_keys = sa.select(alerts.c.id).where(alerts.c.key.in_(ended)).order_by(alerts.c.id)
-            for alert_id in connection.scalars(of_keys).all() if ended else ():
-                resolve(connection, alert_id, "shm", _OVER, at or end)
-            if alert is None:
-                return None
-            return raise_alert(connection, None, None, alert, hooks, at or end)
+            return settle(connection, changes, hooks, at or end)
 
     def list_pooled(
         self, hanger: int, period: Period, since: datetime, until: datetime
@@ -226,17 +203,15 @@ class Streams(Repository):
         query = sa.select(table).where(of_hours, sa.or_(sa.false(), *near))
         return self._values(query.order_by(table.c.start), PooledReading)
 
-    def watch_time(self, hanger: int) -> datetime | None:
-        """Up to when the watch of a hanger has seen readings; None where there is none."""
-        table = stream_watch
-        return self._moment(sa.select(table.c.reading_time).where(table.c.hanger == hanger))
-
-    def watch_before(self, hanger: int, until: datetime) -> tuple[datetime, bytes] | None:
-        """The watch of a hanger as it was at its last kept time up to `until`, and that time."""
-        table = stream_watch_days
-        own = sa.select(table).where(table.c.hanger == hanger, table.c.reading_time <= until)
+    def watch(self, hanger: int, until: datetime | None = None) -> KeptStreamWatch | None:
+        """Return what the watch of a hanger's sensors goes on from; with `until` as it was at the
+        last kept time up to then."""
+        table = stream_watch if until is None else stream_watch_days
+        own = sa.select(table.c.reading_time, table.c.content).where(table.c.hanger == hanger)
+        if until is not None:
+            own = own.where(table.c.reading_time <= until)
         row = self.first(own.order_by(table.c.reading_time.desc()).limit(1))
-        return None if row is None else (row.reading_time, row.content)
+        return None if row is None else KeptStreamWatch(*row)
 
     def go_back(self, hanger: int, to: datetime, content: bytes) -> None:
         """The watch of a hanger goes on from a state of before."""
@@ -246,13 +221,6 @@ class Streams(Repository):
         with self.writing() as connection:
             _replace(connection, stream_watch, state, "hanger")
             connection.execute(sa.delete(days).where(*later))
-
-    def watch_state(self, hanger: int) -> bytes | None:
-        """Return the kept state of the watch of a hanger's sensors, None where there is none."""
-        content: bytes | None = self.scalar(
-            sa.select(stream_watch.c.content).where(stream_watch.c.hanger == hanger)
-        )
-        return content
 
     def save_event(self, event: StreamEvent) -> None:
         """Notes something once; what was noted already is not noted again."""

@@ -13,8 +13,9 @@ from sqlalchemy.engine import Connection, Row
 from shm.errors import NothingThere
 from shm.store.blobs import unpack_response
 from shm.store.database import Repository, insert
-from shm.store.files import advance_recordings, counts, in_force, test_contents, write_step
+from shm.store.files import advance_recordings, counts, in_force, test_contents
 from shm.store.holding import Judged, fingerprint_from, keep_judgement
+from shm.store.journal import write
 from shm.store.list_rows import LatestTest, TestRow
 from shm.store.queries import (
     WEIGHED,
@@ -76,7 +77,7 @@ class Tests(Repository):
             for item in (item for item in found if item.position not in kept):
                 values = {**_test_values(connection, item, recording), **lineage.columns}
                 test_id = insert(connection, tests, {**values, "identified_at": at})
-                write_step(connection, recording_id, Stage.IDENTIFIED, at, test_id)
+                write(connection, at, Stage.IDENTIFIED, recording_id, test_id)
             hanger = found[0].test.hanger
             by_id = recordings.c.id == recording_id
             connection.execute(sa.update(recordings).where(by_id).values(hanger=hanger))
@@ -102,14 +103,13 @@ class Tests(Repository):
             )
         return found[0]
 
-    def list_all(self, hanger: int | None = None) -> tuple[StoredTest, ...]:
-        """The tests of a hanger, or of all, by time; those refused are left out."""
-        return self._tests(counted_tests(hanger))
-
-    def list_numbered(self, ids: Collection[int]) -> tuple[StoredTest, ...]:
-        """Those of these row numbers, by time."""
-        chosen = plain_tests.where(tests.c.id.in_(ids))
-        return self._tests(chosen.order_by(tests.c.time, tests.c.id))
+    def list_all(
+        self, hanger: int | None = None, ids: Collection[int] | None = None
+    ) -> tuple[StoredTest, ...]:
+        """Return the tests of a hanger, those of some numbers, or all, by time; those refused are
+        left out."""
+        query = counted_tests(hanger)
+        return self._tests(query if ids is None else query.where(tests.c.id.in_(ids)))
 
     def list_rows(
         self, hanger: int, limit: int = 50, before: int | None = None
@@ -202,22 +202,16 @@ class Tests(Repository):
             found[hanger] = (*found.get(hanger, ()), name)
         return found
 
-    def tested_hangers(self) -> frozenset[int]:
-        """The numbers of hangers of which tests are in force: one look into the index for each."""
-        least = sa.select(sa.func.min(tests.c.hanger)).where(in_force(tests), counts(tests))
-        found = least.cte(recursive=True)
-        hanger = found.c[0]
-        following = least.where(tests.c.hanger > hanger).correlate(found).scalar_subquery()
-        found = found.union_all(sa.select(following).where(hanger.is_not(None)))
-        return frozenset(self.scalars(sa.select(found.c[0]))) - {None}
-
-    def latest_before(self, hanger: int, recording_id: int, limit: int) -> tuple[StoredTest, ...]:
-        """The latest tests of a hanger that count, but for those of one recording, by time."""
-        return self._latest_but(hanger, recording_id, limit, tests.c.time)
-
-    def latest_received(self, hanger: int, recording_id: int, limit: int) -> tuple[StoredTest, ...]:
-        """Those of them that came in last, whatever their time."""
-        return self._latest_but(hanger, recording_id, limit, tests.c.recording_id)
+    def list_latest(
+        self, hanger: int, recording_id: int, limit: int, *, as_received: bool = False
+    ) -> tuple[StoredTest, ...]:
+        """Return the latest tests of a hanger that count, but for those of one recording, by time
+        or, `as_received`, as they came in."""
+        order = tests.c.recording_id if as_received else tests.c.time
+        mine = (tests.c.hanger == hanger) & (tests.c.recording_id != recording_id)
+        query = plain_tests.where(mine, counts(tests), in_force(tests))
+        latest = query.order_by(order.desc(), tests.c.id.desc()).limit(limit)
+        return self._tests(latest)[::-1]
 
     def dated_beside(
         self, baseline: Baseline, test: StoredTest, limit: int
@@ -300,14 +294,6 @@ class Tests(Repository):
             )
             for row in sorted(rows, key=lambda row: int(row.recording_id))
         )
-
-    def _latest_but(
-        self, hanger: int, recording_id: int, limit: int, order: sa.Column[Any]
-    ) -> tuple[StoredTest, ...]:
-        mine = (tests.c.hanger == hanger) & (tests.c.recording_id != recording_id)
-        query = plain_tests.where(mine, counts(tests), in_force(tests))
-        latest = query.order_by(order.desc(), tests.c.id.desc()).limit(limit)
-        return self._tests(latest)[::-1]
 
     def _around(
         self, query: sa.Select[Any], order: sa.Tuple, here: tuple[object, int], limit: int

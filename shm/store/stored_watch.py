@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import fields, replace
 from datetime import datetime
-from types import MappingProxyType
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy.engine import Connection, Row
 
+from shm.documents import alert_document
 from shm.errors import StoreBusy
-from shm.store.audit import note
 from shm.store.blobs import change_in, watch_document, watch_in
 from shm.store.columns import Number
-from shm.store.database import insert
+from shm.store.database import Repository, insert
 from shm.store.files import all_at, in_force, move
+from shm.store.journal import note
 from shm.store.list_rows import BaselineGlance, TestRow
-from shm.store.outbox import raise_alert, resolve
+from shm.store.outbox import acknowledge, resolve, settle
 from shm.store.queries import (
     among,
     baseline_in_force,
@@ -31,24 +31,22 @@ from shm.store.queries import (
     test_columns,
     test_row,
 )
-from shm.store.reprocessing import WatchedAgain
+from shm.store.rerun import rerun_watched
 from shm.store.rows import (
-    Acknowledgement,
     Baseline,
     KeptWatch,
     Lineage,
+    Reconciled,
     Stage,
     StoredAlert,
     StoredTest,
     StoredWatch,
 )
 from shm.store.tables import (
-    acknowledgements,
     alerts,
     baselines,
     drifts,
     posterior_tests,
-    resolutions,
     tests,
     watch_states,
     watches,
@@ -59,7 +57,7 @@ from shm.values import NAN, Alert, Change, Drift, Hanger, Posterior, WatchedTest
 _DRIFT_COLUMNS = tuple(field.name for field in fields(Drift) if field.name != "test")
 
 
-class Watch(WatchedAgain):
+class Watch(Repository):
     """What the watch said, and the baselines it compares with."""
 
     def save(
@@ -71,32 +69,54 @@ class Watch(WatchedAgain):
         hooks: Sequence[str],
         at: datetime,
         state: KeptWatch | None = None,
-        ended: Mapping[int, str] = MappingProxyType({}),
-        first: StoredAlert | None = None,
+        changes: Reconciled | None = None,
         level: float = NAN,
-    ) -> StoredAlert | None:
-        """Keeps what the watch made of a test; the alert where it is a new one, else None.
+    ) -> tuple[StoredAlert, ...]:
+        """Store what the watch made of a test; return the alerts that are new.
 
-        An alert whose key was raised before is the same standing condition and is not raised again.
-        `state` is what the watch goes on from at the next test. `ended` are the numbers of alerts
-        whose condition this test ends, with the reason; `first` is the alert of a stream that has
-        told what this test shows, and which the test joins; from `level` on an alert was wanted.
+        `alert` is what the test calls for; `changes` are the alerts that it opens and closes, by
+        default it opens that one. `state` is what the watch goes on from at the next test; from
+        `level` on an alert was wanted.
         """
+        if changes is None:
+            changes = Reconciled(() if alert is None else (alert,))
         with self.writing() as connection:
             if not all_at(connection, [test], Stage.UPDATED):
-                return None
+                return ()
             for drift in found.drifts:
                 insert(connection, drifts, _drift_values(drift, test, baseline))
-            raised = None
-            if alert is not None:
-                raised = raise_alert(connection, test.id, baseline.id, alert, hooks, at)
-            insert(connection, watches, _watch_values(found, test, baseline, raised, first, level))
+            insert(connection, watches, _watch_values(found, test, baseline, alert, level))
+            raised = settle(connection, changes, hooks, at, test, baseline.id)
             if state is not None:
                 _keep_state(connection, baseline, state)
-            for alert_id, why in ended.items():
-                resolve(connection, alert_id, "shm", why, at)
             move(connection, [test], Stage.WATCHED, at)
             return raised
+
+    def pass_over(self, test: StoredTest, at: datetime) -> None:
+        """Compare a test within a maintenance window with nothing."""
+        with self.writing() as connection:
+            if all_at(connection, [test], Stage.UPDATED):
+                move(connection, [test], Stage.WATCHED, at)
+
+    def rerun(self, hanger: int, baseline_id: int, why: str, at: datetime) -> int:
+        """Send back what was compared with a baseline, to be judged anew; return how many tests."""
+        with self.writing() as connection:
+            which = watches.c.baseline_id == baseline_id
+            count = rerun_watched(connection, hanger, which, Stage.WATCHED, at)
+            if count:
+                note(connection, at, "tests judged again", f"hanger {hanger}", why, "shm")
+            return count
+
+    def is_again(self, test: StoredTest, baseline: Baseline) -> bool:
+        """Return True where a test has been compared with a baseline before."""
+        own = (watches.c.test_id == test.id) & (watches.c.baseline_id == baseline.id)
+        return self.first(sa.select(watches.c.id).where(own)) is not None
+
+    def is_caught_up(self, test: StoredTest, baseline: Baseline) -> bool:
+        """Return True where no other test waits to be compared with a baseline once more."""
+        waiting = tests.c.stage.in_([Stage.IDENTIFIED, Stage.UPDATED]) & in_force(tests)
+        query = sa.select(tests.c.id).join(watches).where(watches.c.baseline_id == baseline.id)
+        return self.first(query.where(waiting, tests.c.id != test.id)) is None
 
     def state(self, baseline: Baseline) -> KeptWatch | None:
         """What the watch goes on from at the next test that is compared with a baseline."""
@@ -167,19 +187,16 @@ class Watch(WatchedAgain):
                 alerts.c.hanger == hanger,
                 sa.or_(
                     alerts.c.baseline_id == before.id,
-                    alerts.c.baseline_id.is_not(None)
-                    & alerts.c.id.not_in(sa.select(acknowledgements.c.alert_id)),
+                    alerts.c.baseline_id.is_not(None) & alerts.c.noted_at.is_(None),
                 ),
-                alerts.c.id.not_in(sa.select(resolutions.c.alert_id)),
+                alerts.c.ended_at.is_(None),
             )
-            acknowledged = set(connection.scalars(sa.select(acknowledgements.c.alert_id)))
             for alert_id in connection.scalars(stands.order_by(alerts.c.id)).all():
                 if explained is not None and alert_id not in explained:
                     continue
                 resolve(connection, alert_id, who, f"new baseline: {why}", at)
-                if explained is not None and alert_id not in acknowledged:
-                    noted = Acknowledgement(alert_id, who, f"explained by: {why}", at)
-                    insert(connection, acknowledgements, vars(noted))
+                if explained is not None:
+                    acknowledge(connection, alert_id, who, f"explained by: {why}", at)
             note(connection, at, "baseline set", f"hanger {hanger}", why, who)
         return Baseline(id_, hanger, posterior, at, who, why, since)
 
@@ -205,23 +222,19 @@ class Watch(WatchedAgain):
         return tuple(_drift(row) for row in self.rows(query.order_by(drifts.c.time, drifts.c.id)))
 
     def list_all(
-        self, hanger: int | None = None, baseline_id: int | None = None
+        self, hanger: int | None = None, baseline_id: int | None = None, *, last: int | None = None
     ) -> tuple[StoredWatch, ...]:
-        """What the watch said after each test, by time; of one hanger or baseline where named."""
+        """Return what the watch said after each test, or after the `last` so many, by time; of one
+        hanger or baseline where named."""
         query = sa.select(watches.c.id).where(in_force(watches))
         if hanger is not None:
             query = query.where(watches.c.hanger == hanger)
         if baseline_id is not None:
             query = query.where(watches.c.baseline_id == baseline_id)
-        return self._watches(query)
-
-    def list_recent(self, baseline: Baseline, limit: int) -> tuple[StoredWatch, ...]:
-        """The last so many watches against a baseline, by time."""
-        of_one = watches.c.hanger == baseline.hanger, watches.c.baseline_id == baseline.id
-        query = sa.select(watches.c.id).where(*of_one, in_force(watches))
-        latest = query.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(limit)
-        ids = self.scalars(latest)
-        return self._watches(ids)
+        if last is None:
+            return self._watches(query)
+        latest = query.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(last)
+        return self._watches(self.scalars(latest))
 
     def latest(self, hangers: Sequence[Hanger] | None = None) -> dict[int, StoredWatch]:
         """Return the watch of the latest test of each hanger (or these) against its baseline."""
@@ -245,11 +258,6 @@ class Watch(WatchedAgain):
         found = [id_ for id_ in self.scalars(ids) if id_ is not None]
         return {each.hanger: each for each in self._watches(found)}
 
-    def list_detected(self, hanger: int) -> tuple[StoredWatch, ...]:
-        """The watches of a hanger that detected a change from its baseline in force, by time."""
-        chosen = sa.select(watches.c.id).where(watches.c.hanger == hanger, *_called(hanger))
-        return self._watches(chosen)
-
     def detected_changes(
         self, hangers: Sequence[Hanger] | None = None
     ) -> dict[int, tuple[Change, ...]]:
@@ -260,12 +268,11 @@ class Watch(WatchedAgain):
             found[row.hanger].append(change_in(row.document))
         return {hanger: tuple(changes) for hanger, changes in found.items()}
 
-    def list_detected_and_latest(self, baseline: Baseline) -> tuple[StoredWatch, ...]:
-        """The watches that detected a change from a baseline, and the latest of it, by time."""
+    def list_detected(self, hanger: int, baseline_id: int) -> tuple[StoredWatch, ...]:
+        """Return the watches that detected a change from a baseline, and the latest of it, by
+        time."""
         against = sa.select(watches.c.id).where(
-            watches.c.hanger == baseline.hanger,
-            watches.c.baseline_id == baseline.id,
-            in_force(watches),
+            watches.c.hanger == hanger, watches.c.baseline_id == baseline_id, in_force(watches)
         )
         latest = against.order_by(watches.c.time.desc(), watches.c.id.desc()).limit(1)
         with self.reading() as connection:
@@ -327,31 +334,23 @@ def _drift(row: Row[Any]) -> Drift:
 
 
 def _watch_values(
-    found: WatchedTest,
-    test: StoredTest,
-    baseline: Baseline,
-    raised: StoredAlert | None,
-    first: StoredAlert | None,
-    level: float,
+    found: WatchedTest, test: StoredTest, baseline: Baseline, alert: Alert | None, level: float
 ) -> dict[str, Any]:
-    told = {
-        "alert_probability": level,
-        **({} if first is None else {"joins": first.id}),
-    }
+    called = {"alert_probability": level, "calls_for": alert and alert_document(alert)}
     return {
         "test_id": test.id,
         "baseline_id": baseline.id,
         "hanger": test.hanger,
         "time": found.time,
-        "document": {**watch_document(found), **told},
+        "document": {**watch_document(found), **called},
         "called": found.change.called,
     }
 
 
 def _stored_watch(row: Row[Any], shifts: Sequence[Drift]) -> StoredWatch:
-    found, level = watch_in(row.document)
+    found, level, called = watch_in(row.document)
     found = replace(found, test=row.test, time=row.time, drifts=tuple(shifts))
-    return StoredWatch(row.id, row.hanger, row.baseline_id, found, level)
+    return StoredWatch(row.id, row.hanger, row.baseline_id, found, level, called)
 
 
 def _called(hanger: int | None = None) -> tuple[sa.ColumnElement[bool], ...]:

@@ -20,7 +20,7 @@ from shm.store.columns import (
 from shm.store.columns import metadata as metadata
 from shm.store.people_and_stream_tables import users as _of_people  # noqa: F401 - all are there
 
-SCHEMA = "0015"
+SCHEMA = "0016"
 
 _OF_TESTS = ("hanger", "time", "stage", "name", "taken_at", "temperature_c")
 
@@ -219,7 +219,8 @@ watch_states = sa.Table(
 )
 
 # `baseline_id` is empty of the notice that a test is held: it was compared with nothing. `test_id`
-# is empty of what the readings of a stream raised.
+# is empty of what the readings of a stream raised. `noted`: who has taken note of it, when, and
+# what they say to it, once. `ended`: when its condition ended, and who found that, shm or a person.
 alerts = sa.Table(
     "alerts",
     metadata,
@@ -232,13 +233,9 @@ alerts = sa.Table(
     sa.Column("raised_at", UtcTime, nullable=False),
     sa.Column("message", sa.Text, nullable=False),
     sa.Column("document", Document, nullable=False),
+    *note_on_alert("noted"),
+    *note_on_alert("ended"),
 )
-
-# Who has taken note of an alert, when, and what they say to it: once an alert.
-acknowledgements = sa.Table("acknowledgements", metadata, identity(), *note_on_alert())
-
-# When the condition that an alert tells of ended, and who found that: `shm`, or a person.
-resolutions = sa.Table("resolutions", metadata, identity(), *note_on_alert())
 
 # From when until when hooks are not told of a hanger, of all where `hanger` is empty. A maintenance
 # window (`is_maintenance`) also keeps tests of then from the watch. `ended_at` is when a person
@@ -314,28 +311,22 @@ adoptions = sa.Table(
     sa.Column("undone_who", sa.Text),
 )
 
-# Things noticed on the way that change no result: the same file twice, a refused file tried again.
-events = sa.Table(
-    "events",
+# What happened to what, when, by whom, why and with which shm: each stage that a recording or a
+# test has reached, what was noticed on the way, what people changed. Written in the same
+# transaction as what it tells of, never changed. `who` is empty of what nobody asked for; `via` is
+# the way that a change came: page, API, command line. `version` is empty where it is not known.
+journal = sa.Table(
+    "journal",
     metadata,
     identity(),
-    sa.Column("at", UtcTime, nullable=False),
-    sa.Column("kind", sa.String(32), nullable=False),
-    reference("recordings", nullable=True),
-    sa.Column("file_name", sa.Text, nullable=False),
-    sa.Column("message", sa.Text, nullable=False),
-)
-
-# Each stage that a recording or one of its tests has reached, when, and with which shm (empty where
-# that is not known); written in the same transaction as what brought it there, never changed.
-steps = sa.Table(
-    "steps",
-    metadata,
-    identity(),
-    reference("recordings"),
-    reference("tests", nullable=True),
-    sa.Column("stage", sa.String(16), nullable=False),
     sa.Column("at", UtcTime, nullable=False, index=True),
+    sa.Column("kind", sa.String(64), nullable=False),
+    reference("recordings", nullable=True),
+    reference("tests", nullable=True),
+    sa.Column("subject", sa.Text, nullable=False),
+    sa.Column("detail", sa.Text, nullable=False),
+    sa.Column("who", sa.Text),
+    sa.Column("via", sa.String(16)),
     sa.Column("version", sa.String(32)),
     sa.Index(None, "recording_id"),
     sa.Index(None, "test_id"),

@@ -9,14 +9,10 @@ from pathlib import Path
 import sqlalchemy as sa
 
 from shm.store.archive import Archive
-from shm.store.audit import note
-from shm.store.database import insert
-from shm.store.files import write_event
+from shm.store.journal import BACKUP, REMOVED, is_step, write
 from shm.store.list_rows import StoredRecording
 from shm.store.people import Tokens
-from shm.store.tables import archive_copies, events, recordings, steps
-
-_REMOVED, _BACKUP = "removed", "backup"
+from shm.store.tables import archive_copies, journal, recordings
 
 
 @dataclass(frozen=True)
@@ -58,13 +54,13 @@ class Upkeep(Tokens):
         """Notes that a raw file is no longer here, and where its copy lies."""
         name = recording.file.file_name
         with self.writing() as connection:
-            write_event(connection, at, _REMOVED, recording.id, name, copy_folder)
-            note(connection, at, "raw file removed", name, f"copied to {copy_folder}")
+            write(connection, at, REMOVED, recording.id, None, name, copy_folder, who="")
 
     def removed_to(self) -> dict[int, str]:
         """Recordings whose raw files were taken out of the archive: where their copies lie."""
-        query = sa.select(events.c.recording_id, events.c.message).where(events.c.kind == _REMOVED)
-        return {row[0]: row[1] for row in self.rows(query.order_by(events.c.id))}
+        own = journal.c.recording_id, journal.c.detail
+        query = sa.select(*own).where(journal.c.kind == REMOVED).order_by(journal.c.id)
+        return {row[0]: row[1] for row in self.rows(query)}
 
     def removed_names(self, archive: Archive) -> frozenset[str]:
         """Raw files, by their path in the archive, that were taken out of it and are not back."""
@@ -76,19 +72,18 @@ class Upkeep(Tokens):
 
     def note_backup(self, file: Path, at: datetime) -> None:
         """Notes that a backup of the store was written."""
-        values = {"at": at, "kind": _BACKUP, "file_name": str(file), "message": ""}
         with self.writing() as connection:
-            insert(connection, events, values)
+            write(connection, at, BACKUP, subject=str(file))
 
     def last_backup(self) -> tuple[datetime, str] | None:
         """When and where the newest backup of the store was written; None where none was."""
-        query = sa.select(events.c.at, events.c.file_name).where(events.c.kind == _BACKUP)
-        row = self.first(query.order_by(events.c.id.desc()).limit(1))
-        return None if row is None else (row.at, row.file_name)
+        query = sa.select(journal.c.at, journal.c.subject).where(journal.c.kind == BACKUP)
+        row = self.first(query.order_by(journal.c.id.desc()).limit(1))
+        return None if row is None else (row.at, row.subject)
 
     def newest_row_at(self) -> datetime | None:
         """When the newest stage was reached, by the clock of then; None in an empty store."""
-        found: datetime | None = self.scalar(sa.select(sa.func.max(steps.c.at)))
+        found: datetime | None = self.scalar(sa.select(sa.func.max(journal.c.at)).where(is_step))
         return found
 
 

@@ -16,8 +16,8 @@ from shm.resources import default_config
 from shm.settings import Settings, commented, load_settings
 from shm.store.active import ActiveLock, Wait, active, holder
 from shm.store.archive import Archive, Quarantine
-from shm.store.audit import Actor
 from shm.store.database import has_password
+from shm.store.journal import Actor
 from shm.store.store import Store
 
 _DATABASE = "shm.db"

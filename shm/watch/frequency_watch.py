@@ -158,7 +158,7 @@ def watch_newest_frequencies(
     alert = None
     for dated in later:
         now, alert = watch.after(now, dated)
-    return Newest(now.last, alert, watch.keep(now), frozenset(now.told.beyond))
+    return Newest(now.last, alert, watch.keep(now))
 
 
 def measured_levels(tests: Sequence[ModalTest], seed: int) -> Posterior:

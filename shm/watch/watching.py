@@ -35,7 +35,7 @@ from shm.values import (
     RepeatedMistake,
     WatchedTest,
 )
-from shm.watch.agreement import Way, agreement, way_of
+from shm.watch.agreement import agreement, way_of
 from shm.watch.alert_state import AlertState, conditions, still, with_beyond
 from shm.watch.alert_text import alert_of, message_of
 from shm.watch.change_words import CAUSES, suspects
@@ -127,15 +127,11 @@ def kept_of(baseline: Posterior, tests: Sequence[DatedTest]) -> tuple[DatedTest,
 
 @dataclass(frozen=True, eq=False)
 class Newest:
-    """What the watch says after the newest test, the alert it calls for, and what to keep.
-
-    `beyond` is what stands beyond its threshold, and the way that it went.
-    """
+    """What the watch says after the newest test, the alert it calls for, and what to keep."""
 
     test: WatchedTest
     alert: Alert | None
     kept: bytes
-    beyond: frozenset[tuple[str, Way]]
 
 
 def watch_newest(
@@ -188,7 +184,7 @@ def watch_newest(
             alert, told = agreed, with_beyond(told, agreed.drifts, agreed.time)
             told = replace(told, agreed=told.agreed | two_told)
     kept = replace(state, told=told.to_text()).to_bytes()
-    return Newest(found, alert, kept, frozenset(told.beyond))
+    return Newest(found, alert, kept)
 
 
 def options_of(hanger: Hanger, baseline_tests: int, options: WatchOptions) -> WatchOptions:

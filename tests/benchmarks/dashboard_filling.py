@@ -62,7 +62,7 @@ SENSORS = 5
 STREAM_DAYS, WINDOW_DAYS = 365, 40
 NOTED_EVERY = 25
 ENGINEER, PASSWORD = "engineer", "long enough for anybody"
-_NOT_COPIED = ("tokens", "events", "users", "sessions", "changed_settings")
+_NOT_COPIED = ("tokens", "journal", "users", "sessions", "changed_settings")
 _OF_STREAMS = ("stream_windows", "pooled_readings")
 _ALL_OF_STREAMS = ("stream_", "pooled_")
 

@@ -44,7 +44,7 @@ def main() -> None:
         struck = kill_workers(workspace, options.files, options.kills, rng, options.longest)
         counts = stage_counts(workspace)
         with workspace.store() as store:
-            noted = Counter(event.kind for event in store.recordings.list_events())
+            noted = Counter(event.kind for event in store.journal.list_events())
     print(
         f"{struck} kills over {options.files} healthy files, {options.workers} workers: "
         f"{ {str(stage): n for stage, n in counts.items()} }; noted: {dict(noted)}; "

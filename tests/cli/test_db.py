@@ -61,12 +61,12 @@ def test_what_is_wrong_is_told_a_line_each_after_a_summary(shm: Shm, copied: Wor
     changed.write_bytes(b"other")
     with sqlite3.connect(copied.database) as connection:
         connection.execute("DELETE FROM watches")
-        connection.execute("UPDATE steps SET test_id = 99 WHERE id = 3")
+        connection.execute("UPDATE journal SET test_id = 99 WHERE id = 3")
     call = ("--workspace", copied.folder, "db", "check", "--archive")
     summary, *lines = shm(*call).err.splitlines()
     assert summary.startswith("Error: 3 findings: 1 broken reference, 1 missing raw")
     assert [line.partition(": ")[0] for line in lines] == [
-        "steps/3",
+        "journal/3",
         f"archive/{lost.parent.name}/{lost.name}",
         f"archive/{changed.parent.name}/{changed.name}",
     ]

@@ -14,7 +14,7 @@ from rich.text import Text
 
 from shm.pipeline import utc_now
 from shm.store import Workspace
-from shm.store.audit import Actor
+from shm.store.journal import Actor
 from shm.store.people import Role, Scope
 from shm.values.notes import NoteKind
 from shm_cli.terminal import Terminal, escape_controls
@@ -71,7 +71,7 @@ def hostile(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     now = utc_now()
     with replace(workspace, actor=Actor(EVIL, "page")).store() as store:
         store.notes.add(3, now, NoteKind.NOTE, f"{EVIL}\n{EVIL}", EVIL, now)
-        store.audit.note(now, "setting changed", EVIL, EVIL)
+        store.journal.note(now, "setting changed", EVIL, EVIL)
         store.alerts.acknowledge(1, EVIL, EVIL, now)
         store.silences.make(3, (now, now + timedelta(days=9)), EVIL, EVIL, now)
         store.recordings.refuse_unread(EVIL, EVIL, now)

@@ -22,7 +22,7 @@ from shm.pipeline import utc_now
 from shm.read import write
 from shm.simulate import HammerPlan, HangerState, hammer_test
 from shm.store import Stage, Workspace
-from shm.store.audit import Actor
+from shm.store.journal import Actor
 from shm.store.people import Role
 from shm_daemon.web.address import test_page as page_of
 from shm_daemon.web.background_work import BackgroundWorker
@@ -205,7 +205,7 @@ def test_on_a_phone_what_matters_does_not_lie_off_to_the_side(
     assert width_px(page) == PHONE["width"]
     with site.workspace.store() as store:
         anna = store.acting_as(Actor("Anna", "page"))
-        anna.audit.note(utc_now(), "recording uploaded", "a_long_name.csv", "and words " * 9)
+        anna.journal.note(utc_now(), "recording uploaded", "a_long_name.csv", "and words " * 9)
     page.goto(f"{site.url}/audit")
     assert page.locator(".scroll").evaluate("each => each.scrollWidth <= each.clientWidth")
     page.goto(f"{site.url}/upload")

@@ -149,7 +149,7 @@ def test_no_name_of_a_file_holds_up_the_others(
     assert why_turn_failed(workspace) == ""
     with workspace.store() as store:
         assert check_store(store, lambda *_: None).troubles == ()
-        names = [event.file_name for event in store.recordings.list_events("refused")]
+        names = [event.file_name for event in store.journal.list_events("refused")]
     assert len(names) == len(_ODD_NAMES)
     assert all(name.isprintable() and len(name) <= 200 for name in names)
 

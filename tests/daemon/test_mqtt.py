@@ -115,7 +115,7 @@ def test_what_was_received_but_not_acknowledged_is_not_taken_twice(
         time.sleep(0.5)
         assert (spooled(bridge), second.waiting) == ([], [])
     with bridge.store() as store:
-        assert store.recordings.list_events() == ()
+        assert store.journal.list_events() == ()
 
 
 @pytest.mark.slow

@@ -69,7 +69,7 @@ def stated(
     }
     with bridge.store() as store:
         found["store"] = store.alerts.open_counts().get(3, 0)
-        found["rows"] = len(store.alerts.list_rows(3, is_open=True))
+        found["rows"] = len(store.alerts.list_page(3, is_open=True))
     return found
 
 

@@ -68,9 +68,7 @@ def test_a_hundred_sparse_gigabytes_go_to_the_quarantine_unread(tmp_path: Path) 
     assert "max_file_bytes" in reason["remedy"]
     with workspace.store() as store:
         assert [each.stage for each in store.recordings.list_all()] == [Stage.DONE]
-        assert [event.file_name for event in store.recordings.list_events("refused")] == [
-            "huge.csv"
-        ]
+        assert [event.file_name for event in store.journal.list_events("refused")] == ["huge.csv"]
 
 
 def test_two_of_one_name_lie_beside_each_other(tmp_path: Path) -> None:
@@ -104,7 +102,7 @@ def test_what_cannot_be_moved_stays_where_it_is_and_is_said_once(
     reason = json.loads((workspace.quarantine.folder / "huge.csv.reason.json").read_text())
     assert f"left at {huge}" in reason["remedy"]
     with workspace.store() as store:
-        assert len(store.recordings.list_events("refused")) == 1
+        assert len(store.journal.list_events("refused")) == 1
 
 
 def test_a_file_that_a_person_names_is_refused_unread_and_stays(tmp_path: Path) -> None:

@@ -131,4 +131,5 @@ def copied(bridge: Workspace, alert: int, key: str) -> int:
     with bridge.store() as store, store.writing() as connection:
         row = connection.execute(sa.select(alerts).where(alerts.c.id == alert)).one()
         changed = {"id": None, "key": key, "document": loads(row.document)}
+        changed |= {f"{prefix}_at": None for prefix in ("noted", "ended")}
         return insert(connection, alerts, {**row._mapping, **changed})

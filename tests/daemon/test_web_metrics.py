@@ -16,8 +16,9 @@ import sqlalchemy as sa
 from prometheus_client.parser import text_string_to_metric_families
 
 from shm.pipeline import utc_now
-from shm.store import Workspace, files, list_rows, rows
+from shm.store import Workspace, list_rows, rows
 from shm.store.columns import Number, UtcTime
+from shm.store.journal import NOTIFIED, STEPS
 from shm.store.tables import metadata
 from shm_daemon.heartbeat import beat
 from tests.helpers.slow import few_of
@@ -56,7 +57,7 @@ def names() -> set[str]:
         if issubclass(kind, StrEnum)
     }
     said = {str(member) for kind in kinds for member in kind}
-    return said | files.STEPS | {"made by a newer version", "", 'a "quoted"\nname'}
+    return said | STEPS | {"made by a newer version", "", 'a "quoted"\nname'}
 
 
 def odd_values(column: sa.Column[object]) -> Iterator[object]:
@@ -78,7 +79,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
         fill(store)
     with sqlite3.connect(workspace.database) as connection:
         now = utc_now().astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")
-        connection.execute("UPDATE steps SET at = ?", (now,))
+        connection.execute("UPDATE journal SET at = ?", (now,))
     connection.close()
     return workspace
 
@@ -136,7 +137,7 @@ def test_no_state_of_any_row_breaks_a_scrape(
                 assert counted == recordings
                 assert {key[0] for key in seen} >= METRICS - {"shm_scrape_errors"} - (
                     {"shm_stage_seconds", "shm_stage_reached"}
-                    if "steps" in {each.table.name for each in columns}
+                    if "journal" in {each.table.name for each in columns}
                     else set()
                 )
                 health = client.get("/health")
@@ -158,13 +159,14 @@ def test_a_step_that_is_no_stage_is_counted_under_its_name(
 ) -> None:
     """An alert that was delivered is such a step, for an hour after."""
     with sqlite3.connect(bridge.database) as connection:
-        (kept,) = connection.execute("SELECT MAX(id), stage FROM steps").fetchall()
-        update = "UPDATE steps SET stage = ? WHERE id = ?"
-        for told, counted_as in ((files.NOTIFIED, "notified"), ("of the future", rows.OTHER)):
-            connection.execute(update, (told, kept[0]))
-            connection.commit()
-            assert said(client)["shm_stage_reached", counted_as] == 1
-        connection.execute(update, (kept[1], kept[0]))
+        ((row, kept),) = connection.execute(
+            "SELECT MAX(id), kind FROM journal WHERE test_id IS NOT NULL"
+        ).fetchall()
+        update = "UPDATE journal SET kind = ? WHERE id = ?"
+        connection.execute(update, (NOTIFIED, row))
+        connection.commit()
+        assert said(client)["shm_stage_reached", NOTIFIED] == 1
+        connection.execute(update, (kept, row))
     connection.close()
 
 
@@ -188,7 +190,7 @@ def test_a_recording_or_a_delivery_in_an_unknown_state_is_counted_as_other(
 @pytest.mark.parametrize(
     ("table", "part", "lost"),
     [
-        ("steps", "stages", "shm_stage_seconds"),
+        ("journal", "stages", "shm_stage_seconds"),
         ("recordings", "recordings", "shm_recordings"),
         ("deliveries", "deliveries", "shm_deliveries"),
     ],
@@ -220,11 +222,11 @@ def test_a_time_that_nobody_can_read_costs_its_part_alone(
     client: httpx.Client, bridge: Workspace
 ) -> None:
     with sqlite3.connect(bridge.database, isolation_level=None) as connection:
-        kept = connection.execute("SELECT id, at FROM steps").fetchall()
-        connection.execute("UPDATE steps SET at = 'yesterday'")
+        kept = connection.execute("SELECT id, at FROM journal").fetchall()
+        connection.execute("UPDATE journal SET at = 'yesterday'")
         seen = said(client)
         for row, value in kept:
-            connection.execute("UPDATE steps SET at = ? WHERE id = ?", (value, row))
+            connection.execute("UPDATE journal SET at = ? WHERE id = ?", (value, row))
     connection.close()
     assert ("shm_recordings", "done") in seen
     assert seen["shm_scrape_errors_total", "stages"] >= 1

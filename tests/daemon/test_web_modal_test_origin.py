@@ -47,7 +47,7 @@ def view(**changed: Any) -> Any:
     )
     recording = SimpleNamespace(file=file, id=7, received_at=NOON)
     store = SimpleNamespace(
-        recordings=SimpleNamespace(list_steps=lambda id_: STEPS if id_ == 7 else ()),
+        journal=SimpleNamespace(list_steps=lambda id_: STEPS if id_ == 7 else ()),
         tests=SimpleNamespace(list_former=lambda id_: FORMERS if id_ == 7 else ()),
     )
     stored = SimpleNamespace(test=SimpleNamespace(id="t1"), lineage=NOW)

@@ -77,7 +77,7 @@ def test_an_operator_writes_and_a_reader_sees_the_note_its_photo_and_its_mark(
     assert Image.open(io.BytesIO(photo.content)).size == (150, 200)
     assert browser.get("/notes/2/photo").status_code == 404
     with workspace.store() as store:
-        assert [row.who for row in store.audit.list_rows(2)] == ["operator", "operator"]
+        assert [row.who for row in store.journal.list_changes(2)] == ["operator", "operator"]
     traces = browser.get("/api/hangers/3/figures/trend").json()["data"]
     (marked,) = [each for each in traces if each.get("name") == "repair"]
     assert "of hanger 3 by operator: new pin" in str(marked)

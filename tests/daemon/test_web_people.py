@@ -123,7 +123,7 @@ def test_a_person_changes_the_own_password_and_ends_all_other_sessions(
     browser.cookies.clear()
     assert [sign_in(browser, "reader", each) for each in (PASSWORD, new)] == [401, 303]
     with workspace.store() as store:
-        (row,) = store.audit.list_rows(limit=1)
+        (row,) = store.journal.list_changes(limit=1)
     assert (row.who, row.via, row.action, row.subject) == (
         "reader", "page", "password changed", "user reader",
     )  # fmt: skip

@@ -57,7 +57,7 @@ def test_a_threshold_holds_from_now_on_and_goes_back_to_the_file(
     assert run(["--workspace", str(workspace.folder), "status"]) == 0
     assert told in " ".join(capsys.readouterr().out.split())
     with workspace.store() as store:
-        (row,) = store.audit.list_rows(limit=1)
+        (row,) = store.journal.list_changes(limit=1)
     assert (row.who, row.via, row.action, row.detail) == (
         "engineer", "page", "setting changed", f"from {in_file:g} to 0.9",
     )  # fmt: skip
@@ -78,7 +78,7 @@ def test_who_saves_on_what_another_has_changed_meanwhile_is_shown_it_and_overwri
     assert level(workspace) == 0.9
     assert put(browser, LEVEL, "0.7").status_code == 303
     with workspace.store() as store:
-        assert store.audit.list_rows(limit=1)[0].detail == "from 0.9 to 0.7"
+        assert store.journal.list_changes(limit=1)[0].detail == "from 0.9 to 0.7"
 
 
 def test_the_page_says_whether_stored_tests_are_judged_with_what_it_shows(
@@ -93,7 +93,7 @@ def test_the_page_says_whether_stored_tests_are_judged_with_what_it_shows(
     assert "judged again as soon as the daemon runs: tension 0.06 instead of 0.05." in shown
     with workspace.store() as store:
         (watch,) = store.watch.list_all(3)
-        store.watch.judge_again(3, watch.baseline_id, "another threshold", utc_now())
+        store.watch.rerun(3, watch.baseline_id, "another threshold", utc_now())
     assert "Yet to be judged: 1 stored test of it." in browser.get("/settings?hanger=3").text
 
 
@@ -138,7 +138,7 @@ def test_quiet_hours_of_a_hook_are_set_taken_away_and_given_back_to_the_file(
             assert any(told in each.found for each in examine(workspace.folder, utc_now()))
     assert found == ["22:00-06:00", "20:30-07:00", "none", "22:00-06:00"]
     with workspace.store() as store:
-        rows = store.audit.list_rows(limit=3)
+        rows = store.journal.list_changes(limit=3)
     assert {(row.who, row.subject) for row in rows} == {("engineer", HOURS.replace(".", " "))}
     assert [row.detail for row in rows] == [
         "from none to 22:00-06:00, back to bridge.toml",
@@ -217,7 +217,7 @@ def test_an_engineer_lets_people_in_and_out_but_never_ends_the_last_engineer(
     assert ask("remove", "operator").status_code == 303
     with workspace.store() as store:
         found = {each.name: each.role for each in store.people.list_all() if not each.removed_at}
-        rows = store.audit.list_rows(limit=4)
+        rows = store.journal.list_changes(limit=4)
     assert found == {"reader": "operator", "engineer": "engineer", "eva": "engineer"}
     assert [row.action for row in rows] == [
         "user removed", "password set", "role changed", "user added",

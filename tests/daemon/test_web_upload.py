@@ -50,7 +50,7 @@ def test_an_upload_is_safe_in_the_spool_and_goes_through_like_a_dropped_file(
     assert again.json()["outcome"] == "duplicate"
     ingest_quickly(workspace)
     with workspace.store() as store:
-        assert [event.kind for event in store.recordings.list_events()] == ["duplicate"]
+        assert [event.kind for event in store.journal.list_events()] == ["duplicate"]
 
 
 def test_a_refused_upload_tells_its_reason(client: httpx.Client, workspace: Workspace) -> None:

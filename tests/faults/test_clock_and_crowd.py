@@ -32,7 +32,7 @@ def test_a_clock_that_jumps_back_holds_nothing_up(workspace: Workspace) -> None:
             flow.drain()
         assert flow.store.recordings.stage_counts()[Stage.DONE] == 3
         assert [test.test.id for test, _ in flow.store.posteriors.history(3)] == ["t0", "t1", "t2"]
-        stages = [step.stage for step in flow.store.recordings.list_steps(3)]
+        stages = [step.stage for step in flow.store.journal.list_steps(3)]
     assert stages == ["archived", "received", *2 * ["identified"], *2 * ["updated"],
                       "watched", "done"]  # fmt: skip
 

@@ -10,20 +10,21 @@ from typing import Any
 import sqlalchemy as sa
 
 from shm.store import Store
+from shm.store.journal import is_step
 from shm.store.tables import (
     alerts,
     deliveries,
     drifts,
+    journal,
     posterior_tests,
     posteriors,
     recordings,
-    steps,
     tests,
     watches,
 )
 
 _TIMES = {"time", "received_at", "identified_at", "updated_at", "raised_at", "ended_at", "at"}
-_TIMES |= {"modified_at"}
+_TIMES |= {"modified_at", "noted_at"}
 _ROWS = {"id", "recording_id", "test_id", "baseline_id", "alert_id", "arrival", "seconds"}
 _ROWS |= {"checksum"}  # of all else in the row, its times too
 
@@ -41,9 +42,9 @@ def canonical(store: Store) -> dict[str, list[str]]:
         "watches": named.add_columns(*watches.c).select_from(watches.join(tests)),
         "alerts": sa.select(alerts),
         "deliveries": sa.select(deliveries.c.hook, deliveries.c.state, alerts.c.key).join(alerts),
-        "steps": sa.select(steps.c.stage, recordings.c.sha256, tests.c.name).select_from(
-            steps.join(recordings).outerjoin(tests)
-        ),
+        "steps": sa.select(journal.c.kind, recordings.c.sha256, tests.c.name)
+        .select_from(journal.join(recordings).outerjoin(tests, tests.c.id == journal.c.test_id))
+        .where(is_step),
     }
     found: defaultdict[str, list[str]] = defaultdict(list)
     with store.reading() as connection:

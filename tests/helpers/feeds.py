@@ -65,7 +65,7 @@ def assert_all_done_once(feed: Feed) -> None:
         assert len(store.posteriors.list_all(3)) == len(tests)
         assert [drift.test for drift in store.watch.list_drifts(3)] == tests[1:]
         assert len(store.watch.list_all(3)) == len(tests) - 1
-        assert store.recordings.list_events("duplicate") == ()
+        assert store.journal.list_events("duplicate") == ()
     _assert_quarantine_holds(workspace.folder / "quarantine", feed)
 
 

@@ -39,10 +39,7 @@ def raise_alerts(workspace: Workspace, numbers: Iterable[int], hooks: Sequence[s
             name = test.test.id
             store.posteriors.save(test, a_posterior(tests=(name,)), _LINEAGE, NOW)
             alert = an_alert(f"hanger-3:{name}", name)
-            assert (
-                store.watch.save(test, baseline, a_watched_test(name), alert, hooks, NOW)
-                is not None
-            )
+            assert store.watch.save(test, baseline, a_watched_test(name), alert, hooks, NOW)
 
 
 def make_baselines(workspace: Workspace, hangers: Iterable[int]) -> None:

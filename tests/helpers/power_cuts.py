@@ -16,7 +16,8 @@ import sqlalchemy as sa
 
 from shm.store import Stage, Workspace
 from shm.store.checking import check_archive, check_store
-from shm.store.tables import steps
+from shm.store.journal import is_step
+from shm.store.tables import journal
 from tests.helpers.contents import quiet
 from tests.helpers.flows import ingest
 from tests.helpers.power import Disk, Operation, recorded
@@ -96,7 +97,9 @@ def _look(disk: Disk, rng: random.Random, goes_on: bool, memory: str | None) -> 
             assert archived.troubles == ()
             known = {each.file.sha256 for each in store.recordings.list_all()}
             with store.reading() as connection:
-                count = connection.scalar(sa.select(sa.func.count()).select_from(steps))
+                count = connection.scalar(
+                    sa.select(sa.func.count()).select_from(journal).where(is_step)
+                )
         assert entered <= known, "what was entered is lost"
         assert landed <= known | in_spool(workspace), "what had landed is lost"
         assert count >= reached, "a stage that was reached is lost"

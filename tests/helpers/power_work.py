@@ -14,7 +14,8 @@ import sqlalchemy as sa
 
 from shm.pipeline import Flow
 from shm.store import Workspace
-from shm.store.tables import steps as reached
+from shm.store.journal import is_step
+from shm.store.tables import journal
 from shm_daemon.spool import incoming
 from tests.helpers import quick_update
 from tests.helpers.feeds import Feed
@@ -38,7 +39,9 @@ def take_in(flow: Flow, feed: Feed, describe: bool) -> None:
 
 def _reached(flow: Flow) -> int:
     with flow.store.reading() as connection:
-        return int(connection.scalar(sa.select(sa.func.count()).select_from(reached)) or 0)
+        return int(
+            connection.scalar(sa.select(sa.func.count()).select_from(journal).where(is_step)) or 0
+        )
 
 
 def main() -> None:

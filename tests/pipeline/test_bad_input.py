@@ -104,7 +104,7 @@ def test_a_file_mended_by_a_sidecar_is_taken_when_dropped_again(workspace: Works
     ingest(workspace)
     assert "sampling" not in reason_of(workspace, "no_rate.csv")["message"]
     with workspace.store() as store:
-        assert [event.file_name for event in store.recordings.list_events("reopened")] == [
+        assert [event.file_name for event in store.journal.list_events("reopened")] == [
             "no_rate.csv"
         ]
         assert len(store.recordings.list_all()) == 1

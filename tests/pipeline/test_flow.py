@@ -287,7 +287,7 @@ def test_the_same_file_twice_is_one_recording_and_leaves_the_spool(workspace: Wo
     assert len(stages(workspace)) == 1
     with workspace.store() as store:
         assert len(store.tests.list_all()) == 1
-        assert [event.kind for event in store.recordings.list_events()] == [
+        assert [event.kind for event in store.journal.list_events()] == [
             "duplicate",
             "duplicate",
         ]
@@ -548,7 +548,7 @@ def test_a_recording_that_moves_on_is_no_suspect_any_more(workspace: Workspace) 
         clock.pass_by(1.0)
         assert set(stages(workspace).values()) == {Stage.DONE}
         assert flow.store.recordings.deaths() == {}
-        assert [event.kind for event in flow.store.recordings.list_events()] == ["worker died"] * 4
+        assert [event.kind for event in flow.store.journal.list_events()] == ["worker died"] * 4
 
 
 def test_a_file_that_needs_more_memory_than_there_is_is_refused_and_says_so(
@@ -634,7 +634,7 @@ def test_a_result_that_the_store_will_not_have_refuses_its_file(
     ("place", "error"),
     [
         ("shm.pipeline.work.judge", KeyError("tension")),
-        ("shm.pipeline.work.settled", ValueError("The truth value of an array is ambiguous")),
+        ("shm.pipeline.work.reconciled", ValueError("The truth value of an array is ambiguous")),
         ("shm.store.stored_posteriors.Posteriors.save", TypeError("not a number")),
     ],
 )
@@ -815,3 +815,33 @@ def test_a_result_says_from_what_and_how_it_was_made(
     assert (test.input_sha256 == other_test.input_sha256) is same_input
     assert (test.settings_sha256 == other_test.settings_sha256) is same_settings
     assert (posterior == other_posterior) is (not changed)
+
+
+def test_documents_that_cannot_be_read_stop_their_hanger_and_not_the_beginning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    quick_update.stand_in(monkeypatch.setattr)
+    bridge = make_workspace(tmp_path / "bridge", hangers=(3, 4), hooks={"mail": ["true"]})
+    for hanger in (3, 4):
+        for day, tension in ((0, 1.0), (30, 1.0), (60, 0.8), (61, 0.8)):
+            path = bridge.spool / f"h{hanger}-{day}.modes.json"
+            write_test(path, bridge, hanger=hanger, day=day, tension=tension)
+    with a_flow(bridge, notifier=Postman()) as flow:
+        receive_all(flow)
+        flow.drain()
+        assert {each.alert.hanger for each in flow.store.alerts.list_all()} == {3, 4}
+    with sqlite3.connect(bridge.database) as connection:
+        for table in ("alerts", "watches", "posteriors", "tests"):
+            connection.execute(f"UPDATE {table} SET document = 'no' WHERE hanger = 3")
+    connection.close()
+    for hanger in (3, 4):
+        path = bridge.spool / f"h{hanger}-90.modes.json"
+        write_test(path, bridge, hanger=hanger, day=90, tension=0.8)
+    with a_flow(bridge, notifier=Postman()) as flow:  # thresholds and limits read each hanger's
+        bridge.change_setting(flow.store, "settings.false_call_years", 50.0, flow.clock(), "Meier")
+        flow.use(bridge.reopened())
+        receive_all(flow)
+        flow.drain()
+        assert flow.store.tests.named(4, "h4-90").stage is Stage.WATCHED
+        assert flow.store.watch.latest([bridge.bridge.hanger(4)])[4].watched.test == "h4-90"
+    assert "hanger 3 cannot be judged again" in caplog.text

@@ -125,7 +125,7 @@ def test_a_confirmed_test_has_the_time_that_a_person_gave_it(held: Workspace) ->
         flow.store.recordings.accept(2, "Ann", "", flow.clock(), day(30))
         flow.drain()
         assert [test.time for test in flow.store.tests.list_all(3)] == [day(0), day(30)]
-        flow.store.recordings.reprocess(2, Stage.IDENTIFIED, flow.clock())
+        flow.store.recordings.rerun(2, Stage.IDENTIFIED, flow.clock())
         flow.drain()
         assert [test.time for test in flow.store.tests.list_all(3)] == [day(0), day(30)]
         assert flow.store.recordings.stage_counts()[Stage.HELD] == 0
@@ -166,7 +166,7 @@ def test_what_was_discarded_and_comes_again_stays_discarded(held: Workspace) -> 
         assert len(flow.store.alerts.list_all()) == 1
         assert list(held.spool.iterdir()) == []
         with pytest.raises(UsageError, match=r"was discarded on .* because: of another bridge"):
-            flow.store.recordings.reprocess(2, Stage.IDENTIFIED, flow.clock())
+            flow.store.recordings.rerun(2, Stage.IDENTIFIED, flow.clock())
 
 
 def test_a_discarded_file_with_another_sidecar_is_judged_again(held: Workspace) -> None:
@@ -197,7 +197,7 @@ def test_what_was_discarded_is_taken_back_with_its_true_time(held: Workspace) ->
         assert (recording.stage, recording.reason) == (Stage.DONE, None)
         assert [test.time for test in flow.store.tests.list_all(3)] == [day(0), day(30)]
         assert [drift.test for drift in flow.store.watch.list_drifts(3)] == ["lost"]
-        flow.store.recordings.reprocess(2, Stage.IDENTIFIED, flow.clock())
+        flow.store.recordings.rerun(2, Stage.IDENTIFIED, flow.clock())
         flow.drain()
         assert [test.time for test in flow.store.tests.list_all(3)] == [day(0), day(30)]
         assert check_store(flow.store, quiet).troubles == ()
@@ -274,7 +274,7 @@ def test_one_test_of_a_campaign_is_taken_out_and_stays_out(workspace: Workspace)
         store.recordings.exclude(1, "Ann", "a slip", flow.clock(), "b")
         flow.drain()
         assert (counted(store), store.recordings.get(1).stage) == (["a", "c"], Stage.DONE)
-        store.recordings.reprocess(1, Stage.IDENTIFIED, flow.clock())
+        store.recordings.rerun(1, Stage.IDENTIFIED, flow.clock())
         flow.drain()
         assert counted(store) == ["a", "c"]
         assert check_store(store, quiet).troubles == ()
@@ -433,7 +433,7 @@ def test_the_same_modes_at_the_same_time_are_a_copy(workspace: Workspace) -> Non
 
 def test_a_held_recording_that_is_done_again_waits_for_nobody_twice(held: Workspace) -> None:
     with a_flow(held) as flow:
-        flow.store.recordings.reprocess(2, Stage.IDENTIFIED, flow.clock())
+        flow.store.recordings.rerun(2, Stage.IDENTIFIED, flow.clock())
         flow.drain()
         assert len(flow.store.recordings.list_holds()) == 1
         former, _ = flow.store.alerts.list_all()

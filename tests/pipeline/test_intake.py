@@ -123,7 +123,7 @@ def test_a_receipt_cut_short_anywhere_is_finished_by_the_next(
     assert len(files_in(workspace.archive.folder)) == 2
     with workspace.store() as store:
         assert len(store.recordings.list_all()) == 1
-        assert store.recordings.list_events() == ()
+        assert store.journal.list_events() == ()
 
 
 def test_a_receipt_cut_short_between_the_two_removals_is_finished(

@@ -118,9 +118,9 @@ def test_what_was_offline_is_watched_in_its_place_and_its_alert_raised_once(
         [each.compensated_shift for each in readings[72:]], nan_ok=True
     )
     assert [each.alert.key for each in found if each.alert] == [raised.alert.key]
-    kept = store.streams.watch_state(3)
+    kept = store.streams.watch(3)
     assert kept is not None
-    state = StreamState.from_bytes(kept)
+    state = StreamState.from_bytes(kept.content)
     assert replace(state, settled_day=0.0, thermometer=Thermometer()).to_bytes() == found[-1].kept
     assert days_of(workspace) == [1, 2, 3, 4]
 
@@ -171,10 +171,10 @@ def test_whoever_comes_next_ends_what_late_hours_began(
     with ThreadPoolExecutor(1) as threads:
         drain(Streaming(workspace, store, threads, clock=clock), clock)
     readings = hours_of(store)
-    kept = store.streams.watch_state(3)
+    kept = store.streams.watch(3)
     assert kept is not None
     assert len(readings) == 19
-    assert StreamState.from_bytes(kept).readings == 19
+    assert StreamState.from_bytes(kept.content).readings == 19
     assert readings[-1].learning == in_order(workspace, readings)[-1].learning
 
 

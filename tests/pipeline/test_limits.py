@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.report.hanger_status import Status
-from shm.store import StoredAlert, Workspace
+from shm.store import Reconciled, StoredAlert, Workspace
 from shm.values import CrossedLimit
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
 from tests.helpers.workspaces import write_test
@@ -82,7 +82,7 @@ def test_heed_limits_reads_no_key(workspace: Workspace) -> None:
     with workspace.reopened().store() as store:
         ended = {told.id: "ended by this test"}
         older = replace(told.alert, key="hanger-3:limit", limit=None)
-        store.alerts.settle(older, [], ended, Clock()())
+        store.alerts.settle(Reconciled((older,), ended), [], Clock()())
     _, older_one = after(workspace, 1.0)
     assert older_one.alert == older
     assert older_one.resolution is None

@@ -51,7 +51,7 @@ def test_the_alert_of_a_discarded_test_ends(tmp_path: Path) -> None:
         recording, _ = store.recordings.find(alert.alert.test)
         store.recordings.exclude(recording, "Ada", "of another hanger", utc_now())
         assert store.alerts.list_all(3, standing=True) == ()
-        ended = store.alerts.row(alert.id).resolution
+        ended = store.alerts.get(alert.id).resolution
     assert ended is not None
     assert "test discarded by Ada: of another hanger" in str(ended)
     assert message(workspace).status is not Status.ALERT

@@ -81,9 +81,8 @@ def test_an_alert_that_the_new_threshold_calls_too_is_raised_once(workspace: Wor
     with a_flow(workspace.reopened()) as flow:
         (judged,) = flow.store.watch.latest().values()
         assert judged.watched.change.limit_years == 90.0
-        told = [
-            each for each in flow.store.audit.list_rows() if each.action == "tests judged again"
-        ]
+        changes = flow.store.journal.list_changes()
+        told = [each for each in changes if each.action == "tests judged again"]
     assert len(told) == 4
 
 

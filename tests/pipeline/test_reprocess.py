@@ -20,7 +20,7 @@ def done(workspace: Workspace) -> Workspace:
 
 def do_again(flow: Flow, name: str, stage: Stage) -> None:
     recording_id, test = flow.store.recordings.find(name)
-    flow.store.recordings.reprocess(recording_id, stage, flow.clock(), test)
+    flow.store.recordings.rerun(recording_id, stage, flow.clock(), test)
     flow.drain()
 
 
@@ -58,7 +58,7 @@ def test_a_test_that_is_watched_while_the_baselines_own_is_done_again_is_watched
 ) -> None:
     with a_flow(done) as flow:
         shifts = flow.store.watch.list_drifts(3)
-        flow.store.recordings.reprocess(
+        flow.store.recordings.rerun(
             flow.store.recordings.find("t0")[0], Stage.IDENTIFIED, flow.clock()
         )
         do_again(flow, "t2", Stage.WATCHED)
@@ -70,8 +70,8 @@ def test_a_result_of_work_that_was_sent_back_meanwhile_is_not_kept(done: Workspa
         store = flow.store
         recording_id, _ = store.recordings.find("t2")
         test = store.tests.list_all(3)[-1]
-        store.recordings.reprocess(recording_id, Stage.UPDATED, flow.clock(), "t2")
-        store.recordings.reprocess(recording_id, Stage.IDENTIFIED, flow.clock())
+        store.recordings.rerun(recording_id, Stage.UPDATED, flow.clock(), "t2")
+        store.recordings.rerun(recording_id, Stage.IDENTIFIED, flow.clock())
         store.posteriors.save(test, store.posteriors.get(3, "t1"), test.lineage, flow.clock())
         (row,) = store.tests.list_former(recording_id)
         assert len(row.posteriors) == 1

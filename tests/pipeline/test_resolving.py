@@ -11,9 +11,10 @@ import pytest
 
 from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
-from shm.pipeline.ending import SHM, is_told, told_by_other, why_over
+from shm.pipeline.conditions import Evidence, why_over
+from shm.pipeline.reconcile import SHM, Condition, reconcile, tells
 from shm.report.hanger_status import Status
-from shm.store import Stage, StoredAlert, Workspace
+from shm.store import Reconciled, Stage, StoredAlert, Workspace
 from shm.values import Alert, WatchedTest
 from tests.helpers import quick_update
 from tests.helpers.flows import Clock, Postman, a_flow, receive_all
@@ -64,7 +65,7 @@ def test_a_loss_that_a_stream_has_told_rings_again_only_where_tests_show_more(
     drift = replace(a_drift(), shift_mean=-lost, shift_sd=0.002)
     told = Alert("hanger-3:stream", 3, "h3 hour", at, "It fell.", (drift,), ("sudden change",))
     with bridge.store() as store:
-        store.streams.save_pooled(replace(a_reading(), start=at), None, told)
+        store.streams.save_pooled(replace(a_reading(), start=at), None, Reconciled((told,)))
     for day in (59, 60):
         take(bridge, postman, day, 0.8)
     assert bool(postman.told) is rings
@@ -73,16 +74,37 @@ def test_a_loss_that_a_stream_has_told_rings_again_only_where_tests_show_more(
             assert [each.alert.key for each in store.alerts.list_all()] == [told.key]
 
 
-def test_a_stream_joins_what_tests_have_told_before_and_not_what_begins_later() -> None:
+def test_what_another_source_has_told_is_not_opened_again_and_what_begins_later_is() -> None:
     alert = replace(an_alert(), kinds=("sudden change",), change=a_change())
-    of_test = StoredAlert(1, replace(alert, change=None), NOW, baseline_id=1)
-    assert told_by_other(alert, [of_test], of_stream=False) is of_test
-    assert told_by_other(alert, [of_test], of_stream=True) is None
+    of_test = StoredAlert(1, replace(alert, key="t", change=None), NOW, baseline_id=1)
+
+    def is_opened(alert: Alert, *, of_test_too: bool = False) -> bool:
+        own = replace(of_test, baseline_id=None) if of_test_too else of_test
+        return bool(reconcile([own], [Condition(alert, "holds")]).to_open)
+
+    assert not is_opened(alert)
     later = a_change(began_after=NOW + timedelta(hours=1))
-    assert told_by_other(replace(alert, change=later), [of_test], of_stream=False) is None
+    assert is_opened(replace(alert, change=later))
     up = a_change(moved=(replace(a_change().moved[0], shift_mean=0.08),))
-    assert told_by_other(replace(alert, change=up), [of_test], of_stream=False) is None
-    assert told_by_other(replace(alert, kinds=("gap",)), [of_test], of_stream=False) is None
+    assert is_opened(replace(alert, change=up))
+    assert is_opened(replace(alert, kinds=("gap",)))
+    other_baseline = Condition(alert, "holds", baseline_id=2)
+    assert reconcile([of_test], [other_baseline]).to_open == (alert,)
+    # Of the same source the size does not count, but when it began.
+    began = replace(a_change(), began_by=NOW + timedelta(days=2))
+    assert is_opened(replace(alert, change=began), of_test_too=True)
+
+
+def test_the_same_conditions_again_change_nothing_and_one_that_is_over_closes_its_alert() -> None:
+    told = StoredAlert(7, replace(an_alert("a"), kinds=("gap",)), NOW)
+    holds = Condition(replace(an_alert("b"), kinds=("limit",)), "holds")
+    first = reconcile([told], [Condition(told.alert, "unknown"), holds, holds])
+    assert ([each.key for each in first.to_open], first.to_close) == (["b"], {})
+    opened = StoredAlert(8, holds.alert, NOW)
+    again = reconcile([told, opened], [Condition(told.alert, "over", "gone"), holds])
+    assert (again.to_open, again.to_close) == ((), {7: "gone"})
+    # A condition that comes back once its alert is closed is another alert.
+    assert reconcile([told], [holds]).to_open == (holds.alert,)
 
 
 def test_tests_within_a_maintenance_window_raise_nothing_and_the_first_after_it_says_so(
@@ -131,8 +153,9 @@ def test_a_loss_that_lasts_beyond_a_maintenance_window_is_told_once_at_the_first
     assert "Planned works lie in between (new pin)" in raised.message
 
 
-def no_gap(_: WatchedTest) -> bool:
-    return False
+def why(told: Alert, tests: Sequence[WatchedTest], bridge: Workspace) -> str:
+    hanger = bridge.bridge.hangers[0]
+    return why_over(told, Evidence(hanger, tests, tests[-1].test, lambda _: False, ()))
 
 
 def later_test(day: float, probability: float, shift: float = -0.01) -> WatchedTest:
@@ -155,11 +178,9 @@ def test_a_shift_has_ended_below_half_the_level_and_never_where_that_is_unknown(
 ) -> None:
     # Of two visits: one that is disturbed, by a van on the deck for one, must end nothing.
     later = [later_test(1, 0.01), later_test(3, probability)]
-    hanger = bridge.bridge.hangers[0]
-    assert bool(why_over(TOLD, later, hanger, gap_stands=no_gap)) is is_over
-    told_after = replace(TOLD, time=NOW + timedelta(days=2))
-    assert not why_over(told_after, later, hanger, gap_stands=no_gap)
-    assert not why_over(replace(TOLD, drifts=()), later, hanger, gap_stands=no_gap)
+    assert bool(why(TOLD, later, bridge)) is is_over
+    assert not why(replace(TOLD, time=NOW + timedelta(days=2)), later, bridge)
+    assert not why(replace(TOLD, drifts=()), later, bridge)
 
 
 @pytest.mark.parametrize(
@@ -177,21 +198,19 @@ def test_an_alert_ends_by_two_visits_that_agree_and_no_test_after_the_first_diff
     bridge: Workspace, tests: Sequence[tuple[float, float]], is_over: bool
 ) -> None:
     later = [later_test(day, probability) for day, probability in tests]
-    hanger = bridge.bridge.hangers[0]
-    assert bool(why_over(TOLD, later, hanger, gap_stands=no_gap)) is is_over
+    assert bool(why(TOLD, later, bridge)) is is_over
 
 
 def test_a_loss_that_is_still_there_below_the_threshold_has_not_ended(bridge: Workspace) -> None:
     later = [later_test(day, 0.01, shift=-0.045) for day in (1, 3, 5)]
-    assert not why_over(TOLD, later, bridge.bridge.hangers[0], gap_stands=no_gap)
+    assert not why(TOLD, later, bridge)
 
 
 def test_a_test_that_agrees_with_none_before_it_ends_no_shift(bridge: Workspace) -> None:
     later = [later_test(day, 0.01) for day in (1, 3)]
     odd = replace(later[1], change=replace(later[1].change, outlier_probability=0.9))
-    hanger = bridge.bridge.hangers[0]
-    assert why_over(TOLD, later, hanger, gap_stands=no_gap)
-    assert not why_over(TOLD, [later[0], odd], hanger, gap_stands=no_gap)
+    assert why(TOLD, later, bridge)
+    assert not why(TOLD, [later[0], odd], bridge)
 
 
 RAMP = (
@@ -295,10 +314,10 @@ def test_a_loss_that_a_test_done_again_calls_by_another_rule_is_told_already() -
         change=a_change(),
     )
     later = replace(told, key="b", time=told.time + timedelta(days=9))
-    assert is_told(replace(later, kinds=("sudden change",)), [told])
-    assert is_told(replace(later, kinds=("beyond threshold",)), [told])
-    assert is_told(later, [told])
+    assert tells([told], replace(later, kinds=("sudden change",)))
+    assert tells([told], replace(later, kinds=("beyond threshold",)))
+    assert tells([told], later)
     # What is new: that it is beyond its threshold; or a change that began after the first.
-    assert not is_told(later, [replace(told, kinds=("sudden change",))])
+    assert not tells([replace(told, kinds=("sudden change",))], later)
     began = replace(a_change(), began_by=told.time + timedelta(days=2))
-    assert not is_told(replace(later, kinds=("sudden change",), change=began), [told])
+    assert not tells([told], replace(later, kinds=("sudden change",), change=began))

@@ -98,7 +98,7 @@ def raise_on(
             alert = Alert(key, hanger, name, test.time, message, (drift,), kinds)
             assert store.watch.save(
                 test, baseline, a_watched_test(name), alert, hooks, clock()
-            ) is not None  # fmt: skip
+            )  # fmt: skip
 
 
 def _entered(store: Store, hanger: int, day: int, at: datetime) -> list[StoredTest]:

@@ -35,14 +35,14 @@ def outcome(workspace: Workspace) -> object:
     with workspace.store() as store:
         return (
             [
-                [step.stage for step in store.recordings.list_steps(each.id)]
+                [step.stage for step in store.journal.list_steps(each.id)]
                 for each in store.recordings.list_all()
             ],
             tension_kn(store),
             len(store.watch.list_drifts(3)),
             [stored.alert.key for stored in store.alerts.list_all()],
             [(delivery.hook, delivery.state) for delivery in store.alerts.list_deliveries()],
-            Counter(event.kind for event in store.recordings.list_events()),
+            Counter(event.kind for event in store.journal.list_events()),
         )
 
 

@@ -111,7 +111,7 @@ def _update_again(store: Store) -> None:
         store.posteriors.save(third, a_posterior("beam1", ("t4",), seed=seed), LINEAGE, NOW)
         store.watch.save(third, baseline, a_watched_test("t4"), None, [], NOW)
         if seed == 10:
-            store.recordings.reprocess(number, Stage.UPDATED, NOW)
+            store.recordings.rerun(number, Stage.UPDATED, NOW)
 
 
 def main() -> None:

@@ -140,7 +140,11 @@ def test_the_tests_of_a_baseline_set_anew_keep_their_own_posteriors(
     before = [posterior.tests for _, posterior in store.posteriors.history(3)]
     anew(store, watched[2:])
     assert [posterior.tests for _, posterior in store.posteriors.history(3)] == before
-    assert store.posteriors.get(3).tests == store.posteriors.of_test(watched[3]).tests == ("t3",)
+    assert (
+        store.posteriors.get(3).tests
+        == store.posteriors.get(3, watched[3].test.id).tests
+        == ("t3",)
+    )
     assert len(store.posteriors.list_all(3)) == 4
 
 

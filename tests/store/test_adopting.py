@@ -103,7 +103,7 @@ def test_a_test_updated_in_the_class_before_finds_the_baseline_of_that_class(
     adopted(filled)
     second = filled.tests.list_all(3)[1]
     assert second.stage is Stage.UPDATED
-    assert filled.posteriors.of_test(second).model == "beam2"
+    assert filled.posteriors.get(3, second.test.id).model == "beam2"
     assert baseline(filled, "beam2").posterior.model == "beam2"
 
 

@@ -19,7 +19,7 @@ WATCHED, REFUSED, UPDATED_AGAIN, CONFIRMED, HELD = 2, 3, 4, 5, 6
 
 
 def _watch_at_its_time(store: Store) -> None:
-    store.recordings.reprocess(UPDATED_AGAIN, Stage.WATCHED, NOW)
+    store.recordings.rerun(UPDATED_AGAIN, Stage.WATCHED, NOW)
     third, baseline = store.tests.list_all(3)[-1], store.watch.baseline(3)
     assert baseline is not None
     store.watch.save(third, baseline, replace(a_watched_test("t4"), time=third.time), None, [], NOW)
@@ -176,8 +176,8 @@ def test_a_test_of_another_name_is_not_withdrawn(store: Store) -> None:
 def test_each_decision_is_noted_with_its_reason(store: Store) -> None:
     store.recordings.exclude(WATCHED, "Ada", "the wrong hanger", LATER)
     store.recordings.exclude(HELD, "Ada", "a copy", LATER)
-    newest = [(row.who, row.action, row.detail) for row in store.audit.list_rows(2)]
+    newest = [(row.who, row.action, row.detail) for row in store.journal.list_changes(2)]
     assert newest == [
         ("Ada", "recording discarded", "a copy"),
-        ("Ada", "recording withdrawn", "the wrong hanger"),
+        ("Ada", "recording withdrawn", "t2: the wrong hanger"),
     ]

@@ -30,7 +30,7 @@ def test_the_same_bytes_dropped_again_are_noticed_and_not_entered(store: Store) 
     again = store.recordings.receive(a_file(1, file_name="copy.csv", arrival="other"), NOW)
     assert again.outcome is Outcome.DUPLICATE
     assert store.recordings.list_all() == (first,)
-    (event,) = store.recordings.list_events("duplicate")
+    (event,) = store.journal.list_events("duplicate")
     assert (event.file_name, event.recording_id) == ("copy.csv", first.id)
     assert "h3-1.csv" in event.message
     assert "sidecar" not in event.message
@@ -47,7 +47,7 @@ def test_the_same_bytes_with_another_sidecar_are_done_again_with_that(store: Sto
     assert again.recording.stage is Stage.RECEIVED
     assert store.tests.list_all(3) == ()
     assert len(store.tests.list_former(first)) == 1
-    assert "another sidecar" in store.recordings.list_events("redescribed")[0].message
+    assert "another sidecar" in store.journal.list_events("redescribed")[0].message
     assert store.recordings.receive(described, NOW).outcome is Outcome.RESUMED
     late = Judged("11/1.toml")  # what was begun with the sidecar of before
     store.tests.save(first, found, LINEAGE, NOW, late)
@@ -64,7 +64,7 @@ def test_a_duplicate_without_a_sidecar_changes_nothing(store: Store) -> None:
 def test_a_receipt_cut_short_by_a_crash_is_no_duplicate(store: Store) -> None:
     store.recordings.receive(a_file(1), NOW)
     assert store.recordings.receive(a_file(1), NOW).outcome is Outcome.RESUMED
-    assert store.recordings.list_events() == ()
+    assert store.journal.list_events() == ()
     assert len(store.recordings.list_all()) == 1
 
 
@@ -74,7 +74,7 @@ def test_a_refused_file_keeps_its_reason(store: Store) -> None:
     stored = store.recordings.get(recording.id)
     assert stored.stage is Stage.REFUSED
     assert stored.reason == REASON
-    assert store.recordings.list_events("refused")[0].message == "no sampling rate."
+    assert store.journal.list_events("refused")[0].message == "no sampling rate."
 
 
 def test_only_what_still_waits_at_a_stage_is_refused_from_there(store: Store) -> None:
@@ -84,8 +84,8 @@ def test_only_what_still_waits_at_a_stage_is_refused_from_there(store: Store) ->
     )
     for _ in range(2):
         store.recordings.refuse(first, REASON, NOW, stage=Stage.RECEIVED)
-    assert len(store.recordings.list_events("refused")) == 1
-    assert [step.stage for step in store.recordings.list_steps(first)].count(Stage.REFUSED) == 1
+    assert len(store.journal.list_events("refused")) == 1
+    assert [step.stage for step in store.journal.list_steps(first)].count(Stage.REFUSED) == 1
     store.tests.save(second, [IdentifiedTest(a_test("t2"))], LINEAGE, NOW)
     (test,) = store.tests.list_all()
     assert not store.recordings.is_waiting(second, Stage.RECEIVED)
@@ -106,7 +106,7 @@ def test_files_refused_together_each_end_with_their_own_tests(store: Store) -> N
     for number in ids:
         store.recordings.refuse(number, REASON, NOW, tests, stage=Stage.IDENTIFIED)
     for number in ids:
-        stages = [step.stage for step in store.recordings.list_steps(number)]
+        stages = [step.stage for step in store.journal.list_steps(number)]
         assert stages.count(Stage.REFUSED) == 2  # the file and its test
 
 
@@ -119,7 +119,7 @@ def test_a_refused_file_dropped_again_is_tried_again(store: Store) -> None:
     assert receipt.recording.file == mended
     assert receipt.recording.stage is Stage.RECEIVED
     assert receipt.recording.reason is None
-    assert [event.kind for event in store.recordings.list_events()] == ["refused", "reopened"]
+    assert [event.kind for event in store.journal.list_events()] == ["refused", "reopened"]
 
 
 def test_the_spool_entry_of_a_refused_file_left_by_a_crash_is_not_tried_again(
@@ -169,7 +169,7 @@ def test_the_events_of_one_recording_or_name_are_read_alone(store: Store) -> Non
     for number in (1, 2):
         for arrival in ("first", "again"):
             store.recordings.receive(a_file(number, arrival=arrival), NOW)
-    assert len(store.recordings.list_events("duplicate")) == 2
-    (own,) = store.recordings.list_events("duplicate", recording_id=2)
+    assert len(store.journal.list_events("duplicate")) == 2
+    (own,) = store.journal.list_events("duplicate", recording_id=2)
     assert own.recording_id == 2
-    assert [each.recording_id for each in store.recordings.list_events(file_name="h3-1.csv")] == [1]
+    assert [each.recording_id for each in store.journal.list_events(file_name="h3-1.csv")] == [1]

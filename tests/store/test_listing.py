@@ -12,14 +12,13 @@ import sqlalchemy as sa
 
 from shm.errors import NothingThere
 from shm.store import (
-    AlertRow,
     Baseline,
-    DeliveryRow,
     EventKind,
     IdentifiedTest,
     Lineage,
     Stage,
     Store,
+    StoredAlert,
     StoredTest,
     StoredWatch,
     TestRow,
@@ -126,7 +125,7 @@ def test_a_name_that_is_not_there_names_the_latest(file_store: Store) -> None:
 
 def test_what_was_superseded_or_refused_is_not_listed(file_store: Store) -> None:
     first, second = identified(file_store, 1), identified(file_store, 2)
-    file_store.recordings.reprocess(first.recording_id, Stage.IDENTIFIED, NOW)
+    file_store.recordings.rerun(first.recording_id, Stage.IDENTIFIED, NOW)
     file_store.recordings.refuse(second.recording_id, {"message": "no."}, NOW, [second.id])
     assert file_store.tests.list_rows(3) == ()
     with pytest.raises(NothingThere):
@@ -154,13 +153,9 @@ def test_a_watch_against_a_baseline_of_before_is_not_the_latest(file_store: Stor
     posterior = a_posterior("beam1", ("t2",))
     file_store.watch.rebaseline(baseline, posterior, chosen, record, LINEAGE, NOW)
     assert file_store.watch.latest() == {}
-    assert (
-        file_store.watch.list_detected(3)
-        == file_store.watch.list_detected_and_latest(baseline_of(file_store))
-        == ()
-    )
+    assert file_store.watch.list_detected(3, baseline_of(file_store).id) == ()
     assert file_store.watch.detected_changes() == {}
-    told = file_store.watch.list_detected_and_latest(baseline)
+    told = file_store.watch.list_detected(3, baseline.id)
     assert [each.watched.test for each in told] == ["t2"]
 
 
@@ -172,21 +167,20 @@ def test_only_called_changes_are_listed_as_called(store: Store) -> None:
     watched(store, other, 6, 1.0)
     called = [each for each in store.watch.list_all() if each.watched.change.called]
     assert [each.watched.test for each in called] == ["t3", "t4"]
-    assert [each.id for each in store.watch.list_detected(3)] == [each.id for each in called]
+    detected = store.watch.list_detected(3, baseline.id)
+    assert [each.id for each in detected] == [each.id for each in called]
     assert store.watch.detected_changes() == {3: tuple(each.watched.change for each in called)}
-    assert store.watch.list_detected(4) == ()
+    assert not any(e.watched.change.called for e in store.watch.list_detected(4, other.id))
 
 
 def test_calls_and_the_latest_watch_tell_what_there_is_to_tell(store: Store) -> None:
     baseline = with_baseline(store)
     for number, evidence_years in ((2, 1.0), (3, 350.0), (4, 1.0), (5, 1.0)):
         watched(store, baseline, number, evidence_years)
-    found = [
-        (each.id, each.watched.test) for each in store.watch.list_detected_and_latest(baseline)
-    ]
+    found = [(each.id, each.watched.test) for each in store.watch.list_detected(3, baseline.id)]
     assert found == [(2, "t3"), (4, "t5")]
     assert (
-        store.watch.list_detected_and_latest(baseline)[-1].watched.drifts
+        store.watch.list_detected(3, baseline.id)[-1].watched.drifts
         == store.watch.list_drifts(3)[-1:]
         != ()
     )
@@ -212,11 +206,11 @@ def test_a_resolved_alert_is_open_no_more_whoever_took_note(store: Store) -> Non
     store.alerts.acknowledge(3, "engineer", "seen", NOW + timedelta(days=1))
     assert store.alerts.open_counts() == {3: 2, 4: 1}
     assert store.alerts.counts() == (3, 1)
-    opened, others = (store.alerts.list_rows(is_open=each) for each in (True, False))
+    opened, others = (store.alerts.list_page(is_open=each) for each in (True, False))
     assert numbers(opened) == [5, 4, 1]
     assert numbers(others) == [6, 3, 2]
-    assert numbers(store.alerts.list_rows(is_open=False, before=6)) == [3, 2]
-    assert numbers(store.alerts.list_rows(is_open=False, before=3)) == [2]
+    assert numbers(store.alerts.list_page(is_open=False, before=6)) == [3, 2]
+    assert numbers(store.alerts.list_page(is_open=False, before=3)) == [2]
     assert [each.id for each in store.alerts.list_all() if each.is_open] == [1, 4, 5]
 
 
@@ -228,47 +222,43 @@ def raise_alerts(store: Store) -> None:
             watched(store, baseline, 10 * hanger + number)
 
 
-def numbers(rows: tuple[AlertRow, ...]) -> list[int]:
+def numbers(rows: tuple[StoredAlert, ...]) -> list[int]:
     return [row.id for row in rows]
 
 
 def test_alerts_are_listed_page_by_page_newest_first(store: Store) -> None:
     raise_alerts(store)
-    first = store.alerts.list_rows(limit=4)
-    second = store.alerts.list_rows(limit=4, before=first[-1].id)
+    first = store.alerts.list_page(limit=4)
+    second = store.alerts.list_page(limit=4, before=first[-1].id)
     assert numbers((*first, *second)) == [6, 5, 4, 3, 2, 1]
-    assert numbers(store.alerts.list_rows()) == [6, 5, 4, 3, 2, 1]
-    assert numbers(store.alerts.list_rows(3, limit=2)) == [4, 3]
-    assert store.alerts.list_rows(5) == store.alerts.list_rows(before=1) == ()
+    assert numbers(store.alerts.list_page()) == [6, 5, 4, 3, 2, 1]
+    assert numbers(store.alerts.list_page(3, limit=2)) == [4, 3]
+    assert store.alerts.list_page(5) == store.alerts.list_page(before=1) == ()
 
 
 def test_acknowledged_alerts_stand_in_the_order_in_which_they_were(store: Store) -> None:
     raise_alerts(store)
     for days, alert in enumerate((4, 1, 5)):
         store.alerts.acknowledge(alert, "engineer", "seen", NOW + timedelta(days=days))
-    assert numbers(store.alerts.list_rows(is_open=True)) == [6, 3, 2]
-    assert numbers(store.alerts.list_rows(3, is_open=True, before=3)) == [2]
-    assert numbers(store.alerts.list_rows(is_open=False)) == [5, 1, 4]
-    assert numbers(store.alerts.list_rows(is_open=False, limit=1, before=5)) == [1]
-    assert numbers(store.alerts.list_rows(is_open=False, before=1)) == [4]
+    assert numbers(store.alerts.list_page(is_open=True)) == [6, 3, 2]
+    assert numbers(store.alerts.list_page(3, is_open=True, before=3)) == [2]
+    assert numbers(store.alerts.list_page(is_open=False)) == [5, 1, 4]
+    assert numbers(store.alerts.list_page(is_open=False, limit=1, before=5)) == [1]
+    assert numbers(store.alerts.list_page(is_open=False, before=1)) == [4]
 
 
-def test_a_row_says_what_the_alert_says_and_who_was_told(store: Store) -> None:
+def test_one_alert_is_read_with_who_was_told(store: Store) -> None:
     raise_alerts(store)
     noted = store.alerts.acknowledge(2, "engineer", "seen", NOW)
     (delivery,) = (each for each in store.alerts.list_deliveries() if each.alert == noted.alert)
     store.alerts.save_failure(delivery, "no power", NOW, NOW)
     (owed,) = (each for each in store.alerts.list_deliveries() if each.alert == noted.alert)
-    row = store.alerts.row(2)
-    alert = noted.alert
-    assert (row.hanger, row.test, row.kinds) == (alert.hanger, alert.test, alert.kinds)
-    assert (row.raised_at, row.message) == (noted.raised_at, alert.message)
-    assert row.acknowledgement == noted.acknowledgement
-    assert row.deliveries == (DeliveryRow("mail", owed.state, 1, "no power"),)
-    assert row in store.alerts.list_rows(3)
-    assert replace(row, id=1) != store.alerts.row(1)
+    assert store.alerts.get(2) == noted
+    assert noted in store.alerts.list_page(3)
+    assert store.alerts.list_deliveries(alert_ids=[2]) == (owed,)
+    assert (owed.attempts, owed.last_error) == (1, "no power")
     with pytest.raises(NothingThere, match="no alert 9"):
-        store.alerts.row(9)
+        store.alerts.get(9)
 
 
 def test_what_happened_to_a_hanger_stands_in_the_order_of_time(filled: Store) -> None:

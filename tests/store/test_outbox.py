@@ -8,7 +8,7 @@ from datetime import timedelta
 import pytest
 
 from shm.errors import NothingThere, UsageError
-from shm.store import DeliveryState, Store
+from shm.store import DeliveryState, Reconciled, Store
 from shm.store.rows import News
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import a_reading
@@ -21,8 +21,8 @@ GIVEN_UP, NOT_NEEDED = DeliveryState.GIVEN_UP, DeliveryState.NOT_NEEDED
 def raised(store: Store, number: int, *hooks: str) -> int:
     """An alert of a stream, owed to hooks from its own hour on."""
     alert = replace(an_alert(f"hanger-3:{number}"), test="")
-    made = store.streams.save_pooled(a_reading(number), None, alert, hooks, NOW + number * HOUR)
-    assert made is not None
+    opens, at = Reconciled((alert,)), NOW + number * HOUR
+    (made,) = store.streams.save_pooled(a_reading(number), None, opens, hooks, at)
     return made.id
 
 
@@ -38,7 +38,7 @@ def test_messages_keep_the_deliveries_that_they_were_made_of(file_store: Store) 
     alerts = file_store.alerts
     alerts.begin_messages((), {}, NOW)
     first, second, third = (raised(file_store, n, "mail") for n in (1, 2, 3))
-    assert [each.id for each in alerts.list_unsent()] == [1, 2, 3]
+    assert [each.id for each in alerts.list_deliveries(WAITING, unsent=True)] == [1, 2, 3]
     assert due(file_store, 2) == [1, 2]
     assert due(file_store, 2, begun=True) == []
     alerts.begin_messages([[2, 1]], {3: "resolved before"}, NOW + 5 * HOUR)
@@ -49,15 +49,15 @@ def test_messages_keep_the_deliveries_that_they_were_made_of(file_store: Store) 
     ]
     left_out = alerts.list_deliveries(NOT_NEEDED)[0]
     assert (left_out.last_error, left_out.ended_at) == ("resolved before", NOW + 5 * HOUR)
-    assert alerts.list_unsent() == ()
-    assert [each.id for each in alerts.list_of_messages([1])] == [1, 2]
+    assert alerts.list_deliveries(WAITING, unsent=True) == ()
+    assert [each.id for each in alerts.list_deliveries(messages=[1])] == [1, 2]
     assert due(file_store, 5) == due(file_store, 5, begun=True) == [1]
     assert due(file_store, 4) == due(file_store, 5, excluding=[1]) == []
     alerts.begin_messages([[1], [2]], {1: "too late", 3: "too late"}, NOW + 6 * HOUR)
     assert [each[2:] for each in states(file_store)] == [
         (WAITING, 1), (WAITING, 1), (NOT_NEEDED, None),
     ]  # fmt: skip
-    alerts.save_delivery(alerts.list_of_messages([1])[0], NOW + 7 * HOUR)
+    alerts.save_delivery(alerts.list_deliveries(messages=[1])[0], NOW + 7 * HOUR)
     assert [each[2] for each in states(file_store)] == [DELIVERED, DELIVERED, NOT_NEEDED]
     counts = {state: n for state, n in alerts.delivery_counts().items() if n}
     assert counts == {DELIVERED: 2, NOT_NEEDED: 1}
@@ -123,8 +123,8 @@ def test_who_was_told_of_an_alert_is_told_of_its_end_once(file_store: Store) -> 
 
 def test_an_alert_of_a_key_is_raised_once(file_store: Store) -> None:
     raised(file_store, 1, "mail")
-    again = replace(an_alert("hanger-3:1"), test="")
-    assert file_store.streams.save_pooled(a_reading(5), None, again, ("mail",), NOW) is None
+    again = Reconciled((replace(an_alert("hanger-3:1"), test=""),))
+    assert file_store.streams.save_pooled(a_reading(5), None, again, ("mail",), NOW) == ()
     assert len(file_store.alerts.list_deliveries()) == 1
 
 
@@ -138,7 +138,7 @@ def test_an_alert_that_was_acknowledged_keeps_who_did(file_store: Store) -> None
     assert ended.acknowledgement is not None
     assert (ended.acknowledgement.who, ended.acknowledgement.why) == ("Ada", "seen")
     assert alerts.counts() == (0, 1)
-    noted = [(row.who, row.action, row.detail) for row in file_store.audit.list_rows()]
+    noted = [(row.who, row.action, row.detail) for row in file_store.journal.list_changes()]
     assert noted == [("Ben", "alert resolved", "over"), ("Ada", "alert acknowledged", "seen")]
 
 
@@ -146,9 +146,9 @@ def test_a_test_is_through_when_no_hook_is_owed_its_alert(filled_copy: Store) ->
     """Once, however many hooks there are."""
     store = filled_copy
     (first,) = (e for e in store.alerts.list_deliveries() if e.stored.alert.test == "t2")
-    before = [step.stage for step in store.recordings.list_steps(2)]
+    before = [step.stage for step in store.journal.list_steps(2)]
     store.alerts.save_delivery(first, NOW + HOUR)
-    after = [step.stage for step in store.recordings.list_steps(2)]
+    after = [step.stage for step in store.journal.list_steps(2)]
     assert after == [*before, "notified"]
 
 
@@ -174,7 +174,7 @@ def test_a_changed_setting_holds_until_it_is_given_back(file_store: Store) -> No
     assert current["settings.samples"].is_of(4)
     settings.change("settings.samples", None, "Ada", NOW)
     assert list(settings.list_current()) == ["hanger.3.thresholds.alert_probability"]
-    told = [(row.subject, row.detail) for row in file_store.audit.list_rows(2)]
+    told = [(row.subject, row.detail) for row in file_store.journal.list_changes(2)]
     assert told == [
         ("settings samples", "from 2000 to not set, back to bridge.toml"),
         ("settings samples", "from 4000 to 2000"),

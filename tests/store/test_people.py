@@ -8,7 +8,7 @@ import pytest
 
 from shm.errors import NothingThere, UsageError
 from shm.store import Store
-from shm.store.audit import Actor, AuditRow
+from shm.store.journal import Actor, AuditRow
 from shm.store.people import SIGNED_IN_FOR, Role, Scope
 
 NOW = datetime(2026, 5, 1, 12, 0, tzinfo=UTC)
@@ -30,7 +30,7 @@ def people(store: Store) -> Store:
 
 
 def said(store: Store) -> list[tuple[str, str, str, str]]:
-    rows = reversed(store.audit.list_rows())
+    rows = reversed(store.journal.list_changes())
     return [(row.who, row.action, row.subject, row.detail) for row in rows]
 
 
@@ -136,7 +136,7 @@ def test_each_change_of_people_and_tokens_is_noted_as_the_actors(store: Store) -
     acting.upkeep.create_token("logger", Scope.READ, NOW)
     acting.upkeep.create_token("robot", Scope.WRITE, NOW)
     acting.upkeep.revoke_token("logger", NOW)
-    acting.audit.note(NOW, "file uploaded", "a.csv", "5 kB")
+    acting.journal.note(NOW, "file uploaded", "a.csv", "5 kB")
     assert said(store) == [
         ("Ada", "user added", "user Ben", "operator"),
         ("Ada", "role changed", "user Ben", "from operator to reader"),
@@ -147,10 +147,10 @@ def test_each_change_of_people_and_tokens_is_noted_as_the_actors(store: Store) -
         ("Ada", "token revoked", "token logger", ""),
         ("Ada", "file uploaded", "a.csv", "5 kB"),
     ]
-    newest, before = store.audit.list_rows(2)
+    newest, before = store.journal.list_changes(2)
     assert newest == AuditRow(newest.id, NOW, "Ada", "dashboard", "file uploaded", "a.csv", "5 kB")
-    assert store.audit.list_rows(1, newest.id) == (before,)
-    assert len(store.audit.list_rows(before=newest.id)) == 7
+    assert store.journal.list_changes(1, newest.id) == (before,)
+    assert len(store.journal.list_changes(before=newest.id)) == 7
 
 
 def test_a_token_is_good_for_what_it_was_made_for_until_it_is_revoked(store: Store) -> None:

@@ -186,7 +186,7 @@ def test_a_posterior_comes_back_complete_with_its_samples(store: Store) -> None:
     store.posteriors.save(second, posterior, LINEAGE, NOW)
     assert_same(store.posteriors.get(3), posterior)
     assert_same(store.posteriors.get(3, "t2"), posterior)
-    assert_same(store.posteriors.of_test(second), posterior)
+    assert_same(store.posteriors.get(3, second.test.id), posterior)
     assert store.posteriors.get(3, "t1").model == "beam2"
     assert store.posteriors.list_all(3)[-1].lineage == LINEAGE
     assert store.tests.get(second.id).stage is Stage.UPDATED

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
@@ -20,10 +21,9 @@ from shm.resources import migrations_folder
 from shm.store import Acknowledgement, Decision, Stage, Store
 from shm.store.database import make_engine
 from shm.store.schema import changed_objects
-from shm.store.tables import SCHEMA, metadata
+from shm.store.tables import SCHEMA, metadata, tests
 from shm.values import Fingerprint
 from tests.helpers.nouns import NOW, a_change
-from tests.helpers.slow import few_of
 
 RELEASED = sorted(Path(__file__).parent.glob("data/schema_*.db"))
 
@@ -40,13 +40,13 @@ def test_the_schema_named_in_the_code_is_the_newest_migration() -> None:
     assert ScriptDirectory.from_config(config).get_heads() == [SCHEMA]
 
 
-def test_a_database_of_every_schema_is_kept() -> None:
-    migrations = sorted((migrations_folder() / "versions").glob("*.py"))
-    numbers = [path.name.split("_")[0] for path in migrations]
-    assert [path.stem.removeprefix("schema_") for path in RELEASED] == numbers
+def test_a_database_of_each_release_and_of_today_is_kept() -> None:
+    """0.1.0 had the first schema, 1.0.0 the fourteenth; the fifteenth came after it."""
+    numbers = [path.stem.removeprefix("schema_") for path in RELEASED]
+    assert numbers == ["0001", "0014", "0015", SCHEMA]
 
 
-@pytest.mark.parametrize("released", few_of(RELEASED, 3), ids=lambda path: path.stem)
+@pytest.mark.parametrize("released", RELEASED, ids=lambda path: path.stem)
 def test_a_released_database_upgrades_and_keeps_its_contents(
     released: Path, tmp_path: Path
 ) -> None:
@@ -68,19 +68,23 @@ def test_a_released_database_upgrades_and_keeps_its_contents(
         assert {drift.quantity for drift in store.watch.list_drifts(3)} == {"tension"}
         assert store.alerts.list_all()[0].alert.key == "hanger-3:tension-down"
         assert {delivery.hook for delivery in store.alerts.list_deliveries()} == {"mail"}
-        assert [event.kind for event in store.recordings.list_events()][:2] == [
+        assert [event.kind for event in store.journal.list_events()][:2] == [
             "duplicate",
             "refused",
         ]
 
 
-def test_a_database_of_before_the_watch_has_alerts_open_and_its_first_baseline(
+def upgraded(schema: int, folder: Path) -> Store:
+    path = folder / "shm.db"
+    shutil.copyfile(RELEASED[schema], path)
+    Store.upgrade(path)
+    return Store.open(path)
+
+
+def test_a_database_of_the_first_release_has_alerts_open_and_what_is_known_of_its_steps(
     tmp_path: Path,
 ) -> None:
-    path = tmp_path / "shm.db"
-    shutil.copyfile(RELEASED[2], path)
-    Store.upgrade(path)
-    with Store.open(path) as store:
+    with upgraded(0, tmp_path) as store:
         (stored,) = store.alerts.list_all()
         assert (stored.alert.kinds, stored.alert.change) == ((), None)
         assert stored.acknowledgement is None
@@ -88,14 +92,21 @@ def test_a_database_of_before_the_watch_has_alerts_open_and_its_first_baseline(
         baseline = store.watch.baseline(3)
         assert baseline is not None
         assert (baseline.since, baseline.posterior.tests) == (None, ("t1",))
+        steps = store.journal.list_steps(1)
+        assert [(step.stage, step.test, step.version) for step in steps] == [
+            ("received", None, None),
+            ("identified", "t1", "0.1.0"),
+        ]
+        with store.reading() as connection:
+            rows = connection.execute(sa.select(tests.c.taken_at, tests.c.temperature_c)).all()
+        stored_tests = [each.test for each in store.tests.list_all(3)]
+        assert [tuple(row) for row in rows] == [(t.time, t.temperature_c) for t in stored_tests]
 
 
-def test_the_watch_of_a_released_database_is_kept(tmp_path: Path) -> None:
-    path = tmp_path / "shm.db"
-    shutil.copyfile(RELEASED[3], path)
-    Store.upgrade(path)
-    with Store.open(path) as store:
-        (stored,) = store.alerts.list_all()
+@pytest.mark.parametrize("schema", [1, 2])
+def test_all_that_a_database_of_1_0_0_holds_is_kept(schema: int, tmp_path: Path) -> None:
+    with upgraded(schema, tmp_path) as store:
+        stored = store.alerts.list_all()[0]
         assert stored.alert.kinds == ("beyond threshold",)
         assert stored.alert.change == a_change()
         assert stored.acknowledgement == Acknowledgement(1, "engineer", "looked at the pin", NOW)
@@ -105,38 +116,10 @@ def test_the_watch_of_a_released_database_is_kept(tmp_path: Path) -> None:
         baseline = store.watch.baseline(3)
         assert baseline is not None
         assert (baseline.why, baseline.posterior.tests) == ("new pin", ("t2",))
-
-
-def test_of_a_database_of_before_the_steps_what_can_be_told_is_noted(tmp_path: Path) -> None:
-    path = tmp_path / "shm.db"
-    shutil.copyfile(RELEASED[3], path)
-    Store.upgrade(path)
-    with Store.open(path) as store:
-        steps = store.recordings.list_steps(1)
-        assert [(step.stage, step.test, step.version) for step in steps] == [
-            ("received", None, None),
-            ("identified", "t1", "0.1.0"),
-        ]
-        baseline = store.watch.baseline(3)
-        assert baseline is not None
         assert [test.test.id for test in store.tests.of_baseline(baseline)] == ["t2"]
-
-
-def test_what_was_superseded_is_kept_with_its_lineage(tmp_path: Path) -> None:
-    path = tmp_path / "shm.db"
-    shutil.copyfile(RELEASED[4], path)
-    Store.upgrade(path)
-    with Store.open(path) as store:
         (test,) = store.tests.list_former(4)
         assert [made.superseded_at for made in test.posteriors] == [NOW, None]
         assert store.posteriors.get(3, "t4").seed == 11
-
-
-def test_what_is_held_is_kept_with_what_a_person_made_of_it(tmp_path: Path) -> None:
-    path = tmp_path / "shm.db"
-    shutil.copyfile(RELEASED[6], path)
-    Store.upgrade(path)
-    with Store.open(path) as store:
         confirmed = store.recordings.latest_hold(5)
         assert confirmed is not None
         assert (confirmed.decision, confirmed.who) == (Decision.CONFIRMED, "engineer")
@@ -147,6 +130,32 @@ def test_what_is_held_is_kept_with_what_a_person_made_of_it(tmp_path: Path) -> N
         known = store.tests.known_samples(7, 5, Fingerprint("0" * 64, np.ones((1, 256))))
         assert [each.fingerprint.shapes.shape for each in known] == [(1, 256)] * 2
         assert store.recordings.get(5).file.modified_at == NOW
+
+
+def test_four_histories_become_one_journal_in_which_a_refusal_is_one_entry(tmp_path: Path) -> None:
+    with upgraded(1, tmp_path) as store:
+        steps = [(each.stage, each.test) for each in store.journal.list_steps(3)]
+        assert steps == [("archived", None), ("received", None), ("refused", None)]
+        assert store.journal.list_steps(3)[-1].version == "0.1.0"
+        events = [(each.kind, each.file_name) for each in store.journal.list_events()]
+        assert events.count(("refused", "h3-3.csv")) == 1
+        held = [each.stage for each in store.journal.list_steps(6) if each.test is None]
+        assert held.count("held") == 1
+        changes = {(each.who, each.action) for each in store.journal.list_changes()}
+        assert ("engineer", "recording confirmed") in changes
+        assert ("engineer", "baseline set") in changes
+
+
+def test_a_schema_between_two_releases_is_refused_with_the_release_that_upgrades_it(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "shm.db"
+    shutil.copyfile(RELEASED[1], path)
+    _set_version(path, "0009")
+    with pytest.raises(StoreError, match="no release of shm had") as caught:
+        Store.upgrade(path)
+    assert "shm 1.0.0" in caught.value.remedy
+    assert "audit" in _tables(path)
 
 
 @pytest.mark.parametrize("version", ["0000", None])
@@ -185,7 +194,7 @@ def test_an_upgrade_from_an_unknown_schema_says_so(tmp_path: Path) -> None:
     path = tmp_path / "shm.db"
     Store.create(path).close()
     _set_version(path, "0000")
-    with pytest.raises(StoreError, match="cannot be upgraded"):
+    with pytest.raises(StoreError, match="no release of shm had"):
         Store.upgrade(path)
 
 

@@ -56,7 +56,7 @@ def test_a_reader_cannot_write(server_store: Store) -> None:
         pytest.raises(StoreError, match="cannot be written") as caught,
         server_store.reading() as connection,
     ):
-        connection.execute(sa.text("DELETE FROM events"))
+        connection.execute(sa.text("DELETE FROM journal"))
     assert caught.value.retry_after_s == 60.0
 
 
@@ -86,9 +86,9 @@ def test_a_connection_lost_within_a_verb_undoes_it_and_says_when_to_return(
 ) -> None:
     def lose_it() -> None:
         with server_store.writing() as connection:
-            connection.execute(sa.text("DELETE FROM events"))
+            connection.execute(sa.text("DELETE FROM journal"))
             postgresql.cut_connections(server)
-            connection.execute(sa.text("DELETE FROM events"))
+            connection.execute(sa.text("DELETE FROM journal"))
 
     with pytest.raises(StoreError) as caught:
         lose_it()

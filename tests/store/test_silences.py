@@ -33,9 +33,11 @@ def test_a_silence_is_kept_as_it_was_made_and_ended(file_store: Store) -> None:
     ended = silences.end(made.id, "Ben", half)
     assert ended == Silence(made.id, 3, NOW, NOW + HOUR, True, "Ada", "paint", NOW, half, "Ben")
     assert silences.list_all() == (ended, later)
-    assert silences.list_current(NOW) == (ended, later)
-    assert silences.list_current(half) == (later,)
-    said = [(row.who, row.action, row.subject, row.detail) for row in file_store.audit.list_rows()]
+    assert [ended.is_over(at) for at in (NOW, half)] == [False, True]
+    assert [ended.is_in_force(at) for at in (NOW, half)] == [True, False]
+    assert later.is_in_force(later.starts_at)
+    rows = file_store.journal.list_changes()
+    said = [(row.who, row.action, row.subject, row.detail) for row in rows]
     assert said == [
         ("Ben", "maintenance window ended", f"maintenance window {made.id}, hanger 3", ""),
         (

@@ -87,15 +87,13 @@ def test_deaths_count_since_a_recording_moved_on_and_while_it_is_on_its_way(
         1: Deaths(2, NOW + 2 * HOUR),
         2: Deaths(1, NOW + HOUR),
     }
-    kinds = [
-        (each.kind, each.message) for each in file_store.recordings.list_events(recording_id=2)
-    ]
+    kinds = [(each.kind, each.message) for each in file_store.journal.list_events(recording_id=2)]
     assert kinds == [("worker died", "killed")]
 
 
 def test_a_file_that_was_too_large_leaves_its_name_and_no_recording(file_store: Store) -> None:
     file_store.recordings.refuse_unread("big.csv", "5 GB.", NOW)
-    (event,) = file_store.recordings.list_events()
+    (event,) = file_store.journal.list_events()
     assert (event.kind, event.file_name, event.message, event.at, event.recording_id) == (
         "refused", "big.csv", "5 GB.", NOW, None,
     )  # fmt: skip
@@ -113,16 +111,17 @@ def test_a_recording_is_found_by_number_test_and_file_name(filled_copy: Store) -
     filled_copy.recordings.receive(a_file(9, file_name="h3-2.csv"), NOW)
     with pytest.raises(UsageError, match="2 recordings were called"):
         find("h3-2.csv")
-    assert filled_copy.recordings.names_of(1) == ("h3-1.csv",)
 
 
 def test_the_latest_tests_of_a_hanger_by_time_and_by_receipt(file_store: Store) -> None:
     for number, day in ((1, 5), (2, 1), (3, 3), (4, 2)):
         identified(file_store, number, day)
     identified(file_store, 5, 9, hanger=4)
-    latest = file_store.tests.latest_before, file_store.tests.latest_received
-    assert [names(each(3, 99, 3)) for each in latest] == [["t4", "t3", "t1"], ["t2", "t3", "t4"]]
-    assert [names(each(3, 3, 9)) for each in latest] == [["t2", "t4", "t1"], ["t1", "t2", "t4"]]
+    latest = file_store.tests.list_latest
+    assert names(latest(3, 99, 3)) == ["t4", "t3", "t1"]
+    assert names(latest(3, 99, 3, as_received=True)) == ["t2", "t3", "t4"]
+    assert names(latest(3, 3, 9)) == ["t2", "t4", "t1"]
+    assert names(latest(3, 3, 9, as_received=True)) == ["t1", "t2", "t4"]
     told = {h: (each.tests, each.time) for h, each in file_store.tests.latest().items()}
     assert told == {3: (4, NOW + 5 * DAY), 4: (1, NOW + 9 * DAY)}
 
@@ -192,6 +191,6 @@ def test_watched_tests_are_listed_page_by_page(file_store: Store) -> None:
     fourth = file_store.tests.named(3, "t4")
     before = file_store.watch.list_watched(baseline, fourth)
     assert [each.name for each in before] == ["t3", "t5"]
-    recent = file_store.watch.list_recent(baseline, 2)
+    recent = file_store.watch.list_all(3, baseline.id, last=2)
     assert [each.watched.test for each in recent] == ["t4", "t2"]
     assert [each.watched.test for each in file_store.watch.list_all(3)] == ["t3", "t5", "t4", "t2"]

@@ -9,8 +9,10 @@ import pytest
 import sqlalchemy as sa
 
 from shm.errors import StoreError
-from shm.store import DeliveryState, Store
+from shm.pipeline.streaming import last_modes
+from shm.store import DeliveryState, Reconciled, Store
 from shm.store.people_and_stream_tables import stream_windows
+from shm.store.stored_streams import KeptStreamWatch
 from tests.helpers.comparing import assert_same
 from tests.helpers.nouns import NOW, an_alert
 from tests.helpers.streams import MODES, a_reading, a_window, an_event
@@ -38,12 +40,14 @@ def test_progress_never_goes_back(store: Store) -> None:
 def test_the_last_modes_are_those_of_the_latest_windows_each_as_it_was_seen_last(
     store: Store,
 ) -> None:
-    assert store.streams.last_modes("h3") == ()
+    assert store.streams.latest_with_modes("h3") == ()
     moved = replace(MODES[0], frequency_hz=MODES[0].frequency_hz * 1.01)
     store.streams.save_window(a_window(10, (moved,)))
     store.streams.save_window(a_window(20, ()))
     store.streams.save_window(a_window(0))
-    assert_same(store.streams.last_modes("h3"), (moved, *MODES[1:]))
+    latest = store.streams.latest_with_modes("h3")
+    assert [each.window.start for each in latest] == [NOW + timedelta(minutes=m) for m in (10, 0)]
+    assert_same(last_modes(latest), (moved, *MODES[1:]))
     assert_same(store.streams.last_window("h3"), a_window(20, ()))
     assert store.streams.last_window("h4") is None
 
@@ -58,17 +62,21 @@ def test_modes_are_kept_without_what_is_not_known(store: Store) -> None:
 
 def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) -> None:
     alert = replace(an_alert(), key="hanger-3:stream", test="", drifts=())
-    assert store.streams.save_pooled(a_reading(-1)) is None
-    raised = store.streams.save_pooled(a_reading(), b"state", alert, ["mail"])
-    assert raised is not None
+    assert store.streams.save_pooled(a_reading(-1)) == ()
+    opens = Reconciled((alert,))
+    (raised,) = store.streams.save_pooled(a_reading(), b"state", opens, ["mail"])
     assert raised.raised_at == NOW + timedelta(hours=1)
-    assert store.streams.watch_state(3) == b"state"
+    state = store.streams.watch(3)
+    assert state is not None
+    assert state.content == b"state"
     assert_same(store.streams.list_pooled(3, "hour", *EVER), (a_reading(-1), a_reading()))
     (owed,) = store.alerts.list_deliveries()
     assert (owed.hook, owed.stored.alert.key) == ("mail", "hanger-3:stream")
-    again = store.streams.save_pooled(a_reading(1), b"later", alert, ["mail"], NOW)
-    assert (again, store.streams.watch_state(3)) == (None, b"later")
-    store.streams.save_pooled(a_reading(2), b"over", ended=["hanger-3:stream"])
+    again = store.streams.save_pooled(a_reading(1), b"later", opens, ["mail"], NOW)
+    state = store.streams.watch(3)
+    assert state is not None
+    assert (again, state.content) == ((), b"later")
+    store.streams.save_pooled(a_reading(2), b"over", Reconciled((), {raised.id: "over"}))
     (over,) = store.alerts.list_all(3, standing=False)
     assert over.resolution is not None
     assert over.resolution.at == NOW + timedelta(hours=3)
@@ -76,8 +84,8 @@ def test_a_pooled_reading_its_watch_and_its_alert_come_together(store: Store) ->
 
 def test_an_alert_of_a_stream_is_delivered_though_no_test_raised_it(store: Store) -> None:
     alert = replace(an_alert(), key="hanger-3:stream", test="", drifts=())
-    store.streams.save_pooled(a_reading(), None, alert, ["mail"], NOW)
-    assert [row.hanger for row in store.alerts.list_rows()] == [3]
+    store.streams.save_pooled(a_reading(), None, Reconciled((alert,)), ["mail"], NOW)
+    assert [row.alert.hanger for row in store.alerts.list_page()] == [3]
     (owed,) = store.alerts.list_due_deliveries(NOW, 10)
     store.alerts.save_delivery(owed, NOW)
     (told,) = store.alerts.list_deliveries()
@@ -87,8 +95,8 @@ def test_an_alert_of_a_stream_is_delivered_though_no_test_raised_it(store: Store
 def test_nothing_of_a_reading_is_kept_where_its_alert_cannot_be(store: Store) -> None:
     alert = replace(an_alert(), key=None)  # type: ignore[arg-type]
     with pytest.raises(StoreError):
-        store.streams.save_pooled(a_reading(), b"state", alert)
-    assert store.streams.watch_state(3) is None
+        store.streams.save_pooled(a_reading(), b"state", Reconciled((alert,)))
+    assert store.streams.watch(3) is None
     assert store.streams.list_pooled(3, "hour", *EVER) == ()
 
 
@@ -117,8 +125,8 @@ def test_what_is_old_goes_but_days_stay(store: Store) -> None:
 def test_a_stream_says_how_far_it_has_come(file_store: Store) -> None:
     """Of its windows, its hours and days, each by its own start."""
     streams = file_store.streams
-    assert streams.first_window("h3") is streams.last_hour("h3") is streams.first_day("h3") is None
-    assert streams.last_pooled("h3", "hour") is None
+    assert streams.first_window("h3") is None
+    assert streams.pooled_range("h3") is streams.pooled_range("h3", "hour") is None
     for minutes in (20, 0, 10):
         streams.save_window(a_window(minutes))
     for hours, period in ((1, "hour"), (2, "hour"), (-12, "day")):
@@ -128,10 +136,10 @@ def test_a_stream_says_how_far_it_has_come(file_store: Store) -> None:
     starts = {NOW + timedelta(minutes=m) for m in (10, 20)}
     assert streams.window_starts("h3", NOW + timedelta(minutes=10)) == starts
     assert streams.window_starts("h4", NOW) == frozenset()
-    assert streams.last_hour("h3") == a_reading(2)
-    assert streams.last_pooled("h3", "hour") == NOW + timedelta(hours=2)
-    assert streams.last_pooled("h3", "day") == streams.first_day("h3") == NOW - timedelta(hours=12)
-    assert streams.last_pooled("h3", "6 hours") is None
+    hours = NOW + timedelta(hours=1), NOW + timedelta(hours=2)
+    assert streams.pooled_range("h3", "hour") == hours
+    assert streams.pooled_range("h3") == (NOW - timedelta(hours=12), hours[1])
+    assert streams.pooled_range("h3", "six hours") is None
     listed = streams.list_pooled(3, "hour", NOW + timedelta(hours=1), NOW + timedelta(hours=2))
     assert listed == (a_reading(1),)
     assert streams.list_pooled(4, "hour", NOW, NOW + timedelta(days=1)) == ()
@@ -162,15 +170,15 @@ def test_a_window_whose_hour_was_left_out_is_found(
 
 def test_the_watch_goes_back_to_a_day_before(file_store: Store) -> None:
     streams = file_store.streams
-    assert streams.watch_time(3) is streams.watch_state(3) is streams.watch_before(3, NOW) is None
+    assert streams.watch(3) is streams.watch(3, NOW) is None
     for day in range(3):
         streams.save_pooled(a_reading(24 * day), b"day %d" % day)
     end = [NOW + timedelta(days=day, hours=1) for day in range(3)]
-    assert (streams.watch_time(3), streams.watch_state(3)) == (end[2], b"day 2")
-    assert streams.watch_before(3, end[1]) == (end[1], b"day 1")
-    assert streams.watch_before(3, end[1] - timedelta(seconds=1)) == (end[0], b"day 0")
-    assert streams.watch_before(3, end[0] - timedelta(seconds=1)) is None
-    assert streams.watch_before(4, end[2]) is None
+    assert streams.watch(3) == KeptStreamWatch(end[2], b"day 2")
+    assert streams.watch(3, end[1]) == KeptStreamWatch(end[1], b"day 1")
+    assert streams.watch(3, end[1] - timedelta(seconds=1)) == KeptStreamWatch(end[0], b"day 0")
+    assert streams.watch(3, end[0] - timedelta(seconds=1)) is None
+    assert streams.watch(4, end[2]) is None
     streams.go_back(3, end[1], b"anew")
-    assert (streams.watch_time(3), streams.watch_state(3)) == (end[1], b"anew")
-    assert streams.watch_before(3, end[2]) == (end[1], b"day 1")
+    assert streams.watch(3) == KeptStreamWatch(end[1], b"anew")
+    assert streams.watch(3, end[2]) == KeptStreamWatch(end[1], b"day 1")

@@ -51,7 +51,9 @@ def updated(store: Store) -> list[StoredTest]:
 def watch(
     store: Store, test: StoredTest, alert: Alert | None = None, *hooks: str
 ) -> StoredAlert | None:
-    return store.watch.save(test, baseline(store), a_watched_test(test.test.id), alert, hooks, NOW)
+    found = a_watched_test(test.test.id)
+    raised = store.watch.save(test, baseline(store), found, alert, hooks, NOW)
+    return raised[0] if raised else None
 
 
 def baseline(store: Store) -> Baseline:
@@ -165,7 +167,7 @@ def test_a_delivery_that_two_have_made_is_ended_once(
     store.alerts.save_failure(owed, "no answer", NOW, NOW)
     (ended,) = store.alerts.list_deliveries()
     assert (ended.state, ended.attempts, ended.last_error) == (DeliveryState.DELIVERED, 1, "")
-    reached = [step.stage for step in store.recordings.list_steps(updated[0].recording_id)]
+    reached = [step.stage for step in store.journal.list_steps(updated[0].recording_id)]
     assert reached.count("notified") == 1
 
 

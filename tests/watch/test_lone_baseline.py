@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shm.models import build
-from shm.pipeline.ending import why_over
+from shm.pipeline.conditions import Evidence, why_over
 from shm.values import Alert, Beside, Drift, ModalTest, WatchedTest
 from shm.watch import WatchOptions, watch_newest
 from shm.watch.baseline_check import check_baseline
@@ -151,7 +151,7 @@ def test_the_alert_stays_while_one_test_is_disturbed_and_ends_once_the_shift_has
 
     def why(*means: float) -> str:
         tests = [later(mean, weeks) for weeks, mean in enumerate(means, 1)]
-        return why_over(alert, tests, HANGER, gap_stands=lambda _: False)
+        return why_over(alert, Evidence(HANGER, tests, "", lambda _: False, ()))
 
     assert not why(-0.18)
     assert not why(-0.18, -0.005)

@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from shm.pipeline.ending import why_over
+from shm.pipeline.conditions import Evidence, why_over
 from shm.values import ModeReading, Reading, RepeatedMistake, WatchedTest
 from shm.watch.alert_state import AlertState
 from shm.watch.mistaken_modes import repeated_mistakes
@@ -129,5 +129,9 @@ def test_the_notice_ends_once_the_mode_fits_again(tests: int, ends: bool) -> Non
     _, alert = after(AlertState(), watched(2, 3), HANGER_3)
     assert alert is not None
     later = [watched(number, tests) for number in (3, 6)]
-    assert not why_over(alert, later[:1], HANGER_3, gap_stands=lambda _: False)
-    assert bool(why_over(alert, later, HANGER_3, gap_stands=lambda _: False)) is ends
+
+    def is_over(tests: list[WatchedTest]) -> bool:
+        return bool(why_over(alert, Evidence(HANGER_3, tests, "", lambda _: False, ())))
+
+    assert not is_over(later[:1])
+    assert is_over(later) is ends

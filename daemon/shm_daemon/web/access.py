@@ -19,7 +19,7 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
 from shm.pipeline import utc_now
 from shm.store import Scope
-from shm.store.audit import Actor
+from shm.store.journal import Actor
 from shm.store.people import SESSION, Role
 from shm_daemon.web.address import caller_of
 from shm_daemon.web.faults import Refused

@@ -90,7 +90,10 @@ class HangerView:
     @cached_property
     def calls(self) -> tuple[StoredWatch, ...]:
         """The tests at which a change stood as called."""
-        return self.store.watch.list_detected(self.hanger.id)
+        if self.baseline is None:
+            return ()
+        found = self.store.watch.list_detected(self.hanger.id, self.baseline.id)
+        return tuple(each for each in found if each.watched.change.called)
 
     @cached_property
     def report(self) -> HangerReport | None:

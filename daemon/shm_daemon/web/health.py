@@ -95,7 +95,7 @@ def _of_description(site: Site) -> list[Lead]:
 
 def _of_strangers(site: Site) -> list[Lead]:
     try:
-        tested = site.store.tests.tested_hangers()
+        tested = site.store.tests.latest().keys()
     except ShmError:
         return []  # told as a trouble
     missing = sorted(tested - {hanger.id for hanger in site.workspace.bridge.watched})
@@ -112,7 +112,8 @@ def _of_strangers(site: Site) -> list[Lead]:
 
 def _of_silences(site: Site) -> list[Lead]:
     try:
-        found = site.store.silences.list_in_force(utc_now())
+        now = utc_now()
+        found = [each for each in site.store.silences.list_all() if each.is_in_force(now)]
     except ShmError:
         return []  # told as a trouble
     return [

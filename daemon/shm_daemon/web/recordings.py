@@ -209,7 +209,7 @@ def _land(
 
 
 def _outcome(store: Store, landed: Landed) -> Any:
-    store.audit.note(utc_now(), "recording uploaded", landed.path.name)
+    store.journal.note(utc_now(), "recording uploaded", landed.path.name)
     known = store.recordings.with_checksum(landed.sha256)
     if known is None:
         return "new"

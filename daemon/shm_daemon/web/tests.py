@@ -54,7 +54,7 @@ def origin(view: TestView) -> Table:
 
 def steps_of(view: TestView) -> tuple[Step, ...]:
     """The steps of the file, and those of this test of it."""
-    found = view.store.recordings.list_steps(view.recording.id)
+    found = view.store.journal.list_steps(view.recording.id)
     return tuple(step for step in found if step.test in (None, view.stored.test.id))
 
 

@@ -6,6 +6,7 @@ Silences and maintenance windows: made and ended on the page of alerts.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
@@ -20,7 +21,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.bridge_reporting import hanger_lines
 from shm.report import formatting
 from shm.report.hanger_status import HangerMessage
-from shm.store import AlertRow, DeliveryRow, DeliveryState, News, Silence
+from shm.store import Delivery, DeliveryState, News, Silence, StoredAlert
 from shm.store.stored_alerts import said_of, silenced_until
 from shm.values.messages import Lead
 from shm_daemon.web.access import AtSite, Reader, Writer
@@ -72,7 +73,11 @@ def alerts_page(
         open_count=sum(counts.values()) if hanger is None else counts.get(hanger, 0),
         is_first=open_before is None and noted_before is None,
         hanger=hanger,
-        silences=[(each.id, _sentence(each)) for each in site.store.silences.list_current(now)],
+        silences=[
+            (each.id, _sentence(each))
+            for each in site.store.silences.list_all()
+            if not each.is_over(now)
+        ],
         hangers=[
             (h.id, formatting.hanger_name(h.id, h.name)) for h in site.workspace.bridge.watched
         ],
@@ -90,7 +95,7 @@ def _some(
     site: Site, hanger: int | None, before: int | None, *, is_open: bool
 ) -> tuple[list[dict[str, Any]], int | None]:
     """Alerts as the page shows them, and the number to go on after, if there are more."""
-    rows = site.store.alerts.list_rows(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
+    rows = site.store.alerts.list_page(hanger, is_open=is_open, limit=_SHOWN + 1, before=before)
     shown, older = paged(rows, _SHOWN)
     documents, now = alert_documents(shown, site), _messages(shown, site)
     return [
@@ -98,15 +103,15 @@ def _some(
             **document,
             "address": _address(each, site),
             "stream": _stream_of(each, site),
-            "now": _now(each, now.get(each.hanger)),
+            "now": _now(each, now.get(each.alert.hanger)),
         }
         for each, document in zip(shown, documents, strict=True)
     ], older
 
 
-def _messages(shown: Sequence[AlertRow], site: Site) -> dict[int, HangerMessage]:
+def _messages(shown: Sequence[StoredAlert], site: Site) -> dict[int, HangerMessage]:
     """What is said first of the hangers of these alerts, by their numbers."""
-    numbers = {each.hanger for each in shown if each.resolution is None}
+    numbers = {each.alert.hanger for each in shown if each.resolution is None}
     hangers = [each for each in site.workspace.bridge.hangers if each.id in numbers]
     if not hangers:
         return {}
@@ -114,25 +119,27 @@ def _messages(shown: Sequence[AlertRow], site: Site) -> dict[int, HangerMessage]
     return {each.hanger.id: each.message for each in lines}
 
 
-def _now(alert: AlertRow, message: HangerMessage | None) -> str:
+def _now(stored: StoredAlert, message: HangerMessage | None) -> str:
     """How the hanger of an alert that stands is now; empty where the alert says just that."""
-    if message is None or alert.resolution or alert.kinds == ("test",):
+    alert = stored.alert
+    if message is None or stored.resolution or alert.kinds == ("test",):
         return ""
     return "" if alert.message.startswith(message.lead.words) else message.lead.words
 
 
-def _address(alert: AlertRow, site: Site) -> str | None:
+def _address(stored: StoredAlert, site: Site) -> str | None:
     """An alert that only tries a hook is of no test."""
-    if stream := _stream_of(alert, site):
+    alert = stored.alert
+    if stream := _stream_of(stored, site):
         return f"/streams/{stream}"
     if "held" in alert.kinds:  # what is held has no page of its own
         return "/operation#held"
     return None if "test" in alert.kinds else test_page(alert.hanger, alert.test)
 
 
-def _stream_of(alert: AlertRow, site: Site) -> str | None:
+def _stream_of(stored: StoredAlert, site: Site) -> str | None:
     """The stream whose hourly reading raised an alert; None of a hammer test."""
-    name, _, hour = alert.test.rpartition(" ")
+    name, _, hour = stored.alert.test.rpartition(" ")
     known = (each.name for each in site.workspace.bridge.streams)
     return name if hour and name in known else None
 
@@ -164,9 +171,9 @@ def alerts(
     """
     is_open = True if open else None
     if limit is None:
-        found = site.store.alerts.list_rows(hanger, is_open=is_open)[::-1]
+        found = site.store.alerts.list_page(hanger, is_open=is_open)[::-1]
         return {"alerts": alert_documents(found, site), "next_before": None}
-    rows = site.store.alerts.list_rows(hanger, is_open=is_open, limit=limit + 1, before=before)
+    rows = site.store.alerts.list_page(hanger, is_open=is_open, limit=limit + 1, before=before)
     shown, older = paged(rows, limit)
     return {"alerts": alert_documents(shown, site), "next_before": older}
 
@@ -184,26 +191,34 @@ def acknowledge(site: AtSite, writer: Writer, alert_id: Row, told: Acknowledge) 
     alerts = site.store.acting_as(writer.actor).alerts
     note = alerts.resolve if told.resolved else alerts.acknowledge
     note(alert_id, who, told.why, utc_now())
-    return alert_documents([site.store.alerts.row(alert_id)], site)[0]
+    return alert_documents([site.store.alerts.get(alert_id)], site)[0]
 
 
-def alert_documents(found: Sequence[AlertRow], site: Site) -> list[dict[str, Any]]:
+def alert_documents(found: Sequence[StoredAlert], site: Site) -> list[dict[str, Any]]:
     """Alerts with what became of their deliveries, and what holds them back."""
     silences, now = site.store.silences.list_all(), utc_now()
     hooks = {hook.name: hook for hook in site.workspace.bridge.hooks}
-    return [_document(each, hooks, silences, now) for each in found]
+    owed = defaultdict[int, list[Delivery]](list)
+    for each in site.store.alerts.list_deliveries(alert_ids=[each.id for each in found]):
+        owed[each.stored.id].append(each)
+    return [_document(each, owed[each.id], hooks, silences, now) for each in found]
 
 
 def _document(
-    alert: AlertRow, hooks: Mapping[str, Hook], silences: tuple[Silence, ...], now: datetime
+    stored: StoredAlert,
+    owed: Sequence[Delivery],
+    hooks: Mapping[str, Hook],
+    silences: tuple[Silence, ...],
+    now: datetime,
 ) -> dict[str, Any]:
-    noted, ended, lead = alert.acknowledgement, alert.resolution, Lead.of(alert.message)
+    noted, ended, alert = stored.acknowledgement, stored.resolution, stored.alert
+    lead = Lead.of(alert.message)
     return {
-        "id": alert.id,
+        "id": stored.id,
         "hanger": alert.hanger,
-        "raised_at": alert.raised_at,
+        "raised_at": stored.raised_at,
         "test": alert.test,
-        "test_at": alert.test_time,
+        "test_at": alert.time,
         "kinds": list(alert.kinds),
         "message": alert.message,
         **asdict(lead),
@@ -211,19 +226,18 @@ def _document(
         "acknowledged": noted and noted.said,
         "resolved": ended and ended.said,
         "silenced_until": None if ended else silenced_until(silences, alert.hanger, now),
-        "deliveries": [
-            _delivery(each, hooks.get(each.hook), alert.message, now) for each in alert.deliveries
-        ],
+        "deliveries": [_delivery(each, hooks.get(each.hook), alert.message, now) for each in owed],
     }
 
 
-def _delivery(row: DeliveryRow, hook: Hook | None, message: str, now: datetime) -> dict[str, Any]:
+def _delivery(row: Delivery, hook: Hook | None, message: str, now: datetime) -> dict[str, Any]:
     until = None
     if hook is not None and row.state is DeliveryState.WAITING:
         until = hook.quiet_until(message, now, is_raised=row.news is News.RAISED)
     escalates = hook is not None and hook.escalation_after_seconds is not None
+    told = {name: getattr(row, name) for name in ("hook", "attempts", "last_error", "news")}
     state = {"state": row.state.value, "escalation": escalates, "waits_until": until}
-    return {**vars(row), **state}
+    return {**told, **state}
 
 
 @router.post("/silences", include_in_schema=False)

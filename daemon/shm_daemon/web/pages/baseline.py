@@ -16,7 +16,7 @@ from shm.pipeline import utc_now
 from shm.pipeline.rebaselining import Order, set_baseline
 from shm.report import formatting
 from shm.store import Workspace
-from shm.store.audit import Actor
+from shm.store.journal import Actor
 from shm.watch.repair_check import EVENT_KINDS
 from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.background_work import RETRY_AFTER, background_worker_of

@@ -126,7 +126,7 @@ def _temperature(celsius: float) -> str:
 
 def _tension(view: TestView) -> tuple[str, str, str]:
     try:
-        posterior = view.store.posteriors.of_test(view.stored)
+        posterior = view.store.posteriors.get(view.stored.hanger, view.stored.test.id)
     except NothingThere:
         return "Tension", "not yet", f"the test is {view.stored.stage}"
     tension_n = Interval.of_samples(posterior.tension_n)

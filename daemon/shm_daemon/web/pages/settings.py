@@ -18,7 +18,7 @@ from shm.pipeline.watching import differences
 from shm.report import formatting
 from shm.settings import TABLE, Settings, load_settings
 from shm.store import Stage
-from shm.store.audit import ChangedSetting, said
+from shm.store.changed_settings import ChangedSetting, said
 from shm.values import Hanger
 from shm_daemon.web.access import AtSite, Engineer
 from shm_daemon.web.faults import Refused

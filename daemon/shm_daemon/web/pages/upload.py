@@ -130,8 +130,8 @@ async def import_file(
         await receive_body(request, file.write, workspace.settings.max_file_bytes)
         looked = await run_in_threadpool(_looked, file, landing_name(name), workspace, said)
         if looked.sha256 is not None:
-            audit = site.store.acting_as(writer.actor).audit
-            await run_in_threadpool(audit.note, utc_now(), "recording uploaded", name)
+            journal = site.store.acting_as(writer.actor).journal
+            await run_in_threadpool(journal.note, utc_now(), "recording uploaded", name)
         return looked
     finally:
         await run_in_threadpool(file.close)

@@ -67,7 +67,7 @@ def _page(request: Request, site: Site, message: str = "", status: int = 200) ->
 @router.get("/audit")
 def audit_page(request: Request, site: AtSite, _: Engineer, before: Before = None) -> Response:
     """What people changed, by page, API or command line, the newest first."""
-    shown, older = paged(site.store.audit.list_rows(_SHOWN + 1, before), _SHOWN)
+    shown, older = paged(site.store.journal.list_changes(_SHOWN + 1, before), _SHOWN)
     table = Table(
         "Changes",
         ("time", "who", "by", "action", "of", "detail"),

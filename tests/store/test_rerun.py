@@ -42,7 +42,7 @@ def test_identifying_again_keeps_the_old_result_beside_the_new_one(store: Store)
     baseline = with_baseline(store)
     second = identified(store, 2)
     watched(store, second, baseline)
-    rerun = store.recordings.reprocess(second.recording_id, Stage.IDENTIFIED, LATER)
+    rerun = store.recordings.rerun(second.recording_id, Stage.IDENTIFIED, LATER)
     assert (rerun.tests, rerun.posteriors, rerun.watches, rerun.of_baseline) == (("t2",), 1, 1, ())
     assert rerun.recording.stage is Stage.RECEIVED
     assert [test.test.id for test in store.tests.list_all(3)] == ["t1"]
@@ -62,7 +62,7 @@ def test_identifying_again_keeps_the_old_result_beside_the_new_one(store: Store)
     assert store.posteriors.get(3, "t2").seed == 2
     assert len(store.posteriors.list_all(3)) == 2
     assert [drift.test for drift in store.watch.list_drifts(3)] == ["t2"]
-    assert store.recordings.list_events("again")[0].recording_id == second.recording_id
+    assert store.journal.list_events("again")[0].recording_id == second.recording_id
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_a_test_is_sent_back_to_the_stage_before(
     baseline = with_baseline(store)
     second = identified(store, 2)
     watched(store, second, baseline)
-    rerun = store.recordings.reprocess(second.recording_id, stage, LATER, "t2")
+    rerun = store.recordings.rerun(second.recording_id, stage, LATER, "t2")
     assert (rerun.posteriors, rerun.watches) == (posteriors, 1)
     assert store.tests.get(second.id).stage is stands
     assert rerun.recording.stage is stands
@@ -90,7 +90,7 @@ def test_a_test_is_sent_back_to_the_stage_before(
 def test_the_baseline_stays_when_its_own_test_is_identified_again(store: Store) -> None:
     baseline = with_baseline(store)
     first = store.tests.list_all(3)[0]
-    rerun = store.recordings.reprocess(first.recording_id, Stage.IDENTIFIED, LATER)
+    rerun = store.recordings.rerun(first.recording_id, Stage.IDENTIFIED, LATER)
     assert (rerun.of_baseline, rerun.posteriors) == (("t1",), 0)
     anew = identified(store, 1, NEW)
     store.posteriors.save(anew, a_posterior(seed=2), NEW, LATER, to_watch=False)
@@ -105,7 +105,7 @@ def test_the_baseline_stays_when_its_own_test_is_identified_again(store: Store) 
 def test_a_test_of_a_changed_name_keeps_it(store: Store) -> None:
     identified(store, 1, name="t")
     second = identified(store, 2, name="t")
-    store.recordings.reprocess(second.recording_id, Stage.IDENTIFIED, LATER)
+    store.recordings.rerun(second.recording_id, Stage.IDENTIFIED, LATER)
     assert identified(store, 2, name="t").test.id == second.test.id != "t"
 
 
@@ -114,16 +114,14 @@ def test_what_the_watch_kept_is_dropped_with_a_test_that_is_done_again(store: St
     second = identified(store, 2)
     watched(store, second, baseline)
     assert store.watch.state(baseline) == KeptWatch("a key", second.time, b"state")
-    store.recordings.reprocess(second.recording_id, Stage.WATCHED, LATER)
+    store.recordings.rerun(second.recording_id, Stage.WATCHED, LATER)
     assert store.watch.state(baseline) is None
 
 
 def test_a_refused_file_may_be_tried_again(store: Store) -> None:
     recording = store.recordings.receive(a_file(1), NOW).recording
     store.recordings.refuse(recording.id, {"message": "no rate."}, NOW)
-    assert (
-        store.recordings.reprocess(recording.id, Stage.IDENTIFIED, LATER).recording.reason is None
-    )
+    assert store.recordings.rerun(recording.id, Stage.IDENTIFIED, LATER).recording.reason is None
     assert [each.id for each in store.recordings.list_waiting(5)] == [recording.id]
 
 
@@ -131,8 +129,8 @@ def test_a_refused_file_may_be_tried_again(store: Store) -> None:
 def test_what_has_not_come_so_far_cannot_be_done_again(store: Store, stage: Stage) -> None:
     recording = store.recordings.receive(a_file(1), NOW).recording
     with pytest.raises(UsageError, match="not come so far"):
-        store.recordings.reprocess(recording.id, stage, LATER)
-    assert store.recordings.list_events() == ()
+        store.recordings.rerun(recording.id, stage, LATER)
+    assert store.journal.list_events() == ()
 
 
 def test_a_recording_is_found_by_its_number_or_by_the_name_of_a_test(store: Store) -> None:
@@ -158,7 +156,8 @@ def test_a_renamed_file_is_found_by_both_names(store: Store) -> None:
     names = ("t1", "h3-1.csv", "h3-1", "crew/new.uff", "new.uff", "copy", "copy.csv")
     assert {store.recordings.find(name) for name in names} == {(test.recording_id, None)}
     assert store.recordings.find("new") == (test.recording_id, "new")
-    assert store.recordings.names_of(recording.id) == ("crew/new.uff", "h3-1.csv", "copy.csv")
+    came_as = {each.file_name for each in store.journal.list_events(recording_id=recording.id)}
+    assert came_as == {"crew/new.uff", "h3-1.csv", "copy.csv"}
     with pytest.raises(NothingThere):
         store.recordings.find("h3")
     refused = store.recordings.receive(a_file(2), NOW).recording
@@ -182,7 +181,7 @@ def test_each_stage_that_was_reached_is_a_row(store: Store) -> None:
     store.watch.save(second, baseline, a_watched_test(), an_alert(), ["mail", "sms"], NOW)
     for delivery in store.alerts.list_deliveries():
         store.alerts.save_delivery(delivery, LATER)
-    steps = store.recordings.list_steps(second.recording_id)
+    steps = store.journal.list_steps(second.recording_id)
     assert [step.stage for step in steps if step.test is None] == [
         "archived", "received", "identified", "updated", "done"
     ]  # fmt: skip
@@ -195,6 +194,6 @@ def test_a_refusal_is_a_step_of_the_file_and_of_its_tests(store: Store) -> None:
     test = identified(store, 1)
     store.recordings.refuse(test.recording_id, {"message": "no."}, LATER, [test.id])
     refused = [
-        s.test for s in store.recordings.list_steps(test.recording_id) if s.stage == Stage.REFUSED
+        s.test for s in store.journal.list_steps(test.recording_id) if s.stage == Stage.REFUSED
     ]
     assert refused == [None, "t1"]
