@@ -259,6 +259,13 @@ class Bank:
         )
         return bank.without_beginnings()
 
+    def absorbed(self, evidence: Evidence) -> Bank:
+        """With the likeliest change taken for none: what is read from here on is without it."""
+        bank = self.changed(evidence)
+        mean = bank.mean.copy()
+        mean[:, LEVEL] -= evidence.shift
+        return replace(bank, mean=mean)
+
     @property
     def wander_sd(self) -> float:
         """By what ln T wanders within a day or two."""
