@@ -377,7 +377,7 @@ class LocalLevels:
     def _filtered(self, z: FloatArray) -> tuple[FloatArray, list[tuple[FloatArray, ...]]]:
         """Return the log likelihood (m,) of z (m, 2 q) and the steps, one for each test.
 
-        A step is the state before and after it, what it pulls (m, 2 q) and how surely (m, 2 q, 2 q).
+        A step is the state before and after it, what it pulls and how surely (m, 2 q, 2 q).
 
         A test of information L that sees H of a state with covariance P, through scatter of
         covariance S, has the weight (1 + L (H P H' + S))^-1 L: also where L is singular.
