@@ -52,6 +52,7 @@ from shm.watch.linear_reading import Likelihood  # noqa: E402
 from shm.watch.state_sums import StateSums  # noqa: E402
 from shm.watch.watcher import Watcher  # noqa: E402
 from tests.benchmarks import watch_worlds  # noqa: E402
+from tests.benchmarks.watch_trial import outcomes  # noqa: E402
 from tests.benchmarks.watch_trial.outcomes import (  # noqa: E402
     QUIET,
     covers,
@@ -203,11 +204,13 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=82000)
     parser.add_argument("--years", type=float, default=3.0)
     parser.add_argument("--baselines", default="1")
+    parser.add_argument("--begins", type=float, default=outcomes.BEGINS, help="day of the events")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", help="these mechanisms, parted by commas")
     parser.add_argument("--answers", type=Path, help="keep every hanger's outcome, a line each")
     parser.add_argument("--of", type=Path, nargs="*", default=[], help="outcomes that are there")
     given = parser.parse_args()
+    outcomes.BEGINS = watch_worlds.BEGINS = given.begins  # before any process is forked
     names = given.only.split(",") if given.only else list(MECHANISMS)
     if unknown := set(names) - MECHANISMS.keys():
         parser.error(f"no mechanism {sorted(unknown)}; there are {', '.join(MECHANISMS)}")
