@@ -39,16 +39,16 @@ from shm.watch.agreement import Way, agreement, way_of
 from shm.watch.alert_state import AlertState, conditions, still, with_beyond
 from shm.watch.alert_text import alert_of, message_of
 from shm.watch.change_words import CAUSES, suspects
-from shm.watch.isolated_tests import (
+from shm.watch.odd_test_alerts import (
     FEW_TESTS,
     FIRST_TESTS,
     alert_of_baseline,
     first_tests_against,
     message_of_odd,
 )
-from shm.watch.mistaken_modes import news_of, notice_of, repeated_mistakes
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
+from shm.watch.repeated_mistakes import news_of, notice_of, repeated_mistakes
 from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watch, Watcher, watch_of, watched
 
