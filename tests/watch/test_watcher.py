@@ -14,7 +14,6 @@ from shm.values import WatchedTest
 from shm.watch.causes import POINT_MASS, TIMEBASE, Columns
 from shm.watch.options import WatchOptions
 from shm.watch.watcher import Watch, watched
-from tests.contracts.watch_scenarios import load
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.synthetic_readings import (
     BOTH_ENDS,
@@ -417,14 +416,3 @@ def test_results_do_not_hang_on_the_order_of_modes() -> None:
 
     assert other.change.evidence_years == pytest.approx(one.change.evidence_years, rel=1e-6)
     assert other.drifts[0].shift_mean == pytest.approx(one.drifts[0].shift_mean, rel=1e-6)
-
-
-def test_what_one_test_in_four_did_before_needs_more_tests_than_what_none_did() -> None:
-    readings = History(tests=24, outliers=0, seasons_k=5).readings(4)
-    stays = list(range(14, 24))
-
-    (never,) = watch_of(load(readings, stays), TENSION_ALONE).calls
-    often = watch_of(load(readings, [2, 6, 10, *stays]), TENSION_ALONE).calls
-
-    assert never.index <= 16
-    assert not often or often[0].index > never.index
