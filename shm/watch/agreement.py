@@ -141,11 +141,6 @@ def _is_later(newest: ModalTest, other: ModalTest) -> bool:
     return newest.time is not None and other.time is not None and newest.time - other.time >= _APART
 
 
-def are_of_two_visits(*tests: ModalTest) -> bool:
-    """Whether by their own clocks some of the tests were a later visit than others."""
-    return any(_is_later(one, other) for one in tests for other in tests)
-
-
 def way_of(shift: float) -> Way:
     """To which side a shift goes."""
     return "down" if shift < 0 else "up"

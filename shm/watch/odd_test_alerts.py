@@ -4,43 +4,22 @@ A baseline that agrees with none of the tests since: a change right after it, or
 test can tell which. One baseline in twelve has a vehicle next to the hanger, and hardly one change
 in a thousand comes right after it: what a load may do is a notice that states both. What no load
 does is an alert, since a loss in a notice is silent for as long as nobody looks.
-
-The watch itself waits until a change is more probable than all that its tests did before; of a
-baseline of one or two tests it cannot know what that is. So the first tests since are compared with
-it individually, too, with the most scatter that is usual and the temperature's effect allowed for.
 """
 
 from __future__ import annotations
-
-import math
-from collections.abc import Sequence
-from datetime import datetime
-
-import numpy as np
 
 from shm.values import (
     TENSION,
     Alert,
     AlertKind,
-    Beside,
     Drift,
-    FloatArray,
     Hanger,
-    ModalTest,
-    WatchedQuantity,
     WatchedTest,
 )
-from shm.values.drift import ENOUGH_AGAINST
 from shm.values.messages import WEEK
 from shm.values.rounding import force_unit
 from shm.watch.agreement import (
     BY_A_LOAD,
-    CLEAR,
-    Shown,
-    are_of_two_visits,
-    drift_of,
-    read_alone,
-    scatter_of,
 )
 from shm.watch.alert_text import against_baseline_words, alert_of
 from shm.watch.change_words import (
@@ -50,18 +29,9 @@ from shm.watch.change_words import (
     quantity_words,
     size_words,
 )
-from shm.watch.options import WatchOptions
-from shm.watch.readings import Reader
-from shm.watch.repeated_mistakes import off_the_baseline
-from shm.watch.shift_mixture import Shift
 
-FEW_TESTS = 2
-"""Of a baseline: of three, those that agree outvote the odd one."""
-FIRST_TESTS = 6
-"""Since the baseline, in which a change must be told; then the watch knows its scatter."""
 _KIND: AlertKind = "check the baseline"
 _CLEAR_DRIFT = 2.0  # judgement: that tests and baseline disagree is known by then
-_SHOWN = 0.5  # of a shift: half of it or more is nearer to it than to none
 
 
 def alert_of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
@@ -74,66 +44,10 @@ def alert_of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
     message = message_of_baseline(test, hanger)
     if lead is not None and hanger.is_modelled:
         message = _message(hanger, lead, test.change.against_baseline)
-    return _alert(hanger, "check-the-baseline", (test.test, test.time), lead, message)
-
-
-def first_tests_against(
-    reader: Reader,
-    newest: tuple[ModalTest, datetime],
-    beside: Beside,
-    hanger: Hanger,
-    options: WatchOptions,
-) -> Alert | None:
-    """Return the alert of a test that with the two before it clearly reads another tension.
-
-    An end that seems to have moved is left to the watch: one mistaken mode of the only test before
-    passes for it. None where tensions do not, there are no two tests that are watched, all are of
-    one visit, their modes fit no state (a notice says so), or they are off by next to nothing.
-    """
-    unwatched = {*beside.held, *beside.of_works}
-    before = [test for test in beside.came[0] if test.id not in unwatched]
-    tests = [newest[0], *before[: ENOUGH_AGAINST - 1]]
-    if len(tests) < ENOUGH_AGAINST or not are_of_two_visits(*tests):
-        return None
-    if any(off_the_baseline(reader.reading(test, newest[1])).any() for test in tests):
-        return None
-    j = [quantity.name for quantity in reader.quantities].index(TENSION)
-    shown = [read_alone(reader, test, options)[j] for test in tests]
-    lead = _common(reader.quantities[j], shown, newest, hanger, options)
-    if lead is None:
-        return None
-    message, test = _message(hanger, lead, len(tests)), (newest[0].id, newest[1])
-    return _alert(hanger, "first-tests-against-baseline", test, lead, message)
-
-
-def _alert(
-    hanger: Hanger, key: str, test: tuple[str, datetime], lead: Drift | None, message: str
-) -> Alert:
-    """Return an alert where the tension moved further than by any load, else a notice."""
     is_alert = lead is not None and _is_no_load(lead)
     drifts = (lead,) if lead is not None and is_alert else ()
     kind: AlertKind = "beyond threshold" if is_alert else _KIND
-    return alert_of(hanger, test, key, message, (kind,), drifts)
-
-
-def _common(
-    quantity: WatchedQuantity,
-    shown: Sequence[Shown],
-    newest: tuple[ModalTest, datetime],
-    hanger: Hanger,
-    options: WatchOptions,
-) -> Drift | None:
-    """Return what all tests show of the tension; None where one does not, or it is not clear."""
-    each: FloatArray = np.array([one.mean for one in shown])
-    mean = float(each.mean())
-    # What tests scatter by is their own, but for the baseline's; the rest may be common to them.
-    own = (1 - 1 / len(shown)) * scatter_of(quantity) ** 2
-    sd = math.sqrt(float(np.mean([one.variance for one in shown])) - own)
-    moves = float(np.mean([one.moves for one in shown]))
-    is_clear = abs(mean) >= CLEAR * sd and moves >= options.least_frequency_shift
-    if not is_clear or (each / mean).min() < _SHOWN:
-        return None
-    return drift_of(quantity, newest, Shift(mean, sd), hanger)
+    return alert_of(hanger, (test.test, test.time), "check-the-baseline", message, (kind,), drifts)
 
 
 def _is_no_load(lead: Drift) -> bool:

@@ -40,10 +40,7 @@ from shm.watch.alert_state import AlertState, conditions, still, with_beyond
 from shm.watch.alert_text import alert_of, message_of
 from shm.watch.change_words import CAUSES, suspects
 from shm.watch.odd_test_alerts import (
-    FEW_TESTS,
-    FIRST_TESTS,
     alert_of_baseline,
-    first_tests_against,
     message_of_odd,
 )
 from shm.watch.options import WatchOptions
@@ -178,11 +175,6 @@ def watch_newest(
     # A second test that agrees answers the notice that asks for one.
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
         agreed = agreement(reader, later[-1], beside, hanger, options, told.beyond)
-        are_first = state.tests - len(baseline_tests) <= FIRST_TESTS
-        is_told = told.alone or bool(told.beyond)
-        if agreed is None and are_first and len(baseline_tests) <= FEW_TESTS and not is_told:
-            agreed = first_tests_against(reader, later[-1], beside, hanger, options)
-            told = replace(told, alone=told.alone or agreed is not None)
         if agreed is not None:
             two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
             alert, told = agreed, with_beyond(told, agreed.drifts, agreed.time)

@@ -112,7 +112,6 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
     "tests that stand alone": [(watcher, "counted", count_all)],
     "modes that stray": [(isolated_tests, "_strays", give(False))],
     "a baseline that stands alone": [(watcher, "ENOUGH_AGAINST", 10**9)],
-    "first tests against a baseline": [(watch_worlds, "first_tests_against", give(None))],
     "two tests that agree": [(watch_worlds, "agreement", give(None))],
     "learnt scatter": [(StateSums, "scatter", lambda self, _: self.structure.scatter_variance)],
     "four scales of scatter": [with_options(scatter_scales=(1.0,))],
