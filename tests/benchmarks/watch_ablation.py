@@ -2,7 +2,7 @@
 
 make ablation ROOM=watch
 make ablation ROOM=watch ARGS="--only 'everything,persistence' --bridges 4 --seed 82000"
-python tests/benchmarks/watch_ablation.py --answers a.jsonl --of b.jsonl      # goes on from b
+python tests/benchmarks/watch_ablation.py --answers a.jsonl --of b.jsonl    # without what b has
 
 Seasons of the worlds of `watch_worlds.py`: quiet ones, and events on day 540. For each mechanism
 left out: first false alarms a hanger-year, notices a year, events reported of those there are, the
@@ -17,7 +17,6 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -34,14 +33,11 @@ sys.path.insert(0, str(ROOT))
 
 from shm.values import BaselineCheck  # noqa: E402
 from shm.watch import (  # noqa: E402
-    agreement,
-    alert_state,
     causes,
     isolated_tests,
     mistaken_modes,
     options,
     persistence,
-    reading_corrections,
     readings,
     state_sums,
     watcher,
@@ -49,22 +45,11 @@ from shm.watch import (  # noqa: E402
 )
 from shm.watch.change_point import Evidence  # noqa: E402
 from shm.watch.linear_reading import Likelihood  # noqa: E402
-from shm.watch.state_sums import StateSums  # noqa: E402
+from shm.watch.reading_corrections import AmplitudeSlopes  # noqa: E402
+from shm.watch.state_sums import StateSums, WatchState  # noqa: E402
 from shm.watch.watcher import Watcher  # noqa: E402
 from tests.benchmarks import watch_worlds  # noqa: E402
 from tests.benchmarks.watch_trial import outcomes  # noqa: E402
-from tests.benchmarks.watch_trial.outcomes import (  # noqa: E402
-    QUIET,
-    covers,
-    delays,
-    false_alarms,
-    first_alert,
-    is_alert,
-    is_right,
-    ours,
-    rate,
-    share,
-)
 
 Row = dict[str, Any]
 Change = tuple[Any, str, Any]
@@ -87,6 +72,17 @@ def count_all(seen: Any, *_: Any) -> Any:
     return np.isfinite(seen.variances).any(axis=1)
 
 
+def weigh_all(watcher: Watcher, state: WatchState) -> tuple[WatchState, Evidence]:
+    """Give the newest visit its full weight."""
+    rows = np.union1d(np.flatnonzero(state.counted), [state.tests - 1])
+    return state, watcher._evidence(state, rows)
+
+
+def find_no_pattern(*given: Any) -> Any:
+    """Return no pattern of any quantity."""
+    return tuple(np.zeros((0, len(given[3]))) for _ in given[4])
+
+
 WHOLE = "everything"
 MECHANISMS: Mapping[str, Sequence[Change]] = {
     WHOLE: (),
@@ -99,16 +95,7 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
         (persistence, "_LEAST_WAITED", 0.0),
         (persistence, "_MOST_WAITED", np.inf),
     ],
-    "bound on one visit": [
-        (
-            Watcher,
-            "_bounded",
-            lambda self, state: (
-                state,
-                self._evidence(state, np.union1d(np.flatnonzero(state.counted), [state.tests - 1])),
-            ),
-        )
-    ],
+    "bound on one visit": [(Watcher, "_bounded", weigh_all)],
     "tests that stand alone": [(watcher, "counted", count_all)],
     "modes that stray": [(isolated_tests, "_strays", give(False))],
     "a baseline that stands alone": [(watcher, "ENOUGH_AGAINST", 10**9)],
@@ -126,35 +113,16 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
     "mistaken modes: loosened ends": [(readings, "_LOOSENED", 1e-300)],
     "mistaken modes: tests of another bar": [(mistaken_modes, "_MISFIT", 1e-300)],
     "stated errors by the misfit": [(readings, "_PRIOR_FREEDOM", 1e12)],
-    "patterns of loosening": [
-        (
-            readings,
-            "loosening_of",
-            lambda *given: tuple(np.zeros((0, len(given[3]))) for _ in given[4]),
-        )
-    ],
+    "patterns of loosening": [(readings, "loosening_of", find_no_pattern)],
     "slopes with amplitude": [
-        (
-            reading_corrections.AmplitudeSlopes,
-            "at",
-            lambda _, __, modes, ___: (np.zeros(len(modes)), np.zeros(len(modes))),
-        )
-    ],
-    "covariates of amplitude": [
-        with_options(
-            tension_per_amplitude_sd=1e-9,
-            spring_per_amplitude_sd_of_step=1e-9,
-            bending_per_amplitude_sd=1e-9,
-        )
+        (AmplitudeSlopes, "at", lambda _, test, modes, own: np.zeros((2, len(modes))))
     ],
     "creep": [with_options(creep_per_year_sd=1e-9)],
     "unknown temperatures of a season": [(options, "_SEASON_YEARS", 1e-9)],
     "tests of one day": [(state_sums, "OF_ONE_VISIT_YEARS", 1e-9)],
     "springs that move together": [(causes, "_CORRELATION", 0.0)],
-    "end of an alert on two visits": [(alert_state, "OF_ONE_VISIT", -options.OF_ONE_VISIT)],
     "least shift of a frequency": [with_options(least_frequency_shift=0.0)],
     "check of the baseline": [(watch_worlds, "check_baseline", give(BaselineCheck()))],
-    "loads in what two tests show": [(agreement, "BY_A_LOAD", 0.0)],
 }
 
 
@@ -167,28 +135,28 @@ def without(name: str) -> Iterator[None]:
         yield
 
 
-def solve(task: tuple[str, tuple[str, str, int, int, float]]) -> list[Row]:
-    """Return what the watch says of the hangers of one season, without a mechanism."""
-    name, season = task
-    with without(name):
-        return [{**row, "without": name} for row in watch_worlds.solved(season)]
+HEADS = (
+    "| left out | first false alarms a hanger-year | notices a hanger | reported | median test "
+    "| cause right | shift in its interval | ms a test |"
+)
 
 
 def row_of(name: str, rows: Sequence[Row]) -> str:
     """Return the table's row of a mechanism."""
-    quiet = [row for row in rows if row["scenario"] in QUIET]
-    events = [row for row in rows if row["scenario"] not in QUIET]
-    alarms, years = false_alarms(quiet, ours)
-    notices = sum(not is_alert(each) for row in rows for each in row["alerts"])
-    waited, found = delays(events, ours), [row for row in events if first_alert(row)]
+    quiet = [row for row in rows if row["scenario"] in outcomes.QUIET]
+    events = [row for row in rows if row["scenario"] not in outcomes.QUIET]
+    alarms, years = outcomes.false_alarms(quiet, outcomes.ours)
+    notices = sum(not outcomes.is_alert(each) for row in rows for each in row["alerts"])
+    waited = outcomes.delays(events, outcomes.ours)
+    found = [row for row in events if outcomes.first_alert(row)]
     cells = [
         name,
-        rate(alarms, max(years, 1e-9)),
+        outcomes.rate(alarms, years) if years else "",
         f"{notices / max(len(rows), 1):.2f}",
         f"{int(np.isfinite(waited).sum())} of {len(waited)}",
         f"{np.median(waited):.0f}" if len(waited) else "",
-        share(sum(map(is_right, found)), len(found)),
-        share(sum(map(covers, rows)), len(rows)),
+        outcomes.share(sum(map(outcomes.is_right, found)), len(found)),
+        outcomes.share(sum(map(outcomes.covers, rows)), len(rows)),
         f"{1000 * float(np.median([row['seconds'] for row in rows])):.0f}",
     ]
     return f"| {' | '.join(cells)} |"
@@ -204,12 +172,11 @@ def main() -> None:
     parser.add_argument("--years", type=float, default=3.0)
     parser.add_argument("--baselines", default="1")
     parser.add_argument("--begins", type=float, default=outcomes.BEGINS, help="day of the events")
-    parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", help="these mechanisms, parted by commas")
     parser.add_argument("--answers", type=Path, help="keep every hanger's outcome, a line each")
     parser.add_argument("--of", type=Path, nargs="*", default=[], help="outcomes that are there")
     given = parser.parse_args()
-    outcomes.BEGINS = watch_worlds.BEGINS = given.begins  # before any process is forked
+    outcomes.BEGINS = watch_worlds.BEGINS = given.begins
     names = given.only.split(",") if given.only else list(MECHANISMS)
     if unknown := set(names) - MECHANISMS.keys():
         parser.error(f"no mechanism {sorted(unknown)}; there are {', '.join(MECHANISMS)}")
@@ -225,16 +192,14 @@ def main() -> None:
         for seed in range(given.seed, given.seed + given.bridges)
         if (name, world, scenario, seed, int(count)) not in done
     ]
-    with ProcessPoolExecutor(given.jobs) as pool:
-        for found in pool.map(solve, tasks):
-            rows += found
-            if given.answers:
-                with given.answers.open("a") as file:
-                    file.writelines(json.dumps(row) + "\n" for row in found)
-    print(
-        "| left out | first false alarms a hanger-year | notices a hanger | reported | median test"
-    )
-    print("| cause right | shift in its interval | ms a test |\n| " + "--- | " * 8)
+    for name, season in tasks:
+        with without(name):
+            found = [{**row, "without": name} for row in watch_worlds.solved(season)]
+        rows += found
+        if given.answers:
+            with given.answers.open("a") as file:
+                file.writelines(json.dumps(row) + "\n" for row in found)
+    print(HEADS, "|" + " --- |" * 8, sep="\n")
     for name in dict.fromkeys(row["without"] for row in rows):
         print(row_of(name, [row for row in rows if row["without"] == name]), flush=True)
 
