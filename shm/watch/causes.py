@@ -44,7 +44,7 @@ class Direction:
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class DetectedChange:
     """A called change: the test at which it began, its time, and whether it goes on.
 
     `precision` (n + q, n + q) is that of its size before the tests after the call: which causes

@@ -62,7 +62,7 @@ class Seen:
         return modes > 0 and square < float(scipy.special.chdtri(modes, _SELDOM))
 
 
-def counted(seen: Seen, known: BoolArray, baseline_tests: int) -> BoolArray:
+def select_consistent_tests(seen: Seen, known: BoolArray, baseline_tests: int) -> BoolArray:
     """Return which of the tests (T,) count; `known` is the result when there were fewer of them.
 
     Of a baseline of three tests or more those count that agree with half of the others. What was
@@ -84,11 +84,11 @@ def counted(seen: Seen, known: BoolArray, baseline_tests: int) -> BoolArray:
         ]
         near = [each for each in near if each >= first]
         agrees = agreeing >= _AGREEING * len(before) or any(seen.agree(test, n) for n in near)
-        found[test] = agrees and not _strays(seen, found, test, near)
+        found[test] = agrees and not _has_outlying_mode(seen, found, test, near)
     return found
 
 
-def _strays(seen: Seen, found: BoolArray, test: int, near: Sequence[int]) -> bool:
+def _has_outlying_mode(seen: Seen, found: BoolArray, test: int, near: Sequence[int]) -> bool:
     """Return True if a mode lies where no counted test before has it, and none next to it."""
     for mode in np.flatnonzero(np.isfinite(seen.variances[test])):
         measured = np.isfinite(seen.variances[:, mode])

@@ -91,7 +91,7 @@ def reference_of(temperatures_c: Sequence[float]) -> float:
     return float(np.mean(known)) if known else NAN
 
 
-def warmth_of(
+def temperature_offsets(
     temperatures_c: FloatArray, years: FloatArray, reference_c: float, options: WatchOptions
 ) -> Warmth:
     """Of tests at `years` (T,), ascending.

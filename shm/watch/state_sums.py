@@ -20,10 +20,10 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.values import BoolArray, Change, FloatArray, IntArray, WatchedQuantity, is_ratio
-from shm.watch.causes import Structure, Told
+from shm.watch.causes import DetectedChange, Structure
 from shm.watch.change_point import SIZES, Evidence, Sums, sums_of
 from shm.watch.isolated_tests import Seen
-from shm.watch.options import OF_ONE_VISIT_YEARS, Warmth, WatchOptions, warmth_of
+from shm.watch.options import OF_ONE_VISIT_YEARS, Warmth, WatchOptions, temperature_offsets
 from shm.watch.persistence import Course
 from shm.watch.quantities import MeasuredMode
 
@@ -154,7 +154,9 @@ class StateSums:
         return np.concatenate([state.slopes, fixed], axis=2)
 
     def _warmth(self, state: WatchState) -> Warmth:
-        return warmth_of(state.temperature_c, state.years, state.reference_c, self.options)
+        return temperature_offsets(
+            state.temperature_c, state.years, state.reference_c, self.options
+        )
 
     def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
         """What quantities go with, each by a coefficient of its own: kelvin, and as many further
@@ -263,7 +265,7 @@ class StateSums:
             wider[:, None, None, None] * covariance,
         )
 
-    def course(self, state: WatchState, rows: IntArray, called: Sequence[Told]) -> Course:
+    def course(self, state: WatchState, rows: IntArray, called: Sequence[DetectedChange]) -> Course:
         """The tests `rows` with what the null says of each, called changes included."""
         layout = self.structure.layout
         columns = self._columns(state, rows)

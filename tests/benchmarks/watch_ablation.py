@@ -86,7 +86,9 @@ def find_no_pattern(*given: Any) -> Any:
 WHOLE = "everything"
 MECHANISMS: Mapping[str, Sequence[Change]] = {
     WHOLE: (),
-    "persistence": [(Watcher, "_bounded_by_what_stays", lambda _, state, found: (found, found, 0))],
+    "persistence": [
+        (Watcher, "_apply_recurrence_bound", lambda _, state, found: (found, found, 0))
+    ],
     "persistence: joints that give": [(persistence, "_SLIPPING", ())],
     "persistence: large changes": [(persistence, "_LARGE_SEEM", persistence._SEEM)],
     "persistence: gross changes": [(persistence, "_GROSS", np.inf)],
@@ -95,14 +97,14 @@ MECHANISMS: Mapping[str, Sequence[Change]] = {
         (persistence, "_LEAST_WAITED", 0.0),
         (persistence, "_MOST_WAITED", np.inf),
     ],
-    "bound on one visit": [(Watcher, "_bounded", weigh_all)],
-    "tests that stand alone": [(watcher, "counted", count_all)],
-    "modes that stray": [(isolated_tests, "_strays", give(False))],
+    "bound on one visit": [(Watcher, "_limit_last_visit", weigh_all)],
+    "tests that stand alone": [(watcher, "select_consistent_tests", count_all)],
+    "modes that stray": [(isolated_tests, "_has_outlying_mode", give(False))],
     "a baseline that stands alone": [(watcher, "ENOUGH_AGAINST", 10**9)],
     "two tests that agree": [(watch_worlds, "agreement", give(None))],
     "learnt scatter": [(StateSums, "scatter", lambda self, _: self.structure.scatter_variance)],
     "four scales of scatter": [with_options(scatter_scales=(1.0,))],
-    "step or ramp judged again": [(Watcher, "_rejudged", lambda _, state: state)],
+    "step or ramp judged again": [(Watcher, "_reclassify_last_change", lambda _, state: state)],
     "the likeliest scatter": [
         (Evidence, "log_evidence", property(lambda self: min(self.log_statistic, self.log_most)))
     ],
