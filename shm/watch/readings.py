@@ -106,17 +106,26 @@ class Reader:
         sensors_kg = mounted_kg(hanger)
         self._scatter = math.hypot(_MODE_SCATTER, sensors_kg / mass_kg / math.sqrt(8))
         self._loosening = np.vstack(self.columns.loosening).T
+        self._known: dict[int, tuple[ModalTest, Reading]] = {}
         self._residual = np.zeros(len(self.modes))
         self._residual = self._own_residual([self._seen(test) for test in usable])
 
     def reading(self, test: ModalTest, time: datetime) -> Reading:
-        """What `test`, made at `time`, says by itself.
+        """Return what a test by itself states of the quantities; it was made at `time`.
 
         Modes that the baseline does not have are left out, and so are those that fit no state of
         the hanger which the others fit: mistaken ones. Where too many are, none is, and all count
         for less than their errors say. A test without any mode that the baseline has, or of
-        conditions that the model class cannot describe, says nothing: information 0.
+        conditions that the model class cannot describe, says nothing: information 0. A test is
+        read once, since rules that compare it with others ask again.
         """
+        known, found = self._known.get(id(test), (None, None))
+        if found is None or known is not test:
+            found = self._read(test, time)
+            self._known[id(test)] = test, found
+        return replace(found, time=time)
+
+    def _read(self, test: ModalTest, time: datetime) -> Reading:
         count = len(self.quantities)
         blind = Reading(test.id, time, test.temperature_c, np.zeros(count), np.zeros((count,) * 2))
         if not (_is_described(test, self._model) and len((seen := self._seen(test)).own)):
