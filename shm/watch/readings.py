@@ -169,7 +169,7 @@ class Reader:
         return ModeReading(values, variances, slopes, softer, wrong)
 
     def _sound(self, seen: SeenModes) -> BoolArray:
-        """Which modes (n,) are not mistaken: likelier good than off by anything.
+        """Return which modes (n,) are not mistaken: more probably good than off by anything.
 
         Each is good with its error and scatter or, seldom, anywhere. Which are mistaken is asked
         anew about the state that the others give, for only near it are frequencies linear: once
@@ -178,26 +178,21 @@ class Reader:
         every = np.ones(len(seen.own), bool)
         if len(seen.own) < len(self.quantities) + 2:
             return every
-        still, none = np.zeros(len(self.quantities)), self._loosening[:, :0]
-        found = self._sound_by(seen, none, still)
+        found = self._sound_by(seen, self._loosening[:, :0])
         if found.sound.all():
             return every
-        slack = self._sound_by(seen, none, self._likelihood.far_start(seen))
-        if slack.log_evidence > found.log_evidence:
-            found = slack
         if self._loosening.size:
-            loose = self._sound_by(seen, self._loosening, still)
+            loose = self._sound_by(seen, self._loosening)
             if loose.log_evidence + math.log(_LOOSENED) > found.log_evidence:
                 found = loose
         return found.sound if (~found.sound).sum() <= MOST_MISTAKEN * len(every) else every
 
-    def _sound_by(self, seen: SeenModes, more: FloatArray, start: FloatArray) -> SoundModes:
-        """Which modes are sound where the quantities, and `more` (modes, k), may have moved; the
-        quantities are sought from `start` (q,) on."""
+    def _sound_by(self, seen: SeenModes, more: FloatArray) -> SoundModes:
+        """Find the sound modes where the quantities, and `more` (modes, k), may have moved."""
         variance, more = seen.variance + self._scatter**2, more[seen.own]
         wide, sd = replace(seen, variance=variance), np.sqrt(variance)
         pull = np.append(self._likelihood.pull, np.full(more.shape[1], 1 / _LOOSENED_STEPS**2))
-        x = start
+        x = np.zeros(len(self.quantities))
         for _ in range(_ROUNDS):
             linear = self._likelihood.linear(x, wide)
             off = sd * (linear.residual + linear.slopes @ x)
