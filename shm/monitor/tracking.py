@@ -351,7 +351,7 @@ class _Group:
         return self._at_home(made)
 
     def _proven(self) -> tuple[BandFit, list[int]] | None:
-        """The fit of the modes without each of which the lines are far less likely."""
+        """Return the fit of the modes without each of which the lines are far less likely."""
         kept = list(range(len(self.group)))
         start = self.start
         while kept:
@@ -388,7 +388,7 @@ class _Group:
         return CloseModes(radians, decay, power, zero, zero, np.eye(count, dtype=complex), floor)
 
     def _mode(self, fit: BandFit, place: int, index: int) -> Mode | None:
-        """The mode as it is now; None where it is not the known one, or hardly known."""
+        """Return the mode as it is now; None where it is not the known one, or hardly known."""
         known, modes = self.known[index], fit.modes
         radians, decay = float(modes.radians_s[place]), float(modes.decay_1_s[place])
         hz, damping = radians / (2 * math.pi), decay / radians
@@ -420,7 +420,7 @@ class _Group:
         )
 
     def _shape(self, index: int) -> tuple[ShapePoint, ...]:
-        """The shape by which a mode was seen that had none."""
+        """Return the shape by which a mode was seen that had none."""
         row = self.peaks.shapes[:, index]
         points = [ResponsePoint(c.name, c.plane, c.x_m) for c in self.found.channels]
         seen = FoundMode(NAN, NAN, NAN, NAN, row, np.full(len(row), NAN))

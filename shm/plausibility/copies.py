@@ -83,7 +83,7 @@ It is 0.1 of a hum at most, and all of each simulated or real response that was 
 
 
 def fingerprint_of(records: Sequence[Recording | FrequencyResponse]) -> Fingerprint | None:
-    """What the samples of one test look like; None where nothing moves in them."""
+    """Return what the samples of one test look like; None where nothing moves in them."""
     moved = [row for record in records for row in _motions(record) if _moves(row)]
     if not moved:
         return None
@@ -239,7 +239,7 @@ def _again(what: str) -> Doubt:
 
 
 def _what_of(known: KnownSamples, common: Common, hanger: int) -> str:
-    """What of another recording is in one that has no more than that."""
+    """Return what of another recording is in one that has no more than that."""
     name, share = _named(known, hanger), _percent(common.of_other)
     if not common.own_is_whole:
         return f"{_percent(common.of_own)} of its samples are in {name}, {share} of that one"
@@ -249,7 +249,7 @@ def _what_of(known: KnownSamples, common: Common, hanger: int) -> str:
 
 
 def _what_it_has(known: KnownSamples, common: Common, hanger: int) -> str:
-    """The same in one that has more."""
+    """Return what of another recording is in one that has more."""
     how_much = "all" if common.other_is_whole else _percent(common.of_other)
     return f"{how_much} of {_named(known, hanger)}, {_percent(common.of_own)} of its own samples"
 
@@ -263,7 +263,7 @@ def _named(known: KnownSamples, hanger: int) -> str:
 
 
 def _motions(record: Recording | FrequencyResponse) -> list[FloatArray]:
-    """The numbers of each response, bad ones as 0: pulses of a hammer are too much alike."""
+    """Return the numbers of each response, bad ones as 0: pulses of a hammer are too much alike."""
     if isinstance(record, FrequencyResponse):
         lines = record.accelerance
         return [np.nan_to_num(np.concatenate([row.real, row.imag])) for row in lines]

@@ -73,7 +73,7 @@ def agreement(
     options: WatchOptions,
     told: Collection[tuple[str, Way]],
 ) -> Alert | None:
-    """The alert of a test that is the second to show a shift beyond its threshold.
+    """Return the alert of a test that is the second to show a shift beyond its threshold.
 
     None where it shows none, no test beside it agrees, two that agree were there before it, the
     clocks say that it was a later visit, one of a visit before shows the same, or the shift is
@@ -245,7 +245,7 @@ def _drift(
 def drift_of(
     quantity: WatchedQuantity, newest: tuple[ModalTest, datetime], read: Shift, hanger: Hanger
 ) -> Drift:
-    """What tests `read` of a quantity, in the coordinate, as a shift from the baseline."""
+    """Return what tests `read` of a quantity, in the coordinate, as a shift from the baseline."""
     alone = np.ones(1)
     at = alone * read.mean, alone * read.sd
     shift = shift_of_mixture(quantity, alone, *at)

@@ -185,7 +185,7 @@ class Comparison:
         return level, shared - level
 
     def _median_polish(self, quantities: Quantities) -> FloatArray:
-        """The level of each mode once the tension of each test is taken off: by medians."""
+        """Return the level of each mode once the tension of each test is taken off: by medians."""
         slopes = quantities.slopes(np.zeros(quantities.count), Conditions())[:, 1]
         slopes = np.maximum(slopes, 0.05)  # technical: a mode that no tension moves says nothing
         tension = np.zeros(len(self.tests))
@@ -252,7 +252,7 @@ _FEWEST = 5  # modes of a test: fewer leave nothing to tell the odd one by
 
 
 def check_baseline(tests: Sequence[ModalTest], model: Model) -> BaselineCheck:
-    """What is mistaken among the tests of a baseline, and whether they fit.
+    """Return what is mistaken among the tests of a baseline, and whether they fit.
 
     `model` is any class of the hanger that is fast.
     """

@@ -52,7 +52,7 @@ def _best(
     conditions: Conditions,
     held: FloatArray | float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
-    """The likeliest of parameter sets, a few modes being mistaken, and what it is off by.
+    """Return the likeliest of parameter sets, a few modes being mistaken, and what it is off by.
 
     `held` (n,) is the log density of what is known of the sets beforehand.
     """

@@ -242,7 +242,7 @@ class Structure:
 def structure_of(
     quantities: Sequence[WatchedQuantity], columns: Columns, options: WatchOptions
 ) -> Structure:
-    """The hypotheses of a hanger."""
+    """Return the hypotheses of a hanger."""
     n, q = len(columns.modes), len(quantities)
     steps = np.array([each.step_sd for each in quantities])
     is_tension = np.array([each.name == TENSION for each in quantities])

@@ -335,7 +335,7 @@ def _null(
 
 
 def _time_weighted_sum(moments: Sequence[FloatArray], since: float, power: int) -> FloatArray:
-    """Sums weighed by nothing, or by the years since, of `moments` in years from 0 on."""
+    """Return sums weighed by nothing, or by the years since, of `moments` in years from 0 on."""
     return moments[1] - since * moments[0] if power else moments[0]
 
 
@@ -389,7 +389,7 @@ def _suffix_moments(sums: Sums, years: FloatArray) -> tuple[list[FloatArray], li
 
 
 def _suffix(values: FloatArray) -> FloatArray:
-    """Sums over all tests from each on, along the first axis."""
+    """Return sums over all tests from each on, along the first axis."""
     return np.asarray(np.cumsum(values[::-1], axis=0)[::-1])
 
 

@@ -45,7 +45,7 @@ class SeenModes:
     variance: FloatArray
 
     def taken(self, rows: BoolArray) -> SeenModes:
-        """Some of the modes."""
+        """Return some of the modes."""
         arrays = ("plane", "order", "own", "log_frequency", "variance")
         return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
 
@@ -80,7 +80,7 @@ class LinearReading:
 
 
 def _credible_share(misfit: FloatArray, fitted: int) -> float:
-    """The share of its stated information that a test deserves, by its misfit over sd (n,).
+    """Return the share of its stated information that a test deserves, by its misfit over sd (n,).
 
     1 where the misfit is one that a thousandth of good tests exceed, or less. Where the modes fit
     no state of the hanger, their errors are larger than stated by as much (Birge 1932).
@@ -153,7 +153,7 @@ class Likelihood:
         return LinearReading(x, residual / sd, slopes / sd[:, None], self.pull)
 
     def read(self, linear: LinearReading, off: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What moves of the modes `off` (k, n), over sd, make of the coordinates (k, q).
+        """Return what moves of the modes `off` (k, n), over sd, make of the coordinates (k, q).
 
         And the information (q, q) of the likelihood alone, 0 along what is not seen.
         """

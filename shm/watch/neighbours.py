@@ -205,7 +205,7 @@ class BridgePattern:
     remarks: tuple[str, ...] = ()
 
     def probability(self, name: ExplanationName) -> float:
-        """The probability of one explanation."""
+        """Return the probability of one explanation."""
         return next(each.probability for each in self.explanations if each.name == name)
 
 
@@ -245,7 +245,7 @@ def _is_known(drift: Drift) -> bool:
 def _compared(
     shifts: Sequence[HangerShift], order: Sequence[int], days: float
 ) -> tuple[list[HangerShift], tuple[NotCompared, ...]]:
-    """The shifts of the last `days`, by place, and the hangers that are left out."""
+    """Return the shifts of the last `days`, by place, and the hangers that are left out."""
     newest = max((each.time for each in shifts), default=datetime.min)
     recent, left_out = [], []
     for each in sorted(shifts, key=lambda each: each.place):
@@ -531,7 +531,7 @@ def bridge_pattern(
     order: Sequence[int] = (),
     options: NeighbourOptions | None = None,
 ) -> BridgePattern:
-    """What moved over the bridge; shifts whose tests are older than the window are left out.
+    """Return what moved over the bridge; shifts whose tests are older than the window are left out.
 
     `order` names all hangers along the bridge (index: place), so that those without a shift are
     listed. Raises NothingThere where fewer than three hangers can be compared.
@@ -584,7 +584,7 @@ def _row(shift: HangerShift, gained: float, lost: float) -> HangerRow:
 
 
 def _suspects(shifts: Sequence[HangerShift], found: Sequence[Hypotheses]) -> tuple[Suspect, ...]:
-    """The likeliest few of those who shed or gained load."""
+    """Return the likeliest few of those who shed or gained load."""
     suspects = []
     for each in found:
         if each.name not in ("load redistribution", "load gain"):

@@ -11,7 +11,7 @@ _SURE_WHICH = 0.8  # judgement: four to one
 
 
 def sentence_of(pattern: BridgePattern, alike_remedy: str, named_from: float) -> str:
-    """The likeliest explanation, or that none is clear."""
+    """Return the likeliest explanation, or that none is clear."""
     best = pattern.explanations[0]
     largest = max(pattern.rows, key=lambda row: abs(row.shift_fraction))
     suspects = [each for each in pattern.suspects if each.name == best.name]
@@ -90,7 +90,7 @@ def _moved(pattern: BridgePattern) -> str:
 
 
 def remarks_of(pattern: BridgePattern) -> tuple[str, ...]:
-    """What qualifies the sentence: the sum, and who was not compared."""
+    """Return what qualifies the sentence: the sum, and who was not compared."""
     kept, hangers = pattern.sum_kept, pattern.sum_kept.hangers
     places = [row.place for row in pattern.rows if row.hanger in hangers]
     group = _hangers(hangers).lower()

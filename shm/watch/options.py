@@ -86,7 +86,7 @@ class Warmth:
 
 
 def reference_of(temperatures_c: Sequence[float]) -> float:
-    """The mean of those known; NaN where none is."""
+    """Return the mean of those known; NaN where none is."""
     known = [value for value in temperatures_c if math.isfinite(value)]
     return float(np.mean(known)) if known else NAN
 

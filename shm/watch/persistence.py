@@ -90,7 +90,7 @@ def bound_by_recurrence(evidence: Evidence, course: Course, limit_years: float) 
 
 
 def _likeliest(evidence: Evidence) -> list[tuple[int, ...]]:
-    """The likeliest changes of different beginning, kind and cause."""
+    """Return the likeliest changes of different beginning, kind and cause."""
     by_cause = evidence.log_mass.max(axis=(1, 4), initial=-math.inf)
     order = np.argsort(by_cause.ravel())[::-1][:_LEADING]
     chosen: list[tuple[int, ...]] = []

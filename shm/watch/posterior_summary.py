@@ -55,11 +55,11 @@ class SummaryContext:
     by_mode: FloatArray
 
     def at(self, years: float) -> datetime:
-        """The time so many years from the start."""
+        """Return the time so many years from the start."""
         return self.start + timedelta(days=years * DAYS_PER_YEAR)
 
     def model_uncertainty(self, means: FloatArray) -> FloatArray:
-        """Standard deviations (B, q) of shifts `means` (B, q) that the model leaves open.
+        """Return standard deviations (B, q) of shifts `means` (B, q) that the model leaves open.
 
         A share of each, as the baseline's own values are open; some of what ends do may be
         tension's."""
@@ -189,7 +189,7 @@ def _as_changed(
     part: FloatArray,
     probability: float,
 ) -> Moved:
-    """What is at `j` of the names, given that it changed: by the directions of its `part`.
+    """Return what is at `j` of the names, given that it changed: by the directions of its `part`.
 
     Of a cause that is no quantity the shift is that of the frequencies' mean, a fraction.
     """

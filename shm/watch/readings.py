@@ -150,7 +150,7 @@ class Reader:
     def _by_mode(
         self, seen: SeenModes, linear: LinearReading, mistaken: IntArray, *, is_warmth_known: bool
     ) -> ModeReading:
-        """The same for each of the baseline's modes.
+        """Return the same for each of the baseline's modes.
 
         Stated errors are taken to be off by a factor that the misfit tells, as far as it can.
         """

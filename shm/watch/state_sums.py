@@ -98,7 +98,7 @@ class WatchState:
         return len(self.years)
 
     def to_bytes(self) -> bytes:
-        """The state as a file of numpy arrays, without any pickled object."""
+        """Return the state as a file of numpy arrays, without any pickled object."""
         kept = io.BytesIO()
         plain: dict[str, Any] = {
             each.name: np.asarray(value.isoformat() if isinstance(value, datetime) else value)
@@ -110,7 +110,7 @@ class WatchState:
 
     @classmethod
     def from_bytes(cls, content: bytes) -> WatchState:
-        """The state back; raises BadInput where the content is no such state."""
+        """Return the state back; raises BadInput where the content is no such state."""
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as kept:
                 found = dict(kept)
@@ -266,7 +266,7 @@ class StateSums:
         )
 
     def course(self, state: WatchState, rows: IntArray, called: Sequence[DetectedChange]) -> Course:
-        """The tests `rows` with what the null says of each, called changes included."""
+        """Return the tests `rows` with what the null says of each, called changes included."""
         layout = self.structure.layout
         columns = self._columns(state, rows)
         changing, years = columns[:, :, layout.change], state.years[rows]
@@ -305,7 +305,7 @@ def _levels(log_amplitude: FloatArray) -> FloatArray:
 
 
 def begun_of(evidence: Evidence, rows: IntArray, change: Change) -> list[float]:
-    """The likeliest first test of a called change, when it began, and whether it goes on."""
+    """Return the likeliest first test of a called change, when it began, and whether it goes on."""
     share = evidence.shares.sum(axis=(1, 2, 3, 4))
     first = int(evidence.beginnings[int(share.argmax())])
     is_ramp = bool(change.sudden < 0.5)

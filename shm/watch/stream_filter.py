@@ -203,7 +203,7 @@ class Bank:
         return replace(self, excess=excess, watched=self.watched + 1)
 
     def design(self, conditions: FloatArray) -> FloatArray:
-        """What a reading sees of the state (p,)."""
+        """Return what a reading sees of the state (p,)."""
         return np.concatenate([[1.0, 0.0, 1.0, 1.0, 0.0], conditions])
 
     @property
@@ -213,7 +213,7 @@ class Bank:
         return np.maximum(np.interp(age, np.log(_AGES_DAYS), self.excess), 1.0)[:, None]
 
     def evidence(self, least_shift: float) -> Evidence:
-        """What all readings say of a change; material is one by more than `least_shift`."""
+        """Return what all readings say of a change; material is one by more than `least_shift`."""
         if not len(self.by_day):
             return NOTHING
         prior = 1 / np.array([_STEP_SD, _SLOPE_SD]) ** 2

@@ -261,7 +261,7 @@ class SeenReading:
 
 
 def usable(reading: PooledReading) -> tuple[Mode, ...]:
-    """The modes that say something of the tension, each once."""
+    """Return the modes that say something of the tension, each once."""
     found: dict[MeasuredMode, Mode] = {}
     for mode in reading.modes:
         is_measured = np.isfinite(mode.frequency_hz) and mode.frequency_hz > 0

@@ -112,7 +112,7 @@ class StreamState:
         )
 
     def to_bytes(self) -> bytes:
-        """The state as a line of JSON, and the bytes of all arrays after it."""
+        """Return the state as a line of JSON, and the bytes of all arrays after it."""
         arrays = {
             f"{name}.{each.name}": value
             for name, part in (
@@ -142,7 +142,7 @@ class StreamState:
 
     @classmethod
     def from_bytes(cls, content: bytes) -> StreamState:
-        """The state back; raises BadInput where the content is no such state."""
+        """Return the state back; raises BadInput where the content is no such state."""
         try:
             line, _, rest = content.partition(b"\n")
             head = json.loads(line)
@@ -244,7 +244,7 @@ def warmth(state: StreamState) -> float:
 def with_conditions(
     state: StreamState, reading: PooledReading, day: float
 ) -> tuple[StreamState, FloatArray, float]:
-    """The conditions of a reading, and the variance that unknown ones add to it."""
+    """Return the conditions of a reading, and the variance that unknown ones add to it."""
     level = math.log(reading.level_m_s2) if reading.level_m_s2 > 0 else NAN
     now = np.array([reading.temperature_c, level, reading.wind_m_s])
     reference = np.where(np.isfinite(state.reference), state.reference, now)

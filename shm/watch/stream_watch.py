@@ -130,7 +130,7 @@ def watch_reading(
 
 
 def _key(baseline: Posterior | None, hanger: Hanger, stream: str) -> str:
-    """What the state rests on; thresholds may change without a new beginning."""
+    """Return what the state rests on; thresholds may change without a new beginning."""
     of = baseline and (baseline.model, baseline.seed, baseline.tests)
     described = (hanger.length_m, hanger.bending_stiffness_n_m2, hanger.mass_per_length_kg_m)
     rests_on = repr((hanger.id, described, stream, of))
@@ -186,7 +186,7 @@ class StreamWatch:
     def _learning(
         self, state: StreamState, seen: SeenReading, end: datetime
     ) -> tuple[StreamWatched, StreamState]:
-        """The baseline grows: its mean is where the shifts count from."""
+        """Add a reading to the baseline, whose mean is where shifts count from."""
         n = state.readings
         zero = state.zero + (seen.shift - state.zero) / n
         days = self.options.learning_days
@@ -283,7 +283,7 @@ class StreamWatch:
         reading: PooledReading,
         end: datetime,
     ) -> WatchedTest:
-        """The reading as the rules of alerts take any test.
+        """Return the reading as the rules of alerts take any test.
 
         Its interval reaches as far as the reading is `unlike` what the filters say.
         """
@@ -335,7 +335,7 @@ def _nothing() -> StreamWatched:
 
 
 def _compensated(bank: Bank) -> FloatArray:
-    """The state without what the conditions do, as a direction (p,)."""
+    """Return the state without what the conditions do, as a direction (p,)."""
     direction = np.zeros(bank.mean.shape[1])
     direction[[LEVEL, SLOW, FAST]] = 1
     return direction

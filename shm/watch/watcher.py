@@ -123,7 +123,7 @@ class Watcher:
         return state, Watch(tuple(tests), ())
 
     def after(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
-        """The state after one more reading, and the result.
+        """Return the state after one more reading, and the result.
 
         Raises BadInput where the reading is older than the last, or of other quantities, UsageError
         where the state is that of another watch, or its baseline is not complete.
@@ -189,7 +189,7 @@ class Watcher:
         return bounded, causes, 0 if causes.called else stays.against_baseline
 
     def _without_baseline(self, state: WatchState) -> WatchState:
-        """The state in which a baseline that stands alone does not count."""
+        """Return the state in which a baseline that stands alone does not count."""
         counted = state.counted.copy()
         counted[: self.options.baseline_tests] = False
         return replace(state, counted=counted)
@@ -258,7 +258,7 @@ class Watcher:
         return state, evidence
 
     def _with(self, state: WatchState, reading: Reading) -> WatchState:
-        """The state with one more test in it, and who counts now."""
+        """Return the state with one more test in it, and who counts now."""
         n, q = self.structure.layout.n, self.structure.layout.q
         if reading.mean.shape != (q,):
             raise BadInput(f"The reading of test {reading.test} is not of {q} quantities.")
@@ -293,7 +293,7 @@ class Watcher:
         return replace(later, scatter_variance=self.sums.scatter(later))
 
     def _reclassify_last_change(self, state: WatchState) -> WatchState:
-        """The last called change a step or a ramp, as the tests since make clear.
+        """Reclassify the last called change as a step or a ramp, as the tests since make clear.
 
         At the call a ramp has hardly begun: frozen as a step, all that comes later would be new.
         """
@@ -372,19 +372,19 @@ def watched(
 
 
 def watch_of(tests: Sequence[WatchedTest]) -> Watch:
-    """The results of a watch, with the changes that they call."""
+    """Return the results of a watch, with the changes that they call."""
     calls = (Call(n, test.change) for n, test in enumerate(tests) if test.change.called)
     return Watch(tuple(tests), tuple(calls))
 
 
 def _counting(state: WatchState) -> IntArray:
-    """The tests that count; as long as none does, the newest, which then says nothing."""
+    """Return the tests that count; as long as none does, the newest, which then says nothing."""
     rows = np.flatnonzero(state.counted)
     return rows if len(rows) else np.array([state.tests - 1])
 
 
 def _called(state: WatchState, rows: IntArray) -> list[DetectedChange]:
-    """The called changes, as the tests `rows` see them."""
+    """Return the called changes, as the tests `rows` see them."""
     return [
         DetectedChange(int(np.searchsorted(rows, first)), years, bool(is_ramp), precision)
         for (first, years, is_ramp), precision in zip(

@@ -73,7 +73,7 @@ class Watched:
         return self.watch.tests[-1]
 
     def alert(self, hanger: Hanger) -> Alert | None:
-        """What the newest test calls for, beyond what was told before."""
+        """Return what the newest test calls for, beyond what was told before."""
         return new_alert(self.watch.tests, hanger)
 
 
@@ -85,7 +85,7 @@ def watch_hanger(
     options: WatchOptions,
     known: Mapping[str, WatchedTest] = MappingProxyType({}),
 ) -> Watched:
-    """The watch of a hanger over the tests of its baseline and `later` ones, both by time.
+    """Return the watch of a hanger over the tests of its baseline and `later` ones, both by time.
 
     `known` is what it has said before, by test: where that is of all later ones, none is judged
     again.
@@ -115,7 +115,7 @@ def watch_hanger(
 
 
 def kept_of(baseline: Posterior, tests: Sequence[DatedTest]) -> tuple[DatedTest, ...]:
-    """The tests of a baseline without what was left out of it as mistaken."""
+    """Return the tests of a baseline without what was left out of it as mistaken."""
     check = baseline.baseline_check
     if check is None:
         return tuple(tests)
@@ -144,7 +144,7 @@ def watch_newest(
     kept: bytes | None = None,
     beside: Beside | None = None,
 ) -> Newest | None:
-    """The last of what `watch_hanger` finds, from what was `kept` after the tests before it.
+    """Return the last of what `watch_hanger` finds, from what was `kept` after the tests before it.
 
     `later` are then the tests since, the newest alone as a rule; without `kept` all of them. None
     where nothing can go on from what was kept, since rules, options or description have changed:
@@ -211,7 +211,7 @@ def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
 
 
 def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertState, Alert | None]:
-    """What stands after one more test, and the alert that it calls for, if any."""
+    """Return what stands after one more test, and the alert that it calls for, if any."""
     level = hanger.thresholds.alert_probability
     standing = still(told, test, hanger.thresholds.end_probability)
     news = _news(standing, test, level)
@@ -286,7 +286,7 @@ def _is_known(standing: AlertState, change: Change) -> bool:
 
 
 def _suspects(change: Change) -> tuple[str, ...]:
-    """What may have changed: the likeliest quantity, those with it, then those like it."""
+    """Return what may have changed: the likeliest quantity, those with it, then those like it."""
     return tuple(each.quantity for each in suspects(change))
 
 
@@ -336,7 +336,7 @@ def _alert(
 
 
 def _standing(test: WatchedTest, standing: AlertState, hanger: Hanger) -> list[Drift]:
-    """What was said to be beyond its threshold and still is: as sure as it was then."""
+    """Return what was said to be beyond its threshold and still is: as sure as it was then."""
     level = hanger.thresholds.alert_probability
     return [
         replace(each, probability=max(each.probability, level))
@@ -350,13 +350,13 @@ def _kind(change: Change) -> AlertKind:
 
 
 def _suspected(test: WatchedTest) -> tuple[Drift, ...]:
-    """The shifts of what may have changed."""
+    """Return the shifts of what may have changed."""
     by_name = {drift.quantity: drift for drift in test.drifts}
     return tuple(by_name[name] for name in _suspects(test.change) if name in by_name)
 
 
 def _first_moved(news: _News, test: WatchedTest) -> str:
-    """The quantity that is told first, and its way."""
+    """Return the quantity that is told first, and its way."""
     if news.beyond:
         return f"{news.beyond[0].quantity}-{way_of(news.beyond[0].shift_mean)}"
     if test.change.moved:
