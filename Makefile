@@ -6,6 +6,7 @@
 #   make lint       ruff, mypy, import-linter
 #   make docs       the manual: build/manual/index.html
 #   make bench      the slow tests and every benchmark: build/bench/table.md
+#   make ablation   ROOM=watch, identify or inference: what a room loses without each mechanism
 #   make lock       the pinned requirement files
 #   make clean      remove the environment and all that was built
 # Single parts of the tests and benchmarks: make -C tests/benchmarks NAME, listed there.
@@ -19,7 +20,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # With it set, each of the hundreds of processes that the tests start would compile all its imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo demo-live test lint docs bench lock clean
+.PHONY: demo demo-live test lint docs bench ablation lock clean
 
 demo: .venv/runtime
 	$(BIN)/shm demo
@@ -47,6 +48,11 @@ docs: .venv/development
 # Goes on where it stopped, and after what fails: build/bench/table.md.
 bench: .venv/development
 	$(BIN)/python tests/benchmarks/every.py
+
+# A room joins by a file tests/benchmarks/ROOM_ablation.py. ARGS are its arguments: ARGS=--help.
+ROOM ?= watch
+ablation: .venv/development
+	PYTHONPATH=. $(BIN)/python tests/benchmarks/$(ROOM)_ablation.py $(ARGS)
 
 # Compiles the pinned files anew from pyproject.toml; hashes only, no host names.
 lock: .venv/uv

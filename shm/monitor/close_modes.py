@@ -60,7 +60,7 @@ def lines_of(
     half_hz: float,
     unit: FloatArray,
 ) -> Lines:
-    """The lines of bands, averaged where a peak of that half width is finely resolved.
+    """Return the lines of bands, averaged where a peak of that half width is finely resolved.
 
     Channels are in units of `unit` (channels,).
     """
@@ -98,7 +98,7 @@ class CloseModes:
     floor: FloatArray
 
     def only(self, kept: Sequence[int]) -> CloseModes:
-        """Some of them."""
+        """Return some of them."""
         rows = list(kept)
         return CloseModes(
             self.radians_s[rows],
@@ -182,7 +182,7 @@ class Band:
         return Band(self.lines, self.directions, self.shapes[:, kept], self.known.only(kept))
 
     def fitted(self, start: CloseModes, most: int = 25) -> BandFit:
-        """The most likely modes from a start, by Fisher scoring in at most so many steps."""
+        """Return the most likely modes from a start, by Fisher scoring in at most so many steps."""
         modes, damped = start, 1e-3
         value, gradient, information = self.evaluated(modes)
         for _ in range(most):

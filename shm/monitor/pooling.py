@@ -33,7 +33,7 @@ _REPEATS = 6e-5
 def pooled(
     readings: Sequence[WindowReading], period: Period, start: datetime
 ) -> PooledReading | None:
-    """The windows that begin in a period, as one reading; None where no mode was found.
+    """Return the windows that begin in a period, as one reading; None where no mode was found.
 
     Frequencies are at the mean level and temperature of the pooled windows.
     """
@@ -93,7 +93,7 @@ def _mean(values: Sequence[float]) -> float:
 
 
 def _without_outlying(readings: list[WindowReading]) -> list[WindowReading]:
-    """The readings without those of which most modes are off what they usually are."""
+    """Return the readings without those of which most modes are off what they usually are."""
     if len(readings) < _LEAST_TO_JUDGE:
         return readings
     off: list[list[float]] = [[] for _ in readings]
@@ -149,7 +149,7 @@ class _Series:
         return deviations
 
     def mode(self) -> Mode:
-        """The mode of all these windows."""
+        """Return the mode of all these windows."""
         hz, sd, used = self._regressed()
         kept = [mode for mode, use in zip(self.modes, used, strict=True) if use]
         damping, damping_sd = _weighted(

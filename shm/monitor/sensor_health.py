@@ -162,10 +162,10 @@ def _find_loss(
     what: str,
     channel: str,
 ) -> StreamEvent | None:
-    """Return the event that the modes of the last windows are lost, if one of three things holds.
+    """Return the event that the modes of the last windows are lost, if one of these holds.
 
-    For an hour, fewer than half the usual modes, though at this level they are visible; for an
-    hour, no mode and less motion than ever; for a day, no mode.
+    For an hour, fewer than half the usual modes or none, though at this level as many are visible;
+    for an hour, no mode and less motion than ever; for a day, no mode.
     """
     rows = [each for each in rows if math.isfinite(each.window.level_m_s2)]
     sound = [
@@ -181,18 +181,19 @@ def _find_loss(
     end = now.start + timedelta(seconds=now.duration_s)
     if going_on := [each for each in reported if each.end > few[0].window.start]:
         return replace(going_on[-1], start=now.start, end=end)
-    if len(few) < _HOUR:
+    if not _is_lasting(few):
         return None
     none = _tail(few, lambda each: each.n_modes > 0)
     before = [each for each in sound if each.window.start < few[0].window.start]
     is_known = sum(1 for each in before if each.n_modes) >= _LEAST_BEFORE
     level = float(np.median([each.window.level_m_s2 for each in few]))
     lowest = min(each.window.level_m_s2 for each in before) if is_known else math.nan
-    since = few
-    if not (is_known and _are_visible(before, level, usual)):
+    since: Sequence[_Row] = few
+    if not (is_known and _are_visible(before, level, usual / 2)):
         since = none
+    if since is none and not (is_known and _is_lasting(none) and _are_visible(before, level, 0.0)):
         highest = max((each.window.level_m_s2 for each in none), default=math.nan)
-        fallen = len(none) >= _HOUR and highest < _FALLEN * lowest
+        fallen = _is_lasting(none) and highest < _FALLEN * lowest
         if not fallen and not (none and end - none[0].window.start >= _BLIND):
             return None
     first = since[0].window
@@ -204,14 +205,26 @@ def _find_loss(
     return StreamEvent(now.stream, "lost modes", first.start, end, detail, channel)
 
 
+def _is_lasting(rows: Sequence[_Row], least: int = 3, hours: float = 1.0) -> bool:
+    """Return True if windows are enough, and long enough, to tell a loss from a quiet quarter.
+
+    Of a logger that records a few minutes of each hour, `least` windows are as many hours.
+    """
+    if len(rows) < least:
+        return False
+    last = rows[-1].window
+    end = last.start + timedelta(seconds=last.duration_s)
+    return end - rows[0].window.start >= timedelta(hours=hours)
+
+
 def _are_visible(
     before: Sequence[_Row],
     level_m_s2: float,
-    usual: float,
+    n_modes: float,
     enough: float = 0.95,
     visible_db: float = 10.0,
 ) -> bool:
-    """Return True if `enough` of the earlier windows that were as quiet had most of their modes.
+    """Return True if `enough` of the earlier windows that were as quiet had more than `n_modes`.
 
     Where hardly any was as quiet, the quietest count whose peaks would have been `visible_db` high
     at this level.
@@ -222,7 +235,7 @@ def _are_visible(
         height_db = each.window.signal_to_noise_db + quieter_db
         if quieter_db < 0 and (math.isnan(height_db) or len(found) >= _HOUR):
             continue
-        found.append(2 * each.n_modes > usual and (quieter_db >= 0 or height_db >= visible_db))
+        found.append(each.n_modes > n_modes and (quieter_db >= 0 or height_db >= visible_db))
     return len(found) >= _HOUR and float(np.mean(found)) >= enough
 
 

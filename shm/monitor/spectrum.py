@@ -129,7 +129,7 @@ def strongest(
     weight: FloatArray | float = 1.0,
     within: float = 0.01,
 ) -> FloatArray:
-    """The real shape (channels,) that carries most of the power near a frequency."""
+    """Return the real shape (channels,) that carries most of the power near a frequency."""
     power = power_near(stretches, frequency_hz, within) * np.outer(weight, weight)
     vector: FloatArray = np.linalg.eigh(power)[1][:, -1]
     return vector
@@ -175,7 +175,7 @@ def found_peaks(
     known: Sequence[Mode],
     noise: FloatArray,
 ) -> Peaks:
-    """The peaks of known modes near the change of frequency that suits all of them best.
+    """Return the peaks of known modes near the change of frequency that suits all of them best.
 
     A change of tension moves all modes alike: the product of the modes' spectra, each seen by its
     own shape, has its highest peak there.

@@ -15,7 +15,7 @@ from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.planes import shape_points
 from shm.monitor.close_modes import Band, BandFit, CloseModes, directions, lines_of
 from shm.monitor.sensor_health import exchanged
-from shm.monitor.spectrum import ALONE, REACH, Peaks, Stretch
+from shm.monitor.spectrum import ALONE, REACH, Peaks, Stretch, found_peaks
 from shm.monitor.windows import Judged, judged
 from shm.values import (
     NAN,
@@ -97,7 +97,11 @@ def read_window(
 
 
 def _has(modes: Sequence[Mode], known: Mode) -> bool:
-    return any((m.plane, m.order) == (known.plane, known.order) for m in modes)
+    return any(_is(mode, known) for mode in modes)
+
+
+def _is(mode: Mode, known: Mode) -> bool:
+    return (mode.plane, mode.order) == (known.plane, known.order)
 
 
 def _is_reviewed(known: Sequence[Mode], window: Window) -> bool:
@@ -226,10 +230,56 @@ def _from_scratch(
 
 
 def tracked(found: Judged, known: Sequence[Mode], options: IdentifyOptions) -> tuple[Mode, ...]:
-    """The known modes that are proven in the window, in their order."""
-    peaks = found.peaks
-    if peaks is None:
+    """Return the known modes that are proven in the window, in their order.
+
+    A plane of which most are lost is followed by itself: its ends move its modes alone.
+    """
+    if found.peaks is None:
         return ()
+    modes = _prove(found, found.peaks, known, options)
+    for plane in PLANES:
+        own = [index for index, mode in enumerate(known) if mode.plane == plane]
+        lost = 2 * sum(_has(modes, known[index]) for index in own) <= len(own)
+        stays = any(mode.plane != plane for mode in modes)
+        if lost and stays:
+            moved = _move_plane(found, found.peaks, known, own)
+            apart = _prove(found, moved, known, options)
+            if len(apart) > len(modes) and _are_moved_alike(
+                [(known[index], mode) for index in own for mode in apart if _is(mode, known[index])]
+            ):
+                modes = apart
+    return modes
+
+
+def _move_plane(found: Judged, peaks: Peaks, known: Sequence[Mode], own: Sequence[int]) -> Peaks:
+    """Return the peaks with those of one plane's modes where they suit these best."""
+    alone = found_peaks(
+        found.stretches, found.channels, [known[index] for index in own], peaks.noise
+    )
+    expected, hz = peaks.expected_hz.copy(), peaks.frequency_hz.copy()
+    height, shapes = peaks.height_db.copy(), peaks.shapes.copy()
+    expected[own], hz[own] = alone.frequency_hz, alone.frequency_hz
+    height[own], shapes[:, own] = alone.height_db, alone.shapes
+    return replace(peaks, expected_hz=expected, frequency_hz=hz, height_db=height, shapes=shapes)
+
+
+def _are_moved_alike(pairs: Sequence[tuple[Mode, Mode]], least: int = 3) -> bool:
+    """Return True if modes of one plane, before and after, have moved as ends move them.
+
+    That is by fractions that change evenly with the order; peaks of the deck lie anywhere.
+    """
+    if len(pairs) < least:
+        return False
+    order = np.array([before.order for before, _ in pairs])
+    moved = np.log([after.frequency_hz / before.frequency_hz for before, after in pairs])
+    line = np.polyval(np.polyfit(order, moved, 1), order)
+    return bool(np.all(np.abs(moved - line) <= ALONE / 2) and np.ptp(np.sign(moved)) == 0)
+
+
+def _prove(
+    found: Judged, peaks: Peaks, known: Sequence[Mode], options: IdentifyOptions
+) -> tuple[Mode, ...]:
+    """Return the known modes that are proven near their peaks, in their order."""
     seen = [index for index in peaks.seen if peaks.height_db[index] > 0]
     half_hz = _half_hz(peaks, found.stretches)
     modes: dict[int, Mode] = {}
@@ -301,7 +351,7 @@ class _Group:
         return self._at_home(made)
 
     def _proven(self) -> tuple[BandFit, list[int]] | None:
-        """The fit of the modes without each of which the lines are far less likely."""
+        """Return the fit of the modes without each of which the lines are far less likely."""
         kept = list(range(len(self.group)))
         start = self.start
         while kept:
@@ -338,7 +388,7 @@ class _Group:
         return CloseModes(radians, decay, power, zero, zero, np.eye(count, dtype=complex), floor)
 
     def _mode(self, fit: BandFit, place: int, index: int) -> Mode | None:
-        """The mode as it is now; None where it is not the known one, or hardly known."""
+        """Return the mode as it is now; None where it is not the known one, or hardly known."""
         known, modes = self.known[index], fit.modes
         radians, decay = float(modes.radians_s[place]), float(modes.decay_1_s[place])
         hz, damping = radians / (2 * math.pi), decay / radians
@@ -370,7 +420,7 @@ class _Group:
         )
 
     def _shape(self, index: int) -> tuple[ShapePoint, ...]:
-        """The shape by which a mode was seen that had none."""
+        """Return the shape by which a mode was seen that had none."""
         row = self.peaks.shapes[:, index]
         points = [ResponsePoint(c.name, c.plane, c.x_m) for c in self.found.channels]
         seen = FoundMode(NAN, NAN, NAN, NAN, row, np.full(len(row), NAN))

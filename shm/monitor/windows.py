@@ -51,12 +51,12 @@ class Judged:
 
 
 def cut(pieces: Sequence[Piece], stream: Stream, known: Sequence[Mode]) -> Window:
-    """The window of all `pieces`, which may have gaps between them."""
+    """Return the window of all `pieces`, which may have gaps between them."""
     return judged(pieces, stream, known).window
 
 
 def judged(pieces: Sequence[Piece], stream: Stream, known: Sequence[Mode]) -> Judged:
-    """The window of `pieces` and what of it is used."""
+    """Return the window of `pieces` and what of it is used."""
     if not pieces:
         raise ValueError("a window of no pieces")
     broken = broken_channels(pieces, stream)
@@ -228,7 +228,7 @@ class _Events:
         return _BLOCK_S * float(sum(np.sum(each) for each in self.loud))
 
     def undisturbed(self, parts: Sequence[FloatArray]) -> list[FloatArray]:
-        """What lies between the events and is long enough."""
+        """Return what lies between the events and is long enough."""
         least = int(_LEAST_STRETCH_S / _BLOCK_S)
         return [
             part[:, first * self.block : (end * self.block if end < len(loud) else None)]
@@ -257,7 +257,7 @@ def _median(parts: Sequence[FloatArray]) -> float:
 
 
 def _unrest(parts: Sequence[FloatArray]) -> float:
-    """The loudest five seconds over the median five seconds."""
+    """Return the loudest five seconds over the median five seconds."""
     many = int(_STRETCH_S / _BLOCK_S)
     level = np.sqrt(
         np.concatenate([np.mean(_blocks(p[np.newaxis] ** 2, many), axis=2)[0] for p in parts])
@@ -284,7 +284,7 @@ def _kind_of(level: FloatArray) -> Literal["traffic", "knock"]:
 
 
 def _with_edges(marked: BoolArray) -> BoolArray:
-    """The loud blocks with what comes just before and after."""
+    """Return the loud blocks with what comes just before and after."""
     wide = marked.copy()
     for first, end in _runs(marked, 0.0):
         wide[max(0, first - int(_BEFORE_S / _BLOCK_S)) : end + int(_AFTER_S / _BLOCK_S)] = True

@@ -35,7 +35,7 @@ _WITHOUT_MODEL = tuple(each for each in CHECKS if each not in (of_another_bar, o
 
 
 def doubts_about(candidate: Candidate) -> tuple[Doubt, ...]:
-    """The reasons to hold a test, in the order of `CHECKS`; none where it is plausible."""
+    """Return the reasons to hold a test, in the order of `CHECKS`; none where it is plausible."""
     checks = CHECKS if candidate.hanger.is_modelled else _WITHOUT_MODEL
     found = [doubt for check in checks if (doubt := check(candidate)) is not None]
     if any(doubt.check == "copy" for doubt in found):  # that explains the same time

@@ -312,7 +312,7 @@ class Fits:
         return np.asarray(self._way[self._bars.origins.index(origin)])
 
     def described(self, origin: Origin) -> Evidence:
-        """The modes by the priors of the description."""
+        """Return the modes by the priors of the description."""
         row, bars = self._bars.origins.index(origin), self._bars
         away = self._theta[row] - bars.mean[row]
         seen, way = bars.seen[row], self._way[row]
@@ -323,7 +323,7 @@ class Fits:
         return Evidence(replace(seen, log_f=off), way, ((1.0, sds),), errors)
 
     def changed(self, origin: Origin, shift: Seen) -> Evidence:
-        """The hanger of earlier tests with whatever may have changed since."""
+        """Return the hanger of earlier tests with whatever may have changed since."""
         row, bars = self._bars.origins.index(origin), self._bars
         changes = changes_of(ORDINARY, TIGHTER, _LOOSER, _ALTERED)
         start = self._theta[row]

@@ -121,7 +121,7 @@ def _leading(test: ModalTest, own: Known, others: Sequence[Known]) -> OtherOrigi
 
 
 def _by_rank(test: ModalTest) -> ModalTest:
-    """The test with its modes numbered by their frequencies in each plane."""
+    """Return the test with its modes numbered by their frequencies in each plane."""
     modes = sorted(test.modes, key=lambda mode: mode.frequency_hz)
     ranks = dict.fromkeys(PLANES, 0)
     numbered = []
@@ -183,7 +183,7 @@ def _as_before(shift: Seen, sensitivity: FloatArray, *classes: tuple[float, ...]
 def _candidates(
     test: ModalTest, own: Known, others: Sequence[Known]
 ) -> tuple[Evidence, dict[Origin, tuple[float, Evidence]]]:
-    """The hanger of that number, and what else the test may come from with its prior."""
+    """Return the hanger of that number, and what else the test may come from with its prior."""
     rows = Bars()
     now = {each.hanger.id: seen_in([test], each.hanger) for each in (own, *others)}
     before = {

@@ -186,7 +186,7 @@ def _is_of_others(doubt: Doubt) -> bool:
 
 
 def _if_own(candidate: Candidate, *, is_of_other: bool) -> str:
-    """What the modes would mean if they are the hanger's own after all.
+    """Return what the modes would mean if they are the hanger's own after all.
 
     A damaged hanger looks like another one: who discards the test unseen may discard the damage.
     """
@@ -207,7 +207,7 @@ def _if_own(candidate: Candidate, *, is_of_other: bool) -> str:
 
 
 def _loss(candidate: Candidate, others: Sequence[float], counted: Sequence[float]) -> str:
-    """What the modes would mean for the tension; empty where that is below the threshold."""
+    """Return what the modes would mean for the tension; empty where that is below the threshold."""
     hanger, limit = candidate.hanger, candidate.hanger.thresholds.tension_shift_fraction
     shift = implied_shift(candidate.test, candidate.reference, hanger)
     if not abs(shift) >= limit:

@@ -22,7 +22,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from shm.plausibility import background
 from shm.plausibility.candidate import Candidate
 from shm.values import (
     Doubt,
@@ -84,9 +83,8 @@ It is 0.1 of a hum at most, and all of each simulated or real response that was 
 
 
 def fingerprint_of(records: Sequence[Recording | FrequencyResponse]) -> Fingerprint | None:
-    """What the samples of one test look like; None where nothing moves in them."""
-    by_record = [[row for row in _motions(record) if _moves(row)] for record in records]
-    moved = [row for rows in by_record for row in rows]
+    """Return what the samples of one test look like; None where nothing moves in them."""
+    moved = [row for record in records for row in _motions(record) if _moves(row)]
     if not moved:
         return None
     forces = [each.force for each in records if isinstance(each, Recording) and each.force]
@@ -95,18 +93,10 @@ def fingerprint_of(records: Sequence[Recording | FrequencyResponse]) -> Fingerpr
     hashes = sorted(hashlib.sha256(row.tobytes()).digest() for row in numbers)
     most = max(2, min(_MOST_A_CHANNEL, _MOST // len(moved)))
     found = [_shapes(row, channel, most) for channel, row in enumerate(moved)]
-    in_time = [
-        rows
-        for rows, record in zip(by_record, records, strict=True)
-        if rows and isinstance(record, Recording)
-    ]
-    noise, places = background.traced(in_time)
     return Fingerprint(
         hashlib.sha256(b"".join(hashes)).hexdigest(),
         np.concatenate([shapes for shapes, _ in found])[:_MOST],
         np.concatenate([marks for _, marks in found])[:_MOST],
-        noise,
-        places,
     )
 
 
@@ -173,18 +163,6 @@ def shared(own: Fingerprint, other: Fingerprint) -> Common | None:
     None where it does not."""
     if own.digest == other.digest:
         return Common(1.0, 1.0)
-    return _same_shapes(own, other) or _same_background(own, other)
-
-
-def _same_background(own: Fingerprint, other: Fingerprint) -> Common | None:
-    pairs = background.in_common(own, other)
-    if not pairs:
-        return None
-    own_has, other_has = _lengths(own.places), _lengths(other.places)
-    return Common(_share(pairs, own_has, 0), _share(pairs, other_has, 1))
-
-
-def _same_shapes(own: Fingerprint, other: Fingerprint) -> Common | None:
     if not len(own.marks) or not len(other.marks):
         return None
     here, there = _alike(own, other)
@@ -205,7 +183,7 @@ def _same_shapes(own: Fingerprint, other: Fingerprint) -> Common | None:
 
 
 def _lengths(rows: IntArray) -> dict[int, int]:
-    """The samples of each channel: both stand first in marks and places."""
+    """Return the number of samples of each channel, by the first two columns of the marks."""
     return {int(channel): int(length) for channel, length in rows[:, :2]}
 
 
@@ -261,7 +239,7 @@ def _again(what: str) -> Doubt:
 
 
 def _what_of(known: KnownSamples, common: Common, hanger: int) -> str:
-    """What of another recording is in one that has no more than that."""
+    """Return what of another recording is in one that has no more than that."""
     name, share = _named(known, hanger), _percent(common.of_other)
     if not common.own_is_whole:
         return f"{_percent(common.of_own)} of its samples are in {name}, {share} of that one"
@@ -271,7 +249,7 @@ def _what_of(known: KnownSamples, common: Common, hanger: int) -> str:
 
 
 def _what_it_has(known: KnownSamples, common: Common, hanger: int) -> str:
-    """The same in one that has more."""
+    """Return what of another recording is in one that has more."""
     how_much = "all" if common.other_is_whole else _percent(common.of_other)
     return f"{how_much} of {_named(known, hanger)}, {_percent(common.of_own)} of its own samples"
 
@@ -285,7 +263,7 @@ def _named(known: KnownSamples, hanger: int) -> str:
 
 
 def _motions(record: Recording | FrequencyResponse) -> list[FloatArray]:
-    """The numbers of each response, bad ones as 0: pulses of a hammer are too much alike."""
+    """Return the numbers of each response, bad ones as 0: pulses of a hammer are too much alike."""
     if isinstance(record, FrequencyResponse):
         lines = record.accelerance
         return [np.nan_to_num(np.concatenate([row.real, row.imag])) for row in lines]

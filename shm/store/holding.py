@@ -86,9 +86,14 @@ def notice_key(hanger: int, hold_id: int) -> str:
     return f"hanger-{hanger}:held-{hold_id}"
 
 
+_ARRAYS = ("shapes", "marks")
+"""Of a fingerprint, in the order of its fields."""
+
+
 def fingerprint_from(row: Row[Any]) -> Fingerprint:
-    """Marks, noise and places are missing in those of before there were such."""
-    return Fingerprint(row.digest, **unpack(row.shapes))
+    """Return the stored fingerprint; older ones lack marks, or have arrays that nothing reads."""
+    arrays = unpack(row.shapes)
+    return Fingerprint(row.digest, **{name: arrays[name] for name in _ARRAYS if name in arrays})
 
 
 def held_tests_from(document: Mapping[str, Any]) -> tuple[HeldTest, ...]:
@@ -99,8 +104,7 @@ def held_tests_from(document: Mapping[str, Any]) -> tuple[HeldTest, ...]:
 def _keep_fingerprint(connection: Connection, recording_id: int, found: Fingerprint) -> None:
     former = fingerprints.c.recording_id == recording_id
     connection.execute(sa.delete(fingerprints).where(former))
-    arrays = ("shapes", "marks", "noise", "places")
-    shapes = pack(**{name: getattr(found, name) for name in arrays})
+    shapes = pack(**{name: getattr(found, name) for name in _ARRAYS})
     row = {"recording_id": recording_id, "digest": found.digest, "shapes": shapes}
     connection.execute(sa.insert(fingerprints).values(row))
 

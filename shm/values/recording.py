@@ -137,18 +137,11 @@ class Fingerprint:
     near by choose, the same for other units, and in a part of the record. `marks` (shapes, 4) says
     of each its channel, how many samples that has, its place and its reach to either side; prints
     of before there were places have none, and tell by their digest alone.
-
-    `noise` (2, channels, bytes) says of a stretch of each channel, a bit a sample, whether what no
-    prediction foresees is positive, and whether it is background and no hit. `places` (channels, 5)
-    says of each channel how many samples it has, where its stretch begins, and where its record's
-    three strongest onsets lie; prints of before there was a background have neither.
     """
 
     digest: str
     shapes: NDArray[np.int16]
     marks: IntArray = field(default_factory=lambda: np.empty((0, 4), dtype=np.int64))
-    noise: NDArray[np.uint8] = field(default_factory=lambda: np.empty((2, 0, 0), dtype=np.uint8))
-    places: IntArray = field(default_factory=lambda: np.empty((0, 5), dtype=np.int64))
 
 
 @dataclass(frozen=True, eq=False)

@@ -73,7 +73,7 @@ def agreement(
     options: WatchOptions,
     told: Collection[tuple[str, Way]],
 ) -> Alert | None:
-    """The alert of a test that is the second to show a shift beyond its threshold.
+    """Return the alert of a test that is the second to show a shift beyond its threshold.
 
     None where it shows none, no test beside it agrees, two that agree were there before it, the
     clocks say that it was a later visit, one of a visit before shows the same, or the shift is
@@ -139,11 +139,6 @@ def _known_before(
 def _is_later(newest: ModalTest, other: ModalTest) -> bool:
     """Whether the newest was a later visit than the other, by their own clocks."""
     return newest.time is not None and other.time is not None and newest.time - other.time >= _APART
-
-
-def are_of_two_visits(*tests: ModalTest) -> bool:
-    """Whether by their own clocks some of the tests were a later visit than others."""
-    return any(_is_later(one, other) for one in tests for other in tests)
 
 
 def way_of(shift: float) -> Way:
@@ -250,7 +245,7 @@ def _drift(
 def drift_of(
     quantity: WatchedQuantity, newest: tuple[ModalTest, datetime], read: Shift, hanger: Hanger
 ) -> Drift:
-    """What tests `read` of a quantity, in the coordinate, as a shift from the baseline."""
+    """Return what tests `read` of a quantity, in the coordinate, as a shift from the baseline."""
     alone = np.ones(1)
     at = alone * read.mean, alone * read.sd
     shift = shift_of_mixture(quantity, alone, *at)

@@ -88,7 +88,7 @@ class AlertState:
 
 
 def still(told: AlertState, test: WatchedTest, end: float) -> AlertState:
-    """What still stands at a test: all but what tests of two visits have below `end`.
+    """Return what still stands at a test: all but what tests of two visits have below `end`.
 
     A van that stands on the deck for a day ends nothing; neither do unknown shifts. What two tests
     that agree have told was improbable to the watch all along: it ends once the shift has come
@@ -120,7 +120,7 @@ def _probability(drift: Drift, way: Way) -> float:
 
 
 def with_beyond(told: AlertState, beyond: Sequence[Drift], at: datetime) -> AlertState:
-    """The state with shifts that were told at a test to be beyond their threshold."""
+    """Return the state with shifts that were told at a test to be beyond their threshold."""
     return replace(told, beyond={**told.beyond, **dict.fromkeys(conditions(beyond), at)})
 
 

@@ -51,7 +51,7 @@ def message_of(
     is_further: bool = False,
     standing: Sequence[Drift] = (),
 ) -> str:
-    """The lead of the hanger as it is now; since when; then details.
+    """Return the lead of the hanger as it is now; since when; then details.
 
     `change` is the change behind it, as far as one is known; `is_call` says whether it is detected
     now, and `is_further` whether others were before it, from which on its shift counts. `beyond`
@@ -79,7 +79,7 @@ def lead_of(
     *,
     is_further: bool = False,
 ) -> Lead:
-    """The state of a hanger of which something was found, and what to do about it how soon.
+    """Return the state of a hanger of which something was found, and what to do about it how soon.
 
     The only place where it is put into words: alerts, pages, reports and `shm status` ask here.
     """
@@ -110,7 +110,7 @@ def _of_hanger(
 
 
 def _of_frequencies(test: WatchedTest, change: Change | None, *, is_call: bool) -> list[str]:
-    """The same of a structure of which frequencies alone are watched."""
+    """Return the same of a structure of which frequencies alone are watched."""
     return [
         "Temperature, frost and excitation are taken off as far as the tests show what they do.",
         _details(
@@ -199,7 +199,7 @@ def _detected_words(watched: Sequence[WatchedTest]) -> str:
 def _state(
     hanger: Hanger, change: Change | None, beyond: Sequence[Drift], *, is_further: bool
 ) -> str:
-    """The state in a sentence of at most 25 words, with one number and its interval."""
+    """Return the state in a sentence of at most 25 words, with one number and its interval."""
     name = f"Hanger {hanger.id}"
     if beyond:
         lead = gravest(beyond)
@@ -231,7 +231,7 @@ def _changed(change: Change) -> str:
 
 
 def _moved(group: Sequence[Moved]) -> str:
-    """What moved together and how far."""
+    """Return what moved together and how far."""
     first = group[0]
     if first.quantity in CAUSES:
         return f"{group_words(group)} (frequencies {size_words(first)} on average)"
@@ -254,7 +254,7 @@ def _kind(group: Sequence[Moved]) -> str:
 
 
 def _kind_moved(group: Sequence[Moved]) -> str:
-    """The same with its size."""
+    """Return the same with its size."""
     first = group[0]
     if first.quantity in CAUSES:
         size = rounded_percent(first.shift_mean, NINETY_PERCENT * first.shift_sd, "+")
@@ -296,7 +296,7 @@ def _between(after: datetime, by: datetime) -> str:
 
 
 def _tension_now(drift: Drift) -> str:
-    """The tension to three digits, of which its absolute interval hardly leaves more."""
+    """Return the tension to three digits, of which its absolute interval hardly leaves more."""
     unit = force_unit(drift.value, drift.baseline)
     places = max(0, 2 - math.floor(math.log10(unit.of(drift.baseline))))
     now, then = (f"{unit.of(n):.{places}f} {unit.name}" for n in (drift.value, drift.baseline))
@@ -380,7 +380,7 @@ def _probability(value: float) -> str:
 
 
 def _nearest(test: WatchedTest, change: Change) -> Drift | None:
-    """What may have changed and is the likeliest to be beyond its threshold."""
+    """Return what may have changed and is the likeliest to be beyond its threshold."""
     by_name = {drift.quantity: drift for drift in test.drifts}
     found = [by_name[each.quantity] for each in suspects(change) if each.quantity in by_name]
     return max(found, key=lambda drift: drift.probability, default=None)

@@ -33,7 +33,14 @@ from shm.values import (
     ModalTest,
     Mode,
 )
-from shm.watch.baseline_state import Key, Quantities, best_of, known_modes, places, plausible
+from shm.watch.baseline_state import (
+    Key,
+    Quantities,
+    fit_description,
+    known_modes,
+    places,
+    typical_parameters,
+)
 from shm.watch.mistaken_modes import MOST_MISTAKEN, SoundModes, log_mixture, sound_modes
 
 _ROUNDS = 3  # technical: of "what is mistaken" and "where the others lie"
@@ -139,10 +146,10 @@ class Comparison:
         """Each test, what all have in common being the median of what they differ by."""
         planes, orders = places(self.keys)
         level = np.nanmedian(self.table, axis=0)
-        base = plausible(self.model, level, planes, orders)
+        base = typical_parameters(self.model, level, planes, orders)
         quantities = Quantities(self.model, base, planes, orders)
         moved = [np.zeros(quantities.count)] * len(self.tests)
-        level = self._polished(quantities)
+        level = self._median_polish(quantities)
         spread = _SCATTER
         for _ in range(_ROUNDS):
             found = [
@@ -177,8 +184,8 @@ class Comparison:
         level = np.nanmedian(shared, axis=0)
         return level, shared - level
 
-    def _polished(self, quantities: Quantities) -> FloatArray:
-        """The level of each mode once the tension of each test is taken off: by medians."""
+    def _median_polish(self, quantities: Quantities) -> FloatArray:
+        """Return the level of each mode once the tension of each test is taken off: by medians."""
         slopes = quantities.slopes(np.zeros(quantities.count), Conditions())[:, 1]
         slopes = np.maximum(slopes, 0.05)  # technical: a mode that no tension moves says nothing
         tension = np.zeros(len(self.tests))
@@ -245,7 +252,7 @@ _FEWEST = 5  # modes of a test: fewer leave nothing to tell the odd one by
 
 
 def check_baseline(tests: Sequence[ModalTest], model: Model) -> BaselineCheck:
-    """What is mistaken among the tests of a baseline, and whether they fit.
+    """Return what is mistaken among the tests of a baseline, and whether they fit.
 
     `model` is any class of the hanger that is fast.
     """
@@ -335,7 +342,7 @@ def _off_in_all(comparison: Comparison) -> str:
     """Which modes no description allows, though the tests agree on them; empty where none."""
     planes, orders = places(comparison.keys)
     level = np.nanmedian(comparison.table, axis=0)
-    _, off = best_of(comparison.model, level, planes, orders, Conditions())
+    _, off = fit_description(comparison.model, level, planes, orders, Conditions())
     odd = [
         (key, each)
         for key, each in zip(comparison.keys, off.tolist(), strict=True)
@@ -360,7 +367,7 @@ def _against_description(test: ModalTest, model: Model) -> BaselineCheck:
         )
     planes, orders = places([(mode.plane, mode.order) for mode in modes])
     measured = np.log([mode.frequency_hz for mode in modes])
-    _, off = best_of(model, measured, planes, orders, model.conditions(test))
+    _, off = fit_description(model, measured, planes, orders, model.conditions(test))
     is_odd: BoolArray = np.abs(off) > _OFF
     if is_odd.sum() > MOST_MISTAKEN * len(modes):
         return BaselineCheck(

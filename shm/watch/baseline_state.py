@@ -28,7 +28,7 @@ _FELT, _FELT_SD = 3.0, 0.7
 _MODEL_SD = 0.01  # judgement: of a frequency, a class beside a bar as made
 
 
-def best_of(
+def fit_description(
     model: Model, measured: FloatArray, planes: IntArray, orders: IntArray, conditions: Conditions
 ) -> tuple[FloatArray, FloatArray]:
     """The likeliest parameter set of the description, and what the modes (n,) are off from it."""
@@ -52,7 +52,7 @@ def _best(
     conditions: Conditions,
     held: FloatArray | float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
-    """The likeliest of parameter sets, a few modes being mistaken, and what it is off by.
+    """Return the likeliest of parameter sets, a few modes being mistaken, and what it is off by.
 
     `held` (n,) is the log density of what is known of the sets beforehand.
     """
@@ -63,7 +63,9 @@ def _best(
     return theta[at], off[at]
 
 
-def plausible(model: Model, level: FloatArray, planes: IntArray, orders: IntArray) -> FloatArray:
+def typical_parameters(
+    model: Model, level: FloatArray, planes: IntArray, orders: IntArray
+) -> FloatArray:
     """A parameter set near the description at which the median test lies, to take slopes at.
 
     Frequencies alone leave tension, length and ends to each other: what fits best may be a loose

@@ -44,7 +44,7 @@ class Direction:
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class DetectedChange:
     """A called change: the test at which it began, its time, and whether it goes on.
 
     `precision` (n + q, n + q) is that of its size before the tests after the call: which causes
@@ -242,7 +242,7 @@ class Structure:
 def structure_of(
     quantities: Sequence[WatchedQuantity], columns: Columns, options: WatchOptions
 ) -> Structure:
-    """The hypotheses of a hanger."""
+    """Return the hypotheses of a hanger."""
     n, q = len(columns.modes), len(quantities)
     steps = np.array([each.step_sd for each in quantities])
     is_tension = np.array([each.name == TENSION for each in quantities])

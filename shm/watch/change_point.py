@@ -25,7 +25,7 @@ from functools import cached_property
 import numpy as np
 
 from shm.values import FloatArray, IntArray
-from shm.watch.causes import Direction, Layout, Told
+from shm.watch.causes import DetectedChange, Direction, Layout
 from shm.watch.options import OF_ONE_VISIT_YEARS
 
 STEP, RAMP = 0, 1
@@ -79,7 +79,7 @@ class Evidence:
     directions: tuple[Direction, ...]
     years: FloatArray
     beginnings: IntArray
-    called: tuple[Told, ...]
+    called: tuple[DetectedChange, ...]
     log_null: FloatArray
     log_mass: FloatArray
     null_mean: FloatArray
@@ -109,7 +109,7 @@ class Evidence:
     @property
     def waited(self) -> FloatArray:
         """Years (beginnings,) in which each may have begun."""
-        return _waited(self.years, self.beginnings)
+        return _onset_interval_years(self.years, self.beginnings)
 
     @cached_property
     def shares(self) -> FloatArray:
@@ -125,7 +125,7 @@ class Evidence:
         at = int(np.searchsorted(self.years[self.beginnings], self.years[-1] - OF_ONE_VISIT_YEARS))
         if at == len(self.beginnings):
             return 0.0, -math.inf
-        waited = math.log(max(float(_waited(self.years, self.beginnings)[at]), 1e-12))
+        waited = math.log(max(float(_onset_interval_years(self.years, self.beginnings)[at]), 1e-12))
         kinds = np.log([1 + each.may_ramp for each in self.directions])
         prior = np.array([each.log_prior for each in self.directions]) - kinds
         over_scatters = np.logaddexp.reduce(self.log_mass[at, :, STEP], axis=0) - waited
@@ -202,7 +202,7 @@ def evidence_of(
     baseline_tests: int,
     layout: Layout,
     directions: Sequence[Direction],
-    called: Sequence[Told] = (),
+    called: Sequence[DetectedChange] = (),
     most_beginnings: int = 60,
 ) -> Evidence:
     """The evidence of `sums` of tests (T,) at `years`, ascending; no change before the baseline's.
@@ -211,7 +211,7 @@ def evidence_of(
     new one is looked for after the last of them.
     """
     tests = len(years)
-    suffix, pulls = _moments(sums, years)
+    suffix, pulls = _suffix_moments(sums, years)
     mean, covariance, log_null = _null(sums, years, layout, called, suffix, pulls)
     log_null = log_null - _total(log_null)
     first = max([baseline_tests, *(each.first + 1 for each in called)])
@@ -223,8 +223,10 @@ def evidence_of(
             layout, tuple(directions), years, beginnings, tuple(called),
             log_null, nothing, mean, covariance, (empty, empty, empty),
         )  # fmt: skip
-    seen = _seen(years, beginnings, layout, called, (suffix, pulls), (mean, covariance))
-    waited = np.log(np.maximum(_waited(years, beginnings), 1e-12))
+    seen = _change_information(
+        years, beginnings, layout, called, (suffix, pulls), (mean, covariance)
+    )
+    waited = np.log(np.maximum(_onset_interval_years(years, beginnings), 1e-12))
     log_mass = _log_factors(directions, seen) + log_null[None, :, None, None, None]
     log_mass = log_mass + waited[:, None, None, None, None]
     return Evidence(
@@ -234,18 +236,18 @@ def evidence_of(
 
 
 def log_probability_of_called(
-    sums: Sums, years: FloatArray, layout: Layout, called: Sequence[Told]
+    sums: Sums, years: FloatArray, layout: Layout, called: Sequence[DetectedChange]
 ) -> float:
     """Of all tests, if nothing changed beyond what was `called`, over all scatters."""
-    suffix, pulls = _moments(sums, years)
+    suffix, pulls = _suffix_moments(sums, years)
     return _total(_null(sums, years, layout, called, suffix, pulls)[2])
 
 
-def _seen(
+def _change_information(
     years: FloatArray,
     beginnings: IntArray,
     layout: Layout,
-    called: Sequence[Told],
+    called: Sequence[DetectedChange],
     sums: tuple[Sequence[FloatArray], Sequence[FloatArray]],
     of_null: tuple[FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -291,7 +293,7 @@ def _null(
     sums: Sums,
     years: FloatArray,
     layout: Layout,
-    called: Sequence[Told],
+    called: Sequence[DetectedChange],
     suffix: Sequence[FloatArray],
     pulls: Sequence[FloatArray],
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -309,18 +311,18 @@ def _null(
     for a, (told, power) in enumerate(pieces):
         columns = slice(len(null) + a * size, len(null) + (a + 1) * size)
         prior[columns, columns] = told.precision
-        lifted = _lifted([each[told.first] for each in suffix], told.years, power)
+        lifted = _time_weighted_sum([each[told.first] for each in suffix], told.years, power)
         joint[:, : len(null), columns] = lifted[:, null][:, :, part]
         joint[:, columns, : len(null)] = np.swapaxes(lifted[:, null][:, :, part], 1, 2)
-        vector[:, columns] = _lifted([each[told.first] for each in pulls], told.years, power)[
-            :, part
-        ]
+        vector[:, columns] = _time_weighted_sum(
+            [each[told.first] for each in pulls], told.years, power
+        )[:, part]
         for b, (other, other_power) in enumerate(pieces):
             late = max(told.first, other.first)
             moments = [each[late] for each in suffix]
-            shifted = _lifted(moments, told.years, power)
+            shifted = _time_weighted_sum(moments, told.years, power)
             if other_power:
-                further = _lifted(moments[1:], told.years, power)
+                further = _time_weighted_sum(moments[1:], told.years, power)
                 shifted = further - other.years * shifted
             others = slice(len(null) + b * size, len(null) + (b + 1) * size)
             joint[:, columns, others] = shifted[:, part, part]
@@ -332,8 +334,8 @@ def _null(
     return mean, covariance, np.asarray(log_evidence)
 
 
-def _lifted(moments: Sequence[FloatArray], since: float, power: int) -> FloatArray:
-    """Sums weighed by nothing, or by the years since, of `moments` in years from 0 on."""
+def _time_weighted_sum(moments: Sequence[FloatArray], since: float, power: int) -> FloatArray:
+    """Return sums weighed by nothing, or by the years since, of `moments` in years from 0 on."""
     return moments[1] - since * moments[0] if power else moments[0]
 
 
@@ -362,7 +364,7 @@ def _ramp_from(years: FloatArray, beginnings: IntArray) -> FloatArray:
     return np.asarray(years[beginnings - 1])
 
 
-def _waited(years: FloatArray, beginnings: IntArray) -> FloatArray:
+def _onset_interval_years(years: FloatArray, beginnings: IntArray) -> FloatArray:
     """Years (beginnings,) in which each may have begun: since the one before, thinned or not."""
     before = np.concatenate([beginnings[:1] - 1, beginnings[:-1]])
     return np.asarray(years[beginnings] - years[before])
@@ -378,7 +380,7 @@ def _chosen(beginnings: IntArray, most: int) -> IntArray:
     return np.concatenate([old[picked], beginnings[-recent:]])
 
 
-def _moments(sums: Sums, years: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
+def _suffix_moments(sums: Sums, years: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
     """Z'WZ and Z'Wy of all tests from each on, weighed by powers of the years."""
     return (
         [_suffix(_times(sums.square, years**k)) for k in range(3)],
@@ -387,7 +389,7 @@ def _moments(sums: Sums, years: FloatArray) -> tuple[list[FloatArray], list[Floa
 
 
 def _suffix(values: FloatArray) -> FloatArray:
-    """Sums over all tests from each on, along the first axis."""
+    """Return sums over all tests from each on, along the first axis."""
     return np.asarray(np.cumsum(values[::-1], axis=0)[::-1])
 
 

@@ -38,12 +38,12 @@ CAUSES = {
 
 
 def suspects(change: Change) -> list[Moved]:
-    """The likeliest quantity, those that moved with it, and those that may have instead."""
+    """Return the likeliest quantity, those that moved with it, and those that may have instead."""
     return list(dict.fromkeys(each for group in suspected_groups(change) for each in group))
 
 
 def suspected_groups(change: Change) -> list[tuple[Moved, ...]]:
-    """What may have moved, each with what moved with it, the likeliest first."""
+    """Return what may have moved, each with what moved with it, the likeliest first."""
     by_name = {each.quantity: each for each in change.moved}
     groups: dict[frozenset[str], tuple[Moved, ...]] = {}
     for first in change.moved[:1]:
@@ -55,7 +55,7 @@ def suspected_groups(change: Change) -> list[tuple[Moved, ...]]:
 
 
 def probable_groups(change: Change) -> list[tuple[Moved, ...]]:
-    """The same without what the data fit as well but nobody need expect."""
+    """Return the same without what the data fit as well but nobody need expect."""
     first, *others = suspected_groups(change) or [()]
     likely = [each for each in others if each[0].probability >= _PROBABLE]
     return [first, *likely] if first else []
@@ -167,7 +167,7 @@ def undetected_words(latest: Change) -> str:
 
 
 def structure_words(hanger: Hanger) -> str:
-    """The name of a structure that no model class describes."""
+    """Return the name of a structure that no model class describes."""
     return hanger.name or f"structure {hanger.id}"
 
 
@@ -194,7 +194,7 @@ def frequencies_state(
 
 
 def frequency_words(watched: Sequence[WatchedTest], hanger: Hanger) -> str:
-    """What was detected of such a structure since its baseline, or how near that is."""
+    """Return what was detected of such a structure since its baseline, or how near that is."""
     detected = [each.change for each in watched if each.change.called]
     if not detected:
         return undetected_words(watched[-1].change) if watched else ""
@@ -205,13 +205,13 @@ def frequency_words(watched: Sequence[WatchedTest], hanger: Hanger) -> str:
 
 
 def each_frequency(test: WatchedTest) -> str:
-    """The shift of each, as it is if it changed."""
+    """Return the shift of each, as it is if it changed."""
     told = (f"{each.quantity} {_signed(each.shift_mean, each.shift_sd)}" for each in test.drifts)
     return ", ".join(told)
 
 
 def odd_frequencies(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
-    """What `message_of_odd` says of such a structure."""
+    """Return what `message_of_odd` says of such a structure."""
     name = structure_words(hanger)
     if in_a_row == 1:
         return (
@@ -263,7 +263,7 @@ def _losses(hanger: Hanger, beyond: Sequence[Drift]) -> list[Drift]:
 def action_words(
     hanger: Hanger, change: Change | None, beyond: Sequence[Drift], drifts: Sequence[Drift] = ()
 ) -> str:
-    """What to do and how soon, in a sentence."""
+    """Return what to do and how soon, in a sentence."""
     urgency = urgency_of(hanger, change, beyond, drifts)
     if not hanger.is_modelled:
         return f"Look at the structure {_WHEN[urgency]}: {_LOOK_AT}."
@@ -293,7 +293,7 @@ def _again(urgency: Urgency, hanger: Hanger) -> str:
 
 
 def _tell_apart(groups: Sequence[Sequence[Moved]], urgency: Urgency, hanger: Hanger) -> str:
-    """What shows which of several causes it was."""
+    """Return what shows which of several causes it was."""
     causes = [CAUSES[each[0].quantity] for each in groups if each[0].quantity in CAUSES]
     if not causes:
         again, with_what = _again(urgency, hanger), "a sensor near each end and more modes"

@@ -145,7 +145,7 @@ def _quantity(mode: MeasuredMode, level: float) -> WatchedQuantity:
 
 
 def structure_of_frequencies(n: int, options: WatchOptions) -> Structure:
-    """The hypotheses of `n` frequencies."""
+    """Return the hypotheses of `n` frequencies."""
     ones = np.ones(n)
     prior_sd = np.concatenate(
         [

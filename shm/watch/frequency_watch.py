@@ -150,7 +150,7 @@ def watch_newest_frequencies(
     options: WatchOptions,
     kept: bytes | None = None,
 ) -> Newest | None:
-    """What `watch_newest` says of a hanger, of a structure without a model."""
+    """Return what `watch_newest` says of a hanger, of a structure without a model."""
     watch = FrequencyWatch(baseline, hanger, options)
     now = watch.begin() if kept is None else watch.resume(kept)
     if now is None:
@@ -247,13 +247,13 @@ def _pooled(tests: Sequence[DatedTest]) -> list[tuple[DatedTest, ...]]:
 
 
 def _between_looks(found: WatchedTest) -> WatchedTest:
-    """The same at a test that decides nothing: a change that was called is called once."""
+    """Return the same at a test that decides nothing: a change that was called is called once."""
     if not found.change.called:
         return found
     return replace(found, change=replace(found.change, evidence_years=0.0))
 
 
 def _as_of(found: WatchedTest, test: ModalTest, time: datetime) -> WatchedTest:
-    """What the pools say, as it is known at a test."""
+    """Return what the pools say, as it is known at a test."""
     drifts = tuple(replace(each, test=test.id, time=time) for each in found.drifts)
     return replace(found, test=test.id, time=time, temperature_c=test.temperature_c, drifts=drifts)

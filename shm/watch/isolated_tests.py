@@ -1,68 +1,20 @@
-"""Tests that agree with none beside them: another hanger was hit, a clock was off, a bad day.
+"""Tests that agree with none next to them: another hanger was hit, a clock was off, a bad day.
 
 A test counts where it agrees with what was before it or with a test next to it, before or after,
 and none of its modes strays: two tests agree by the modes that they share, and these may be without
-the one that is mistaken. So a blunder counts in nothing as long as it stands alone, and what lasts
+the one that is mistaken. So a blunder counts in nothing as long as it is alone, and what lasts
 counts from its second test on, however large it is. Nothing here asks which cause it is.
-
-A baseline that agrees with none of the tests since: a change right after it, or a disturbed day.
-
-No test can tell which. One baseline in twelve has a vehicle beside the hanger, and hardly one
-change in a thousand comes right after it: what a load may do is a notice that says both. What no
-load does is an alert, since a loss kept for a notice is silent for as long as nobody looks.
-
-The watch itself waits until a change is likelier than all that its tests did before; of a baseline
-of one or two tests it cannot know what that is. So the first tests since are compared with it by
-themselves, too, with the most scatter that is usual and the swing with the temperature allowed for.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
 
 import numpy as np
 import scipy
 
-from shm.values import (
-    TENSION,
-    Alert,
-    AlertKind,
-    Beside,
-    BoolArray,
-    Drift,
-    FloatArray,
-    Hanger,
-    ModalTest,
-    WatchedQuantity,
-    WatchedTest,
-)
-from shm.values.drift import ENOUGH_AGAINST
-from shm.values.messages import WEEK
-from shm.values.rounding import force_unit
-from shm.watch.agreement import (
-    BY_A_LOAD,
-    CLEAR,
-    Shown,
-    are_of_two_visits,
-    drift_of,
-    read_alone,
-    scatter_of,
-)
-from shm.watch.alert_text import against_baseline_words, alert_of
-from shm.watch.change_words import (
-    is_stiffness,
-    look_again,
-    odd_frequencies,
-    quantity_words,
-    size_words,
-)
-from shm.watch.mistaken_modes import off_the_baseline
-from shm.watch.options import WatchOptions
-from shm.watch.readings import Reader
-from shm.watch.shift_mixture import Shift
+from shm.values import BoolArray, FloatArray
 
 _SELDOM = 1e-3  # of tests that agree so many are taken for such that do not
 _NEAR = 2  # tests to each side: a blunder may lie between two that agree
@@ -88,7 +40,7 @@ class Seen:
     sds: FloatArray
 
     def distance(self, one: int, other: int) -> tuple[float, int, float]:
-        """Squared length of the difference, its modes, log determinant of its covariance."""
+        """Return a difference's squared length, its modes, its covariance's log determinant."""
         both = np.isfinite(self.variances[one]) & np.isfinite(self.variances[other])
         if not both.any():
             return 0.0, 0, 0.0
@@ -105,13 +57,13 @@ class Seen:
         )
 
     def agree(self, one: int, other: int) -> bool:
-        """Whether two tests may be of one state."""
+        """Return True if two tests may be of one state."""
         square, modes, _ = self.distance(one, other)
         return modes > 0 and square < float(scipy.special.chdtri(modes, _SELDOM))
 
 
-def counted(seen: Seen, known: BoolArray, baseline_tests: int) -> BoolArray:
-    """Which of the tests (T,) count; `known` is what was found when there were fewer of them.
+def select_consistent_tests(seen: Seen, known: BoolArray, baseline_tests: int) -> BoolArray:
+    """Return which of the tests (T,) count; `known` is the result when there were fewer of them.
 
     Of a baseline of three tests or more those count that agree with half of the others. What was
     found of a test stays once two tests have followed it.
@@ -132,12 +84,12 @@ def counted(seen: Seen, known: BoolArray, baseline_tests: int) -> BoolArray:
         ]
         near = [each for each in near if each >= first]
         agrees = agreeing >= _AGREEING * len(before) or any(seen.agree(test, n) for n in near)
-        found[test] = agrees and not _strays(seen, found, test, near)
+        found[test] = agrees and not _has_outlying_mode(seen, found, test, near)
     return found
 
 
-def _strays(seen: Seen, found: BoolArray, test: int, near: Sequence[int]) -> bool:
-    """Whether a mode of a test lies where no counted test before has it, and none beside it."""
+def _has_outlying_mode(seen: Seen, found: BoolArray, test: int, near: Sequence[int]) -> bool:
+    """Return True if a mode lies where no counted test before has it, and none next to it."""
     for mode in np.flatnonzero(np.isfinite(seen.variances[test])):
         measured = np.isfinite(seen.variances[:, mode])
         before = np.flatnonzero(found[:test] & measured[:test])[-_BEFORE:]
@@ -164,7 +116,7 @@ def _of_baseline(seen: Seen, first: int) -> BoolArray:
 
 
 def outlier_probability(seen: Seen, known: BoolArray, test: int, prior: float) -> float:
-    """That `test` is a blunder, by how it lies to the nearest of the last that count (`known`)."""
+    """Return the probability that a test is a blunder, by the nearest of the last that count."""
     odds = np.log(prior / (1 - prior))
     against = []
     for before in np.flatnonzero(known[:test])[-_BEFORE:]:
@@ -175,157 +127,3 @@ def outlier_probability(seen: Seen, known: BoolArray, test: int, prior: float) -
     if not against:
         return prior
     return float(1 / (1 + np.exp(-np.clip(odds + min(against), -700, 700))))
-
-
-FEW_TESTS = 2
-"""Of a baseline: of three, those that agree outvote the odd one."""
-FIRST_TESTS = 6
-"""Since the baseline, in which a change must be told; then the watch knows its scatter."""
-_KIND: AlertKind = "check the baseline"
-_CLEAR_DRIFT = 2.0  # judgement: that tests and baseline disagree is known by then
-_SHOWN = 0.5  # of a shift: half of it or more is nearer to it than to none
-
-
-def alert_of_baseline(test: WatchedTest, hanger: Hanger) -> Alert:
-    """The alert where the tension moved further than by any load; else a notice.
-
-    One mistaken mode of the only test before passes for an end that moved.
-    """
-    clear = [each for each in test.drifts if _deviations(each) > _CLEAR_DRIFT]
-    lead = max(clear, key=_deviations, default=None)
-    message = message_of_baseline(test, hanger)
-    if lead is not None and hanger.is_modelled:
-        message = _message(hanger, lead, test.change.against_baseline)
-    return _alert(hanger, "check-the-baseline", (test.test, test.time), lead, message)
-
-
-def first_tests_against(
-    reader: Reader,
-    newest: tuple[ModalTest, datetime],
-    beside: Beside,
-    hanger: Hanger,
-    options: WatchOptions,
-) -> Alert | None:
-    """The alert of a test that with the two before it clearly reads another tension, alike.
-
-    An end that seems to have moved is left to the watch: one mistaken mode of the only test before
-    passes for it. None where tensions do not, there are no two tests that are watched, all are of
-    one visit, their modes fit no state (a notice says so), or they are off by next to nothing.
-    """
-    unwatched = {*beside.held, *beside.of_works}
-    before = [test for test in beside.came[0] if test.id not in unwatched]
-    tests = [newest[0], *before[: ENOUGH_AGAINST - 1]]
-    if len(tests) < ENOUGH_AGAINST or not are_of_two_visits(*tests):
-        return None
-    if any(off_the_baseline(reader.reading(test, newest[1])).any() for test in tests):
-        return None
-    j = [quantity.name for quantity in reader.quantities].index(TENSION)
-    shown = [read_alone(reader, test, options)[j] for test in tests]
-    lead = _common(reader.quantities[j], shown, newest, hanger, options)
-    if lead is None:
-        return None
-    message, test = _message(hanger, lead, len(tests)), (newest[0].id, newest[1])
-    return _alert(hanger, "first-tests-against-baseline", test, lead, message)
-
-
-def _alert(
-    hanger: Hanger, key: str, test: tuple[str, datetime], lead: Drift | None, message: str
-) -> Alert:
-    """The alert where the tension moved further than by any load; else a notice."""
-    is_alert = lead is not None and _is_no_load(lead)
-    drifts = (lead,) if lead is not None and is_alert else ()
-    kind: AlertKind = "beyond threshold" if is_alert else _KIND
-    return alert_of(hanger, test, key, message, (kind,), drifts)
-
-
-def _common(
-    quantity: WatchedQuantity,
-    shown: Sequence[Shown],
-    newest: tuple[ModalTest, datetime],
-    hanger: Hanger,
-    options: WatchOptions,
-) -> Drift | None:
-    """What all tests show of the tension; None where one does not, or it is not clear."""
-    each: FloatArray = np.array([one.mean for one in shown])
-    mean = float(each.mean())
-    # What tests scatter by is their own, but for the baseline's; the rest may be common to them.
-    own = (1 - 1 / len(shown)) * scatter_of(quantity) ** 2
-    sd = math.sqrt(float(np.mean([one.variance for one in shown])) - own)
-    moves = float(np.mean([one.moves for one in shown]))
-    is_clear = abs(mean) >= CLEAR * sd and moves >= options.least_frequency_shift
-    if not is_clear or (each / mean).min() < _SHOWN:
-        return None
-    return drift_of(quantity, newest, Shift(mean, sd), hanger)
-
-
-def _is_no_load(lead: Drift) -> bool:
-    """Whether a tension is clearly off, and by more than a load on the deck does."""
-    is_far = abs(lead.shift_mean) > max(BY_A_LOAD, lead.threshold)
-    return lead.quantity == TENSION and lead.is_clearly_beyond and is_far
-
-
-def _deviations(drift: Drift) -> float:
-    return abs(drift.shift_mean) / drift.shift_sd if drift.shift_sd > 0 else 0.0
-
-
-def _message(hanger: Hanger, lead: Drift, tests: int) -> str:
-    """Both that may be, what to do about either, how far it is and how many tests say so."""
-    if is_stiffness(lead.quantity):
-        look = "inspect both ends"
-    elif lead.shift_mean < 0:
-        look = "inspect its anchorages and the rod"
-    else:
-        look = "compare the hangers beside it (`shm drift bridge`)"
-    now = ""
-    if lead.quantity == TENSION:
-        unit = force_unit(lead.value, lead.baseline)
-        was, value = unit.told(lead.baseline), unit.told(lead.value)
-        now = f"Tension was {was} at the baseline, {value} since. "
-    return (
-        f"Hanger {hanger.id}: either {quantity_words(lead.quantity)} {size_words(lead)} since its "
-        f"baseline, or the baseline was disturbed. Within a week, {look}, and find out what was "
-        f"different on the day of the baseline. {now}The last {tests} tests agree with each other "
-        "and not with it; no test tells which. If it was disturbed, set another (`shm drift "
-        "rebaseline`)."
-    )
-
-
-def message_of_baseline(test: WatchedTest, hanger: Hanger) -> str:
-    """Of a baseline that agrees with none of the tests since."""
-    return (
-        f"{against_baseline_words(test.change, hanger)} Either the baseline was disturbed, by a "
-        "load on the deck for one, or the hanger changed right after it; no test shows which."
-    )
-
-
-def message_of_odd(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
-    """Of a test that agrees with none before it, or of so many in a row."""
-    if not hanger.is_modelled:
-        return odd_frequencies(test, hanger, in_a_row)
-    if hanger.has_sensors:
-        return _odd_days(test, hanger, in_a_row)
-    if in_a_row == 1:
-        return (
-            f"Hanger {hanger.id}: test {test.test} agrees with no test before it. Repeat it within "
-            "a week; it does not count until another test agrees with it. Another hanger may have "
-            "been hit, a sensor moved or the order of a mode mistaken; or the hanger has changed."
-        )
-    return (
-        f"Hanger {hanger.id}: {in_a_row} tests in a row agree neither with those before nor with "
-        "each other. Repeat the hammer test within a week, with the same people and sensors as at "
-        "the baseline. Until then the state of this hanger rests on older tests."
-    )
-
-
-def _odd_days(test: WatchedTest, hanger: Hanger, in_a_row: int) -> str:
-    """The same of days of sensors that stay: the next day is another test by itself."""
-    state = (
-        f"test {test.test} agrees with no test before it"
-        if in_a_row == 1
-        else f"{in_a_row} tests in a row agree neither with those before nor with each other"
-    )
-    return (
-        f"Hanger {hanger.id}: {state}. {look_again(hanger)} {WEEK}. Until tests agree again, its "
-        "state rests on older ones. A sensor may have moved or the order of a mode been mistaken; "
-        "or the hanger has changed."
-    )

@@ -20,7 +20,6 @@ _SLOPE_STEP = 0.1  # technical: of a quantity's step, over which frequencies go 
 _LEAST_SLOPE_STEP = 1e-7
 _PULL_SD_IN_STEPS = 10.0
 _MOST_STEPS = 12
-_STARTS = 24  # technical: of a tension from a fiftieth to five times the nominal one
 # In units of the reading's variance: a last step of a tenth of its standard deviation is taken
 # along with the reading, which is linear about the place before it.
 _SETTLED = 1e-2
@@ -46,7 +45,7 @@ class SeenModes:
     variance: FloatArray
 
     def taken(self, rows: BoolArray) -> SeenModes:
-        """Some of the modes."""
+        """Return some of the modes."""
         arrays = ("plane", "order", "own", "log_frequency", "variance")
         return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
 
@@ -81,7 +80,7 @@ class LinearReading:
 
 
 def _credible_share(misfit: FloatArray, fitted: int) -> float:
-    """The share of its stated information that a test deserves, by its misfit over sd (n,).
+    """Return the share of its stated information that a test deserves, by its misfit over sd (n,).
 
     1 where the misfit is one that a thousandth of good tests exceed, or less. Where the modes fit
     no state of the hanger, their errors are larger than stated by as much (Birge 1932).
@@ -118,31 +117,12 @@ class Likelihood:
         """Coordinates (q,) no further beyond the tables than a search may go."""
         return np.clip(x, self._lowest - _BEYOND, self._highest + _BEYOND)
 
-    def far_start(self, seen: SeenModes) -> FloatArray:
-        """Where the tension alone fits best, over all that its table holds: half of the modes may
-        be anywhere."""
-        first = np.linspace(self._lowest[0], self._highest[0], _STARTS)
-        places = np.zeros((_STARTS, len(self._quantities)))
-        places[:, 0] = first
-        off = np.abs(seen.log_frequency - self.predicted(places, seen))
-        return np.asarray(places[int(np.median(off, axis=1).argmin())])
-
     def settled(self, seen: SeenModes) -> LinearReading:
-        """The likelihood about where it is largest, or very nearly.
+        """Return the likelihood about where it is largest, or very nearly.
 
-        Sought from the baseline on; where that fits badly, from where the tension alone fits best,
-        too: on the way to a slack hanger a descent may lose itself among stiffnesses.
+        Sought from the baseline on; steps that overshoot halve.
         """
-        near = self._descended(np.zeros(len(self._quantities)), seen)
-        misfit = float(near.residual @ near.residual)
-        if misfit <= scipy.special.chdtri(len(near.residual), _SELDOM):
-            return near
-        far = self._descended(self.far_start(seen), seen)
-        return far if far.cost < near.cost else near
-
-    def _descended(self, start: FloatArray, seen: SeenModes) -> LinearReading:
-        """The same from `start` (q,) on; steps that overshoot halve."""
-        best = self.linear(start, seen)
+        best = self.linear(np.zeros(len(self._quantities)), seen)
         step = best.step
         for _ in range(_MOST_STEPS):
             if best.gain(step) < _SETTLED:
@@ -173,7 +153,7 @@ class Likelihood:
         return LinearReading(x, residual / sd, slopes / sd[:, None], self.pull)
 
     def read(self, linear: LinearReading, off: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What moves of the modes `off` (k, n), over sd, make of the coordinates (k, q).
+        """Return what moves of the modes `off` (k, n), over sd, make of the coordinates (k, q).
 
         And the information (q, q) of the likelihood alone, 0 along what is not seen.
         """

@@ -4,39 +4,18 @@ Log frequencies lie about a linear function of a few coordinates, which have a n
 with an error; or, seldom, anywhere. For a given set of mistaken modes all is normal, and its
 evidence has a closed form. Sets of up to two are compared exhaustively, since two can hide each
 other; larger ones grow from the best of these, one mode at a time.
-
-Of modes that tests keep having wrong there is a notice. One slip of a test is left out and
-forgotten. The same mode wrong in three tests in a row is numbered wrongly each time, or the hanger
-has changed in a way that its model class does not know. Where more modes are off the baseline than
-can be misnamed, it is the tests that do not fit it. A misnamed mode is one of a few: where many are
-off, the tests do not fit the baseline.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
 
-from shm.values import (
-    Alert,
-    AlertKind,
-    BoolArray,
-    FloatArray,
-    Hanger,
-    Plane,
-    Reading,
-    RepeatedMistake,
-    WatchedTest,
-)
-from shm.values.drift import ENOUGH_FITS
-from shm.values.rounding import listed
-from shm.watch.alert_text import alert_of
-from shm.watch.quantities import MeasuredMode
+from shm.values import BoolArray, FloatArray
 
 # Of routine modes so many are mistaken: judgement, of hammer tests that were checked by hand.
 MISTAKEN = 0.04
@@ -50,8 +29,7 @@ _MISFIT, _MISFIT_SDS = 0.001, (0.01, 0.02, 0.04)
 
 
 def log_mixture(off: FloatArray, variance: FloatArray | float) -> FloatArray:
-    """Log density of modes that are `off` by so much, of which a few are mistaken; NaN where a mode
-    was not measured."""
+    """Return the log density of modes `off` by so much, of which a few are mistaken; NaN stays."""
     with np.errstate(invalid="ignore"):
         mixed = np.logaddexp(_log_good(off, variance), math.log(MISTAKEN / MISTAKEN_RANGE))
     return np.asarray(mixed)
@@ -81,9 +59,9 @@ class SoundModes:
 def sound_modes(
     off: FloatArray, slopes: FloatArray, variance: FloatArray, precision: FloatArray
 ) -> SoundModes:
-    """Of modes `off` (n,) from the origin, with `slopes` (n, q) and error `variance` (n,).
+    """Find the sound ones of modes `off` (n,) from the origin, with `slopes` (n, q).
 
-    `precision` (q,) is that of the prior of the coordinates about 0.
+    `variance` (n,) is that of their errors, `precision` (q,) that of the coordinates about 0.
     """
     problem = _Problem.of(off, slopes, variance, precision)
     count = len(off)
@@ -113,7 +91,7 @@ def sound_modes(
 
 @lru_cache(64)
 def _small_sets(count: int, most: int) -> BoolArray:
-    """All sets of up to `most` of `count` modes (sets, count), the empty one first."""
+    """Return all sets of up to `most` of `count` modes (sets, count), the empty one first."""
     chosen = [each for size in range(most + 1) for each in combinations(range(count), size)]
     sets = np.zeros((len(chosen), count), bool)
     for row, each in zip(sets, chosen, strict=True):
@@ -139,7 +117,7 @@ class _Problem:
         return cls(over[:, :, None] * slopes[:, None, :], over * off[:, None], log, precision)
 
     def scores(self, sets: BoolArray) -> FloatArray:
-        """Log evidence (sets,) of each set of mistaken modes, less that of all being mistaken."""
+        """Return the log evidence (sets,) of sets of mistaken modes, less that of all modes."""
         kept = (~sets).astype(float)
         matrix = np.tensordot(kept, self.information, 1) + np.diag(self.precision)
         pull = kept @ self.pull
@@ -150,111 +128,6 @@ class _Problem:
         return np.asarray(kept @ self.log + gain / 2)
 
     def most_probable(self, mistaken: BoolArray) -> FloatArray:
-        """The coordinates (q,), `mistaken` modes (n,) left out."""
+        """Return the coordinates (q,), `mistaken` modes (n,) left out."""
         matrix = self.information[~mistaken].sum(axis=0) + np.diag(self.precision)
         return np.asarray(np.linalg.solve(matrix, self.pull[~mistaken].sum(axis=0)))
-
-
-def notice_words(mistaken: Sequence[RepeatedMistake], hanger: Hanger) -> str:
-    """The notice of them."""
-    return f"Hanger {hanger.id}: {' '.join(_words(mistaken))}"
-
-
-def warning_words(mistaken: Sequence[RepeatedMistake], hanger: Hanger) -> str:
-    """The same as one of several warnings of a report, without the reason."""
-    return f"Hanger {hanger.id}: {' '.join(_words(mistaken)[:2])}"
-
-
-def _words(mistaken: Sequence[RepeatedMistake]) -> tuple[str, str, str]:
-    """State, action and why."""
-    since = f"{min(each.since for each in mistaken):%Y-%m-%d}"
-    if any(each.is_misfit for each in mistaken):
-        return _of_misfit(since)
-    names, many = [str(each) for each in mistaken], len(mistaken) > 1
-    have, numbers, them = ("have", "their numbers", "them") if many else ("has", "its number", "it")
-    return (
-        f"{listed(names)} {have} not fitted the other modes since {since}.",
-        f"Check {numbers} at the next planned test.",
-        f"The watch leaves {them} out: another order or a machine's tone may be taken for {them}, "
-        "or one end alone has loosened.",
-    )
-
-
-def _of_misfit(since: str) -> tuple[str, str, str]:
-    return (
-        f"since {since} more of its modes miss the baseline's than one wrong number explains.",
-        "At the next planned test, compare how the modes were numbered then and now, and "
-        "look for new fittings.",
-        "No tension and no end stiffness of the baseline's model explains them, so these tests "
-        "count for little until another baseline is set (`shm drift rebaseline`).",
-    )
-
-
-# Of a log frequency: more than sensors, joints and traffic do to a mode by itself (judgement).
-_OFF = 0.01
-
-
-def repeated_mistakes(
-    before: Sequence[RepeatedMistake], reading: Reading, modes: Sequence[MeasuredMode]
-) -> tuple[RepeatedMistake, ...]:
-    """The modes that are wrong by a reading, or were of late.
-
-    `modes` are those of the baseline, in the order of the reading's; `before` is the same by the
-    test before.
-    """
-    if reading.modes is None:
-        return tuple(before)
-    known = {(each.plane, each.order): each for each in before}
-    misfit = off_the_baseline(reading)
-    is_wrong = reading.modes.mistaken | misfit
-    found = []
-    for key, wrong, off, variance in zip(
-        modes, is_wrong.tolist(), misfit.tolist(), reading.modes.variances, strict=True
-    ):
-        run = known.get(key)
-        if wrong:
-            since, tests = (run.since, run.tests) if run else (reading.time, 0)
-            found.append(RepeatedMistake(*key, since, tests + 1, is_misfit=off))
-        elif run and math.isinf(variance):  # this test does not have the mode
-            found.append(run)
-        elif run and run.is_notable and run.fits + 1 < ENOUGH_FITS:
-            found.append(replace(run, fits=run.fits + 1))
-    return tuple(found)
-
-
-def off_the_baseline(reading: Reading) -> BoolArray:
-    """Which of the baseline's modes (modes,) lie off the state that a reading fits best, where
-    these are too many to be misnamed; else none.
-    """
-    modes = reading.modes
-    if modes is None:
-        return np.zeros(0, bool)
-    measured = np.isfinite(modes.variances)
-    off = measured & (np.abs(modes.values - modes.slopes @ reading.mean) > _OFF)
-    can_tell = measured.sum() > len(reading.mean) + 1
-    are_too_many = can_tell and off.sum() > MOST_MISTAKEN * measured.sum()
-    return off if are_too_many else np.zeros(len(off), bool)
-
-
-def news_of(
-    mistaken: Sequence[RepeatedMistake], noted: Collection[tuple[Plane, int]]
-) -> tuple[RepeatedMistake, ...]:
-    """The modes that a notice is due for, `noted` being those of which one was given.
-
-    A further mode of tests that do not fit is no further cause.
-    """
-    notable = [each for each in mistaken if each.is_notable]
-    is_told = any((each.plane, each.order) in noted for each in notable if each.is_misfit)
-    return tuple(
-        each
-        for each in notable
-        if (each.plane, each.order) not in noted and not (is_told and each.is_misfit)
-    )
-
-
-def notice_of(test: WatchedTest, hanger: Hanger, news: Sequence[RepeatedMistake]) -> Alert:
-    """A notice of the modes `news` that tests keep having wrong."""
-    kind: AlertKind = "check the modes"
-    names = "+".join(f"{each.plane}-{each.order}" for each in news)
-    what = f"{kind.replace(' ', '-')}:{names}"
-    return alert_of(hanger, (test.test, test.time), what, notice_words(news, hanger), (kind,))

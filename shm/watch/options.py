@@ -86,12 +86,12 @@ class Warmth:
 
 
 def reference_of(temperatures_c: Sequence[float]) -> float:
-    """The mean of those known; NaN where none is."""
+    """Return the mean of those known; NaN where none is."""
     known = [value for value in temperatures_c if math.isfinite(value)]
     return float(np.mean(known)) if known else NAN
 
 
-def warmth_of(
+def temperature_offsets(
     temperatures_c: FloatArray, years: FloatArray, reference_c: float, options: WatchOptions
 ) -> Warmth:
     """Of tests at `years` (T,), ascending.

@@ -64,7 +64,7 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Stays:
+class RecurrenceBound:
     """What stays: `log_years` that it has for a change, of each no more than it has anyway and the
     most of all; and how many tests agree with each other against a baseline that stands alone."""
 
@@ -72,7 +72,7 @@ class Stays:
     against_baseline: int = 0
 
 
-def what_stays(evidence: Evidence, course: Course, limit_years: float) -> Stays:
+def bound_by_recurrence(evidence: Evidence, course: Course, limit_years: float) -> RecurrenceBound:
     """Of the likeliest changes; a baseline stands alone only where a normal law would call it."""
     is_clear = evidence.log_evidence > math.log(limit_years)
     found, against = -math.inf, 0
@@ -86,11 +86,11 @@ def what_stays(evidence: Evidence, course: Course, limit_years: float) -> Stays:
         first = int(evidence.beginnings[index[0]])
         if n == 0 and first == course.baseline and is_of_those_before and is_clear:
             against = showing
-    return Stays(found, against)
+    return RecurrenceBound(found, against)
 
 
 def _likeliest(evidence: Evidence) -> list[tuple[int, ...]]:
-    """The likeliest changes of different beginning, kind and cause."""
+    """Return the likeliest changes of different beginning, kind and cause."""
     by_cause = evidence.log_mass.max(axis=(1, 4), initial=-math.inf)
     order = np.argsort(by_cause.ravel())[::-1][:_LEADING]
     chosen: list[tuple[int, ...]] = []

@@ -40,7 +40,7 @@ _MOST = 24  # technical: changes that a mixture is made of, the likeliest
 
 
 @dataclass(frozen=True, eq=False)
-class Subject:
+class SummaryContext:
     """What all tests of one hanger share; `start` is the time of the first reading, and
     `baseline_years` from it the mean of the baseline's. `effects` (r, n + q) are what a change does
     to what owners look at: of each plane the first frequency, then the mean; `by_mode` (n, n + q)
@@ -55,11 +55,11 @@ class Subject:
     by_mode: FloatArray
 
     def at(self, years: float) -> datetime:
-        """The time so many years from the start."""
+        """Return the time so many years from the start."""
         return self.start + timedelta(days=years * DAYS_PER_YEAR)
 
-    def left_open(self, means: FloatArray) -> FloatArray:
-        """Standard deviations (B, q) of shifts `means` (B, q) that the model leaves open.
+    def model_uncertainty(self, means: FloatArray) -> FloatArray:
+        """Return standard deviations (B, q) of shifts `means` (B, q) that the model leaves open.
 
         A share of each, as the baseline's own values are open; some of what ends do may be
         tension's."""
@@ -79,8 +79,8 @@ def probability_of_change(evidence: Evidence, options: WatchOptions) -> float:
     return 1 / (1 + math.exp(min(-odds, 700.0)))
 
 
-def changed(
-    subject: Subject,
+def summarize_change(
+    subject: SummaryContext,
     evidence: Evidence,
     causes: Evidence,
     reading: Reading,
@@ -101,14 +101,14 @@ def changed(
         sudden=_sudden(causes),
         began_after=began_after,
         began_by=began_by,
-        moved=_moved(subject, causes),
+        moved=_rank_causes(subject, causes),
         outlier_probability=outlier,
         material_probability=_material(subject, causes),
         against_baseline=against_baseline,
     )
 
 
-def _material(subject: Subject, evidence: Evidence) -> float:
+def _material(subject: SummaryContext, evidence: Evidence) -> float:
     """The probability that a change, if there is one, moves one of the frequencies that owners look
     at by more than what is to be told."""
     if not len(evidence.beginnings):
@@ -118,7 +118,7 @@ def _material(subject: Subject, evidence: Evidence) -> float:
 
 
 def _materials(
-    subject: Subject, evidence: Evidence, changes: Sequence[tuple[int, ...]]
+    subject: SummaryContext, evidence: Evidence, changes: Sequence[tuple[int, ...]]
 ) -> FloatArray:
     """The same (changes,) of each; of any mode, where no doubt is left that something changed."""
     effects, least = subject.effects, subject.options.least_frequency_shift
@@ -140,7 +140,9 @@ def _sudden(evidence: Evidence) -> float:
     return float(evidence.shares[:, :, STEP].sum())
 
 
-def _began(subject: Subject, evidence: Evidence, reading: Reading) -> tuple[datetime, datetime]:
+def _began(
+    subject: SummaryContext, evidence: Evidence, reading: Reading
+) -> tuple[datetime, datetime]:
     """Between which times the change began, with 90 % probability; the test's own if none can."""
     beginnings, years = evidence.beginnings, evidence.years
     if not len(beginnings):
@@ -154,7 +156,7 @@ def _began(subject: Subject, evidence: Evidence, reading: Reading) -> tuple[date
     )
 
 
-def _moved(subject: Subject, evidence: Evidence) -> tuple[Moved, ...]:
+def _rank_causes(subject: SummaryContext, evidence: Evidence) -> tuple[Moved, ...]:
     """Each quantity as one that changed, and each other cause, the likeliest first.
 
     A spring precedes the tension that is as likely: a part of its loss may be read as tension.
@@ -180,26 +182,26 @@ def _moved(subject: Subject, evidence: Evidence) -> tuple[Moved, ...]:
 
 
 def _as_changed(
-    subject: Subject,
+    subject: SummaryContext,
     evidence: Evidence,
     names: Sequence[str],
     j: int,
     part: FloatArray,
     probability: float,
 ) -> Moved:
-    """What is at `j` of the names, given that it changed: by the directions of its `part`.
+    """Return what is at `j` of the names, given that it changed: by the directions of its `part`.
 
     Of a cause that is no quantity the shift is that of the frequencies' mean, a fraction.
     """
     weights, changes = _leading(evidence, part)
     found = evidence.changes_at(changes)
     n = evidence.layout.n
-    together, alike = _company(evidence, part, names, names[j])
+    together, alike = _find_company(evidence, part, names, names[j])
     if j < len(subject.quantities):
         quantity = subject.quantities[j]
         means = np.array([each[0][n:] for each in found])
         sd = np.array([math.sqrt(float((each[1][n + j] ** 2).sum())) for each in found])
-        sd = np.hypot(sd, subject.left_open(means)[:, j])
+        sd = np.hypot(sd, subject.model_uncertainty(means)[:, j])
         shift = shift_of_mixture(quantity, weights, means[:, j], sd)
         end, plane = quantity.end, quantity.plane
     else:
@@ -239,7 +241,7 @@ def _leading(
     return np.asarray(weights), [tuple(each) for each in places.tolist()]
 
 
-def _company(
+def _find_company(
     evidence: Evidence, part: FloatArray, names: Sequence[str], itself: str
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What moves with `itself` in the likeliest direction of `part`; what does as well without.
@@ -268,8 +270,13 @@ def _company(
     return together, tuple(name for name in names if name in chosen)
 
 
-def drifted(
-    subject: Subject, evidence: Evidence, causes: Evidence, reading: Reading, *, is_baseline: bool
+def summarize_drifts(
+    subject: SummaryContext,
+    evidence: Evidence,
+    causes: Evidence,
+    reading: Reading,
+    *,
+    is_baseline: bool,
 ) -> tuple[Drift, ...]:
     """The shift of each quantity since the baseline: slow creep, called changes, and a new one.
 
@@ -298,7 +305,7 @@ def drifted(
     all_means = np.concatenate([np.array([each[1] for each in nulls]).reshape(-1, q), means])
     sds_of_null = np.array([np.sqrt(np.maximum(np.diag(each[2]), 0)) for each in nulls])
     all_sds = np.hypot(
-        np.concatenate([sds_of_null.reshape(-1, q), sds]), subject.left_open(all_means)
+        np.concatenate([sds_of_null.reshape(-1, q), sds]), subject.model_uncertainty(all_means)
     )
     told = np.ones(len(all_weights))
     if len(changes) and not evidence.called:
@@ -310,7 +317,7 @@ def drifted(
             part = np.array([j in each.members for each in evidence.directions])
             own = _shifts(evidence, part, loadings, alone=len(evidence.beginnings) == 1)
             if len(own[0]):
-                chosen = (*own[:2], np.hypot(own[2], subject.left_open(own[1])))
+                chosen = (*own[:2], np.hypot(own[2], subject.model_uncertainty(own[1])))
         elif not evidence.called and not is_baseline:
             sd = quantity.step_sd * math.sqrt(float(np.exp(LOG_SHARES) @ SIZES**2))
             chosen = np.ones(1), np.zeros((1, q)), np.full((1, q), sd)
@@ -329,7 +336,7 @@ def drifted(
     return tuple(found)
 
 
-def _of_null(evidence: Evidence, subject: Subject) -> FloatArray:
+def _of_null(evidence: Evidence, subject: SummaryContext) -> FloatArray:
     """Loadings (q, null) of slow creep and called changes on the shift of each quantity by now."""
     layout, now = evidence.layout, float(evidence.years[-1])
     own = np.hstack([np.zeros((layout.q, layout.n)), np.eye(layout.q)])
@@ -365,7 +372,7 @@ def _shifts(
 
 
 def _drift(
-    subject: Subject,
+    subject: SummaryContext,
     quantity: WatchedQuantity,
     reading: Reading,
     shift: Shift,

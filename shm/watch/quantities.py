@@ -89,7 +89,7 @@ def watched_quantities(
 
 
 def _held(model: Model, base: FloatArray, modes: Sequence[MeasuredMode]) -> list[tuple[str, ...]]:
-    """The springs of the class, those together that can be exchanged."""
+    """Return the springs of the class, those together that can be exchanged."""
     pairs = exchangeable(model, base, modes)
     paired = {name for pair in pairs for name in pair}
     return [*pairs, *((name,) for name in _springs(model) if name not in paired)]
@@ -125,7 +125,7 @@ def _is_exchangeable(
 
 
 def base_point(baseline: Posterior, model: Model) -> FloatArray:
-    """The baseline's most probable parameter set (parameters,), its tension kept in N.
+    """Return the baseline's most probable parameter set (parameters,), its tension kept in N.
 
     What the bar as made deviates by from its description is part of it: all tests have it alike.
     Springs lie within their prior, which is that of the described bar.
@@ -179,7 +179,7 @@ def _like(x: _X, found: float | FloatArray) -> _X:
 
 
 def _tension(baseline: Posterior, model: Model, base: FloatArray) -> WatchedQuantity:
-    """The tension, as far as the class's prior reaches, and down to a slack hanger."""
+    """Return the tension, as far as the class's prior reaches, and down to a slack hanger."""
     column = model.parameter_names.index(_TENSION_RATIO)
     lower, upper = (ends[column] / base[column] for ends in (model.prior.lower, model.prior.upper))
     lower = min(lower, _SLACK)
@@ -293,13 +293,13 @@ def _refined(log10_k: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def _springs(model: Model) -> list[str]:
-    """The springs of the class, or of the baseline of an adopted one."""
+    """Return the springs of the class, or of the baseline of an adopted one."""
     own = MODELS[_baseline_class(model)].bounds
     return [each for each in model.parameter_names if each in own and each.startswith(_STIFFNESS)]
 
 
 def _baseline_class(model: Model) -> str:
-    """The name of the class, or of the baseline of an adopted one."""
+    """Return the name of the class, or of the baseline of an adopted one."""
     return AdoptedName.parse(model.name).baseline if is_adopted(model.name) else model.name
 
 
@@ -342,7 +342,7 @@ def _spring(response: _Response, baseline: Posterior, model: Model) -> WatchedQu
 
 
 def _rising(mean: FloatArray, at: int) -> list[int]:
-    """The nodes to keep so that coordinates rise strictly, that of the base `at` always."""
+    """Return the nodes to keep so that coordinates rise strictly, that of the base `at` always."""
     above, below = [at], [at]
     for index in range(at + 1, len(mean)):
         if mean[index] > mean[above[-1]] + _ROUNDING:
@@ -359,7 +359,7 @@ def _off_by(ratios: FloatArray) -> float:
 
 
 def _spring_step(response: _Response, samples: FloatArray) -> float:
-    """What 0.3 decades do, the larger of up and down: at the base point or typically."""
+    """Return what 0.3 decades do, the larger of up and down: at the base point or typically."""
     at_base = _step_at(response, np.array([response.base]))
     typical = np.sqrt(np.mean(_step_at(response, samples) ** 2))
     return float(max(at_base[0], typical))

@@ -106,17 +106,26 @@ class Reader:
         sensors_kg = mounted_kg(hanger)
         self._scatter = math.hypot(_MODE_SCATTER, sensors_kg / mass_kg / math.sqrt(8))
         self._loosening = np.vstack(self.columns.loosening).T
+        self._known: dict[int, tuple[ModalTest, Reading]] = {}
         self._residual = np.zeros(len(self.modes))
         self._residual = self._own_residual([self._seen(test) for test in usable])
 
     def reading(self, test: ModalTest, time: datetime) -> Reading:
-        """What `test`, made at `time`, says by itself.
+        """Return what a test by itself states of the quantities; it was made at `time`.
 
         Modes that the baseline does not have are left out, and so are those that fit no state of
         the hanger which the others fit: mistaken ones. Where too many are, none is, and all count
         for less than their errors say. A test without any mode that the baseline has, or of
-        conditions that the model class cannot describe, says nothing: information 0.
+        conditions that the model class cannot describe, says nothing: information 0. A test is
+        read once, since rules that compare it with others ask again.
         """
+        known, found = self._known.get(id(test), (None, None))
+        if found is None or known is not test:
+            found = self._read(test, time)
+            self._known[id(test)] = test, found
+        return replace(found, time=time)
+
+    def _read(self, test: ModalTest, time: datetime) -> Reading:
         count = len(self.quantities)
         blind = Reading(test.id, time, test.temperature_c, np.zeros(count), np.zeros((count,) * 2))
         if not (_is_described(test, self._model) and len((seen := self._seen(test)).own)):
@@ -141,7 +150,7 @@ class Reader:
     def _by_mode(
         self, seen: SeenModes, linear: LinearReading, mistaken: IntArray, *, is_warmth_known: bool
     ) -> ModeReading:
-        """The same for each of the baseline's modes.
+        """Return the same for each of the baseline's modes.
 
         Stated errors are taken to be off by a factor that the misfit tells, as far as it can.
         """
@@ -160,7 +169,7 @@ class Reader:
         return ModeReading(values, variances, slopes, softer, wrong)
 
     def _sound(self, seen: SeenModes) -> BoolArray:
-        """Which modes (n,) are not mistaken: likelier good than off by anything.
+        """Return which modes (n,) are not mistaken: more probably good than off by anything.
 
         Each is good with its error and scatter or, seldom, anywhere. Which are mistaken is asked
         anew about the state that the others give, for only near it are frequencies linear: once
@@ -169,26 +178,21 @@ class Reader:
         every = np.ones(len(seen.own), bool)
         if len(seen.own) < len(self.quantities) + 2:
             return every
-        still, none = np.zeros(len(self.quantities)), self._loosening[:, :0]
-        found = self._sound_by(seen, none, still)
+        found = self._sound_by(seen, self._loosening[:, :0])
         if found.sound.all():
             return every
-        slack = self._sound_by(seen, none, self._likelihood.far_start(seen))
-        if slack.log_evidence > found.log_evidence:
-            found = slack
         if self._loosening.size:
-            loose = self._sound_by(seen, self._loosening, still)
+            loose = self._sound_by(seen, self._loosening)
             if loose.log_evidence + math.log(_LOOSENED) > found.log_evidence:
                 found = loose
         return found.sound if (~found.sound).sum() <= MOST_MISTAKEN * len(every) else every
 
-    def _sound_by(self, seen: SeenModes, more: FloatArray, start: FloatArray) -> SoundModes:
-        """Which modes are sound where the quantities, and `more` (modes, k), may have moved; the
-        quantities are sought from `start` (q,) on."""
+    def _sound_by(self, seen: SeenModes, more: FloatArray) -> SoundModes:
+        """Find the sound modes where the quantities, and `more` (modes, k), may have moved."""
         variance, more = seen.variance + self._scatter**2, more[seen.own]
         wide, sd = replace(seen, variance=variance), np.sqrt(variance)
         pull = np.append(self._likelihood.pull, np.full(more.shape[1], 1 / _LOOSENED_STEPS**2))
-        x = start
+        x = np.zeros(len(self.quantities))
         for _ in range(_ROUNDS):
             linear = self._likelihood.linear(x, wide)
             off = sd * (linear.residual + linear.slopes @ x)

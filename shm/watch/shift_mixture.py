@@ -67,7 +67,7 @@ def beyond(
 
 
 def _coordinate(quantity: WatchedQuantity, shift: float) -> float:
-    """The coordinate of a shift; infinite where the quantity's table ends before it."""
+    """Return the coordinate of a shift; infinite where the quantity's table ends before it."""
     is_fraction = is_ratio(quantity.name)
     value = quantity.baseline * (1 + shift) if is_fraction else quantity.baseline + shift
     if not min(quantity.values) < value < max(quantity.values):

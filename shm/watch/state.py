@@ -1,19 +1,22 @@
 """Tension and end stiffness over time: local levels with the temperature as regressor.
 
 level_t = level_{t-1} + N(0, rate^2 dt), reading_t = level_t + coefficient (temperature_t -
-reference) + scatter + the reading's own error, of all quantities jointly. What the sequential test
-has found goes in: outliers get a wide noise, at a called change the level is set free.
+reference) + scatter + the reading's own error, of all quantities jointly (Harvey 1989, chapters 2
+to 4; Durbin and Koopman 2012, sections 4.3 and 4.4). What the sequential test has found goes in:
+outliers get a wide noise, at a called change the level is set free.
 """
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from datetime import datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import scipy
 
 from shm.assumptions import DEFAULTS, Assumptions
 from shm.errors import NothingThere, UsageError
@@ -24,8 +27,12 @@ from shm.values.rounding import NINETY_PERCENT
 from shm.watch.options import reference_of
 from shm.watch.quantities import value_at
 
-if TYPE_CHECKING:
-    from shm.watch.local_level import Course, LocalLevels
+_SECONDS_A_YEAR = 365.25 * 86400  # Julian
+_ROUNDING = 1e-9  # technical
+_FEW = 5  # fewer give an sd no better than to a third
+_A_STEP, _CLEAR = 0.5, 3  # likelier a step than a ramp; tests: judgement, see `set_free`
+_WIDEST = 4.0  # prior sds: beyond lies 1 in 16,000
+_SLOPE_STEP = 1e-4  # technical: rounding and curvature then each spoil a slope by some 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,130 +46,10 @@ class Band:
     middle: FloatArray
     high: FloatArray
 
-
-@dataclass(frozen=True, eq=False)
-class StateHistory:
-    """Levels of all watched quantities over the tests of a hanger, in the watch's coordinates.
-
-    `filtered_mean` (n, q) and `filtered_covariance` (n, q, q) rest on the tests up to each, the
-    smoothed ones on all. Every level holds at `reference_temperature_c`: the swing with the
-    temperature is taken out. `coefficient_mean` and `coefficient_sd` (q,) are of the coordinates
-    per kelvin, `coefficient_prior_sd` is the sd before any test; `level_rate` (q,) is the sd by
-    which a level wanders in a year, `scatter` (q,) the sd from test to test beyond the readings'
-    own errors. Both are the likeliest given the whole history, for the filtered levels too; how
-    little is known of them widens the covariances.
-    """
-
-    quantities: tuple[WatchedQuantity, ...]
-    readings: tuple[Reading, ...]
-    reference_temperature_c: float
-    filtered_mean: FloatArray
-    filtered_covariance: FloatArray
-    smoothed_mean: FloatArray
-    smoothed_covariance: FloatArray
-    coefficient_mean: FloatArray
-    coefficient_sd: FloatArray
-    coefficient_prior_sd: FloatArray
-    level_rate: FloatArray
-    scatter: FloatArray
-
-    @property
-    def tests(self) -> tuple[str, ...]:
-        return tuple(reading.test for reading in self.readings)
-
-    @property
-    def times(self) -> tuple[datetime, ...]:
-        return tuple(reading.time for reading in self.readings)
-
-    @property
-    def temperatures_c(self) -> FloatArray:
-        """(n,), NaN where a test has none."""
-        return np.array([reading.temperature_c for reading in self.readings], np.float64)
-
-    def filtered(self, name: str) -> Band:
-        """What was known at each test of quantity `name`, from that test and those before."""
-        return self._level(name, self.filtered_mean, self.filtered_covariance)
-
-    def smoothed(self, name: str) -> Band:
-        """What is known today of quantity `name` at each test."""
-        return self._level(name, self.smoothed_mean, self.smoothed_covariance)
-
-    def read(self, name: str) -> Band:
-        """What each test by itself says of quantity `name` at the reference temperature.
-
-        A test may not tell all quantities apart, so the others are taken as smoothed and their
-        uncertainty is added. The interval holds the reading's own error, not the scatter.
-        """
-        j = self._place(name)
-        pairs = np.array([self._alone(test, j) for test in range(len(self.readings))])
-        return _band(self.quantities[j], pairs[:, 0], pairs[:, 1])
-
-    def temperature_coefficients(self) -> tuple[TemperatureCoefficient, ...]:
-        """Per kelvin, at the baseline: a fraction of the tension, decades of a stiffness."""
-        return tuple(
-            TemperatureCoefficient(
-                quantity.name, float(slope * mean), float(slope * sd), float(slope * prior_sd)
-            )
-            for quantity, mean, sd, prior_sd in zip(
-                self.quantities,
-                self.coefficient_mean,
-                self.coefficient_sd,
-                self.coefficient_prior_sd,
-                strict=True,
-            )
-            for slope in [_slope_at_baseline(quantity)]
-        )
-
-    def _place(self, name: str) -> int:
-        names = [quantity.name for quantity in self.quantities]
-        if name not in names:
-            raise UsageError(f"{name} is not watched.", remedy=f"Watched: {', '.join(names)}.")
-        return names.index(name)
-
-    def _level(self, name: str, mean: FloatArray, covariance: FloatArray) -> Band:
-        j = self._place(name)
-        sd = np.sqrt(np.maximum(covariance[:, j, j], 0))
-        return _band(self.quantities[j], mean[:, j], sd)
-
-    def _alone(self, test: int, j: int) -> tuple[float, float]:
-        """Mean and sd of coordinate `j` by this test, the others as smoothed."""
-        reading = self.readings[test]
-        own = float(reading.information[j, j])
-        if not (own > 0 and np.all(np.isfinite(reading.mean))):
-            return np.nan, np.nan
-        warmth = reading.temperature_c - self.reference_temperature_c
-        swing = self.coefficient_mean * (warmth if np.isfinite(warmth) else 0.0)
-        pull = np.delete(reading.information[j], j) / own
-        off = np.delete(self.smoothed_mean[test] + swing - reading.mean, j)
-        others = np.delete(np.delete(self.smoothed_covariance[test], j, 0), j, 1)
-        mean = reading.mean[j] - swing[j] - pull @ off
-        return float(mean), float(np.sqrt(1 / own + pull @ others @ pull))
-
-
-def _band(quantity: WatchedQuantity, mean: FloatArray, sd: FloatArray) -> Band:
-    ends = [value_at(quantity, mean + sign * NINETY_PERCENT * sd) for sign in (-1, 1)]
-    return Band(np.minimum(*ends), value_at(quantity, mean), np.maximum(*ends))
-
-
-def _slope_at_baseline(quantity: WatchedQuantity) -> float:
-    """Fraction of the tension, or decades, per unit of the coordinate.
-
-    Over a step's sd to either side: at an end that is as good as clamped the slope at one point
-    has no bounds.
-    """
-    if quantity.name == TENSION:
-        return 1.0
-    reach = quantity.step_sd
-    low = max(-reach, float(quantity.coordinates[0]))
-    high = min(reach, float(quantity.coordinates[-1]))
-    return (value_at(quantity, high) - value_at(quantity, low)) / (high - low)
-
-
-_SECONDS_A_YEAR = 365.25 * 86400  # Julian
-_UNSEEN = 1e-6  # of a step: an sd of a thousand steps sees nothing
-_ROUNDING = 1e-9  # technical
-_FEW = 5  # fewer give an sd no better than to a third
-_A_STEP, _CLEAR = 0.5, 3  # likelier a step than a ramp; tests: judgement, see `set_free`
+    @classmethod
+    def of(cls, quantity: WatchedQuantity, mean: FloatArray, sd: FloatArray) -> Band:
+        ends = [value_at(quantity, mean + sign * NINETY_PERCENT * sd) for sign in (-1, 1)]
+        return cls(np.minimum(*ends), value_at(quantity, mean), np.maximum(*ends))
 
 
 @dataclass(frozen=True)
@@ -198,6 +85,105 @@ class StateOptions:
         return cls(**{**rows, **given})
 
 
+@dataclass(frozen=True, eq=False)
+class StateHistory:
+    """Levels of all watched quantities over the tests of a hanger, in the watch's coordinates.
+
+    `filtered_mean` (n, q) and `filtered_covariance` (n, q, q) rest on the tests up to each, the
+    smoothed ones on all. Every level holds at `reference_temperature_c`: the swing with the
+    temperature is taken out. `coefficient_mean` and `coefficient_sd` (q,) are of the coordinates
+    per kelvin, `coefficient_prior_sd` is the sd before any test; `level_rate` (q,) is the sd by
+    which a level wanders in a year, `scatter` (q,) the sd from test to test beyond the readings'
+    own errors. Both are the most probable ones given the complete history, for the filtered levels
+    too.
+    """
+
+    quantities: tuple[WatchedQuantity, ...]
+    readings: tuple[Reading, ...]
+    reference_temperature_c: float
+    filtered_mean: FloatArray
+    filtered_covariance: FloatArray
+    smoothed_mean: FloatArray
+    smoothed_covariance: FloatArray
+    coefficient_mean: FloatArray
+    coefficient_sd: FloatArray
+    coefficient_prior_sd: FloatArray
+    level_rate: FloatArray
+    scatter: FloatArray
+
+    @property
+    def tests(self) -> tuple[str, ...]:
+        return tuple(reading.test for reading in self.readings)
+
+    @property
+    def times(self) -> tuple[datetime, ...]:
+        return tuple(reading.time for reading in self.readings)
+
+    @property
+    def temperatures_c(self) -> FloatArray:
+        """Return those of the tests (n,), NaN where a test has none."""
+        return _temperatures_c(self.readings)
+
+    def filtered(self, name: str) -> Band:
+        """Return what was known of a quantity at each test, from that test and those before."""
+        return self._level(name, self.filtered_mean, self.filtered_covariance)
+
+    def smoothed(self, name: str) -> Band:
+        """Return what is known today of a quantity at each test."""
+        return self._level(name, self.smoothed_mean, self.smoothed_covariance)
+
+    def read(self, name: str) -> Band:
+        """Return what each test by itself says of a quantity at the reference temperature.
+
+        A test may not tell all quantities apart, so the others are taken as smoothed and their
+        uncertainty is added. The interval holds the reading's own error, not the scatter.
+        """
+        j = self._index(name)
+        mean, sd = np.full((2, len(self.readings)), np.nan)
+        for t, reading in enumerate(self.readings):
+            row, own = np.delete(reading.information[j], j), reading.information[j, j]
+            if own > 0 and np.all(np.isfinite(reading.mean)):
+                warmth = np.nan_to_num(reading.temperature_c - self.reference_temperature_c)
+                rest = reading.mean - self.coefficient_mean * warmth  # at the reference
+                others = np.delete(np.delete(self.smoothed_covariance[t], j, 0), j, 1)
+                off = np.delete(self.smoothed_mean[t] - rest, j)
+                mean[t] = rest[j] - row @ off / own
+                sd[t] = math.sqrt(1 / own + row @ others @ row / own**2)
+        return Band.of(self.quantities[j], mean, sd)
+
+    def temperature_coefficients(self) -> tuple[TemperatureCoefficient, ...]:
+        """Return those per kelvin, at the baseline: a fraction of the tension, or decades."""
+        columns = self.coefficient_mean, self.coefficient_sd, self.coefficient_prior_sd
+        return tuple(
+            TemperatureCoefficient(each.name, *(float(_slope_at_baseline(each) * v) for v in row))
+            for each, row in zip(self.quantities, np.array(columns).T, strict=True)
+        )
+
+    def _index(self, name: str) -> int:
+        names = [quantity.name for quantity in self.quantities]
+        if name not in names:
+            raise UsageError(f"{name} is not watched.", remedy=f"Watched: {', '.join(names)}.")
+        return names.index(name)
+
+    def _level(self, name: str, mean: FloatArray, covariance: FloatArray) -> Band:
+        j = self._index(name)
+        sd = np.sqrt(np.maximum(covariance[:, j, j], 0))
+        return Band.of(self.quantities[j], mean[:, j], sd)
+
+
+def _slope_at_baseline(quantity: WatchedQuantity) -> float:
+    """Return the fraction of the tension, or the decades, per unit of the coordinate.
+
+    Over a step's sd to either side: at an end that is as good as clamped the slope at one point
+    has no bounds.
+    """
+    if quantity.name == TENSION:
+        return 1.0
+    inside = quantity.coordinates[0], quantity.coordinates[-1]
+    low, high = np.clip([-quantity.step_sd, quantity.step_sd], *inside).tolist()
+    return float((value_at(quantity, high) - value_at(quantity, low)) / (high - low))
+
+
 def states(
     readings: Sequence[Reading],
     quantities: Sequence[WatchedQuantity],
@@ -205,7 +191,7 @@ def states(
     changes: Sequence[datetime] = (),
     options: StateOptions | None = None,
 ) -> StateHistory:
-    """Filtered and smoothed levels of all quantities at each of n readings, oldest first.
+    """Return filtered and smoothed levels of all quantities at n readings, oldest first.
 
     `weights` (n,) are probabilities of being an outlier (None: no outliers; NaN: not known, taken
     as 0). At each of `changes` the level is set free just before the first reading at that time or
@@ -213,16 +199,36 @@ def states(
     not in order or weights do not fit.
     """
     chosen = options or StateOptions()
-    given = np.zeros(len(readings)) if weights is None else np.asarray(weights, np.float64)
-    outlier = np.nan_to_num(given, nan=0.0)
+    outlier = np.zeros(len(readings)) if weights is None else np.nan_to_num(weights, nan=0.0)
     _check(readings, outlier)
-    reference_c = _reference(readings, chosen)
-    course = _course(readings, quantities, outlier, changes, reference_c, chosen)
-    return _history(*_fitted(course), readings, quantities, reference_c, chosen)
+    model = LocalLevels.of(readings, quantities, outlier, changes, chosen)
+    z = model.fitted()
+    if model.unknown_k.any():  # what the other tests say of the coefficients tells how it matters
+        _, _, found, covariance = model.states(z)
+        square = found[-1] ** 2 + np.diag(covariance[-1])
+        model = replace(model, unknown_square=square[model.q :])
+        z = model.fitted()
+    before, before_cov, after, after_cov = model.states(z)
+    step, q = model.step, model.q
+    rate, scatter = model.rate_and_scatter(z)
+    return StateHistory(
+        quantities=tuple(quantities),
+        readings=tuple(readings),
+        reference_temperature_c=model.reference_c,
+        filtered_mean=step * before[:, :q],
+        filtered_covariance=np.outer(step, step) * before_cov[:, :q, :q],
+        smoothed_mean=step * after[:, :q],
+        smoothed_covariance=np.outer(step, step) * after_cov[:, :q, :q],
+        coefficient_mean=step * after[-1, q:],
+        coefficient_sd=step * np.sqrt(np.maximum(np.diag(after_cov[-1])[q:], 0)),
+        coefficient_prior_sd=step * model.coefficient_sd,
+        level_rate=step * rate,
+        scatter=step * scatter,
+    )
 
 
 def set_free(calls: Sequence[Change], readings: Sequence[Reading]) -> tuple[datetime, ...]:
-    """The `changes` of `states` that called changes make.
+    """Return the `changes` of `states` that called changes make.
 
     A step that began within three tests frees the level at each of them; of one whose beginning is
     less clear at the last alone, since a level that is free at every test knows nothing but that
@@ -234,24 +240,6 @@ def set_free(calls: Sequence[Change], readings: Sequence[Reading]) -> tuple[date
         if call.sudden > _A_STEP:
             free += times if len(times) <= _CLEAR else times[-1:]
     return tuple(sorted(set(free)))
-
-
-def _fitted(course: Course) -> tuple[LocalLevels, FloatArray]:
-    """The model with its parameters.
-
-    Where temperatures are not known it is fitted twice: what the others say of the coefficients
-    tells how much that matters.
-    """
-    from shm.watch.local_level import LocalLevels
-
-    model = LocalLevels(course)
-    z = model.fitted()
-    if np.any(course.extra_variance):
-        per_prior = course.extra_variance / course.coefficient_sd**2
-        known = replace(course, extra_variance=per_prior * model.coefficient_square(z))
-        model = LocalLevels(known)
-        z = model.fitted()
-    return model, z
 
 
 def _check(readings: Sequence[Reading], outlier: FloatArray) -> None:
@@ -267,124 +255,166 @@ def _check(readings: Sequence[Reading], outlier: FloatArray) -> None:
         raise UsageError("The readings are not in the order of time.", remedy="Sort them first.")
 
 
-def _reference(readings: Sequence[Reading], options: StateOptions) -> float:
-    if np.isfinite(options.reference_temperature_c):
-        return options.reference_temperature_c
-    return reference_of([reading.temperature_c for reading in readings])
+def _temperatures_c(readings: Sequence[Reading]) -> FloatArray:
+    return np.array([reading.temperature_c for reading in readings], np.float64)
 
 
-def _known_temperatures_c(readings: Sequence[Reading]) -> FloatArray:
-    all_c = np.array([reading.temperature_c for reading in readings], np.float64)
-    return all_c[np.isfinite(all_c)]
+@dataclass(frozen=True, eq=False)
+class LocalLevels:
+    """The model of n tests of q quantities, in units of each one's `step` (q,).
 
-
-def _course(
-    readings: Sequence[Reading],
-    quantities: Sequence[WatchedQuantity],
-    outlier: FloatArray,
-    changes: Sequence[datetime],
-    reference_c: float,
-    options: StateOptions,
-) -> Course:
-    from shm.watch.local_level import Course
-
-    step_sd = np.array([quantity.step_sd for quantity in quantities], np.float64)
-    parts = [_seen(reading, step_sd) for reading in readings]
-    seen, directions, variance = (np.stack(part) for part in zip(*parts, strict=True))
-    warmth_k = np.array([reading.temperature_c for reading in readings]) - reference_c
-    coefficient_sd = _coefficient_sd(quantities, options)
-    seconds = np.array([reading.time.timestamp() for reading in readings], np.float64)
-    return Course(
-        seen=seen,
-        directions=directions,
-        variance=variance,
-        warmth_k=np.where(np.isfinite(warmth_k), warmth_k, 0.0),
-        extra_variance=_unknown_warmth(readings, coefficient_sd, options),
-        inflation=1 / np.clip(1 - outlier, 1 / options.largest_inflation, 1.0),
-        years=np.diff(seconds) / _SECONDS_A_YEAR,
-        jump_variance=_jumps(readings, changes, options.jump_of_step * step_sd),
-        coefficient_sd=coefficient_sd,
-        rate=options.rate_of_step * step_sd,
-        scatter=options.scatter_of_step * step_sd,
-        rate_log_sd=options.rate_log_sd,
-        scatter_log_sd=options.scatter_log_sd,
-    )
-
-
-def _coefficient_sd(quantities: Sequence[WatchedQuantity], options: StateOptions) -> FloatArray:
-    """Of each coordinate (q,), per kelvin."""
-    return np.array(
-        [
-            options.tension_per_kelvin_sd
-            if quantity.name == TENSION
-            else options.spring_per_kelvin_sd_of_step * quantity.step_sd
-            for quantity in quantities
-        ]
-    )
-
-
-def _seen(reading: Reading, step_sd: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Values (q,), directions (q, q; a row each) and variances (q,) that do not depend on another.
-
-    Along the eigenvectors of the information in units of `step_sd`, since coordinates differ in
-    size by orders; the value is NaN where there is next to no information.
+    `mean` (n, q) and `information` (n, q, q) are the readings', `warmth_k` (n,) the temperature
+    above the reference, 0 where unknown, and `unknown_k` (n,) the sd of that; `unknown_square` (q,)
+    what a kelvin then does, squared. `inflation` (n,) is of the whole noise, for outliers, `years`
+    (n,) those to the test before, `jump` (n,) the variance of the level just before each test.
+    Parameters z (2 q,) are standard normal before any data: how many prior sds the logarithms of
+    the q rates, then of the q scatters, lie above their prior medians.
     """
-    count = len(step_sd)
-    if not (np.all(np.isfinite(reading.information)) and np.all(np.isfinite(reading.mean))):
-        return np.full(count, np.nan), np.diag(1 / step_sd), np.ones(count)
-    information = (reading.information + reading.information.T) / 2 * np.outer(step_sd, step_sd)
-    strength, vectors = np.linalg.eigh(information)
-    there = strength > max(_UNSEEN, _ROUNDING * strength[-1])
-    directions = vectors.T / step_sd
-    values = np.where(there, directions @ reading.mean, np.nan)
-    return values, directions, 1 / np.where(there, strength, 1.0)
 
+    mean: FloatArray
+    information: FloatArray
+    warmth_k: FloatArray
+    unknown_k: FloatArray
+    unknown_square: FloatArray
+    inflation: FloatArray
+    years: FloatArray
+    jump: FloatArray
+    coefficient_sd: FloatArray
+    step: FloatArray
+    reference_c: float
+    options: StateOptions
 
-def _unknown_warmth(
-    readings: Sequence[Reading], coefficient_sd: FloatArray, options: StateOptions
-) -> FloatArray:
-    """Variance (n, q) of each coordinate for not knowing a test's temperature."""
-    known = _known_temperatures_c(readings)
-    spread = known.std() if len(known) >= _FEW else options.unknown_temperature_sd_k
-    unknown = np.array([not np.isfinite(reading.temperature_c) for reading in readings])
-    return np.asarray(unknown[:, None] * (coefficient_sd * spread) ** 2, np.float64)
+    @classmethod
+    def of(
+        cls,
+        readings: Sequence[Reading],
+        quantities: Sequence[WatchedQuantity],
+        outlier: FloatArray,
+        changes: Sequence[datetime],
+        options: StateOptions,
+    ) -> LocalLevels:
+        step = np.array([quantity.step_sd for quantity in quantities])
+        coefficient_sd = np.array(
+            [
+                options.tension_per_kelvin_sd / quantity.step_sd
+                if quantity.name == TENSION
+                else options.spring_per_kelvin_sd_of_step
+                for quantity in quantities
+            ]
+        )
+        mean = np.array([each.mean for each in readings]) / step
+        information = np.array([each.information for each in readings]) * np.outer(step, step)
+        is_blind = ~(np.isfinite(mean).all(axis=1) & np.isfinite(information).all(axis=(1, 2)))
+        mean[is_blind], information[is_blind] = 0.0, 0.0
+        temperature_c = _temperatures_c(readings)
+        known = temperature_c[np.isfinite(temperature_c)]
+        reference_c = options.reference_temperature_c
+        if not math.isfinite(reference_c):
+            reference_c = reference_of(temperature_c.tolist())
+        spread_k = known.std() if len(known) >= _FEW else options.unknown_temperature_sd_k
+        seconds = [reading.time.timestamp() for reading in readings]
+        times, jump = [reading.time for reading in readings], np.zeros(len(readings))
+        free = [0, *(bisect_left(times, change) for change in changes)]
+        jump[[at for at in free if at < len(times)]] = options.jump_of_step**2
+        return cls(
+            mean,
+            (information + np.swapaxes(information, 1, 2)) / 2,
+            np.nan_to_num(temperature_c - reference_c),
+            np.where(np.isfinite(temperature_c), 0.0, spread_k),
+            coefficient_sd**2,
+            1 / np.clip(1 - outlier, 1 / options.largest_inflation, 1.0),
+            np.diff(seconds, prepend=seconds[0]) / _SECONDS_A_YEAR,
+            jump,
+            coefficient_sd,
+            step,
+            reference_c,
+            options,
+        )
 
+    @property
+    def q(self) -> int:
+        return len(self.step)
 
-def _jumps(
-    readings: Sequence[Reading], changes: Sequence[datetime], jump_sd: FloatArray
-) -> FloatArray:
-    """Variance (n, q) of the level just before each reading."""
-    times = [reading.time for reading in readings]
-    variance = np.zeros((len(times), len(jump_sd)))
-    variance[[0, *(at for at in (bisect_left(times, c) for c in changes) if at < len(times))]] = (
-        jump_sd**2
-    )
-    return variance
+    def rate_and_scatter(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return both (..., q) of z (..., 2 q), in steps; rates per square root of a year."""
+        rates, scatters = np.split(z, 2, axis=-1)
+        given = self.options
+        return (
+            given.rate_of_step * np.exp(given.rate_log_sd * rates),
+            given.scatter_of_step * np.exp(given.scatter_log_sd * scatters),
+        )
 
+    def misfit(self, z: FloatArray) -> FloatArray:
+        """Return minus the log (m,) of the posterior density of z (m, 2 q), but for a constant."""
+        return np.asarray((z**2).sum(axis=1) / 2 - self._filtered(z)[0])
 
-def _history(
-    model: LocalLevels,
-    z: FloatArray,
-    readings: Sequence[Reading],
-    quantities: Sequence[WatchedQuantity],
-    reference_c: float,
-    options: StateOptions,
-) -> StateHistory:
-    count = len(quantities)
-    found = model.course_of_states(z)
-    rate, scatter = model.rate_and_scatter(z)
-    last = found.smoothed_covariance[-1].diagonal()[count:]
-    return StateHistory(
-        quantities=tuple(quantities),
-        readings=tuple(readings),
-        reference_temperature_c=reference_c,
-        filtered_mean=found.filtered_mean[:, :count],
-        filtered_covariance=found.filtered_covariance[:, :count, :count],
-        smoothed_mean=found.smoothed_mean[:, :count],
-        smoothed_covariance=found.smoothed_covariance[:, :count, :count],
-        coefficient_mean=found.smoothed_mean[-1, count:],
-        coefficient_sd=np.sqrt(np.maximum(last, 0)),
-        coefficient_prior_sd=_coefficient_sd(quantities, options),
-        level_rate=rate,
-        scatter=scatter,
-    )
+    def fitted(self) -> FloatArray:
+        """Return z (2 q,) of the largest posterior density: the likelihood times the weak prior."""
+        steps = _SLOPE_STEP * np.eye(2 * self.q)
+
+        def misfit_and_slope(z: FloatArray) -> tuple[float, FloatArray]:
+            here, *beside = self.misfit(z + np.vstack([0 * steps[:1], steps, -steps]))
+            ahead, behind = np.split(np.array(beside), 2)
+            return float(here), (ahead - behind) / (2 * _SLOPE_STEP)
+
+        found = scipy.optimize.minimize(
+            misfit_and_slope,
+            np.zeros(2 * self.q),
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[(-_WIDEST, _WIDEST)] * 2 * self.q,
+            options={"ftol": 1e-7, "maxiter": 60},
+        )
+        return np.asarray(found.x)
+
+    def states(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return means (n, 2 q) and covariances (n, 2 q, 2 q) at `z` (2 q,), filtered, smoothed."""
+        made = self._filtered(z[None])[1]
+        before, before_cov = (np.array([each[k][0] for each in made]) for k in (2, 3))
+        after, after_cov = self._smoothed(made)
+        return before, before_cov, after[0], after_cov[0]
+
+    def _filtered(self, z: FloatArray) -> tuple[FloatArray, list[tuple[FloatArray, ...]]]:
+        """Return the log likelihood (m,) of z (m, 2 q) and the steps, one for each test.
+
+        A step is the state before and after it, what it pulls and how surely (m, 2 q, 2 q).
+
+        A test of information L that sees H of a state with covariance P, through scatter of
+        covariance S, has the weight (1 + L (H P H' + S))^-1 L: also where L is singular.
+        """
+        (rate, scatter), eye = self.rate_and_scatter(z), np.eye(self.q)
+        mean = np.zeros((len(z), 2 * self.q))
+        first = np.append(np.zeros(self.q), self.coefficient_sd**2)
+        covariance = np.broadcast_to(np.diag(first), (len(z), 2 * self.q, 2 * self.q))
+        log_likelihood: FloatArray = np.zeros(len(z))
+        made: list[tuple[FloatArray, ...]] = []
+        for t, information in enumerate(self.information / self.inflation[:, None, None]):
+            wandered = np.append(rate**2 * self.years[t] + self.jump[t], 0 * rate, axis=1)
+            covariance = covariance + wandered[:, :, None] * np.eye(2 * self.q)
+            sees = np.hstack([eye, self.warmth_k[t] * eye])
+            noise = scatter**2 + self.unknown_k[t] ** 2 * self.unknown_square
+            spread = sees @ covariance @ sees.T + self.inflation[t] * noise[:, :, None] * eye
+            core = eye + information @ spread
+            weight = np.linalg.solve(core, np.broadcast_to(information, core.shape))
+            off = self.mean[t] - mean @ sees.T
+            pull = np.einsum("mij,mj->mi", sees.T @ weight, off)
+            surely = sees.T @ weight @ sees
+            log_likelihood -= np.einsum("mi,mij,mj->m", off, weight, off) / 2
+            log_likelihood -= np.linalg.slogdet(core)[1] / 2
+            after = mean + np.einsum("mij,mj->mi", covariance, pull)
+            left = covariance - covariance @ surely @ covariance
+            made.append((mean, covariance, after, left, pull, surely))
+            mean, covariance = after, (left + np.swapaxes(left, 1, 2)) / 2
+        return log_likelihood, made
+
+    def _smoothed(self, made: list[tuple[FloatArray, ...]]) -> tuple[FloatArray, FloatArray]:
+        """Return means (m, n, 2 q) and covariances, backwards over the steps."""
+        pulled, certainty = np.zeros_like(made[0][0]), np.zeros_like(made[0][1])
+        means, covariances = [], []
+        for mean, covariance, _, _, pull, surely in reversed(made):
+            back = np.eye(mean.shape[1]) - surely @ covariance
+            pulled = pull + np.einsum("mij,mj->mi", back, pulled)
+            certainty = surely + back @ certainty @ np.swapaxes(back, 1, 2)
+            means.append(mean + np.einsum("mij,mj->mi", covariance, pulled))
+            covariances.append(covariance - covariance @ certainty @ covariance)
+        return np.stack(means[::-1], axis=1), np.stack(covariances[::-1], axis=1)

@@ -20,10 +20,10 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.values import BoolArray, Change, FloatArray, IntArray, WatchedQuantity, is_ratio
-from shm.watch.causes import Structure, Told
+from shm.watch.causes import DetectedChange, Structure
 from shm.watch.change_point import SIZES, Evidence, Sums, sums_of
 from shm.watch.isolated_tests import Seen
-from shm.watch.options import OF_ONE_VISIT_YEARS, Warmth, WatchOptions, warmth_of
+from shm.watch.options import OF_ONE_VISIT_YEARS, Warmth, WatchOptions, temperature_offsets
 from shm.watch.persistence import Course
 from shm.watch.quantities import MeasuredMode
 
@@ -98,7 +98,7 @@ class WatchState:
         return len(self.years)
 
     def to_bytes(self) -> bytes:
-        """The state as a file of numpy arrays, without any pickled object."""
+        """Return the state as a file of numpy arrays, without any pickled object."""
         kept = io.BytesIO()
         plain: dict[str, Any] = {
             each.name: np.asarray(value.isoformat() if isinstance(value, datetime) else value)
@@ -110,7 +110,7 @@ class WatchState:
 
     @classmethod
     def from_bytes(cls, content: bytes) -> WatchState:
-        """The state back; raises BadInput where the content is no such state."""
+        """Return the state back; raises BadInput where the content is no such state."""
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as kept:
                 found = dict(kept)
@@ -154,7 +154,9 @@ class StateSums:
         return np.concatenate([state.slopes, fixed], axis=2)
 
     def _warmth(self, state: WatchState) -> Warmth:
-        return warmth_of(state.temperature_c, state.years, state.reference_c, self.options)
+        return temperature_offsets(
+            state.temperature_c, state.years, state.reference_c, self.options
+        )
 
     def _thermal(self, state: WatchState) -> tuple[Warmth, ...]:
         """What quantities go with, each by a coefficient of its own: kelvin, and as many further
@@ -263,8 +265,8 @@ class StateSums:
             wider[:, None, None, None] * covariance,
         )
 
-    def course(self, state: WatchState, rows: IntArray, called: Sequence[Told]) -> Course:
-        """The tests `rows` with what the null says of each, called changes included."""
+    def course(self, state: WatchState, rows: IntArray, called: Sequence[DetectedChange]) -> Course:
+        """Return the tests `rows` with what the null says of each, called changes included."""
         layout = self.structure.layout
         columns = self._columns(state, rows)
         changing, years = columns[:, :, layout.change], state.years[rows]
@@ -303,7 +305,7 @@ def _levels(log_amplitude: FloatArray) -> FloatArray:
 
 
 def begun_of(evidence: Evidence, rows: IntArray, change: Change) -> list[float]:
-    """The likeliest first test of a called change, when it began, and whether it goes on."""
+    """Return the likeliest first test of a called change, when it began, and whether it goes on."""
     share = evidence.shares.sum(axis=(1, 2, 3, 4))
     first = int(evidence.beginnings[int(share.argmax())])
     is_ramp = bool(change.sudden < 0.5)

@@ -238,7 +238,7 @@ def _normal(y: FloatArray, variance: FloatArray, columns: FloatArray) -> tuple[f
 def _moved_quantities(
     patterns: Sequence[_Pattern], fits: Sequence[tuple[float, float, float]], chance: FloatArray
 ) -> tuple[Moved, ...]:
-    """What may have moved, in the words that alerts have for it; the likeliest first."""
+    """Return what may have moved, in the words that alerts have for it; the likeliest first."""
     order = np.argsort(-chance)
     bayes = chance / [_prior(each) for each in patterns]
     alike = tuple(

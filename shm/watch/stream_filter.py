@@ -24,7 +24,6 @@ import numpy as np
 import scipy
 
 from shm.values import FloatArray, IntArray
-from shm.watch.local_level import corrected
 from shm.watch.options import DAYS_PER_YEAR
 
 _OVERSTATED = 100.0
@@ -177,18 +176,17 @@ class Bank:
         own = variance + (_UNSTEADY * _FAST_SD) ** 2
         spread = np.einsum("i,mij,j->m", design, self.covariance, design) + own
         clipped = np.maximum(spread, missed**2 / CLIP**2)
-        noise = (own + clipped - spread)[:, None, None]
-        step = corrected(self.mean, self.covariance, design[None], np.array([value]), noise)
+        gain = self.covariance @ design / clipped[:, None]
         # The loss is bounded as the gain of a change is: else a large wander would explain it.
         fit = -np.log(spread) / 2 - np.minimum(missed**2 / spread, CLIP**2) / 2
         foreseen = self.effect @ design.astype(np.float32)
-        gain = step.gain[:, None, None, :, 0].astype(np.float32)
+        pulled = foreseen[..., None] * gain[:, None, None].astype(np.float32)
         bank = replace(
             self,
-            mean=step.mean_after,
-            covariance=step.covariance_after,
+            mean=self.mean + gain * missed[:, None],
+            covariance=self.covariance - gain[:, :, None] * gain[:, None] * clipped[:, None, None],
             log_weight=self.log_weight + fit - fit.max(),
-            effect=self.effect - foreseen[..., None] * gain,
+            effect=self.effect - pulled,
             score=self.score + foreseen * (missed / clipped)[:, None, None],
             information=self.information + foreseen**2 / clipped[:, None, None],
         )
@@ -205,7 +203,7 @@ class Bank:
         return replace(self, excess=excess, watched=self.watched + 1)
 
     def design(self, conditions: FloatArray) -> FloatArray:
-        """What a reading sees of the state (p,)."""
+        """Return what a reading sees of the state (p,)."""
         return np.concatenate([[1.0, 0.0, 1.0, 1.0, 0.0], conditions])
 
     @property
@@ -215,7 +213,7 @@ class Bank:
         return np.maximum(np.interp(age, np.log(_AGES_DAYS), self.excess), 1.0)[:, None]
 
     def evidence(self, least_shift: float) -> Evidence:
-        """What all readings say of a change; material is one by more than `least_shift`."""
+        """Return what all readings say of a change; material is one by more than `least_shift`."""
         if not len(self.by_day):
             return NOTHING
         prior = 1 / np.array([_STEP_SD, _SLOPE_SD]) ** 2
@@ -258,6 +256,13 @@ class Bank:
             self, mean=self.mean + effect * evidence.shift, covariance=self.covariance + more
         )
         return bank.without_beginnings()
+
+    def absorbed(self, evidence: Evidence) -> Bank:
+        """With the likeliest change taken for none: what is read from here on is without it."""
+        bank = self.changed(evidence)
+        mean = bank.mean.copy()
+        mean[:, LEVEL] -= evidence.shift
+        return replace(bank, mean=mean)
 
     @property
     def wander_sd(self) -> float:

@@ -1,9 +1,10 @@
-"""A pooled reading of a permanent sensor as one number: how far the tension has moved.
+"""A pooled reading of a permanent sensor: how far the tension has moved, by each plane's modes.
 
 The change of each mode's log frequency over its sensitivity d ln f / d ln T is a change of tension;
-all modes together give it by robust weighted least squares, so that one that went astray (close
-planes exchanged, a peak of the deck) moves nothing. What a mode differs by from the others is
-learnt, for days: a reading that lacks a mode must not look like a step.
+the modes of a plane together give it by robust weighted least squares, so that one that went astray
+(close planes exchanged, a peak of the deck) moves nothing. What a mode differs by from the others
+of its plane is learnt, for days: a reading that lacks a mode must not look like a step. What a
+whole plane differs by from the other is no mistake: it is the reading's contrast.
 
 Frequencies of a bar on springs are homogeneous of degree 1/2 in tension, bending stiffness and
 springs. So what a kelvin does by softening steel is -3e-4 (1/2 - d ln f / d ln T).
@@ -12,7 +13,7 @@ springs. So what a kelvin does by softening steel is -3e-4 (1/2 - d ln f / d ln 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -30,8 +31,7 @@ LEAST_SD = 3e-5
 _MEMORY_READINGS = 120.0  # judgement: five days of what modes differ by, ten times a night's
 _DEGREES = 4.0  # judgement: of Student's t, as robust regressions take (Lange et al. 1989)
 _ROUNDS = 4  # technical: of reweighting, from the weighted median on
-_APART, _LEAST_APART = 5.0, 3
-"""Judgement: in spreads, from when on a mode is told from that of the other plane; in how many."""
+_HALVES = np.array([0.5, -0.5])  # by definition: of a contrast, in each of PLANES
 _CLIP = 4.0  # sds: what a mode may add to its spread at once
 _STEP = 0.01  # technical: of the tension, for a slope by central differences
 _DECADES = 0.1  # technical: of the springs, likewise
@@ -142,9 +142,14 @@ class ModeTable:
         return cls(keys, found.tension, found.ends, level, sd**2, zero, found.tension_n)
 
     def with_new(
-        self, baseline: Posterior | None, hanger: Hanger, modes: Sequence[Mode], shift: float
+        self,
+        baseline: Posterior | None,
+        hanger: Hanger,
+        modes: Sequence[Mode],
+        shift: float,
+        contrast: float = 0.0,
     ) -> ModeTable:
-        """With modes that were not seen before, at a tension moved by `shift`."""
+        """With modes that were not seen before, at a tension moved by `shift`, planes apart."""
         new = [mode for mode in modes if (mode.plane, mode.order) not in self.modes]
         if not new:
             return self
@@ -153,48 +158,75 @@ class ModeTable:
             name: np.append(getattr(self, name), getattr(more, name))
             for name in ("tension", "ends", "spread", "readings")
         }
-        level = np.append(self.level, more.level - more.tension * shift)
+        by_plane = dict(zip(PLANES, shift + contrast * _HALVES, strict=True))
+        moved = more.tension * [by_plane[mode.plane] for mode in new]
+        level = np.append(self.level, more.level - moved)
         return replace(self, modes=(*self.modes, *more.modes), level=level, **parts)
 
-    def are_exchanged(self, modes: Sequence[Mode], shift: float) -> bool | None:
-        """Whether each mode lies where that of the other plane does, at a tension moved by `shift`.
+    def are_exchanged(
+        self,
+        modes: Sequence[Mode],
+        least: int = 3,
+        surely: float = 5.0,
+        elsewhere_sd: float = 0.01,
+    ) -> bool | None:
+        """Return whether each mode lies where that of the other plane does, at any tension.
 
-        None where too few are told apart.
+        None where the modes do not tell: fewer than `least`, log odds below `surely`, or where
+        modes anywhere within `elsewhere_sd` of ln f are more likely than either.
         """
-        level = dict(zip(self.modes, self.level + self.tension * shift, strict=True))
-        spread = dict(zip(self.modes, np.sqrt(self.spread), strict=True))
-        nearer = []
-        for mode, log_hz in zip(modes, _measured(modes)[0], strict=True):
-            own = mode.plane, mode.order
-            other = _other(mode).plane, mode.order
-            apart = abs(level[other] - level[own]) if {own, other} <= level.keys() else 0.0
-            if apart > _APART * max(spread.get(own, 0.0), spread.get(other, 0.0), LEAST_SD):
-                off, otherwise = abs(log_hz - level[own]), abs(log_hz - level[other])
-                nearer.append((otherwise < off / 2) - float(off < otherwise / 2))
-        if len(nearer) < _LEAST_APART:
+        place = {mode: index for index, mode in enumerate(self.modes)}
+        own = [(mode.plane, mode.order) for mode in modes]
+        other = [(_other(mode).plane, mode.order) for mode in modes]
+        both = [n for n in range(len(modes)) if {own[n], other[n]} <= place.keys()]
+        if len(both) < least:
             return None
-        return float(np.mean(nearer)) > 0.5
+        here, there = ([place[keys[n]] for n in both] for keys in (own, other))
+        spread = np.maximum(np.maximum(self.spread[here], self.spread[there]), LEAST_SD**2)
+        if np.sum((self.level[here] - self.level[there]) ** 2 / spread) < 8 * surely:
+            return None  # chance alone would tell them exchanged in some hour
+        log_hz = _measured([modes[n] for n in both])[0]
+        straight, crossed = (self._weigh(log_hz, at) for at in (here, there))
+        neither = -len(both) * math.log(elsewhere_sd)
+        if max(straight, crossed) < neither or abs(crossed - straight) < surely:
+            return None
+        return crossed > straight
+
+    def _weigh(self, log_hz: FloatArray, at: Sequence[int]) -> float:
+        """Return the log likelihood of modes in these places of the table, at the best tension."""
+        slope, variance = self.tension[at], np.maximum(self.spread[at], LEAST_SD**2)
+        off = log_hz - self.level[at]
+        left = off - slope * _read_plane(off, variance, slope)[0]
+        tails = (_DEGREES + 1) * np.log1p(left**2 / (_DEGREES * variance))
+        return -float(np.sum(tails + np.log(variance))) / 2
 
     def softer(self, assumed: Assumptions) -> FloatArray:
         """Return by what ln f goes with a kelvin, as steel softens."""
         return np.asarray(assumed.modulus_per_kelvin.value * (0.5 - self.tension))
 
     def seen(
-        self, modes: Sequence[Mode], warmth_k: float, assumed: Assumptions = DEFAULTS
+        self,
+        modes: Sequence[Mode],
+        warmth_k: float,
+        assumed: Assumptions = DEFAULTS,
+        expected: tuple[float, float] = (0.0, 0.0),
     ) -> SeenReading:
-        """A reading in the places of the table's modes, NaN where it lacks one."""
+        """A reading in the places of the table's modes, NaN where it lacks one.
+
+        `expected` is the contrast between the planes by the readings before, with its sd.
+        """
         off, variance = np.full(len(self.modes), np.nan), np.full(len(self.modes), np.inf)
         own = [self.modes.index((mode.plane, mode.order)) for mode in modes]
         log_hz, sd = _measured(modes, assumed)
         off[own] = log_hz - self.level[own] - warmth_k * self.softer(assumed)[own]
         variance[own] = np.maximum(sd**2, self.spread[own])
-        return _read(off, variance, self.tension)
+        return _read(off, variance, self.tension, planes_of(self.modes), expected)
 
     def learnt(self, seen: SeenReading) -> ModeTable:
         """With what a reading adds to each mode's level and spread.
 
-        What is left over once the tension is taken off adds up to 0 in the tension's direction:
-        the levels cannot take up what the tension does.
+        What is left over once each plane's shift is taken off adds up to 0 in the direction of a
+        tension: the levels can take up neither what the tension does nor what one plane does.
         """
         known = np.isfinite(seen.left)
         readings = self.readings + known
@@ -214,17 +246,22 @@ class ModeTable:
 class SeenReading:
     """`shift` of ln T by one reading with its variance; `left` (n,) of each mode, NaN if lacking.
 
-    `off` (n,) are the modes' own changes of ln f, warmth of steel taken off.
+    `off` (n,) are the modes' own changes of ln f, warmth of steel taken off. `contrast` is what the
+    modes of the first plane say of ln T less what those of the other do; NaN without either plane.
+    `by_plane` is what each plane says of the shift, as much apart as expected.
     """
 
     shift: float
     variance: float
     off: FloatArray
     left: FloatArray
+    by_plane: FloatArray
+    contrast: float = math.nan
+    contrast_variance: float = math.inf
 
 
 def usable(reading: PooledReading) -> tuple[Mode, ...]:
-    """The modes that say something of the tension, each once."""
+    """Return the modes that say something of the tension, each once."""
     found: dict[MeasuredMode, Mode] = {}
     for mode in reading.modes:
         is_measured = np.isfinite(mode.frequency_hz) and mode.frequency_hz > 0
@@ -251,10 +288,35 @@ def _measured(
     return np.log(hz), np.where(sd > 0, np.maximum(sd, LEAST_SD), unstated)
 
 
-def _read(off: FloatArray, variance: FloatArray, slope: FloatArray) -> SeenReading:
+def _read(
+    off: FloatArray,
+    variance: FloatArray,
+    slope: FloatArray,
+    planes: Mapping[str, BoolArray],
+    expected: tuple[float, float],
+) -> SeenReading:
+    """Read each plane by itself; where planes disagree by more than expected, the errors grow."""
+    left = np.full(len(off), np.nan)
+    shift, own = np.zeros(len(PLANES)), np.full(len(PLANES), np.inf)
+    for place, plane in enumerate(PLANES):
+        seen = np.isfinite(off) & planes.get(plane, np.zeros(len(off), bool))
+        if seen.any():
+            shift[place], own[place] = _read_plane(off[seen], variance[seen], slope[seen])
+            left[seen] = off[seen] - slope[seen] * shift[place]
+    weight = (1 / own) / (1 / own).sum()
+    by_plane = np.where(np.isfinite(own), shift - expected[0] * _HALVES, np.nan)
+    mean = float(weight @ np.nan_to_num(by_plane))
+    total = 1 / float((1 / own).sum()) + (float(weight @ _HALVES) * expected[1]) ** 2
+    if not np.isfinite(own).all():
+        return SeenReading(mean, total, off, left, by_plane)
+    contrast = float(shift[0] - shift[1])
+    both = float(own.sum())
+    misfit = (contrast - expected[0]) ** 2 / (both + expected[1] ** 2)
+    return SeenReading(mean, total * max(misfit, 1.0), off, left, by_plane, contrast, both)
+
+
+def _read_plane(y: FloatArray, v: FloatArray, s: FloatArray) -> tuple[float, float]:
     """Reweighted least squares from the weighted median on; errors grow where the modes differ."""
-    known = np.isfinite(off)
-    y, v, s = off[known], variance[known], slope[known]
     shift = _weighted_median(y / s, s / np.sqrt(v))
     for _ in range(_ROUNDS):
         weight = (_DEGREES + 1) / (_DEGREES + (y - s * shift) ** 2 / v) / v
@@ -262,7 +324,7 @@ def _read(off: FloatArray, variance: FloatArray, slope: FloatArray) -> SeenReadi
         information = float(weight @ s**2)
         shift = float(weight @ (s * y)) / information
     misfit = float(weight @ (y - s * shift) ** 2) / max(len(y) - 1, 1)
-    return SeenReading(shift, max(misfit, 1.0) / information, off, off - slope * shift)
+    return shift, max(misfit, 1.0) / information
 
 
 def _weighted_median(values: FloatArray, weight: FloatArray) -> float:

@@ -33,6 +33,8 @@ _LAGS_DAYS = np.array([2.0, 14.0, 240.0]) / HOURS_A_DAY
 _UNKNOWN_K, TOGETHER = 4.0, 3.0
 HOURS_EXCHANGED, _SURELY_EXCHANGED = 3, 8
 """Judgement: until it is told, as mistaken modes look like it for an hour; and until it is over."""
+NO_CONDITIONS = np.zeros(0)
+"""Of the contrast of the planes: what the weather does to one more than the other is its wander."""
 _RING = 24  # readings: a change is told within a day or is slow
 OLD_READINGS = 120.0  # judgement: five days, as what a mode differs by is learnt over
 
@@ -56,7 +58,9 @@ class StreamState:
     log level and of the wind; `known_day` is the last with a temperature. `ring` (24, n) are the
     newest readings' modes with the conditions taken off, `ring_day` their days, `old` (n,) the mean
     of those before. Shifts count from `zero`, compensated ones from `compensated_zero`; a change
-    that was told moved the tension by `called_shift` from `called_from` on, 0 where none stands.
+    that was told moved the tension by `called_shift` from `called_from` on, 0 where none stands;
+    likewise `apart_shift` and `apart_from` of one plane. `contrast` are the filters of what one
+    plane says more than the other, less what was `absorbed` into the modes' levels.
     So many hours the planes were exchanged. `unknown_sd` of ln T is what an unknown temperature may
     do, 0 where it is known. Up to `settled_day` readings are gone over again: no
     alert ends before.
@@ -66,6 +70,7 @@ class StreamState:
     start: datetime
     table: ModeTable
     bank: Bank
+    contrast: Bank
     lagged_c: FloatArray
     reference: FloatArray
     ring: FloatArray
@@ -78,6 +83,9 @@ class StreamState:
     is_learning: bool = True
     called_from: float = 0.0
     called_shift: float = 0.0
+    apart_from: float = 0.0
+    apart_shift: float = 0.0
+    absorbed: float = 0.0
     told: AlertState = field(default_factory=AlertState)
     standing: tuple[str, ...] = ()
     exchanged_hours: int = 0
@@ -95,6 +103,7 @@ class StreamState:
             start,
             table,
             Bank.begun(0.0, condition_sd(assumed)),
+            Bank.begun(0.0, NO_CONDITIONS),
             lagged_c=np.full(3, NAN),
             reference=np.full(3, NAN),
             ring=np.zeros((0, n)),
@@ -103,10 +112,15 @@ class StreamState:
         )
 
     def to_bytes(self) -> bytes:
-        """The state as a line of JSON, and the bytes of all arrays after it."""
+        """Return the state as a line of JSON, and the bytes of all arrays after it."""
         arrays = {
             f"{name}.{each.name}": value
-            for name, part in (("state", self), ("table", self.table), ("bank", self.bank))
+            for name, part in (
+                ("state", self),
+                ("table", self.table),
+                ("bank", self.bank),
+                ("contrast", self.contrast),
+            )
             for each in fields(part)
             if isinstance(value := getattr(part, each.name), np.ndarray)
         }
@@ -114,6 +128,8 @@ class StreamState:
             "start": self.start.isoformat(),
             "day": self.bank.day,
             "watched": self.bank.watched,
+            "contrast_day": self.contrast.day,
+            "contrast_watched": self.contrast.watched,
             "tension_n": self.table.tension_n,
             "modes": self.table.modes,
             "told": self.told.to_text(),
@@ -126,11 +142,13 @@ class StreamState:
 
     @classmethod
     def from_bytes(cls, content: bytes) -> StreamState:
-        """The state back; raises BadInput where the content is no such state."""
+        """Return the state back; raises BadInput where the content is no such state."""
         try:
             line, _, rest = content.partition(b"\n")
             head = json.loads(line)
-            parts: dict[str, dict[str, Any]] = {"state": {}, "table": {}, "bank": {}}
+            parts: dict[str, dict[str, Any]] = {
+                name: {} for name in ("state", "table", "bank", "contrast")
+            }
             at = 0
             for name, kind, shape in head["arrays"]:
                 part, _, own = name.partition(".")
@@ -142,6 +160,7 @@ class StreamState:
                 start=datetime.fromisoformat(head["start"]),
                 table=ModeTable(modes=modes, tension_n=head["tension_n"], **parts["table"]),
                 bank=Bank(day=head["day"], watched=head["watched"], **parts["bank"]),
+                contrast=_read_contrast(head, parts["contrast"]),
                 told=AlertState.from_text(head["told"]),
                 thermometer=Thermometer(**head.get("thermometer", {})),
                 **{name: head[name] for name in _SCALARS if name in head},
@@ -156,8 +175,16 @@ class StreamState:
 
 _SCALARS = (
     "key", "known_day", "zero", "compensated_zero", "readings", "is_learning", "called_from",
-    "called_shift", "standing", "exchanged_hours", "settled_day", "unknown_sd",
+    "called_shift", "apart_from", "apart_shift", "absorbed", "standing", "exchanged_hours",
+    "settled_day", "unknown_sd",
 )  # fmt: skip
+
+
+def _read_contrast(head: dict[str, Any], arrays: dict[str, Any]) -> Bank:
+    """Return the filters of the contrast; a state of before there were any begins to learn it."""
+    if not arrays:
+        return Bank.begun(head["day"], NO_CONDITIONS)
+    return Bank(day=head["contrast_day"], watched=head["contrast_watched"], **arrays)
 
 
 def gone_back(earlier: bytes, newest: bytes) -> bytes:
@@ -171,15 +198,13 @@ def gone_back(earlier: bytes, newest: bytes) -> bytes:
     return replace(state, settled_day=settled, standing=standing).to_bytes()
 
 
-def as_mounted(
-    state: StreamState, modes: tuple[Mode, ...], shift: float
-) -> tuple[StreamState, tuple[Mode, ...]]:
+def as_mounted(state: StreamState, modes: tuple[Mode, ...]) -> tuple[StreamState, tuple[Mode, ...]]:
     """The modes in the planes that were always theirs, where those of the sensors are exchanged."""
-    found = None if state.is_learning else state.table.are_exchanged(modes, shift)
+    found = None if state.is_learning else state.table.are_exchanged(modes)
     hours = state.exchanged_hours
     if found or (found is None and hours >= HOURS_EXCHANGED):
         hours = hours + 1 if hours < HOURS_EXCHANGED else _SURELY_EXCHANGED
-    else:
+    elif found is not None:
         hours = hours - 1 if hours > HOURS_EXCHANGED + 1 else 0
     return replace(state, exchanged_hours=hours), exchanged(modes) if hours else modes
 
@@ -202,10 +227,9 @@ def windows_as_mounted(
     state = None if kept is None else StreamState.from_bytes(kept)
     if state is None or state.is_learning:
         return readings
-    table, zero = state.table, state.zero
     return [
         replace(each, modes=exchanged(each.modes))
-        if table.are_exchanged(each.modes, zero)
+        if state.table.are_exchanged(each.modes)
         else each
         for each in readings
     ]
@@ -220,7 +244,7 @@ def warmth(state: StreamState) -> float:
 def with_conditions(
     state: StreamState, reading: PooledReading, day: float
 ) -> tuple[StreamState, FloatArray, float]:
-    """The conditions of a reading, and the variance that unknown ones add to it."""
+    """Return the conditions of a reading, and the variance that unknown ones add to it."""
     level = math.log(reading.level_m_s2) if reading.level_m_s2 > 0 else NAN
     now = np.array([reading.temperature_c, level, reading.wind_m_s])
     reference = np.where(np.isfinite(state.reference), state.reference, now)

@@ -89,7 +89,7 @@ class Believed:
 def believed(
     thermometer: Thermometer, readings: Sequence[WindowReading], *, learning: bool
 ) -> Believed:
-    """What is believed of the windows' temperatures, after those that came before.
+    """Return what is believed of the windows' temperatures, after those that came before.
 
     Windows that the thermometer went through already are judged by what it remembers.
     """

@@ -1,7 +1,9 @@
 """The watch of a permanent sensor: pooled readings of each hour, one after the other, for good.
 
-Each reading becomes a shift of the tension (`stream_reading`), which the filters explain by what
-the conditions do, or by a change (`stream_filter`). A detected change is told apart by its pattern
+Each reading becomes a shift of the tension and a contrast of the planes (`stream_reading`), which
+the filters explain by what the conditions do and by wander, or by a change (`stream_filter`). A
+change of one plane alone is of its ends or its sensors: its modes' levels take it up, the tension
+goes on by the other plane. A detected change is told apart by its pattern
 over the modes: a tension moves each by its sensitivity, springs the lower ones of a stiff bar more,
 a time base all alike, a sensor those of one plane. What is the measurement's is an event of the
 stream and rings nobody. All that the next reading needs is kept as bytes of a bounded size.
@@ -24,6 +26,7 @@ import scipy
 from shm.errors import BadInput
 from shm.values import (
     NAN,
+    PLANES,
     TENSION,
     Alert,
     Change,
@@ -34,13 +37,15 @@ from shm.values import (
     Posterior,
     WatchedTest,
 )
+from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PERIODS, PooledReading, StreamEvent, StreamEventKind
 from shm.watch.stream_cause import EXCHANGED, MODEL_OFF, SWAPPED, TIME_BASE, Cause, cause_of
-from shm.watch.stream_filter import FAST, LEVEL, NOTHING, SLOW, Bank, Evidence
-from shm.watch.stream_reading import ModeTable, SeenReading, exchanged, usable
+from shm.watch.stream_filter import CLIP, FAST, LEVEL, NOTHING, SLOW, Bank, Evidence
+from shm.watch.stream_reading import ModeTable, SeenReading, exchanged, planes_of, usable
 from shm.watch.stream_state import (
     HOURS_A_DAY,
     HOURS_EXCHANGED,
+    NO_CONDITIONS,
     OLD_READINGS,
     TOGETHER,
     StreamState,
@@ -64,12 +69,14 @@ class StreamOptions:
     """`limit_years` is the mean time to a false call, a hanger's own `false_call_years` goes first.
 
     Less than `least_shift` of the tension is not told; `learning_days` are the baseline.
+    `share_of_one_plane` of all changes are of one plane alone, as the causes' priors have it.
     """
 
     limit_years: float = 100.0
     change_rate_per_year: float = 0.02
     least_shift: float = 0.005
     learning_days: float = 3.0
+    share_of_one_plane: float = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +130,7 @@ def watch_reading(
 
 
 def _key(baseline: Posterior | None, hanger: Hanger, stream: str) -> str:
-    """What the state rests on; thresholds may change without a new beginning."""
+    """Return what the state rests on; thresholds may change without a new beginning."""
     of = baseline and (baseline.model, baseline.seed, baseline.tests)
     described = (hanger.length_m, hanger.bending_stiffness_n_m2, hanger.mass_per_length_kg_m)
     rests_on = repr((hanger.id, described, stream, of))
@@ -157,22 +164,29 @@ class StreamWatch:
         state, conditions, extra = with_conditions(state, reading, day)
         bank = state.bank.advanced(day, condition_sd(self.hanger.assumptions))
         expected = bank.along(bank.design(conditions))[0]
-        state, modes = as_mounted(state, modes, expected)
-        table = state.table.with_new(self.baseline, self.hanger, modes, expected)
-        seen = table.seen(modes, warmth(state), self.hanger.assumptions)
+        state, modes = as_mounted(state, modes)
+        contrast = state.contrast.advanced(day, NO_CONDITIONS)
+        between = contrast.along(_compensated(contrast))
+        table = state.table.with_new(self.baseline, self.hanger, modes, expected, between[0])
+        seen = table.seen(modes, warmth(state), self.hanger.assumptions, between)
         if not state.is_learning:
             bank = bank.with_beginning(state.bank.day)
+            contrast = contrast.with_beginning(state.contrast.day)
         bank = bank.seen(seen.shift, seen.variance + extra, conditions)
+        if math.isfinite(seen.contrast):
+            contrast = contrast.seen(seen.contrast, seen.contrast_variance, NO_CONDITIONS)
+            state = replace(state, contrast=contrast)
         state = replace(state, table=table.learnt(seen), bank=bank, readings=state.readings + 1)
         state = with_ring(state, seen, conditions, day)
         if state.is_learning:
             return self._learning(state, seen, end)
-        return self._decided(state, seen, reading, end)
+        unlike = _find_contradiction(state, seen, conditions)
+        return self._decided(state, seen, reading, end, unlike)
 
     def _learning(
         self, state: StreamState, seen: SeenReading, end: datetime
     ) -> tuple[StreamWatched, StreamState]:
-        """The baseline grows: its mean is where the shifts count from."""
+        """Add a reading to the baseline, whose mean is where shifts count from."""
         n = state.readings
         zero = state.zero + (seen.shift - state.zero) / n
         days = self.options.learning_days
@@ -185,9 +199,14 @@ class StreamWatch:
         return replace(_nothing(), learning="" if is_over else words), state
 
     def _decided(
-        self, state: StreamState, seen: SeenReading, reading: PooledReading, end: datetime
+        self,
+        state: StreamState,
+        seen: SeenReading,
+        reading: PooledReading,
+        end: datetime,
+        unlike: float,
     ) -> tuple[StreamWatched, StreamState]:
-        evidence = state.bank.evidence(self.options.least_shift)
+        evidence, apart, is_apart = self._weigh(state)
         events: tuple[StreamEvent, ...] = ()
         if state.exchanged_hours == HOURS_EXCHANGED:
             began = end - timedelta(hours=HOURS_EXCHANGED)
@@ -200,7 +219,21 @@ class StreamWatch:
                 evidence = NOTHING
             elif cause.is_measurement:
                 events += (_event(cause, state, evidence, reading, end),)
-                state, evidence = _absorbed(state, cause), NOTHING
+                if cause.plane:
+                    state = _absorb_plane(state, cause, apart, None if is_apart else evidence)
+                else:
+                    state = _absorbed(state, cause)
+                evidence, unlike = NOTHING, 0.0
+            elif cause.plane:
+                before = state
+                state = _absorb_plane(state, cause, apart, None if is_apart else evidence)
+                state = _stand_apart(before, state)
+                moved, unlike, is_apart = cause.moved, 0.0, True
+            elif is_apart:
+                before = state
+                state = replace(state, contrast=state.contrast.changed(apart))
+                state = _stand_apart(before, state)
+                moved, unlike = cause.moved, 0.0
             else:
                 evidence = _sized(evidence, cause, state)
                 moved = tuple(
@@ -209,8 +242,8 @@ class StreamWatch:
                     else each
                     for each in cause.moved
                 )
-                state = _changed(state, evidence)
-        test = self._watched_test(state, evidence, moved, reading, end)
+                state, unlike = _changed(state, evidence), 0.0
+        test = self._watched_test(state, evidence, moved, is_apart, unlike, reading, end)
         told, alert = after(state.told, test, self.hanger)
         told = replace(told, called=told.called[-_CALLS_KEPT:])
         standing = (*state.standing, alert.key) if alert else state.standing
@@ -218,10 +251,19 @@ class StreamWatch:
         ended = () if stands else standing
         state = replace(state, told=told, standing=() if ended else standing)
         if ended:
-            state = replace(state, called_shift=0.0)
+            state = replace(state, called_shift=0.0, apart_shift=0.0)
         shift, sd = test.drifts[0].shift_mean, test.drifts[0].shift_sd
         own, own_sd = shift_of_reading(state, seen)
         return StreamWatched(b"", own, own_sd, shift, sd, test, alert, events, ended, ""), state
+
+    def _weigh(self, state: StreamState) -> tuple[Evidence, Evidence, bool]:
+        """Return the evidence of any change, that of one plane's, and whether it is mostly that."""
+        of_tension = state.bank.evidence(self.options.least_shift)
+        apart = state.contrast.evidence(self.options.least_shift)
+        share = self.options.share_of_one_plane
+        shares = (1 - share) * of_tension.years, share * apart.years
+        is_apart = shares[1] > shares[0]
+        return replace(apart if is_apart else of_tension, years=sum(shares)), apart, is_apart
 
     def _is_called(self, evidence: Evidence) -> bool:
         return evidence.years > self._limit_years and evidence.material > 0.5
@@ -236,19 +278,29 @@ class StreamWatch:
         state: StreamState,
         evidence: Evidence,
         moved: tuple[Moved, ...],
+        is_apart: bool,
+        unlike: float,
         reading: PooledReading,
         end: datetime,
     ) -> WatchedTest:
-        """The reading as the rules of alerts take any test."""
+        """Return the reading as the rules of alerts take any test.
+
+        Its interval reaches as far as the reading is `unlike` what the filters say.
+        """
         rate = self.options.change_rate_per_year * evidence.years
         mean, sd = _shift(state)
+        sd = math.hypot(sd, unlike / NINETY_PERCENT)
         limits, table = self.hanger.thresholds, state.table
         chance = rate / (1 + rate)
-        if state.called_shift:
-            gone = (mean - state.called_from) / state.called_shift
-            left = _beyond(gone - 0.5, sd / abs(state.called_shift))
+        of_tension = (mean - state.called_from, sd, state.called_shift)
+        between, between_sd = _contrast(state)
+        of_plane = (between - state.apart_from, between_sd, state.apart_shift)
+        standing = [each for each in (of_tension, of_plane) if each[2]]
+        if standing:
+            left = max(_beyond(now / size - 0.5, own / abs(size)) for now, own, size in standing)
             chance = max(left, chance) if moved else left
-            if moved and gone < 0.5:  # it came back: the end of an alert, not another
+            now, _, size = of_plane if is_apart else of_tension
+            if moved and size and now / size < 0.5:  # it came back: the end of an alert
                 chance, evidence, moved = left, NOTHING, ()
         threshold = limits.tension_shift_fraction
         beyond = _beyond(mean - threshold, sd) + _beyond(-mean - threshold, sd)
@@ -283,7 +335,7 @@ def _nothing() -> StreamWatched:
 
 
 def _compensated(bank: Bank) -> FloatArray:
-    """The state without what the conditions do, as a direction (p,)."""
+    """Return the state without what the conditions do, as a direction (p,)."""
     direction = np.zeros(bank.mean.shape[1])
     direction[[LEVEL, SLOW, FAST]] = 1
     return direction
@@ -295,6 +347,26 @@ def _shift(state: StreamState) -> tuple[float, float]:
     return _fraction(mean - state.compensated_zero, sd, state.table)
 
 
+def _contrast(state: StreamState) -> tuple[float, float]:
+    """Return what one plane says of ln T more than the other, as at first, with its sd."""
+    mean, sd = state.contrast.along(_compensated(state.contrast))
+    return mean + state.absorbed, sd
+
+
+def _find_contradiction(state: StreamState, seen: SeenReading, conditions: FloatArray) -> float:
+    """Return how far either plane of a reading is from what the filters say, 0 within scatter."""
+    expected, sd = state.bank.along(state.bank.design(conditions))
+    off = abs(seen.shift - expected)
+    reach = off if off > CLIP * math.hypot(sd, math.sqrt(seen.variance)) else 0.0
+    if not math.isfinite(seen.contrast):
+        return reach
+    between, sd = state.contrast.along(_compensated(state.contrast))
+    apart = abs(seen.contrast - between)
+    if apart > CLIP * math.hypot(sd, math.sqrt(seen.contrast_variance)):
+        reach = float(np.nanmax(np.abs(seen.by_plane - expected)))
+    return reach
+
+
 def daily_shift(kept: bytes, hours: Sequence[PooledReading]) -> tuple[float, float]:
     """Of the tension over a day since the stream's baseline, with its sd: by the day's `hours`.
 
@@ -302,15 +374,16 @@ def daily_shift(kept: bytes, hours: Sequence[PooledReading]) -> tuple[float, flo
     known to, and not all hours have all modes. Without thermometer's or watch's corrections.
     """
     state = StreamState.from_bytes(kept)
-    seen = []
+    seen, between = [], state.contrast.along(_compensated(state.contrast))
     for reading in hours:
         modes = usable(reading)
-        if state.table.are_exchanged(modes, state.zero):
+        if state.table.are_exchanged(modes):
             modes = exchanged(modes)
         known = [mode for mode in modes if (mode.plane, mode.order) in state.table.modes]
         if known:
             kelvin = reading.temperature_c - state.reference[0]
-            seen.append(state.table.seen(known, kelvin if math.isfinite(kelvin) else 0.0))
+            warmer = kelvin if math.isfinite(kelvin) else 0.0
+            seen.append(state.table.seen(known, warmer, expected=between))
     if not seen:
         return NAN, NAN
     shifts, n = np.array([each.shift for each in seen]), len(seen)
@@ -375,6 +448,44 @@ def _changed(state: StreamState, evidence: Evidence) -> StreamState:
     return replace(state, called_from=since, called_shift=now - since)
 
 
+def _stand_apart(before: StreamState, state: StreamState) -> StreamState:
+    """With a change of one plane that was told: it stands until half of it is back."""
+    now, then = _contrast(state)[0], _contrast(before)[0]
+    if before.apart_shift and (now - before.apart_from) / before.apart_shift < 0.5:
+        return state
+    since = before.apart_from if before.apart_shift else then
+    return replace(state, apart_from=since, apart_shift=now - since)
+
+
+def _absorb_plane(
+    state: StreamState, cause: Cause, apart: Evidence, of_tension: Evidence | None
+) -> StreamState:
+    """With a change of one plane in its modes' levels: the tension goes on by the other plane.
+
+    `of_tension` is what the filters of the tension took it for, if they did.
+    """
+    table, own = state.table, planes_of(state.table.modes)[cause.plane]
+    other = np.nan_to_num(np.nanmedian((cause.by_mode / table.tension)[~own]))
+    moved = np.where(own, np.nan_to_num(cause.by_mode - other * table.tension), 0.0)
+    size = float(np.median((moved / table.tension)[own & np.isfinite(cause.by_mode)]))
+    size = size if cause.plane == PLANES[0] else -size
+    contrast = state.contrast
+    if apart.beginning >= 0:
+        contrast = contrast.absorbed(replace(apart, shift=size, kind=0))
+    bank = state.bank if of_tension is None else state.bank.absorbed(of_tension)
+    began = of_tension or apart
+    ring = np.where((state.ring_day >= began.by_day)[:, None], state.ring - moved, state.ring)
+    ring[(state.ring_day > began.after_day) & (state.ring_day < began.by_day)] = np.nan
+    return replace(
+        state,
+        table=replace(table, level=table.level + moved),
+        bank=bank,
+        contrast=contrast,
+        absorbed=state.absorbed + size,
+        ring=ring,
+    )
+
+
 def _absorbed(state: StreamState, cause: Cause) -> StreamState:
     """With a fault of the measurement in the modes' levels: the tension goes on as it was."""
     moved = np.nan_to_num(cause.by_mode)
@@ -384,6 +495,7 @@ def _absorbed(state: StreamState, cause: Cause) -> StreamState:
         state,
         table=table,
         bank=state.bank.without_beginnings(),
+        contrast=state.contrast.without_beginnings(),
         ring=np.zeros((0, n)),
         ring_day=np.zeros(0),
     )

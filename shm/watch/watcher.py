@@ -27,16 +27,21 @@ from shm.values import (
     WatchedTest,
 )
 from shm.values.drift import ENOUGH_AGAINST
-from shm.watch.causes import Columns, Structure, Told, structure_of
+from shm.watch.causes import Columns, DetectedChange, Structure, structure_of
 from shm.watch.change_point import Evidence, evidence_of, log_probability_of_called
-from shm.watch.isolated_tests import counted, outlier_probability
+from shm.watch.isolated_tests import outlier_probability, select_consistent_tests
 from shm.watch.options import OF_ONE_VISIT_YEARS, WatchOptions, reference_of, years_between
-from shm.watch.persistence import what_stays
-from shm.watch.posterior_summary import Subject, changed, drifted, probability_of_change
+from shm.watch.persistence import bound_by_recurrence
+from shm.watch.posterior_summary import (
+    SummaryContext,
+    probability_of_change,
+    summarize_change,
+    summarize_drifts,
+)
 from shm.watch.state_sums import StateSums, WatchState, begun_of, size_of
 
 # To be raised whenever the same readings give other results than before: kept states are void then.
-_VERSION = 13
+_VERSION = 14
 _LOOKED_AT = 0.1  # technical: of the limit: below it nobody asks which cause it was
 # Technical: what a test says goes nearly in proportion to its weight.
 _MOST_REPEATS, _NEARLY = 6, 0.5
@@ -78,7 +83,7 @@ class Watcher:
     @cached_property
     def key(self) -> str:
         """Names what a state rests on beside the readings: the rules, options and quantities."""
-        given = [_VERSION, asdict(self.options), [_told(each) for each in self.quantities]]
+        given = [_VERSION, asdict(self.options), [_fingerprint(each) for each in self.quantities]]
         return hashlib.sha256(json.dumps(given).encode()).hexdigest()
 
     @cached_property
@@ -113,12 +118,12 @@ class Watcher:
         )
         tests = []
         for reading in readings:
-            state, found = self._next(state, reading)
+            state, found = self._advance(state, reading)
             tests.append(found)
         return state, Watch(tuple(tests), ())
 
     def after(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
-        """The state after one more reading, and the result.
+        """Return the state after one more reading, and the result.
 
         Raises BadInput where the reading is older than the last, or of other quantities, UsageError
         where the state is that of another watch, or its baseline is not complete.
@@ -128,35 +133,35 @@ class Watcher:
                 "This state of a watch is not of this hanger, baseline and options.",
                 remedy="Begin the watch anew.",
             )
-        return self._next(state, reading)
+        return self._advance(state, reading)
 
-    def _next(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
+    def _advance(self, state: WatchState, reading: Reading) -> tuple[WatchState, WatchedTest]:
         if reading.time < state.last_time:
             raise BadInput(
                 f"The watch was given test {reading.test} after one that is later.",
                 remedy="Sort the tests by time.",
             )
-        state = self._rejudged(self._with(state, reading))
-        state, evidence = self._bounded(state)
+        state = self._reclassify_last_change(self._with(state, reading))
+        state, evidence = self._limit_last_visit(state)
         rows = _counting(state)
         if not state.counted[-1]:
             evidence = self._evidence(state, rows)
-        evidence, causes, against = self._bounded_by_what_stays(state, evidence)
+        evidence, causes, against = self._apply_recurrence_bound(state, evidence)
         if against >= ENOUGH_AGAINST:
             # Else everything since would be one change, and hide the next.
             state = self._without_baseline(state)
             evidence = self._evidence(state, _counting(state))
-            evidence, causes, _ = self._bounded_by_what_stays(state, evidence)
+            evidence, causes, _ = self._apply_recurrence_bound(state, evidence)
         own = slice(self.options.baseline_tests)
         if np.isfinite(state.variances[own]).any() and not state.counted[own].any():
             against = int(state.counted.sum())
             # How far it is since the baseline stays open all the same.
             whole = self._with_baseline(state)
             since = self._evidence(whole, _counting(whole))
-            since, all_causes, _ = self._bounded_by_what_stays(whole, since)
+            since, all_causes, _ = self._apply_recurrence_bound(whole, since)
         else:
             since, all_causes = evidence, causes
-        found = self._said(state, reading, (evidence, causes, against), (since, all_causes))
+        found = self._summarize(state, reading, (evidence, causes, against), (since, all_causes))
         coefficients, coefficient_sd = self._coefficients(evidence)
         if found.change.called and state.counted[-1]:
             still = state.still_same * (1 - probability_of_change(evidence, self.options))
@@ -167,7 +172,7 @@ class Watcher:
         state = replace(state, coefficients=coefficients, coefficient_sd=coefficient_sd)
         return state, found
 
-    def _bounded_by_what_stays(
+    def _apply_recurrence_bound(
         self, state: WatchState, evidence: Evidence
     ) -> tuple[Evidence, Evidence, int]:
         """As far as it stays, by which causes are weighed, and tests against the baseline."""
@@ -179,12 +184,12 @@ class Watcher:
         if (state.weight[rows] != 1).any():
             causes = self._evidence(replace(state, weight=np.ones_like(state.weight)), rows)
         course = self.sums.course(state, rows, causes.called)
-        stays = what_stays(causes, course, self.options.limit_years)
+        stays = bound_by_recurrence(causes, course, self.options.limit_years)
         bounded = replace(evidence, log_most=stays.log_years)
         return bounded, causes, 0 if causes.called else stays.against_baseline
 
     def _without_baseline(self, state: WatchState) -> WatchState:
-        """The state in which a baseline that stands alone does not count."""
+        """Return the state in which a baseline that stands alone does not count."""
         counted = state.counted.copy()
         counted[: self.options.baseline_tests] = False
         return replace(state, counted=counted)
@@ -195,7 +200,7 @@ class Watcher:
         none = state.called[:0], state.called_precision[:0]
         return replace(state, counted=counted, called=none[0], called_precision=none[1])
 
-    def _said(
+    def _summarize(
         self,
         state: WatchState,
         reading: Reading,
@@ -206,7 +211,7 @@ class Watcher:
         causes are weighed, and tests against the baseline; and of shifts since the baseline."""
         evidence, causes, against_baseline = changes
         of_baseline = float(state.years[: self.options.baseline_tests].mean())
-        subject = Subject(
+        subject = SummaryContext(
             self.quantities,
             self.hanger,
             self.options,
@@ -219,10 +224,10 @@ class Watcher:
             test=reading.test,
             time=reading.time,
             temperature_c=reading.temperature_c,
-            drifts=drifted(
+            drifts=summarize_drifts(
                 subject, *shifts, reading, is_baseline=state.tests <= self.options.baseline_tests
             ),
-            change=changed(
+            change=summarize_change(
                 subject,
                 evidence,
                 causes,
@@ -234,7 +239,7 @@ class Watcher:
             creep_per_year=self._creep(evidence),
         )
 
-    def _bounded(self, state: WatchState) -> tuple[WatchState, Evidence]:
+    def _limit_last_visit(self, state: WatchState) -> tuple[WatchState, Evidence]:
         """The newest visit with what is left of its weight: alone it speaks for no change by more
         than it may, whether it counts by now or only once another agrees with it. And the evidence
         as if it counted."""
@@ -253,7 +258,7 @@ class Watcher:
         return state, evidence
 
     def _with(self, state: WatchState, reading: Reading) -> WatchState:
-        """The state with one more test in it, and who counts now."""
+        """Return the state with one more test in it, and who counts now."""
         n, q = self.structure.layout.n, self.structure.layout.q
         if reading.mean.shape != (q,):
             raise BadInput(f"The reading of test {reading.test} is not of {q} quantities.")
@@ -281,12 +286,14 @@ class Watcher:
         }
         reference_c = known[0] if known else math.nan
         later = replace(state, last_time=reading.time, reference_c=reference_c, **grown)
-        counts = counted(self.sums.seen(later), state.counted, self.options.baseline_tests)
+        counts = select_consistent_tests(
+            self.sums.seen(later), state.counted, self.options.baseline_tests
+        )
         later = replace(later, counted=counts)
         return replace(later, scatter_variance=self.sums.scatter(later))
 
-    def _rejudged(self, state: WatchState) -> WatchState:
-        """The last called change a step or a ramp, as the tests since make clear.
+    def _reclassify_last_change(self, state: WatchState) -> WatchState:
+        """Reclassify the last called change as a step or a ramp, as the tests since make clear.
 
         At the call a ramp has hardly begun: frozen as a step, all that comes later would be new.
         """
@@ -365,28 +372,28 @@ def watched(
 
 
 def watch_of(tests: Sequence[WatchedTest]) -> Watch:
-    """The results of a watch, with the changes that they call."""
+    """Return the results of a watch, with the changes that they call."""
     calls = (Call(n, test.change) for n, test in enumerate(tests) if test.change.called)
     return Watch(tuple(tests), tuple(calls))
 
 
 def _counting(state: WatchState) -> IntArray:
-    """The tests that count; as long as none does, the newest, which then says nothing."""
+    """Return the tests that count; as long as none does, the newest, which then says nothing."""
     rows = np.flatnonzero(state.counted)
     return rows if len(rows) else np.array([state.tests - 1])
 
 
-def _called(state: WatchState, rows: IntArray) -> list[Told]:
-    """The called changes, as the tests `rows` see them."""
+def _called(state: WatchState, rows: IntArray) -> list[DetectedChange]:
+    """Return the called changes, as the tests `rows` see them."""
     return [
-        Told(int(np.searchsorted(rows, first)), years, bool(is_ramp), precision)
+        DetectedChange(int(np.searchsorted(rows, first)), years, bool(is_ramp), precision)
         for (first, years, is_ramp), precision in zip(
             state.called.tolist(), state.called_precision, strict=True
         )
     ]
 
 
-def _told(quantity: WatchedQuantity) -> list[object]:
+def _fingerprint(quantity: WatchedQuantity) -> list[object]:
     """All of a quantity, its table as a digest."""
     table = np.array([quantity.coordinates, quantity.values]).tobytes()
     plain = (getattr(quantity, name) for name in ("name", "baseline", "step_sd", "end", "plane"))

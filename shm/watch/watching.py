@@ -39,16 +39,13 @@ from shm.watch.agreement import agreement, way_of
 from shm.watch.alert_state import AlertState, conditions, still, with_beyond
 from shm.watch.alert_text import alert_of, message_of
 from shm.watch.change_words import CAUSES, suspects
-from shm.watch.isolated_tests import (
-    FEW_TESTS,
-    FIRST_TESTS,
+from shm.watch.odd_test_alerts import (
     alert_of_baseline,
-    first_tests_against,
     message_of_odd,
 )
-from shm.watch.mistaken_modes import news_of, notice_of, repeated_mistakes
 from shm.watch.options import WatchOptions
 from shm.watch.readings import Reader
+from shm.watch.repeated_mistakes import news_of, notice_of, repeated_mistakes
 from shm.watch.state_sums import WatchState
 from shm.watch.watcher import Watch, Watcher, watch_of, watched
 
@@ -76,7 +73,7 @@ class Watched:
         return self.watch.tests[-1]
 
     def alert(self, hanger: Hanger) -> Alert | None:
-        """What the newest test calls for, beyond what was told before."""
+        """Return what the newest test calls for, beyond what was told before."""
         return new_alert(self.watch.tests, hanger)
 
 
@@ -88,7 +85,7 @@ def watch_hanger(
     options: WatchOptions,
     known: Mapping[str, WatchedTest] = MappingProxyType({}),
 ) -> Watched:
-    """The watch of a hanger over the tests of its baseline and `later` ones, both by time.
+    """Return the watch of a hanger over the tests of its baseline and `later` ones, both by time.
 
     `known` is what it has said before, by test: where that is of all later ones, none is judged
     again.
@@ -118,7 +115,7 @@ def watch_hanger(
 
 
 def kept_of(baseline: Posterior, tests: Sequence[DatedTest]) -> tuple[DatedTest, ...]:
-    """The tests of a baseline without what was left out of it as mistaken."""
+    """Return the tests of a baseline without what was left out of it as mistaken."""
     check = baseline.baseline_check
     if check is None:
         return tuple(tests)
@@ -143,7 +140,7 @@ def watch_newest(
     kept: bytes | None = None,
     beside: Beside | None = None,
 ) -> Newest | None:
-    """The last of what `watch_hanger` finds, from what was `kept` after the tests before it.
+    """Return the last of what `watch_hanger` finds, from what was `kept` after the tests before it.
 
     `later` are then the tests since, the newest alone as a rule; without `kept` all of them. None
     where nothing can go on from what was kept, since rules, options or description have changed:
@@ -174,11 +171,6 @@ def watch_newest(
     # A second test that agrees answers the notice that asks for one.
     if (alert is None or alert.kinds == (_REPEAT,)) and beside is not None and later:
         agreed = agreement(reader, later[-1], beside, hanger, options, told.beyond)
-        are_first = state.tests - len(baseline_tests) <= FIRST_TESTS
-        is_told = told.alone or bool(told.beyond)
-        if agreed is None and are_first and len(baseline_tests) <= FEW_TESTS and not is_told:
-            agreed = first_tests_against(reader, later[-1], beside, hanger, options)
-            told = replace(told, alone=told.alone or agreed is not None)
         if agreed is not None:
             two_told = {(each.quantity, way_of(each.shift_mean)) for each in agreed.drifts}
             alert, told = agreed, with_beyond(told, agreed.drifts, agreed.time)
@@ -215,7 +207,7 @@ def new_alert(watched: Sequence[WatchedTest], hanger: Hanger) -> Alert | None:
 
 
 def after(told: AlertState, test: WatchedTest, hanger: Hanger) -> tuple[AlertState, Alert | None]:
-    """What stands after one more test, and the alert that it calls for, if any."""
+    """Return what stands after one more test, and the alert that it calls for, if any."""
     level = hanger.thresholds.alert_probability
     standing = still(told, test, hanger.thresholds.end_probability)
     news = _news(standing, test, level)
@@ -290,7 +282,7 @@ def _is_known(standing: AlertState, change: Change) -> bool:
 
 
 def _suspects(change: Change) -> tuple[str, ...]:
-    """What may have changed: the likeliest quantity, those with it, then those like it."""
+    """Return what may have changed: the likeliest quantity, those with it, then those like it."""
     return tuple(each.quantity for each in suspects(change))
 
 
@@ -340,7 +332,7 @@ def _alert(
 
 
 def _standing(test: WatchedTest, standing: AlertState, hanger: Hanger) -> list[Drift]:
-    """What was said to be beyond its threshold and still is: as sure as it was then."""
+    """Return what was said to be beyond its threshold and still is: as sure as it was then."""
     level = hanger.thresholds.alert_probability
     return [
         replace(each, probability=max(each.probability, level))
@@ -354,13 +346,13 @@ def _kind(change: Change) -> AlertKind:
 
 
 def _suspected(test: WatchedTest) -> tuple[Drift, ...]:
-    """The shifts of what may have changed."""
+    """Return the shifts of what may have changed."""
     by_name = {drift.quantity: drift for drift in test.drifts}
     return tuple(by_name[name] for name in _suspects(test.change) if name in by_name)
 
 
 def _first_moved(news: _News, test: WatchedTest) -> str:
-    """The quantity that is told first, and its way."""
+    """Return the quantity that is told first, and its way."""
     if news.beyond:
         return f"{news.beyond[0].quantity}-{way_of(news.beyond[0].shift_mean)}"
     if test.change.moved:

@@ -65,6 +65,7 @@ SHORT = {
     "stream_trial": "--hangers 1 --years 0.2", "stream_windows": "--seeds 1 --hours 0.3",
     "tension_coverage": "--cases 2", "updating_from_known": "--cases 8", "upload": "20",
     "validate": "--table A.6",
+    "watch_ablation": "--only everything --world network --scenarios step5 --bridges 1",
     "watch_ambient": "--scenarios quiet --structures 1", "wrong_diameter": "--hangers 1",
     "watch_worlds": "--world tied_arch --scenarios quiet --bridges 1 --years 1 --jobs 1",
     "week": "--tests 24 --hangers 2 --every 6 --samples 200", "worlds": "--hangers 1",

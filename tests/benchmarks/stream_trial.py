@@ -36,9 +36,17 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from shm.values import Hanger, Mode  # noqa: E402
+from shm.monitor.sensor_health import SEEN_BEFORE, find_lost_planes  # noqa: E402
+from shm.values import PLANES, Hanger, Mode  # noqa: E402
 from shm.values.rounding import NINETY_PERCENT  # noqa: E402
-from shm.values.stream import PooledReading  # noqa: E402
+from shm.values.stream import (  # noqa: E402
+    PooledReading,
+    Stream,
+    StreamChannel,
+    StreamEvent,
+    Window,
+    WindowReading,
+)
 from shm.watch.stream_watch import (  # noqa: E402
     StreamOptions,
     StreamState,
@@ -161,11 +169,13 @@ def solved(world: ModuleType, name: str, seed: int, years: float) -> dict[str, A
     readings = list(with_fault(list(map(as_reading, plain)), scenario, at, size))
     watch = StreamWatch(None, described(world, seed, number), StreamOptions())
     alerts, events, worst, state = [], [], 0.0, None
+    windows: list[WindowReading] = []
     daily: list[tuple[datetime, float, float]] = []
     began = time.process_time()
     for _, group in groupby(readings, key=lambda each: each.start.date()):
         hours = list(group)
         for each in hours:
+            events += with_lost_planes(windows, each, scenario.minutes)
             if not each.modes:
                 continue
             found, state = watch.after(state, each)
@@ -192,6 +202,24 @@ def solved(world: ModuleType, name: str, seed: int, years: float) -> dict[str, A
         **daily_figures(world, seed, number, changes, start, daily, state),
         "state_bytes": len(state.to_bytes()) if state else 0,
     }  # fmt: skip
+
+
+def with_lost_planes(
+    windows: list[WindowReading], hour: PooledReading, minutes: float
+) -> tuple[StreamEvent, ...]:
+    """Add an hour to the windows of three days; return what the monitor says of planes first.
+
+    An hour counts as one window: windows of ten minutes tell it after one hour, these after three.
+    """
+    before = list(windows)
+    window = Window("a", hour.hanger, hour.start, 60 * minutes, "wind", hour.level_m_s2)
+    windows.append(WindowReading(window, hour.modes, "tracked"))
+    del windows[: -int(SEEN_BEFORE / HOUR)]
+    channels = tuple(StreamChannel(plane[0], plane, 2.0, 20.0) for plane in PLANES)
+    found = find_lost_planes(windows, Stream("a", hour.hanger, 100.0, channels))
+    # One hour more of what was lost before is no news.
+    earlier = find_lost_planes(before, Stream("a", hour.hanger, 100.0, channels))
+    return tuple(e for e in found if e.channel not in {each.channel for each in earlier})
 
 
 def daily_figures(

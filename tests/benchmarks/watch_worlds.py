@@ -43,7 +43,6 @@ from shm.values import TENSION, Alert, Beside, Hanger, ModalTest, Posterior  # n
 from shm.watch import DatedTest, Watched, WatchOptions, watch_hanger  # noqa: E402
 from shm.watch.agreement import agreement  # noqa: E402
 from shm.watch.baseline_check import check_baseline  # noqa: E402
-from shm.watch.isolated_tests import FEW_TESTS, FIRST_TESTS, first_tests_against  # noqa: E402
 from shm.watch.watching import alerts_of  # noqa: E402
 from tests.benchmarks.watch_trial.outcomes import BEGINS  # noqa: E402
 from tests.benchmarks.watch_trial.report import HEADS, events, save_figure, tables  # noqa: E402
@@ -202,8 +201,6 @@ def agreeing(
         before = [test for test, _ in reversed(dated[first:n])]
         beside = Beside(came=(before[:3], ()))
         found = agreement(watched.reader, dated[n], beside, hanger, options, ())
-        if found is None and first <= FEW_TESTS and n - first < FIRST_TESTS:
-            found = first_tests_against(watched.reader, dated[n], beside, hanger, options)
         if found is not None:
             return [found]
     return []

@@ -121,13 +121,13 @@ def list_scenarios() -> Iterator[Scenario]:
     for lost in (0.02, 0.05, 0.1):
         yield Scenario(
             f"loss of {lost:.0%}",
-            "by the fourth test, under a season's swing",
+            "by the third test, under a season's swing",
             simulate(change(lose(lost), seasons_k=20)),
             CHANGE_AT,
-            CHANGE_AT + 3,
+            CHANGE_AT + 2,
         )
     slow = History(tests=34, change_at=CHANGE_AT, ramp=[-0.02], seasons_k=20)
-    yield Scenario("slow loss", "before 2 % are lost", simulate(slow), CHANGE_AT, CHANGE_AT + 17)
+    yield Scenario("slow loss", "before 2 % are lost", simulate(slow), CHANGE_AT, CHANGE_AT + 11)
     warm = History(tests=40, seasons_k=25, per_kelvin=0.002)
     yield Scenario("temperature", "what goes with it is no change", simulate(warm))
     yield Scenario(

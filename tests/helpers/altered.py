@@ -58,7 +58,7 @@ def _rounded(values: FloatArray, digits: int) -> FloatArray:
 
 _LOW_PASS = signal.butter(4, 0.4)
 
-KNOWN: dict[str, Alter] = {
+ALTERED: dict[str, Alter] = {
     "noise of 1e-4": lambda r: noisy(r, 1e-4),
     "noise of 1 %": lambda r: noisy(r, 0.01),
     "a drift": drifting,
@@ -70,11 +70,6 @@ KNOWN: dict[str, Alter] = {
         r, lambda v: np.asarray(signal.lfilter(*_LOW_PASS, v))
     ),
     "noise of 1 %, a drift, axes turned": lambda r: noisy(rotated(drifting(r), 0.02), 0.01),
-}
-"""What is known again."""
-
-ALTERED: dict[str, Alter] = {
-    **KNOWN,
     "noise of 2 %": lambda r: noisy(r, 0.02),
     "noise of 5 %": lambda r: noisy(r, 0.05),
     "cut to 70 %, noise of 1 %": lambda r: noisy(cut(r, 0.2, 0.9), 0.01),
@@ -86,4 +81,4 @@ ALTERED: dict[str, Alter] = {
         r, lambda v: np.asarray(signal.resample_poly(v, 100, 99))
     ),
 }
-"""That, and what is beyond it."""
+"""Ways to alter the samples themselves."""

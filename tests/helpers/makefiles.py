@@ -16,10 +16,10 @@ def make_targets(folder: Path) -> set[str]:
     return set(found[1].replace("\\\n", " ").split())
 
 
-def dry_run(folder: Path, target: str) -> str:
-    """Return the commands that make would run for a target."""
+def dry_run(folder: Path, *target: str) -> str:
+    """Return the commands that make would run for a target, variables after it."""
     shown = subprocess.run(
-        ["make", "--dry-run", "--directory", str(folder), target],
+        ["make", "--dry-run", "--directory", str(folder), *target],
         capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
     assert shown.returncode == 0, shown.stderr

@@ -8,7 +8,7 @@ from datetime import timedelta
 import numpy as np
 import pytest
 
-from shm.monitor import offsets, sees_nothing, sensor_faults
+from shm.monitor import find_lost_planes, offsets, sees_nothing, sensor_faults
 from shm.values import FloatArray
 from shm.values.stream import Window, WindowReading
 from tests.helpers.ambient_stream import Motion, drawn, piece, stream, values
@@ -161,3 +161,19 @@ def test_what_sees_nothing_goes_on_until_modes_are_seen_and_is_told_again_after(
     found = sees_nothing(again, [told])
     assert found is not None
     assert found.start == again[-6].window.start
+
+
+@pytest.mark.parametrize(("hours", "is_told"), [(2, False), (3, True)])
+def test_find_lost_planes_six_minutes_an_hour(hours: int, is_told: bool) -> None:
+    """A logger that records six minutes of each hour tells a lost plane within three hours."""
+    windows = [
+        WindowReading(
+            Window("h3", 3, NOW + n * timedelta(hours=1), 360.0, "wind", 5e-3),
+            tuple(m for m in MODES if n < 48 or m.plane == "longitudinal"),
+            "tracked",
+        )
+        for n in range(48 + hours)
+    ]
+    found = find_lost_planes(windows, stream())
+    assert [each.channel for each in found] == (["t0", "t1"] if is_told else [])
+    assert all(each.start == windows[48].window.start for each in found)

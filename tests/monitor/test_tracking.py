@@ -12,7 +12,7 @@ import pytest
 
 from shm.identify import IdentifyOptions, identify
 from shm.monitor import read_window, tracking
-from shm.values import PLANES, Channel, FloatArray, Hanger, Mode, Recording
+from shm.values import PLANES, Channel, FloatArray, Hanger, Mode, Plane, Recording
 from shm.values.stream import Piece, Stream, StreamChannel, WindowReading
 from tests.helpers.ambient_stream import (
     LENGTH_M,
@@ -229,6 +229,23 @@ def test_read_window_detached_plane_gains_no_mode(
     for mode in reading.modes:
         expected = motion.frequency_hz[mode.plane, mode.order]
         assert mode.frequency_hz == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize("plane", PLANES)
+@pytest.mark.parametrize("fall", [0.02, 0.057])
+def test_read_window_loosened_plane(plane: Plane, fall: float) -> None:
+    """The modes of one plane fall, the lowest most: all are followed, each by its own number."""
+    rng = np.random.default_rng(5)
+    motion = drawn(rng, orders=4)
+    hz = {
+        key: f * (1 - fall * (1.1 - 0.1 * key[1]) * (key[0] == plane))
+        for key, f in motion.frequency_hz.items()
+    }
+    now = replace(motion, frequency_hz=hz)
+    reading = read_window([piece(values(now, rng))], stream(), motion.known(), HANGER, OPTIONS)
+    assert len(reading.modes) == 8
+    for mode in reading.modes:
+        assert mode.frequency_hz == pytest.approx(hz[mode.plane, mode.order], rel=2e-3)
 
 
 @pytest.mark.parametrize("share", [-0.3, 0.3])

@@ -23,7 +23,6 @@ from shm.values import (
     Recording,
     ResponsePoint,
 )
-from tests.helpers.altered import KNOWN, noisy
 from tests.helpers.hangers import HANGER_3
 from tests.helpers.workspaces import START, modelled_test
 
@@ -121,26 +120,6 @@ def test_a_copy_is_known(how: str, hits: int) -> None:
     assert copy is not None
     assert is_copy(copy, own)
     assert is_copy(own, copy)
-
-
-@pytest.mark.parametrize(
-    ("how", "hits"), of_hits(KNOWN, "two digits", "noise of 1 %, a drift, axes turned")
-)
-def test_a_copy_that_was_altered_a_little_is_known(how: str, hits: int) -> None:
-    original = a_recording(2, hits)
-    altered = KNOWN[how](replace(original, time=START + timedelta(days=30)))
-    own, copy = print_of(2, hits), fingerprint_of([altered])
-    assert copy is not None
-    assert is_copy(copy, own)
-    assert is_copy(own, copy)
-
-
-def test_an_altered_copy_is_named_with_the_file_that_it_is_of() -> None:
-    whole = a_recording()
-    assert state_of(noisy(whole, 0.01), known(1, a_recording(2)), known(2, whole)) == (
-        "it holds the samples of f2 (recording 2) again",
-        (),
-    )
 
 
 def candidate(own: Recording, *known: KnownSamples) -> Candidate:
@@ -350,8 +329,7 @@ def test_a_print_stays_small(channels: int) -> None:
     found = fingerprint_of([Recording("s", many, 512.0)])
     assert found is not None
     assert len(found.marks)
-    arrays = (found.shapes, found.marks, found.noise, found.places)
-    assert len(pack(**dict(zip("abcd", arrays, strict=True)))) < 120_000
+    assert len(pack(shapes=found.shapes, marks=found.marks)) < 70_000
 
 
 def test_frequency_responses_are_compared_too() -> None:

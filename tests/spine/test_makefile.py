@@ -10,7 +10,7 @@ from tests.helpers.makefiles import dry_run, make_targets
 
 ROOT = Path(__file__).resolve().parents[2]
 BENCHMARKS = ROOT / "tests" / "benchmarks"
-AT_ROOT = {"demo", "demo-live", "test", "lint", "docs", "bench", "lock", "clean"}
+AT_ROOT = {"demo", "demo-live", "test", "lint", "docs", "bench", "ablation", "lock", "clean"}
 
 
 def test_makefile_targets_at_root() -> None:
@@ -39,6 +39,14 @@ def test_make_test_runs_each_file_once() -> None:
     assert all((ROOT / name).is_file() for name in alone)
     for command in ("ruff check .", "ruff format --check .", "mypy", "lint-imports"):
         assert f"/{command}" in shown
+
+
+@pytest.mark.parametrize("room", ["watch", "identify", "inference"])
+def test_ablation_runs_the_benchmark_of_a_room(room: str) -> None:
+    shown = dry_run(ROOT, "ablation", f"ROOM={room}", "ARGS=--help")
+    script = f"tests/benchmarks/{room}_ablation.py"
+    assert f"{script} --help" in shown
+    assert (ROOT / script).is_file()
 
 
 def test_long_test_files_exist() -> None:

@@ -26,7 +26,7 @@ from shm.watch.causes import (
     TIMEBASE,
     UNEXPLAINED,
 )
-from shm.watch.isolated_tests import message_of_odd
+from shm.watch.odd_test_alerts import message_of_odd
 from tests.helpers.hangers import HANGER_3
 
 START = datetime(2026, 5, 1, tzinfo=UTC)

@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
 from shm.values import FloatArray
-from shm.watch.causes import Direction, Layout, Told
+from shm.watch.causes import DetectedChange, Direction, Layout
 from shm.watch.change_point import (
     LOG_SHARES,
     RAMP,
@@ -38,7 +38,7 @@ class Example:
     variances: FloatArray
     scatter: FloatArray
     directions: tuple[Direction, ...]
-    called: tuple[Told, ...] = ()
+    called: tuple[DetectedChange, ...] = ()
 
     @cached_property
     def evidence(self) -> Evidence:
@@ -126,7 +126,7 @@ def test_a_step_of_one_mode_has_the_bayes_factor_of_two_means(after: float, test
         assert factor == pytest.approx(textbook, abs=1e-5)
 
 
-def small_world(called: tuple[Told, ...] = ()) -> Example:
+def small_world(called: tuple[DetectedChange, ...] = ()) -> Example:
     """Three modes, two quantities, a covariate, two scatters, a mode that was missed at times."""
     rng = np.random.default_rng(4)
     tests, n, q = 9, 3, 2
@@ -159,12 +159,14 @@ def small_world(called: tuple[Told, ...] = ()) -> Example:
     )
 
 
-CALLED = Told(4, 0.6, True, np.diag([4.0, 9.0, 4.0, 1.0, 2.0]))
-STEPPED = Told(4, 0.6, False, np.diag([4.0, 9.0, 4.0, 1.0, 2.0]))
+CALLED = DetectedChange(4, 0.6, True, np.diag([4.0, 9.0, 4.0, 1.0, 2.0]))
+STEPPED = DetectedChange(4, 0.6, False, np.diag([4.0, 9.0, 4.0, 1.0, 2.0]))
 
 
 @pytest.mark.parametrize("called", [(), (STEPPED,), (CALLED,), (STEPPED, CALLED)])
-def test_every_mass_is_that_of_the_dense_gaussian_likelihood(called: tuple[Told, ...]) -> None:
+def test_every_mass_is_that_of_the_dense_gaussian_likelihood(
+    called: tuple[DetectedChange, ...],
+) -> None:
     example = small_world(called)
     evidence = example.evidence
     covariances = [example.covariance(k) for k in range(2)]

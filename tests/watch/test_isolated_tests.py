@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shm.values import BoolArray, FloatArray
-from shm.watch.isolated_tests import Seen, counted, outlier_probability
+from shm.watch.isolated_tests import Seen, outlier_probability, select_consistent_tests
 
 MODES, SD = 6, 1e-3
 
@@ -32,7 +32,7 @@ def in_turn(given: FloatArray, baseline_tests: int = 1) -> BoolArray:
             every.values[:tests], every.variances[:tests], every.doubt[:tests],
             every.factors, every.sds,
         )  # fmt: skip
-        known = counted(part, known, baseline_tests)
+        known = select_consistent_tests(part, known, baseline_tests)
     return known
 
 
@@ -98,7 +98,7 @@ def test_a_mistaken_mode_that_no_test_beside_it_has_lets_the_test_count_for_noth
 
     def count(values: FloatArray) -> list[bool]:
         part = Seen(values, variances, every.doubt, every.factors, every.sds)
-        return [bool(each) for each in counted(part, np.zeros(0, bool), 1)]
+        return [bool(each) for each in select_consistent_tests(part, np.zeros(0, bool), 1)]
 
     assert count(every.values) == [True] * 8
     assert count(strayed) == [n != 4 for n in range(8)]

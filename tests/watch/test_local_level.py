@@ -8,95 +8,85 @@ from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
 from shm.values import FloatArray
-from shm.watch.local_level import Course, LocalLevels
+from shm.watch.state import LocalLevels, StateOptions
 
 
-def course(tests: int, quantities: int, seed: int) -> Course:
-    """Readings along turned directions, some not seen, some by outliers, with a jump halfway."""
+def levels(tests: int, quantities: int, seed: int) -> LocalLevels:
+    """Readings of which some see nothing, some are outliers, with a jump halfway."""
     rng = np.random.default_rng(seed)
-    shape = tests, quantities
-    turned = [np.linalg.qr(rng.normal(size=(quantities, quantities)))[0] for _ in range(tests)]
-    seen = np.where(rng.random(shape) < 0.2, np.nan, rng.normal(0, 0.5, shape))
-    jumps = np.zeros(shape)
-    jumps[[0, tests // 2]] = 0.02
-    return Course(
-        seen=seen,
-        directions=30 * np.stack(turned),
-        variance=rng.uniform(0.01, 1, shape),
+    roots = rng.normal(0, 2, (tests, quantities, quantities))
+    information = roots @ np.swapaxes(roots, 1, 2)
+    information[rng.random(tests) < 0.2] = 0.0
+    jump = np.zeros(tests)
+    jump[[0, tests // 2]] = 0.5
+    return LocalLevels(
+        mean=rng.normal(0, 0.5, (tests, quantities)),
+        information=information,
         warmth_k=rng.normal(0, 8, tests),
-        extra_variance=np.where(rng.random(shape) < 0.2, 1e-4, 0.0),
+        unknown_k=np.where(rng.random(tests) < 0.2, 10.0, 0.0),
+        unknown_square=np.full(quantities, 0.01**2),
         inflation=np.where(rng.random(tests) < 0.2, 50.0, 1.0),
-        years=rng.uniform(0.05, 0.5, tests - 1),
-        jump_variance=jumps,
-        coefficient_sd=np.full(quantities, 0.004),
-        rate=np.full(quantities, 0.005),
-        scatter=np.full(quantities, 0.002),
-        rate_log_sd=1.5,
-        scatter_log_sd=1.0,
+        years=np.append(0.0, rng.uniform(0.05, 0.5, tests - 1)),
+        jump=jump,
+        coefficient_sd=np.full(quantities, 0.08),
+        step=np.ones(quantities),
+        reference_c=10.0,
+        options=StateOptions(),
     )
 
 
-def one_law(given: Course, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def one_law(
+    given: LocalLevels, z: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Prior covariance of levels at all tests and of coefficients; what sees them, noise, seen."""
-    tests, quantities = given.seen.shape
-    rate, scatter = LocalLevels(given).rate_and_scatter(z)
-    steps = given.jump_variance.copy()
-    steps[1:] += given.years[:, None] * rate**2
-    wandered = np.cumsum(steps, axis=0)
-    prior = np.zeros((tests * quantities + quantities,) * 2)
-    for j in range(quantities):
-        at = np.arange(tests) * quantities + j
+    tests, q = given.mean.shape
+    rate, scatter = given.rate_and_scatter(z)
+    wandered = np.cumsum(given.jump[:, None] + given.years[:, None] * rate**2, axis=0)
+    prior = np.zeros((tests * q + q,) * 2)
+    for j in range(q):
+        at = np.arange(tests) * q + j
         prior[np.ix_(at, at)] = np.minimum.outer(wandered[:, j], wandered[:, j])
-        prior[tests * quantities + j, tests * quantities + j] = given.coefficient_sd[j] ** 2
-    warmed = np.concatenate(given.directions * given.warmth_k[:, None, None])
-    sees = np.hstack([block_diag(*given.directions), warmed])
-    noises = [
-        factor * (turn @ np.diag(extra + scatter**2) @ turn.T + np.diag(own))
-        for factor, turn, extra, own in zip(
-            given.inflation, given.directions, given.extra_variance, given.variance, strict=True
-        )
-    ]
-    there = np.isfinite(given.seen).ravel()
-    noise = block_diag(*noises)[np.ix_(there, there)]
-    return prior, sees[there], noise, given.seen.ravel()[there]
+        prior[tests * q + j, tests * q + j] = given.coefficient_sd[j] ** 2
+    sees = np.hstack([np.eye(tests * q), np.kron(given.warmth_k[:, None], np.eye(q))])
+    noise = given.unknown_k[:, None] ** 2 * given.unknown_square + scatter**2
+    seen = np.repeat(given.information.any(axis=(1, 2)), q)
+    own = [np.linalg.inv(each) if each.any() else np.eye(q) for each in given.information]
+    whole = block_diag(
+        *(f * (a + np.diag(b)) for f, a, b in zip(given.inflation, own, noise, strict=True))
+    )
+    return prior, sees[seen], whole[np.ix_(seen, seen)], given.mean.ravel()[seen]
 
 
 @pytest.mark.parametrize(("tests", "quantities"), [(1, 1), (7, 1), (9, 3)])
 def test_misfits_differ_as_those_of_the_whole_law(tests: int, quantities: int) -> None:
-    given = course(tests, quantities, seed=5)
+    given = levels(tests, quantities, seed=5)
     several = np.random.default_rng(6).normal(size=(4, 2 * quantities))
     expected = []
     for z in several:
         prior, sees, noise, seen = one_law(given, z)
-        density = multivariate_normal.logpdf(
-            seen, np.zeros(len(seen)), sees @ prior @ sees.T + noise
-        )
-        expected.append(z @ z / 2 - density)
-    found = LocalLevels(given).misfits(several)
-    np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-9, atol=1e-9)
+        law = multivariate_normal(np.zeros(len(seen)), sees @ prior @ sees.T + noise)
+        expected.append(z @ z / 2 - law.logpdf(seen))
+    np.testing.assert_allclose(np.diff(given.misfit(several)), np.diff(expected), 1e-8, 1e-8)
 
 
 @pytest.mark.parametrize(("tests", "quantities"), [(1, 1), (7, 1), (9, 3)])
 def test_smoothed_states_are_those_of_the_whole_law(tests: int, quantities: int) -> None:
-    given = course(tests, quantities, seed=7)
+    given = levels(tests, quantities, seed=7)
     z = np.random.default_rng(8).normal(size=2 * quantities)
     prior, sees, noise, seen = one_law(given, z)
     gain = np.linalg.solve(sees @ prior @ sees.T + noise, sees @ prior).T
     mean, covariance = gain @ seen, prior - gain @ sees @ prior
-    found = LocalLevels(given).smoothed(z[None])
-    coefficients = np.arange(tests * quantities, tests * quantities + quantities)
+    made = given._filtered(z[None])[1]
+    means, covariances = given._smoothed(made)
     for test in range(tests):
-        at = np.concatenate([np.arange(quantities) + test * quantities, coefficients])
-        np.testing.assert_allclose(found.smoothed_mean[0, test], mean[at], rtol=1e-7, atol=1e-12)
-        np.testing.assert_allclose(
-            found.smoothed_covariance[0, test], covariance[np.ix_(at, at)], rtol=1e-6, atol=1e-13
-        )
-    last = np.concatenate([np.arange(quantities) + (tests - 1) * quantities, coefficients])
-    np.testing.assert_allclose(found.filtered_mean[0, -1], mean[last], rtol=1e-7, atol=1e-12)
+        at = np.r_[np.arange(quantities) + test * quantities, tests * quantities : len(mean)]
+        np.testing.assert_allclose(means[0, test], mean[at], 1e-6, 1e-10)
+        np.testing.assert_allclose(covariances[0, test], covariance[np.ix_(at, at)], 1e-6, 1e-10)
+    np.testing.assert_allclose(made[-1][2][0], mean[at], 1e-6, 1e-10)
 
 
 def test_the_best_parameters_are_a_minimum() -> None:
-    model = LocalLevels(course(20, 2, seed=9))
+    model = levels(20, 2, seed=9)
     best = model.fitted()
     around = best + 0.3 * np.concatenate([np.eye(4), -np.eye(4)])
-    assert np.all(model.misfits(around) > model.misfits(best[None]))
+    assert np.all(model.misfit(around) > model.misfit(best[None]))

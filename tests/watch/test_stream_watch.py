@@ -13,6 +13,7 @@ import pytest
 from shm.errors import BadInput
 from shm.models.tensioned_beam import frequencies_hz
 from shm.values import FloatArray, Hanger, ModalTest, Mode, Thresholds
+from shm.values.rounding import NINETY_PERCENT
 from shm.values.stream import PooledReading, StreamEvent, Window, WindowReading
 from shm.watch.ambient_hammer import ambient_bias
 from shm.watch.stream_cause import cause_of, led_by
@@ -227,6 +228,47 @@ def test_a_loosened_end_is_told_as_one() -> None:
     assert "end stiffness" in told.message
     assert told.change is not None
     assert told.change.moved[0].quantity == "transverse_end_stiffness"
+
+
+@pytest.mark.parametrize("plane", ["transverse", "longitudinal"])
+def test_loosened_end_of_one_plane(plane: str) -> None:
+    """It is told within half a day, as no tension, and stands until the end is tight again."""
+    own = np.array([each == plane for each, _ in MODES])
+    softer = (log_hz(600e3, K / 10) - BASE) * own
+    found, state = watched(hours(640, modes=lambda n: softer if 500 <= n < 580 else 0.0))
+    (told,) = [each.alert for each in found if each.alert]
+    assert START + timedelta(hours=500) < told.time <= START + timedelta(hours=512)
+    assert told.change is not None
+    assert told.change.moved[0].quantity == f"{plane}_end_stiffness"
+    (ended,) = [n for n, each in enumerate(found) if each.ended]
+    assert 580 < ended < 604
+    assert not state.standing
+    for each in (found[540], found[-1]):
+        assert abs(each.compensated_shift) < 3 * each.compensated_sd < 0.006
+
+
+@pytest.mark.parametrize(("tension", "modes"), [(-0.08, 0.0), (0.0, -0.04)])
+def test_interval_reaches_what_its_reading_says(tension: float, modes: float) -> None:
+    """In the hours before a change is told: of the tension, or of one plane that says -8 %."""
+    own = np.array([each == "longitudinal" for each, _ in MODES])
+    found, _ = watched(
+        hours(503, tension=from_hour(500, tension), modes=lambda n: modes * own * (n >= 500))
+    )
+    assert not any(each.alert for each in found)
+    for each in found[500:]:
+        assert abs(each.compensated_shift + 0.08) < NINETY_PERCENT * each.compensated_sd + 0.005
+
+
+@pytest.mark.parametrize("apart", [6e-4, 2e-3])
+def test_close_planes_that_are_exchanged(apart: float) -> None:
+    """Planes that lie a few deviations apart are told, and what is exchanged is no change."""
+    plain = hours(560, modes=lambda _: np.repeat([0.0, -apart], 5))
+    off = [replace(each, modes=exchanged(each.modes)) for each in plain[500:]]
+    found, _ = watched([*plain[:500], *off])
+    assert not any(each.alert for each in found)
+    (event,) = [event for each in found for event in each.events]
+    assert event.kind == "swapped"
+    assert event.end <= START + timedelta(hours=506)
 
 
 def test_where_ends_and_tension_cannot_be_told_apart_both_are_named() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shm.watch import watcher
-from shm.watch.posterior_summary import drifted
+from shm.watch.posterior_summary import summarize_drifts
 from tests.helpers.synthetic_readings import TENSION_ALONE, History, watch_of
 
 
@@ -20,9 +20,9 @@ def test_drifted_improbable_changes(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def note(*arguments: Any, is_baseline: bool) -> Any:
         given.append(arguments)
-        return drifted(*arguments, is_baseline=is_baseline)
+        return summarize_drifts(*arguments, is_baseline=is_baseline)
 
-    monkeypatch.setattr(watcher, "drifted", note)
+    monkeypatch.setattr(watcher, "summarize_drifts", note)
     watch_of(History(TENSION_ALONE, tests=8, outliers=0).readings(0), TENSION_ALONE)
     subject, evidence, causes, reading = given[-1]
     log_mass = causes.log_mass.copy()
@@ -30,8 +30,8 @@ def test_drifted_improbable_changes(monkeypatch: pytest.MonkeyPatch) -> None:
     of_tension[np.unravel_index(of_tension.argmax(), of_tension.shape)] += 2000.0
     surely_last = replace(causes, log_mass=log_mass)
 
-    before = drifted(subject, evidence, causes, reading, is_baseline=False)
-    after = drifted(subject, evidence, surely_last, reading, is_baseline=False)
+    before = summarize_drifts(subject, evidence, causes, reading, is_baseline=False)
+    after = summarize_drifts(subject, evidence, surely_last, reading, is_baseline=False)
 
     for one, other in zip(before, after, strict=True):
         assert math.isfinite(other.shift_mean)

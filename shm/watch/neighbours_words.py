@@ -1,0 +1,129 @@
+"""The pattern over the bridge in English: what most probably moved, by how much, what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from shm.values.rounding import NINETY_PERCENT, force_unit, listed, rounded, rounded_percent
+from shm.watch.neighbours import REACH, BridgePattern, HangerRow
+
+_SURE_WHICH = 0.8  # judgement: four to one
+
+
+def sentence_of(pattern: BridgePattern, alike_remedy: str, named_from: float) -> str:
+    """Return the likeliest explanation, or that none is clear."""
+    best = pattern.explanations[0]
+    largest = max(pattern.rows, key=lambda row: abs(row.shift_fraction))
+    suspects = [each for each in pattern.suspects if each.name == best.name]
+    moving = best.name in ("load redistribution", "load gain")
+    if best.probability < named_from or (moving and not suspects):
+        way = "from" if best.name == "load redistribution" else "of"
+        of = f" {way} {_hangers(suspects[0].hangers).lower()}" if suspects else ""
+        return (
+            "It is not clear yet whether load moved between hangers. Most probable is "
+            f"{best.name}{of} (probability {best.probability:.2f}). The largest shift is "
+            f"{_percent(largest)}, of hanger {largest.hanger}."
+        )
+    if best.name == "no change":
+        return (
+            f"No load has moved between hangers: the largest shift, {_percent(largest)} of hanger "
+            f"{largest.hanger}, is within the scatter."
+        )
+    if best.name == "common shift":
+        size = rounded_percent(pattern.alike_fraction, NINETY_PERCENT * pattern.alike_sd, "+")
+        return (
+            f"All hangers shifted alike, by {size}. The probable cause is {pattern.alike_cause}, "
+            f"not the hangers. {alike_remedy[0].upper()}{alike_remedy[1:]}."
+        )
+    return _moved(pattern) if moving else _each_by_itself(pattern)
+
+
+def _each_by_itself(pattern: BridgePattern) -> str:
+    moved = [row for row in pattern.rows if row.way != "unchanged"]
+    if not moved:
+        return (
+            "Some hangers changed a little, without load moving between them; the tests do not "
+            "show which."
+        )
+    who = f"Hanger {moved[0].hanger} {_way(moved[0])}, and its"
+    if len(moved) > 1:
+        who = f"{_hangers([row.hanger for row in moved])} changed, and their"
+    return (
+        f"{who} neighbours did not take it up. A wrong sensor, clamp or description would look "
+        "the same."
+    )
+
+
+def _moved(pattern: BridgePattern) -> str:
+    """Who shed or gained load, how much of it the neighbours took up or gave, and any doubt."""
+    name = pattern.explanations[0].name
+    suspects = [each for each in pattern.suspects if each.name == name]
+    movers = [row for hanger in suspects[0].hangers for row in pattern.rows if row.hanger == hanger]
+    lost, one = name == "load redistribution", len(movers) == 1
+    whose = f"{_hangers(suspects[0].hangers).lower()} to {'its' if one else 'their'}"
+    said = [f"Load has moved from {whose} neighbours."] if lost else []
+    said += [f"Hanger {row.hanger} {_way(row)}." for row in movers]
+    near = [
+        row
+        for row in pattern.rows
+        if row not in movers and min(abs(row.place - each.place) for each in movers) <= REACH
+    ]
+    answered = [
+        row for row in near if (row.gained_probability if lost else row.lost_probability) > 0.5
+    ]
+    near = answered or near
+    if near:
+        taken = sum(row.shift_n for row in near)
+        half = sum((row.high_n - row.shift_n) ** 2 for row in near) ** 0.5
+        names, did = _hangers([row.hanger for row in near]), "took up" if lost else "gave up"
+        said.append(
+            f"{names} beside {'it' if one else 'them'} {did} {_force(abs(taken), half)} of it."
+        )
+    else:
+        said.append(f"{'Its' if one else 'Their'} neighbours have no test to compare.")
+    if len(suspects) > 1 and suspects[0].probability <= _SURE_WHICH * pattern.probability(name):
+        said.append(
+            f"It may also be {_hangers(suspects[1].hangers).lower()} (probability "
+            f"{suspects[1].probability:.2f})."
+        )
+    return " ".join(said)
+
+
+def remarks_of(pattern: BridgePattern) -> tuple[str, ...]:
+    """Return what qualifies the sentence: the sum, and who was not compared."""
+    kept, hangers = pattern.sum_kept, pattern.sum_kept.hangers
+    places = [row.place for row in pattern.rows if row.hanger in hangers]
+    group = _hangers(hangers).lower()
+    if len(hangers) == len(pattern.rows):
+        group = "all hangers compared"
+    elif len(hangers) > 2 and places[-1] - places[0] == len(places) - 1:
+        group = f"hangers {hangers[0]} to {hangers[-1]}"
+    change = _force(kept.sum_n, NINETY_PERCENT * kept.sum_sd_n, "+")
+    remarks = [f"The sum of the tensions of {group} changed by {change}."]
+    if not kept.complete:
+        remarks.append("A hanger without a test, or the bridge's end, may carry a part of it.")
+    if pattern.not_compared:
+        names = _hangers([each.hanger for each in pattern.not_compared])
+        remarks.append(f"Not compared: {names.lower()}, whose tests are too old or missing.")
+    return tuple(remarks)
+
+
+def _way(row: HangerRow) -> str:
+    """`lost 34.1 ± 5.8 kN`."""
+    verb = "lost" if row.shift_n < 0 else "gained"
+    return f"{verb} {_force(abs(row.shift_n), (row.high_n - row.low_n) / 2)}"
+
+
+def _force(force_n: float, half_n: float, sign: str = "") -> str:
+    """`34.1 ± 5.8 kN`, rounded by its interval."""
+    unit = force_unit(force_n, half_n)
+    return f"{rounded(unit.of(force_n), unit.of(half_n), sign)} {unit.name}"
+
+
+def _percent(row: HangerRow) -> str:
+    return rounded_percent(row.shift_fraction, (row.high_fraction - row.low_fraction) / 2, "+")
+
+
+def _hangers(hangers: Sequence[int]) -> str:
+    names = listed([str(each) for each in hangers])
+    return f"Hanger {names}" if len(hangers) == 1 else f"Hangers {names}"

@@ -1,0 +1,206 @@
+"""What the watch loses without each of its mechanisms: a new rule has to pass this table.
+
+make ablation ROOM=watch
+make ablation ROOM=watch ARGS="--only 'everything,persistence' --bridges 4 --seed 82000"
+python tests/benchmarks/watch_ablation.py --answers a.jsonl --of b.jsonl    # without what b has
+
+Seasons of the worlds of `watch_worlds.py`: quiet ones, and events on day 540. For each mechanism
+left out: first false alarms a hanger-year, notices a year, events reported of those there are, the
+median test at which they are, how many first causes are right, how often the last shift's 90 %
+interval holds the true one, and processor time. A mechanism that changes none of these is to go.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from shm.values import BaselineCheck  # noqa: E402
+from shm.watch import (  # noqa: E402
+    causes,
+    isolated_tests,
+    mistaken_modes,
+    options,
+    persistence,
+    readings,
+    state_sums,
+    watcher,
+    watching,
+)
+from shm.watch.change_point import Evidence  # noqa: E402
+from shm.watch.reading_corrections import AmplitudeSlopes  # noqa: E402
+from shm.watch.state_sums import StateSums, WatchState  # noqa: E402
+from shm.watch.watcher import Watcher  # noqa: E402
+from tests.benchmarks import watch_worlds  # noqa: E402
+from tests.benchmarks.watch_trial import outcomes  # noqa: E402
+
+Row = dict[str, Any]
+Change = tuple[Any, str, Any]
+"""An object, the name of its attribute, and what stands there while a mechanism is left out."""
+
+
+def give(value: Any) -> Callable[..., Any]:
+    """Return a function that gives one value, whatever it is asked."""
+    return lambda *_, **__: value
+
+
+def with_options(**changed: Any) -> Change:
+    """Return the change of some of the watch's options."""
+    as_it_is = watching.options_of
+    return watching, "options_of", lambda *given: replace(as_it_is(*given), **changed)
+
+
+def count_all(seen: Any, *_: Any) -> Any:
+    """Count every test that has a mode."""
+    return np.isfinite(seen.variances).any(axis=1)
+
+
+def weigh_all(watcher: Watcher, state: WatchState) -> tuple[WatchState, Evidence]:
+    """Give the newest visit its full weight."""
+    rows = np.union1d(np.flatnonzero(state.counted), [state.tests - 1])
+    return state, watcher._evidence(state, rows)
+
+
+def find_no_pattern(*given: Any) -> Any:
+    """Return no pattern of any quantity."""
+    return tuple(np.zeros((0, len(given[3]))) for _ in given[4])
+
+
+WHOLE = "everything"
+MECHANISMS: Mapping[str, Sequence[Change]] = {
+    WHOLE: (),
+    "persistence": [
+        (Watcher, "_apply_recurrence_bound", lambda _, state, found: (found, found, 0))
+    ],
+    "persistence: joints that give": [(persistence, "_SLIPPING", ())],
+    "persistence: large changes": [(persistence, "_LARGE_SEEM", persistence._SEEM)],
+    "persistence: gross changes": [(persistence, "_GROSS", np.inf)],
+    "persistence: odd tests differ": [(persistence, "_ODD_ALIKE", 1.0)],
+    "persistence: bounds of waiting": [
+        (persistence, "_LEAST_WAITED", 0.0),
+        (persistence, "_MOST_WAITED", np.inf),
+    ],
+    "bound on one visit": [(Watcher, "_limit_last_visit", weigh_all)],
+    "tests that stand alone": [(watcher, "select_consistent_tests", count_all)],
+    "modes that stray": [(isolated_tests, "_has_outlying_mode", give(False))],
+    "a baseline that stands alone": [(watcher, "ENOUGH_AGAINST", 10**9)],
+    "two tests that agree": [(watch_worlds, "agreement", give(None))],
+    "learnt scatter": [(StateSums, "scatter", lambda self, _: self.structure.scatter_variance)],
+    "four scales of scatter": [with_options(scatter_scales=(1.0,))],
+    "step or ramp judged again": [(Watcher, "_reclassify_last_change", lambda _, state: state)],
+    "the likeliest scatter": [
+        (Evidence, "log_evidence", property(lambda self: min(self.log_statistic, self.log_most)))
+    ],
+    "mistaken modes": [(readings.Reader, "_sound", lambda _, seen: np.ones(len(seen.own), bool))],
+    "mistaken modes: loosened ends": [(readings, "_LOOSENED", 1e-300)],
+    "mistaken modes: tests of another bar": [(mistaken_modes, "_MISFIT", 1e-300)],
+    "stated errors by the misfit": [(readings, "_PRIOR_FREEDOM", 1e12)],
+    "patterns of loosening": [(readings, "loosening_of", find_no_pattern)],
+    "slopes with amplitude": [
+        (AmplitudeSlopes, "at", lambda _, test, modes, own: np.zeros((2, len(modes))))
+    ],
+    "creep": [with_options(creep_per_year_sd=1e-9)],
+    "unknown temperatures of a season": [(options, "_SEASON_YEARS", 1e-9)],
+    "tests of one day": [(state_sums, "OF_ONE_VISIT_YEARS", 1e-9)],
+    "springs that move together": [(causes, "_CORRELATION", 0.0)],
+    "least shift of a frequency": [with_options(least_frequency_shift=0.0)],
+    "check of the baseline": [(watch_worlds, "check_baseline", give(BaselineCheck()))],
+}
+
+
+@contextmanager
+def without(name: str) -> Iterator[None]:
+    """Run with a mechanism left out."""
+    with ExitStack() as stack:
+        for change in MECHANISMS[name]:
+            stack.enter_context(patch.object(*change))
+        yield
+
+
+HEADS = (
+    "| left out | first false alarms a hanger-year | notices a hanger | reported | median test "
+    "| cause right | shift in its interval | ms a test |"
+)
+
+
+def row_of(name: str, rows: Sequence[Row]) -> str:
+    """Return the table's row of a mechanism."""
+    quiet = [row for row in rows if row["scenario"] in outcomes.QUIET]
+    events = [row for row in rows if row["scenario"] not in outcomes.QUIET]
+    alarms, years = outcomes.false_alarms(quiet, outcomes.ours)
+    notices = sum(not outcomes.is_alert(each) for row in rows for each in row["alerts"])
+    waited = outcomes.delays(events, outcomes.ours)
+    found = [row for row in events if outcomes.first_alert(row)]
+    cells = [
+        name,
+        outcomes.rate(alarms, years) if years else "",
+        f"{notices / max(len(rows), 1):.2f}",
+        f"{int(np.isfinite(waited).sum())} of {len(waited)}",
+        f"{np.median(waited):.0f}" if len(waited) else "",
+        outcomes.share(sum(map(outcomes.is_right, found)), len(found)),
+        outcomes.share(sum(map(outcomes.covers, rows)), len(rows)),
+        f"{1000 * float(np.median([row['seconds'] for row in rows])):.0f}",
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--world", default=",".join(watch_worlds.WORLDS))
+    parser.add_argument("--scenarios", default="quiet,step5,springs,lamp")
+    parser.add_argument("--bridges", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=82000)
+    parser.add_argument("--years", type=float, default=3.0)
+    parser.add_argument("--baselines", default="1")
+    parser.add_argument("--begins", type=float, default=outcomes.BEGINS, help="day of the events")
+    parser.add_argument("--only", help="these mechanisms, parted by commas")
+    parser.add_argument("--answers", type=Path, help="keep every hanger's outcome, a line each")
+    parser.add_argument("--of", type=Path, nargs="*", default=[], help="outcomes that are there")
+    given = parser.parse_args()
+    outcomes.BEGINS = watch_worlds.BEGINS = given.begins
+    names = given.only.split(",") if given.only else list(MECHANISMS)
+    if unknown := set(names) - MECHANISMS.keys():
+        parser.error(f"no mechanism {sorted(unknown)}; there are {', '.join(MECHANISMS)}")
+    rows = [json.loads(line) for path in given.of for line in path.read_text().splitlines()]
+    key = ("without", "world", "scenario", "seed", "baseline")
+    done = {tuple(row[each] for each in key) for row in rows}
+    tasks = [
+        (name, (world, scenario, seed, int(count), given.years))
+        for name in names
+        for count in given.baselines.split(",")
+        for scenario in given.scenarios.split(",")
+        for world in given.world.split(",")
+        for seed in range(given.seed, given.seed + given.bridges)
+        if (name, world, scenario, seed, int(count)) not in done
+    ]
+    for name, season in tasks:
+        with without(name):
+            found = [{**row, "without": name} for row in watch_worlds.solved(season)]
+        rows += found
+        if given.answers:
+            with given.answers.open("a") as file:
+                file.writelines(json.dumps(row) + "\n" for row in found)
+    print(HEADS, "|" + " --- |" * 8, sep="\n")
+    for name in dict.fromkeys(row["without"] for row in rows):
+        print(row_of(name, [row for row in rows if row["without"] == name]), flush=True)
+
+
+if __name__ == "__main__":
+    main()
