@@ -119,8 +119,14 @@ class Settings:
     )
     band_low_hz: float = _row(2.0, "Hz", "modes below are not looked for", 0, None)
     band_high_hz: float = _row(100.0, "Hz", "modes above are not looked for", 0.1, None)
-    identifier: str = _choice("how modes are found", "ssi", "frf")
-    cross_check: str = _choice("a second identifier to compare with", "frf", "ssi", "none")
+    identifier: str = _choice("how modes are found", "ssi", "pyoma2")
+    cross_check: str = _choice(
+        "a second identifier to compare with; auto: pyoma2 of structures without a model",
+        "auto",
+        "pyoma2",
+        "ssi",
+        "none",
+    )
     estimator: str = _choice("of frequency responses", "h1", "h2", "hv")
     reference_force_n: float = _row(1000.0, "N", "a hit this hard has amplitude 1", 1, None)
     frequency_allowance: float = _row(

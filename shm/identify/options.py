@@ -12,7 +12,7 @@ from typing import Literal
 from shm.errors import UsageError
 from shm.values import NAN, Recording
 
-NO_CROSS_CHECK = "none"
+NO_CROSS_CHECK, AUTO_CROSS_CHECK = "none", "auto"
 PASSED = 0.4
 """Of the sampling rate: what anti-aliasing filters pass."""
 
@@ -40,7 +40,8 @@ class IdentifyOptions:
     `window_time_constant_s`: of the exponential window already in a given frequency response.
     `estimator`: of the frequency response: `h1` (noise in the responses), `h2` (noise in the
     force), `hv` (noise in both).
-    `cross_check`: name of a second identifier whose frequencies are compared, or `none`.
+    `cross_check`: name of a second identifier whose frequencies are compared, `none`, or `auto`:
+    `pyoma2` of a structure without a model, `ssi` where `pyoma2` identifies, else none.
     `frequency_allowance`: standard deviation, as a fraction, of what differs from one test to the
     next without being seen within one (mounting of sensors, rest of the temperature): added to
     that of each frequency.

@@ -11,8 +11,7 @@ from shm.identify.contract import Measurement
 from shm.identify.estimation.amplitude_dependence import is_sure
 from shm.identify.measuring.frf import response_of
 from shm.identify.measuring.hits import struck_planes
-from shm.identify.mode_ordering.alignment import log_frequency
-from shm.identify.mode_ordering.order import Expected
+from shm.identify.mode_ordering.bars import Description, log_factor
 from shm.identify.quality.inspection import Inspection
 from shm.values import (
     NAN,
@@ -234,6 +233,6 @@ def _below_first(modes: Sequence[Mode], plane: Plane, hanger: Hanger, low_hz: fl
     first = min(own, key=lambda mode: mode.order)
     orders = np.arange(1, first.order + 1)
     half_fixed = np.full(orders.shape, 0.5)
-    log_hz = log_frequency(Expected.of(hanger).log_xi, half_fixed, orders.astype(float))
+    log_hz = log_factor(Description.of(hanger).log_xi, half_fixed, orders.astype(float))
     expected_hz = first.frequency_hz * np.exp(log_hz - log_hz[-1])
     return [int(order) for order in orders[:-1][expected_hz[:-1] >= low_hz]]
