@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import compress
 
 import numpy as np
 
 from shm.identify.contract import Measurement
-from shm.identify.estimation.amplitude_dependence import is_sure
+from shm.identify.estimation.amplitude_dependence import are_sure
 from shm.identify.measuring.frf import response_of
 from shm.identify.measuring.hits import struck_planes
 from shm.identify.mode_ordering.bars import Description, log_factor
@@ -126,7 +127,8 @@ def amplitude_dependence(inspection: Inspection) -> QualityCheck | None:
     known = [mode for mode in found if math.isfinite(mode.amplitude_slope)]
     if not known:
         return None
-    sure = [mode for mode in known if is_sure(mode.amplitude_slope, mode.amplitude_slope_sd)]
+    slopes = np.array([(mode.amplitude_slope, mode.amplitude_slope_sd) for mode in known])
+    sure = list(compress(known, are_sure(*slopes.T)))
     worst = max(sure, key=lambda mode: abs(mode.amplitude_slope), default=None)
     if worst is None or abs(worst.amplitude_slope) < SLOPE_OF_NOTE:
         value = abs(worst.amplitude_slope) if worst else 0.0
