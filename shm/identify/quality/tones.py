@@ -21,7 +21,8 @@ from shm.identify.measuring.hits import RINGING_SAMPLES
 from shm.identify.measuring.prediction import thinned
 from shm.identify.options import IdentifyOptions
 from shm.identify.quality.inspection import Inspection
-from shm.values import BoolArray, Channel, ComplexArray, FloatArray, QualityCheck, Recording
+from shm.identify.quality.table import Reading, Row
+from shm.values import BoolArray, Channel, ComplexArray, FloatArray, Recording
 
 _PROMINENCE = 30.0
 """Noise averaged over one channel reaches 14 times its median once in 10,000 lines."""
@@ -67,19 +68,20 @@ def tones(
     return _in_most(lists, options)
 
 
-def steady_tones(inspection: Inspection) -> QualityCheck | None:
-    """How many tones lie in the band, and at which frequencies."""
+def _steady_tones(inspection: Inspection) -> Reading | None:
+    """Return how many tones lie in the band, and at which frequencies."""
     if not inspection.records:
         return None
-    found = inspection.tones
-    if not found:
-        return QualityCheck("tones", "good", 0.0, 0.0, "", "no steady vibration in the band")
-    listed = ", ".join(f"{tone.frequency_hz:.2f} Hz ({tone.name})" for tone in found)
-    return QualityCheck(
-        "tones", "warning", float(len(found)), 0.0, "", f"steady vibration at {listed}",
-        "Switch off machines near the hanger, run the logger from a battery, keep sensor cables "
-        "away from power cables; name known machines as disturbance bands.",
-    )  # fmt: skip
+    tones = [f"{tone.frequency_hz:.2f} Hz ({tone.name})" for tone in inspection.tones]
+    return Reading(len(tones), {"tones": ", ".join(tones)})
+
+
+ROW = Row(
+    "tones", _steady_tones, 0.0, "", "no steady vibration in the band",
+    "steady vibration at {tones}",
+    "Switch off machines near the hanger, run the logger from a battery, keep sensor cables "
+    "away from power cables; name known machines as disturbance bands.",
+)  # fmt: skip
 
 
 def _tones_of_record(
