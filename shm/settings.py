@@ -230,6 +230,10 @@ def commented() -> str:
     return "".join(lines)
 
 
+FORMER = {"identifier = frf": "ssi", "cross_check = frf": "auto"}
+"""Choices of former versions that a description may still hold, and what takes their place."""
+
+
 def load_settings(
     file_table: Mapping[str, object] | None = None,
     flags: Mapping[str, object] | None = None,
@@ -257,7 +261,8 @@ def _value(
         return row.parse(flags[row.name], "command line")
     if row.environment_variable in environment:
         return row.parse(environment[row.environment_variable], row.environment_variable)
-    return row.parse(file_table.get(row.name, row.default), source)
+    value = file_table.get(row.name, row.default)
+    return row.parse(FORMER.get(f"{row.name} = {value}", value), source)
 
 
 def _refuse_unknown(names: Mapping[str, object], source: str) -> None:

@@ -37,9 +37,10 @@ def modes_of_each_hit(
     found: Sequence[Sequence[FoundMode]],
     modes: Sequence[Mode],
 ) -> tuple[HitModes, ...]:
-    """Return all hits in time; `found` are the modes of each set-up."""
+    """Return all hits in time; `found` are each set-up's modes, shapeless where it saw none."""
     rows = []
-    for measurement, own in zip(measurements, found, strict=True):
+    for measurement, seen in zip(measurements, found, strict=True):
+        own = [mode for mode in seen if len(mode.shape) == len(measurement.points)]
         decays = iter(measurement.decays)
         for hit in measurement.hits:
             known = [(NAN, NAN)] * len(modes)

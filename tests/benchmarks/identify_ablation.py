@@ -259,14 +259,16 @@ def without_steps(names: Sequence[str], seeds: Sequence[int]) -> None:
     for name in names:
         patches, draw = STEPS[name]
         counts = {True: Counter[str](), False: Counter[str]()}
-        for test in (test for seed in seeds for test in draw(seed)):
+        for seed in seeds:
+            for test in draw(seed):
+                for is_kept, count in counts.items():
+                    with ExitStack() as stack:
+                        for each in () if is_kept else patches:
+                            stack.enter_context(patch.object(*each))
+                        count.update(_scored(test))
             for is_kept, count in counts.items():
-                with ExitStack() as stack:
-                    for each in () if is_kept else patches:
-                        stack.enter_context(patch.object(*each))
-                    count.update(_scored(test))
-        for is_kept, count in counts.items():
-            print(f"{'with' if is_kept else 'without':8s}{name:32s} {dict(count)}", flush=True)
+                side = "with" if is_kept else "without"
+                print(f"to seed {seed} {side:8s}{name:32s} {dict(count)}", flush=True)
 
 
 def _scored(test: Test) -> dict[str, Any]:

@@ -69,6 +69,11 @@ def test_a_name_that_is_none_of_the_choices_is_refused_with_them(name: str) -> N
     assert getattr(Settings(), name) in caught.value.remedy
 
 
+def test_choices_of_former_versions_have_a_successor() -> None:
+    found = load_settings({"identifier": "frf", "cross_check": "frf"}, environment={})
+    assert (found.identifier, found.cross_check) == ("ssi", "auto")
+
+
 def test_every_identifier_can_be_chosen() -> None:
     choices = {row.name: set(row.choices) for row in TABLE}
     assert choices["identifier"] == set(IDENTIFIERS)
