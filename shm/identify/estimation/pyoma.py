@@ -120,7 +120,7 @@ def _clustered(motion: FloatArray, sampling_rate_hz: float, options: IdentifyOpt
     """Return pyOMA2's result for signals (channels, samples), clustered under the name `own`."""
     algorithms, setup = _import("pyoma2.algorithms"), _import("pyoma2.setup")
     parameters = _import("pyoma2.algorithms.data.run_params")
-    _import("pyoma2.algorithms.ssi").trange = range
+    setattr(_import("pyoma2.algorithms.ssi"), "trange", range)  # noqa: B010
     _ssi()
     rows = max(_LEAST_BLOCK_ROWS, 1 + math.ceil(_HIGHEST_ORDER / len(motion)))
     ssi = algorithms.SSI(name="ssi", br=rows, ordmax=_HIGHEST_ORDER, step=_STEP)
@@ -160,7 +160,7 @@ def _diagram(result: Any) -> Poles:
 def _ssi() -> ModuleType:
     """Return pyOMA2's functions of SSI, without their progress bars."""
     module = _import("pyoma2.functions.ssi")
-    module.trange = range  # type: ignore[attr-defined]
+    setattr(module, "trange", range)  # noqa: B010
     return module
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import scipy
@@ -158,8 +158,8 @@ def _cheapest(planes: Sequence[PlaneModes], bars: Bars, basis: Basis) -> Numberi
         fits.append((total + bars.prior, numbers, misfits))
     total, numbers, misfits = min(fits, key=lambda fit: float(fit[0].min()))
     least = float(total.min())
-    at = np.unravel_index(int(total.argmin()), total.shape)
-    orders = tuple(tuple(number[(slice(None), *at)].tolist()) for number in numbers)
+    tension, unit = divmod(int(total.argmin()), total.shape[1])
+    orders = tuple(tuple(number[:, tension, unit].tolist()) for number in numbers)
     margins = tuple(
         tuple(
             min(
@@ -172,7 +172,7 @@ def _cheapest(planes: Sequence[PlaneModes], bars: Bars, basis: Basis) -> Numberi
         for p, numbered in enumerate(orders)
     )
     irregular = tuple(
-        any(n == 1 and misfits[p][(m, *at)] >= FOREIGN for m, n in enumerate(numbered))
+        any(n == 1 and misfits[p][m, tension, unit] >= FOREIGN for m, n in enumerate(numbered))
         for p, numbered in enumerate(orders)
     )
     return Numbering(orders, margins, irregular, basis)
@@ -260,10 +260,10 @@ def _together(totals: Sequence[FloatArray], bars: Bars) -> tuple[FloatArray, Int
     return least, shift
 
 
-def _moved(values: FloatArray, shift: IntArray) -> FloatArray:
+def _moved(values: Any, shift: IntArray) -> Any:
     """Return values (modes, tensions, units) of the second plane, as the first one's units."""
     t, u = np.ogrid[: shift.shape[0], : shift.shape[1]]
-    return np.asarray(values[:, t, np.clip(u + shift, 0, shift.shape[1] - 1)])
+    return values[:, t, np.clip(u + shift, 0, shift.shape[1] - 1)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -253,7 +253,8 @@ def _in_gaps(
     modes, doubtful = look(list(gaps.values()))
     seen = [*modes, *doubtful] if bar.is_plain else list(modes)
     places = planes_of(seen, points, principal_angle(found, points))
-    reach, taken = _NEAR if bar.is_plain else _FAR, []
+    reach = _NEAR if bar.is_plain else _FAR
+    taken: list[_Candidate] = []
     for (plane, order), hz in gaps.items():
         near = [
             mode
