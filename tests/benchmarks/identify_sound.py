@@ -3,8 +3,8 @@
     python tests/benchmarks/identify_sound.py --seeds 0:20
 
 Hammer tests of linear bars in wind, by `tests/worlds/recordings.py`: its sensors, cables and
-loggers, but no mains, no machine and no second blow. A warning of such a record is wrong, except
-for what the record does lack: `few` are checks of the crew's work, listed apart.
+loggers, but no mains, no machine and no second blow. A warning of such a record is wrong, unless it
+is of the crew's work (`OF_THE_CREW`).
 """
 
 from __future__ import annotations
@@ -33,8 +33,9 @@ from tests.worlds import recordings as world
 from tests.worlds.recorded_kinds import KINDS
 
 OF_THE_CREW = {"coherence", "first orders", "force spectrum", "hits", "noise", "numbering",
-               "pre-trigger", "ring-down"}  # fmt: skip
-"""Checks that say what a test lacks: too few hits, a soft tip, no time to ring down."""
+               "pre-trigger", "repeatability", "ring-down"}  # fmt: skip
+"""Checks that say what a test lacks: too few hits, hits of several directions (up to 20 degrees off
+here), a soft tip, no time to ring down."""
 PLAN = replace(KINDS["plain"].plan, hits=(4, 8), rebounds=0.0)
 
 

@@ -139,7 +139,8 @@ def _with_slope(
         # A line that is as broad as the frequency moves looks damped by as much.
         known = replace(known, damping_sd=math.hypot(mode.damping_sd, usual))
     prior_hz = usual * mode.frequency_hz
-    if fit is not None and not usual and abs(fit.shift_hz) > _ALONE * mode.frequency_hz:
+    beyond_hz = max(_ALONE * mode.frequency_hz, SURE_SDS * fit.shift_sd_hz) if fit else math.inf
+    if fit is not None and not usual and abs(fit.shift_hz) > beyond_hz:
         return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, fit.shift_hz))
     if fit is None or abs(fit.slope) > MOST_SLOPE:
         return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, prior_hz))

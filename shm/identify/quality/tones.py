@@ -45,6 +45,8 @@ _LOCKED_TO_HITS = 0.6
 _STEADY_IN_BAND = _STEADY / 2  # judgement: a machine that is named needs less proof
 _MOST_CANDIDATES = 100  # technical: time; tones are among the strongest lines
 _LEAST_TRANSFORM = 65536  # technical: a fine grid of short records
+_UNNAMED = "a machine"
+_LEAST_DAMPING = 0.1  # of the median: as of a mode that hardly decays, see `foreign`
 _MAINS_TOLERANCE = 0.004
 """A grid's frequency moves by 0.2 Hz in 50 in a bad hour."""
 
@@ -69,10 +71,21 @@ def tones(
 
 
 def _steady_tones(inspection: Inspection) -> Reading | None:
-    """Return how many tones lie in the band, and at which frequencies."""
+    """Return how many tones lie in the band, and at which frequencies.
+
+    What nobody named and where a mode rings down as the others do is that mode.
+    """
     if not inspection.records:
         return None
-    tones = [f"{tone.frequency_hz:.2f} Hz ({tone.name})" for tone in inspection.tones]
+    modes = inspection.finding.modes if inspection.finding else ()
+    least = _LEAST_DAMPING * float(np.median([m.damping_ratio for m in modes])) if modes else 0.0
+    rings_hz = np.array([m.frequency_hz for m in modes if m.damping_ratio > least])
+    tones = [
+        f"{tone.frequency_hz:.2f} Hz ({tone.name})"
+        for tone in inspection.tones
+        if tone.name != _UNNAMED
+        or not np.any(np.abs(rings_hz / tone.frequency_hz - 1) < _MAINS_TOLERANCE / 2)
+    ]
     return Reading(len(tones), {"tones": ", ".join(tones)})
 
 
@@ -217,7 +230,7 @@ def _name(frequency_hz: float, options: IdentifyOptions) -> str:
     order = round(frequency_hz / options.mains_hz)
     if order >= 1 and abs(frequency_hz / (order * options.mains_hz) - 1) <= _MAINS_TOLERANCE:
         return "mains" if order == 1 else f"mains, harmonic {order}"
-    return "a machine"
+    return _UNNAMED
 
 
 _LEAST_BEFORE_S = 0.25  # judgement: lines of 4 Hz; of half a second that crews are told to record
