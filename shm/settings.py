@@ -119,8 +119,14 @@ class Settings:
     )
     band_low_hz: float = _row(2.0, "Hz", "modes below are not looked for", 0, None)
     band_high_hz: float = _row(100.0, "Hz", "modes above are not looked for", 0.1, None)
-    identifier: str = _choice("how modes are found", "ssi", "frf")
-    cross_check: str = _choice("a second identifier to compare with", "frf", "ssi", "none")
+    identifier: str = _choice("how modes are found", "ssi", "pyoma2")
+    cross_check: str = _choice(
+        "a second identifier to compare with; auto: pyoma2 of structures without a model",
+        "auto",
+        "pyoma2",
+        "ssi",
+        "none",
+    )
     estimator: str = _choice("of frequency responses", "h1", "h2", "hv")
     reference_force_n: float = _row(1000.0, "N", "a hit this hard has amplitude 1", 1, None)
     frequency_allowance: float = _row(
@@ -224,6 +230,10 @@ def commented() -> str:
     return "".join(lines)
 
 
+FORMER = {"identifier = frf": "ssi", "cross_check = frf": "auto"}
+"""Choices of former versions that a description may still hold, and what takes their place."""
+
+
 def load_settings(
     file_table: Mapping[str, object] | None = None,
     flags: Mapping[str, object] | None = None,
@@ -251,7 +261,8 @@ def _value(
         return row.parse(flags[row.name], "command line")
     if row.environment_variable in environment:
         return row.parse(environment[row.environment_variable], row.environment_variable)
-    return row.parse(file_table.get(row.name, row.default), source)
+    value = file_table.get(row.name, row.default)
+    return row.parse(FORMER.get(f"{row.name} = {value}", value), source)
 
 
 def _refuse_unknown(names: Mapping[str, object], source: str) -> None:

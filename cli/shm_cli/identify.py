@@ -13,6 +13,7 @@ import rich_click as click
 from shm.documents import dump
 from shm.errors import BadInput, UsageError
 from shm.identify import IDENTIFIERS, IdentifyOptions, identify
+from shm.identify.each_hit import as_csv
 from shm.identify.plausibility import signal_doubts
 from shm.modes_document import modes_document
 from shm.read.sandbox import read_test
@@ -55,13 +56,13 @@ _DEFAULT = Settings()
     "--identifier",
     type=click.Choice(list(IDENTIFIERS)),
     default=_DEFAULT.identifier,
-    help="How modes are found.",
+    help="How modes are found; pyoma2: by its own SSI and clustering.",
 )
 @click.option(
     "--cross-check",
-    type=click.Choice([*IDENTIFIERS, "none"]),
+    type=click.Choice([*IDENTIFIERS, "none", "auto"]),
     default=_DEFAULT.cross_check,
-    help="A second identifier whose frequencies are compared.",
+    help="A second identifier whose frequencies are compared; auto: of structures without a model.",
 )
 @click.option(
     "--estimator",
@@ -112,6 +113,12 @@ _DEFAULT = Settings()
     metavar="SHEET.html",
     help="Write a page with all figures here; one test only.",
 )
+@click.option(
+    "--hits",
+    type=flags.NewFile(),
+    metavar="HITS.csv",
+    help="Write each hit with its force, its modes, and why it is not used; one test only.",
+)
 @flags.figures
 @flags.hanger()
 @flags.hanger_file
@@ -125,6 +132,7 @@ def command(
     band: tuple[float, float],
     out: Path | None,
     html: Path | None,
+    hits: Path | None,
     figures: Path | None,
     hanger_id: int | None,
     hanger_file: Path | None,
@@ -143,8 +151,11 @@ def command(
     known = hanger_file is not None or hanger_id is not None
     hanger = one_hanger(ctx, hanger_file, hanger_id) if known else None
     groups = [files] if together else [(path,) for path in files]
-    if html is not None and len(groups) > 1:
-        raise UsageError("--html shows one test.", remedy="Give one file, or --together.")
+    if (html is not None or hits is not None) and len(groups) > 1:
+        raise UsageError(
+            f"{'--html' if html else '--hits'} shows one test.",
+            remedy="Give one file, or --together.",
+        )
     options = IdentifyOptions(band_low_hz=band[0], band_high_hz=band[1], **chosen)
     workspace = None
     if hanger_file is None and (hanger_id is not None or is_workspace(ctx)):
@@ -157,6 +168,9 @@ def command(
     _refuse_several_hangers(sheets)
     with drawing():
         _write(sheets, out, html, figures)
+    if hits is not None:
+        found = sheets[0].identification
+        hits.write_text(as_csv(found.each_hit, found.test.modes), encoding="utf-8")
     said = [as_text(modal_test_paper(sheet), readable_width()).rstrip() for sheet in sheets]
     answer(_document(sheets), "\n".join(said))
 

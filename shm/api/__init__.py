@@ -176,7 +176,7 @@ def identify(
     `records` are those of one test: hits, set-ups, or frequency responses. The description of the
     `hanger`, where known, helps to number the modes. `test_id` names the test; left out, the name
     of its first file. Modes are looked for within `band_hz`. `identifier` and `cross_check` are
-    names of `shm.identify.IDENTIFIERS` (`ssi`, `frf`; the latter also `none`).
+    names of `shm.identify.IDENTIFIERS` (`ssi`, `pyoma2`; the latter also `none` and `auto`).
     `estimator` of the frequency response allows for noise in the responses (`h1`), the force
     (`h2`) or both (`hv`). A hit of `reference_force_n` has amplitude 1. `frequency_allowance` is
     the part of a frequency by which it differs from test to test unseen. `window_time_constant_s`

@@ -74,7 +74,8 @@ class Measurement:
     first. `hammer` is where and in which direction it hit. Hits of unknown force have `decays` and
     `hits` alone. Ambient records have none of these: their `decays` are parts of the record.
     Exponential windows of `window_time_constant_s` and `decay_time_constant_s` (inf: none) lie on
-    spectra and frequency responses, and on `decays`.
+    spectra and frequency responses, and on `decays`. `unlike` is how far the responses of its hits
+    are from each other (0 alike, 1 unlike), NaN below three hits.
     """
 
     source: str
@@ -89,6 +90,7 @@ class Measurement:
     decay_time_constant_s: float = math.inf
     hits: tuple[Hit, ...] = ()
     dropped: tuple[Dropped, ...] = ()
+    unlike: float = NAN
 
 
 @dataclass(frozen=True, eq=False)

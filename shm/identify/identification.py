@@ -21,16 +21,16 @@ from shm.identify.contract import (
     Poles,
     Tone,
 )
+from shm.identify.each_hit import HitModes, modes_of_each_hit
 from shm.identify.estimation.finished import finished, without_sidebands
+from shm.identify.estimation.pyoma import own_identification
 from shm.identify.estimation.repeats import FREQUENCY_FLOOR, LEAST_HITS
-from shm.identify.estimation.response_fit import common_denominator_fit
 from shm.identify.estimation.ssi import looked_at_again, summed_hankel_ssi
 from shm.identify.estimation.stabilise import completed
 from shm.identify.measuring.setups import measured, refuse_off_the_hanger, without_unused_force
-from shm.identify.mode_ordering.confirmed import placed_with_doubtful
 from shm.identify.mode_ordering.placement import STATE_PLANES, Placement, placed
 from shm.identify.mode_ordering.planes import directions
-from shm.identify.options import NO_CROSS_CHECK, IdentifyOptions
+from shm.identify.options import AUTO_CROSS_CHECK, NO_CROSS_CHECK, IdentifyOptions
 from shm.identify.quality import Inspection, assess, refusal, tones
 from shm.identify.quality.of_modes import first_orders
 from shm.identify.quality.of_sensors import sensor_gain, sensor_places
@@ -62,7 +62,8 @@ class Identification:
     in it without being a mode of the hanger; `dropped` counts all that was left out with the
     reason; `notes` are decisions a reader should know of. `frequency_response`, None where nobody
     hit, has the exponential window of `window_time_constant_s` (inf: none) on it, the modes have
-    not; `fit` (points, lines) is what the identified modes make of it, window included.
+    not; `fit` (points, lines) is what the identified modes make of it, window included. `each_hit`
+    has the modes in each hit by itself.
     """
 
     test: ModalTest
@@ -75,6 +76,7 @@ class Identification:
     quality: tuple[QualityCheck, ...] = ()
     set_aside: tuple[ForeignMode, ...] = ()
     fit: ComplexArray | None = None
+    each_hit: tuple[HitModes, ...] = ()
 
     def with_orders(self, source: str) -> Identification:
         """Itself, where modes have orders; else NotIdentifiable, which lists what was found."""
@@ -115,7 +117,7 @@ def identify(
     placement = _placed(found, measurements, hanger, steady, options)
     if not placement.modes and (closer := _closer(found, measurements, options)):
         found, placement = closer, _placed(closer, measurements, hanger, steady, options)
-    second = _cross_check(measurements, options)
+    second = _cross_check(measurements, options, hanger)
     quality = assess(Inspection(recordings, measurements, options, steady, found.finding, second))
     if turned := directions(found.finding.modes, found.points):
         quality = (*quality, turned)
@@ -150,6 +152,7 @@ def identify(
         quality=(*quality, *_of_placed(measurements, found, placement, hanger, options)),
         set_aside=placement.set_aside,
         fit=fitted(measurements, found.apart, options) if level_left == 1 else None,
+        each_hit=modes_of_each_hit(measurements, found.apart, placement.modes),
     )
 
 
@@ -160,20 +163,15 @@ def _placed(
     steady: Sequence[Tone],
     options: IdentifyOptions,
 ) -> Placement:
-    return placed_with_doubtful(
-        found.finding.modes,
-        partial(_looked_at, measurements, found.finding, options),
-        found.points,
-        hanger,
-        steady,
-    )
+    look = partial(_looked_at, measurements, found.finding, options)
+    return placed(found.finding.modes, found.points, hanger, steady, look)
 
 
 def _closer(
     found: Joined, measurements: Sequence[Measurement], options: IdentifyOptions
 ) -> Joined | None:
     """With what windows over the whole band show of one set-up; None where they show no more."""
-    if len(measurements) > 1 or options.identifier not in WITHOUT_FORCE:
+    if len(measurements) > 1 or options.identifier != "ssi":
         return None
     again = looked_at_again(measurements[0], options)
     if again is None or not again.modes:
@@ -190,7 +188,7 @@ def _looked_at(
 ) -> tuple[tuple[FoundMode, ...], tuple[FoundMode, ...]]:
     """What windows show about the frequencies `at_hz`, of one set-up, and what may be a mode."""
     again = None
-    if len(measurements) == 1 and options.identifier in WITHOUT_FORCE:
+    if len(measurements) == 1 and options.identifier == "ssi":
         again = looked_at_again(measurements[0], options, at_hz)
     if again is None:
         return (), found.doubtful
@@ -251,32 +249,31 @@ def _strange(free: float) -> tuple[str, ...]:
     )
 
 
-def _cross_check(measurements: Sequence[Measurement], options: IdentifyOptions) -> Finding | None:
-    """What the second identifier finds; None where none is asked or these records have no force."""
+def _cross_check(
+    measurements: Sequence[Measurement], options: IdentifyOptions, hanger: Hanger | None
+) -> Finding | None:
+    """Return what the second identifier finds; None where none is asked.
+
+    `auto` asks for it where no bar speaks for the modes of the first: of a structure that no model
+    describes, and where pyOMA2's own modes are taken.
+    """
     name = options.cross_check
-    if name == NO_CROSS_CHECK or not _can_do(name, measurements):
+    if name == AUTO_CROSS_CHECK:
+        modelled = hanger is None or hanger.is_modelled
+        name = "ssi" if options.identifier == "pyoma2" else NO_CROSS_CHECK if modelled else "pyoma2"
+    if name == NO_CROSS_CHECK:
         return None
     return _found(measurements, name, options).finding
-
-
-def _can_do(name: str, measurements: Sequence[Measurement]) -> bool:
-    forces = any(m.frequency_response is not None for m in measurements)
-    return forces or name in WITHOUT_FORCE
 
 
 def _found(measurements: Sequence[Measurement], name: str, options: IdentifyOptions) -> Joined:
     """What the identifier of that name finds in each set-up, as one finding."""
     function = identifier(name)
-    if not _can_do(name, measurements):
-        raise UsageError(
-            f"identifier {name!r} needs the hammer's force; these records have none.",
-            remedy=f"Choose {' or '.join(sorted(WITHOUT_FORCE))}.",
-        )
     # What tests differ by is allowed for once, not set-up by set-up.
     alone = options if len(measurements) == 1 else replace(options, frequency_allowance=0.0)
     findings = [finished(function(m, alone), m, options) for m in measurements]
     found = joined(measurements, findings, options)
-    if name in WITHOUT_FORCE and alike(measurements):
+    if name == "ssi" and alike(measurements):
         every = together(measurements)
         whole = finished(function(every, options), every, options)
         found = sharpened(measurements, found, whole)
@@ -368,11 +365,8 @@ def _amplitude(hits: Sequence[Hit], options: IdentifyOptions) -> float:
 
 IDENTIFIERS: dict[str, Identifier] = {
     "ssi": summed_hankel_ssi,
-    "frf": common_denominator_fit,
+    "pyoma2": own_identification,
 }
-WITHOUT_FORCE = frozenset({"ssi"})
-"""Those that can do with accelerations alone. They see hits one by one, so that these need not be
-of one direction."""
 
 
 def identifier(name: str) -> Identifier:

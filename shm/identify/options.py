@@ -5,14 +5,13 @@ suit records that were made for their whole band.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from shm.errors import UsageError
-from shm.values import NAN, Recording
+from shm.values import NAN
 
-NO_CROSS_CHECK = "none"
+NO_CROSS_CHECK, AUTO_CROSS_CHECK = "none", "auto"
 PASSED = 0.4
 """Of the sampling rate: what anti-aliasing filters pass."""
 
@@ -40,7 +39,8 @@ class IdentifyOptions:
     `window_time_constant_s`: of the exponential window already in a given frequency response.
     `estimator`: of the frequency response: `h1` (noise in the responses), `h2` (noise in the
     force), `hv` (noise in both).
-    `cross_check`: name of a second identifier whose frequencies are compared, or `none`.
+    `cross_check`: name of a second identifier whose frequencies are compared, `none`, or `auto`:
+    `pyoma2` of a structure without a model, `ssi` where `pyoma2` identifies, else none.
     `frequency_allowance`: standard deviation, as a fraction, of what differs from one test to the
     next without being seen within one (mounting of sensors, rest of the temperature): added to
     that of each frequency.
@@ -98,22 +98,3 @@ class IdentifyOptions:
             return 0.0, 0.0
         radians = 2 * math.pi * frequency_hz * self.ambient_s
         return math.sqrt(damping_ratio / radians), 1 / math.sqrt(damping_ratio * radians)
-
-
-def campaign_options(
-    records: Sequence[Recording],
-    *,
-    reference_force_n: float = 1000.0,
-    frequency_allowance: float = 1e-4,
-    shape_allowance: float = 0.005,
-) -> IdentifyOptions:
-    """The defaults of the settings, and as the band all that the loggers of `records` pass.
-
-    What hits repeat to 1e-4 of a shape, sensors clamped on again do not: half a percent is allowed.
-    """
-    return IdentifyOptions(
-        band_high_hz=PASSED * min(record.sampling_rate_hz for record in records),
-        reference_force_n=reference_force_n,
-        frequency_allowance=frequency_allowance,
-        shape_allowance=shape_allowance,
-    )

@@ -13,6 +13,7 @@ from shm.errors import NotIdentifiable, ShmError
 from shm.identify import IdentifyOptions, identify
 from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.planes import shape_points
+from shm.identify.options import NO_CROSS_CHECK
 from shm.monitor.close_modes import Band, BandFit, CloseModes, directions, lines_of
 from shm.monitor.sensor_health import exchanged
 from shm.monitor.spectrum import ALONE, REACH, Peaks, Stretch, found_peaks
@@ -221,7 +222,8 @@ def _from_scratch(
         time=found.window.start,
         temperature_c=found.window.temperature_c,
     )
-    made = identify([record], options, test_id=record.source, hanger=hanger)
+    alone = replace(options, cross_check=NO_CROSS_CHECK)
+    made = identify([record], alone, test_id=record.source, hanger=hanger)
     if made.hits:
         raise NotIdentifiable(
             "what moved the hanger looks like hits.", file=record.source, remedy="Wait for wind."

@@ -23,7 +23,7 @@ SIGNATURES = {
     "round_bar": "(id, *, diameter_m, length_m, elastic_modulus_pa, density_kg_m3, "
     "nominal_tension_n, name='')",
     "identify": "(records, *, hanger=None, test_id=None, band_hz=(2.0, 100.0), identifier='ssi', "
-    "cross_check='frf', estimator='h1', reference_force_n=1000.0, frequency_allowance=0.0001, "
+    "cross_check='auto', estimator='h1', reference_force_n=1000.0, frequency_allowance=0.0001, "
     "mains_hz=50.0, window_time_constant_s=inf)",
     "update": "(tests, hanger, model='beam2', *, seed=1, samples=1000, "
     "priors='description', progress, sampler='importance', calibrated_by=())",

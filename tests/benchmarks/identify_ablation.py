@@ -1,12 +1,13 @@
 """What `identify` loses without one of its steps or constants.
 
     python tests/benchmarks/identify_ablation.py --kinds softening,hardening --seeds 3:11
-    python tests/benchmarks/identify_ablation.py --steps --kinds plain,close_planes,low_signal
+    python tests/benchmarks/identify_ablation.py --steps all --seeds 0:20
 
-Recordings of `tests/worlds/recordings.py`. Without `--steps` each is identified once, and its
-frequencies are taken to small amplitude with each constant of `amplitude_dependence` in turn
-left out: median error, coverage of the 90 % intervals, and how much of its slope a frequency holds
-that is not of small amplitude. With `--steps` it is identified anew without each step.
+Without `--steps` each of the recordings of `tests/worlds/recordings.py` is identified once, and its
+frequencies are taken to small amplitude with each constant of `amplitude_dependence` in turn left
+out: median error, coverage of the 90 % intervals, and how much of its slope a frequency holds that
+is not of small amplitude. With `--steps` the records that each step was made for are identified
+with it and without it.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -26,8 +29,10 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
+sys.path[:0] = [str(HERE.parents[1]), str(HERE), str(HERE / "identification")]
 
+from cases import random_case  # noqa: E402
+from gap_dynamics import drawn  # noqa: E402
 from recordings_trial import (  # noqa: E402
     LEAST_SNR_DB,
     NINETY,
@@ -37,7 +42,7 @@ from recordings_trial import (  # noqa: E402
 )
 
 from shm.errors import ShmError  # noqa: E402
-from shm.identify import IdentifyOptions, identify  # noqa: E402
+from shm.identify import IdentifyOptions, identification, identify  # noqa: E402
 from shm.identify.contract import Finding  # noqa: E402
 from shm.identify.estimation import (  # noqa: E402
     amplitude_dependence,
@@ -45,7 +50,13 @@ from shm.identify.estimation import (  # noqa: E402
     finished,
     stabilise,
 )
+from shm.identify.measuring import screening  # noqa: E402
+from shm.identify.mode_ordering import placement  # noqa: E402
+from shm.values import PLANES, Hanger, Recording  # noqa: E402
+from tests.helpers.struck import STRUCK, recordings  # noqa: E402
+from tests.identify.signals import Planted, recording  # noqa: E402
 from tests.worlds import recordings as world  # noqa: E402
+from tests.worlds import struck_bar  # noqa: E402
 
 CONSTANTS: Mapping[str, tuple[Any, str, float] | None] = {
     "all as they are": None,
@@ -56,11 +67,6 @@ CONSTANTS: Mapping[str, tuple[Any, str, float] | None] = {
     "stretches twice as long": (courses, "_STRETCH_SECONDS", 1.0),
 }
 AS_FOUND = "any correction"
-STEPS: Mapping[str, Mapping[str, Any]] = {
-    "all as it is": {},
-    "without close pairs": {},
-    "identifier frf": {"identifier": "frf"},
-}
 Errors = dict[str, list[tuple[float, float]]]
 """By variant the relative error of each mode, and the same over its standard deviation."""
 
@@ -125,29 +131,171 @@ def without_constants(cases: Iterator[world.Recording]) -> None:
     print("share of the slope, quartiles:", np.quantile(shares, [0.25, 0.5, 0.75]).round(2))
 
 
-def without_steps(cases: Iterator[world.Recording]) -> None:
-    """Prints what is found without each step."""
-    found, expected, reported = (dict.fromkeys(STEPS, 0) for _ in range(3))
-    for case in cases:
-        truths_hz = heard_hz(case)
-        for name, options in STEPS.items():
-            is_off = name == "without close pairs"
-            with patch.object(stabilise, "told_apart", _left) if is_off else ExitStack():
-                modes = list(_identified(case, options))
-            reported[name] += len(modes)
-            expected[name] += len(truths_hz)
-            for hz in truths_hz:
-                mode = nearest(hz, modes)
-                if mode is not None:
-                    modes.remove(mode)
-                    found[name] += 1
-    for name in STEPS:
-        print(f"{name:24s} {found[name]} of {expected[name]} found, {reported[name]} reported")
+@dataclass
+class Test:
+    """Records of one test and its modes to be found: plane, order and Hz as the file shows them.
+
+    `axes_deg` is by how much the hanger's planes are turned from the sensors' axes, where known.
+    """
+
+    records: list[Recording]
+    hanger: Hanger | None
+    truths: list[tuple[str, int, float]]
+    axes_deg: float = float("nan")
 
 
-def _left(single: Sequence[Any], again: Sequence[Any], *_: Any) -> tuple[list[Any], list[Any]]:
-    """In place of `told_apart`: pairs stay as they were."""
-    return list(single), list(again)
+def of_world(*kinds: str) -> Callable[[int], Iterator[Test]]:
+    """Return what draws recordings of `tests/worlds/recordings.py`."""
+
+    def draw(seed: int) -> Iterator[Test]:
+        for kind in kinds:
+            case = world.case(kind, seed)
+            planes = {each.plane for each in case.channels if each.quantity == "acceleration"}
+            clock = 1 + case.truth.time_base_error
+            truths = [
+                (mode.plane, mode.order, mode.frequency_hz / clock)
+                for mode in case.truth.modes
+                if mode.snr_db >= LEAST_SNR_DB and mode.plane in planes
+            ]
+            yield Test([as_record(case)], described(case), truths)
+
+    return draw
+
+
+def simulated(*faults: str) -> Callable[[int], Iterator[Test]]:
+    """Return what draws random hangers with each of the faults."""
+
+    def draw(seed: int) -> Iterator[Test]:
+        for fault in faults:
+            case = random_case(33, seed, fault)
+            truths = [
+                (truth.plane, truth.order, truth.frequency_hz)
+                for truth in case.truths
+                if truth.snr_db >= LEAST_SNR_DB and not truth.under_tone
+            ]
+            yield Test([case.made.recording], case.hanger, truths)
+
+    return draw
+
+
+def guided(seed: int) -> Iterator[Test]:
+    """Draw a bar that knocks in a guide with play, hit hard."""
+    part = drawn("guide", np.random.default_rng(seed))
+    crew = struck_bar.Crew(hits=4)
+    records = struck_bar.tested(
+        struck_bar.Hanger(part=part), crew, 1.0, np.random.default_rng([seed, 1])
+    )
+    exact_hz = struck_bar.modes_of(struck_bar.Bar()).omega / (2 * np.pi)
+    truths = [
+        (plane, order, float(hz))
+        for plane in struck_bar.PLANES
+        for order, hz in enumerate(exact_hz[:9], 1)
+    ]
+    yield Test(recordings(records, crew), STRUCK, truths)
+
+
+def turned(seed: int) -> Iterator[Test]:
+    """Draw a hanger whose axes are not the sensors', hit along either in turn."""
+    rng = np.random.default_rng(seed)
+    angle, hit, apart = rng.uniform(1, 40), rng.uniform(0, 90), rng.uniform(0.2, 3) * 0.002
+    bars = [(hz * (1 + apart * across), across) for hz in HZ for across in (0, 1)]
+    records = []
+    for number, plane in enumerate(PLANES):
+        modes = []
+        for hz, across in bars:
+            along = np.radians(angle + 90 * across)
+            drive = float(np.cos(along - np.radians(hit + 90 * number)))
+            modes.append(Planted(hz, 0.001, (float(np.cos(along)), float(np.sin(along))), drive))
+        made = recording(modes, hits=3, seconds=6.0, rate_hz=256.0, noise=0.003, seed=seed)
+        force = replace(made.channels[0], plane=plane, x_m=1.0)
+        records.append(replace(made, channels=(force, *made.channels[1:])))
+    orders = {hz: 1 + n // 2 for n, (hz, _) in enumerate(bars)}
+    yield Test(records, None, [(PLANES[across], orders[hz], hz) for hz, across in bars], angle)
+
+
+HZ = (6.0, 13.5, 23.0)
+Draw = Callable[[int], Iterator[Test]]
+STEPS: Mapping[str, tuple[tuple[tuple[Any, str, Any], ...], Draw]] = {
+    "hits of both directions": (((identification, "alike", lambda _: False),), turned),
+    "calm part": (((identification, "_once_calm", lambda *_: None),), guided),
+    "closer look through the band": (
+        ((identification, "_closer", lambda *_: None),),
+        of_world("low_signal", "short_record", "one_axis", "close_planes"),
+    ),
+    "closer look at gaps": (
+        ((placement, "_in_gaps", lambda *_: []),), of_world("plain", "close_planes", "low_signal"),
+    ),
+    "tones as modes": (
+        ((placement, "without_tones", lambda found, *_, **__: (list(found), [])),),
+        of_world("hum_at_mode"),
+    ),
+    "tones as modes, machines": (
+        ((placement, "without_tones", lambda found, *_, **__: (list(found), [])),),
+        simulated("mains", "machine"),
+    ),
+    "sidebands": (
+        ((identification, "without_sidebands", lambda found: found),), of_world("sidebands"),
+    ),
+    "hits unlike the others": (
+        ((screening, "_with_outliers", lambda _, reasons, *__: list(reasons)),),
+        simulated("outlier_hit"),
+    ),
+    "disturbed ring-downs": (
+        ((screening, "until_disturbed", lambda _, downs, faults, *__: (downs, faults)),),
+        simulated("double_hit", "cable", "drop_out"),
+    ),
+    "delays of channels": (((stabilise, "delays_s", lambda *_: None),), of_world("plain")),
+}  # fmt: skip
+"""What is put in place of each step, and the records that it was made for."""
+
+
+def without_steps(names: Sequence[str], seeds: Sequence[int]) -> None:
+    """Print what is found with each step and without it."""
+    for name in names:
+        patches, draw = STEPS[name]
+        counts = {True: Counter[str](), False: Counter[str]()}
+        for seed in seeds:
+            for test in draw(seed):
+                for is_kept, count in counts.items():
+                    with ExitStack() as stack:
+                        for each in () if is_kept else patches:
+                            stack.enter_context(patch.object(*each))
+                        count.update(_scored(test))
+            for is_kept, count in counts.items():
+                side = "with" if is_kept else "without"
+                print(f"to seed {seed} {side:8s}{name:32s} {dict(count)}", flush=True)
+
+
+def _scored(test: Test) -> dict[str, Any]:
+    """Return modes to be found and found, wrong names, false ones and refused tests."""
+    began = time.process_time()
+    try:
+        made = identify(test.records, IdentifyOptions(), test_id="t", hanger=test.hanger)
+    except ShmError:
+        return {"expected": len(test.truths), "refused": 1}
+    modes = list(made.test.modes)
+    found, turned_deg = 0, 0.0
+    if np.isfinite(test.axes_deg):
+        turned_deg = sum(abs(_angle_deg(mode) - test.axes_deg) for mode in modes)
+    for plane, order, hz in test.truths:
+        own = [m for m in modes if (m.plane, m.order) == (plane, order) and _near(m, hz)]
+        found += bool(own)
+        modes = [m for m in modes if m not in own]
+    wrong = sum(any(_near(mode, hz) for *_, hz in test.truths) for mode in modes)
+    spent = round(100 * (time.process_time() - began))
+    return {"expected": len(test.truths), "found": found, "wrong": wrong,
+            "false": len(modes) - wrong, "turned_deg": round(turned_deg, 1),
+            "centiseconds": spent}  # fmt: skip
+
+
+def _angle_deg(mode: Any) -> float:
+    """Return by how much the shape at the first place is turned from its plane."""
+    sign = 1 if mode.plane == PLANES[0] else -1
+    return float(np.degrees(np.arctan(sign * mode.shape[0].cross / mode.shape[0].value)))
+
+
+def _near(mode: Any, hz: float) -> bool:
+    return abs(mode.frequency_hz / hz - 1) < SAME_MODE
 
 
 def _identified(case: world.Recording, options: Mapping[str, Any]) -> Sequence[Any]:
@@ -164,11 +312,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kinds", default="softening,hardening", help="parted by commas")
     parser.add_argument("--seeds", default="3:11", help="first:end")
-    parser.add_argument("--steps", action="store_true", help="leave steps out, not constants")
+    parser.add_argument("--steps", help="names of steps, parted by commas, or all")
     arguments = parser.parse_args()
-    first, end = map(int, arguments.seeds.split(":"))
-    cases = (world.case(k, n) for k in arguments.kinds.split(",") for n in range(first, end))
-    (without_steps if arguments.steps else without_constants)(cases)
+    seeds = range(*map(int, arguments.seeds.split(":")))
+    if arguments.steps:
+        names = list(STEPS) if arguments.steps == "all" else arguments.steps.split(",")
+        without_steps(names, seeds)
+    else:
+        without_constants(world.case(k, n) for k in arguments.kinds.split(",") for n in seeds)
 
 
 if __name__ == "__main__":

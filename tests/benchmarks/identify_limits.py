@@ -28,7 +28,7 @@ from page import DOCS, put  # noqa: E402
 from shm.errors import NotIdentifiable  # noqa: E402
 from shm.identify import identify  # noqa: E402
 from shm.identify.measuring import screening, signal_faults  # noqa: E402
-from shm.identify.mode_ordering import non_bending_modes  # noqa: E402
+from shm.identify.mode_ordering import foreign  # noqa: E402
 from shm.identify.quality import of_hits, of_modes, of_signals  # noqa: E402
 from shm_cli.common import markdown  # noqa: E402
 
@@ -50,7 +50,7 @@ class Watch:
         self._spy(signal_faults, "_plain_faults", self._silence)
         self._spy(signal_faults, "_is_crowded", self._crowd)
         self._spy(tones, "_is_tone", self._tone)
-        self._spy(non_bending_modes, "_is_steady", self._damping)
+        self._spy(foreign, "_is_steady", self._damping)
 
     def test(self, case: Case) -> Seen:
         """The quantities of one test."""
@@ -149,7 +149,7 @@ LIMITS = (
 OF_TONES = (
     ("steadiness of a {}", tones._STEADY, False),
     ("change before the first hit of a {}", tones._SAME_BEFORE, True),
-    ("damping of a {} over the others'", non_bending_modes._STEADY, True),
+    ("damping of a {} over the others'", foreign._STEADY, True),
 )
 
 

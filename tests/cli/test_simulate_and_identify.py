@@ -66,7 +66,9 @@ def test_a_page_and_figures_let_a_person_check_the_modes(
     unpaint(monkeypatch)
     page, figures = tmp_path / "sheet.html", tmp_path / "figures"
     ask = ("--hanger-file", hanger_file, "--html", page)
-    ended = shm("identify", recording, *ask, "--figures", figures, "--json")
+    ended = shm(
+        "identify", recording, *ask, "--cross-check", "pyoma2", "--figures", figures, "--json"
+    )
     assert ended.code == 0, ended.err
     (test,) = ended.document["tests"]
     checks = {check["name"]: check["verdict"] for check in test["quality"]}
@@ -175,12 +177,12 @@ def test_every_choice_of_the_command_reaches_the_identification(
 
     monkeypatch.setattr("shm_cli.identify._identified", stop)
     shm(
-        "identify", recording, "--band", 3, 70, "--identifier", "frf", "--cross-check", "ssi",
+        "identify", recording, "--band", 3, 70, "--identifier", "pyoma2", "--cross-check", "ssi",
         "--estimator", "hv", "--reference-force", 500, "--frequency-allowance", 0.002, "--mains",
         60, "--window", 1.5,
     )  # fmt: skip
     expected = IdentifyOptions(
-        band_low_hz=3, band_high_hz=70, identifier="frf", cross_check="ssi", estimator="hv",
+        band_low_hz=3, band_high_hz=70, identifier="pyoma2", cross_check="ssi", estimator="hv",
         reference_force_n=500, frequency_allowance=0.002, mains_hz=60, window_time_constant_s=1.5,
     )  # fmt: skip
     assert seen == [expected]

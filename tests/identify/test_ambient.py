@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shm.errors import NotIdentifiable, UsageError
+from shm.errors import NotIdentifiable
 from shm.identify import Identification, IdentifyOptions, identify
-from shm.identify import identification as module
-from shm.identify.identification import IDENTIFIERS
 from shm.identify.measuring.ambient import LEAST_PARTS, MOST_PARTS, ambient_measurement
 from shm.values import Recording
 from tests.identify.signals import Planted, Sensor, as_recording, response
@@ -120,11 +118,3 @@ def test_set_ups_are_joined_by_the_sensor_that_they_share() -> None:
     (mode,) = [m for m in result.test.modes if abs(m.frequency_hz - 13.5) < 0.1]
     values = {point.x_m: point.value for point in mode.shape}
     assert values[3.5] / values[2.0] == pytest.approx(-0.7 / 0.8, abs=0.03)
-
-
-def test_an_identifier_that_needs_the_force_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(IDENTIFIERS, "by-force", IDENTIFIERS["ssi"])
-    assert "by-force" not in module.WITHOUT_FORCE
-    with pytest.raises(UsageError, match="needs the hammer's force") as caught:
-        identify([RECORD], replace(OPTIONS, identifier="by-force"), test_id="t")
-    assert "ssi" in caught.value.remedy

@@ -12,10 +12,12 @@ from shm.identify.contract import Dropped, Finding, FoundMode, Poles
 from shm.identify.estimation.stabilise import completed
 from shm.identify.measuring.ambient import LEAST_PARTS, LOUDER, ambient_measurement, set_apart
 from shm.identify.quality import Inspection
-from shm.identify.quality.of_ambient import peaks, signal_to_noise, stationarity
+from shm.identify.quality.of_ambient import ROWS
 from shm.values import Hanger, QualityCheck, Recording
 from tests.identify.signals import Planted, as_recording, response
 from tests.identify.test_ambient import OPTIONS, RATE_HZ, RECORD, SENSORS
+
+_, _HEIGHT, _PEAKS = ROWS
 
 DECK = Hanger.without_model(100, "Deck")
 WIDE = (Planted(5.0, 0.02, (1.0, 0.3, 0.6)), Planted(11.0, 0.02, (0.5, 0.2, -1.0)))
@@ -104,26 +106,24 @@ def _inspection(known_hz: tuple[float, ...]) -> Inspection:
 
 
 def test_a_strong_peak_without_a_mode_is_named() -> None:
-    check = peaks(_inspection((6.0, 6.3, 13.5)))
+    check = _PEAKS.check(_inspection((6.0, 6.3, 13.5)))
     assert check is not None
     assert check.verdict == "warning"
     assert "23 Hz" in check.found
-    whole = peaks(_inspection((6.0, 6.3, 13.5, 23.0)))
+    whole = _PEAKS.check(_inspection((6.0, 6.3, 13.5, 23.0)))
     assert whole is not None
     assert whole.verdict == "good"
 
 
 def test_modes_where_the_spectrum_has_no_peak_are_warned_of() -> None:
-    check = signal_to_noise(_inspection((17.0, 30.0)))
+    check = _HEIGHT.check(_inspection((17.0, 30.0)))
     assert check is not None
     assert check.verdict == "warning"
 
 
 def test_after_hits_these_checks_do_not_arise() -> None:
     inspection = replace(_inspection((6.0,)), records=())
-    assert stationarity(inspection) is None
-    assert peaks(inspection) is None
-    assert signal_to_noise(inspection) is None
+    assert [row.check(inspection) for row in ROWS] == [None, None, None]
 
 
 def test_a_finding_is_completed_by_what_it_lacks() -> None:

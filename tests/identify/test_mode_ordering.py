@@ -10,7 +10,7 @@ import pytest
 from shm.identify.contract import FoundMode
 from shm.identify.mode_ordering.placement import placed
 from shm.values import NAN, PLANES, Hanger
-from tests.identify.test_non_bending_modes import (
+from tests.identify.test_foreign import (
     COUNTED,
     HANGER,
     POINTS,

@@ -10,12 +10,12 @@ import pytest
 from shm.errors import NotIdentifiable
 from shm.identify import Identification
 from shm.identify.contract import FoundMode, Poles, Tone
-from shm.identify.mode_ordering.order import LEAST_MARGIN
+from shm.identify.mode_ordering.numbering import LEAST_MARGIN
 from shm.identify.mode_ordering.placement import Placement, placed
 from shm.report.shared_tables import headline
 from shm.values import NAN, PLANES, Hanger, ModalTest, ResponsePoint
 from shm.values.modes import NUMBERING
-from tests.identify.test_non_bending_modes import HANGER, PLACES, STATE, hanger_modes
+from tests.identify.test_foreign import HANGER, PLACES, STATE, hanger_modes
 from tests.worlds.simulated.elements import plane_modes
 
 POINTS = tuple(ResponsePoint(f"{x}", "transverse", x) for x in PLACES)

@@ -3,8 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shm.identify.estimation.poles import collinearity, poles_of, real_shape
-from shm.identify.estimation.ssi import hankel, realised
+from shm.identify.estimation.poles import collinearity, real_shape
+from shm.identify.estimation.pyoma import poles_of_orders
+from shm.identify.estimation.ssi import hankel
 
 RATE_HZ = 256.0
 
@@ -39,9 +40,7 @@ def test_it_is_a_sum_over_time_so_that_long_decays_weigh_more() -> None:
 
 def test_a_realisation_returns_the_pole_and_the_shape_that_made_the_decay() -> None:
     decay = _decay(20.0, 0.004)
-    left, values, _ = np.linalg.svd(hankel(decay, decay, 30), full_matrices=False)
-    ((state, output),) = realised(left[:, :2] * np.sqrt(values[:2]), 30, [2])
-    poles = poles_of(state, output, RATE_HZ)
+    (poles,) = poles_of_orders(hankel(decay, decay, 30), 30, [2], RATE_HZ)
     assert poles.frequency_hz == pytest.approx([20.0], rel=1e-9)
     assert poles.damping_ratio == pytest.approx([0.004], rel=1e-6)
     np.testing.assert_allclose(real_shape(poles.shapes[:, 0]), [1.0, 0.4, -0.7], atol=1e-9)

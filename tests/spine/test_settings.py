@@ -8,7 +8,7 @@ import pytest
 
 from shm.errors import BadInput
 from shm.identify import IDENTIFIERS, IdentifyOptions
-from shm.identify.options import NO_CROSS_CHECK
+from shm.identify.options import AUTO_CROSS_CHECK, NO_CROSS_CHECK
 from shm.settings import TABLE, Settings, load_settings
 
 
@@ -69,8 +69,13 @@ def test_a_name_that_is_none_of_the_choices_is_refused_with_them(name: str) -> N
     assert getattr(Settings(), name) in caught.value.remedy
 
 
+def test_choices_of_former_versions_have_a_successor() -> None:
+    found = load_settings({"identifier": "frf", "cross_check": "frf"}, environment={})
+    assert (found.identifier, found.cross_check) == ("ssi", "auto")
+
+
 def test_every_identifier_can_be_chosen() -> None:
     choices = {row.name: set(row.choices) for row in TABLE}
     assert choices["identifier"] == set(IDENTIFIERS)
-    assert choices["cross_check"] == {*IDENTIFIERS, NO_CROSS_CHECK}
+    assert choices["cross_check"] == {*IDENTIFIERS, NO_CROSS_CHECK, AUTO_CROSS_CHECK}
     assert choices["estimator"] == set(get_args(get_type_hints(IdentifyOptions)["estimator"]))

@@ -33,7 +33,7 @@ from shm.identify.estimation.courses import (
     with_drift,
 )
 from shm.identify.estimation.repeats import LEAST_HITS, widening
-from shm.values import NAN, FloatArray
+from shm.values import NAN, BoolArray, FloatArray
 from shm.values.modes import MOST_SLOPE, SURE_SDS
 
 _LEAST_SLOPE = 2e-5
@@ -54,8 +54,8 @@ _SHIFT_ERROR = 0.02
 _HALVES = (0.1, 0.3, 1.0)
 """Of A_hit: h. Above, it is friction; below, ring-downs end before it shows (judgement)."""
 _BY_CHANCE = 0.01
-"""Probability that as many modes are sure by chance, below which others are corrected, too (0.001
-to 0.1 do alike). 85 % in records that soften if they never are."""
+"""Probability that as many modes, or one by so much, are sure by chance, above which none is. Of a
+test of twenty modes one is beyond `SURE_SDS` by chance in 22 %."""
 _ALONE = 1e-3
 """A shift beyond that of one mode while the others stay: no joint does it. It only widens."""
 _INDEPENDENT = 8.0
@@ -81,14 +81,22 @@ class _Fit:
     misfit: float
     freedom: int
 
-    @property
-    def is_sure(self) -> bool:
-        return is_sure(self.slope, self.slope_sd)
 
+def are_sure(slopes: FloatArray, sds: FloatArray) -> BoolArray:
+    """Return which frequencies depend on amplitude by more than chance and less than nonsense.
 
-def is_sure(slope: float, sd: float) -> bool:
-    """Whether a frequency depends on amplitude by more than chance and less than nonsense."""
-    return max(SURE_SDS * sd, _LEAST_SLOPE) < abs(slope) < MOST_SLOPE
+    Where several are beyond `SURE_SDS` that is no chance; one alone must be by more, the more modes
+    there are. `slopes` and `sds` (modes,) are NaN where they are not known.
+    """
+    known = int(np.sum(np.isfinite(slopes)))
+    size = np.where(np.isfinite(slopes), np.abs(slopes), 0.0)
+    possible = (size > _LEAST_SLOPE) & (size < MOST_SLOPE)
+    sure = possible & (size > SURE_SDS * sds)
+    count, one = int(np.sum(sure)), 2 * scipy.special.ndtr(-SURE_SDS)
+    if not count or scipy.special.bdtrc(count - 1, known, one) < _BY_CHANCE:
+        return np.asarray(sure)
+    alone = -scipy.special.ndtri(_BY_CHANCE / (2 * known))
+    return np.asarray(possible & (size > alone * sds))
 
 
 def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Finding:
@@ -101,28 +109,28 @@ def with_amplitude_dependence(found: Finding, measurement: Measurement) -> Findi
     ]
     leads_s = _leads_s(measurement)
     fits = [_fits(mode, index, courses, leads_s) for index, mode in enumerate(found.modes)]
-    sure = [
+    slopes = np.array([(NAN, NAN) if fit is None else (fit.slope, fit.slope_sd) for fit in fits])
+    sure = are_sure(*slopes.T)
+    shifts = [
         fit.shift_hz / mode.frequency_hz
-        for mode, fit in zip(found.modes, fits, strict=True)
-        if fit is not None and fit.is_sure
+        for mode, fit, is_sure in zip(found.modes, fits, sure, strict=True)
+        if fit is not None and is_sure
     ]
     # Where several depend on amplitude, the others will too, by about as much.
-    chance = scipy.special.bdtrc(
-        len(sure) - 1, sum(fit is not None for fit in fits), 2 * scipy.special.ndtr(-SURE_SDS)
-    )
-    several = bool(sure) and chance < _BY_CHANCE
-    usual = float(np.sqrt(np.mean(np.square(sure)))) if several else 0.0
+    usual = float(np.sqrt(np.mean(np.square(shifts)))) if len(shifts) > 1 else 0.0
     # A joint that slips lowers all frequencies, stretching raises all.
-    expected = float(np.median(sure)) if several else 0.0
+    expected = float(np.median(shifts)) if len(shifts) > 1 else 0.0
     modes = tuple(
-        _unlike(_with_slope(mode, fit, expected, usual), index, courses, mode)
-        for index, (mode, fit) in enumerate(zip(found.modes, fits, strict=True))
+        _unlike(_with_slope(mode, fit, bool(own), expected, usual), index, courses, mode)
+        for index, (mode, fit, own) in enumerate(zip(found.modes, fits, sure, strict=True))
     )
     used = [hit for hit in measurement.hits if hit.used]
     return with_drift(replace(found, modes=modes), courses, used)
 
 
-def _with_slope(mode: FoundMode, fit: _Fit | None, expected: float, usual: float) -> FoundMode:
+def _with_slope(
+    mode: FoundMode, fit: _Fit | None, is_sure: bool, expected: float, usual: float
+) -> FoundMode:
     """The mode with its slope and shift; by `expected` +- `usual`, relative, it is shifted where
     its own phase says nothing."""
     slope = (fit.slope, fit.slope_sd) if fit is not None else (NAN, NAN)
@@ -131,19 +139,20 @@ def _with_slope(mode: FoundMode, fit: _Fit | None, expected: float, usual: float
         # A line that is as broad as the frequency moves looks damped by as much.
         known = replace(known, damping_sd=math.hypot(mode.damping_sd, usual))
     prior_hz = usual * mode.frequency_hz
-    if fit is not None and not usual and abs(fit.shift_hz) > _ALONE * mode.frequency_hz:
+    beyond_hz = max(_ALONE * mode.frequency_hz, SURE_SDS * fit.shift_sd_hz) if fit else math.inf
+    if fit is not None and not usual and abs(fit.shift_hz) > beyond_hz:
         return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, fit.shift_hz))
     if fit is None or abs(fit.slope) > MOST_SLOPE:
         return replace(known, frequency_sd_hz=math.hypot(mode.frequency_sd_hz, prior_hz))
     # Beside what the other modes shift, a shift that is not sure by itself counts by its share.
-    vague = 0.0 if fit.is_sure else fit.shift_sd_hz**2
-    share = 1.0 if fit.is_sure else prior_hz**2 / (prior_hz**2 + vague + TINY)
+    vague = 0.0 if is_sure else fit.shift_sd_hz**2
+    share = 1.0 if is_sure else prior_hz**2 / (prior_hz**2 + vague + TINY)
     shift_hz = share * fit.shift_hz + (1 - share) * expected * mode.frequency_hz
     by_phase = math.hypot(
         math.sqrt(share) * fit.shift_sd_hz,
         _SHIFT_ERROR * shift_hz,
-        _LAW_ERROR * fit.left * mode.frequency_hz,
-        _TO_ZERO * fit.slope * mode.frequency_hz,
+        share * _LAW_ERROR * fit.left * mode.frequency_hz,
+        share * _TO_ZERO * fit.slope * mode.frequency_hz,
     )
     as_found = mode.frequency_sd_hz if math.isnan(mode.damping_sd) else 0.0
     kept = (1 - share) * mode.frequency_sd_hz

@@ -46,24 +46,6 @@ class PoleSet:
         )
 
 
-def poles_of(
-    state: FloatArray, output: FloatArray, sampling_rate_hz: float, shift_hz: float = 0.0
-) -> PoleSet:
-    """The poles above the real axis of x[k+1] = state x[k], y = output x, raised by `shift_hz`."""
-    values, vectors = np.linalg.eig(state)
-    above = values.imag > 0
-    real = len(values) - 2 * int(np.sum(above))
-    lowered = np.log(values[above].astype(np.complex128)) * sampling_rate_hz
-    rates = lowered + 2j * np.pi * shift_hz
-    return PoleSet(
-        order=len(state),
-        frequency_hz=np.abs(rates) / (2 * np.pi),
-        damping_ratio=-rates.real / np.abs(rates),
-        shapes=output @ vectors[:, above],
-        dropped=(Dropped("poles", real, "do not oscillate"),),
-    )
-
-
 def in_band(poles: PoleSet, options: IdentifyOptions) -> BoolArray:
     """Which poles lie in the band, (poles,)."""
     return np.asarray(
@@ -129,14 +111,10 @@ FAR = 1e6  # of a pair that must not be: far above the cost of any allowed one, 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A track of stable poles, and those of its poles that its estimates are taken from.
-
-    `blur_hz` is a standard deviation of the frequency that no other hit or order shows.
-    """
+    """A track of stable poles, and those of its poles that its estimates are taken from."""
 
     track: Track
     poles: tuple[Pole, ...]
-    blur_hz: float = 0.0
 
     @cached_property
     def frequency_hz(self) -> float:

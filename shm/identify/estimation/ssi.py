@@ -5,9 +5,9 @@ stay from order to order, and stay when any one hit is left out, are modes. Freq
 are medians over a few high orders; standard deviations are the jackknife's. Ambient motion goes
 the same way: the covariances of white-noise-driven modes are sums of free decays.
 
-State-space models of rising order are cut from the sum. Leaving out a hit need not cost a new
-decomposition: the Hankel matrix without it, times the leading right singular vectors of the whole
-one, spans the same columns but for terms of second order.
+pyOMA2 cuts state-space models of rising order from the sum and solves them. Leaving out a hit need
+not cost a decomposition of the whole: the Hankel matrix without it, times the leading right
+singular vectors of the whole one, spans the same columns but for terms of second order.
 
 A model of the whole band spends its lags on its highest frequency: of a long hanger it sees a
 second, while two planes beat for ten. So ring-downs are also seen through narrow windows: shifted
@@ -26,7 +26,8 @@ import numpy as np
 import scipy
 
 from shm.identify.contract import Finding, Measurement
-from shm.identify.estimation.poles import PoleSet, poles_of
+from shm.identify.estimation.poles import PoleSet
+from shm.identify.estimation.pyoma import poles_of_orders
 from shm.identify.estimation.repeats import LEAST_HITS
 from shm.identify.estimation.stabilise import (
     completed,
@@ -299,7 +300,8 @@ def modes_of_hankel(
     if max_order < _LEAST_ORDER:
         return nothing_moves(len(matrices))
     size = _Size(rows, max_order, measurement.sampling_rate_hz, shift_hz)
-    sets = _models(left, values, size, size.orders)
+    leading = left[:, :max_order] * values[:max_order]
+    sets = poles_of_orders(leading, rows, size.orders, size.sampling_rate_hz, shift_hz)
     without_each = _models_without_each_hit(matrices, right[:max_order].T, size)
     seconds = max(decay.shape[1] for decay in measurement.decays) / size.sampling_rate_hz
     return stabilised(sets, without_each, seconds, options)
@@ -313,32 +315,6 @@ def _max_order(shape: tuple[int, int], values: FloatArray, rows: int, most: int)
     return int(largest // 2 * 2)
 
 
-def _models(
-    left: FloatArray, values: FloatArray, size: _Size, orders: Sequence[int]
-) -> list[PoleSet]:
-    """The poles of each of `orders`, from a Hankel matrix' left singular vectors and values."""
-    observability = left[:, : size.max_order] * np.sqrt(values[: size.max_order])
-    return [
-        poles_of(state, output, size.sampling_rate_hz, size.shift_hz)
-        for state, output in realised(observability, size.block_rows, orders)
-    ]
-
-
-def realised(
-    observability: FloatArray, block_rows: int, orders: Sequence[int]
-) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """State and output matrices of each of `orders`, all from one QR decomposition.
-
-    M. Doehler and L. Mevel, Mech. Syst. Signal Process. 38 (2013): the least squares of each order
-    are the first rows and columns of those of the highest.
-    """
-    channels = len(observability) // block_rows
-    basis, upper = np.linalg.qr(observability[:-channels])
-    shifted = basis.T @ observability[channels:]
-    for n in orders:
-        yield np.linalg.solve(upper[:n, :n], shifted[:n, :n]), observability[:channels, :n]
-
-
 def _models_without_each_hit(
     matrices: Sequence[FloatArray], basis: FloatArray, size: _Size
 ) -> list[list[PoleSet]]:
@@ -348,8 +324,10 @@ def _models_without_each_hit(
     projected = [matrix @ basis for matrix in matrices]
     total = np.sum(projected, axis=0)
     orders = final_orders(size.orders)
-    parts = (np.linalg.svd(total - part, full_matrices=False)[:2] for part in projected)
-    return [_models(*part, size, orders) for part in parts]
+    return [
+        poles_of_orders(total - each, size.block_rows, orders, size.sampling_rate_hz, size.shift_hz)
+        for each in projected
+    ]
 
 
 def hankel(response: FloatArray, reference: FloatArray, block_rows: int) -> FloatArray:

@@ -15,7 +15,6 @@ from dataclasses import replace
 import numpy as np
 
 from shm.identify.contract import Dropped, Finding, FoundMode, Poles
-from shm.identify.estimation.close_pairs import told_apart
 from shm.identify.estimation.poles import (
     Candidate,
     PoleSet,
@@ -64,10 +63,8 @@ def stabilised(
         without_each_hit = [[simultaneous(p, late_s) for p in of] for of in without_each_hit]
         candidates = [as_simultaneous(candidate, late_s) for candidate in candidates]
     single, doubles = resolved(candidates, seconds)
-    final = [poles for poles in sets if poles.order in orders]
     again = find_again(single, without_each_hit)
-    told, again = told_apart(single, again, (final, without_each_hit), seconds, options)
-    modes, kept, doubtful, refused = proven(told, again, options)
+    modes, kept, doubtful, refused = proven(single, again, options)
     lost = sum(len(c.track) for c in candidates) - sum(len(c.track) for c in kept)
     followed = Dropped("poles", lost, "stable, but of a mode that was dropped")
     dropped = (*unstable, followed, *doubles, *refused)

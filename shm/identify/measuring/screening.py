@@ -40,7 +40,7 @@ from shm.identify.measuring.signal_faults import (
 )
 from shm.identify.measuring.unforced_hits import find_unforced
 from shm.identify.options import IdentifyOptions
-from shm.values import BoolArray, Channel, ComplexArray, FloatArray, Plane, Recording
+from shm.values import NAN, BoolArray, Channel, ComplexArray, FloatArray, Plane, Recording
 
 _LEAST_SHARE_OF_LONGEST = 0.25  # judgement: a quarter as sharp, it blurs the others
 FEWEST_TO_COMPARE = 3
@@ -58,12 +58,16 @@ _HARDLY = 0.1  # 20 dB below the largest, usual in impact testing (Ewins 2000, 3
 
 @dataclass(frozen=True, eq=False)
 class Screening:
-    """All `hits`; the ring-downs of the `used` ones, with the accelerations of `rows` alone."""
+    """All `hits`; the ring-downs of the `used` ones, with the accelerations of `rows` alone.
+
+    `unlike` is how far the used hits are from each other, the median; NaN below three hits.
+    """
 
     hits: tuple[Hit, ...]
     used: tuple[HitRecord, ...]
     rows: tuple[int, ...]
     dropped: tuple[Dropped, ...]
+    unlike: float
 
 
 def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screening:
@@ -78,8 +82,9 @@ def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screenin
     rows, dropped = _usable_channels(channels, faults)
     ring_downs = _with_rows(ring_downs, rows)
     reasons = _reasons(ring_downs, [[each[row] for row in rows] for each in faults], rate, options)
-    if records[0].force is not None:
-        planes = [channels[row].plane for row in rows]
+    planes = [channels[row].plane for row in rows]
+    forced = records[0].force is not None
+    if forced:
         reasons = _with_outliers(ring_downs, reasons, rate, options, planes)
     used = [ring_down for ring_down, reason in zip(ring_downs, reasons, strict=True) if not reason]
     if not used or not rows:
@@ -88,7 +93,11 @@ def screened(records: Sequence[Recording], options: IdentifyOptions) -> Screenin
         replace(hit, used=not reason, reason=reason, cut="" if reason else _cut(ring_down, names))
         for hit, reason, ring_down, (_, names) in zip(hits, reasons, ring_downs, ends, strict=True)
     ]
-    return Screening(tuple(judged), tuple(used), tuple(rows), dropped + _counted(reasons))
+    unlike = NAN
+    if forced and len(used) >= FEWEST_TO_COMPARE:
+        apart = disagreement(used, rate, (options.band_low_hz, options.band_high_hz), planes)
+        unlike = float(np.nanmedian(apart)) if np.isfinite(apart).any() else NAN
+    return Screening(tuple(judged), tuple(used), tuple(rows), dropped + _counted(reasons), unlike)
 
 
 def pulses_of(record: Recording, options: IdentifyOptions) -> list[Pulse]:

@@ -305,6 +305,7 @@ def screened_measurement(
             frequency_response=None,
             hits=found.hits,
             dropped=found.dropped,
+            unlike=found.unlike,
         )
     response, spectra = _response(records[0], found, window, options)
     force = records[0].force
@@ -320,6 +321,7 @@ def screened_measurement(
         window_time_constant_s=window.time_constant_s,
         hits=found.hits,
         dropped=found.dropped,
+        unlike=found.unlike,
     )
 
 

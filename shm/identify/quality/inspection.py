@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from shm.identify.contract import Finding, Hit, Measurement, Tone
 from shm.identify.options import IdentifyOptions
-from shm.values import QualityCheck, Recording
+from shm.values import Recording
 from shm.values.rounding import listed
 
 _MOST_TOLD = 4  # technical: of a sentence that can be read
@@ -29,12 +28,6 @@ class Inspection:
     tones: Sequence[Tone] = ()
     finding: Finding | None = None
     cross_check: Finding | None = None
-
-
-class Check(Protocol):
-    """Gives one figure of a test's quality; None where the question does not arise."""
-
-    def __call__(self, inspection: Inspection) -> QualityCheck | None: ...
 
 
 def hits_of(inspection: Inspection) -> list[Hit]:
@@ -67,27 +60,3 @@ def places(inspection: Inspection, hits: Sequence[Hit]) -> str:
         f"{hit.start_s:.1f} s" + (f" of record {hit.record + 1}" if several else "") for hit in hits
     ]
     return ("the hit at " if len(told) == 1 else "the hits at ") + listed(told)
-
-
-def fault_count(
-    inspection: Inspection,
-    name: str,
-    reasons: Sequence[str],
-    none: str,
-    remedy: str,
-    part: str = "used until then",
-) -> QualityCheck | None:
-    """How many hits and channels were left out for the reasons, or of how many hits a part is used;
-    none is good."""
-    if not hits_of(inspection):
-        return None
-    hits, channels = hits_for(inspection, reasons), channels_for(inspection, reasons)
-    cut = [hit for hit in hits_of(inspection) if hit.cut.startswith(tuple(reasons))]
-    count = len(hits) + len(channels) + len(cut)
-    if not count:
-        return QualityCheck(name, "good", 0.0, 0.0, "", none)
-    told = [places(inspection, hits)] if hits else []
-    found = f"left out: {listed(told + channels)}" if told + channels else ""
-    used = f"{part}: {places(inspection, cut)}" if cut else ""
-    found = "; ".join(each for each in (found, used) if each)
-    return QualityCheck(name, "warning", float(count), 0.0, "", found, remedy)

@@ -10,7 +10,8 @@ import scipy
 from shm.identify.contract import Measurement
 from shm.identify.measuring.ambient import LOUD, loudness
 from shm.identify.quality.inspection import Inspection
-from shm.values import NAN, FloatArray, QualityCheck, Recording
+from shm.identify.quality.table import Reading, Row
+from shm.values import NAN, FloatArray, Recording
 from shm.values.rounding import listed
 
 _UNSTEADY, _STRETCH_S = 2.5, 5.0
@@ -25,26 +26,19 @@ _SAME = 0.02  # judgement: half-power width of 1 % damping
 _MOST_TOLD = 4  # technical: of a sentence that can be read
 
 
-def stationarity(inspection: Inspection) -> QualityCheck | None:
-    """How much the loudest stretch is louder than the median, and what was set apart."""
+def _stationarity(inspection: Inspection) -> Reading | None:
+    """Return how much the loudest stretch is louder than the median, and what was set apart."""
     records = _ambient(inspection)
     value = max((_unrest(record) for record in records), default=NAN)
     if not records or np.isnan(value):
         return None
     apart = sum(d.count for m in inspection.measurements for d in m.dropped if d.reason == LOUD)
-    told = f"the loudest {_STRETCH_S:g} s move {value:.1f} times as much as the median"
-    if apart:
-        told += f"; {apart} parts are set apart: {LOUD}"
-    if apart or value > _UNSTEADY:
-        return QualityCheck(
-            "stationarity", "warning", value, _UNSTEADY, "", told,
-            "Measure in steady wind without traffic, or longer.",
-        )  # fmt: skip
-    return QualityCheck("stationarity", "good", value, _UNSTEADY, "", told)
+    more = f"; {apart} parts are set apart: {LOUD}" if apart else ""
+    return Reading(value, {"more": more}, "warning" if apart else None)
 
 
-def signal_to_noise(inspection: Inspection) -> QualityCheck | None:
-    """The median height of the modes' peaks over the spectrum beside them, in dB."""
+def _signal_to_noise(inspection: Inspection) -> Reading | None:
+    """Return the median height of the modes' peaks over the spectrum beside them, in dB."""
     if not _ambient(inspection) or inspection.finding is None or not inspection.finding.modes:
         return None
     spectra = [_spectrum(m) for m in inspection.measurements]
@@ -52,33 +46,41 @@ def signal_to_noise(inspection: Inspection) -> QualityCheck | None:
         max(_height_db(f, power, mode.frequency_hz) for f, power in spectra)
         for mode in inspection.finding.modes
     ]
-    value = float(np.median(heights))
-    found = f"the modes' peaks stand {value:.0f} dB above the spectrum beside them"
-    if value >= _LEAST_DB:
-        return QualityCheck("peak height", "good", value, _LEAST_DB, "dB", found)
-    return QualityCheck(
-        "peak height", "warning", value, _LEAST_DB, "dB", found,
-        "Measure in more wind, with quieter sensors, or hit the hanger.",
-    )  # fmt: skip
+    return Reading(float(np.median(heights)))
 
 
-def peaks(inspection: Inspection) -> QualityCheck | None:
-    """Peaks of the spectrum that are neither mode nor tone, and stronger than one that is."""
+def _peaks(inspection: Inspection) -> Reading | None:
+    """Return the peaks that are neither mode nor tone, and stronger than one that is."""
     if not _ambient(inspection) or inspection.finding is None:
         return None
     known = [mode.frequency_hz for mode in inspection.finding.modes]
     missed = sorted({hz for m in inspection.measurements for hz in _missed(m, known, inspection)})
-    count = float(len(missed))
-    if not missed:
-        found = "every strong peak of the spectrum is a mode or a tone"
-        return QualityCheck("missed peaks", "good", count, 0.0, "", found)
     named = listed([f"{hz:.3g} Hz" for hz in missed[:_MOST_TOLD]])
     more = f" and {len(missed) - _MOST_TOLD} more" if len(missed) > _MOST_TOLD else ""
-    return QualityCheck(
-        "missed peaks", "warning", count, 0.0, "",
-        f"no mode was proven at strong peaks of the spectrum: {named}{more}",
+    return Reading(len(missed), {"named": named + more})
+
+
+ROWS = (
+    Row(
+        "stationarity", _stationarity, _UNSTEADY, "",
+        f"the loudest {_STRETCH_S:g} s move {{value:.1f}} times as much as the median{{more}}",
+        f"the loudest {_STRETCH_S:g} s move {{value:.1f}} times as much as the median{{more}}",
+        "Measure in steady wind without traffic, or longer.",
+    ),
+    Row(
+        "peak height", _signal_to_noise, _LEAST_DB, "dB",
+        "the modes' peaks stand {value:.0f} dB above the spectrum beside them",
+        "the modes' peaks stand {value:.0f} dB above the spectrum beside them",
+        "Measure in more wind, with quieter sensors, or hit the hanger.",
+        is_least=True,
+    ),
+    Row(
+        "missed peaks", _peaks, 0.0, "",
+        "every strong peak of the spectrum is a mode or a tone",
+        "no mode was proven at strong peaks of the spectrum: {named}",
         "Measure longer, and look at the spectrum before using the modes.",
-    )  # fmt: skip
+    ),
+)  # fmt: skip
 
 
 def _ambient(inspection: Inspection) -> Sequence[Recording]:

@@ -9,13 +9,14 @@ from collections import Counter
 
 import numpy as np
 
-from shm.identify.contract import Hit, Measurement
+from shm.identify.contract import Hit
 from shm.identify.estimation.repeats import LEAST_HITS
-from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES, HitRecord, find_pulses
-from shm.identify.measuring.screening import FEWEST_TO_COMPARE, LIMIT, disagreement
+from shm.identify.measuring.hits import PULSE_SECONDS, RINGING_SAMPLES
+from shm.identify.measuring.screening import FEWEST_TO_COMPARE, LIMIT
 from shm.identify.measuring.signal_faults import CUT_OFF, DOUBLE_HIT, KNOCK, OUTLIER
-from shm.identify.quality.inspection import Inspection, fault_count, hits_for, hits_of, places
-from shm.values import NAN, FloatArray, QualityCheck, Recording
+from shm.identify.quality.inspection import Inspection, hits_for, hits_of, places
+from shm.identify.quality.table import Reading, Row, fault_reading
+from shm.values import NAN, FloatArray
 
 _RUNG_DOWN_DB = -3.0
 """Above it less than a third of a time constant is seen: damping rests on a small difference."""
@@ -27,8 +28,8 @@ _LONGEST_PULSE_S = 0.05  # judgement: ten soft pulses; what follows is noise in 
 _TRANSFORM_S = 1.0
 
 
-def hits_used(inspection: Inspection) -> QualityCheck | None:
-    """Used hits of the set-up with the fewest, below three a warning.
+def _hits_used(inspection: Inspection) -> Reading | None:
+    """Return the used hits of the set-up with the fewest.
 
     A single hit with which its record begins is refused, as nothing repeats it and nothing shows
     the noise it stands in; but for one whose vibration dies away, as noise does not, in modes that
@@ -38,20 +39,15 @@ def hits_used(inspection: Inspection) -> QualityCheck | None:
     if not hits:
         return None
     used = [hit for hit in hits if hit.used]
-    fewest = min(sum(h.used for h in m.hits) for m in inspection.measurements)
-    found = f"{len(used)} of {len(hits)} hits are used{_reasons([h.reason for h in hits])}"
-    if _unforced(inspection):
-        found += "; no force is known, so they are known by what they set in motion"
-    remedy = "Hit at least three times, better five, with time to ring down."
     if len(used) == 1 and used[0].start < RINGING_SAMPLES and not _dies_away(inspection):
         found = "one hit that begins with its record: nothing tells its vibration from noise"
-        return QualityCheck(
-            "hits", "refused", 1.0, float(LEAST_HITS), "",
-            found, f"{remedy} Record half a second before the first hit.",
-        )  # fmt: skip
-    if fewest < LEAST_HITS:
-        return QualityCheck("hits", "warning", fewest, float(LEAST_HITS), "", found, remedy)
-    return QualityCheck("hits", "good", fewest, float(LEAST_HITS), "", found)
+        remedy = f"{_HIT_MORE} Record half a second before the first hit."
+        return Reading(1.0, {}, "refused", found=found, remedy=remedy)
+    fewest = min(sum(h.used for h in m.hits) for m in inspection.measurements)
+    more = _reasons([hit.reason for hit in hits])
+    if _unforced(inspection):
+        more += "; no force is known, so they are known by what they set in motion"
+    return Reading(fewest, {"used": len(used), "all": len(hits), "more": more})
 
 
 def _dies_away(inspection: Inspection) -> bool:
@@ -74,24 +70,12 @@ def _reasons(reasons: list[str]) -> str:
     return f" (left out: {told})" if told else ""
 
 
-def double_hits(inspection: Inspection) -> QualityCheck | None:
-    """How many hits have a second blow in their ring-down.
-
-    They are used from after it.
-    """
-    remedy = "Hit from the wrist and let the hammer spring back at once; repeat these hits."
-    return fault_count(
-        inspection,
-        "double hits",
-        (DOUBLE_HIT,),
-        "each hit is a single blow",
-        remedy,
-        part="used from after the second blow",
-    )
+def _double_hits(inspection: Inspection) -> Reading | None:
+    return fault_reading(inspection, (DOUBLE_HIT,), "used from after the second blow")
 
 
-def pre_trigger(inspection: Inspection) -> QualityCheck | None:
-    """Milliseconds from the beginning of a record to its first hit, the shortest.
+def _pre_trigger(inspection: Inspection) -> Reading | None:
+    """Return the milliseconds from the beginning of a record to its first hit, the shortest.
 
     The frequency response takes 6 ms and 16 samples before the pulse: so long an anti-aliasing
     filter may announce it. The ring-down is as good without.
@@ -102,38 +86,19 @@ def pre_trigger(inspection: Inspection) -> QualityCheck | None:
     limit = max(
         PULSE_SECONDS + RINGING_SAMPLES / record.sampling_rate_hz for record in inspection.records
     )
-    shortest = min(hit.start_s for hit in hits)
-    short = [hit for hit in hits if hit.start_s < limit]
-    good = not short
-    return QualityCheck(
-        "pre-trigger",
-        "good" if good else "warning",
-        1000 * shortest,
-        1000 * limit,
-        "ms",
-        "every pulse is recorded whole"
-        if good
-        else f"too little before {places(inspection, short)}: "
-        "frequency responses may lack a part of the pulse, frequencies and damping do not",
-        "" if good else "Set a pre-trigger of half a second, or start the logger before hitting.",
-    )
+    short = places(inspection, [hit for hit in hits if hit.start_s < limit])
+    return Reading(1000 * min(hit.start_s for hit in hits), {"short": short}, limit=1000 * limit)
 
 
-def ring_down(inspection: Inspection) -> QualityCheck | None:
-    """Level of a ring-down's last tenth over its first, in dB, median over the used hits."""
+def _ring_down(inspection: Inspection) -> Reading | None:
+    """Return the level of a ring-down's last tenth over its first, in dB, the hits' median."""
     if not hits_of(inspection):
         return None
     levels = [_level_db(d) for measurement in inspection.measurements for d in measurement.decays]
     level = float(np.median(levels))
     short = hits_for(inspection, (CUT_OFF,))
-    found = f"it ends {-level:.0f} dB below its beginning"
-    if not short and level <= _RUNG_DOWN_DB:
-        return QualityCheck("ring-down", "good", level, _RUNG_DOWN_DB, "dB", found)
-    found = f"{places(inspection, short)} is cut off and left out; {found}" if short else found
-    return QualityCheck(
-        "ring-down", "warning", level, _RUNG_DOWN_DB, "dB", found,
-        "Wait longer before the next hit and before stopping the logger: until nothing moves.",
-    )  # fmt: skip
+    cut = f"{places(inspection, short)} is cut off and left out; " if short else ""
+    return Reading(level, {"below": -level, "cut": cut}, "warning" if short else None)
 
 
 def _level_db(decay: FloatArray) -> float:
@@ -143,85 +108,39 @@ def _level_db(decay: FloatArray) -> float:
     return float(20 * np.log10(max(float(last), tiny) / max(float(first), tiny)))
 
 
-def repeatability(inspection: Inspection) -> QualityCheck | None:
-    """How far apart the used hits' responses are (0 alike, 1 unlike), worst set-up."""
+def _repeatability(inspection: Inspection) -> Reading | None:
+    """Return how far apart the used hits' responses are (0 alike, 1 unlike), worst set-up."""
     if not hits_of(inspection) or _unforced(inspection):
         return None
     dropped = hits_for(inspection, (OUTLIER, KNOCK))
-    values = [_apart(m, inspection) for m in inspection.measurements]
-    known = [value for value in values if np.isfinite(value)]
+    known = [m.unlike for m in inspection.measurements if np.isfinite(m.unlike)]
     value = max(known, default=NAN)
-    remedy = "Hit the same point in the same direction, and let nobody touch the hanger."
     struck = [hit for hit in hits_of(inspection) if hit.cut == KNOCK]
     if dropped or struck:
         told = [f"left out as unlike the others: {places(inspection, dropped)}"] if dropped else []
         told += [f"something else struck: {places(inspection, struck)}"] if struck else []
-        found = "; ".join(told)
-        return QualityCheck("repeatability", "warning", value, LIMIT, "", found, remedy)
+        return Reading(value, {}, "warning", found="; ".join(told))
     if not known:
         found = f"fewer than {FEWEST_TO_COMPARE} hits: nothing to compare"
-        return QualityCheck("repeatability", "unknown", NAN, LIMIT, "", found, "Hit more often.")
-    if value > LIMIT:
-        found = "the hits differ, and not one against the rest"
-        return QualityCheck("repeatability", "warning", value, LIMIT, "", found, remedy)
-    return QualityCheck("repeatability", "good", value, LIMIT, "", "the hits are alike")
+        return Reading(NAN, {}, "unknown", found=found, remedy="Hit more often.")
+    return Reading(value)
 
 
-def _apart(measurement: Measurement, inspection: Inspection) -> float:
-    """Median over the used hits of how far each is from the others; NaN below three hits."""
-    if sum(hit.used for hit in measurement.hits) < FEWEST_TO_COMPARE:
-        return NAN
-    names = {point.name for point in measurement.points}
-    used = {(hit.record, hit.start) for hit in measurement.hits if hit.used}
-    records = [
-        part
-        for number in sorted({hit.record for hit in measurement.hits})
-        for part in _hit_records(inspection.records[number], number, names, used)
-    ]
-    options = inspection.options
-    rate = inspection.records[measurement.hits[0].record].sampling_rate_hz
-    planes = [
-        c.plane
-        for c in inspection.records[measurement.hits[0].record].accelerations
-        if c.name in names
-    ]
-    apart = disagreement(records, rate, (options.band_low_hz, options.band_high_hz), planes)
-    known = apart[np.isfinite(apart)]
-    return float(np.median(known)) if len(known) else NAN
-
-
-def _hit_records(
-    record: Recording, number: int, names: set[str], used: set[tuple[int, int]]
-) -> list[HitRecord]:
-    """The used hits of one record, with the channels that are used."""
-    force = record.force
-    assert force is not None
-    accelerations = np.array([c.values for c in record.accelerations if c.name in names])
-    pulses = find_pulses(force.values, record.sampling_rate_hz)
-    return [HitRecord(force.values, accelerations, p) for p in pulses if (number, p.start) in used]
-
-
-def force_spectrum(inspection: Inspection) -> QualityCheck | None:
-    """Force at the band's upper end over its largest in the band, in dB, median over the hits."""
+def _force_spectrum(inspection: Inspection) -> Reading | None:
+    """Return the force at the band's upper end over its largest in it, in dB, the hits' median."""
     used = [hit for hit in hits_of(inspection) if hit.used]
     if not used or _unforced(inspection):
         return None
-    high = inspection.options.band_high_hz
     curves = [_spectrum_db(inspection, hit) for hit in used]
     # A zero between lobes of the spectrum is as bad as its end: the lowest value counts.
-    ends = [float(np.min(db)) for _, db in curves]
-    value = float(np.median(ends))
-    if value >= _LEAST_FORCE_DB:
-        found = f"the force reaches {high:g} Hz"
-        return QualityCheck("force spectrum", "good", value, _LEAST_FORCE_DB, "dB", found)
+    value = float(np.median([float(np.min(db)) for _, db in curves]))
     below = [np.flatnonzero(db < _LEAST_FORCE_DB) for _, db in curves]
     ends_hz = [f[k[0] if len(k) else -1] for (f, _), k in zip(curves, below, strict=True)]
     reach = float(np.median(ends_hz))
-    return QualityCheck(
-        "force spectrum", "warning", value, _LEAST_FORCE_DB, "dB",
-        f"the force reaches {reach:.0f} Hz; modes above may be missed or uncertain",
-        f"Use a harder tip, or look for modes up to {reach:.0f} Hz only.",
-    )  # fmt: skip
+    words = {"high": inspection.options.band_high_hz, "reach": reach}
+    return Reading(
+        value, words, remedy=f"Use a harder tip, or look for modes up to {reach:.0f} Hz only."
+    )
 
 
 def _spectrum_db(inspection: Inspection, hit: Hit) -> tuple[FloatArray, FloatArray]:
@@ -242,3 +161,34 @@ def _spectrum_db(inspection: Inspection, hit: Hit) -> tuple[FloatArray, FloatArr
     top = max(float(level[lines].max(initial=0.0)), np.finfo(float).tiny)
     decibels = 20 * np.log10(np.maximum(level[lines] / top, 1e-6))
     return np.asarray(frequency[lines]), np.asarray(decibels)
+
+
+_HIT_MORE = "Hit at least three times, better five, with time to ring down."
+_USED = "{used} of {all} hits are used{more}"
+_ENDS = "{cut}it ends {below:.0f} dB below its beginning"
+HITS = Row("hits", _hits_used, LEAST_HITS, "", _USED, _USED, _HIT_MORE, is_least=True)
+DOUBLE_HITS = Row(
+    "double hits", _double_hits, 0.0, "", "each hit is a single blow", "{faults}",
+    "Hit from the wrist and let the hammer spring back at once; repeat these hits.",
+)  # fmt: skip
+PRE_TRIGGER = Row(
+    "pre-trigger", _pre_trigger, NAN, "ms", "every pulse is recorded whole",
+    "too little before {short}: frequency responses may lack a part of the pulse, frequencies and "
+    "damping do not",
+    "Set a pre-trigger of half a second, or start the logger before hitting.",
+    is_least=True,
+)  # fmt: skip
+RING_DOWN = Row(
+    "ring-down", _ring_down, _RUNG_DOWN_DB, "dB", _ENDS, _ENDS,
+    "Wait longer before the next hit and before stopping the logger: until nothing moves.",
+)  # fmt: skip
+REPEATABILITY = Row(
+    "repeatability", _repeatability, LIMIT, "", "the hits are alike",
+    "the hits differ, and not one against the rest",
+    "Hit the same point in the same direction, and let nobody touch the hanger.",
+)  # fmt: skip
+FORCE_SPECTRUM = Row(
+    "force spectrum", _force_spectrum, _LEAST_FORCE_DB, "dB", "the force reaches {high:g} Hz",
+    "the force reaches {reach:.0f} Hz; modes above may be missed or uncertain", "",
+    is_least=True,
+)  # fmt: skip

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import compress
 
 import numpy as np
 
 from shm.identify.contract import Measurement
-from shm.identify.estimation.amplitude_dependence import is_sure
+from shm.identify.estimation.amplitude_dependence import are_sure
 from shm.identify.measuring.frf import response_of
 from shm.identify.measuring.hits import struck_planes
-from shm.identify.mode_ordering.alignment import log_frequency
-from shm.identify.mode_ordering.order import Expected
+from shm.identify.mode_ordering.bars import Description, log_factor
 from shm.identify.quality.inspection import Inspection
+from shm.identify.quality.table import Reading, Row
 from shm.values import (
     NAN,
     PLANES,
@@ -23,7 +24,6 @@ from shm.values import (
     Mode,
     Plane,
     QualityCheck,
-    Verdict,
 )
 from shm.values.modes import FIRST_ORDERS, SLOPE_OF_NOTE
 from shm.values.rounding import NINETY_PERCENT, listed
@@ -39,8 +39,8 @@ _LEAST_COMMON = 0.5
 """In a third of sound simulated tests the fit to frequency responses lacks a weak or close mode."""
 
 
-def coherence(inspection: Inspection) -> QualityCheck | None:
-    """Median coherence at the found modes, or before they are known where a point moves most.
+def _explained(inspection: Inspection) -> Reading | None:
+    """Return the median coherence at the found modes, or else where a point moves most.
 
     Measured frequency responses below `min_coherence` are refused: what is not explained by the
     force is not a response to it. After hits that are known in time it is a warning: free decays do
@@ -52,32 +52,22 @@ def coherence(inspection: Inspection) -> QualityCheck | None:
     values = [_coherence(m, inspection) for m in measured]
     known = np.concatenate([v for v in values if v is not None] or [np.empty(0)])
     known = known[np.isfinite(known)]
-    refuse = not inspection.records
-    limit = max(_WARNING, inspection.options.min_coherence)
+    given, least = not inspection.records, inspection.options.min_coherence
+    limit = max(_WARNING, least)
     if not len(known):
-        return QualityCheck(
-            "coherence", "unknown", NAN, limit, "", _unknown(refuse),
-            "Export the coherence with the responses." if refuse else "Hit at least three times.",
-        )  # fmt: skip
+        found = "the responses come without it" if given else "one hit has none"
+        remedy = (
+            "Export the coherence with the responses." if given else "Hit at least three times."
+        )
+        return Reading(NAN, {}, "unknown", limit, found, remedy)
     value = float(np.median(known))
-    found = f"the force explains {value:.0%} of the response where the hanger responds"
-    if value >= limit:
-        return QualityCheck("coherence", "good", value, limit, "", found)
-    if refuse and value < inspection.options.min_coherence:
-        return QualityCheck(
-            "coherence", "refused", value, inspection.options.min_coherence, "",
-            f"{found}: the rest is noise",
-            "Measure again: check hammer and sensor cables, hit the same point squarely and let "
-            "each hit ring down.",
+    if given and value < least:
+        return Reading(
+            value, {"more": ": the rest is noise"}, "refused", least,
+            remedy="Measure again: check hammer and sensor cables, hit the same point squarely and "
+            "let each hit ring down.",
         )  # fmt: skip
-    return QualityCheck(
-        "coherence", "warning", value, limit, "", found,
-        "Hit the same point in the same direction, and let each hit ring down before the next.",
-    )  # fmt: skip
-
-
-def _unknown(responses: bool) -> str:
-    return "the responses come without it" if responses else "one hit has none"
+    return Reading(value, {"more": ""}, limit=limit)
 
 
 def _coherence(measurement: Measurement, inspection: Inspection) -> FloatArray | None:
@@ -121,51 +111,34 @@ def _near(frequency_hz: FloatArray, modes_hz: FloatArray) -> BoolArray:
     return np.asarray(np.any(distance <= (_LINES_AROUND + 0.5) * spacing, axis=1))
 
 
-def amplitude_dependence(inspection: Inspection) -> QualityCheck | None:
-    """Largest sure change of a frequency with amplitude, as a fraction, at that of a hit."""
+def _amplitude_dependence(inspection: Inspection) -> Reading | None:
+    """Return the largest sure change of a frequency with amplitude, as a fraction, at a hit's."""
     found = inspection.finding.modes if inspection.finding else ()
     known = [mode for mode in found if math.isfinite(mode.amplitude_slope)]
     if not known:
         return None
-    sure = [mode for mode in known if is_sure(mode.amplitude_slope, mode.amplitude_slope_sd)]
+    slopes = np.array([(mode.amplitude_slope, mode.amplitude_slope_sd) for mode in known])
+    sure = list(compress(known, are_sure(*slopes.T)))
     worst = max(sure, key=lambda mode: abs(mode.amplitude_slope), default=None)
-    if worst is None or abs(worst.amplitude_slope) < SLOPE_OF_NOTE:
-        value = abs(worst.amplitude_slope) if worst else 0.0
-        told = "frequencies do not depend on amplitude"
-        return QualityCheck("amplitude", "good", value, SLOPE_OF_NOTE, "", told)
+    if worst is None:
+        return Reading(0.0)
     side = "lower" if worst.amplitude_slope < 0 else "higher"
-    return QualityCheck(
-        "amplitude", "warning", abs(worst.amplitude_slope), SLOPE_OF_NOTE, "",
-        f"{len(sure)} frequencies change with amplitude; right after a hit that of "
-        f"{worst.frequency_hz:.2f} Hz is {side} by {abs(worst.amplitude_slope):.2%}: "
-        "those of small amplitude are given",
-        "Hit equally hard in every test; look for a joint that slips.",
-    )  # fmt: skip
+    words = {"count": len(sure), "hz": worst.frequency_hz, "side": side}
+    return Reading(abs(worst.amplitude_slope), words)
 
 
-def drift(inspection: Inspection) -> QualityCheck | None:
-    """Relative change from the first hit to the last that all frequencies have in common."""
+def _drift(inspection: Inspection) -> Reading | None:
+    """Return the relative change from the first hit to the last that all frequencies share."""
     seen = inspection.finding.drift if inspection.finding else None
     if seen is None:
         return None
-    change = abs(seen.change)
-    if not seen.sure:
-        told = f"{seen.modes} frequencies do not move together from the first hit to the last"
-        return QualityCheck("drift", "good", change, SLOPE_OF_NOTE, "", told)
     side = "fall" if seen.change < 0 else "rise"
-    half = NINETY_PERCENT * seen.sd
-    return QualityCheck(
-        "drift", "warning", change, SLOPE_OF_NOTE, "",
-        f"frequencies {side} by {change:.2%} (+/- {half:.2%}) from the first hit to the last, all "
-        "in the same ratio: the logger's clock drifts, or the tension changes with temperature or "
-        "load",
-        "Let logger and sensors warm up and keep traffic off; check the clock against a tone of "
-        "known frequency.",
-    )  # fmt: skip
+    words = {"modes": seen.modes, "side": side, "half": NINETY_PERCENT * seen.sd}
+    return Reading(abs(seen.change), words, "warning" if seen.sure else "good")
 
 
-def agreement(inspection: Inspection) -> QualityCheck | None:
-    """Largest difference of a common mode's frequency, as a fraction; modes that only one saw.
+def _agreement(inspection: Inspection) -> Reading | None:
+    """Return the largest difference of a common mode's frequency; modes that only one saw.
 
     Modes nearer than 1 % that are each other's nearest are common. That the second misses some is
     told, and a warning only where it misses most.
@@ -176,21 +149,48 @@ def agreement(inspection: Inspection) -> QualityCheck | None:
     one = np.array([mode.frequency_hz for mode in finding.modes])
     other = np.array([mode.frequency_hz for mode in second.modes])
     pairs = _pairs(one, other)
-    remedy = "Look at the stabilisation diagram and the fit of these modes before using them."
     if not pairs:
         found = "the second identifier found none of the modes"
-        return QualityCheck("cross-check", "warning", NAN, _LIMIT, "", found, remedy)
+        return Reading(NAN, verdict="warning", found=found)
     differences = [abs(other[j] / one[i] - 1) for i, j in pairs]
-    value = float(max(differences))
-    worst = one[pairs[int(np.argmax(differences))][0]]
-    found = (
-        f"{len(pairs)} modes in common, furthest apart by {value:.3%} at {worst:.2f} Hz"
-        f"{_alone('this', one, [i for i, _ in pairs])}"
-        f"{_alone('the second', other, [j for _, j in pairs])}"
-    )
-    good = value <= _LIMIT and len(pairs) >= _LEAST_COMMON * len(one)
-    verdict: Verdict = "good" if good else "warning"
-    return QualityCheck("cross-check", verdict, value, _LIMIT, "", found, "" if good else remedy)
+    words = {
+        "count": len(pairs),
+        "worst": one[pairs[int(np.argmax(differences))][0]],
+        "this": _alone("this", one, [i for i, _ in pairs]),
+        "second": _alone("the second", other, [j for _, j in pairs]),
+    }
+    few = len(pairs) < _LEAST_COMMON * len(one)
+    return Reading(float(max(differences)), words, "warning" if few else None)
+
+
+_FORCE_EXPLAINS = "the force explains {value:.0%} of the response where the hanger responds"
+_IN_COMMON = (
+    "{count} modes in common, furthest apart by {value:.3%} at {worst:.2f} Hz{this}{second}"
+)
+COHERENCE = Row(
+    "coherence", _explained, _WARNING, "", _FORCE_EXPLAINS, _FORCE_EXPLAINS + "{more}",
+    "Hit the same point in the same direction, and let each hit ring down before the next.",
+    is_least=True,
+)  # fmt: skip
+AMPLITUDE = Row(
+    "amplitude", _amplitude_dependence, SLOPE_OF_NOTE, "",
+    "frequencies do not depend on amplitude",
+    "{count} frequencies change with amplitude; right after a hit that of {hz:.2f} Hz is {side} by "
+    "{value:.2%}: those of small amplitude are given",
+    "Hit equally hard in every test; look for a joint that slips.",
+)  # fmt: skip
+DRIFT = Row(
+    "drift", _drift, SLOPE_OF_NOTE, "",
+    "{modes} frequencies do not move together from the first hit to the last",
+    "frequencies {side} by {value:.2%} (+/- {half:.2%}) from the first hit to the last, all in the "
+    "same ratio: the logger's clock drifts, or the tension changes with temperature or load",
+    "Let logger and sensors warm up and keep traffic off; check the clock against a tone of "
+    "known frequency.",
+)  # fmt: skip
+AGREEMENT = Row(
+    "cross-check", _agreement, _LIMIT, "", _IN_COMMON, _IN_COMMON,
+    "Look at the stabilisation diagram and the fit of these modes before using them.",
+)  # fmt: skip
 
 
 def _pairs(one: FloatArray, other: FloatArray) -> list[tuple[int, int]]:
@@ -234,6 +234,6 @@ def _below_first(modes: Sequence[Mode], plane: Plane, hanger: Hanger, low_hz: fl
     first = min(own, key=lambda mode: mode.order)
     orders = np.arange(1, first.order + 1)
     half_fixed = np.full(orders.shape, 0.5)
-    log_hz = log_frequency(Expected.of(hanger).log_xi, half_fixed, orders.astype(float))
+    log_hz = log_factor(Description.of(hanger).log_xi, half_fixed, orders.astype(float))
     expected_hz = first.frequency_hz * np.exp(log_hz - log_hz[-1])
     return [int(order) for order in orders[:-1][expected_hz[:-1] >= low_hz]]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shm.identify.contract import FoundMode, Measurement
-from shm.identify.mode_ordering.alignment import HIGHEST_ORDER, tensioned_beam_pattern
+from shm.identify.mode_ordering.bars import HIGHEST_ORDER, described_shapes
 from shm.identify.setup_merging.modal_participation import ringing
 from shm.values import NAN, PLANES, FloatArray, Hanger, IntArray, Mode, Plane, QualityCheck, Verdict
 
@@ -133,7 +133,7 @@ def _ratio(
     The hammer's is the last of the places. Of all end springs those whose ratios agree best.
     """
     best, least = np.full(len(residue), np.nan), np.inf
-    for shape in _shapes(np.array(places_m), orders, hanger):
+    for shape in described_shapes(np.array(places_m), orders, hanger):
         at_sensor, at_hammer = np.abs(shape[:, :-1].T), np.abs(shape[:, -1])
         near = (at_sensor > _LEAST_SHAPE) & (at_hammer > _LEAST_SHAPE)
         if near.sum() < _LEAST_ENTRIES:
@@ -145,14 +145,6 @@ def _ratio(
         if spread < least:
             best, least = middle, spread
     return np.asarray(best)
-
-
-def _shapes(places_m: FloatArray, orders: IntArray, hanger: Hanger) -> FloatArray:
-    """Shapes of the described hanger over end springs: (springs, modes, places)."""
-    pattern = tensioned_beam_pattern()
-    xi = hanger.length_m * np.sqrt(hanger.nominal_tension_n / hanger.bending_stiffness_n_m2)
-    tension = np.array([np.argmin(np.abs(pattern.log_xi - np.log(xi)))])
-    return np.asarray(pattern.shapes(places_m / hanger.length_m, tension)[0][:, orders - 1])
 
 
 def sensor_places(modes: Sequence[Mode], hanger: Hanger) -> QualityCheck | None:
@@ -206,7 +198,7 @@ def _explained(
     """The misfit of shapes (modes, places), its mean and its median over the modes, and of each
     place what its factor or its place mends."""
     every = np.concatenate([places_m, _PLACES * hanger.length_m])
-    shapes = _shapes(every, orders, hanger)
+    shapes = described_shapes(every, orders, hanger)
     own, elsewhere = shapes[:, :, : len(places_m)], shapes[:, :, len(places_m) :]
     wrong = []
     for n, x_m in enumerate(places_m):

@@ -27,12 +27,12 @@ from shm.identify.measuring.signal_faults import (
 from shm.identify.quality.inspection import (
     Inspection,
     channels_for,
-    fault_count,
     hits_for,
     hits_of,
     places,
 )
-from shm.values import NAN, Channel, FloatArray, QualityCheck, Recording
+from shm.identify.quality.table import Reading, Row, fault_reading
+from shm.values import NAN, Channel, FloatArray, Recording
 from shm.values.rounding import listed
 
 _PULSES = 5.0
@@ -49,22 +49,15 @@ _STRETCH_S = 0.5
 _LEAST_STRETCH_S = 0.1
 
 
-def units(inspection: Inspection) -> QualityCheck | None:
-    """Channels whose unit nothing states; None where all do."""
+def _units(inspection: Inspection) -> Reading | None:
+    """Return how many channels have a unit that nothing states; None where all state theirs."""
     channels = [channel for record in inspection.records for channel in record.channels]
     silent = sorted({channel.name for channel in channels if not channel.states_unit})
-    if not silent:
-        return None
-    return QualityCheck(
-        "units", "warning", float(len(silent)), 0.0, "",
-        f"neither file nor sidecar states the unit of {listed(silent)}: N and m/s2 were assumed",
-        "State the unit of each channel in the file's sidecar, or once for this logger by "
-        "`shm import FILE`.",
-    )  # fmt: skip
+    return Reading(len(silent), {"channels": listed(silent)}) if silent else None
 
 
-def clipping(inspection: Inspection) -> QualityCheck | None:
-    """How many hits have a clipped signal.
+def _clipping(inspection: Inspection) -> Reading | None:
+    """Return how many hits have a clipped signal.
 
     A ring-down that is clipped at first is used from where it is not. A clipped pulse is used:
     frequencies and damping come from after it; the frequency responses are off by what was cut.
@@ -89,14 +82,9 @@ def clipping(inspection: Inspection) -> QualityCheck | None:
         ),
         *(f"{name} is clipped in the pulse of {places(inspection, h)}" for name, h in pulses),
     ]
-    if not told:
-        return QualityCheck("clipping", "good", 0.0, 0.0, "", "no signal is clipped")
     struck = {(hit.record, hit.start) for _, hits in pulses for hit in hits}
     struck |= {(hit.record, hit.start) for hit in (*dropped, *late)}
-    return QualityCheck(
-        "clipping", "warning", float(max(len(struck), len(channels))), 0.0, "", "; ".join(told),
-        "Set larger ranges of hammer and sensors in the logger, or hit more softly.",
-    )  # fmt: skip
+    return Reading(max(len(struck), len(channels)), {"faults": "; ".join(told)})
 
 
 def _clipped_pulses(inspection: Inspection) -> list[tuple[str, list[Hit]]]:
@@ -128,76 +116,86 @@ def _clipped_hits(
     return [bool(bad) for bad in found]
 
 
-def recorded_window(inspection: Inspection) -> QualityCheck | None:
-    """An exponential window that the analyser laid on the records; None where none is seen."""
+def _recorded_window(inspection: Inspection) -> Reading | None:
+    """Return the rate of an analyser's exponential window; None where none is seen."""
     rate = max((recorded_window_rate(m) for m in inspection.measurements), default=0.0)
-    if not rate:
-        return None
-    return QualityCheck(
-        "window", "warning", rate, 0.0, "1/s",
-        f"the sensors' noise falls by {rate:.2g}/s after each hit, as an exponential window of "
-        f"{1 / rate:.2g} s makes it: damping ratios are too high by up to {rate:.2g}/(2 pi f)",
-        "Switch off the analyser's exponential window, or export the time records without it.",
-    )  # fmt: skip
+    return Reading(rate, {"seconds": 1 / rate}) if rate else None
 
 
-def cable(inspection: Inspection) -> QualityCheck | None:
-    """How many hits and channels were left out for what a cable or a sensor made of them."""
-    return fault_count(
-        inspection,
-        "cable",
-        (CABLE, COPY, DEAD, SILENT, WANDERS, HITS_NOT_SHOWN),
-        "no channel jumps, wanders or is silent",
-        "Reseat the connectors of these channels, tie the cables down, exchange a cable that stays "
-        "bad, and repeat these hits; if all channels are named, check the logger's clock.",
-    )
+def _cable(inspection: Inspection) -> Reading | None:
+    return fault_reading(inspection, (CABLE, COPY, DEAD, SILENT, WANDERS, HITS_NOT_SHOWN))
 
 
-def drop_outs(inspection: Inspection) -> QualityCheck | None:
-    """How many hits and channels were left out for missing, lost or repeated samples.
-
-    Refused where most ring-downs have lost samples: the others' clock is not to be believed.
-    """
-    remedy = "Check the logger's memory card or radio link and its load, and repeat these hits."
+def _drop_outs(inspection: Inspection) -> Reading | None:
+    """Refuse where most ring-downs have lost samples: the others' clock is not to be believed."""
     lost, hits = hits_for(inspection, (LOST,)), hits_of(inspection)
     if 2 * len(lost) > len(hits):
         found = f"samples are lost in {len(lost)} of {len(hits)} ring-downs: no frequency is right"
-        return QualityCheck("drop-outs", "refused", float(len(lost)), 0.0, "", found, remedy)
-    reasons = (NOT_A_NUMBER, FROZEN, LOST)
-    return fault_count(inspection, "drop-outs", reasons, "no sample is missing", remedy)
+        return Reading(len(lost), verdict="refused", found=found)
+    return fault_reading(inspection, (NOT_A_NUMBER, FROZEN, LOST))
 
 
-def noise(inspection: Inspection) -> QualityCheck | None:
-    """Vibration right after a hit over the quietest of what is recorded without one, in dB.
+def _noise(inspection: Inspection) -> Reading | None:
+    """Return the vibration right after a hit over the quietest of what is recorded without one.
 
-    In the band, of the channel that shows it best, median over the used hits. Quiet is the time
-    before the first hit of a record or the end of a ring-down.
+    In dB, in the band, of the channel that shows it best, median over the used hits. Quiet is the
+    time before the first hit of a record or the end of a ring-down.
     """
     if not hits_of(inspection):
         return None
     results = [_ratios_db(m, inspection) for m in inspection.measurements]
     value = max((db for db, _ in results), default=NAN)
     seen_before = any(before for _, before in results)
-    found = f"the ring-down begins {value:.0f} dB above the noise"
     if value >= _WARNING_DB:
-        return QualityCheck("noise", "good", value, _WARNING_DB, "dB", found)
+        return Reading(value)
     if value < (_REFUSED_DB if seen_before else _STILL_DB):
-        return QualityCheck(
-            "noise", "refused", value, _REFUSED_DB, "dB",
+        return Reading(
+            value, {}, "refused", _REFUSED_DB,
             "after a hit the sensors show hardly more than the noise before it",
             "Check that the sensors are fixed to this hanger, connected and set to the right "
             "range; hit harder, and when no machine runs.",
         )  # fmt: skip
     if not seen_before:
-        return QualityCheck(
-            "noise", "unknown", NAN, _WARNING_DB, "dB",
-            "nothing is recorded before the hits, and they still ring at the end",
-            "Record half a second before the first hit.",
+        return Reading(
+            NAN, verdict="unknown",
+            found="nothing is recorded before the hits, and they still ring at the end",
+            remedy="Record half a second before the first hit.",
         )  # fmt: skip
-    return QualityCheck(
-        "noise", "warning", value, _WARNING_DB, "dB", found,
-        "Hit harder, or measure when wind and traffic are low; fix loose sensors.",
-    )  # fmt: skip
+    return Reading(value)
+
+
+UNITS = Row(
+    "units", _units, 0.0, "", "",
+    "neither file nor sidecar states the unit of {channels}: N and m/s2 were assumed",
+    "State the unit of each channel in the file's sidecar, or once for this logger by "
+    "`shm import FILE`.",
+)  # fmt: skip
+CLIPPING = Row(
+    "clipping", _clipping, 0.0, "", "no signal is clipped", "{faults}",
+    "Set larger ranges of hammer and sensors in the logger, or hit more softly.",
+)  # fmt: skip
+WINDOW = Row(
+    "window", _recorded_window, 0.0, "1/s", "",
+    "the sensors' noise falls by {value:.2g}/s after each hit, as an exponential window of "
+    "{seconds:.2g} s makes it: damping ratios are too high by up to {value:.2g}/(2 pi f)",
+    "Switch off the analyser's exponential window, or export the time records without it.",
+)  # fmt: skip
+CABLES = Row(
+    "cable", _cable, 0.0, "", "no channel jumps, wanders or is silent", "{faults}",
+    "Reseat the connectors of these channels, tie the cables down, exchange a cable that stays "
+    "bad, and repeat these hits; if all channels are named, check the logger's clock.",
+)  # fmt: skip
+DROP_OUTS = Row(
+    "drop-outs", _drop_outs, 0.0, "", "no sample is missing", "{faults}",
+    "Check the logger's memory card or radio link and its load, and repeat these hits.",
+)  # fmt: skip
+NOISE = Row(
+    "noise", _noise, _WARNING_DB, "dB",
+    "the ring-down begins {value:.0f} dB above the noise",
+    "the ring-down begins {value:.0f} dB above the noise",
+    "Hit harder, or measure when wind and traffic are low; fix loose sensors.",
+    is_least=True,
+)  # fmt: skip
 
 
 def _ratios_db(measurement: Measurement, inspection: Inspection) -> tuple[float, bool]:

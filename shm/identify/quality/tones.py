@@ -21,7 +21,8 @@ from shm.identify.measuring.hits import RINGING_SAMPLES
 from shm.identify.measuring.prediction import thinned
 from shm.identify.options import IdentifyOptions
 from shm.identify.quality.inspection import Inspection
-from shm.values import BoolArray, Channel, ComplexArray, FloatArray, QualityCheck, Recording
+from shm.identify.quality.table import Reading, Row
+from shm.values import BoolArray, Channel, ComplexArray, FloatArray, Recording
 
 _PROMINENCE = 30.0
 """Noise averaged over one channel reaches 14 times its median once in 10,000 lines."""
@@ -44,6 +45,8 @@ _LOCKED_TO_HITS = 0.6
 _STEADY_IN_BAND = _STEADY / 2  # judgement: a machine that is named needs less proof
 _MOST_CANDIDATES = 100  # technical: time; tones are among the strongest lines
 _LEAST_TRANSFORM = 65536  # technical: a fine grid of short records
+_UNNAMED = "a machine"
+_LEAST_DAMPING = 0.1  # of the median: as of a mode that hardly decays, see `foreign`
 _MAINS_TOLERANCE = 0.004
 """A grid's frequency moves by 0.2 Hz in 50 in a bad hour."""
 
@@ -67,19 +70,31 @@ def tones(
     return _in_most(lists, options)
 
 
-def steady_tones(inspection: Inspection) -> QualityCheck | None:
-    """How many tones lie in the band, and at which frequencies."""
+def _steady_tones(inspection: Inspection) -> Reading | None:
+    """Return how many tones lie in the band, and at which frequencies.
+
+    What nobody named and where a mode rings down as the others do is that mode.
+    """
     if not inspection.records:
         return None
-    found = inspection.tones
-    if not found:
-        return QualityCheck("tones", "good", 0.0, 0.0, "", "no steady vibration in the band")
-    listed = ", ".join(f"{tone.frequency_hz:.2f} Hz ({tone.name})" for tone in found)
-    return QualityCheck(
-        "tones", "warning", float(len(found)), 0.0, "", f"steady vibration at {listed}",
-        "Switch off machines near the hanger, run the logger from a battery, keep sensor cables "
-        "away from power cables; name known machines as disturbance bands.",
-    )  # fmt: skip
+    modes = inspection.finding.modes if inspection.finding else ()
+    least = _LEAST_DAMPING * float(np.median([m.damping_ratio for m in modes])) if modes else 0.0
+    rings_hz = np.array([m.frequency_hz for m in modes if m.damping_ratio > least])
+    tones = [
+        f"{tone.frequency_hz:.2f} Hz ({tone.name})"
+        for tone in inspection.tones
+        if tone.name != _UNNAMED
+        or not np.any(np.abs(rings_hz / tone.frequency_hz - 1) < _MAINS_TOLERANCE / 2)
+    ]
+    return Reading(len(tones), {"tones": ", ".join(tones)})
+
+
+ROW = Row(
+    "tones", _steady_tones, 0.0, "", "no steady vibration in the band",
+    "steady vibration at {tones}",
+    "Switch off machines near the hanger, run the logger from a battery, keep sensor cables "
+    "away from power cables; name known machines as disturbance bands.",
+)  # fmt: skip
 
 
 def _tones_of_record(
@@ -215,7 +230,7 @@ def _name(frequency_hz: float, options: IdentifyOptions) -> str:
     order = round(frequency_hz / options.mains_hz)
     if order >= 1 and abs(frequency_hz / (order * options.mains_hz) - 1) <= _MAINS_TOLERANCE:
         return "mains" if order == 1 else f"mains, harmonic {order}"
-    return "a machine"
+    return _UNNAMED
 
 
 _LEAST_BEFORE_S = 0.25  # judgement: lines of 4 Hz; of half a second that crews are told to record

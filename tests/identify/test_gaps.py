@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from shm.identify.contract import FoundMode
-from shm.identify.mode_ordering.alignment import log_frequency
-from shm.identify.mode_ordering.confirmed import placed_with_doubtful
-from shm.identify.mode_ordering.order import Expected
+from shm.identify.mode_ordering.bars import Description, log_factor
+from shm.identify.mode_ordering.placement import placed
 from shm.identify.quality.of_modes import first_orders
 from shm.values import PLANES, Plane, ResponsePoint
 from tests.helpers.beam_shapes import mode_shape
@@ -25,8 +24,8 @@ FIXITY = dict(zip(PLANES, (0.8, 0.6), strict=True))
 
 def mode(plane: Plane, order: int, off: float = 0.0) -> FoundMode:
     """Of the described hanger, its frequency off by a fraction."""
-    told = Expected.of(HANGER)
-    log_hz = told.log_unit + log_frequency(
+    told = Description.of(HANGER)
+    log_hz = told.log_unit + log_factor(
         told.log_xi, np.array([FIXITY[plane]]), np.array([float(order)])
     )
     hz = float(np.exp(log_hz[0])) * (1 + off)
@@ -63,7 +62,7 @@ def test_a_doubtful_mode_is_taken_only_where_the_bar_lacks_one(
         asked.extend(at_hz)
         return [], [doubtful]
 
-    placement = placed_with_doubtful(SURE, look, POINTS, HANGER)
+    placement = placed(SURE, POINTS, HANGER, look=look)
     given = {(each.plane, each.order): each.frequency_hz for each in placement.modes}
     assert asked == pytest.approx([mode(*GAP).frequency_hz], rel=1e-3)
     assert (given.get(GAP) == doubtful.frequency_hz) is is_taken
@@ -78,7 +77,7 @@ def test_of_a_hanger_that_is_no_plain_bar_only_what_is_proven_is_taken(in_doubt:
     ]
     more = [mode(*GAP, 0.006)]
     seen = ([], more) if in_doubt else (more, [])
-    placement = placed_with_doubtful(rough, lambda _: seen, POINTS, HANGER)
+    placement = placed(rough, POINTS, HANGER, look=lambda _: seen)
     assert len(placement.modes) == len(SURE) + (not in_doubt)
 
 
@@ -86,11 +85,11 @@ def test_without_a_description_nothing_is_asked_for() -> None:
     def never(_: object) -> tuple[list[FoundMode], list[FoundMode]]:
         raise AssertionError
 
-    assert placed_with_doubtful(SURE, never, POINTS, None).modes
+    assert placed(SURE, POINTS, None, look=never).modes
 
 
 def test_a_first_order_below_the_band_is_not_missed() -> None:
-    placement = placed_with_doubtful(SURE[1:], lambda _: ([], []), POINTS, HANGER)
+    placement = placed(SURE[1:], POINTS, HANGER, look=lambda _: ([], []))
     lowest, next_hz = (mode(PLANES[0], order).frequency_hz for order in (1, 2))
     lost = min(PLANES, key=lambda plane: mode(plane, 1).frequency_hz)
     told = first_orders(placement.modes, HANGER, 0.8 * lowest)

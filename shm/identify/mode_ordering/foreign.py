@@ -1,9 +1,7 @@
 """What rings in a test without being a bending mode of the hanger, and how that is known.
 
 A tone is known by its frequency and by not decaying. Anything else is foreign only if it fits no
-order of the hanger: a string's modes are near multiples of each other, too. What is suspicious
-apart from that (a multiple with the shape of its base, a damping unlike the others') is a doubt,
-which decides where the order does not.
+order of the hanger: a string's modes are near multiples of each other, too.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ import numpy as np
 
 from shm.identify.contract import FoundMode, Tone
 from shm.identify.estimation.poles import modal_assurance
-from shm.values import FloatArray, ForeignMode, Plane
+from shm.values import ForeignMode, Plane
 
 MULTIPLES = (2, 3)  # judgement: rattling contacts give the first two, higher ones are fainter
 _MULTIPLE_TOLERANCE = 5e-4  # judgement: it is exact but for the drift within a test
@@ -25,16 +23,7 @@ _STANDARD_DEVIATIONS = 3.0  # 99.7 % of a normal distribution
 # Modes of a hanger have 0.73 of the others' damping and more, the median planted tone 0.003:
 # identify_limits.py (docs/trials/identification_benchmarks.md); in between is judgement
 _STEADY = 0.1
-# judgement: costs, added to the misfit. By ASIDE_COST, 12, an undoubted mode is set aside 3.5
-# tolerances off its order; a multiple 3.1 off (by many points 2.1), a steady one 2.0, one of odd
-# damping 3.0: dampings of one hanger differ by a factor of three.
-_LIKE = 0.9
-_DOUBT_OF_MULTIPLE = 2.5
-_MOST_POINTS = 3.0
-_DOUBT_OF_STEADY = 8.0
-_MOST_DOUBT_OF_DAMPING = 3.0
-_ORDINARY_DAMPING = math.log(3.0)
-_LEAST_MODES = 4  # judgement: of fewer a median says little
+_LIKE = 0.9  # judgement: modal assurance criterion of a shape that is repeated
 _NEAR = 0.03  # judgement: words alone depend on it
 
 
@@ -59,17 +48,6 @@ def without_tones(
         else:
             rest.append(mode)
     return rest, aside
-
-
-def doubts(modes: Sequence[FoundMode]) -> FloatArray:
-    """The cost of taking each of `modes` for one of the hanger, (modes,)."""
-    return np.array(
-        [
-            _doubt_of_multiple(mode, modes)
-            + (_DOUBT_OF_STEADY if _is_steady(mode, modes) else _doubt_of_damping(mode, modes))
-            for mode in modes
-        ]
-    )
 
 
 def explained(
@@ -151,21 +129,6 @@ def _is_steady(mode: FoundMode, modes: Sequence[FoundMode]) -> bool:
     """Whether its damping is a small part of the others'."""
     others = [each.damping_ratio for each in modes if each is not mode]
     return bool(others) and mode.damping_ratio < _STEADY * float(np.median(others))
-
-
-def _doubt_of_multiple(mode: FoundMode, modes: Sequence[FoundMode]) -> float:
-    """More for a shape like the base's at many points, which a mode of its own would not have."""
-    if base_of(mode, modes) is None:
-        return 0.0
-    return _DOUBT_OF_MULTIPLE * min(max(len(mode.shape) / 2, 1.0), _MOST_POINTS)
-
-
-def _doubt_of_damping(mode: FoundMode, modes: Sequence[FoundMode]) -> float:
-    ratios = [each.damping_ratio for each in modes if each.damping_ratio > 0]
-    if len(ratios) < _LEAST_MODES or not mode.damping_ratio > 0:
-        return 0.0
-    away = math.log(mode.damping_ratio / float(np.median(ratios))) / _ORDINARY_DAMPING
-    return min(away**2, _MOST_DOUBT_OF_DAMPING)
 
 
 def _fits_nothing(mode: FoundMode, hanger_modes: Sequence[FoundMode]) -> str:

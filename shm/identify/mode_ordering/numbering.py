@@ -1,0 +1,374 @@
+"""Orders of modes as one likelihood over bars: of each bar a mode takes the nearest order or is
+foreign, the cheapest bar numbers the modes, and the next cheapest that gives a mode another order
+says how sure its number is.
+
+Both planes share the tension and nearly the length, not the springs. Where length and sensor places
+are known, shapes have a say. A hanger that is but a bar in springs is one to a thousandth with its
+own orders and seldom with others: there one least-squares bar decides between orders that the grid
+leaves open, and says where a missing order lies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import scipy
+
+from shm.identify.mode_ordering.bars import (
+    HIGHEST_ORDER,
+    TENSION_SD,
+    UNIT_SD,
+    Bars,
+    Description,
+    any_bars,
+    described_bars,
+    heavy_tailed,
+    log_factor,
+    turnbuckle_shift,
+)
+from shm.values import FloatArray, Hanger, IntArray
+
+LEAST_MARGIN = 6.0
+"""Of costs, by which another order is 20 times less likely: in 112 tests of
+tests/worlds/recordings.py all of the wrong orders were below, and 4 of 107 right ones."""
+PLAIN_BAR = 0.001
+"""Root mean square misfit of a hanger that is but a bar in springs, as a fraction of a frequency.
+In 214 tests of tests/worlds/recordings.py such are 120, of 1,664 modes, to a median of 0.0002."""
+LEAST_MODES = 6  # judgement: tension, stiffness and two springs fit four frequencies of any order
+FOREIGN = 12.0
+"""Cost of a mode that is none of the plane: a good fit is believed up to 3.5 tolerances."""
+_IRREGULAR, _FARTHEST_BELOW = 8.0, 0.2
+"""Cost of a first order off the others' bar: a sag raises it, by up to two fifths, a section lost
+near an end lowers it by no more than a fifth, and it alone tells of either."""
+_MOST_SHAPE_COST = 9.0  # three standard deviations, squared: a shape alone makes no mode foreign
+_TOLERANCES = ((0.012, 0.08), (0.03, 0.24))
+"""Of frequencies (fraction) and shapes (radians), of bars in plain springs and of those with
+plates, brackets or turnbuckles; what is looser pays for it."""
+PLANE_SD = 0.03  # how far the planes differ beyond what end springs explain
+MOST_FOREIGN = 0.4  # share of the modes from which on the bars themselves are doubted
+_MOST_FOREIGN_ONE_AXIS = 0.7  # one axis hears the other plane, too
+_FREE = 2  # level and xi: two frequencies fit some bar
+_MOST_OFF = 3.0  # standard deviations of a plain bar, beyond which a mode's order stays open
+
+Basis: TypeAlias = Literal["description", "pattern", "counting"]
+Orders: TypeAlias = tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneModes:
+    """Modes of one plane by rising frequency.
+
+    `frequency_hz` (modes,); `strength` (modes,), by which of two modes at one order the stronger is
+    preferred, in costs; `position` (points,) as x/L, empty where unknown; `shapes` (modes, points)
+    and the standard deviation of their values `shape_sd` (modes,).
+    """
+
+    frequency_hz: FloatArray
+    strength: FloatArray
+    position: FloatArray = field(default_factory=lambda: np.empty(0))
+    shapes: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    shape_sd: FloatArray = field(default_factory=lambda: np.empty(0))
+
+
+@dataclass(frozen=True)
+class Numbering:
+    """Orders from 1 of the modes of each plane, 0 for a foreign one, and how they are known.
+
+    `margins` (planes, modes): how much more it costs at least to give a mode another order.
+    `irregular` (planes,): whether the first order is off the bar that the others follow.
+    """
+
+    orders: Orders
+    margins: tuple[tuple[float, ...], ...]
+    irregular: tuple[bool, ...]
+    basis: Basis
+
+    @property
+    def least_margin(self) -> float:
+        """Return the least margin of a mode with an order; inf where none has one."""
+        known = [
+            margin
+            for orders, own in zip(self.orders, self.margins, strict=True)
+            for order, margin in zip(orders, own, strict=True)
+            if order
+        ]
+        return min(known, default=np.inf)
+
+
+def number_modes(planes: Sequence[PlaneModes], hanger: Hanger | None) -> Numbering:
+    """Number the modes of one or two planes.
+
+    Where too many would be foreign, the description is doubted, then that there is a bar at all:
+    without either, modes are counted.
+    """
+    counts = [len(plane.frequency_hz) for plane in planes]
+    if 0 < max(counts) <= HIGHEST_ORDER:
+        if hanger:
+            bars = described_bars(hanger)
+            found = _cheapest(planes, bars, "description")
+            if _is_believed(planes, found, bars):
+                return decided_by_bar(planes, found, hanger)
+        lowest_hz = min(p.frequency_hz[0] for p in planes if len(p.frequency_hz))
+        found = _cheapest(planes, any_bars(lowest_hz), "pattern")
+        if _is_believed(planes, found, None):
+            return found
+    counted = tuple(tuple(range(1, count + 1)) for count in counts)
+    none = tuple((0.0,) * count for count in counts)
+    return Numbering(counted, none, (False,) * len(counts), "counting")
+
+
+def _is_believed(planes: Sequence[PlaneModes], found: Numbering, bars: Bars | None) -> bool:
+    """Return whether so few modes are foreign that the bars themselves are not doubted.
+
+    What lies below any bar that the description allows is the deck's and says nothing of the
+    hanger. Without a description, the first few modes only find out what bar it is.
+    """
+    lowest_hz = float(np.exp(bars.log_factor.min() + bars.offset.min())) if bars else 0.0
+    orders = [
+        order
+        for plane, own in zip(planes, found.orders, strict=True)
+        for hz, order in zip(plane.frequency_hz, own, strict=True)
+        if hz >= lowest_hz
+    ]
+    most = MOST_FOREIGN if len(planes) > 1 or not bars else _MOST_FOREIGN_ONE_AXIS
+    return orders.count(0) <= most * max(len(orders) - (0 if bars else _FREE), 0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Hold a plane on a grid at the best springs: `total` (tensions, units), `number` from 1, 0 for
+    foreign, and `misfit` of the frequency, (modes, tensions, units)."""
+
+    total: FloatArray
+    number: IntArray
+    misfit: FloatArray
+
+
+def _cheapest(planes: Sequence[PlaneModes], bars: Bars, basis: Basis) -> Numbering:
+    """Return the orders by the cheapest bar over both tolerances."""
+    fits = []
+    for tolerance in _TOLERANCES:
+        each = [_fit(plane, bars, tolerance) for plane in planes]
+        total, shift = _together([fit.total for fit in each], bars)
+        numbers = [each[0].number, *(_moved(fit.number, shift) for fit in each[1:])]
+        misfits = [each[0].misfit, *(_moved(fit.misfit, shift) for fit in each[1:])]
+        fits.append((total + bars.prior, numbers, misfits))
+    total, numbers, misfits = min(fits, key=lambda fit: float(fit[0].min()))
+    least = float(total.min())
+    tension, unit = divmod(int(total.argmin()), total.shape[1])
+    orders = tuple(tuple(number[:, tension, unit].tolist()) for number in numbers)
+    margins = tuple(
+        tuple(
+            min(
+                float(np.min(cost[(n[p][m] > 0) & (n[p][m] != own)], initial=np.inf))
+                for cost, n, _ in fits
+            )
+            - least
+            for m, own in enumerate(numbered)
+        )
+        for p, numbered in enumerate(orders)
+    )
+    irregular = tuple(
+        any(n == 1 and misfits[p][m, tension, unit] >= FOREIGN for m, n in enumerate(numbered))
+        for p, numbered in enumerate(orders)
+    )
+    return Numbering(orders, margins, irregular, basis)
+
+
+def _fit(plane: PlaneModes, bars: Bars, tolerance: tuple[float, float]) -> _Fit:
+    """Return the cost of a plane's modes, each at its nearest order, at the best springs."""
+    logs = bars.log_factor
+    limits = ((logs[..., 1:] + logs[..., :-1]) / 2)[:, np.newaxis]
+    shaped = _shape_costs(plane, bars, tolerance[1])
+    t, _, s = np.ogrid[: len(logs), :1, : logs.shape[1]]
+    loose = 2 * np.log(tolerance[0] / _TOLERANCES[0][0])
+    numbers, costs, misfits = [], [], []
+    for mode, hz in enumerate(plane.frequency_hz):
+        beside = (np.log(hz) - bars.offset)[:, :, np.newaxis]
+        near = np.sum(beside[..., np.newaxis] > limits, axis=-1)
+        off = beside - logs[t, s, near]
+        misfit = (off / tolerance[0]) ** 2
+        first = (near == 0) & (off > -_FARTHEST_BELOW)
+        cost = np.where(first, np.minimum(misfit, _IRREGULAR), misfit) + loose
+        if shaped is not None:
+            cost = cost + shaped[mode][t, s, near]
+        numbers.append(np.where(cost < FOREIGN, near + 1, 0))
+        costs.append(np.minimum(cost, FOREIGN))
+        misfits.append(misfit + loose)
+    _settle(numbers, costs, plane.strength)
+    return _at_best_springs(numbers, costs, misfits, bars)
+
+
+def _settle(numbers: list[IntArray], costs: list[FloatArray], strength: FloatArray) -> None:
+    """Leave of two modes at one order the likelier one; the other is foreign."""
+    for i in range(len(numbers)):
+        for j in range(i - 1, -1, -1):  # by rising frequency: only neighbours share an order
+            clash = (numbers[i] == numbers[j]) & (numbers[i] > 0)
+            if not clash.any() and i - j > 1:
+                break
+            loses = costs[i] - strength[i] >= costs[j] - strength[j]
+            numbers[i] = np.where(clash & loses, 0, numbers[i])
+            numbers[j] = np.where(clash & ~loses, 0, numbers[j])
+
+
+def _at_best_springs(
+    numbers: Sequence[IntArray], costs: Sequence[FloatArray], misfits: Sequence[FloatArray],
+    bars: Bars,
+) -> _Fit:  # fmt: skip
+    shape = (*bars.offset.shape, bars.log_factor.shape[1])
+    number = np.array(numbers, dtype=int).reshape(-1, *shape)
+    cost = np.array(costs).reshape(-1, *shape)
+    total = np.where(number > 0, cost, FOREIGN).sum(axis=0)
+    passed_over = number.max(axis=0, initial=0) - (number > 0).sum(axis=0)
+    total += bars.missing_cost * passed_over
+    spring = total.argmin(axis=-1)[..., np.newaxis]
+    return _Fit(
+        np.take_along_axis(total, spring, -1)[..., 0],
+        np.take_along_axis(number, spring[np.newaxis], -1)[..., 0],
+        np.take_along_axis(np.array(misfits).reshape(-1, *shape), spring[np.newaxis], -1)[..., 0],
+    )
+
+
+def _shape_costs(plane: PlaneModes, bars: Bars, tolerance: float) -> FloatArray | None:
+    """Return the misfit of shapes, (modes, tensions, fixities, orders); None of a single place."""
+    if len(plane.position) < 2 or not len(plane.shapes):
+        return None
+    expected = bars.shapes(plane.position)
+    norm = np.sum(plane.shapes**2, axis=1)[:, np.newaxis, np.newaxis, np.newaxis]
+    product = np.tensordot(plane.shapes, expected, axes=(1, 3)) ** 2
+    likeness = product / (np.sum(expected**2, axis=-1) * norm + np.finfo(float).tiny)
+    sd = np.nan_to_num(plane.shape_sd)[:, np.newaxis, np.newaxis, np.newaxis]
+    return np.asarray(np.minimum((1 - likeness) / (tolerance**2 + sd**2 / norm), _MOST_SHAPE_COST))
+
+
+def _together(totals: Sequence[FloatArray], bars: Bars) -> tuple[FloatArray, IntArray]:
+    """Return the costs of one or two planes, and by how many units the second differs there."""
+    least, shift = totals[0], np.zeros(totals[0].shape, int)
+    if len(totals) == 2:
+        reach = round(2.5 * PLANE_SD / bars.unit_step)
+        padded = np.pad(totals[1], ((0, 0), (reach, reach)), constant_values=np.inf)
+        units = totals[0].shape[1]
+        tried = np.array([
+            padded[:, reach + by : reach + by + units] + (by * bars.unit_step / PLANE_SD) ** 2
+            for by in range(-reach, reach + 1)
+        ])  # fmt: skip
+        shift = np.argmin(tried, axis=0) - reach
+        least = least + np.min(tried, axis=0)
+    return least, shift
+
+
+def _moved(values: Any, shift: IntArray) -> Any:
+    """Return values (modes, tensions, units) of the second plane, as the first one's units."""
+    t, u = np.ogrid[: shift.shape[0], : shift.shape[1]]
+    return values[:, t, np.clip(u + shift, 0, shift.shape[1] - 1)]
+
+
+@dataclass(frozen=True, eq=False)
+class FittedBar:
+    """The bar of least cost in given orders; `off` (modes,): log frequencies beside its own.
+
+    `at` is the log unit and log xi, then each plane's fixity; `shift`: see `Bars`.
+    """
+
+    orders: Orders
+    cost: float
+    off: FloatArray
+    at: FloatArray
+    shift: FloatArray
+
+    def frequencies_hz(self, plane: int, highest: int) -> FloatArray:
+        """Return those of the orders from 1 to `highest` of the plane of that number."""
+        fixity = np.full(highest, self.at[2 + plane])
+        factor = log_factor(self.at[1], fixity, np.arange(1.0, highest + 1))
+        return np.asarray(np.exp(self.at[0] + factor + self.shift[:highest]))
+
+    @property
+    def is_plain(self) -> bool:
+        """Return whether the modes are its own to a thousandth."""
+        known = self.off[np.isfinite(self.off)]
+        return bool(np.sqrt(np.mean(known**2)) < PLAIN_BAR)
+
+
+def fit_bar(planes: Sequence[FloatArray], orders: Orders, hanger: Hanger) -> FittedBar:
+    """Fit tension, stiffness and each plane's fixity to frequencies in Hz of given orders."""
+    told = Description.of(hanger)
+    shift = turnbuckle_shift(hanger)
+    number = np.concatenate([np.array(own, float) for own in orders])
+    number[number == 0] = np.nan
+    start = np.array([told.log_unit, told.log_xi, *([0.5] * len(planes))])
+    if not np.nanmin(number) >= 1 or np.nanmax(number) > HIGHEST_ORDER:
+        return FittedBar(orders, np.inf, np.full(number.shape, np.nan), start, shift)
+    log_hz = np.log(np.concatenate(planes))
+    log_hz = log_hz - np.append(np.nan, shift)[np.nan_to_num(number).astype(int)]
+    plane_of = np.repeat(np.arange(len(planes)), [len(own) for own in orders])
+
+    def off(at: FloatArray) -> FloatArray:
+        return np.asarray(log_hz - at[0] - log_factor(at[1], at[2:][plane_of], number))
+
+    def misfit(at: FloatArray) -> FloatArray:
+        unit = at[0] - told.log_unit
+        string = unit + at[1] - told.log_xi
+        rest = off(at) / PLAIN_BAR
+        every = np.append(rest[np.isfinite(rest)], [string / TENSION_SD, unit / UNIT_SD])
+        return np.asarray(np.sign(every) * np.sqrt(heavy_tailed(every)))
+
+    low, high = np.append([-np.inf, 0.0], 0 * start[2:]), np.append([np.inf] * 2, 0 * start[2:] + 1)
+    best = scipy.optimize.least_squares(misfit, start, bounds=(low, high), method="dogbox")
+    return FittedBar(orders, 2 * float(best.cost), off(best.x), best.x, shift)
+
+
+def decided_by_bar(planes: Sequence[PlaneModes], found: Numbering, hanger: Hanger) -> Numbering:
+    """Return the orders and margins of the shift that a bar fits to a thousandth, where one does.
+
+    Tried are shifts of all orders, as far as they fit better, and of one plane's beside the other.
+    Shapes have no say: a sensor's gain or place is one cause for the shapes of all modes.
+    """
+    known = sum(order > 0 for own in found.orders for order in own)
+    if known < LEAST_MODES:
+        return found
+    frequency_hz = [plane.frequency_hz for plane in planes]
+    first = fit_bar(frequency_hz, found.orders, hanger)
+    if found.least_margin >= LEAST_MARGIN and (first.is_plain or not _has_shapes(planes)):
+        return found
+    tried = list(_shifted_while_better(first, frequency_hz, hanger))
+    best = min(tried, key=lambda bar: bar.cost)
+    if all(any(own) for own in found.orders) and len(planes) > 1:
+        beside = ((0, 1), (0, -1))
+        tried += [fit_bar(frequency_hz, _shifted(best.orders, by), hanger) for by in beside]
+    best, *others = sorted(tried, key=lambda bar: bar.cost)
+    if not best.is_plain:
+        return found
+    margin = min((bar.cost for bar in others), default=np.inf) - best.cost
+    sure = np.where(np.abs(best.off) < _MOST_OFF * PLAIN_BAR, margin, 0.0)
+    apart = np.split(sure, np.cumsum([len(own) for own in best.orders])[:-1])
+    return replace(found, orders=best.orders, margins=tuple(tuple(own.tolist()) for own in apart))
+
+
+def _has_shapes(planes: Sequence[PlaneModes]) -> bool:
+    return any(len(plane.position) > 1 for plane in planes)
+
+
+def _shifted_while_better(
+    first: FittedBar, frequency_hz: Sequence[FloatArray], hanger: Hanger
+) -> Iterator[FittedBar]:
+    """Yield bars of all orders lower and higher, as far as they cost little more than the best."""
+    yield first
+    least = first.cost
+    for step in (1, -1):
+        bar, shift = first, step
+        while bar.cost < least + LEAST_MARGIN and np.isfinite(bar.cost):
+            bar = fit_bar(frequency_hz, _shifted(first.orders, (shift, shift)), hanger)
+            least = min(least, bar.cost)
+            yield bar
+            shift += step
+
+
+def _shifted(orders: Orders, shifts: Sequence[int]) -> Orders:
+    """Return orders higher by `shifts`, one a plane; what comes below 1 makes a bar of no cost."""
+    return tuple(
+        tuple(order and (order + by if order + by > 0 else HIGHEST_ORDER + 1) for order in own)
+        for own, by in zip(orders, shifts, strict=False)
+    )
