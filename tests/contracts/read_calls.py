@@ -223,5 +223,3 @@ def run_all(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, Any]:
         "refusals": refusals(folder / "faulty"),
         "exit_codes": exit_codes(folder / "calls", patch),
     }
-
-

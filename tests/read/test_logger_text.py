@@ -17,6 +17,7 @@ from shm.read.stamps import moment, parsed
 from shm.values import Recording
 from tests.helpers.logger_texts import ACC, FORCE, PLAIN, RATE, SHAPES, german, rows
 
+
 def written(folder: Path, content: str | bytes, name: str = "export.csv") -> Path:
     path = folder / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
