@@ -14,13 +14,10 @@ from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
 from shm.errors import BadInput
-from shm.read.base import Format, LoggerTable, Peek
-from shm.read.comma_separated import peek_text, read_text, table_of_text
+from shm.read.comma_separated import text_format
 from shm.read.content import checked_members
 from shm.read.limits import guarded, limits, refuse_many_samples, too_large
-from shm.values import FrequencyResponse, Recording
 
-_NAME = "Excel"
 _PARTS = (b"[Content_Types].xml", b"_rels/.rels", b"docProps/", b"xl/")
 _MOST_COLUMNS = 200  # judgement: far more than the 16 accelerations that are read
 _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
@@ -114,27 +111,4 @@ def _cell(value: object) -> str:
     return re.sub(r"[\t\r\n]+", " ", text).strip()
 
 
-def _read(path: Path) -> Recording | FrequencyResponse:
-    text, others = text_of_workbook(path)
-    return read_text(text, path, others)
-
-
-def _peek(path: Path) -> Peek:
-    text, others = text_of_workbook(path)
-    return peek_text(text, _NAME, path, others)
-
-
-def _table(path: Path) -> LoggerTable | None:
-    text, others = text_of_workbook(path)
-    return table_of_text(text, path, others)
-
-
-FORMAT = Format(
-    name=_NAME,
-    suffixes=(".xlsx", ".xlsm"),
-    recognises=recognises,
-    peek=_peek,
-    read=_read,
-    table=_table,
-    library="openpyxl",
-)
+FORMAT = text_format("Excel", (".xlsx", ".xlsm"), recognises, text_of_workbook, library="openpyxl")

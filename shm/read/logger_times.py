@@ -12,7 +12,6 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.read import logger_words as words
-from shm.read.comma_table import REMEDY, evened
 from shm.read.logger_heading import Heading
 from shm.read.logger_rows import Block, second_record, values_of
 from shm.read.stamps import (
@@ -24,6 +23,7 @@ from shm.read.stamps import (
     possible_times,
     seconds_of_stamps,
 )
+from shm.read.time_axis import REMEDY, on_even_grid
 from shm.values import NAN, FloatArray
 
 # Judgement: no logger records a hammer test slower than this, and none faster.
@@ -212,9 +212,9 @@ def _even(
     if block.seam and len(back):
         raise second_record(block.seam, path)
     if len(seconds) < 2 or np.all(np.diff(seconds) > 0):
-        _, rate = evened(seconds, seconds[np.newaxis], fault)
+        _, rate = on_even_grid(seconds, seconds[np.newaxis], fault)
         return Clock(
-            used, rate, start, evened=lambda v: evened(seconds, v[np.newaxis], fault)[0][0]
+            used, rate, start, evened=lambda v: on_even_grid(seconds, v[np.newaxis], fault)[0][0]
         )
     rate = _rate_of_coarse(seconds, said_hz, fault)
     return Clock(used, rate, start)
