@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -59,6 +60,8 @@ def format_of_arrays(
 def _table(arrays: Arrays, path: Path, name: str) -> Table:
     """Return the arrays of a file: channels first, then all that may be one."""
     columns = [_column(variable, path) for variable in arrays.variables]
+    if not any(column.is_complex for column in columns):
+        columns = [_as_record(column) for column in columns]
     measured = [column for column in columns if column.role == "channel"]
     others = [column for column in columns if column.role != "channel"]
     may_be = [column for column in others if column.may_be_chosen and column.role == "other"]
@@ -72,6 +75,12 @@ def _table(arrays: Arrays, path: Path, name: str) -> Table:
         (name, *named),
         left_out=arrays.left_out,
     )
+
+
+def _as_record(column: Column) -> Column:
+    """Return a column of a file without responses, where F may be a force."""
+    is_f = column.role == "frequencies" and not column.unit and _bare(column.name) == "f"
+    return replace(column, role="other") if is_f else column
 
 
 def _column(variable: Variable, path: Path) -> Column:

@@ -184,7 +184,8 @@ def _refuse_different_rates(found: Description) -> None:
                 file=path,
                 remedy="Export all channels of one recording with one length and rate.",
             )
-    stated = [column.facts.get("sampling_rate_hz") for column in found.used]
+    silent = [column for column in found.used if math.isnan(column.rate_hz)]
+    stated = [column.facts.get("sampling_rate_hz") for column in silent]
     rates = {entry.text if entry is not None else "" for entry in stated}
     if len(rates) > 1 and (told is None or told.file == path):
         raise BadInput(

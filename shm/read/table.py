@@ -92,8 +92,7 @@ class Table:
     @property
     def choosable(self) -> list[Column]:
         """Return the columns that are, or may be, channels of a recording."""
-        roles = ("channel", "other", "frequencies")
-        return [c for c in self.columns if c.may_be_chosen and c.role in roles]
+        return [c for c in self.columns if c.may_be_chosen and c.role in ("channel", "other")]
 
     @property
     def own_header(self) -> Header:
@@ -155,7 +154,6 @@ def describe(table: Table, *, with_beside: bool = True) -> Description:
         for column in others
         if roles[column.name] == "other"
         or (roles[column.name] in ("times", "frequencies") and column.name in beside)
-        or (roles[column.name] == "frequencies" and not is_response)
     ]
     named = [c.label or c.name for c in idle if c is not times and c is not frequencies]
     return Description(

@@ -9,6 +9,7 @@ costs.
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,7 +31,7 @@ from shm.read.sandbox.reading_process import ask
 from shm.values import FrequencyResponse, ModalTest, Recording
 
 __all__ = [
-    "Limits", "foreign_modes", "layout_of", "load_modes", "peek_test", "read_test", "survey",
+    "Limits", "foreign_modes", "layout_of", "load_modes", "missing_bounds", "peek_test", "read_test", "survey",
 ]  # fmt: skip
 T = TypeVar("T")
 _LARGEST_HANGER = 2**31  # a column of PostgreSQL's type integer
@@ -77,6 +78,15 @@ def foreign_modes(path: Path, limits: Limits | None = None) -> ForeignModes | No
 def load_modes(path: Path, limits: Limits | None = None) -> tuple[ModalTest, ...]:
     """Return the tests of a `*.modes.json`, as `shm.documents.load_modes` gives them."""
     return parse_modes(_answer("load_modes", path, limits or Limits()).found, path)
+
+
+def missing_bounds() -> dict[str, str]:
+    """Return the bounds of reading that this system does not have, by name, and why.
+
+    Raises ShmError where one that it has could not be put in force.
+    """
+    found = _answer("missing_bounds", Path(os.devnull), Limits()).found
+    return {str(name): str(why) for name, why in dict(found).items()}
 
 
 def _values(verb: str, kind: type[T], path: Path, limits: Limits | None) -> list[T]:
@@ -129,6 +139,8 @@ def _refuse_unsound(found: Any, path: Path, limits: Limits) -> None:
     if found.hanger is not None and not 0 <= found.hanger < _LARGEST_HANGER:
         raise ValueError("no hanger has such a number")
     is_response = isinstance(found, FrequencyResponse)
+    if not is_response and len(found.channels) - len(found.accelerations) > 1:
+        raise ValueError("it has two forces")
     rows = found.accelerance.real if is_response else [c.values for c in found.channels]
     size = len(found.frequency_hz) if is_response else found.samples
     if not 1 <= len(rows) <= limits.max_channels + 1 or not 1 < size <= limits.max_samples:

@@ -94,6 +94,7 @@ def confine(allowed: Limits, *, unpacks: bool, keep: int) -> None:
         resource.RLIMIT_CPU: (seconds, seconds + 1),  # the first says why, the second kills
         resource.RLIMIT_FSIZE: (file_bytes, file_bytes),
         resource.RLIMIT_NOFILE: (_OPEN_FILES, _OPEN_FILES),
+        resource.RLIMIT_NPROC: (0, 0),  # begins no process, unless it is root's
     }
     if sys.platform == "linux":
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
@@ -133,6 +134,9 @@ _VERBS: dict[str, Callable[[Path], object]] = {
     "peek_test": peek_test,
     # A document that holds nothing but what the reader understood.
     "load_modes": lambda path: json.loads(dump(modes_document(load_modes(path)))),
+    "missing_bounds": lambda _: (
+        {} if sys.platform == "linux" else {"a limit of memory": "only Linux enforces one"}
+    ),
     "survey": lambda path: [survey(path)],
     "layout_of": lambda path: [layout_of(path)],
     "foreign_modes": lambda path: [each for each in [foreign_modes(path)] if each],
