@@ -301,7 +301,7 @@ def check_confinement() -> Iterator[Finding]:
         )
     if not missing:
         yield ok(
-            "confinement", "files are read in a process each, within limits of time and memory"
+            "confinement", "each file is read in a process with limits of time and memory"
         )
 
 

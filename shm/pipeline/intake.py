@@ -18,7 +18,7 @@ from pathlib import Path
 
 from shm.errors import BadInput, TooLarge
 from shm.pipeline.lineage import read_limits
-from shm.read import holds_test, sidecar_path
+from shm.read import sidecar_path
 from shm.read.base import Layout
 from shm.read.profiles import Profile, any_profile, completed, learn_day_order, profile_for
 from shm.read.sandbox import layout_of
@@ -172,7 +172,7 @@ def _by_profile(path: Path, workspace: Workspace) -> str | None:
 
 def _layout_and_sidecar(path: Path, workspace: Workspace) -> tuple[Layout, Described] | None:
     """Return how a recording looks and what its own sidecar says; None of what cannot be read."""
-    if holds_test(path) or path.name.lower().endswith(MODES_SUFFIX):
+    if path.name.lower().endswith(MODES_SUFFIX):
         return None
     try:
         return layout_of(path, read_limits(workspace.settings)), document_beside(path)
@@ -197,7 +197,7 @@ def learn_from_answer(workspace: Workspace, store: Store, hold: Hold) -> None:
         with workspace.archive.opened(recording.file) as path:
             layout = layout_of(path, read_limits(workspace.settings))
     except BadInput:
-        return  # an archive of several files has no logger's layout
+        return  # an archive of several loggers has no layout
     order = order_of_choice(hold.time, layout.possible_times)
     learn_day_order(layout, order, workspace.folder)
 

@@ -17,6 +17,7 @@ from shm.read.base import Format
 from shm.read.header import CHANNEL_KEYS, KEYS, Entry, quantity_named
 from shm.read.limits import guarded, refuse_large
 from shm.read.logger_words import UNSAID, unit_of
+from shm.read.stamps import moment
 from shm.read.table import Column, Role, Table, is_accelerance
 from shm.values import ComplexArray, FloatArray
 
@@ -30,6 +31,7 @@ _RATES = {
 }  # fmt: skip
 _STEPS = {"dt", "dts", "timestep", "samplinginterval", "sampleinterval", "wfincrement"}
 _MOMENTS = {"time", "starttime", "wfstarttime", "timeutc"}
+_DAYS = {"date", "datetime"}
 _KEYS = {
     "hanger": "hanger", "temperaturec": "temperature_c", "addedmasskg": "added_mass_kg",
     "addedmassatm": "added_mass_at_m", "addedmassradiusm": "added_mass_radius_m",
@@ -162,6 +164,8 @@ def facts(attributes: Mapping[str, object]) -> dict[str, object]:
             found[_KEYS[key]] = value
         elif key in _MOMENTS and not isinstance(value, int | float):
             found["time"] = value
+        elif key in _DAYS and (day := moment("", str(value))) is not None:
+            found.setdefault("time", day.isoformat())
         elif key in _STEPS and isinstance(value, int | float) and value > 0:
             found.setdefault("sampling_rate_hz", 1 / value)
     return found

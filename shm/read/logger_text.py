@@ -18,13 +18,23 @@ from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
 from shm.documents import format_time
 from shm.errors import BadInput
 from shm.read import logger_words as words
 from shm.read.content import LINE_BREAK, cells_of, mark_between
 from shm.read.header import Entry, quantity_named
 from shm.read.limits import refuse_long_header
-from shm.read.logger_heading import Heading, heading_of, quantity_said, rate_said, unlike, unrounded
+from shm.read.logger_heading import (
+    Heading,
+    heading_of,
+    quantity_said,
+    rate_said,
+    unlike,
+    unrounded,
+    with_channel_units,
+)
 from shm.read.logger_rows import (
     Block,
     block_of,
@@ -114,6 +124,8 @@ def _table(heading: Heading, block: Block, path: Path, before: int = 0) -> Table
     clock = clock_of(heading, block, rate, order, path)
     time = clock.start or _time(heading, order)
     _refuse_wrapped(block, path)
+    layout = _layout(heading, block)  # without what is found in its lines: profiles know it so
+    heading = with_channel_units(heading, block.above)
     line = max(0, heading.names_line - before) or None
     columns = tuple(
         _column(heading, block, clock, place, line, path)
@@ -123,7 +135,7 @@ def _table(heading: Heading, block: Block, path: Path, before: int = 0) -> Table
     said = {
         "hanger": _hanger(heading),
         "time": format_time(time),
-        "temperature_c": _temperature(heading, decimal),
+        "temperature_c": _temperature(heading, decimal, columns),
         "sampling_rate_hz": unrounded(rate, clock.rate_hz, heading.facts, decimal),
     }
     known = {key: value for key, value in said.items() if value is not None and value == value}
@@ -131,7 +143,7 @@ def _table(heading: Heading, block: Block, path: Path, before: int = 0) -> Table
         path,
         columns,
         {key: Entry(value, path) for key, value in known.items()},
-        _layout(heading, block),
+        layout,
         clock.rate_hz,
         remarks=(*clock.remarks, *block.remarks),
         possible_times=() if time else clock.possible_starts or _possible_times(heading),
@@ -246,7 +258,9 @@ def _dates(heading: Heading) -> list[str]:
 
 
 def _moments(heading: Heading) -> list[str]:
-    return [v for k, v in heading.facts if words.means_moment(k) and parsed(v)]
+    """Return the times of a heading, catman's `T0 = ...` among them."""
+    named = ((k, v) for k, v in heading.facts if parsed(v))
+    return [v for k, v in named if words.means_moment(k) or k.strip().upper() == "T0"]
 
 
 def _days(heading: Heading) -> list[str]:
@@ -269,13 +283,21 @@ def _possible_times(heading: Heading) -> tuple[PossibleTime, ...]:
     return next((each for text in texts if (each := possible_times(text))), ())
 
 
-def _temperature(heading: Heading, decimal: str) -> float:
+def _temperature(heading: Heading, decimal: str, columns: Sequence[Column]) -> float:
+    """Return the temperature that a preamble says, or the median of the column that is one."""
     for key, value in heading.facts:
         if words.means_temperature(key):
             number, unit = quantity_said(value, decimal)
             if unit.lower() in ("", "°c", "c", "degc", "grad"):
                 return number
-    return NAN
+    told = [(words.temperature_meant(c.name), c) for c in columns if words.is_celsius(c.unit)]
+    best = [c for how_well, c in told if how_well and how_well == max(told, key=_first)[0]]
+    values = best[0].load() if len(best) == 1 else []
+    return float(np.nanmedian(values)) if np.isfinite(values).any() else NAN
+
+
+def _first(pair: tuple[int, Column]) -> int:
+    return pair[0]
 
 
 def _layout(heading: Heading, block: Block) -> tuple[str, ...]:

@@ -22,6 +22,7 @@ from shm.read.stamps import (
     parsed,
     possible_times,
     seconds_of_stamps,
+    without_clock_change,
 )
 from shm.read.time_axis import REMEDY, on_even_grid
 from shm.values import NAN, FloatArray
@@ -199,7 +200,12 @@ def _of_stamps(
     if seconds is None:
         wrong = next(place for place, text in enumerate(texts) if parsed(text) is None)
         raise _fault(block, name, path)(wrong, f"{texts[wrong][:40]!r} is no time")
-    return _started(_even(seconds, said_hz, None, used, name, block, path), texts, order)
+    seconds, place = without_clock_change(seconds)
+    found = _started(_even(seconds, said_hz, None, used, name, block, path), texts, order)
+    if place is None:
+        return found
+    what = f"the clock went back one hour at line {block.lines[place]}: the end of summer time."
+    return replace(found, remarks=(*found.remarks, what))
 
 
 def _even(

@@ -152,7 +152,7 @@ def _single(channel: Channel) -> Channel:
 
 
 T = TypeVar("T")
-Found = TypeVar("Found", bound=Recording | FrequencyResponse | Peek | ModalTest)
+Found = TypeVar("Found", bound=Recording | FrequencyResponse | Peek | ModalTest | Survey)
 
 
 def read_test(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
@@ -220,6 +220,7 @@ def load_modes(path: Path) -> tuple[ModalTest, ...]:
 def _as_said(found: Found, said: Mapping[str, Any]) -> Found:
     """Return a test with what a sidecar says of all of it; None and NaN change nothing."""
     known = {key: value for key, value in said.items() if value is not None and value == value}
+    known = {key: value for key, value in known.items() if hasattr(found, key)}
     return replace(found, **known)
 
 
@@ -253,7 +254,26 @@ _FINGERPRINT_DIGITS = 16  # technical: of 64 bits; a workspace has a handful of 
 
 def survey(path: Path) -> Survey:
     """Return all that can be found out about a file; raises BadInput where that is nothing."""
-    _refuse_archive(path)
+    if not holds_test(path):
+        return _survey_file(path)
+    head_of(path)
+    found = each_member(path, lambda file, name: _named(_survey_file, file, name))
+    if len({each.layout.fingerprint for each in found}) > 1:
+        raise BadInput(
+            "is an archive of files of several loggers.",
+            file=path,
+            remedy="Unpack it and import one of its files of each.",
+        )
+    said, several = entries_of_test(path).of_test, f"the first of {len(found)} files is shown"
+    first, remarks = _as_said(found[0], said), [several] if len(found) > 1 else []
+    orders = {each.layout.day_order for each in found} - {None}
+    layout = replace(
+        first.layout, possible_times=(), day_order=orders.pop() if len(orders) == 1 else None
+    )
+    return replace(first, source=str(path), layout=layout, remarks=(*first.remarks, *remarks))
+
+
+def _survey_file(path: Path) -> Survey:
     known = format_of(path)
     with known.open_tables(path) as tables:
         return _surveyed(tables, known.name, path)
@@ -303,16 +323,6 @@ def _left_out(seen: Peek, columns: Sequence[SurveyedColumn]) -> tuple[str, ...]:
     if columns or not seen.left_out:
         return ()
     return (f"it holds {', '.join(seen.left_out)[:200]}, which is not read.",)
-
-
-def _refuse_archive(path: Path) -> None:
-    if holds_test(path):
-        raise BadInput(
-            "is an archive of several files.",
-            file=path,
-            remedy="Unpack it and import one of its files; those of the same logger need nothing"
-            " then.",
-        )
 
 
 def _column(column: Column, known: PeekChannel | None) -> SurveyedColumn:

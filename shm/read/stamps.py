@@ -33,6 +33,7 @@ _DAY_IN_BYTES = re.compile(rb"(?<!\d)\d{1,2}([-/])\d{1,2}\1\d{2}")
 _PACKED = (".xlsx", ".xlsm", ".gz")  # whose first bytes tell nothing
 _MONTH = re.compile("jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec", re.IGNORECASE)
 _DAY_S = 86400.0
+_HOUR_S, _WHOLE_S = 3600.0, 1.0
 _CLOCK_ONLY = datetime(1, 1, 1, tzinfo=UTC)
 
 DayOrder = Literal["day first", "month first", "year first"]
@@ -229,3 +230,18 @@ def moment(day: str, clock: str, order: DayOrder | None = None) -> datetime | No
         if found is not None and found[1]:
             return found[0] if found[0].year > 1 else None
     return None
+
+
+def without_clock_change(seconds: FloatArray) -> tuple[FloatArray, int | None]:
+    """Return times that run on over the end of summer time, and the place where the hour came back.
+
+    Nothing but a clock set back makes times fall by an hour less one step. None where none does.
+    """
+    steps = np.diff(seconds)
+    back = np.flatnonzero(steps < 0)
+    step = float(np.median(steps)) if len(steps) else 0.0
+    if len(back) != 1 or abs(steps[back[0]] + _HOUR_S - step) > max(step, _WHOLE_S):
+        return seconds, None
+    place = int(back[0]) + 1
+    later = np.arange(len(seconds)) >= place
+    return seconds + _HOUR_S * later, place

@@ -31,7 +31,8 @@ from shm.read.sandbox.reading_process import ask
 from shm.values import FrequencyResponse, ModalTest, Recording
 
 __all__ = [
-    "Limits", "foreign_modes", "layout_of", "load_modes", "missing_bounds", "peek_test", "read_test", "survey",
+    "Limits", "foreign_modes", "layout_of", "load_modes", "missing_bounds", "peek_test",
+    "read_test", "survey",
 ]  # fmt: skip
 T = TypeVar("T")
 _LARGEST_HANGER = 2**31  # a column of PostgreSQL's type integer
