@@ -300,9 +300,7 @@ def check_confinement() -> Iterator[Finding]:
             "A damaged file may fill the memory of this computer: run shm on Linux.",
         )
     if not missing:
-        yield ok(
-            "confinement", "each file is read in a process with limits of time and memory"
-        )
+        yield ok("confinement", "each file is read in a process with limits of time and memory")
 
 
 def check_folders(folder: Path) -> Iterator[Finding]:

@@ -70,9 +70,9 @@ def collecting(problems: list[str]) -> Attempt:
 # ---------------------------------------------------------------- a table
 
 
-def assemble(table: Table) -> Recording | FrequencyResponse:
+def assemble(table: Table, described: Description | None = None) -> Recording | FrequencyResponse:
     """Return the values of a table in SI units, described by file and sidecar; raises BadInput."""
-    found = describe(table)
+    found = described or describe(table)
     header, path = found.header, table.path
     if found.is_response:
         values = np.array([column.load() for column in found.used], dtype=np.complex128)

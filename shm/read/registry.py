@@ -23,6 +23,7 @@ from shm.read.assemble import assemble, collecting, read_of_test
 from shm.read.assemble import peek as look
 from shm.read.base import Format, Layout, Peek, PeekChannel, Survey, SurveyedColumn
 from shm.read.bundles import each_member, entries_of_test, holds_test
+from shm.read.campbell_file import FORMAT as CAMPBELL
 from shm.read.comma_separated import FORMAT as CSV
 from shm.read.content import (
     head_of,
@@ -52,6 +53,7 @@ FORMATS: tuple[Format, ...] = (
     EXCEL,
     WAVE,
     MINI_SEED,
+    CAMPBELL,
     UFF,
     CSV,
 )
@@ -114,8 +116,8 @@ def format_of(path: Path) -> Format:
             file=path,
             remedy="Unpack it, or ingest the archive as a whole.",
         )
-    claimed = _format_of_suffix(_unpacked_name(path))
     recognised = next((known for known in FORMATS if known.recognises(head)), None)
+    claimed = _format_of_suffix(_unpacked_name(path), recognised)
     if claimed is None or (is_gzipped(path) and not claimed.may_be_gzipped):
         raise refuse_unreadable_suffix(path, _suffixes(), recognised)
     refuse_unless_readable(path, head, claimed, recognised)
@@ -126,18 +128,24 @@ def _unpacked_name(path: Path) -> Path:
     return path.with_suffix("") if is_gzipped(path) else path
 
 
-def _format_of_suffix(path: Path) -> Format | None:
-    return next((known for known in FORMATS if path.suffix.lower() in known.suffixes), None)
+def _format_of_suffix(path: Path, recognised: Format | None = None) -> Format | None:
+    """Return the format that a suffix claims: of several the one whose content is recognised.
+
+    Else the one that is written, which is the text among them.
+    """
+    claimed = [known for known in FORMATS if path.suffix.lower() in known.suffixes]
+    written = [known for known in claimed if known.write is not None]
+    return recognised if recognised in claimed else next(iter([*written, *claimed]), None)
 
 
 def _suffixes() -> list[str]:
-    return [suffix for known in FORMATS for suffix in known.suffixes]
+    return list(dict.fromkeys(suffix for known in FORMATS for suffix in known.suffixes))
 
 
 def libraries_for(path: Path) -> tuple[str, ...]:
     """What reading a file loads, by its suffix; an archive may hold any format."""
-    claimed = _format_of_suffix(_unpacked_name(path))
-    formats = FORMATS if holds_test(path) else (claimed,) if claimed else ()
+    suffix = _unpacked_name(path).suffix.lower()
+    formats = FORMATS if holds_test(path) else [f for f in FORMATS if suffix in f.suffixes]
     return tuple(each.library for each in formats if each.library)
 
 
