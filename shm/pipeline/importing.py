@@ -11,7 +11,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import datetime, tzinfo
 from datetime import time as clock_time
 from importlib import import_module
 from pathlib import Path
@@ -30,7 +30,7 @@ from shm.read.header import CHANNEL_KEYS, Entry, Header
 from shm.read.profiles import Profile, completed, profile_for, save_profile, with_day_order
 from shm.read.sandbox import survey
 from shm.read.sidecar import Described, document_beside
-from shm.read.stamps import DayOrder, order_of_choice
+from shm.read.stamps import DayOrder, in_zone, order_of_choice
 from shm.store import Workspace
 from shm.values import NAN, Channel, Plane, Quantity, Recording
 
@@ -152,10 +152,11 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     path = Path(found.source)
     profile = profile_for(found.layout, workspace.folder)
     own = _joined(document_beside(path), answers.said)
-    own, order = _with_chosen_time(own, found)
+    own, order = _with_chosen_time(own, found, workspace.bridge.time_zone)
     _refuse_unknown(own, found, path)
     known = profile.described if profile is not None else {}
-    described = with_times(completed(known, found.layout, own, path.name), found)
+    zone = workspace.bridge.time_zone
+    described = with_times(completed(known, found.layout, own, path.name, zone), found)
     hanger = described.get("hanger", found.hanger)
     rate, uneven = rate_told(found, described)
     questions = _questions(found, described, hanger, rate)
@@ -188,7 +189,9 @@ def keep_profile(found: Import, workspace: Workspace, *, each_time: bool = False
     return save_profile(found.kept, found.survey.layout, workspace.folder, roams=each_time)
 
 
-def _with_chosen_time(own: dict[str, Any], found: Survey) -> tuple[dict[str, Any], DayOrder | None]:
+def _with_chosen_time(
+    own: dict[str, Any], found: Survey, zone: tzinfo
+) -> tuple[dict[str, Any], DayOrder | None]:
     """Return the sidecar with the complete time, and the order of day and month that is known now.
 
     A person may name one of the possible times by its day alone.
@@ -198,7 +201,8 @@ def _with_chosen_time(own: dict[str, Any], found: Survey) -> tuple[dict[str, Any
         return own, found.layout.day_order
     order = order_of_choice(time, possible) or found.layout.day_order
     same = [each.time for each in possible if each.time.date() == time.date()]
-    return {**own, "time": same[0]} if same and time.time() == clock_time.min else own, order
+    is_day = bool(same) and time.time() == clock_time.min
+    return {**own, "time": in_zone(same[0], zone)} if is_day else own, order
 
 
 def _joined(first: Described, then: Described) -> dict[str, Any]:

@@ -72,6 +72,8 @@ def collecting(problems: list[str]) -> Attempt:
 
 def assemble(table: Table, described: Description | None = None) -> Recording | FrequencyResponse:
     """Return the values of a table in SI units, described by file and sidecar; raises BadInput."""
+    if table.refusal is not None:
+        raise table.refusal
     found = described or describe(table)
     header, path = found.header, table.path
     if found.is_response:
@@ -100,6 +102,8 @@ def peek(table: Table, file_format: str) -> Peek:
     """Return what is said of a table, without its values; faults become problems."""
     problems = list(table.problems)
     attempt = collecting(problems)
+    if table.refusal is not None:
+        return Peek(table.source, file_format, (), 0, problems=(*problems, str(table.refusal)))
     found = attempt(lambda: describe(table), None)
     if found is None:
         found = describe(table, with_beside=False)

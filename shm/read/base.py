@@ -151,8 +151,8 @@ class Survey:
 class Layout:
     """The layout by which files of one logger are recognised, and facts of this one.
 
-    `hanger` and `says_rate` are what a profile must not say in its stead. `day_order` and
-    `possible_times` are those of its table.
+    `hanger` and `says_rate` are what a profile must not say in its stead. `day_order`,
+    `possible_times` and `local_time` are those of its table.
     """
 
     fingerprint: str
@@ -162,3 +162,4 @@ class Layout:
     says_rate: bool = False
     day_order: DayOrder | None = None
     possible_times: tuple[PossibleTime, ...] = ()
+    local_time: datetime | None = None

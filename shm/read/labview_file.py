@@ -82,7 +82,7 @@ def _table(
     known = {key: value for key, value in said.items() if value is not None and value == value}
     entries = {key: Entry(value, path) for key, value in known.items()}
     layout = _layout([column for column in columns if column is not times], text, path)
-    return Table(path, columns, entries, layout, remarks=remarks, record=name)
+    return Table(path, columns, entries, layout, remarks=remarks, record=name, local_time=time)
 
 
 def _times(record: Mapping[str, Any], data: FloatArray, path: Path) -> Column | None:

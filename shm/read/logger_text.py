@@ -46,7 +46,7 @@ from shm.read.logger_rows import (
 )
 from shm.read.logger_times import Clock, clock_of, day_order_of
 from shm.read.logger_words import UNSAID, Sensitivity
-from shm.read.stamps import DayOrder, PossibleTime, moment, parsed, possible_times
+from shm.read.stamps import DayOrder, PossibleTime, moment, parsed, possible_times, says_zone
 from shm.read.table import Column, Table
 from shm.values import NAN
 
@@ -122,7 +122,9 @@ def _table(heading: Heading, block: Block, path: Path, before: int = 0) -> Table
     rate = rate_said(heading.facts, decimal)
     order = day_order_of(_days(heading), block)
     clock = clock_of(heading, block, rate, order, path)
-    time = clock.start or _time(heading, order)
+    time, is_local = clock.start, clock.is_local
+    if time is None:
+        time, is_local = _time(heading, order)
     _refuse_wrapped(block, path)
     layout = _layout(heading, block)  # without what is found in its lines: profiles know it so
     heading = with_channel_units(heading, block.above)
@@ -148,6 +150,7 @@ def _table(heading: Heading, block: Block, path: Path, before: int = 0) -> Table
         remarks=(*clock.remarks, *block.remarks),
         possible_times=() if time else clock.possible_starts or _possible_times(heading),
         day_order=order,
+        local_time=time if is_local else None,
     )
 
 
@@ -268,12 +271,15 @@ def _days(heading: Heading) -> list[str]:
     return [*_dates(heading), *_moments(heading)]
 
 
-def _time(heading: Heading, order: DayOrder | None) -> datetime | None:
+def _time(heading: Heading, order: DayOrder | None) -> tuple[datetime | None, bool]:
+    """Return the time that a heading says, and whether its clock names no zone."""
     days, clocks = _dates(heading), _moments(heading)
     whole = [v for v in clocks if moment("", v, order) is not None]
     if whole:
-        return moment("", whole[0], order)
-    return moment(days[0], clocks[0] if clocks else "", order) if days else None
+        return moment("", whole[0], order), not says_zone(whole[0])
+    clock = clocks[0] if clocks else ""
+    local = not says_zone(clock) and not any(map(says_zone, days[:1]))
+    return (moment(days[0], clock, order), local) if days else (None, False)
 
 
 def _possible_times(heading: Heading) -> tuple[PossibleTime, ...]:

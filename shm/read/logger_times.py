@@ -21,6 +21,7 @@ from shm.read.stamps import (
     follow_days,
     parsed,
     possible_times,
+    says_zone,
     seconds_of_stamps,
     without_clock_change,
 )
@@ -40,7 +41,8 @@ _FINE = 1e-4  # judgement: of the span; times rounded more coarsely do not give 
 class Clock:
     """Rate and start by the columns of times; `used` are the columns without a measurement.
 
-    `possible_starts` are several where the day of the start can be read in several orders.
+    `possible_starts` are several where the day of the start can be read in several orders;
+    `is_local` says that the start is by a clock that names no zone.
     """
 
     used: frozenset[int]
@@ -49,6 +51,7 @@ class Clock:
     possible_starts: tuple[PossibleTime, ...] = ()
     evened: Callable[[FloatArray], FloatArray] = lambda values: values
     remarks: tuple[str, ...] = ()
+    is_local: bool = False
 
 
 def clock_of(
@@ -187,9 +190,10 @@ def _factor(values: FloatArray, said_hz: float) -> float | None:
 def _started(clock: Clock, stamps: Sequence[str], order: DayOrder | None) -> Clock:
     """Return a clock with the start that its first stamp tells, or all where its day is unsure."""
     found = parsed(stamps[0], order)
+    local = not says_zone(stamps[0])
     if found is not None and found[1]:
-        return replace(clock, start=found[0])
-    return replace(clock, possible_starts=possible_times(stamps[0]))
+        return replace(clock, start=found[0], is_local=local)
+    return replace(clock, possible_starts=possible_times(stamps[0]), is_local=local)
 
 
 def _of_stamps(

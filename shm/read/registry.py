@@ -272,11 +272,14 @@ def survey(path: Path) -> Survey:
             file=path,
             remedy="Unpack it and import one of its files of each.",
         )
-    said, several = entries_of_test(path).of_test, f"the first of {len(found)} files is shown"
-    first, remarks = _as_said(found[0], said), [several] if len(found) > 1 else []
+    entries, several = entries_of_test(path), f"the first of {len(found)} files is shown"
+    first, remarks = _as_said(found[0], entries.of_test), [several] if len(found) > 1 else []
     orders = {each.layout.day_order for each in found} - {None}
     layout = replace(
-        first.layout, possible_times=(), day_order=orders.pop() if len(orders) == 1 else None
+        first.layout,
+        possible_times=(),
+        day_order=orders.pop() if len(orders) == 1 else None,
+        local_time=first.layout.local_time if len(found) == 1 and entries.time is None else None,
     )
     return replace(first, source=str(path), layout=layout, remarks=(*first.remarks, *remarks))
 
@@ -378,4 +381,5 @@ def _layout(table: Table, file_format: str, columns: Sequence[SurveyedColumn]) -
         says_rate,
         table.day_order,
         table.possible_times,
+        table.local_time,
     )

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, tzinfo
 from pathlib import Path
 from typing import Literal
 
@@ -71,6 +71,20 @@ def parsed(text: str, order: DayOrder | None = None) -> tuple[datetime, bool] | 
         return (day, certain) if alone else (_clocked(day, found), certain)
     except (ValueError, OverflowError):
         return None
+
+
+def says_zone(text: str) -> bool:
+    """Return whether a time says of which zone it is."""
+    found = _STAMP.fullmatch(text.strip())
+    return found is not None and found["zone"] is not None
+
+
+def in_zone(time: datetime, zone: tzinfo) -> datetime:
+    """Return the time in UTC of a clock in a zone, whose reading was taken for UTC.
+
+    Of the hour that comes twice at the end of summer time, the first.
+    """
+    return time.replace(tzinfo=zone).astimezone(UTC)
 
 
 def possible_times(text: str) -> tuple[PossibleTime, ...]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -71,6 +72,8 @@ class Table:
     possible_times: tuple[PossibleTime, ...] = ()
     day_order: DayOrder | None = None
     line_of: Callable[[int], int | None] = field(default=lambda row: None)
+    refusal: BadInput | None = None
+    local_time: datetime | None = None
 
     @property
     def source(self) -> str:

@@ -50,15 +50,16 @@ def _holds_histories(content: Content) -> bool:
 
 
 def _table(content: Content, values: Callable[[FunctionSet], Any], path: Path) -> Table:
-    """Return all time histories; raises BadInput for a file of modes alone."""
+    """Return all time histories; none, and why, of a file of modes alone."""
     every = histories(content)
     if not every and content.mode_count:
-        raise BadInput(
+        refusal = BadInput(
             f"it holds {content.mode_count} modes at {len(content.nodes)} places that another"
             " program identified, no recording.",
             file=path,
             remedy="Give `shm import FILE`: it asks for the hanger and for the planes.",
         )
+        return Table(path, (), layout=("UFF",), refusal=refusal)
     columns = tuple(
         _column(name, found, content, partial(_signed, found, values), path)
         for name, found in zip(_names(every, path), every, strict=True)

@@ -12,6 +12,7 @@ import csiio
 import numpy as np
 import pandas as pd
 import pytest
+import pyuff
 import scipy.io
 from sdypy_sep005.sep005 import assert_sep005
 
@@ -279,6 +280,40 @@ def test_the_profile_of_a_logger_holds_for_a_test_of_one_file_for_each_hit(
     for each in records:
         assert isinstance(each, Recording)
         assert (each.hanger, each.channels[1].x_m, each.channels[1].plane) == (2, 2.1, "transverse")
+
+
+@pytest.mark.parametrize(
+    ("stamp", "hour"),
+    [("2026-05-14 10:00:00", 8), ("2026-05-14T10:00:00Z", 10), ("2026-01-14 10:00:00", 9)],
+)
+def test_a_clock_that_names_no_zone_is_in_the_zone_of_the_bridge(
+    tmp_path: Path, workspace: Workspace, stamp: str, hour: int
+) -> None:
+    described = workspace.folder / "bridge.toml"
+    text = described.read_text()
+    described.write_text(text.replace("[bridge]", '[bridge]\ntime_zone = "Europe/Berlin"', 1))
+    workspace = Workspace.open(workspace.folder)
+    path = written(tmp_path, f"Start time: {stamp}\nTime [s],Hammer [N],A1 [m/s2]\n{PLAIN}")
+    with as_taken_in(path, workspace) as taken:
+        found = recorded(taken)
+    assert found.time is not None
+    assert (found.time.hour, found.time.tzinfo) == (hour, UTC)
+    assert look_into(path, workspace, Answers()).described.get("time", found.time) == found.time
+
+
+def test_modes_alone_are_imported_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "modes.uff"
+    shape = {"node_nums": [1, 2, 3], "r1": [0.1, 0.2, 0.1], "r2": [0.0] * 3, "r3": [0.0] * 3}
+    mode = pyuff.prepare_55(
+        model_type=1, id1="a", analysis_type=2, data_ch=2, spec_data_type=8, load_case=1, mode_n=1,
+        freq=5.0, modal_m=1.0, modal_damp_vis=0.01, modal_damp_his=0.0, **shape,
+    )  # fmt: skip
+    pyuff.UFF(str(path)).write_sets([mode], mode="add")
+    (problem,) = peek(path).problems
+    assert "holds 1 modes at 0 places" in problem
+    assert "shm import FILE" in problem
+    with pytest.raises(BadInput, match="modes at 0 places"):
+        read(path)
 
 
 def test_the_sidecar_of_an_archive_describes_channels_of_all_files(tmp_path: Path) -> None:
