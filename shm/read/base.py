@@ -70,7 +70,8 @@ class Format:
     for each record, as long as the context lasts. `write` is None of a format that is only read;
     `may_be_gzipped` says whether NAME.csv.gz is read too; `holds_responses` is False of one that
     holds time records alone, `names_channels` of one whose channels have numbers, or names of its
-    own. `library` is what it loads where a file is read.
+    own. `library` is what it loads where a file is read; `shared_suffixes` are those of a text that
+    its content may have too.
     """
 
     name: str
@@ -82,6 +83,7 @@ class Format:
     holds_responses: bool = True
     names_channels: bool = True
     library: str = ""
+    shared_suffixes: tuple[str, ...] = ()
 
 
 def at_once(

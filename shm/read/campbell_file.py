@@ -90,10 +90,11 @@ def _library(path: Path) -> Any:
 
 FORMAT = Format(
     _NAME,
-    (".tob3", ".tob1", ".dat"),
+    (".tob3", ".tob1"),
     recognises,
     at_once(open_tables),
     holds_responses=False,
     names_channels=False,
     library="csiio",
+    shared_suffixes=(".dat",),
 )

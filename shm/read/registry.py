@@ -129,23 +129,25 @@ def _unpacked_name(path: Path) -> Path:
 
 
 def _format_of_suffix(path: Path, recognised: Format | None = None) -> Format | None:
-    """Return the format that a suffix claims: of several the one whose content is recognised.
-
-    Else the one that is written, which is the text among them.
-    """
-    claimed = [known for known in FORMATS if path.suffix.lower() in known.suffixes]
-    written = [known for known in claimed if known.write is not None]
-    return recognised if recognised in claimed else next(iter([*written, *claimed]), None)
+    """Return the format that a suffix claims, or the one recognised where it shares that suffix."""
+    suffix = path.suffix.lower()
+    if recognised is not None and suffix in recognised.shared_suffixes:
+        return recognised
+    return next((known for known in FORMATS if suffix in known.suffixes), None)
 
 
 def _suffixes() -> list[str]:
-    return list(dict.fromkeys(suffix for known in FORMATS for suffix in known.suffixes))
+    return [suffix for known in FORMATS for suffix in known.suffixes]
 
 
 def libraries_for(path: Path) -> tuple[str, ...]:
     """What reading a file loads, by its suffix; an archive may hold any format."""
     suffix = _unpacked_name(path).suffix.lower()
-    formats = FORMATS if holds_test(path) else [f for f in FORMATS if suffix in f.suffixes]
+    formats = (
+        FORMATS
+        if holds_test(path)
+        else [f for f in FORMATS if suffix in f.suffixes + f.shared_suffixes]
+    )
     return tuple(each.library for each in formats if each.library)
 
 
@@ -294,10 +296,14 @@ def _surveyed(tables: Sequence[Table], file_format: str, path: Path) -> Survey:
     table = tables[0]
     seen, is_response = look(table, file_format), describe(table, with_beside=False).is_response
     channels = {channel.name: channel for channel in seen.channels}
+    columns: list[SurveyedColumn] = []
+    problems = list(seen.problems)
     if seen.lines or is_response:
         columns = [_bare(channel) for channel in seen.channels]
     else:
-        columns = [_column(each, channels.get(each.name)) for each in _may_be_chosen(table)]
+        shown = _may_be_chosen(table)
+        attempt = collecting(problems)
+        columns = attempt(lambda: [_column(each, channels.get(each.name)) for each in shown], [])
     several = f"holds {len(tables)} records of one test; the first is shown"
     return Survey(
         source=str(path),
@@ -311,7 +317,7 @@ def _surveyed(tables: Sequence[Table], file_format: str, path: Path) -> Survey:
         layout=_layout(table, file_format, columns),
         lines=seen.lines,
         remarks=(*table.remarks, *([several] if len(tables) > 1 else [])),
-        problems=(*seen.problems, *_left_out(seen, columns)),
+        problems=(*problems, *_left_out(seen, columns)),
     )
 
 
