@@ -49,7 +49,7 @@ class Answer:
             return found
 
         by = reader(finite)
-        by.register_structure_hook_func(lambda kind: get_origin(kind) is np.ndarray, array)
+        by.register_structure_hook_func(_is_array, array)
         return value_of(kind, node, by=by)
 
     def refusal(self) -> BadInput:
@@ -59,6 +59,10 @@ class Answer:
         return BadInput(
             str(self.found["message"]), line=line if isinstance(line, int) else None, **texts
         )
+
+
+def _is_array(kind: Any) -> bool:
+    return get_origin(kind) is np.ndarray
 
 
 def refusal_document(error: BadInput) -> dict[str, object]:
@@ -77,8 +81,9 @@ def send(found: object, pipe: int, *, refused: bool, most_bytes: int) -> bool:
     header = compact({"refused": refused, "found": _node(found, arrays)}).encode()
     if len(header) + sum(array.nbytes for array in arrays.values()) > most_bytes:
         return False
+    packed: dict[str, Any] = {_HEADER: np.frombuffer(header, np.uint8), **arrays}
     with os.fdopen(pipe, "wb", closefd=False) as stream:
-        np.savez(stream, **{_HEADER: np.frombuffer(header, np.uint8)}, **arrays)
+        np.savez(stream, **packed)
     return True
 
 
