@@ -77,10 +77,10 @@ def assemble(table: Table, described: Description | None = None) -> Recording | 
     found = described or describe(table)
     header, path = found.header, table.path
     if found.is_response:
-        values = np.array([column.load() for column in found.used], dtype=np.complex128)
+        responses = np.array([column.load() for column in found.used], dtype=np.complex128)
         listed = _listed_hz(found).load()
         coherence = _coherence(found)
-        response = frequency_response(header, listed, values, coherence, path)
+        response = frequency_response(header, listed, responses, coherence, path)
         return replace(response, source=table.source)
     for column in found.used or table.columns:
         _refuse_raw(column, header, path)

@@ -66,8 +66,8 @@ def table_in(content: Content, values: Callable[[FunctionSet], Any], path: Path)
         )  # fmt: skip
         share = coherences.get((found.response, found.reference))
         if share is not None:
-            load = partial(_real, share, values)
-            columns.append(Column(f"{name}_coherence", share.points, load, "", "coherence"))
+            both, shares = f"{name}_coherence", partial(_real, share, values)
+            columns.append(Column(both, share.points, shares, "", "coherence"))
     listed = partial(_frequencies, sets, path)
     columns.append(Column("frequency_hz", sets[0].points, listed, "Hz", "frequencies"))
     return Table(path, tuple(columns), layout=tuple(said))

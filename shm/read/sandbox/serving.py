@@ -100,7 +100,7 @@ def confine(allowed: Limits, *, unpacks: bool, keep: int) -> None:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
         memory = pages * resource.getpagesize() + allowed.parse_memory_bytes
         bounds[resource.RLIMIT_AS] = memory, memory
-        if hasattr(os, "unshare"):
+        if sys.version_info >= (3, 12):
             with suppress(OSError):  # a container may forbid new namespaces
                 os.unshare(os.CLONE_NEWUSER | os.CLONE_NEWNET)
     for what, most in bounds.items():
