@@ -104,12 +104,14 @@ def _node(value: object, arrays: dict[str, NDArray[Any]]) -> Any:
 
 
 def decoded(raw: bytes) -> Answer:
-    """Return an answer; raises ValueError where it is none."""
+    """Return the answer behind the first byte; raises ValueError where there is none."""
     try:
-        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+        stream = io.BytesIO(raw)
+        with zipfile.ZipFile(stream) as archive:
             if sum(member.file_size for member in archive.infolist()) > len(raw):
                 raise ValueError("it unpacks to more than was sent")
-        with np.load(io.BytesIO(raw), allow_pickle=False) as packed:
+        stream.seek(1)
+        with np.load(stream, allow_pickle=False) as packed:
             arrays = {name: packed[name] for name in packed.files}
         header = json.loads(arrays.pop(_HEADER).tobytes())
         return Answer(header["refused"] is True, header["found"], arrays)

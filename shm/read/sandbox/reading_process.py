@@ -112,7 +112,7 @@ class _Reader:
             if status is None:
                 _forget()
         try:
-            return decoded(bytes(memoryview(raw)[1:]))
+            return decoded(raw)
         except ValueError:
             timed_out = -signal.SIGALRM if raw.startswith(_TIME_IS_UP) else -signal.SIGKILL
             status = timed_out if status is None else status
@@ -128,21 +128,21 @@ class _Reader:
             self.process.wait()
 
 
-def _received(pipe: int, limits: Limits) -> bytes | bytearray:
+def _received(pipe: int, limits: Limits) -> bytes:
     """Return all that a child writes, `_TIME_IS_UP` where that takes too long."""
     deadline = time.monotonic() + WALL_SECONDS * limits.parse_seconds + _GRACE_S
     most = LARGEST_ANSWER * limits.bytes_at_once + (1 << 21)
-    found, poll = bytearray(), select.poll()
+    parts, poll = [b""], select.poll()
     poll.register(pipe, select.POLLIN | select.POLLHUP)
-    while len(found) <= most:
+    while most > 0:
         left = deadline - time.monotonic()
         if left <= 0 or not poll.poll(1000 * left):
             return _TIME_IS_UP
-        part = os.read(pipe, 1 << 20)
-        if not part:
+        parts.append(os.read(pipe, 1 << 20))
+        most -= len(parts[-1])
+        if not parts[-1]:
             break
-        found += part
-    return found
+    return b"".join(parts)
 
 
 def _death(status: int, path: str, limits: Limits, *, begun: bool) -> ShmError:
