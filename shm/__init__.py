@@ -16,7 +16,7 @@ In a notebook, from a recording to the tension and what limits it::
 - A hanger: `load_hanger` (from TOML), `round_bar` (from its diameter), `Hanger` (from all figures).
 - The steps: `read`, `identify`, `update`, `select`, `diagnose`; `simulate` makes a recording whose
   truth is known (a `PlantedEffect` is part of it); `load_modes` takes modal tests that were
-  identified before, or elsewhere.
+  identified before, or elsewhere; `from_sep005` takes channels of other programs of the field.
 - `check_gap` says beforehand which effects `diagnose` would find, and from which size on.
 - `diagnose_simulator` asks the same of any simulator of your own: a `Simulator` with a `Prior` for
   each parameter, a `SimulatorEffect` for each possible cause, and a `Reading` for each measurement.
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from shm.api import check_gap as check_gap
     from shm.api import diagnose as diagnose
     from shm.api import diagnose_simulator as diagnose_simulator
+    from shm.api import from_sep005 as from_sep005
     from shm.api import identify as identify
     from shm.api import load_hanger as load_hanger
     from shm.api import load_modes as load_modes
@@ -79,8 +80,8 @@ __version__ = "1.0.0"
 _STEPS_AND_PACKAGES = ("identify", "read", "simulate")
 _HOMES = {
     "shm.api": (
-        "Store", "check_gap", "diagnose", "diagnose_simulator", "load_hanger", "load_modes",
-        "round_bar", "select", "update",
+        "Store", "check_gap", "diagnose", "diagnose_simulator", "from_sep005", "load_hanger",
+        "load_modes", "round_bar", "select", "update",
     ),
     "shm.errors": ("ShmError",),
     "shm.gap.simulator_problem": ("Prior", "Reading", "Simulator", "SimulatorEffect"),

@@ -193,6 +193,7 @@ def command(ctx: click.Context, /, file: Path, dry_run: bool, **said: Any) -> in
     found = understand(first.survey, workspace, answers) if answers != _whole_file(said) else first
     if found.questions and asks:
         _show(found)
+        answers = asked(found.of_test, answers, workspace, partial(_answer, found))
         while found.questions:  # a column with a unit may be a sensor, whose place is asked next
             answers = asked(found.questions, answers, workspace, partial(_answer, found))
             found = understand(found.survey, workspace, answers)

@@ -11,7 +11,7 @@ from typing import TypeVar
 import rich_click as click
 
 from shm.errors import BadInput, UsageError
-from shm.pipeline.import_answers import answer_time
+from shm.pipeline.import_answers import answer_temperature, answer_time
 from shm.pipeline.importing import Answers, Question
 from shm.store import Workspace
 
@@ -32,6 +32,8 @@ def asked(
             answers = replace(answers, sampling_rate_hz=_prompt(question, _rate_hz))
         elif question.about == "time":
             answers = _prompt(question, partial(answer_time, answers=answers))
+        elif question.about == "temperature":
+            answers = _prompt(question, partial(answer_temperature, answers=answers))
         else:
             given = _prompt(question, partial(of_channel, question))
             tables.setdefault(question.channel, {}).update(given)
@@ -53,7 +55,8 @@ def _prompt(question: Question, take: Callable[[str], T]) -> T:
         except (UsageError, BadInput) as error:
             raise click.UsageError(str(error)) from error
 
-    answer: T = click.prompt(question.text, value_proc=taken)
+    told = f" [{', '.join(question.choices)}]" if question.choices else ""
+    answer: T = click.prompt(f"{question.text}{told}", value_proc=taken)
     return answer
 
 

@@ -333,9 +333,9 @@ def _missing(look: Peek, workspace: Workspace | None) -> list[str]:
 
 
 def _say_it(look: Peek) -> str:
-    file = shlex.quote(look.source)
-    is_member = not Path(look.source).is_file()
-    return "unpack it and run `shm import` on it" if is_member else f"run `shm import {file}`"
+    source = Path(look.source)  # a member of an archive, or a record of a file, lies below it
+    file = next((each for each in (source, *source.parents) if each.is_file()), source)
+    return f"run `shm import {shlex.quote(str(file))}`"
 
 
 def _modes(path: Path) -> Peek:

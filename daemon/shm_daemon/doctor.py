@@ -297,11 +297,10 @@ def check_confinement() -> Iterator[Finding]:
         yield warning(
             "confinement",
             f"files are read without {name}: {why}",
-            "A file made to take its reader over could do what this user may: let nobody send "
-            "files whom you do not trust, or run shm on a newer Linux, on x86_64 or aarch64.",
+            "A damaged file may fill the memory of this computer: run shm on Linux.",
         )
     if not missing:
-        yield ok("confinement", "files are read within limits, Landlock and a list of system calls")
+        yield ok("confinement", "each file is read in a process with limits of time and memory")
 
 
 def check_folders(folder: Path) -> Iterator[Finding]:

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -35,6 +35,7 @@ from shm.models import DESCRIPTION, build, competing_names
 from shm.models.base import Conditions, Model
 from shm.read import read as read_file
 from shm.read import registry
+from shm.read import sep005 as sep005_channels
 from shm.settings import Settings, load_settings
 from shm.simulate import (
     HammerPlan,
@@ -57,7 +58,8 @@ from shm.values import (
 )
 
 __all__ = [
-    "Store", "check_gap", "diagnose", "diagnose_simulator", "identify", "load_hanger",
+    "Store", "check_gap", "diagnose", "diagnose_simulator", "from_sep005", "identify",
+    "load_hanger",
     "load_modes", "read", "round_bar", "select", "simulate", "update",
 ]  # fmt: skip
 
@@ -76,6 +78,22 @@ def read(path: str | Path) -> Recording | FrequencyResponse:
         ['force', 'acc_1', 'acc_2']
     """
     return read_file(Path(path))
+
+
+def from_sep005(
+    channels: Sequence[Mapping[str, Any]] | Mapping[str, Any], *, hanger: int | None = None
+) -> Recording:
+    """Return the recording of channels in SDyPy's form (SEP005), as the field's readers give them.
+
+    Channels in units of force or acceleration are taken; `Recording.to_sep005` gives them back.
+    Raises BadInput naming the channel.
+
+    Example:
+        >>> acceleration = {"data": [0.0, 0.1] * 50, "name": "acc", "unit_str": "g", "fs": 100.0}
+        >>> shm.from_sep005([acceleration], hanger=3).samples
+        100
+    """
+    return sep005_channels.from_sep005(channels, hanger=hanger)
 
 
 def load_modes(path: str | Path) -> tuple[ModalTest, ...]:

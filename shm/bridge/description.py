@@ -11,7 +11,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from datetime import date, datetime
+from datetime import UTC, date, datetime, tzinfo
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -166,7 +166,7 @@ class Bridge:
     `structures` are those without a model, of which frequencies alone are watched: a deck, a pylon.
     Their numbers are none of a hanger. `measurement_hours` is what each kind of measurement costs.
     `as_in_file` is the bridge without what the page Settings
-    has changed; None where it has changed nothing.
+    has changed; None where it has changed nothing. `time_zone` is that of clocks that name none.
     """
 
     name: str
@@ -184,6 +184,7 @@ class Bridge:
     as_in_file: Bridge | None = None
     single_sign_on: SingleSignOn | None = None
     assumptions: Assumptions = DEFAULTS
+    time_zone: tzinfo = UTC
 
     @property
     def escalation_s(self) -> dict[str, float]:
@@ -266,6 +267,7 @@ def _described(document: dict[str, Any], path: Path) -> Bridge:
         measurement_hours=_hours(document, path),
         single_sign_on=single_sign_on_of(document, path),
         assumptions=assumed,
+        time_zone=zone,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +10,7 @@ from shm.documents import parse_time
 from shm.errors import UsageError
 from shm.pipeline.importing import WORTHS, Answers, Import, Question, Understood
 from shm.read.logger_words import KNOWN, seconds_of, sensitivity_of, unit_of, volts_of
-from shm.values import PLANES, Plane
+from shm.values import NAN, PLANES, Plane, outdoor_c
 
 _PLANES: dict[str, Plane] = {
     "transverse": "transverse", "t": "transverse", "quer": "transverse",
@@ -56,6 +57,19 @@ def answer_time(text: str, answers: Answers) -> Answers:
         return replace(answers, time=parse_time(text.strip()))
     except (ValueError, OverflowError):
         raise UsageError(f"{text!r} is no day.", remedy="Write it as 2026-05-01.") from None
+
+
+def answer_temperature(text: str, answers: Answers) -> Answers:
+    """Return the answers with the temperature of the steel, by degrees Celsius or 'unknown'."""
+    if text.strip().lower() in _UNKNOWN:
+        return replace(answers, is_temperature_unknown=True)
+    try:
+        number = float(text.replace(",", "."))
+    except ValueError:
+        number = NAN
+    if math.isnan(outdoor_c(number)):
+        raise UsageError(f"{text!r} is no temperature outdoors.", remedy="Give degrees Celsius.")
+    return replace(answers, temperature_c=number)
 
 
 def unit_recorded(name: str, found: Import) -> str:
@@ -111,18 +125,20 @@ def import_document(found: Import) -> dict[str, Any]:
         "samples": survey.samples,
         "columns": [_column(column) for column in found.columns],
         "questions": [question_document(question) for question in found.questions],
+        "of_test": [question_document(question) for question in found.of_test],
         "problems": list(found.problems),
         "remarks": list(found.remarks),
     }
 
 
-def question_document(question: Question) -> dict[str, str]:
+def question_document(question: Question) -> dict[str, object]:
     """A question, and the option of `shm import` that answers it."""
     return {
         "about": question.about,
         "channel": question.channel,
         "text": question.text,
         "option": question.option,
+        "choices": list(question.choices),
     }
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from shm.errors import BadInput
 from shm.read import logger_words as words
 from shm.read.base import Survey
-from shm.read.comma_table import REMEDY, rate_of
 from shm.read.sidecar import Described
+from shm.read.time_axis import REMEDY, rate_of
 from shm.values import NAN, FloatArray
 
 

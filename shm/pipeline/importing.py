@@ -11,7 +11,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import datetime, tzinfo
 from datetime import time as clock_time
 from importlib import import_module
 from pathlib import Path
@@ -30,9 +30,9 @@ from shm.read.header import CHANNEL_KEYS, Entry, Header
 from shm.read.profiles import Profile, completed, profile_for, save_profile, with_day_order
 from shm.read.sandbox import survey
 from shm.read.sidecar import Described, document_beside
-from shm.read.stamps import DayOrder, order_of_choice
+from shm.read.stamps import DayOrder, in_zone, order_of_choice
 from shm.store import Workspace
-from shm.values import NAN, Channel, Plane, Quantity, Recording
+from shm.values import NAN, PLANES, Channel, Plane, Quantity, Recording
 
 WORTHS = {
     "full scale": ("the full scale", ("50 g", "2000 N")),
@@ -49,7 +49,7 @@ class Answers:
 
     `channels` are keys of a sidecar's table of a channel, by its name. `each_time`: the logger
     goes from hanger to hanger, and its profile is to name none. `is_time_unknown`: which of two
-    days the file means is not known either.
+    days the file means, or when it was at all, is not known either.
     """
 
     hanger: int | None = None
@@ -59,6 +59,7 @@ class Answers:
     channels: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     each_time: bool = False
     is_time_unknown: bool = False
+    is_temperature_unknown: bool = False
 
     @property
     def said(self) -> dict[str, Any]:
@@ -76,14 +77,17 @@ class Answers:
 
 @dataclass(frozen=True)
 class Question:
-    """What only a person knows: of a channel, or of the whole file where `channel` is empty; a file
-    can be taken in without what is not `needed`."""
+    """What only a person knows: of a channel, or of the whole file where `channel` is empty.
+
+    A file can be taken in without what is not `needed`. `choices` are the usual answers.
+    """
 
     about: str
     channel: str
     text: str
     option: str
     needed: bool = True
+    choices: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -110,7 +114,8 @@ class Understood:
 @dataclass(frozen=True, eq=False)
 class Import:
     """A file as it is understood. `described` is its sidecar, `kept` what its logger's profile is
-    to say; `problems` are what nobody can answer.
+    to say; `problems` are what nobody can answer. `of_test` asks when it was and how warm, which is
+    asked once where anything is, and of one file alone.
     """
 
     survey: Survey
@@ -122,6 +127,7 @@ class Import:
     hanger: int | None
     questions: tuple[Question, ...]
     problems: tuple[str, ...]
+    of_test: tuple[Question, ...] = ()
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -152,15 +158,17 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     path = Path(found.source)
     profile = profile_for(found.layout, workspace.folder)
     own = _joined(document_beside(path), answers.said)
-    own, order = _with_chosen_time(own, found)
+    own, order = _with_chosen_time(own, found, workspace.bridge.time_zone)
     _refuse_unknown(own, found, path)
     known = profile.described if profile is not None else {}
-    described = with_times(completed(known, found.layout, own, path.name), found)
+    zone = workspace.bridge.time_zone
+    described = with_times(completed(known, found.layout, own, path.name, zone), found)
     hanger = described.get("hanger", found.hanger)
     rate, uneven = rate_told(found, described)
-    questions = _questions(found, described, hanger, rate)
-    if found.layout.possible_times and "time" not in described and not answers.is_time_unknown:
-        questions.append(_of_time([each.time for each in found.layout.possible_times]))
+    questions = _questions(found, described, hanger, rate, workspace)
+    of_test = _of_test(found, described, answers)
+    if found.layout.possible_times:  # two days in question are asked of each file
+        questions += [each for each in of_test if each.about == "time"]
     problems = (
         *_hanger_problem(hanger, workspace),
         *_place_problems(found, described, hanger, workspace),
@@ -175,8 +183,9 @@ def understand(found: Survey, workspace: Workspace, answers: Answers) -> Import:
     columns = _columns(found, described, record, rate)
     problems = (*problems, *((fault,) if fault else ()))
     return Import(
-        found, described, kept, profile, columns, rate, hanger, tuple(questions), problems
-    )
+        found, described, kept, profile, columns, rate, hanger, tuple(questions), problems,
+        tuple(each for each in of_test if each not in questions),
+    )  # fmt: skip
 
 
 def keep_profile(found: Import, workspace: Workspace, *, each_time: bool = False) -> Profile | None:
@@ -188,7 +197,9 @@ def keep_profile(found: Import, workspace: Workspace, *, each_time: bool = False
     return save_profile(found.kept, found.survey.layout, workspace.folder, roams=each_time)
 
 
-def _with_chosen_time(own: dict[str, Any], found: Survey) -> tuple[dict[str, Any], DayOrder | None]:
+def _with_chosen_time(
+    own: dict[str, Any], found: Survey, zone: tzinfo
+) -> tuple[dict[str, Any], DayOrder | None]:
     """Return the sidecar with the complete time, and the order of day and month that is known now.
 
     A person may name one of the possible times by its day alone.
@@ -198,7 +209,8 @@ def _with_chosen_time(own: dict[str, Any], found: Survey) -> tuple[dict[str, Any
         return own, found.layout.day_order
     order = order_of_choice(time, possible) or found.layout.day_order
     same = [each.time for each in possible if each.time.date() == time.date()]
-    return {**own, "time": same[0]} if same and time.time() == clock_time.min else own, order
+    is_day = bool(same) and time.time() == clock_time.min
+    return {**own, "time": in_zone(same[0], zone)} if is_day else own, order
 
 
 def _joined(first: Described, then: Described) -> dict[str, Any]:
@@ -256,10 +268,17 @@ def _place_problems(
 # ---------------------------------------------------------------- what is open
 
 
-def _questions(found: Survey, described: Described, hanger: object, rate: float) -> list[Question]:
+_UNITS = ("N", "kN", "lbf", "m/s2", "mm/s2", "g", "mg", "s", "none")
+
+
+def _questions(
+    found: Survey, described: Described, hanger: object, rate: float, workspace: Workspace
+) -> list[Question]:
     asked: list[Question] = []
     if hanger is None:
-        asked.append(Question("hanger", "", "Which hanger was tested?", "--hanger N"))
+        known = tuple(str(each.id) for each in workspace.bridge.watched)
+        text, option = "Which hanger was tested?", "--hanger N"
+        asked.append(Question("hanger", "", text, option, choices=known))
     if math.isnan(rate) and not found.lines:
         asked.append(Question("rate", "", "How many samples a second?", "--rate HZ"))
     columns = [_told(column, described) for column in found.columns]
@@ -267,10 +286,30 @@ def _questions(found: Survey, described: Described, hanger: object, rate: float)
     return asked + [each for column in columns for each in _of_sensor(column, described)]
 
 
-def _of_time(possible: Sequence[datetime]) -> Question:
-    days = tuple(dict.fromkeys(f"{each:%Y-%m-%d}" for each in possible))
+def _says(described: Described, key: str, is_unknown: bool) -> bool:
+    return key in described or is_unknown
+
+
+def _of_test(found: Survey, described: Described, answers: Answers) -> list[Question]:
+    """Return the questions about time and temperature, without which a file can be taken in."""
+    asked = []
+    if found.time is None and not _says(described, "time", answers.is_time_unknown):
+        asked.append(_of_time(found))
+    warmth = _says(described, "temperature_c", answers.is_temperature_unknown)
+    if math.isnan(found.temperature_c) and not warmth:
+        text = "How warm was the steel, in degrees Celsius (or 'unknown')?"
+        asked.append(Question("temperature", "", text, "--temperature C", needed=False))
+    return asked
+
+
+def _of_time(found: Survey) -> Question:
+    possible = found.layout.possible_times
+    days = tuple(dict.fromkeys(f"{each.time:%Y-%m-%d}" for each in possible))
+    if not days:
+        text = "When was the test (such as 2026-05-01T10:00Z, or 'unknown')?"
+        return Question("time", "", text, "--time TIME", needed=False)
     text = f"Was the test on {' or on '.join(days)} (or 'unknown')?"
-    return Question("time", "", text, f"--time {'|'.join(days)}", needed=False)
+    return Question("time", "", text, f"--time {'|'.join(days)}", False, days)
 
 
 def _holds_nothing(found: Survey, described: Described, questions: Sequence[Question]) -> bool:
@@ -341,7 +380,8 @@ def _of_unit(column: SurveyedColumn) -> Question:
             one, examples = WORTHS[column.unit]
             text = f"What is {one} of {column.name} worth (such as {', '.join(examples)})?"
             option = f"--sensitivity {quoted}='{examples[0]}' or --leave-out {quoted}"
-    return Question("unit", column.name, text, option)
+    choices = _UNITS if option.startswith("--unit") else ()
+    return Question("unit", column.name, text, option, choices=choices)
 
 
 def _of_sensor(column: SurveyedColumn, described: Described) -> list[Question]:
@@ -354,7 +394,8 @@ def _of_sensor(column: SurveyedColumn, described: Described) -> list[Question]:
         asked.append(Question("place", name, text, f"--place {quoted}=M", needed=moves))
     if moves and column.plane is None and "plane" not in described:
         text = f"In which plane does {name} measure (transverse or longitudinal)?"
-        asked.append(Question("plane", name, text, f"--plane {quoted}=transverse|longitudinal"))
+        option = f"--plane {quoted}=transverse|longitudinal"
+        asked.append(Question("plane", name, text, option, choices=PLANES))
     return asked
 
 

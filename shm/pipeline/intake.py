@@ -13,12 +13,12 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, tzinfo
 from pathlib import Path
 
 from shm.errors import BadInput, TooLarge
 from shm.pipeline.lineage import read_limits
-from shm.read import holds_test, sidecar_path
+from shm.read import sidecar_path
 from shm.read.base import Layout
 from shm.read.profiles import Profile, any_profile, completed, learn_day_order, profile_for
 from shm.read.sandbox import layout_of
@@ -152,27 +152,30 @@ def _learnt_sidecar(path: Path, workspace: Workspace, follow: bool) -> str | Non
     It is kept with the file, so that a profile which changes later changes no test of before. None
     where there is no such profile, or it adds nothing.
     """
-    may_teach = any_profile(workspace.folder) or may_hold_days(path)
+    zone = workspace.bridge.time_zone
+    may_teach = any_profile(workspace.folder) or may_hold_days(path) or zone is not UTC
     if not may_teach or (path.is_symlink() and not follow):
         return None
     known = _layout_and_sidecar(path, workspace)
     if known is None:
         return None
     profile = learn_day_order(known[0], known[0].day_order, workspace.folder)
-    return _completed_text(profile, *known, path)
+    return _completed_text(profile, *known, path, zone)
 
 
 def _by_profile(path: Path, workspace: Workspace) -> str | None:
     """Make the sidecar of a file by its logger's profile, which stays as it is."""
-    known = _layout_and_sidecar(path, workspace) if any_profile(workspace.folder) else None
+    zone = workspace.bridge.time_zone
+    may_add = any_profile(workspace.folder) or zone is not UTC
+    known = _layout_and_sidecar(path, workspace) if may_add else None
     if known is None:
         return None
-    return _completed_text(profile_for(known[0], workspace.folder), *known, path)
+    return _completed_text(profile_for(known[0], workspace.folder), *known, path, zone)
 
 
 def _layout_and_sidecar(path: Path, workspace: Workspace) -> tuple[Layout, Described] | None:
     """Return how a recording looks and what its own sidecar says; None of what cannot be read."""
-    if holds_test(path) or path.name.lower().endswith(MODES_SUFFIX):
+    if path.name.lower().endswith(MODES_SUFFIX):
         return None
     try:
         return layout_of(path, read_limits(workspace.settings)), document_beside(path)
@@ -181,10 +184,12 @@ def _layout_and_sidecar(path: Path, workspace: Workspace) -> tuple[Layout, Descr
 
 
 def _completed_text(
-    profile: Profile | None, layout: Layout, own: Described, path: Path
+    profile: Profile | None, layout: Layout, own: Described, path: Path, zone: tzinfo
 ) -> str | None:
-    """Return what a profile adds to a file's own sidecar, with it; None where that is nothing."""
-    whole = completed(profile.described, layout, own, path.name) if profile is not None else own
+    """Return what profile and zone add to a file's own sidecar, with it; None if it is nothing."""
+    known = profile.described if profile is not None else {}
+    is_silent = profile is None and zone is UTC
+    whole = own if is_silent else completed(known, layout, own, path.name, zone)
     return sidecar_text(whole) if whole != own else None
 
 
@@ -197,7 +202,7 @@ def learn_from_answer(workspace: Workspace, store: Store, hold: Hold) -> None:
         with workspace.archive.opened(recording.file) as path:
             layout = layout_of(path, read_limits(workspace.settings))
     except BadInput:
-        return  # an archive of several files has no logger's layout
+        return  # an archive of several loggers has no layout
     order = order_of_choice(hold.time, layout.possible_times)
     learn_day_order(layout, order, workspace.folder)
 

@@ -1,30 +1,33 @@
-"""The end that all formats share: header, sidecar and raw numbers become values in SI units, of
-time records and of frequency responses.
+"""A described table becomes a recording, frequency responses, or a look at what they will be.
+
+Every check is written once: reading raises the first refusal, a look lists all of them.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from shm.errors import BadInput
 from shm.read.base import Peek, PeekChannel
 from shm.read.header import OF_TEST, Header
-from shm.read.limits import limits, refuse_many_samples
+from shm.read.limits import limits, refuse_large, refuse_many_samples
 from shm.read.logger_words import ACCELERANCE
+from shm.read.sidecar import sidecar_path
+from shm.read.table import Column, Description, Table, describe, is_raw
+from shm.read.time_axis import on_even_grid, rate_of
 from shm.values import (
     NAN,
     Channel,
     ComplexArray,
     FloatArray,
     FrequencyResponse,
-    Plane,
-    Quantity,
     Recording,
     ResponsePoint,
 )
@@ -33,34 +36,257 @@ from shm.values import (
 LEAST_SAMPLES = 16
 LARGEST = 1e9  # N or m/s^2: beyond, the bytes are not what the headers say
 _SAME_RATE = 1e-4
+_ROUNDED = 1e-3  # judgement: of the rate that the file says; so small a difference moves no tension
+_OFF_GRID = 0.05  # steps: analysers round the frequencies that they list
 _NAME_THEM = (
     "Name accelerometers acc_1, acc_2, ..., or give in NAME.toml a table [channel.NAME] with"
     ' unit = "m/s2" for each; `shm import FILE` asks and keeps it for all files of this logger.'
 )
 _LEAVE_OUT = "Leave the others out: [channel.NAME] with leave_out = true in NAME.toml."
 
-T = TypeVar("T")
+Attempt = Callable[[Callable[[], Any], Any], Any]
+"""Runs a check; the second argument stands for one that fails where faults are noted."""
+
+
+def strictly(check: Callable[[], Any], _: Any) -> Any:
+    """Run a check; its refusal is raised."""
+    return check()
+
+
+def collecting(problems: list[str]) -> Attempt:
+    """Return the attempt that notes a refusal among `problems`."""
+
+    def attempt(check: Callable[[], Any], otherwise: Any) -> Any:
+        try:
+            return check()
+        except BadInput as refusal:
+            if str(refusal) not in problems:
+                problems.append(str(refusal))
+            return otherwise
+
+    return attempt
+
+
+# ---------------------------------------------------------------- a table
+
+
+def assemble(table: Table, described: Description | None = None) -> Recording | FrequencyResponse:
+    """Return the values of a table in SI units, described by file and sidecar; raises BadInput."""
+    if table.refusal is not None:
+        raise table.refusal
+    found = described or describe(table)
+    header, path = found.header, table.path
+    if found.is_response:
+        responses = np.array([column.load() for column in found.used], dtype=np.complex128)
+        listed = _listed_hz(found).load()
+        coherence = _coherence(found)
+        response = frequency_response(header, listed, responses, coherence, path)
+        return replace(response, source=table.source)
+    for column in found.used or table.columns:
+        _refuse_raw(column, header, path)
+    if not found.used:
+        raise _no_channel(found)
+    _samples(found)
+    rate = _told_rate(found, with_times=False)
+    values = _rows(found.used, path)
+    if found.times is not None:
+        seconds = found.seconds * np.asarray(found.times.load(), float)
+        values, by_times = on_even_grid(seconds, values, table.uneven(found.times))
+        rate = _beside_said(by_times, header, path)
+    made = replace(recording(header, values, path, rate), source=table.source)
+    possible = tuple(dict.fromkeys(each.time for each in table.possible_times))
+    return made if made.time else replace(made, possible_times=possible)
+
+
+def peek(table: Table, file_format: str) -> Peek:
+    """Return what is said of a table, without its values; faults become problems."""
+    problems = list(table.problems)
+    attempt = collecting(problems)
+    if table.refusal is not None:
+        return Peek(table.source, file_format, (), 0, problems=(*problems, str(table.refusal)))
+    found = attempt(lambda: describe(table), None)
+    if found is None:
+        found = describe(table, with_beside=False)
+    header, path = found.header, table.path
+    if found.is_response:
+        listed = _listed_hz(found)
+        look = _peeked_response(header, file_format, lambda: listed.load(), path, attempt)
+    else:
+        samples = attempt(lambda: _samples(found), 0)
+        rate = partial(_told_rate, found, with_times=True)
+        look = _peeked(header, file_format, samples, rate, path, attempt)
+        for column in found.used or table.columns:
+            attempt(partial(_refuse_raw, column, header, path), None)
+    possible = tuple(dict.fromkeys(each.time for each in table.possible_times))
+    return replace(
+        look,
+        source=table.source,
+        left_out=found.left_out,
+        problems=tuple(problems),
+        possible_times=() if look.time else possible,
+    )
+
+
+def _samples(found: Description) -> int:
+    """Return the length of all channels; raises BadInput where they differ or are too long."""
+    path, first = found.table.path, next(iter(found.used or found.table.choosable), None)
+    if first is None:
+        return 0
+    refuse_many_samples(first.size, path)
+    for column in found.used:
+        if column.size != first.size:
+            raise BadInput(
+                f"has {column.size} values, {first.name} {first.size}.",
+                file=path,
+                channel=column.name,
+                remedy="Export all channels of one recording with one length and rate.",
+            )
+    return first.size
+
+
+def _rows(used: Sequence[Column], path: Path) -> FloatArray:
+    if sum(column.size for column in used) > limits().values_at_once:
+        refuse_large((len(used), used[0].size), 8, "", path)
+    return np.array([column.load() for column in used], dtype=np.float64)
+
+
+def _told_rate(found: Description, *, with_times: bool) -> float:
+    """Return the rate that the data tell, NaN where nothing does or it agrees with what is said.
+
+    The times are loaded only where they are asked for and nothing else says the rate.
+    """
+    table, header = found.table, found.header
+    _refuse_different_rates(found)
+    rate = table.clock_rate_hz
+    if math.isnan(rate):
+        shown = found.used or table.choosable
+        rate = next((c.rate_hz for c in shown if not math.isnan(c.rate_hz)), NAN)
+    if found.times is not None and with_times and math.isnan(header.sampling_rate_hz):
+        seconds = found.seconds * np.asarray(found.times.load(), float)
+        rate = rate_of(seconds, table.uneven(found.times))
+    return _beside_said(rate, header, table.path)
+
+
+def _beside_said(rate_hz: float, header: Header, path: Path) -> float:
+    """Return a rate of times, NaN where it agrees with the one that the same file says.
+
+    A column of times is rounded to its last digit, and a preamble's rate is the one that was set.
+    """
+    entry, said = header.entries.get("sampling_rate_hz"), header.sampling_rate_hz
+    agree = abs(rate_hz - said) <= _ROUNDED * said
+    return NAN if agree and entry is not None and entry.file == path else rate_hz
+
+
+def _refuse_different_rates(found: Description) -> None:
+    path, told = found.table.path, found.header.entries.get("sampling_rate_hz")
+    first = found.used[0] if found.used else None
+    for column in found.used:
+        if first is not None and str(column.rate_hz) != str(first.rate_hz):
+            raise BadInput(
+                f"{column.label} has {column.size} samples every {_step_s(column):g} s,"
+                f" {first.label} {first.size} every {_step_s(first):g} s.",
+                file=path,
+                remedy="Export all channels of one recording with one length and rate.",
+            )
+    silent = [column for column in found.used if math.isnan(column.rate_hz)]
+    stated = [column.facts.get("sampling_rate_hz") for column in silent]
+    rates = {entry.text if entry is not None else "" for entry in stated}
+    if len(rates) > 1 and (told is None or told.file == path):
+        raise BadInput(
+            f"the channels have different sampling rates ({', '.join(sorted(rates))}).",
+            file=path,
+            remedy="Export all channels of one recording with one length and rate.",
+        )
+
+
+def _step_s(column: Column) -> float:
+    return 0.0 if math.isnan(column.rate_hz) else 1 / column.rate_hz
+
+
+def _refuse_raw(column: Column, header: Header, path: Path) -> None:
+    """Raise BadInput for a channel in counts, or of nothing known, that nobody gives a worth."""
+    if is_raw(column, header):
+        raise BadInput(
+            f"holds {column.unit}, and nobody says what one is worth.",
+            file=path,
+            channel=column.name,
+            remedy=f"Write into {sidecar_path(path).name}, or for all files of a stream into its "
+            f'stream.toml: [channel.{column.name}] with unit = "m/s2" and calibration = the m/s2 '
+            "of one of them (1 / the recorder's sensitivity).",
+        )
+
+
+def _no_channel(found: Description) -> BadInput:
+    """Return the refusal of a file without a channel, with what it holds instead."""
+    held = ", ".join(found.left_out[:20]) or "nothing that is read"
+    example = found.left_out[0] if found.left_out else "acc_1"
+    return BadInput(
+        f"no channel holds an acceleration. The file holds {held}.",
+        file=found.table.path,
+        remedy=f'Say in NAME.toml what each is: [channel."{example}"] with unit = "m/s2";'
+        " `shm import FILE` asks and keeps it for all files of this logger.",
+    )
+
+
+def _listed_hz(found: Description) -> Column:
+    if found.frequencies is None:
+        lines = found.used[0].size if found.used else 0
+        raise BadInput(
+            f"no array holds the frequencies of its {lines} lines.",
+            file=found.table.path,
+            remedy='Name the array frequency_hz, or give it unit = "Hz" in NAME.toml.',
+        )
+    return found.frequencies
+
+
+def _coherence(found: Description) -> FloatArray | None:
+    """Return coherences (points, lines) where there is one for each response, else None."""
+    known = {c.name: c for c in found.table.columns if not c.is_complex}
+    wanted = []
+    for name, said in found.header.channels.items():
+        wanted.append(
+            known.get(said["coherence"].text if "coherence" in said else f"{name}_coherence")
+        )
+    rows = [c for c in wanted if c is not None and c.size == found.used[0].size]
+    whole = rows and len(rows) == len(wanted)
+    return _rows(rows, found.table.path) if whole else None
+
+
+# ---------------------------------------------------------------- time records
 
 
 def recording(header: Header, values: FloatArray, path: Path, file_rate_hz: float) -> Recording:
-    """A recording of raw `values` (channels, samples), checked; raises BadInput.
+    """Return a recording of raw `values` (channels, samples), checked; raises BadInput.
 
     `file_rate_hz` is the rate that the data themselves tell (a time column, an abscissa), or NaN.
     """
-    rate = checked_rate(header, file_rate_hz, path)
-    _refuse_short(values.shape[1], path)
-    refuse_many_samples(values.shape[1], path)
-    channels = tuple(
-        _channel(header, name, row, path)
-        for name, row in zip(header.channels, values, strict=True)
-        if not header.leaves_out(name)
-    )
-    refuse_quantities([channel.quantity for channel in channels], path)
-    return Recording(str(path), channels, rate, **header.of_test)
+    look = _peeked(header, "", values.shape[1], lambda: file_rate_hz, path, strictly)
+    rows = dict(zip(header.channels, values, strict=True))
+    channels = tuple(_channel(header, said, rows[said.name], path) for said in look.channels)
+    return Recording(str(path), channels, look.sampling_rate_hz, **header.of_test)
+
+
+def _peeked(
+    header: Header,
+    file_format: str,
+    samples: int,
+    file_rate_hz: Callable[[], float],
+    path: Path,
+    attempt: Attempt,
+) -> Peek:
+    names = [name for name in header.channels if not attempt(partial(header.leaves_out, name), 0)]
+    channels = tuple(_peek_channel(header, name, attempt) for name in names)
+    rate = attempt(lambda: checked_rate(header, file_rate_hz(), path), NAN)
+    quantities = [channel.quantity for channel in channels if channel.quantity]
+    if channels:
+        attempt(lambda: _refuse_few(samples, "the record has {} samples", path), None)
+        attempt(lambda: refuse_many_samples(samples, path), None)
+    attempt(lambda: refuse_quantities(quantities, path), None)
+    return Peek(str(path), file_format, channels, samples, rate, **read_of_test(header, attempt))
 
 
 def checked_rate(header: Header, file_rate_hz: float, path: Path) -> float:
-    """The sampling rate, from header or data; raises BadInput where neither or both differ."""
+    """Return the sampling rate; raises BadInput where neither header nor data say it, or differ."""
     said = header.sampling_rate_hz
     if math.isnan(said) and math.isnan(file_rate_hz):
         raise BadInput(
@@ -79,57 +305,22 @@ def checked_rate(header: Header, file_rate_hz: float, path: Path) -> float:
     return said
 
 
-def peeked(
-    header: Header,
-    file_format: str,
-    samples: int,
-    file_rate_hz: Callable[[], float],
-    path: Path,
-    problems: Sequence[str] = (),
-    left_out: Sequence[str] = (),
-) -> Peek:
-    """What a header says of a time record; faults, also of `file_rate_hz`, become `problems`."""
-    found = list(problems)
-    out = [name for name in header.channels if _is_left_out(header, name, found)]
-    used = [name for name in header.channels if name not in out]
-    channels = tuple(_peek_channel(header, name, found) for name in used)
-    rate = attempt(lambda: checked_rate(header, file_rate_hz(), path), NAN, found)
-    measured = [channel.quantity for channel in channels if channel.quantity]
-    attempt(lambda: refuse_quantities(measured, path), None, found)
-    if channels:
-        attempt(lambda: _refuse_short(samples, path), None, found)
-        attempt(lambda: refuse_many_samples(samples, path), None, found)
-    return Peek(
-        source=str(path),
-        format=file_format,
-        channels=channels,
-        samples=samples,
-        sampling_rate_hz=rate,
-        **read_of_test(header, found),
-        problems=tuple(found),
-        left_out=(*left_out, *out),
-    )
-
-
-def refuse_quantities(quantities: Sequence[Quantity], path: Path) -> None:
-    """Raises BadInput for too many or no accelerations, and for more than one force."""
+def refuse_quantities(quantities: Sequence[str], path: Path) -> None:
+    """Raise BadInput for too many or no accelerations, and for more than one force."""
     forces, accelerations = quantities.count("force"), quantities.count("acceleration")
+    most = limits().max_channels
     if accelerations == 0:
         raise BadInput("no channel holds an acceleration.", file=path, remedy=_NAME_THEM)
-    if accelerations > limits().max_channels:
-        raise BadInput(
-            f"{accelerations} accelerations; at most {limits().max_channels} are read.",
-            file=path,
-            remedy=_LEAVE_OUT,
-        )
+    if accelerations > most:
+        what = f"{accelerations} accelerations; at most {most} are read."
+        raise BadInput(what, file=path, remedy=_LEAVE_OUT)
     if forces > 1:
-        raise BadInput(
-            f"{forces} channels hold a force, where one hammer hits.", file=path, remedy=_LEAVE_OUT
-        )
+        what = f"{forces} channels hold a force, where one hammer hits."
+        raise BadInput(what, file=path, remedy=_LEAVE_OUT)
 
 
 def refuse_implausible(values: FloatArray, channel: str, path: Path) -> None:
-    """Raises BadInput for a channel without any number, with infinite or impossible ones."""
+    """Raise BadInput for a channel without any number, with infinite or impossible ones."""
     if np.isnan(values).all():
         raise BadInput(
             "holds no number at all (only NaN).",
@@ -147,68 +338,46 @@ def refuse_implausible(values: FloatArray, channel: str, path: Path) -> None:
         )
 
 
-def _channel(header: Header, name: str, raw: FloatArray, path: Path) -> Channel:
-    quantity, unit = header.quantity_and_unit(name)
-    calibration = header.calibration(name)
-    with np.errstate(invalid="ignore"):
-        values = raw * (unit.si if math.isnan(calibration) else unit.si * calibration)
-    refuse_implausible(values, name, path)
-    full_scale = header.full_scale(name) * unit.si
-    return Channel(
-        name, quantity, values, header.plane(name), header.x_m(name), full_scale,
-        header.says(name, "unit"),
-    )  # fmt: skip
-
-
-def _peek_channel(header: Header, name: str, problems: list[str]) -> PeekChannel:
-    no_plane: Plane | None = None
-    return PeekChannel(
-        name=name,
-        quantity=attempt(lambda: header.quantity_and_unit(name)[0], None, problems),
-        unit=header.unit_text(name),
-        plane=attempt(lambda: header.plane(name), no_plane, problems),
-        x_m=attempt(lambda: header.x_m(name), NAN, problems),
-        calibration=attempt(lambda: header.calibration(name), NAN, problems),
-        full_scale=attempt(lambda: header.full_scale(name), NAN, problems),
-    )
-
-
-def read_of_test(header: Header, problems: list[str]) -> dict[str, Any]:
-    """Return what a header says of the complete test; None and NaN where that is faulty.
-
-    Each fault is added to `problems`.
-    """
-    unknown = dict.fromkeys(OF_TEST) | {"temperature_c": NAN}
-    return {
-        key: attempt(partial(getattr, header, key), nothing, problems)
-        for key, nothing in unknown.items()
-    }
-
-
-def _is_left_out(header: Header, name: str, problems: list[str]) -> bool:
-    return attempt(lambda: header.leaves_out(name), False, problems)
-
-
-def attempt(verb: Callable[[], T], otherwise: T, problems: list[str]) -> T:
-    """What `verb` gives; where it refuses, `otherwise`, with the refusal noted."""
-    try:
-        return verb()
-    except BadInput as refusal:
-        problems.append(str(refusal))
-        return otherwise
-
-
-def _refuse_short(samples: int, path: Path) -> None:
-    if samples < LEAST_SAMPLES:
+def _refuse_few(count: int, what: str, path: Path) -> None:
+    if count < LEAST_SAMPLES:
         raise BadInput(
-            f"the record has {samples} samples; at least {LEAST_SAMPLES} are needed.",
+            f"{what.format(count)}; at least {LEAST_SAMPLES} are needed.",
             file=path,
-            remedy="Record some seconds, from before the hit until the vibration has died away.",
+            remedy="Export the frequency response over its whole band."
+            if "lines" in what
+            else "Record some seconds, from before the hit until the vibration has died away.",
         )
 
 
-_OFF_GRID = 0.05  # steps: analysers round the frequencies that they list
-_LEAST_LINES = 16
+def _channel(header: Header, said: PeekChannel, raw: FloatArray, path: Path) -> Channel:
+    quantity, unit = header.quantity_and_unit(said.name)
+    calibration = 1.0 if math.isnan(said.calibration) else said.calibration
+    with np.errstate(invalid="ignore"):
+        values = raw * (unit.si * calibration)
+    refuse_implausible(values, said.name, path)
+    scale, states_unit = said.full_scale * unit.si, header.says(said.name, "unit")
+    return Channel(said.name, quantity, values, said.plane, said.x_m, scale, states_unit)
+
+
+def _peek_channel(header: Header, name: str, attempt: Attempt) -> PeekChannel:
+    return PeekChannel(
+        name=name,
+        quantity=attempt(lambda: header.quantity_and_unit(name)[0], None),
+        unit=header.unit_text(name),
+        plane=attempt(partial(header.plane, name), None),
+        x_m=attempt(partial(header.x_m, name), NAN),
+        calibration=attempt(partial(header.calibration, name), NAN),
+        full_scale=attempt(partial(header.full_scale, name), NAN),
+    )
+
+
+def read_of_test(header: Header, attempt: Attempt) -> dict[str, Any]:
+    """Return what a header says of the complete test; None and NaN where that is faulty."""
+    unknown = dict.fromkeys(OF_TEST) | {"temperature_c": NAN}
+    return {key: attempt(partial(getattr, header, key), none) for key, none in unknown.items()}
+
+
+# ---------------------------------------------------------------- frequency responses
 
 
 def frequency_response(
@@ -218,112 +387,70 @@ def frequency_response(
     coherence: FloatArray | None,
     path: Path,
 ) -> FrequencyResponse:
-    """Accelerances (points, lines) at `listed_hz` (lines,), with lines from 0 added as NaN.
+    """Return accelerances (points, lines) at `listed_hz` (lines,), lines from 0 added as NaN.
 
     The points are the header's channels. Raises BadInput for an uneven grid and faulty values.
     """
     skipped, frequency = grid(listed_hz, path)
-    used = [row for row, name in enumerate(header.channels) if not header.leaves_out(name)]
-    names = [list(header.channels)[row] for row in used]
-    rows = [_scaled(header, n, values[row], path) for row, n in zip(used, names, strict=True)]
+    for row, name in zip(values, header.channels, strict=True):
+        row *= header.accelerance_si(name)
+        refuse_implausible(np.abs(row), name, path)
+    # estimates of few averages may stand a little off 0 to 1
+    if coherence is not None and (np.abs(coherence - 0.5) > 1.5).any():
+        raise BadInput(
+            "a coherence lies far outside 0 to 1.",
+            file=path,
+            remedy="Export the coherence anew, or leave it out.",
+        )
     return FrequencyResponse(
         str(path),
-        tuple(ResponsePoint(n, header.plane(n), header.x_m(n)) for n in names),
+        tuple(ResponsePoint(n, header.plane(n), header.x_m(n)) for n in header.channels),
         frequency,
-        _from_zero(np.array(rows), skipped),
-        None if coherence is None else _from_zero(_checked(coherence[used], path), skipped),
+        _from_zero(values, skipped),
+        None if coherence is None else _from_zero(coherence, skipped),
         **header.of_test,
     )
 
 
 def grid(listed_hz: FloatArray, path: Path) -> tuple[int, FloatArray]:
-    """How many lines the file leaves out below its first, and all frequencies from 0 in Hz."""
-    _refuse_few(len(listed_hz), path)
-    if not np.isfinite(listed_hz).all():
-        raise _uneven(path)
+    """Return how many lines a file leaves out below its first, and all frequencies from 0 in Hz."""
+    _refuse_few(len(listed_hz), "{} lines", path)
     step = float(listed_hz[-1] - listed_hz[0]) / (len(listed_hz) - 1)
     first = listed_hz[0] / step if step > 0 else NAN
-    if not 0 <= first + _OFF_GRID < limits().values_at_once:
-        raise _uneven(path)
-    skipped = round(float(first))
-    refuse_many_samples(skipped + len(listed_hz), path)
-    step = float(listed_hz[-1]) / (skipped + len(listed_hz) - 1)
-    frequency = step * np.arange(skipped + len(listed_hz), dtype=float)
-    if not np.abs(listed_hz - frequency[skipped:]).max() < _OFF_GRID * step:
-        raise _uneven(path)
-    return skipped, frequency
-
-
-def peeked_response(
-    header: Header,
-    file_format: str,
-    listed_hz: FloatArray,
-    path: Path,
-    left_out: Sequence[str] = (),
-) -> Peek:
-    """What the headers of frequency responses say; faults become `problems`."""
-    problems: list[str] = []
-    channels = tuple(peek_point(header, name, problems) for name in header.channels)
-    frequency = attempt(lambda: grid(listed_hz, path)[1], np.zeros(0), problems)
-    return Peek(
-        source=str(path),
-        format=file_format,
-        channels=channels,
-        samples=0,
-        **read_of_test(header, problems),
-        problems=tuple(problems),
-        lines=len(frequency),
-        frequency_step_hz=float(frequency[1]) if len(frequency) else NAN,
-        left_out=tuple(left_out),
-    )
-
-
-def peek_point(header: Header, name: str, problems: list[str]) -> PeekChannel:
-    """Return a point of frequency responses as its header describes it; faults are `problems`."""
-    attempt(lambda: header.accelerance_si(name), NAN, problems)
-    return PeekChannel(
-        name=name,
-        quantity="acceleration",
-        unit=header.unit_text(name) or ACCELERANCE,
-        plane=attempt(lambda: header.plane(name), None, problems),
-        x_m=attempt(lambda: header.x_m(name), NAN, problems),
-    )
-
-
-def _scaled(header: Header, name: str, raw: ComplexArray, path: Path) -> ComplexArray:
-    values: ComplexArray = raw * complex(header.accelerance_si(name))
-    refuse_implausible(np.abs(values), name, path)
-    return values
-
-
-def _checked(coherence: FloatArray, path: Path) -> FloatArray:
-    """Coherences; estimates of few averages may stand a little off 0 to 1."""
-    with np.errstate(invalid="ignore"):
-        if (np.abs(coherence - 0.5) > 1.5).any():
-            raise BadInput(
-                "a coherence lies far outside 0 to 1.",
-                file=path,
-                remedy="Export the coherence anew, or leave it out.",
-            )
-    return coherence
-
-
-def _from_zero(rows: np.ndarray, skipped: int) -> np.ndarray:
-    return np.pad(rows, ((0, 0), (skipped, 0)), constant_values=np.nan)
-
-
-def _refuse_few(lines: int, path: Path) -> None:
-    if lines < _LEAST_LINES:
-        raise BadInput(
-            f"{lines} lines; at least {_LEAST_LINES} are needed.",
-            file=path,
-            remedy="Export the frequency response over its whole band.",
-        )
-
-
-def _uneven(path: Path) -> BadInput:
-    return BadInput(
+    if 0 <= first + _OFF_GRID < limits().values_at_once:
+        skipped = round(float(first))
+        refuse_many_samples(skipped + len(listed_hz), path)
+        step = float(listed_hz[-1]) / (skipped + len(listed_hz) - 1)
+        frequency = step * np.arange(skipped + len(listed_hz), dtype=float)
+        if np.abs(listed_hz - frequency[skipped:]).max() < _OFF_GRID * step:
+            return skipped, frequency
+    raise BadInput(
         "its frequencies do not lie on an even grid from 0.",
         file=path,
         remedy="Export lines at whole multiples of one step.",
     )
+
+
+def _peeked_response(
+    header: Header,
+    file_format: str,
+    listed_hz: Callable[[], FloatArray],
+    path: Path,
+    attempt: Attempt,
+) -> Peek:
+    channels = []
+    for name in header.channels:
+        attempt(partial(header.accelerance_si, name), NAN)
+        plane = attempt(partial(header.plane, name), None)
+        x_m = attempt(partial(header.x_m, name), NAN)
+        unit = header.unit_text(name) or ACCELERANCE
+        channels.append(PeekChannel(name, "acceleration", unit, plane, x_m))
+    frequency = attempt(lambda: grid(listed_hz(), path)[1], np.zeros(0))
+    return Peek(
+        str(path), file_format, tuple(channels), 0, **read_of_test(header, attempt),
+        lines=len(frequency), frequency_step_hz=float(frequency[1]) if len(frequency) else NAN,
+    )  # fmt: skip
+
+
+def _from_zero(rows: np.ndarray, skipped: int) -> np.ndarray:
+    return np.pad(rows, ((0, 0), (skipped, 0)), constant_values=np.nan)

@@ -7,57 +7,18 @@ this time. By its fingerprint a logger's profile is found (`shm.read.profiles`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from shm.read.logger_words import Sensitivity
 from shm.read.stamps import DayOrder, PossibleTime
 from shm.values import NAN, AddedMass, FloatArray, FrequencyResponse, Plane, Quantity, Recording
 
-
-@dataclass(frozen=True, eq=False)
-class LoggerColumn:
-    """A column as recorded: `values` (samples,) in `unit` ("" where the file says none), NaN where
-    bad, of which `overloads` were beyond what the logger can record.
-    """
-
-    name: str
-    unit: str
-    values: FloatArray
-    overloads: int = 0
-    sensitivity: Sensitivity | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class LoggerTable:
-    """The content of a logger's file: its measured columns, and facts about all of it.
-
-    `said_rate_hz` is what its heading says, `times_rate_hz` what a column of times tells, NaN
-    without. `layout` are the words by which files of one logger are known. `is_text` is False of a
-    format that has a reader of its own; `title` is that of a text with one signal. `day_order` is
-    what its days prove of their order; `possible_times` are several where nothing does
-    and `time` can be read in several.
-    """
-
-    columns: tuple[LoggerColumn, ...]
-    said_rate_hz: float
-    times_rate_hz: float
-    hanger: int | None
-    time: datetime | None
-    temperature_c: float
-    names_line: int
-    layout: tuple[str, ...]
-    remarks: tuple[str, ...]
-    is_text: bool = True
-    title: str = ""
-    possible_times: tuple[PossibleTime, ...] = ()
-    day_order: DayOrder | None = None
-
-    @property
-    def samples(self) -> int:
-        return len(self.columns[0].values) if self.columns else 0
+if TYPE_CHECKING:
+    from shm.read.table import Table
 
 
 @dataclass(frozen=True)
@@ -103,26 +64,38 @@ class Peek:
 
 @dataclass(frozen=True)
 class Format:
-    """One file format: the suffixes it goes by and its verbs.
+    """One file format: the suffixes it goes by, how it is told, and how it is opened.
 
-    `recognises` judges the first bytes of a file; `write` is None of a format that is only read;
+    `recognises` judges the first bytes of a file; `open_tables` gives what a file holds, a table
+    for each record, as long as the context lasts. `write` is None of a format that is only read;
     `may_be_gzipped` says whether NAME.csv.gz is read too; `holds_responses` is False of one that
     holds time records alone, `names_channels` of one whose channels have numbers, or names of its
-    own. `table` gives all columns of a file, None where it holds no time records. `library` is what
-    it loads where a file is read.
+    own. `library` is what it loads where a file is read; `shared_suffixes` are those of a text that
+    its content may have too.
     """
 
     name: str
     suffixes: tuple[str, ...]
     recognises: Callable[[bytes], bool]
-    peek: Callable[[Path], Peek]
-    read: Callable[[Path], Recording | FrequencyResponse]
+    open_tables: Callable[[Path], AbstractContextManager[tuple[Table, ...]]]
     write: Callable[[Recording | FrequencyResponse, Path], None] | None = None
     may_be_gzipped: bool = False
     holds_responses: bool = True
     names_channels: bool = True
-    table: Callable[[Path], LoggerTable | None] | None = None
     library: str = ""
+    shared_suffixes: tuple[str, ...] = ()
+
+
+def at_once(
+    open_tables: Callable[[Path], tuple[Table, ...]],
+) -> Callable[[Path], AbstractContextManager[tuple[Table, ...]]]:
+    """Return the way to open a file that need not stay open."""
+
+    @contextmanager
+    def opened(path: Path) -> Iterator[tuple[Table, ...]]:
+        yield open_tables(path)
+
+    return opened
 
 
 def names_in(described: Recording | FrequencyResponse) -> list[str]:
@@ -180,8 +153,8 @@ class Survey:
 class Layout:
     """The layout by which files of one logger are recognised, and facts of this one.
 
-    `hanger` and `says_rate` are what a profile must not say in its stead. `day_order` and
-    `possible_times` are those of its table.
+    `hanger` and `says_rate` are what a profile must not say in its stead. `day_order`,
+    `possible_times` and `local_time` are those of its table.
     """
 
     fingerprint: str
@@ -191,3 +164,4 @@ class Layout:
     says_rate: bool = False
     day_order: DayOrder | None = None
     possible_times: tuple[PossibleTime, ...] = ()
+    local_time: datetime | None = None

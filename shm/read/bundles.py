@@ -1,10 +1,13 @@
 """Tests of several files: one .zip holds the files of one test, each with its sidecar.
 
-A sidecar NAME.toml beside NAME.zip may say hanger, time and temperature of the whole test.
+A sidecar NAME.toml beside NAME.zip may say hanger, time and temperature of the whole test, and of
+all its files the rate and what their channels are. What the app phyphox exports is such a test of
+one file.
 """
 
 from __future__ import annotations
 
+import csv
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,12 +18,22 @@ from shm.errors import BadInput, UsageError
 from shm.read.arrays import natural
 from shm.read.atomic import replace_file
 from shm.read.content import MOST_MEMBERS, checked_members, refusal, unpack, unpacking_folder
-from shm.read.header import CHANNEL_KEYS, Header
+from shm.read.header import CHANNEL_KEYS, Entry, Header
 from shm.read.limits import guarded, limits
-from shm.read.sidecar import SIDECAR_SUFFIX, document_beside, sidecar_path, with_sidecar
+from shm.read.sidecar import (
+    SIDECAR_SUFFIX,
+    document_beside,
+    sidecar_path,
+    sidecar_text,
+    with_sidecar,
+)
+from shm.read.stamps import moment
 
 SUFFIX = ".zip"
 FIRST_DAY = (1980, 1, 1, 0, 0, 0)  # the earliest that ZIP knows, so that equal files pack alike
+_OF_EACH = ("channel", "sampling_rate_hz")
+_DEVICE, _CLOCK = "meta/device.csv", "meta/time.csv"
+_MOST_CLOCK = 10_000  # judgement: bytes; it holds a line for each start and pause
 _UNIX, _PLAIN_FILE = 3, 0o100644 << 16  # PKWARE APPNOTE 4.4.2 and 4.4.15: rw-r--r--
 
 T = TypeVar("T")
@@ -33,11 +46,12 @@ def holds_test(path: Path) -> bool:
 
 @contextmanager
 def unpacked(path: Path) -> Iterator[tuple[Path, ...]]:
-    """The recordings of an archive in a folder that lasts as long as the context, sidecars beside.
+    """Unpack the recordings of an archive, sidecars beside, for as long as the context lasts.
 
-    Raises BadInput naming the member at fault.
+    What the archive's sidecar says of channels goes into that of each. Raises BadInput naming the
+    member at fault.
     """
-    members = checked_members(path)
+    members = [member for member in checked_members(path) if not _is_of_phyphox(member.filename)]
     with unpacking_folder() as folder:
         with guarded(path, "the archive"), zipfile.ZipFile(path) as archive:
             files = _unpack_all(archive, members, folder)
@@ -50,7 +64,32 @@ def unpacked(path: Path) -> Iterator[tuple[Path, ...]]:
                 file=path,
                 remedy="Pack the files of one test with `shm ingest --together`.",
             )
+        shared = {key: v for key, v in document_beside(path).items() if key in _OF_EACH}
+        for file in recordings if shared else ():
+            own = document_beside(file)
+            tables = {**shared.get("channel", {}), **own.get("channel", {})}
+            text = sidecar_text({**shared, **own, "channel": tables})
+            sidecar_path(file).write_text(text, encoding="utf-8")
         yield tuple(recordings)
+
+
+def _is_of_phyphox(name: str) -> bool:
+    """Return whether a member is what the app phyphox says of phone and clock."""
+    return PurePosixPath(name.replace("\\", "/")).as_posix() in (_DEVICE, _CLOCK)
+
+
+def _start_of_phyphox(path: Path) -> dict[str, Entry]:
+    """Return the time at which the app phyphox began to record; empty for other archives."""
+    with guarded(path, "the archive"), zipfile.ZipFile(path) as archive:
+        if _CLOCK not in archive.namelist() or archive.getinfo(_CLOCK).file_size > _MOST_CLOCK:
+            return {}
+        text = archive.read(_CLOCK).decode("utf-8", errors="replace")
+    for cells in csv.reader(text.splitlines()):
+        if cells and cells[0] == "START":
+            stamp = cells[-1].replace("UTC+", "+").replace("UTC-", "-")
+            found = moment("", stamp)
+            return {} if found is None else {"time": Entry(found.isoformat(), path)}
+    return {}
 
 
 def each_member(path: Path, verb: Callable[[Path, str], T]) -> tuple[T, ...]:
@@ -62,16 +101,17 @@ def each_member(path: Path, verb: Callable[[Path, str], T]) -> tuple[T, ...]:
 def entries_of_test(path: Path) -> Header:
     """What the sidecar of the archive says of the whole test.
 
-    Raises BadInput where it describes channels: each file's own sidecar does.
+    Raises BadInput where it lists something of channels by their order.
     """
-    for key in document_beside(path).keys() & {"channel", *CHANNEL_KEYS}:
+    for key in document_beside(path).keys() & {*CHANNEL_KEYS}:
         raise BadInput(
             f"{key!r} is said of a whole test.",
             file=sidecar_path(path),
-            remedy="Say hanger, time and temperature_c here; describe channels in a sidecar of"
-            " each file in the archive.",
+            remedy="Say hanger, time and temperature_c here; describe channels by name, in tables"
+            " [channel.NAME] that hold for all files in the archive.",
         )
-    return with_sidecar(Header(path, {}), path)
+    entries = _start_of_phyphox(path) if holds_test(path) else {}
+    return with_sidecar(Header(path, {}, entries), path, of_channels=False)
 
 
 def bundle(paths: Sequence[Path], archive: Path) -> Path:

@@ -28,117 +28,252 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, partial
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
 from shm.documents import format_time
 from shm.errors import BadInput, UsageError
-from shm.read import assemble, logger_text
+from shm.read import labview_file, logger_text
 from shm.read.atomic import replace_text
-from shm.read.base import Format, LoggerColumn, LoggerTable, Peek, names_in
-from shm.read.comma_table import (
-    LINE_BREAK,
-    REMEDY,
-    Heading,
-    cells_of,
-    evened,
-    header_of,
-    is_number,
-    mark_between,
-    parse_heading,
-    parse_table,
-    rate_of,
-    refuse_long_heading,
-    rows_in,
-)
-from shm.read.content import is_text, text_of
-from shm.read.header import Entry, Header, mass_entries
+from shm.read.base import Format, at_once, names_in
+from shm.read.content import LINE_BREAK, cells_of, is_text, mark_between, text_of
+from shm.read.header import CHANNEL_KEYS, KEYS, Entry, Header, mass_entries, spread
+from shm.read.limits import refuse_long_header
 from shm.read.logger_words import ACCELERANCE, SI
-from shm.read.sidecar import with_sidecar
+from shm.read.table import Column, Role, Table
 from shm.values import NAN, Channel, FloatArray, FrequencyResponse, Recording, ResponsePoint
 
+_TIME = re.compile(r"t|time([ _]?[\[(]?s[\])]?)?", re.IGNORECASE)
 _PLAIN = re.compile(r"[^,;\t\r\n#\"]+")
+_MISSING = {"", "nan", "na", "n/a", "null", "none", "-"}
+_SAMPLE = "a line of names such as force,acc_1,acc_2"
+_FREE_LINES = 60  # before the names of an analyser's export
+_PARTS = {
+    "real": "real", "re": "real", "imaginary": "imaginary", "imag": "imaginary", "im": "imaginary",
+    "coherence": "coherence", "coh": "coherence",
+}  # fmt: skip
+_PART = re.compile(rf"(?:(.*?)[ _.])?({'|'.join(_PARTS)})( part)?(\s*[\[(][^\])]*[\])]\s*)?", re.I)
 
 
-def _read(path: Path) -> Recording | FrequencyResponse:
-    return read_text(text_of(path), path)
+def text_format(
+    name: str,
+    suffixes: tuple[str, ...],
+    recognises: Callable[[bytes], bool],
+    text_in: Callable[[Path], tuple[str, Sequence[str]]],
+    **more: Any,
+) -> Format:
+    """Return the format of files that hold text, and lines said elsewhere, as on other sheets."""
+
+    def open_tables(path: Path) -> tuple[Table, ...]:
+        text, preamble = text_in(path)
+        return open_text(text, path, preamble)
+
+    return Format(name, suffixes, recognises, at_once(open_tables), **more)
 
 
-def read_text(text: str, path: Path, preamble: Sequence[str] = ()) -> Recording | FrequencyResponse:
-    """What a text holds, with lines that a workbook says elsewhere; raises BadInput."""
-    responses = responses_in(text, path)
-    if responses is not None:
-        return _read_responses(responses, path)
-    logged = None if logger_text.is_ours(text) else logger_text.parse(text, path, preamble)
-    if logged is not None:
-        return logger_text.recording(logged, path)
-    heading = parse_heading(text, path)
-    table, rate = parse_table(heading, path), NAN
-    if heading.has_time:
-        table, rate = evened(table[0], table[1:], lambda *fault: _uneven(heading, path, *fault))
-    return assemble.recording(with_sidecar(heading.header, path), table, path, rate)
+def open_text(text: str, path: Path, preamble: Sequence[str] = ()) -> tuple[Table, ...]:
+    """Return what a text holds, as any logger's where it is none of ours; raises BadInput."""
+    if labview_file.recognises(text):
+        return labview_file.tables_in(text, path)
+    lines = LINE_BREAK.split(text)
+    at = next((i for i, line in enumerate(lines[:_FREE_LINES]) if _names_frequency(line)), None)
+    if at is not None:
+        return (_Text(lines, path, at).responses(),)
+    logged = None if logger_text.is_ours(text) else logger_text.table_in(text, path, preamble)
+    return (logged if logged is not None else _Text(lines, path).record(),)
 
 
-def _peek(path: Path) -> Peek:
-    return peek_text(text_of(path), FORMAT.name, path)
+def _names_frequency(line: str) -> bool:
+    cells = cells_of(line, mark_between(line))
+    return len(cells) > 2 and cells[0].lower().startswith("freq")
 
 
-def peek_text(text: str, file_format: str, path: Path, preamble: Sequence[str] = ()) -> Peek:
-    """What the heading of a text says; faults become problems."""
-    responses = responses_in(text, path)
-    if responses is not None:
-        return _peek_responses(responses, file_format, path)
-    logged = None if logger_text.is_ours(text) else logger_text.parse(text, path, preamble)
-    if logged is not None:
-        return logger_text.peeked(logged, file_format, path)
-    heading = parse_heading(text, path)
-    rows = rows_in(heading.body)
-    header = with_sidecar(heading.header, path)
-    return assemble.peeked(
-        header, file_format, rows, lambda: _rate(heading, path), path, heading.remarks
-    )
+class _Text:
+    """A text whose columns are named in line `at` (from 0), by default the first that is filled."""
+
+    def __init__(self, lines: Sequence[str], path: Path, at: int | None = None):
+        self.lines, self.path = lines, path
+        if at is None:
+            filled = (i for i, line in enumerate(lines) if line.strip() and not _is_remark(line))
+            at = next(filled, None)
+        if at is None:
+            raise self._refusal("there are no columns in it", f"Begin with {_SAMPLE}, then numbers")
+        refuse_long_header(sum(map(len, lines[: at + 1])), path)
+        self.at, self.mark = at, mark_between(lines[at])
+        self.names = cells_of(lines[at], self.mark)
+
+    def record(self) -> Table:
+        self._refuse_names()
+        timed = _TIME.fullmatch(self.names[0]) is not None
+        names = self.names[timed:]
+        header, remarks = self._header(names)
+        body = self._body(self.at + 1)
+        rows = cache(partial(self._numbers, body))  # a peek does without, but for times
+        columns = []
+        for at, name in enumerate(self.names):
+            said = header.channels.get(name, {})
+            unit = said["unit"].text if "unit" in said else ""
+            role: Role = "times" if timed and at == 0 else "channel"
+            load = partial(lambda at: rows()[at], at)
+            columns.append(Column(name, len(body), load, unit, role, said))
+        return Table(
+            self.path,
+            tuple(columns),
+            header.entries,
+            ("shm", *names),
+            problems=remarks,
+            remarks=remarks,
+            line_of=lambda row: body[row][0],
+        )
+
+    def responses(self) -> Table:
+        self.names = [name for name in self.names if name]
+        places = self._points()
+        below = range(self.at + 1, len(self.lines))
+        body = next((i for i in below if self._is_numbers(i)), len(self.lines))
+        header, remarks = self._header(list(places))
+        for i in range(self.at + 1, body):  # an analyser's line of units
+            cells = [cell for cell in cells_of(self.lines[i], self.mark) if cell]
+            if len(cells) > 1 and cells[0] == "Hz":
+                unit = {"unit": Entry(cells[1], self.path, i + 1)}
+                channels = {name: {**unit, **said} for name, said in header.channels.items()}
+                header = Header(self.path, channels, header.entries)
+        rows = self._numbers(self._body(body))
+        columns = [Column(self.names[0], rows[0].size, rows[0].copy, "Hz", "frequencies")]
+        for name, own in places.items():
+            values = rows[own["real"]] + 1j * rows[own["imaginary"]]
+            said = header.channels[name]
+            columns.append(
+                Column(name, values.size, values.copy, "", "response", said, is_complex=True)
+            )
+            if "coherence" in own:
+                share, both = rows[own["coherence"]], f"{name}_coherence"
+                columns.append(Column(both, share.size, share.copy, "", "coherence"))
+        return Table(
+            self.path, tuple(columns), header.entries, tuple(places), problems=remarks,
+            remarks=remarks,
+        )  # fmt: skip
+
+    def _points(self) -> dict[str, dict[str, int]]:
+        """The columns of each point; a point without a name is point_1, point_2, ..."""
+        places: dict[str, dict[str, int]] = {}
+        for place, column in enumerate(self.names[1:], start=1):
+            found = _PART.fullmatch(column)
+            if found is None:
+                raise self._no_response(f"the column {column!r} is no part of a response")
+            part = _PARTS[found[2].lower()]
+            nameless = sum(name.startswith("point_") for name in places) + (part == "real")
+            own = places.setdefault(found[1] or f"point_{nameless}", {})
+            if part in own:
+                raise self._no_response(f"the column {column!r} stands twice")
+            own[part] = place
+        if not all({"real", "imaginary"} <= set(own) for own in places.values()):
+            raise self._no_response("a real or an imaginary part is missing")
+        return places
+
+    def _refuse_names(self) -> None:
+        if all(_number(name) is not None for name in self.names if name):
+            remedy = f"Put {_SAMPLE} before the numbers"
+            raise self._refusal("the names of the columns are missing", remedy, self.at)
+        for name in self.names:
+            if not name or self.names.count(name) > 1:
+                what = f"the column name {name!r} stands twice" if name else "a column has no name"
+                raise self._refusal(what, "Give each column its own name", self.at, name)
+
+    def _header(self, names: Sequence[str]) -> tuple[Header, tuple[str, ...]]:
+        """What the lines before the names say, and remarks on keys not known."""
+        channels: dict[str, dict[str, Entry]] = {name: {} for name in names}
+        keys = {f"{a}{dot}{b}": (n, k) for n in names for k in CHANNEL_KEYS for dot in "._ "
+                for a, b in ((n.lower(), k), (k, n.lower()))}  # fmt: skip
+        entries: dict[str, Entry] = {}
+        remarks = []
+        for line, text in enumerate(self.lines[: self.at], start=1):
+            if ":" not in text or not _is_remark(text):
+                continue
+            key, _, value = text.strip().strip('"').lstrip("# \t").partition(":")
+            key, value = key.strip().lower(), value.strip()
+            entry = Entry(value.strip(f"{self.mark},; "), self.path, line)
+            if key in KEYS:
+                entries[key] = entry
+            elif key in CHANNEL_KEYS:
+                cells = value.split(self.mark if self.mark in value else ",")
+                if len(cells) == len(names) + 1 == len(self.names):
+                    del cells[0]  # of the column of times
+                listed = [Entry(cell.strip(), self.path, line) for cell in cells]
+                for name, each in spread(key, listed, names, entry).items():
+                    channels[name][key] = each
+            elif key in keys:
+                name, own = keys[key]
+                channels[name][own] = entry
+            else:
+                remarks.append(f"line {line}: {key!r} is not a key of recordings; left out.")
+        return Header(self.path, channels, entries), tuple(remarks)
+
+    def _body(self, start: int) -> list[tuple[int, str]]:
+        """The lines with numbers, each with its number."""
+        body = [(i + 1, self.lines[i]) for i in range(start, len(self.lines))]
+        return [(i, line) for i, line in body if line.strip(" \t\x1a") and not _is_remark(line)]
+
+    def _numbers(self, body: list[tuple[int, str]]) -> FloatArray:
+        """All columns (columns, rows), empty cells as NaN."""
+        if self.mark != ",":
+            body = [(i, line.replace(",", ".")) for i, line in body]
+        lines = [line for _, line in body]
+        try:
+            rows = np.loadtxt(lines, delimiter=self.mark, ndmin=2) if lines else np.zeros((0, 0))
+            is_plain = rows.shape[1] == len(self.names) and not np.isinf(rows).any()
+        except ValueError:
+            is_plain = False
+        if not is_plain:  # find the fault, or the empty cells
+            rows = np.array([self._row(line, i) for i, line in body]).reshape(-1, len(self.names))
+        return np.ascontiguousarray(rows.T)
+
+    def _row(self, line: str, number: int) -> list[float]:
+        cells = cells_of(line.split("#")[0], self.mark)
+        if len(cells) != len(self.names):
+            what = f"{len(cells)} values where the names of the columns are {len(self.names)}"
+            remedy = "Complete or remove the line; a bad value may be left empty"
+            raise self._refusal(what, remedy, number - 1)
+        values = [NAN if cell.lower() in _MISSING else _number(cell) for cell in cells]
+        for cell, value, name in zip(cells, values, self.names, strict=True):
+            if value is None or math.isinf(value):
+                what = "the value is infinite" if value else f"{cell[:40]!r} is not a number"
+                remedy = "Leave the cell empty where the logger failed"
+                remedy = remedy if value else "Correct it, or leave it empty"
+                raise self._refusal(what, remedy, number - 1, name)
+        return [value for value in values if value is not None]
+
+    def _is_numbers(self, at: int) -> bool:
+        cells = [cell for cell in cells_of(self.lines[at], self.mark) if cell]
+        return len(cells) > 2 and all(_number(cell.replace(",", ".")) is not None for cell in cells)
+
+    def _no_response(self, what: str) -> BadInput:
+        remedy = "Head the columns frequency, acc_1_real, acc_1_imaginary, acc_2_real, ..."
+        return self._refusal(what, remedy, self.at)
+
+    def _refusal(
+        self, what: str, remedy: str, at: int | None = None, channel: str = ""
+    ) -> BadInput:
+        line = None if at is None else at + 1
+        return BadInput(f"{what}.", file=self.path, channel=channel, line=line, remedy=f"{remedy}.")
 
 
-def _table(path: Path) -> LoggerTable | None:
-    return table_of_text(text_of(path), path)
+def _is_remark(line: str) -> bool:
+    return line.strip().strip('"').startswith("#")
 
 
-def table_of_text(text: str, path: Path, preamble: Sequence[str] = ()) -> LoggerTable | None:
-    """All columns of a text; None for frequency responses, and where there are no numbers."""
-    if responses_in(text, path) is not None:
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
         return None
-    if not logger_text.is_ours(text):
-        return logger_text.parse(text, path, preamble)
-    heading = parse_heading(text, path)
-    rows = parse_table(heading, path)
-    names = heading.columns[1:] if heading.has_time else heading.columns
-    units = (heading.header.channels[name].get("unit") for name in names)
-    columns = tuple(
-        LoggerColumn(name, unit.text if unit else "", row)
-        for name, unit, row in zip(names, units, rows[heading.has_time :], strict=True)
-    )
-    rate, said = _rate(heading, path), heading.header.sampling_rate_hz
-    layout = ("shm", *names)
-    return LoggerTable(
-        columns, said, rate, heading.header.hanger, None, NAN, 0, layout, heading.remarks, False
-    )
 
 
-def _rate(heading: Heading, path: Path) -> float:
-    """The rate that a column of times tells, NaN without one; raises BadInput where faulty."""
-    if not heading.has_time:
-        return NAN
-    times = parse_table(heading, path)[0]
-    return rate_of(times, lambda *fault: _uneven(heading, path, *fault))
-
-
-def _uneven(heading: Heading, path: Path, row: int, what: str) -> BadInput:
-    line, column = heading.body_line + row, heading.columns[0]
-    return BadInput(f"{what}.", file=path, channel=column, line=line, remedy=REMEDY)
+# ---------------------------------------------------------------- writing
 
 
 def _write(described: Recording | FrequencyResponse, path: Path) -> None:
@@ -154,194 +289,70 @@ def _write(described: Recording | FrequencyResponse, path: Path) -> None:
         replace_text(path, recording_text(described))
 
 
-FORMAT = Format(
-    name="CSV",
-    suffixes=(".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".prn", ".xls"),
-    recognises=is_text,
-    peek=_peek,
-    read=_read,
-    write=_write,
-    may_be_gzipped=True,
-    table=_table,
-)
-
-
 def recording_text(recording: Recording) -> str:
     """Rows of nine digits, one more than a 24-bit converter gives."""
     channels = recording.channels
-    known = {
-        "sampling_rate_hz": _number(recording.sampling_rate_hz),
+    said = {
+        "sampling_rate_hz": recording.sampling_rate_hz,
         **_places(channels),
-        "unit": ", ".join(SI[c.quantity] if c.states_unit else "" for c in channels),
-        "full_scale": _list([channel.full_scale for channel in channels]),
+        "unit": [SI[c.quantity] if c.states_unit else "" for c in channels],
+        "full_scale": [channel.full_scale for channel in channels],
     }
-    names = [channel.name for channel in channels]
-    rows = np.column_stack([channel.values for channel in channels])
-    return _heading(recording, known, names) + _body(rows, "%.9g")
+    return _text(recording, said, {c.name: c.values for c in channels}, "%.9g")
 
 
 def response_text(response: FrequencyResponse) -> str:
     """A column of frequencies, then of each point real and imaginary part and coherence."""
-    names, columns = ["frequency"], [response.frequency_hz]
+    columns = {"frequency": response.frequency_hz}
     for row, point in enumerate(response.points):
-        parts = {
-            "real": response.accelerance[row].real,
-            "imaginary": response.accelerance[row].imag,
-        }
+        columns[f"{point.name}_real"] = response.accelerance[row].real
+        columns[f"{point.name}_imaginary"] = response.accelerance[row].imag
         if response.coherence is not None:
-            parts["coherence"] = response.coherence[row]
-        names += [f"{point.name}_{part}" for part in parts]
-        columns += list(parts.values())
-    unit = ", ".join([ACCELERANCE] * len(response.points))
-    known = {**_places(response.points), "unit": unit}
-    return _heading(response, known, names) + _body(np.column_stack(columns), "%.15g")
+            columns[f"{point.name}_coherence"] = response.coherence[row]
+    said = {**_places(response.points), "unit": [ACCELERANCE] * len(response.points)}
+    return _text(response, said, columns, "%.15g")
 
 
-def _heading(
-    described: Recording | FrequencyResponse, more: dict[str, str], names: Sequence[str]
+def _text(
+    described: Recording | FrequencyResponse,
+    said: Mapping[str, object],
+    columns: Mapping[str, FloatArray],
+    digits: str,
 ) -> str:
-    known = {
+    whole = {
         "hanger": described.hanger,
         "time": format_time(described.time),
-        "temperature_c": _number(described.temperature_c),
-        **{key: _number(value) for key, value in mass_entries(described.added_mass).items()},
-        **more,
+        "temperature_c": described.temperature_c,
+        **mass_entries(described.added_mass),
+        **said,
     }
-    lines = [f"# {key}: {value}" for key, value in known.items() if value not in (None, "")]
-    return "\n".join([*lines, ",".join(names)]) + "\n"
+    head = [
+        f"# {key}: {text}\n" for key, value in whole.items() if (text := _said(value)).strip(", ")
+    ]
+    rows = np.column_stack(list(columns.values()))
+    row = ",".join([digits] * len(columns)) + "\n"
+    body = (row * len(rows)) % tuple(rows.ravel().tolist())
+    return "".join([*head, ",".join(columns), "\n", body])
 
 
-def _places(points: Sequence[Channel] | Sequence[ResponsePoint]) -> dict[str, str]:
-    planes = [point.plane or "" for point in points]
-    return {
-        "plane": ", ".join(planes) if any(planes) else "",
-        "x_m": _list([point.x_m for point in points]),
-    }
+def _places(points: Sequence[Channel] | Sequence[ResponsePoint]) -> dict[str, object]:
+    return {"plane": [point.plane for point in points], "x_m": [point.x_m for point in points]}
 
 
-def _list(values: Sequence[float]) -> str:
-    """One value a column; nothing where none is known."""
-    return "" if all(map(math.isnan, values)) else ", ".join(map(_number, values))
+def _said(value: object) -> str:
+    """A value, or one a column, as text; what is not known is empty."""
+    if isinstance(value, list):
+        return ", ".join(map(_said, value))
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    return repr(float(value)) if isinstance(value, float) else str(value)
 
 
-def _number(value: float) -> str:
-    return "" if math.isnan(value) else repr(float(value))
-
-
-def _body(rows: FloatArray, digits: str) -> str:
-    row = ",".join([digits] * rows.shape[1]) + "\n"
-    return (row * len(rows)) % tuple(rows.ravel().tolist())
-
-
-_Part = Literal["real", "imaginary", "coherence"]
-_PARTS: dict[str, _Part] = {
-    "real": "real", "re": "real", "imaginary": "imaginary", "imag": "imaginary", "im": "imaginary",
-    "coherence": "coherence", "coh": "coherence",
-}  # fmt: skip
-_COLUMN = re.compile(r"(?:(.*?)[ _.])?(real|re|imaginary|imag|im|coherence|coh)( part)?", re.I)
-_BRACKETS = re.compile(r"\s*[\[(][^\])]*[\])]\s*$")
-_FREE_LINES, _FREE_CHARACTERS = 60, 50_000
-
-
-@dataclass(frozen=True)
-class ResponseTable:
-    """A parsed heading, with the places of each point's columns by their part."""
-
-    heading: Heading
-    places: dict[str, dict[_Part, int]]
-
-
-def responses_in(text: str, path: Path) -> ResponseTable | None:
-    """The heading of frequency responses; None for other texts; raises BadInput where faulty."""
-    first = LINE_BREAK.split(text[:_FREE_CHARACTERS])[:_FREE_LINES]
-    at = next((i for i, line in enumerate(first) if _names(line)), None)
-    if at is None:
-        return None
-    lines = LINE_BREAK.split(text)
-    refuse_long_heading(lines[: at + 1], path)
-    mark = mark_between(lines[at])
-    columns = [cell for cell in cells_of(lines[at], mark) if cell]
-    places = _columns_of_points(columns, at + 1, path)
-    body = next((i for i in range(at + 1, len(lines)) if _numbers(lines[i], mark)), len(lines))
-    header, remarks = header_of(lines[:at], list(places), mark, path)
-    heading = Heading(header, tuple(columns), mark, lines[body:], body + 1, remarks)
-    units = next((e for i in range(at + 1, body) if (e := _unit(lines[i], mark, path, i))), None)
-    return ResponseTable(_with_unit(heading, units), places)
-
-
-def _read_responses(table: ResponseTable, path: Path) -> FrequencyResponse:
-    """The frequency responses of a text; raises BadInput naming line and column."""
-    rows = parse_table(table.heading, path)
-    parts = list(table.places.values())
-    values = np.array([rows[p["real"]] + 1j * rows[p["imaginary"]] for p in parts])
-    coherence = None
-    if all("coherence" in part for part in parts):
-        coherence = np.array([rows[part["coherence"]] for part in parts])
-    return assemble.frequency_response(
-        _response_header(table, path), rows[0], values, coherence, path
-    )
-
-
-def _peek_responses(table: ResponseTable, file_format: str, path: Path) -> Peek:
-    """What the heading and the column of frequencies say."""
-    listed = parse_table(table.heading, path)[0]
-    found = assemble.peeked_response(_response_header(table, path), file_format, listed, path)
-    return replace(found, problems=(*table.heading.remarks, *found.problems))
-
-
-def _response_header(table: ResponseTable, path: Path) -> Header:
-    return with_sidecar(table.heading.header, path)
-
-
-def _names(line: str) -> bool:
-    """Whether a line heads columns of which the first holds frequencies."""
-    cells = cells_of(line, mark_between(line))
-    return len(cells) > 2 and cells[0].lower().startswith("freq")
-
-
-def _numbers(line: str, mark: str) -> bool:
-    cells = [cell for cell in cells_of(line, mark) if cell]
-    return len(cells) > 2 and all(map(is_number, cells))
-
-
-def _columns_of_points(
-    columns: Sequence[str], line: int, path: Path
-) -> dict[str, dict[_Part, int]]:
-    """The columns of each point; a point without a name is point_1, point_2, ..."""
-    places: dict[str, dict[_Part, int]] = {}
-    for place, column in enumerate(columns[1:], start=1):
-        found = _COLUMN.fullmatch(_BRACKETS.sub("", column))
-        if found is None:
-            raise _no_response(f"the column {column!r} is no part of a response", line, path)
-        part = _PARTS[found[2].lower()]
-        nameless = sum(name.startswith("point_") for name in places) + (part == "real")
-        own = places.setdefault(found[1] or f"point_{nameless}", {})
-        if part in own:
-            raise _no_response(f"the column {column!r} stands twice", line, path)
-        own[part] = place
-    if not all({"real", "imaginary"} <= set(own) for own in places.values()):
-        raise _no_response("a real or an imaginary part is missing", line, path)
-    return places
-
-
-def _no_response(what: str, line: int, path: Path) -> BadInput:
-    return BadInput(
-        f"{what}.",
-        file=path,
-        line=line,
-        remedy="Head the columns frequency, acc_1_real, acc_1_imaginary, acc_2_real, ...",
-    )
-
-
-def _unit(line: str, mark: str, path: Path, index: int) -> Entry | None:
-    """The unit in an analyser's line of units, which begins with Hz."""
-    cells = [cell for cell in cells_of(line, mark) if cell]
-    return Entry(cells[1], path, index + 1) if len(cells) > 1 and cells[0] == "Hz" else None
-
-
-def _with_unit(heading: Heading, unit: Entry | None) -> Heading:
-    if unit is None:
-        return heading
-    header = heading.header
-    channels = {name: {"unit": unit, **said} for name, said in header.channels.items()}
-    return replace(heading, header=Header(header.file, channels, header.entries))
+FORMAT = text_format(
+    "CSV",
+    (".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".prn", ".xls"),
+    is_text,
+    lambda path: (text_of(path), ()),
+    write=_write,
+    may_be_gzipped=True,
+)

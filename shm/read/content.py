@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import codecs
 import gzip
+import re
 import stat
 import tempfile
 import zipfile
@@ -14,10 +15,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import TYPE_CHECKING
 
 from shm.errors import BadInput
-from shm.read.base import Format
 from shm.read.limits import guarded, limits, too_large
+
+if TYPE_CHECKING:
+    from shm.read.base import Format
 
 # judgement: marks of formats stand at the beginning, and a page tells text from other bytes
 _HEAD_BYTES = 4096
@@ -108,6 +112,19 @@ def text_of(path: Path) -> str:
         return content.decode(_unmarked_utf16(content[:_HEAD_BYTES]) or "utf-8-sig")
     except UnicodeDecodeError:
         return content.decode("latin-1")
+
+
+LINE_BREAK = re.compile(r"\r\n|\r|\n")
+
+
+def mark_between(line: str) -> str:
+    """Return the mark that separates the columns of a line."""
+    return next((mark for mark in "\t;" if mark in line), ",")
+
+
+def cells_of(line: str, mark: str) -> list[str]:
+    """Return the cells of a line without blanks and quotes around them."""
+    return [cell.strip().strip('"').strip() for cell in line.split(mark)]
 
 
 def _unmarked_utf16(head: bytes) -> str | None:

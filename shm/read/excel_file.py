@@ -6,25 +6,20 @@ the workbook was saved; macros are never run.
 
 from __future__ import annotations
 
-import io
 import re
-import warnings
-import zipfile
 from datetime import date, datetime, time, timedelta
 from pathlib import Path
+from typing import Any
 
 from shm.errors import BadInput
-from shm.read.base import Format, LoggerTable, Peek
-from shm.read.comma_separated import peek_text, read_text, table_of_text
+from shm.read.comma_separated import text_format
 from shm.read.content import checked_members
-from shm.read.limits import guarded, limits, refuse_many_samples, too_large
-from shm.values import FrequencyResponse, Recording
+from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples, too_large
 
-_NAME = "Excel"
 _PARTS = (b"[Content_Types].xml", b"_rels/.rels", b"docProps/", b"xl/")
 _MOST_COLUMNS = 200  # judgement: far more than the 16 accelerations that are read
 _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
-_EMPTY_FILL = re.compile(rb"<fill\s*/>")
+_WHOLE = 2**53  # technical: beyond, a double leaves out whole numbers
 _SHARE_OF_LARGEST = 0.5  # judgement: a sheet of half as many rows holds a recording too
 
 
@@ -59,51 +54,31 @@ def text_of_workbook(path: Path) -> tuple[str, tuple[str, ...]]:
 
 
 def _sheets(path: Path) -> dict[str, list[str]]:
-    import openpyxl  # half a second that no other format needs
+    import python_calamine  # of use for no other format
 
     with guarded(path, "the workbook"):
-        warnings.simplefilter("ignore")  # of styles and extensions that openpyxl does not know
-        options = {"read_only": True, "data_only": True, "keep_links": False}
-        try:
-            book = openpyxl.load_workbook(path, **options)
-        except TypeError:  # of a fill that is empty, as some programs write it
-            book = openpyxl.load_workbook(_with_fills(path), **options)
-        try:
-            return {sheet.title: _lines(sheet, path) for sheet in book.worksheets}
-        finally:
-            book.close()
+        book = python_calamine.CalamineWorkbook.from_path(str(path))
+        sheets = {}
+        for found in book.sheets_metadata:
+            if found.typ == python_calamine.SheetTypeEnum.WorkSheet:
+                sheets[found.name] = _lines(book.get_sheet_by_name(found.name), path)
+    return sheets
 
 
-def _with_fills(path: Path) -> io.BytesIO:
-    """A copy of a workbook in which no fill is empty: openpyxl raises TypeError for one."""
-    copy = io.BytesIO()
-    with zipfile.ZipFile(path) as packed, zipfile.ZipFile(copy, "w") as archive:
-        for member in packed.namelist():
-            content = packed.read(member)
-            if member.endswith("styles.xml"):
-                content = _EMPTY_FILL.sub(b"<fill><patternFill/></fill>", content)
-            archive.writestr(member, content)
-    copy.seek(0)
-    return copy
-
-
-def _lines(sheet: object, path: Path) -> list[str]:
-    """The rows of a sheet as lines, empty ones kept so that line numbers are those of the rows."""
-    lines: list[str] = []
-    for row in sheet.iter_rows(values_only=True):  # type: ignore[attr-defined]
-        lines.append("\t".join(map(_cell, row[:_MOST_COLUMNS])).rstrip())
-        if len(lines) % 10_000 == 0:
-            refuse_many_samples(len(lines), path)
+def _lines(sheet: Any, path: Path) -> list[str]:
+    """Return the rows of a sheet as lines, numbered as the rows: the empty ones are kept."""
+    refuse_large((sheet.total_height, min(sheet.total_width, _MOST_COLUMNS)), 32, sheet.name, path)
+    refuse_many_samples(sheet.total_height, path)
+    rows = sheet.to_python(skip_empty_area=False)
+    lines = ["\t".join(map(_cell, row[:_MOST_COLUMNS])).rstrip() for row in rows]
     while lines and not lines[-1]:
         lines.pop()
     return lines
 
 
 def _cell(value: object) -> str:
-    if value is None:
-        return ""
     if isinstance(value, float):
-        return repr(value)
+        return repr(int(value)) if value.is_integer() and abs(value) < _WHOLE else repr(value)
     if isinstance(value, datetime | date | time):
         return value.isoformat()
     if isinstance(value, timedelta):
@@ -114,27 +89,6 @@ def _cell(value: object) -> str:
     return re.sub(r"[\t\r\n]+", " ", text).strip()
 
 
-def _read(path: Path) -> Recording | FrequencyResponse:
-    text, others = text_of_workbook(path)
-    return read_text(text, path, others)
-
-
-def _peek(path: Path) -> Peek:
-    text, others = text_of_workbook(path)
-    return peek_text(text, _NAME, path, others)
-
-
-def _table(path: Path) -> LoggerTable | None:
-    text, others = text_of_workbook(path)
-    return table_of_text(text, path, others)
-
-
-FORMAT = Format(
-    name=_NAME,
-    suffixes=(".xlsx", ".xlsm"),
-    recognises=recognises,
-    peek=_peek,
-    read=_read,
-    table=_table,
-    library="openpyxl",
+FORMAT = text_format(
+    "Excel", (".xlsx", ".xlsm"), recognises, text_of_workbook, library="python_calamine"
 )

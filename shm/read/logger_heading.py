@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from shm.read import logger_words as words
 from shm.read.logger_rows import Script, is_number, number_of
@@ -54,7 +54,11 @@ def heading_of(above: Sequence[str], script: Script) -> Heading:
         for place, line in enumerate(above)
         if (cells := _cells(line, script)) and len(cells) <= len(script.kinds) + 1
     }
-    wide = {place: _padded(cells, script) for place, cells in rows.items() if len(cells) > 1}
+    wide = {
+        place: _padded(_axes_named(cells), script)
+        for place, cells in rows.items()
+        if len(cells) > 1
+    }
     at = _names_at(wide, script)
     split = [words.name_and_unit(cell) for cell in wide.get(at, [""] * len(script.kinds))]
     if at in wide and _label(wide[at][0]) in _NAME_LABELS:
@@ -71,6 +75,20 @@ def heading_of(above: Sequence[str], script: Script) -> Heading:
     ]
     names = unlike(tuple(name for name, _ in split))
     return Heading(names, tuple(units), _sensitivities(others, script), tuple(facts), at + 1)
+
+
+def _axes_named(cells: list[str]) -> list[str]:
+    """Return cells in which `Acc [m/s2], 1, 2` are Acc, Acc 1 and Acc 2, all in that unit."""
+    named: list[str] = []
+    first, count = ("", ""), 0
+    for cell in cells:
+        count += 1
+        if not (first[1] and cell == str(count)):
+            first, count = words.name_and_unit(cell), 0
+            named.append(cell)
+        else:
+            named.append(f"{first[0]} {cell} [{first[1]}]")
+    return named
 
 
 def _cells(line: str, script: Script) -> list[str]:
@@ -154,6 +172,22 @@ def _sensitivities(
         if any(found):
             return found
     return (None,) * len(script.kinds)
+
+
+_CHANNEL_UNIT = re.compile(
+    r"\b(?:channel|kanal|ch|sensor)\W{0,3}(\d+)\W+(?:units?|einheit)\W+([^\s,;|]+)", re.IGNORECASE
+)
+_CHANNEL = re.compile(r"(?:channel|kanal|ch|sensor)\W{0,3}(\d+)", re.IGNORECASE)
+
+
+def with_channel_units(heading: Heading, above: Sequence[str]) -> Heading:
+    """Return a heading with the units that lines such as `,Channel,1,Units,G` give by number."""
+    by_number = {f[1]: f[2] for line in above for f in _CHANNEL_UNIT.finditer(line)}
+    units = []
+    for name, unit in zip(heading.names, heading.units, strict=True):
+        found = _CHANNEL.fullmatch(name.strip())
+        units.append(unit or (by_number.get(found[1], "") if found is not None else ""))
+    return replace(heading, units=tuple(units))
 
 
 def unlike(names: Sequence[str]) -> tuple[str, ...]:

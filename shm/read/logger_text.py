@@ -11,9 +11,8 @@ sidecar to describe (see `shm import`), times without a unit need a rate that ag
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
 from itertools import pairwise
@@ -23,13 +22,19 @@ import numpy as np
 
 from shm.documents import format_time
 from shm.errors import BadInput
-from shm.read import assemble
 from shm.read import logger_words as words
-from shm.read.base import LoggerColumn, LoggerTable, Peek
-from shm.read.comma_table import LINE_BREAK, REMEDY, cells_of, mark_between, rate_of
-from shm.read.header import Entry, Header, quantity_named
+from shm.read.content import LINE_BREAK, cells_of, mark_between
+from shm.read.header import Entry, quantity_named
 from shm.read.limits import refuse_long_header
-from shm.read.logger_heading import Heading, heading_of, quantity_said, rate_said, unlike, unrounded
+from shm.read.logger_heading import (
+    Heading,
+    heading_of,
+    quantity_said,
+    rate_said,
+    unlike,
+    unrounded,
+    with_channel_units,
+)
 from shm.read.logger_rows import (
     Block,
     block_of,
@@ -40,10 +45,10 @@ from shm.read.logger_rows import (
     values_of,
 )
 from shm.read.logger_times import Clock, clock_of, day_order_of
-from shm.read.logger_words import UNSAID
-from shm.read.sidecar import channels_described, with_sidecar
-from shm.read.stamps import DayOrder, PossibleTime, moment, parsed, possible_times
-from shm.values import NAN, FloatArray, Recording
+from shm.read.logger_words import UNSAID, Sensitivity
+from shm.read.stamps import DayOrder, PossibleTime, moment, parsed, possible_times, says_zone
+from shm.read.table import Column, Table
+from shm.values import NAN
 
 _PLAIN_NAME = set("abcdefghijklmnopqrstuvwxyz0123456789_")
 _LISTED = re.compile(r"TIMESERIES .*?, *(\d+) samples,")  # SLIST and TSPAIR, of seismology
@@ -83,17 +88,24 @@ _OUR_KEYS = {
 }  # fmt: skip
 
 
-def parse(text: str, path: Path, preamble: Sequence[str] = ()) -> LoggerTable | None:
-    """What a logger's text says; None where nothing in it looks like rows of numbers.
+def table_in(text: str, path: Path, preamble: Sequence[str] = ()) -> Table | None:
+    """Return what a logger's text says; None where nothing in it looks like rows of numbers.
 
-    `preamble` are lines that are said elsewhere, as on another sheet of a workbook.
-
-    Raises BadInput naming line and column for rows that are damaged, and for times that are uneven.
+    `preamble` are lines that are said elsewhere, as on another sheet of a workbook. Raises BadInput
+    naming line and column for rows that are damaged, and for times that are uneven.
     """
     lines = LINE_BREAK.split(text.rstrip("\x00\x1a"))
     stacked = _stacked(lines, path)
     if stacked is not None:
         return stacked
+    parsed_text = _parsed(lines, path, preamble)
+    return None if parsed_text is None else _table(*parsed_text, path, len(preamble))
+
+
+def _parsed(
+    lines: Sequence[str], path: Path, preamble: Sequence[str] = ()
+) -> tuple[Heading, Block] | None:
+    """Return the heading and the rows of a text; None where it has no rows."""
     script = script_of(lines)
     block = None if script is None else block_of(lines, script, path)
     if script is None or block is None:
@@ -101,64 +113,95 @@ def parse(text: str, path: Path, preamble: Sequence[str] = ()) -> LoggerTable | 
     refuse_long_header(sum(map(len, block.above)), path)
     heading = heading_of((*preamble, *block.above), script)
     _refuse_split_decimals(heading, block, path)
-    rate = rate_said(heading.facts, script.decimal)
+    return heading, block
+
+
+def _table(heading: Heading, block: Block, path: Path, before: int = 0) -> Table:
+    """Return the table of a heading of which `before` lines are not in the file."""
+    decimal = block.script.decimal
+    rate = rate_said(heading.facts, decimal)
     order = day_order_of(_days(heading), block)
     clock = clock_of(heading, block, rate, order, path)
-    time = clock.start or _time(heading, order)
+    time, is_local = clock.start, clock.is_local
+    if time is None:
+        time, is_local = _time(heading, order)
     _refuse_wrapped(block, path)
+    layout = _layout(heading, block)  # without what is found in its lines: profiles know it so
+    heading = with_channel_units(heading, block.above)
+    line = max(0, heading.names_line - before) or None
     columns = tuple(
-        _column(heading, block, clock, place, path)
-        for place, kind in enumerate(script.kinds)
+        _column(heading, block, clock, place, line, path)
+        for place, kind in enumerate(block.script.kinds)
         if kind == "number" and place not in clock.used
     )
-    return LoggerTable(
-        columns=columns,
-        said_rate_hz=unrounded(rate, clock.rate_hz, heading.facts, script.decimal),
-        times_rate_hz=clock.rate_hz,
-        hanger=_hanger(heading, path),
-        time=time,
-        temperature_c=_temperature(heading, script.decimal),
-        names_line=max(0, heading.names_line - len(preamble)),
-        layout=_layout(heading, block),
-        title=_of_one_signal(heading, words.means_title),
+    said = {
+        "hanger": _hanger(heading),
+        "time": format_time(time),
+        "temperature_c": _temperature(heading, decimal, columns),
+        "sampling_rate_hz": unrounded(rate, clock.rate_hz, heading.facts, decimal),
+    }
+    known = {key: value for key, value in said.items() if value is not None and value == value}
+    return Table(
+        path,
+        columns,
+        {key: Entry(value, path) for key, value in known.items()},
+        layout,
+        clock.rate_hz,
         remarks=(*clock.remarks, *block.remarks),
         possible_times=() if time else clock.possible_starts or _possible_times(heading),
         day_order=order,
+        local_time=time if is_local else None,
     )
 
 
-def _stacked(lines: Sequence[str], path: Path) -> LoggerTable | None:
-    """Signals of equal length one below the other, each under its own heading; None for others.
+def _stacked(lines: Sequence[str], path: Path) -> Table | None:
+    """Return signals of equal length one below the other, each under its own heading, as one table.
 
-    Their first line is the same, and each heading says a title and a unit of its one signal.
+    Their first line is the same, and each heading says a title and a unit of its one signal. None
+    for other texts.
     """
     first = next((line for line in lines if line.strip()), "")
     starts = [place for place, line in enumerate(lines) if line == first]
     if len(starts) < 2 or ":" not in first or len(starts) > _MOST_STACKED:
         return None
-    parts = [lines[a:b] for a, b in pairwise([*starts, len(lines)])]
-    tables = [parse("\n".join(["", *part[1:]]), path) for part in parts]
-    found = [table for table in tables if table is not None and len(table.columns) == 1]
-    if len(found) < len(tables) or len({t.samples for t in found}) > 1:
-        return None
-    if len({(str(t.said_rate_hz), str(t.times_rate_hz)) for t in found}) > 1:
+    tables, titles = [], []
+    for a, b in pairwise([*starts, len(lines)]):
+        part = _parsed(["", *lines[a + 1 : b]], path)
+        table = None if part is None else _table(*part, path)
+        if part is None or table is None or len(table.columns) != 1:
+            return None
+        tables.append(table)
+        titles.append(_of_one_signal(part[0], words.means_title))
+    if len({(t.columns[0].size, str(t.clock_rate_hz), _rate_text(t)) for t in tables}) > 1:
         return None
     columns = tuple(
         replace(table.columns[0], name=name)
-        for table, name in zip(found, unlike([t.title for t in found]), strict=True)
+        for table, name in zip(tables, unlike(titles), strict=True)
     )
-    units = [f"{c.name} [{c.unit}]" for c in columns]
-    return replace(found[0], columns=columns, layout=("stacked", *units))
+    units = [f"{column.name} [{column.unit}]" for column in columns]
+    return replace(tables[0], columns=columns, layout=("stacked", *units))
 
 
-def _column(heading: Heading, block: Block, clock: Clock, place: int, path: Path) -> LoggerColumn:
+def _rate_text(table: Table) -> str:
+    entry = table.entries.get("sampling_rate_hz")
+    return entry.text if entry is not None else ""
+
+
+def _column(
+    heading: Heading, block: Block, clock: Clock, place: int, line: int | None, path: Path
+) -> Column:
     values, overloads = values_of(block, place, path)
-    return LoggerColumn(
-        heading.names[place],
-        heading.units[place] or ("" if heading.names_line else _unit_of_one(heading)),
-        clock.evened(values),
-        overloads,
-        heading.sensitivities[place],
+    values = clock.evened(values)
+    name, sensitivity = heading.names[place], heading.sensitivities[place]
+    unit = heading.units[place] or ("" if heading.names_line else _unit_of_one(heading))
+    return Column(
+        name,
+        len(values),
+        lambda: values,
+        unit,
+        "channel" if is_measured(name, unit, sensitivity) else "other",
+        said_of(name, unit, sensitivity, line, path),
+        overloads=overloads,
     )
 
 
@@ -204,13 +247,13 @@ def _unit_of_one(heading: Heading) -> str:
     return unit if words.is_unit(unit) else ""
 
 
-def _hanger(heading: Heading, path: Path) -> int | None:
-    """The hanger that the preamble numbers, or else the file's name."""
+def _hanger(heading: Heading) -> int | None:
+    """Return the hanger that the preamble numbers."""
     for key, value in heading.facts:
         if words.means_hanger(key) and value.strip().isdigit():
             return int(value)
     said = {n for fact in heading.facts if (n := words.hanger_numbered(" ".join(fact))) is not None}
-    return said.pop() if len(said) == 1 else words.hanger_numbered(path.stem)
+    return said.pop() if len(said) == 1 else None
 
 
 def _dates(heading: Heading) -> list[str]:
@@ -218,7 +261,9 @@ def _dates(heading: Heading) -> list[str]:
 
 
 def _moments(heading: Heading) -> list[str]:
-    return [v for k, v in heading.facts if words.means_moment(k) and parsed(v)]
+    """Return the times of a heading, catman's `T0 = ...` among them."""
+    named = ((k, v) for k, v in heading.facts if parsed(v))
+    return [v for k, v in named if words.means_moment(k) or k.strip().upper() == "T0"]
 
 
 def _days(heading: Heading) -> list[str]:
@@ -226,12 +271,15 @@ def _days(heading: Heading) -> list[str]:
     return [*_dates(heading), *_moments(heading)]
 
 
-def _time(heading: Heading, order: DayOrder | None) -> datetime | None:
+def _time(heading: Heading, order: DayOrder | None) -> tuple[datetime | None, bool]:
+    """Return the time that a heading says, and whether its clock names no zone."""
     days, clocks = _dates(heading), _moments(heading)
     whole = [v for v in clocks if moment("", v, order) is not None]
     if whole:
-        return moment("", whole[0], order)
-    return moment(days[0], clocks[0] if clocks else "", order) if days else None
+        return moment("", whole[0], order), not says_zone(whole[0])
+    clock = clocks[0] if clocks else ""
+    local = not says_zone(clock) and not any(map(says_zone, days[:1]))
+    return (moment(days[0], clock, order), local) if days else (None, False)
 
 
 def _possible_times(heading: Heading) -> tuple[PossibleTime, ...]:
@@ -241,13 +289,21 @@ def _possible_times(heading: Heading) -> tuple[PossibleTime, ...]:
     return next((each for text in texts if (each := possible_times(text))), ())
 
 
-def _temperature(heading: Heading, decimal: str) -> float:
+def _temperature(heading: Heading, decimal: str, columns: Sequence[Column]) -> float:
+    """Return the temperature that a preamble says, or the median of the column that is one."""
     for key, value in heading.facts:
         if words.means_temperature(key):
             number, unit = quantity_said(value, decimal)
             if unit.lower() in ("", "°c", "c", "degc", "grad"):
                 return number
-    return NAN
+    told = [(words.temperature_meant(c.name), c) for c in columns if words.is_celsius(c.unit)]
+    best = [c for how_well, c in told if how_well and how_well == max(told, key=_first)[0]]
+    values = best[0].load() if len(best) == 1 else []
+    return float(np.nanmedian(values)) if np.isfinite(values).any() else NAN
+
+
+def _first(pair: tuple[int, Column]) -> int:
+    return pair[0]
 
 
 def _layout(heading: Heading, block: Block) -> tuple[str, ...]:
@@ -262,127 +318,33 @@ def _layout(heading: Heading, block: Block) -> tuple[str, ...]:
     return (f"{script.mark}{script.decimal}", *keys, *serials, *columns)
 
 
-# ---------------------------------------------------------------- to a header
+# ---------------------------------------------------------------- channels
 
 
-def header_of(table: LoggerTable, path: Path) -> tuple[Header, list[int], tuple[str, ...]]:
-    """The header of a table with its sidecar, the places of its channels, names left out.
-
-    A channel is what is in a unit of force or acceleration, in volts of a sensor whose sensitivity
-    the file says, or described by the sidecar.
-    """
-    described = channels_described(path)
-    used = [
-        place
-        for place, column in enumerate(table.columns)
-        if (column.name in described and not _described_seconds(described[column.name]))
-        or (column.name not in described and is_measured(column))
-    ]
-    channels = {
-        table.columns[place].name: _entries(table.columns[place], table.names_line, path)
-        for place in used
-    }
-    out = tuple(c.name for place, c in enumerate(table.columns) if place not in used)
-    said = {
-        "hanger": table.hanger,
-        "time": format_time(table.time),
-        "temperature_c": None if math.isnan(table.temperature_c) else table.temperature_c,
-        "sampling_rate_hz": None if math.isnan(table.said_rate_hz) else table.said_rate_hz,
-    }
-    entries = {key: Entry(value, path) for key, value in said.items() if value is not None}
-    return with_sidecar(Header(path, channels, entries), path, out), used, out
+def is_measured(name: str, unit: str, sensitivity: Sensitivity | None) -> bool:
+    """Return whether a file itself says that a column is a force or an acceleration, in a unit."""
+    measured = words.unit_of(unit) is not None and not _is_doubtful(name, unit)
+    return measured or (words.volts_of(unit) is not None and sensitivity is not None)
 
 
-def _described_seconds(entries: Mapping[str, Entry]) -> float | None:
-    """Return the seconds of a unit of time that a sidecar gives a column; None of other units."""
-    return words.seconds_of(entries["unit"].text) if "unit" in entries else None
+def _is_doubtful(name: str, unit: str) -> bool:
+    """Return whether a load cell, by its name, is in a unit of acceleration: g may be its grams."""
+    known = words.unit_of(unit)
+    in_g = known is not None and known.quantity == "acceleration"
+    return in_g and words.means_force_alone(name)
 
 
-def is_measured(column: LoggerColumn) -> bool:
-    """Whether a file itself says that a column is a force or an acceleration, and in what unit."""
-    measured = words.unit_of(column.unit) is not None and not _is_doubtful(column)
-    return measured or (words.volts_of(column.unit) is not None and column.sensitivity is not None)
-
-
-def _is_doubtful(column: LoggerColumn) -> bool:
-    """Whether a load cell, by its name, is in a unit of acceleration: g may be its grams."""
-    unit = words.unit_of(column.unit)
-    in_g = unit is not None and unit.quantity == "acceleration"
-    return in_g and words.means_force_alone(column.name)
-
-
-def _entries(column: LoggerColumn, line: int, path: Path) -> dict[str, Entry]:
-    said: dict[str, object] = {"unit": column.unit}
-    volts = words.volts_of(column.unit)
-    if volts is not None and column.sensitivity is not None:
-        said["unit"] = column.sensitivity.unit
-        said["calibration"] = column.sensitivity.unit_per_volt * volts
-    elif _is_doubtful(column) or (quantity_named(column.name) and not column.unit):
+def said_of(
+    name: str, unit: str, sensitivity: Sensitivity | None, line: int | None, path: Path
+) -> dict[str, Entry]:
+    """Return what a logger's name and unit say of a channel, by the keys of a sidecar."""
+    said: dict[str, object] = {"unit": unit}
+    volts = words.volts_of(unit)
+    if volts is not None and sensitivity is not None:
+        said = {"unit": sensitivity.unit, "calibration": sensitivity.unit_per_volt * volts}
+    elif _is_doubtful(name, unit) or (quantity_named(name) and not unit):
         said["unit"] = UNSAID  # a name such as force promises newtons in our own files alone
-    plane = words.plane_meant(column.name)
-    if plane is not None and (unit := words.unit_of(str(said["unit"]))) is not None:
-        said |= {"plane": plane} if unit.quantity == "acceleration" else {}
-    return {key: Entry(value, path, line or None) for key, value in said.items() if value}
-
-
-def recording(table: LoggerTable, path: Path) -> Recording:
-    """The recording that a table holds, described by file and sidecar; raises BadInput."""
-    header, used, _ = header_of(table, path)
-    rate = told_rate(table, header, path)
-    found = assemble.recording(header, _values(table, used), path, rate)
-    return found if found.time else replace(found, possible_times=_distinct_times(table))
-
-
-def peeked(table: LoggerTable, file_format: str, path: Path) -> Peek:
-    """What the headers say; faults become problems."""
-    header, _, out = header_of(table, path)
-    look = assemble.peeked(
-        header, file_format, table.samples, lambda: told_rate(table, header, path), path,
-        left_out=out,
-    )  # fmt: skip
-    return look if look.time else replace(look, possible_times=_distinct_times(table))
-
-
-def _distinct_times(table: LoggerTable) -> tuple[datetime, ...]:
-    """Return the possible times of a table, each once: two orders may have the same day."""
-    return tuple(dict.fromkeys(each.time for each in table.possible_times))
-
-
-def _values(table: LoggerTable, used: Sequence[int]) -> FloatArray:
-    """The values of channels (channels, samples), as recorded."""
-    if not used:
-        return np.zeros((0, table.samples))
-    return np.array([table.columns[place].values for place in used])
-
-
-def told_rate(table: LoggerTable, header: Header, path: Path) -> float:
-    """What the times tell, where that is to be held against what is said; NaN where both agree.
-
-    A column of times is rounded to its last digit, and a preamble's rate is the one that was set.
-    """
-    entry = header.entries.get("sampling_rate_hz")
-    if entry is None and math.isnan(table.times_rate_hz):
-        return _described_rate(table, path)
-    said = table.said_rate_hz
-    agree = abs(table.times_rate_hz - said) <= _SAME * said
-    return NAN if agree and entry is not None and entry.file == path else table.times_rate_hz
-
-
-def _described_rate(table: LoggerTable, path: Path) -> float:
-    """Return the rate by the column that the sidecar gives a unit of time; NaN where none has."""
-    for name, entries in channels_described(path).items():
-        seconds = _described_seconds(entries)
-        column = next((each for each in table.columns if each.name == name), None)
-        if seconds is not None and column is not None:
-            fault = _refusal_of_times(path, name)
-            return rate_of(column.values * seconds, fault)
-    return NAN
-
-
-def _refusal_of_times(path: Path, name: str) -> Callable[[int, str], BadInput]:
-    return lambda row, what: BadInput(
-        f"{what} at sample {row + 1}.", file=path, channel=name, remedy=REMEDY
-    )
-
-
-_SAME = 1e-3  # judgement: of the rate; a frequency that is off by so little moves no tension
+    plane = words.plane_meant(name)
+    if plane is not None and (known := words.unit_of(str(said["unit"]))) is not None:
+        said |= {"plane": plane} if known.quantity == "acceleration" else {}
+    return {key: Entry(value, path, line) for key, value in said.items() if value}

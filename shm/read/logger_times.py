@@ -12,7 +12,6 @@ import numpy as np
 
 from shm.errors import BadInput
 from shm.read import logger_words as words
-from shm.read.comma_table import REMEDY, evened
 from shm.read.logger_heading import Heading
 from shm.read.logger_rows import Block, second_record, values_of
 from shm.read.stamps import (
@@ -22,8 +21,11 @@ from shm.read.stamps import (
     follow_days,
     parsed,
     possible_times,
+    says_zone,
     seconds_of_stamps,
+    without_clock_change,
 )
+from shm.read.time_axis import REMEDY, on_even_grid
 from shm.values import NAN, FloatArray
 
 # Judgement: no logger records a hammer test slower than this, and none faster.
@@ -39,7 +41,8 @@ _FINE = 1e-4  # judgement: of the span; times rounded more coarsely do not give 
 class Clock:
     """Rate and start by the columns of times; `used` are the columns without a measurement.
 
-    `possible_starts` are several where the day of the start can be read in several orders.
+    `possible_starts` are several where the day of the start can be read in several orders;
+    `is_local` says that the start is by a clock that names no zone.
     """
 
     used: frozenset[int]
@@ -48,6 +51,7 @@ class Clock:
     possible_starts: tuple[PossibleTime, ...] = ()
     evened: Callable[[FloatArray], FloatArray] = lambda values: values
     remarks: tuple[str, ...] = ()
+    is_local: bool = False
 
 
 def clock_of(
@@ -186,9 +190,10 @@ def _factor(values: FloatArray, said_hz: float) -> float | None:
 def _started(clock: Clock, stamps: Sequence[str], order: DayOrder | None) -> Clock:
     """Return a clock with the start that its first stamp tells, or all where its day is unsure."""
     found = parsed(stamps[0], order)
+    local = not says_zone(stamps[0])
     if found is not None and found[1]:
-        return replace(clock, start=found[0])
-    return replace(clock, possible_starts=possible_times(stamps[0]))
+        return replace(clock, start=found[0], is_local=local)
+    return replace(clock, possible_starts=possible_times(stamps[0]), is_local=local)
 
 
 def _of_stamps(
@@ -199,7 +204,12 @@ def _of_stamps(
     if seconds is None:
         wrong = next(place for place, text in enumerate(texts) if parsed(text) is None)
         raise _fault(block, name, path)(wrong, f"{texts[wrong][:40]!r} is no time")
-    return _started(_even(seconds, said_hz, None, used, name, block, path), texts, order)
+    seconds, place = without_clock_change(seconds)
+    found = _started(_even(seconds, said_hz, None, used, name, block, path), texts, order)
+    if place is None:
+        return found
+    what = f"the clock went back one hour at line {block.lines[place]}: the end of summer time."
+    return replace(found, remarks=(*found.remarks, what))
 
 
 def _even(
@@ -212,9 +222,9 @@ def _even(
     if block.seam and len(back):
         raise second_record(block.seam, path)
     if len(seconds) < 2 or np.all(np.diff(seconds) > 0):
-        _, rate = evened(seconds, seconds[np.newaxis], fault)
+        _, rate = on_even_grid(seconds, seconds[np.newaxis], fault)
         return Clock(
-            used, rate, start, evened=lambda v: evened(seconds, v[np.newaxis], fault)[0][0]
+            used, rate, start, evened=lambda v: on_even_grid(seconds, v[np.newaxis], fault)[0][0]
         )
     rate = _rate_of_coarse(seconds, said_hz, fault)
     return Clock(used, rate, start)

@@ -126,7 +126,7 @@ _TIMES = re.compile(
     re.IGNORECASE,
 )
 _COUNTERS = re.compile(
-    r"(n|nr|no|nummer|number|index|idx|i|#|sample|samples|scan|scans|zeile|row|record|punkt|point|"
+    r"(n|nr|no|nummer|number|index|idx|i|#|sample|samples|sweeps?|scan|scans|zeile|row|record|punkt|point|"
     r"sample ?(no|nr|number|index)|mess(wert|punkt)( ?nr)?|lfd ?nr|count|counter|z(ä|ae)hler)\.?",
     re.IGNORECASE,
 )
@@ -187,6 +187,8 @@ def name_and_unit(text: str) -> tuple[str, str]:
     if found is not None:
         unit = next(part for part in found.groups() if part is not None).strip()
         name = text[: found.start()].strip()
+        if name and found[2] is not None and unit.isdecimal():
+            return text, ""  # Acc_Z(1): an element of an array
         if is_unit(unit):
             return name, unit
         inner = name_and_unit(name) if name else ("", "")
@@ -270,6 +272,22 @@ means_temperature = _meaning(
 means_hanger = _meaning(
     r"h(a|ä|ae)nger(nr|no|nummer|number|id)?|seil(nr|nummer)?|cable(no|number)?"
 )
+_OF_HANGER = re.compile(
+    r"steel|stahl|bauteil|h(a|ä|ae)nger|cable|seil|surface|oberfl|(air|luft|ambient|umgebung)", re.I
+)
+
+
+def temperature_meant(name: str) -> int:
+    """Return how well a column of degrees tells the hanger's: 2 its steel, 1 the air, 0 neither."""
+    found = _OF_HANGER.search(name)
+    return 0 if found is None else 1 if found[2] else 2
+
+
+def is_celsius(unit: str) -> bool:
+    """Return whether a unit is degrees Celsius."""
+    return plain_unit(unit) in ("°c", "degc", "degreesc", "celsius", "c")
+
+
 _NUMBERED = re.compile(
     r"(?:h(?:a|ä|ae)nger|seil|cable)\s*(?:nr\.?|no\.?|#)?[\s_:=-]*0*(\d{1,3})(?!\d|[.-]\d)",
     re.IGNORECASE,

@@ -1,7 +1,7 @@
 """MATLAB .mat files: version 5 (save -v7) by scipy, version 7.3 by h5py.
 
 Variables are those of `arrays`: force, acc_1, sampling_rate_hz, acc_1_unit, acc_1_x_m, ...
-Objects, functions, cells and, in version 5, structs are left out unread.
+A struct of one element counts as its fields. Objects, functions and cells are left out unread.
 
 The door to scipy.io: the variables of a MATLAB file of version 5 (save -v6, -v7).
 
@@ -23,6 +23,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ from numpy.typing import NDArray
 
 from shm.errors import BadInput
 from shm.read.array_reading import format_of_arrays
-from shm.read.arrays import Arrays, Variable
+from shm.read.arrays import Arrays, Variable, named_apart
 from shm.read.content import bytes_of
 from shm.read.hdf5_file import opened_nodes, variables
 from shm.read.limits import guarded, limits, refuse_large
@@ -78,6 +79,7 @@ FORMAT = format_of_arrays("MATLAB", (".mat",), _recognises, _opened, "scipy.io")
 
 _scipy: Any = scipy  # the stubs of its `io` know no streams
 _MOST_VARIABLES = 1000
+_MOST_BESIDE = 20  # judgement: a struct among more is settings of a program, no recording
 _KINDS = {
     "double": ("f", 8), "single": ("f", 4), "char": ("U", 4), "int8": ("i", 1), "uint8": ("u", 1),
     "int16": ("i", 2), "uint16": ("u", 2), "int32": ("i", 4), "uint32": ("u", 4),
@@ -95,15 +97,53 @@ def arrays_in(path: Path) -> Arrays:
         if len(listed) != len(elements) or len(listed) > _MOST_VARIABLES:
             raise ValueError("there are not as many variables as elements")
     _refuse_doubles([name for name, _, _ in listed], path)
-    found = [
-        _variable(name, shape, kind, is_complex, element, content, path)
-        for (name, shape, kind), element, is_complex in zip(
-            listed, elements, complexities, strict=True
+    found: list[Variable] = []
+    left_out: list[str] = []
+    for (name, shape, kind), element, is_complex in zip(
+        listed, elements, complexities, strict=True
+    ):
+        if kind in _KINDS:
+            found.append(_variable(name, shape, kind, is_complex, element, content, path))
+        elif kind == "struct" and math.prod(shape) == 1 and len(listed) < _MOST_BESIDE:
+            fields = _fields(name, element, content, path)
+            found += fields
+            left_out += [] if fields else [f"{name} ({kind})"]
+        else:
+            left_out.append(f"{name} ({kind})")
+    names = named_apart([tuple(variable.name.split(".")) for variable in found])
+    apart = [replace(v, name=name) for v, name in zip(found, names, strict=True)]
+    return Arrays(tuple(apart), {}, tuple(left_out))
+
+
+def _fields(name: str, element: Element, content: bytes, path: Path) -> list[Variable]:
+    """Return the fields of a struct that hold numbers or a text; none where no record is in it.
+
+    A field `unit` of as many texts as there are records gives the unit of each, in their order.
+    """
+    with guarded(path, f"the struct {name!r}"):
+        element.refuse_damaged_struct()
+        found = _scipy.io.loadmat(io.BytesIO(content), variable_names=[name], simplify_cells=True)[
+            name
+        ]
+        fields = {str(key): np.asarray(value) for key, value in found.items()}
+    plain = {key: value for key, value in fields.items() if value.dtype.kind in "iufcU"}
+    records = [key for key, value in plain.items() if value.ndim == 1 and value.size > 1]
+    units = next((fields[key] for key in ("unit", "units") if key in fields), np.zeros(0))
+    if not records:
+        return []
+    told = units.size == len(records) and all(isinstance(unit, str) for unit in units.flat)
+    by_name = dict(zip(records, units.flat, strict=True)) if told else {}
+    return [
+        Variable(
+            f"{name}.{key}",
+            value.shape,
+            value.dtype.kind,
+            value.dtype.itemsize,
+            partial(np.asarray, value),
+            {"unit": by_name[key]} if key in by_name else {},
         )
-        if kind in _KINDS
+        for key, value in plain.items()
     ]
-    left_out = tuple(f"{name} ({kind})" for name, _, kind in listed if kind not in _KINDS)
-    return Arrays(tuple(found), {}, left_out)
 
 
 def _variable(
@@ -147,6 +187,8 @@ _INT8, _INT32, _UINT32 = 1, 5, 6
 _NUMBER_BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}
 _TEXTS = (1, 2, 4, 16, 17, 18)
 _COMPLEX_FLAG = 0x800
+_CELL, _STRUCT, _CHAR, _SPARSE, _LAST_NUMBER = 1, 2, 4, 5, 15  # classes of arrays
+_DEEPEST = 3
 _CHUNK = 1 << 20  # technical: unpacked at once
 
 
@@ -191,6 +233,38 @@ class Element:
                 continue
             if is_text or len(part) != math.prod(shape) * _NUMBER_BYTES[kind]:
                 raise ValueError("a variable's values are not as many as its shape says")
+
+    def refuse_damaged_struct(self) -> None:
+        """Raise ValueError where a part of a struct is not what its tag says, or far too large."""
+        content = b"".join(self.pieces())
+        if len(content) > limits().bytes_at_once:
+            raise ValueError("a variable unpacks to more than is read at once")
+        self._refuse_damaged_part(content, 0)
+
+    def _refuse_damaged_part(self, content: bytes, depth: int) -> None:
+        parts = list(self._parts(content))
+        (_, flags), (_, sizes), _, *values = parts
+        kind, dims = (
+            self._number(flags, 0) & 0xFF,
+            [self._number(sizes, place) for place in range(0, len(sizes), 4)],
+        )
+        if kind in (_STRUCT, _CELL):
+            inner = values[2:] if kind == _STRUCT else values
+            counted = kind == _STRUCT or len(inner) == math.prod(dims)
+            if depth > _DEEPEST or not counted or any(each[0] != _MATRIX for each in inner):
+                raise ValueError("a struct is damaged, or nested too deeply")
+            for _, part in inner:
+                if part:
+                    head = struct.pack(f"{self.byte_order}II", _MATRIX, len(part))
+                    self._refuse_damaged_part(head + part, depth + 1)
+            return
+        is_text, is_complex = kind == _CHAR, bool(self._number(flags, 0) & _COMPLEX_FLAG)
+        if not _CHAR <= kind <= _LAST_NUMBER or kind == _SPARSE or len(values) != 1 + is_complex:
+            raise ValueError("a field of a struct is of a kind that is not read")
+        for found, part in values:
+            fits = found in _TEXTS if is_text else found in _NUMBER_BYTES
+            if not fits or (not is_text and len(part) != math.prod(dims) * _NUMBER_BYTES[found]):
+                raise ValueError("a field's values are not as many as its shape says")
 
     def _head(self, piece: bytes) -> list[tuple[int, bytes]]:
         """Flags, dimensions and name of a matrix, each with its type."""

@@ -7,9 +7,8 @@ samples are counts, or numbers without a unit: what they are worth stands in a s
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -17,12 +16,11 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput
-from shm.read import logger_text
-from shm.read.base import Format, LoggerColumn, LoggerTable, Peek
+from shm.read.base import Format, at_once
+from shm.read.header import Entry
 from shm.read.limits import guarded, refuse_large, refuse_many_samples
-from shm.read.logger_words import hanger_numbered
-from shm.read.sidecar import sidecar_path
-from shm.values import NAN, FloatArray, Recording
+from shm.read.table import Column, Table
+from shm.values import NAN, FloatArray
 
 _NAME = "miniSEED"
 _COUNTS = "counts"
@@ -49,8 +47,8 @@ def recognises(head: bytes) -> bool:
     return head[:3] == b"MS\x03" or (len(head) > 48 and is_2)
 
 
-def table_of(path: Path) -> LoggerTable:
-    """The channels of a file on one grid of times; raises BadInput where it is damaged."""
+def open_tables(path: Path) -> tuple[Table, ...]:
+    """Return the channels of a file on one grid of times; raises BadInput where it is damaged."""
     traces = _traces(path)
     rates = [trace.sampling_rate_hz for trace in traces]
     rate, start_ns = rates[0], min(trace.start_ns for trace in traces)
@@ -70,10 +68,10 @@ def table_of(path: Path) -> LoggerTable:
     for begin, trace in zip(begins, traces, strict=True):
         _fill(rows[trace.name][begin : begin + len(trace.values)], trace.values)
     whole = {trace.name for trace in traces if trace.values.dtype.kind == "i"}
-    columns = tuple(LoggerColumn(n, _COUNTS if n in whole else "", rows[n]) for n in names)
+    columns = tuple(Column(n, samples, rows[n].copy, _COUNTS if n in whole else "") for n in names)
     start = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=start_ns // 1000)
-    hanger = hanger_numbered(path.stem)
-    return LoggerTable(columns, rate, NAN, hanger, start, NAN, 0, (_NAME, *names), ())
+    entries = {"time": Entry(start.isoformat(), path), "sampling_rate_hz": Entry(rate, path)}
+    return (Table(path, columns, entries, (_NAME, *names)),)
 
 
 def _fill(row: FloatArray, values: np.ndarray) -> None:
@@ -136,54 +134,12 @@ def _library(path: Path) -> Any:
     return pymseed
 
 
-def _worthless(table: LoggerTable, path: Path) -> BadInput | None:
-    """The refusal of a file of which nobody says what a count is worth."""
-    header, used, _ = logger_text.header_of(table, path)
-    names = [table.columns[place].name for place in used]
-    units = {column.name: column.unit for column in table.columns}
-    unknown = [
-        name
-        for name in names or units
-        if name not in header.channels
-        or (units[name] == _COUNTS and math.isnan(header.calibration(name)))
-    ]
-    if not unknown:
-        return None
-    what = units[unknown[0]] or "numbers without a unit"
-    return BadInput(
-        f"holds {what}, and nobody says what one is worth.",
-        file=path,
-        channel=unknown[0],
-        remedy=f"Write into {sidecar_path(path).name}, or for all files of a stream into its "
-        f'stream.toml: [channel.{unknown[0]}] with unit = "m/s2" and calibration = the m/s2 of '
-        "one count (1 / the recorder's sensitivity).",
-    )
-
-
-def _read(path: Path) -> Recording:
-    table = table_of(path)
-    if (refusal := _worthless(table, path)) is not None:
-        raise refusal
-    return logger_text.recording(table, path)
-
-
-def _peek(path: Path) -> Peek:
-    table = table_of(path)
-    found = logger_text.peeked(table, _NAME, path)
-    refusal = _worthless(table, path)
-    if refusal is None:
-        return found
-    return replace(found, problems=(*found.problems, str(refusal)))
-
-
 FORMAT = Format(
-    name=_NAME,
-    suffixes=(".mseed", ".miniseed", ".msd"),
-    recognises=recognises,
-    peek=_peek,
-    read=_read,
+    _NAME,
+    (".mseed", ".miniseed", ".msd"),
+    recognises,
+    at_once(open_tables),
     holds_responses=False,
     names_channels=False,
-    table=table_of,
     library="pymseed",
 )

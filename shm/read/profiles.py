@@ -26,6 +26,7 @@ from __future__ import annotations
 import re
 import tomllib
 from dataclasses import dataclass
+from datetime import UTC, tzinfo
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ from shm.read.content import unreadable
 from shm.read.header import CHANNEL_KEYS
 from shm.read.logger_words import hanger_numbered
 from shm.read.sidecar import Described, sidecar_text
-from shm.read.stamps import DAY_ORDERS, DayOrder
+from shm.read.stamps import DAY_ORDERS, DayOrder, in_zone
 
 FOLDER = "loggers"
 DAY_ORDER = "day_order"
@@ -80,14 +81,19 @@ def any_profile(workspace: Path) -> bool:
 
 
 def completed(
-    profile: Described, layout: Layout, own: Described, file_name: str = ""
+    profile: Described, layout: Layout, own: Described, file_name: str = "", zone: tzinfo = UTC
 ) -> dict[str, Any]:
-    """The sidecar of one file: what its own says, and what its name and the profile add to that."""
+    """Return the sidecar of one file: what its own says, and what name and profile add to that.
+
+    `zone` is that of clocks which name none.
+    """
     added = {key: profile[key] for key in _OF_PROFILE if key in profile}
     order = added.pop(DAY_ORDER, MIXED)
     for each in layout.possible_times:
         if each.order == order:
-            added["time"] = each.time
+            added["time"] = in_zone(each.time, zone)
+    if layout.local_time is not None and zone is not UTC:
+        added["time"] = in_zone(layout.local_time, zone)
     named = hanger_numbered(file_name)
     if named is not None:
         added["hanger"] = named

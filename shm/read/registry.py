@@ -18,20 +18,12 @@ import numpy as np
 
 from shm import modes_document
 from shm.errors import BadInput, UsageError
-from shm.read import logger_text
 from shm.read import logger_words as words
-from shm.read.assemble import read_of_test
-from shm.read.base import (
-    Format,
-    Layout,
-    LoggerColumn,
-    LoggerTable,
-    Peek,
-    PeekChannel,
-    Survey,
-    SurveyedColumn,
-)
+from shm.read.assemble import assemble, collecting, read_of_test
+from shm.read.assemble import peek as look
+from shm.read.base import Format, Layout, Peek, PeekChannel, Survey, SurveyedColumn
 from shm.read.bundles import each_member, entries_of_test, holds_test
+from shm.read.campbell_file import FORMAT as CAMPBELL
 from shm.read.comma_separated import FORMAT as CSV
 from shm.read.content import (
     head_of,
@@ -46,6 +38,7 @@ from shm.read.matlab_file import FORMAT as MATLAB
 from shm.read.mini_seed_file import FORMAT as MINI_SEED
 from shm.read.numpy_file import FORMAT as NUMPY
 from shm.read.sidecar import document_beside, sidecar_path
+from shm.read.table import Column, Table, describe
 from shm.read.tdms_file import FORMAT as TDMS
 from shm.read.universal_file import FORMAT as UFF
 from shm.read.wave_file import FORMAT as WAVE
@@ -60,23 +53,42 @@ FORMATS: tuple[Format, ...] = (
     EXCEL,
     WAVE,
     MINI_SEED,
+    CAMPBELL,
     UFF,
     CSV,
 )
 
 
 def read(path: Path) -> Recording | FrequencyResponse:
-    """The content of a file; raises BadInput naming file, line, channel and remedy."""
-    return format_of(path).read(path)
+    """Return the content of a file; raises BadInput naming file, line, channel and remedy."""
+    found = _records(path)
+    if len(found) > 1:
+        raise BadInput(
+            f"holds {len(found)} records, as of the hits of one test, where one is read.",
+            file=path,
+            remedy="Ingest it as a whole, or read it with `shm.read.read_test`.",
+        )
+    return found[0]
+
+
+def _records(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
+    with format_of(path).open_tables(path) as tables:
+        return tuple(map(assemble, tables))
 
 
 def peek(path: Path) -> Peek:
-    """What the headers of a file say, without its data.
+    """Return what the headers of a file say, without its data: of the first of several records.
 
     Faults of the description are listed in `problems`; a file of which nothing can be made out
     raises BadInput.
     """
-    return format_of(path).peek(path)
+    return _looks(path)[0]
+
+
+def _looks(path: Path) -> tuple[Peek, ...]:
+    found = format_of(path)
+    with found.open_tables(path) as tables:
+        return tuple(look(table, found.name) for table in tables)
 
 
 def write(recording: Recording | FrequencyResponse, path: Path) -> None:
@@ -104,8 +116,8 @@ def format_of(path: Path) -> Format:
             file=path,
             remedy="Unpack it, or ingest the archive as a whole.",
         )
-    claimed = _format_of_suffix(_unpacked_name(path))
     recognised = next((known for known in FORMATS if known.recognises(head)), None)
+    claimed = _format_of_suffix(_unpacked_name(path), recognised)
     if claimed is None or (is_gzipped(path) and not claimed.may_be_gzipped):
         raise refuse_unreadable_suffix(path, _suffixes(), recognised)
     refuse_unless_readable(path, head, claimed, recognised)
@@ -116,8 +128,12 @@ def _unpacked_name(path: Path) -> Path:
     return path.with_suffix("") if is_gzipped(path) else path
 
 
-def _format_of_suffix(path: Path) -> Format | None:
-    return next((known for known in FORMATS if path.suffix.lower() in known.suffixes), None)
+def _format_of_suffix(path: Path, recognised: Format | None = None) -> Format | None:
+    """Return the format that a suffix claims, or the one recognised where it shares that suffix."""
+    suffix = path.suffix.lower()
+    if recognised is not None and suffix in recognised.shared_suffixes:
+        return recognised
+    return next((known for known in FORMATS if suffix in known.suffixes), None)
 
 
 def _suffixes() -> list[str]:
@@ -126,8 +142,12 @@ def _suffixes() -> list[str]:
 
 def libraries_for(path: Path) -> tuple[str, ...]:
     """What reading a file loads, by its suffix; an archive may hold any format."""
-    claimed = _format_of_suffix(_unpacked_name(path))
-    formats = FORMATS if holds_test(path) else (claimed,) if claimed else ()
+    suffix = _unpacked_name(path).suffix.lower()
+    formats = (
+        FORMATS
+        if holds_test(path)
+        else [f for f in FORMATS if suffix in f.suffixes + f.shared_suffixes]
+    )
     return tuple(each.library for each in formats if each.library)
 
 
@@ -142,34 +162,42 @@ def _single(channel: Channel) -> Channel:
 
 
 T = TypeVar("T")
-Found = TypeVar("Found", bound=Recording | FrequencyResponse | Peek | ModalTest)
+Found = TypeVar("Found", bound=Recording | FrequencyResponse | Peek | ModalTest | Survey)
 
 
 def read_test(path: Path) -> tuple[Recording | FrequencyResponse, ...]:
-    """The files of one test: all of a .zip, in the order of their names, else the one file."""
+    """Return the records of one test: of all files of a .zip, in the order of names, or of one."""
     if not holds_test(path):
-        return (read(path),)
+        return _records(path)
     head_of(path)
-    records = each_member(path, lambda file, name: replace(_named(read, file, name), source=name))
-    return tuple(_as_said(record, entries_of_test(path).of_test) for record in records)
+    said = entries_of_test(path).of_test
+    read_all = (_as_said(each, said) for found in each_member(path, _read_member) for each in found)
+    return tuple(read_all)
+
+
+def _read_member(file: Path, name: str) -> tuple[Recording | FrequencyResponse, ...]:
+    return tuple(replace(each, source=name) for each in _named(_records, file, name))
 
 
 def peek_test(path: Path) -> tuple[Peek, ...]:
-    """What the headers of each file of a test say; members not readable have that as problem."""
+    """Return what the headers of each record of a test say.
+
+    Members that cannot be read have that as problem.
+    """
     if not holds_test(path):
-        return (peek(path),)
+        return _looks(path)
     head_of(path)
     problems: list[str] = []
-    said = read_of_test(entries_of_test(path), problems)
-    looks = (_as_said(found, said) for found in each_member(path, _peek_member))
-    return tuple(replace(look, problems=(*look.problems, *problems)) for look in looks)
+    said = read_of_test(entries_of_test(path), collecting(problems))
+    looks = (_as_said(each, said) for found in each_member(path, _peek_member) for each in found)
+    return tuple(replace(each, problems=(*each.problems, *problems)) for each in looks)
 
 
-def _peek_member(file: Path, name: str) -> Peek:
+def _peek_member(file: Path, name: str) -> tuple[Peek, ...]:
     try:
-        return replace(_named(peek, file, name), source=name)
+        return tuple(replace(each, source=name) for each in _named(_looks, file, name))
     except BadInput as refusal:
-        return Peek(name, "not readable", (), 0, problems=(str(refusal),))
+        return (Peek(name, "not readable", (), 0, problems=(str(refusal),)),)
 
 
 def _named(verb: Callable[[Path], T], file: Path, name: str) -> T:
@@ -202,6 +230,7 @@ def load_modes(path: Path) -> tuple[ModalTest, ...]:
 def _as_said(found: Found, said: Mapping[str, Any]) -> Found:
     """Return a test with what a sidecar says of all of it; None and NaN change nothing."""
     known = {key: value for key, value in said.items() if value is not None and value == value}
+    known = {key: value for key, value in known.items() if hasattr(found, key)}
     return replace(found, **known)
 
 
@@ -234,71 +263,102 @@ _FINGERPRINT_DIGITS = 16  # technical: of 64 bits; a workspace has a handful of 
 
 
 def survey(path: Path) -> Survey:
-    """All that can be found out about a file; raises BadInput where that is nothing."""
-    _refuse_archive(path)
-    found = format_of(path)
-    table = found.table(path) if found.table else None
-    look = (
-        logger_text.peeked(table, found.name, path)
-        if table is not None and table.is_text
-        else found.peek(path)
+    """Return all that can be found out about a file; raises BadInput where that is nothing."""
+    if not holds_test(path):
+        return _survey_file(path)
+    head_of(path)
+    found = each_member(path, lambda file, name: _named(_survey_file, file, name))
+    if len({each.layout.fingerprint for each in found}) > 1:
+        raise BadInput(
+            "is an archive of files of several loggers.",
+            file=path,
+            remedy="Unpack it and import one of its files of each.",
+        )
+    entries, several = entries_of_test(path), f"the first of {len(found)} files is shown"
+    first, remarks = _as_said(found[0], entries.of_test), [several] if len(found) > 1 else []
+    orders = {each.layout.day_order for each in found} - {None}
+    layout = replace(
+        first.layout,
+        possible_times=(),
+        day_order=orders.pop() if len(orders) == 1 else None,
+        local_time=first.layout.local_time if len(found) == 1 and entries.time is None else None,
     )
-    known = {channel.name: channel for channel in look.channels}
-    if table is None:
-        listed = look.channels if look.lines else ()
-        columns: Sequence[SurveyedColumn] = [_bare(channel) for channel in listed]
+    return replace(first, source=str(path), layout=layout, remarks=(*first.remarks, *remarks))
+
+
+def _survey_file(path: Path) -> Survey:
+    known = format_of(path)
+    with known.open_tables(path) as tables:
+        return _surveyed(tables, known.name, path)
+
+
+def _surveyed(tables: Sequence[Table], file_format: str, path: Path) -> Survey:
+    table = tables[0]
+    seen, is_response = look(table, file_format), describe(table, with_beside=False).is_response
+    channels = {channel.name: channel for channel in seen.channels}
+    columns: list[SurveyedColumn] = []
+    problems = list(seen.problems)
+    if seen.lines or is_response:
+        columns = [_bare(channel) for channel in seen.channels]
     else:
-        columns = [_column(column, known.get(column.name)) for column in table.columns]
+        shown = _may_be_chosen(table)
+        attempt = collecting(problems)
+        columns = attempt(lambda: [_column(each, channels.get(each.name)) for each in shown], [])
+    several = f"holds {len(tables)} records of one test; the first is shown"
     return Survey(
         source=str(path),
-        format=found.name,
+        format=file_format,
         columns=tuple(columns),
-        samples=look.samples or (table.samples if table is not None else 0),
-        sampling_rate_hz=look.sampling_rate_hz,
-        hanger=look.hanger,
-        time=look.time,
-        temperature_c=look.temperature_c,
-        layout=_layout(found, table, look),
-        lines=look.lines,
-        remarks=table.remarks if table is not None else (),
-        problems=(*look.problems, *_left_out(look, columns)),
+        samples=seen.samples or next((len(c.values) for c in columns if c.values is not None), 0),
+        sampling_rate_hz=seen.sampling_rate_hz,
+        hanger=seen.hanger,
+        time=seen.time,
+        temperature_c=seen.temperature_c,
+        layout=_layout(table, file_format, columns),
+        lines=seen.lines,
+        remarks=(*table.remarks, *([several] if len(tables) > 1 else [])),
+        problems=(*problems, *_left_out(seen, columns)),
     )
+
+
+def _may_be_chosen(table: Table) -> list[Column]:
+    """Return the columns of numbers that are as long as the channels, or else as most are."""
+    measured = [column for column in table.columns if column.role == "channel"]
+    may_be = table.choosable
+    sizes = [(column.size, column.rate_hz) for column in measured or may_be]
+    usual = max(map(str, sizes), key=list(map(str, sizes)).count, default="")
+    return [column for column in may_be if str((column.size, column.rate_hz)) == usual]
 
 
 def layout_of(path: Path) -> Layout:
-    """The layout of a file alone; raises BadInput where nothing can be made out."""
+    """Return the layout of a file alone; raises BadInput where nothing can be made out."""
     return survey(path).layout
 
 
-def _left_out(look: Peek, columns: Sequence[SurveyedColumn]) -> tuple[str, ...]:
-    """What a file holds that is not read, where that is all that it holds."""
-    if columns or not look.left_out:
+def _left_out(seen: Peek, columns: Sequence[SurveyedColumn]) -> tuple[str, ...]:
+    """Return what a file holds that is not read, where that is all that it holds."""
+    if columns or not seen.left_out:
         return ()
-    return (f"it holds {', '.join(look.left_out)[:200]}, which is not read.",)
+    return (f"it holds {', '.join(seen.left_out)[:200]}, which is not read.",)
 
 
-def _refuse_archive(path: Path) -> None:
-    if holds_test(path):
-        raise BadInput(
-            "is an archive of several files.",
-            file=path,
-            remedy="Unpack it and import one of its files; those of the same logger need nothing"
-            " then.",
-        )
-
-
-def _column(column: LoggerColumn, known: PeekChannel | None) -> SurveyedColumn:
-    meant = words.quantity_meant(column.name)
-    plane = words.plane_meant(column.name)
-    if known is None:
-        return SurveyedColumn(
-            column.name, column.unit, column.values, column.overloads, None, meant, plane
-        )
-    return SurveyedColumn(
-        column.name, column.unit, column.values, column.overloads, known.quantity, meant,
-        known.plane or (plane if known.quantity == "acceleration" else None),
-        known.x_m, known.calibration, known.full_scale, known.unit,
+def _column(column: Column, known: PeekChannel | None) -> SurveyedColumn:
+    meant, plane = words.quantity_meant(column.name), words.plane_meant(column.name)
+    found = SurveyedColumn(
+        column.name, column.unit, np.asarray(column.load(), float), column.overloads, meant=meant,
+        plane=plane,
     )  # fmt: skip
+    if known is None:
+        return found
+    return replace(
+        found,
+        quantity=known.quantity,
+        plane=known.plane or (plane if known.quantity == "acceleration" else None),
+        x_m=known.x_m,
+        calibration=known.calibration,
+        full_scale=known.full_scale,
+        described_unit=known.unit,
+    )
 
 
 def _bare(channel: PeekChannel) -> SurveyedColumn:
@@ -308,20 +368,24 @@ def _bare(channel: PeekChannel) -> SurveyedColumn:
     )  # fmt: skip
 
 
-def _layout(found: Format, table: LoggerTable | None, look: Peek) -> Layout:
-    said = table.layout if table is not None else tuple(c.name for c in look.channels)
-    digest = hashlib.sha256("\n".join((found.name, *said)).encode()).hexdigest()
-    columns = (
-        tuple(f"{c.name} [{c.unit}]" if c.unit else c.name for c in table.columns)
-        if table is not None
-        else said
-    )
+def _layout(table: Table, file_format: str, columns: Sequence[SurveyedColumn]) -> Layout:
+    """Return the layout by what the file itself says, whatever a sidecar adds."""
+    is_response = bool(columns) and columns[0].values is None
+    names = tuple(column.name for column in columns)
+    said = names if is_response else table.layout
+    digest = hashlib.sha256("\n".join((file_format, *said)).encode()).hexdigest()
+    attempt, own = collecting([]), table.own_header
+    timed = any(column.role == "times" or column.rate_hz > 0 for column in table.columns)
+    says_rate = timed or table.clock_rate_hz > 0 or attempt(lambda: own.sampling_rate_hz, 0) > 0
     return Layout(
         digest[:_FINGERPRINT_DIGITS],
-        found.name,
-        columns,
-        table.hanger if table is not None else look.hanger,
-        table is not None and (table.said_rate_hz > 0 or table.times_rate_hz > 0),
-        table.day_order if table is not None else None,
-        table.possible_times if table is not None else (),
+        file_format,
+        names
+        if is_response
+        else tuple(f"{c.name} [{c.unit}]" if c.unit else c.name for c in columns),
+        attempt(lambda: own.hanger, None),
+        says_rate,
+        table.day_order,
+        table.possible_times,
+        table.local_time,
     )

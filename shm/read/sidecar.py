@@ -53,10 +53,13 @@ def sidecar_path(path: Path) -> Path:
     return plain.with_name(os.fsdecode(name))
 
 
-def with_sidecar(header: Header, path: Path, others: Sequence[str] = ()) -> Header:
-    """A file's header overridden by its sidecar, if there is one; raises BadInput naming it.
+def with_sidecar(
+    header: Header, path: Path, others: Sequence[str] = (), *, of_channels: bool = True
+) -> Header:
+    """Return a file's header overridden by its sidecar; raises BadInput naming it.
 
-    The sidecar may also describe `others`, which the file holds but which are no channels.
+    The sidecar may also describe `others`, which the file holds but which are no channels; what it
+    says of channels is left alone where it is not asked for.
     """
     sidecar = sidecar_path(path)
     document = document_beside(path)
@@ -71,7 +74,8 @@ def with_sidecar(header: Header, path: Path, others: Sequence[str] = ()) -> Head
             for name, entry in _listed(key, document[key], names, sidecar).items():
                 channels[name][key] = entry
     tables = _tables(document, sidecar)
-    _refuse_unknown(tables, [*names, *others], sidecar)
+    if of_channels:
+        _refuse_unknown(tables, [*names, *others], sidecar)
     for name in [name for name in names if name in tables]:
         channels[name].update(_entries(tables[name], sidecar))
     return header.overridden_by(Header(sidecar, channels, entries))

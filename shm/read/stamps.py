@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, tzinfo
 from pathlib import Path
 from typing import Literal
 
@@ -33,6 +33,7 @@ _DAY_IN_BYTES = re.compile(rb"(?<!\d)\d{1,2}([-/])\d{1,2}\1\d{2}")
 _PACKED = (".xlsx", ".xlsm", ".gz")  # whose first bytes tell nothing
 _MONTH = re.compile("jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec", re.IGNORECASE)
 _DAY_S = 86400.0
+_HOUR_S, _WHOLE_S = 3600.0, 1.0
 _CLOCK_ONLY = datetime(1, 1, 1, tzinfo=UTC)
 
 DayOrder = Literal["day first", "month first", "year first"]
@@ -70,6 +71,20 @@ def parsed(text: str, order: DayOrder | None = None) -> tuple[datetime, bool] | 
         return (day, certain) if alone else (_clocked(day, found), certain)
     except (ValueError, OverflowError):
         return None
+
+
+def says_zone(text: str) -> bool:
+    """Return whether a time says of which zone it is."""
+    found = _STAMP.fullmatch(text.strip())
+    return found is not None and found["zone"] is not None
+
+
+def in_zone(time: datetime, zone: tzinfo) -> datetime:
+    """Return the time in UTC of a clock in a zone, whose reading was taken for UTC.
+
+    Of the hour that comes twice at the end of summer time, the first.
+    """
+    return time.replace(tzinfo=zone).astimezone(UTC)
 
 
 def possible_times(text: str) -> tuple[PossibleTime, ...]:
@@ -229,3 +244,18 @@ def moment(day: str, clock: str, order: DayOrder | None = None) -> datetime | No
         if found is not None and found[1]:
             return found[0] if found[0].year > 1 else None
     return None
+
+
+def without_clock_change(seconds: FloatArray) -> tuple[FloatArray, int | None]:
+    """Return times that run on over the end of summer time, and the place where the hour came back.
+
+    Nothing but a clock set back makes times fall by an hour less one step. None where none does.
+    """
+    steps = np.diff(seconds)
+    back = np.flatnonzero(steps < 0)
+    step = float(np.median(steps)) if len(steps) else 0.0
+    if len(back) != 1 or abs(steps[back[0]] + _HOUR_S - step) > max(step, _WHOLE_S):
+        return seconds, None
+    place = int(back[0]) + 1
+    later = np.arange(len(seconds)) >= place
+    return seconds + _HOUR_S * later, place

@@ -8,7 +8,8 @@ Time histories of a UFF file and recordings, each made from the other.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -16,35 +17,86 @@ from typing import Any
 import numpy as np
 
 from shm.errors import BadInput, UsageError
-from shm.read import assemble, universal_frf
+from shm.read import universal_frf
 from shm.read.atomic import replace_file
-from shm.read.base import Format, LoggerColumn, LoggerTable, Peek, PeekChannel
-from shm.read.header import Header
+from shm.read.base import Format, PeekChannel, at_once
 from shm.read.logger_heading import unlike
 from shm.read.logger_words import SI, unit_of
-from shm.read.sidecar import channels_described, with_sidecar, write_sidecar
+from shm.read.sidecar import write_sidecar
+from shm.read.table import Column, Table
 from shm.read.universal_sets import TIME_RESPONSE, Content, FunctionSet, load, recognises, save
 from shm.values import NAN, FloatArray, FrequencyResponse, Quantity, Recording
 
 
-def _read(path: Path) -> Recording | FrequencyResponse:
-    content = load(path, headers_only=False)
-    if _holds_responses(content):
-        return universal_frf.frequency_response(content, path)
-    return recording(content, path)
-
-
-def _peek(path: Path) -> Peek:
+def open_tables(path: Path) -> tuple[Table, ...]:
+    """Return what a file is for: its time histories, or its frequency responses."""
     content = load(path, headers_only=True)
-    if _holds_responses(content):
-        return universal_frf.peek(content, FORMAT.name, path)
-    return peek(content, FORMAT.name, path)
+
+    @cache
+    def loaded() -> tuple[FunctionSet, ...]:
+        return load(path, headers_only=False).functions
+
+    def values(found: FunctionSet) -> Any:
+        return loaded()[content.functions.index(found)].data
+
+    if universal_frf.response_sets(content) and not _holds_histories(content):
+        return (universal_frf.table_in(content, values, path),)
+    return (_table(content, values, path),)
 
 
-def _holds_responses(content: Content) -> bool:
-    """Whether frequency responses are what the file is for: time histories go first if whole."""
-    measured = {quantity(found) for found in time_sets(content)}
-    return bool(universal_frf.response_sets(content)) and len(measured) < 2
+def _holds_histories(content: Content) -> bool:
+    """Return whether time histories are what a file with responses is for: force and response."""
+    return len({quantity(found) for found in histories(content)} - {None}) > 1
+
+
+def _table(content: Content, values: Callable[[FunctionSet], Any], path: Path) -> Table:
+    """Return all time histories; none, and why, of a file of modes alone."""
+    every = histories(content)
+    if not every and content.mode_count:
+        refusal = BadInput(
+            f"it holds {content.mode_count} modes at {len(content.nodes)} places that another"
+            " program identified, no recording.",
+            file=path,
+            remedy="Give `shm import FILE`: it asks for the hanger and for the planes.",
+        )
+        return Table(path, (), layout=("UFF",), refusal=refusal)
+    columns = tuple(
+        _column(name, found, content, partial(_signed, found, values), path)
+        for name, found in zip(_names(every, path), every, strict=True)
+    )
+    sets = [c for c in columns if c.role == "channel"] or columns
+    named = (
+        f"{c.name} [{c.unit}]"
+        for c in columns
+        if (c.size, c.rate_hz) == (sets[0].size, sets[0].rate_hz)
+    )
+    left_out = tuple(_label(found) for found in content.functions if found not in every)
+    return Table(path, columns, layout=("UFF", *named), left_out=left_out)
+
+
+def _column(
+    name: str, found: FunctionSet, content: Content, load: Callable[[], FloatArray], path: Path
+) -> Column:
+    return Column(
+        name,
+        found.points,
+        load,
+        found.unit,
+        "other" if quantity(found) is None else "channel",
+        universal_frf.channel_entries(found, *found.response[1:], content, path),
+        universal_frf.entries(found, path),
+        1 / found.step if found.step > 0 else NAN,
+        label=_label(found),
+    )
+
+
+def _label(found: FunctionSet) -> str:
+    return f"{found.title} ({found.label or 'of another kind'})"
+
+
+def _signed(found: FunctionSet, values: Callable[[FunctionSet], Any]) -> FloatArray:
+    signed = universal_frf.sign(found.response[2]) * np.real(np.asarray(values(found)))
+    return np.asarray(signed, float)
 
 
 def _write(described: Recording | FrequencyResponse, path: Path) -> None:
@@ -69,33 +121,14 @@ def _write(described: Recording | FrequencyResponse, path: Path) -> None:
     replace_file(path, lambda temporary: save(temporary, sets))
 
 
-def _table(path: Path) -> LoggerTable | None:
-    """The time histories, with those that are neither a force nor an acceleration."""
-    content = load(path, headers_only=False)
-    every, sets = histories(content), time_sets(content) or histories(content)
-    if _holds_responses(content) or not sets:
-        return None
-    _refuse_different(sets, path)
-    columns = tuple(
-        LoggerColumn(name, found.unit, _real(found))
-        for name, found in zip(_names(every, path), every, strict=True)
-        if (found.points, found.step) == (sets[0].points, sets[0].step)
-    )
-    layout = ("UFF", *(f"{c.name} [{c.unit}]" for c in columns))
-    rate, header = _rate(sets), _header(_used(content, path), content, path)
-    return LoggerTable(columns, rate, NAN, header.hanger, None, NAN, 0, layout, (), False)
-
-
 FORMAT = Format(
-    name="UFF",
-    library="pyuff",
-    suffixes=(".uff", ".unv", ".uf"),
-    recognises=recognises,
-    peek=_peek,
-    read=_read,
+    "UFF",
+    (".uff", ".unv", ".uf"),
+    recognises,
+    at_once(open_tables),
     write=_write,
     may_be_gzipped=True,
-    table=_table,
+    library="pyuff",
 )
 
 
@@ -110,56 +143,10 @@ def histories(content: Content) -> list[FunctionSet]:
     return [found for found in content.functions if found.function == TIME_RESPONSE]
 
 
-def time_sets(content: Content) -> list[FunctionSet]:
-    """The sets that hold a force or an acceleration over time."""
-    return [found for found in histories(content) if quantity(found) is not None]
-
-
-def _used(content: Content, path: Path) -> dict[str, FunctionSet]:
-    """Those, and what the sidecar says to be one, by name."""
-    described, sets = channels_described(path), histories(content)
-    named = zip(_names(sets, path), sets, strict=True)
-    return {n: found for n, found in named if quantity(found) is not None or n in described}
-
-
 def quantity(found: FunctionSet) -> Quantity | None:
     """What a set measures, by its unit or else by its type; None for anything else."""
     unit = unit_of(found.unit)
     return unit.quantity if unit is not None else _QUANTITIES.get(found.quantity)
-
-
-def recording(content: Content, path: Path) -> Recording:
-    _refuse_different(time_sets(content), path)
-    used = _used(content, path)
-    sets = list(used.values())
-    if not sets:
-        _refuse_modes(content, path)
-        assemble.refuse_quantities([], path)
-    _refuse_different(sets, path)
-    values = np.array([universal_frf.sign(found.response[2]) * _real(found) for found in sets])
-    header = _header(used, content, path)
-    return assemble.recording(header, values, path, _rate(sets))
-
-
-def _refuse_modes(content: Content, path: Path) -> None:
-    """Raises BadInput for a file of modes alone, which a person must say more of."""
-    if content.has_modes:
-        raise BadInput(
-            "it holds modes that another program identified, no recording.",
-            file=path,
-            remedy="Give `shm import FILE`: it asks for the hanger and for the planes.",
-        )
-
-
-def peek(content: Content, file_format: str, path: Path) -> Peek:
-    used = _used(content, path)
-    sets = list(used.values())
-    left_out = [found for found in content.functions if found not in sets]
-    named = [f"{found.title} ({found.label or 'of another kind'})" for found in left_out]
-    timed = sets or histories(content)
-    samples = timed[0].points if timed else 0
-    header = _header(used, content, path)
-    return assemble.peeked(header, file_format, samples, lambda: _rate(timed), path, left_out=named)
 
 
 def sets_of(recording: Recording) -> list[dict[str, Any]]:
@@ -194,18 +181,6 @@ def sets_of(recording: Recording) -> list[dict[str, Any]]:
             }
         )
     return sets
-
-
-def _header(used: Mapping[str, FunctionSet], content: Content, path: Path) -> Header:
-    others = [name for name in _names(histories(content), path) if name not in used]
-    if not used:
-        return with_sidecar(Header(path, {}), path, others)
-    channels = {
-        name: universal_frf.channel_entries(found, *found.response[1:], content, path)
-        for name, found in used.items()
-    }
-    first = next(iter(used.values()))
-    return with_sidecar(Header(path, channels, universal_frf.entries(first, path)), path, others)
 
 
 def _names(sets: Sequence[FunctionSet], path: Path) -> list[str]:
@@ -246,29 +221,10 @@ def _sensor(found: FunctionSet) -> tuple[object, ...]:
 
 
 def _refuse_doubles(keys: Sequence[object], sets: Sequence[FunctionSet], path: Path) -> None:
-    if len(set(keys)) < len(keys):
+    alike = len({(found.points, found.step) for found in sets}) == 1  # else it is refused for that
+    if alike and len(set(keys)) < len(keys):
         raise BadInput(
             f"{len(sets)} time histories, several of one sensor.",
             file=path,
             remedy="Put each recording, with one or many hits, into a file of its own.",
         )
-
-
-def _refuse_different(sets: Sequence[FunctionSet], path: Path) -> None:
-    for found in sets[1:]:
-        first = sets[0]
-        if (found.points, found.step) != (first.points, first.step):
-            raise BadInput(
-                f"{found.title} has {found.points} samples every {found.step:g} s, {first.title}"
-                f" {first.points} every {first.step:g} s.",
-                file=path,
-                remedy="Export all channels of one recording with one length and rate.",
-            )
-
-
-def _real(found: FunctionSet) -> FloatArray:
-    return np.real(np.asarray(found.data)).astype(float)
-
-
-def _rate(sets: Sequence[FunctionSet]) -> float:
-    return 1 / sets[0].step if sets and sets[0].step > 0 else NAN

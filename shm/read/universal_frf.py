@@ -9,8 +9,9 @@ of others say none of this: their sidecar must.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,26 +19,21 @@ import numpy as np
 
 from shm.documents import format_time
 from shm.errors import BadInput
-from shm.read import assemble
-from shm.read.base import Peek
-from shm.read.header import KEYS, Entry, Header, mass_entries
+from shm.read.header import KEYS, Entry, mass_entries
 from shm.read.logger_words import accelerance_si
-from shm.read.sidecar import with_sidecar
+from shm.read.table import Column, Table
 from shm.read.universal_sets import COHERENCE, FREQUENCY_RESPONSE, Content, FunctionSet
 from shm.values import (
-    NAN,
     ComplexArray,
     FloatArray,
     FrequencyResponse,
     Plane,
     Recording,
-    ResponsePoint,
 )
 
 # UC-SDRL, Universal File Formats, data set 58, records 7 to 10
 _ACCELERATION, _EXCITATION, _FREQUENCY, _EVEN = 12, 13, 18, 1
 _STEP = "frequency_step_hz"
-_OFF_GRID = 0.01  # judgement: of a step; six digits of first and step leave 0.01 at line 1000
 _SAME_STEP = 1e-4  # judgement: a step printed with six digits errs by 5e-6 at most
 _MARK = "shm"
 # Data set 2411; x runs along the hanger, so that y and z, 2 and 3, are the planes
@@ -51,41 +47,34 @@ def response_sets(content: Content) -> list[FunctionSet]:
     return [found for found in content.functions if found.function == FREQUENCY_RESPONSE]
 
 
-def frequency_response(content: Content, path: Path) -> FrequencyResponse:
-    """The accelerances of a file, roving sensor or roving hammer; raises BadInput."""
+def table_in(content: Content, values: Callable[[FunctionSet], Any], path: Path) -> Table:
+    """Return the accelerances of a file, roving sensor or roving hammer; raises BadInput."""
     sets = response_sets(content)
-    header = _header(sets, content, path)
-    skipped, frequency = _frequencies(sets, path)
-    named = zip(header.channels, sets, strict=True)
-    used = {name: found for name, found in named if not header.leaves_out(name)}
-    accelerance = np.array([_accelerance(found, name, path) for name, found in used.items()])
-    return FrequencyResponse(
-        str(path),
-        tuple(ResponsePoint(name, header.plane(name), header.x_m(name)) for name in used),
-        frequency,
-        np.pad(accelerance, ((0, 0), (skipped, 0)), constant_values=np.nan),
-        _coherence(list(used.values()), content, skipped),
-        **header.of_test,
-    )
+    said = _points(sets, content, path)
+    coherences = {
+        (found.response, found.reference): found
+        for found in content.functions
+        if found.function == COHERENCE and found.points == sets[0].points
+    }
+    columns = []
+    for found, (name, entries_of) in zip(sets, said.items(), strict=True):
+        load = partial(_accelerance, found, name, values, path)
+        facts_of, title = entries(found, path), found.title
+        columns.append(
+            Column(name, found.points, load, "", "response", entries_of, facts_of, label=title,
+                   is_complex=True)
+        )  # fmt: skip
+        share = coherences.get((found.response, found.reference))
+        if share is not None:
+            both, shares = f"{name}_coherence", partial(_real, share, values)
+            columns.append(Column(both, share.points, shares, "", "coherence"))
+    listed = partial(_frequencies, sets, path)
+    columns.append(Column("frequency_hz", sets[0].points, listed, "Hz", "frequencies"))
+    return Table(path, tuple(columns), layout=tuple(said))
 
 
-def peek(content: Content, file_format: str, path: Path) -> Peek:
-    """Return what the headers of frequency responses say; faults become `problems`."""
-    sets = response_sets(content)
-    header = _header(sets, content, path)
-    problems: list[str] = []
-    channels = tuple(assemble.peek_point(header, name, problems) for name in header.channels)
-    assemble.attempt(lambda: _frequencies(sets, path), None, problems)
-    return Peek(
-        source=str(path),
-        format=file_format,
-        channels=channels,
-        samples=0,
-        **assemble.read_of_test(header, problems),
-        problems=tuple(problems),
-        lines=sets[0].points,
-        frequency_step_hz=_step(sets[0]) or NAN,
-    )
+def _real(found: FunctionSet, values: Callable[[FunctionSet], Any]) -> FloatArray:
+    return np.real(np.asarray(values(found))).astype(float)
 
 
 def sets_of(response: FrequencyResponse) -> list[dict[str, Any]]:
@@ -128,8 +117,10 @@ def _set(response: FrequencyResponse, index: int, node: int) -> dict[str, Any]:
     }
 
 
-def _header(sets: Sequence[FunctionSet], content: Content, path: Path) -> Header:
-    """The points: where the response was measured or, where that stays, where was hit."""
+def _points(
+    sets: Sequence[FunctionSet], content: Content, path: Path
+) -> dict[str, dict[str, Entry]]:
+    """Return the points: where the response was measured or, where that stays, where was hit."""
     responses, references = (
         {found.response[1:] for found in sets},
         {found.reference[1:] for found in sets},
@@ -153,11 +144,11 @@ def _header(sets: Sequence[FunctionSet], content: Content, path: Path) -> Header
             file=path,
             remedy="Give each its own first id line.",
         )
-    return with_sidecar(Header(path, channels, entries(sets[0], path)), path)
+    return channels
 
 
-def _frequencies(sets: Sequence[FunctionSet], path: Path) -> tuple[int, FloatArray]:
-    """How many lines the file leaves out below its first, and all frequencies from 0, in Hz."""
+def _frequencies(sets: Sequence[FunctionSet], path: Path) -> FloatArray:
+    """Return the frequencies of all lines, in Hz; raises BadInput where the sets differ."""
     first = sets[0]
     for found in sets:
         if (found.points, found.first, found.step) != (first.points, first.first, first.step):
@@ -166,16 +157,7 @@ def _frequencies(sets: Sequence[FunctionSet], path: Path) -> tuple[int, FloatArr
                 file=path,
                 remedy="Export all responses over the same lines.",
             )
-    step = _step(first)
-    skipped = first.first / step if step > 0 else math.nan
-    if not 0 <= skipped < 1e6 or abs(skipped - round(skipped)) > _OFF_GRID:
-        raise BadInput(
-            "its frequencies do not lie on an even grid from 0.",
-            file=path,
-            remedy="Export lines at whole multiples of one step.",
-        )
-    lines = np.arange(round(skipped) + first.points, dtype=float)
-    return round(skipped), step * lines
+    return first.first + _step(first) * np.arange(first.points, dtype=float)
 
 
 def _step(found: FunctionSet) -> float:
@@ -187,7 +169,9 @@ def _step(found: FunctionSet) -> float:
     return own if abs(own - found.step) < _SAME_STEP * found.step else found.step
 
 
-def _accelerance(found: FunctionSet, name: str, path: Path) -> ComplexArray:
+def _accelerance(
+    found: FunctionSet, name: str, values: Callable[[FunctionSet], Any], path: Path
+) -> ComplexArray:
     factor = accelerance_si(found.unit, found.denominator_unit)
     if factor is None or (not found.unit and found.quantity != _ACCELERATION):
         raise BadInput(
@@ -198,22 +182,8 @@ def _accelerance(found: FunctionSet, name: str, path: Path) -> ComplexArray:
             remedy="Export accelerances, in m/s2 or g over N, kN or lbf.",
         )
     direction = sign(found.response[2], found.reference[2])
-    values: ComplexArray = np.asarray(found.data, dtype=complex) * complex(factor * direction)
-    assemble.refuse_implausible(np.abs(values), name, path)
-    return values
-
-
-def _coherence(sets: Sequence[FunctionSet], content: Content, skipped: int) -> FloatArray | None:
-    """Coherences (points, lines) where the file holds one for each response, else None."""
-    known = {
-        (found.response, found.reference): np.real(np.asarray(found.data))
-        for found in content.functions
-        if found.function == COHERENCE and found.points == sets[0].points
-    }
-    rows = [known.get((found.response, found.reference)) for found in sets]
-    if any(row is None for row in rows):
-        return None
-    return np.pad(np.array(rows, float), ((0, 0), (skipped, 0)), constant_values=np.nan)
+    signed: ComplexArray = np.asarray(values(found), complex) * complex(factor * direction)
+    return signed
 
 
 def facts(found: FunctionSet) -> dict[str, str]:

@@ -65,12 +65,12 @@ class FunctionSet:
 class Content:
     """The functions of a file and the places (x, y, z) of its nodes, in m.
 
-    `has_modes` says whether it holds modes that another program identified (`modal_sets`).
+    `mode_count` counts modes that another program identified (`modal_sets`).
     """
 
     functions: tuple[FunctionSet, ...]
     nodes: dict[int, tuple[float, float, float]]
-    has_modes: bool = False
+    mode_count: int = 0
 
 
 def recognises(head: bytes) -> bool:
@@ -116,7 +116,7 @@ def _content(file: Any, path: Path, raw: bytes, headers_only: bool) -> Content:
             functions.append(_function(found, index + 1, path, raw))
         elif kind in NODES:
             nodes.update(_nodes(read_set(file, index, path, raw, headers_only)))
-    return Content(tuple(functions), nodes, _MODES in kinds)
+    return Content(tuple(functions), nodes, kinds.count(_MODES))
 
 
 def opened(plain: Path, path: Path) -> Any:

@@ -8,19 +8,18 @@ from __future__ import annotations
 
 import io
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from shm.errors import BadInput
-from shm.read import logger_text
-from shm.read.base import Format, LoggerColumn, LoggerTable, Peek
+from shm.read.base import Format, at_once
+from shm.read.header import Entry
 from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples, too_large
-from shm.read.logger_words import hanger_numbered
-from shm.values import NAN, Recording
+from shm.read.table import Column, Table
 
-_NAME = "WAV"
 FULL_SCALE = "full scale"
 _FORMS = (b"RIFF", b"RIFX", b"RF64")
 _OPEN_SIZES = (0, 0xFFFFFFFF)  # what recorders write before they know
@@ -32,8 +31,8 @@ def recognises(head: bytes) -> bool:
     return head[:4] in _FORMS and head[8:12] == b"WAVE"
 
 
-def table_of(path: Path) -> LoggerTable:
-    """The channels of a file, `channel_1` and so on; raises BadInput where it is damaged."""
+def open_tables(path: Path) -> tuple[Table, ...]:
+    """Return the channels of a file, `channel_1` and so on; raises BadInput where it is damaged."""
     from scipy.io import wavfile
 
     if path.stat().st_size > limits().bytes_at_once:
@@ -52,11 +51,11 @@ def table_of(path: Path) -> LoggerTable:
     unit = FULL_SCALE if data.dtype.kind in "iu" else ""
     names = [f"channel_{place}" for place in range(1, data.shape[1] + 1)]
     columns = tuple(
-        LoggerColumn(name, unit, _shares(data[:, place])) for place, name in enumerate(names)
+        Column(name, len(data), partial(_shares, data[:, place]), unit)
+        for place, name in enumerate(names)
     )
-    layout = ("WAV", str(data.dtype), *names)
-    hanger = hanger_numbered(path.stem)
-    return LoggerTable(columns, float(rate), NAN, hanger, None, NAN, 0, layout, ())
+    entries = {"sampling_rate_hz": Entry(float(rate), path)}
+    return (Table(path, columns, entries, ("WAV", str(data.dtype), *names)),)
 
 
 def _closed(content: bytes) -> bytes:
@@ -84,21 +83,11 @@ def _shares(values: np.ndarray) -> np.ndarray:
     return found / -float(np.iinfo(values.dtype).min) if values.dtype.kind == "i" else found
 
 
-def _read(path: Path) -> Recording:
-    return logger_text.recording(table_of(path), path)
-
-
-def _peek(path: Path) -> Peek:
-    return logger_text.peeked(table_of(path), _NAME, path)
-
-
 FORMAT = Format(
-    name=_NAME,
-    suffixes=(".wav",),
-    recognises=recognises,
-    peek=_peek,
-    read=_read,
+    "WAV",
+    (".wav",),
+    recognises,
+    at_once(open_tables),
     holds_responses=False,
     names_channels=False,
-    table=table_of,
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +80,25 @@ class Recording:
     @property
     def duration_s(self) -> float:
         return self.samples / self.sampling_rate_hz
+
+    def to_sep005(self) -> list[dict[str, Any]]:
+        """Return the channels as the dictionaries of SDyPy's enhancement proposal 5.
+
+        Units are N and m/s^2. Hanger, places and planes, which it does not know, are left out.
+        """
+        start = {} if self.time is None else {"start_timestamp": self.time.isoformat()}
+        units = {"force": ("N", "f"), "acceleration": ("m/s^2", "a")}
+        return [
+            {
+                "data": channel.values,
+                "name": channel.name,
+                "unit_str": units[channel.quantity][0],
+                "quantity": units[channel.quantity][1],
+                "fs": self.sampling_rate_hz,
+                **start,
+            }
+            for channel in self.channels
+        ]
 
 
 @dataclass(frozen=True)

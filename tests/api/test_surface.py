@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 SIGNATURES = {
     "read": "(path)",
+    "from_sep005": "(channels, *, hanger=None)",
     "load_modes": "(path)",
     "load_hanger": "(path, hanger_id=None)",
     "round_bar": "(id, *, diameter_m, length_m, elastic_modulus_pa, density_kg_m3, "

@@ -33,6 +33,9 @@ PATIENCE_S = 120.0
 _STYLE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 
 
+OF_TEST = {"When was the test": "2026-05-01T10:00Z", "How warm": "12,5"}
+
+
 class Terminal:
     """A command at a terminal, and a person at its keys."""
 
@@ -152,6 +155,8 @@ def test_a_wrong_answer_is_asked_for_again_and_the_right_ones_are_kept(
     workspace: Workspace, tmp_path: Path
 ) -> None:
     with terminal(workspace, export(tmp_path / "a.csv")) as person:
+        person.answer("When was the test", "lately", "2026-05-01T10:00Z")
+        person.answer("How warm", "very", "12,5")
         person.answer("Which hanger", "three", "9", "3")
         person.answer("hammer of Kraft", "1,9")
         person.answer("Where is A1", "high up", "2,52")
@@ -160,7 +165,16 @@ def test_a_wrong_answer_is_asked_for_again_and_the_right_ones_are_kept(
         person.answer("which plane does A2", "l")
         person.answer("of hanger 3, too?", "y")
         assert person.end() == 0
-    for wrong in ("'three' is no number", "hanger 9 is not described", "'high up' is no place"):
+    landed = tomllib.loads((workspace.spool / "a.toml").read_text())
+    assert (landed["temperature_c"], landed["time"].hour) == (12.5, 10)
+    assert "Which hanger was tested? [3, 4]" in person.shown
+    for wrong in (
+        "'lately' is no day",
+        "'very' is no temperature",
+        "'three' is no number",
+        "hanger 9 is not described",
+        "'high up' is no place",
+    ):
         assert wrong in person.shown
     (profile,) = (workspace.folder / "loggers").iterdir()
     said = tomllib.loads(profile.read_text())
@@ -178,10 +192,14 @@ def test_a_logger_that_is_carried_is_asked_for_its_hanger_each_time(
 ) -> None:
     said = ("--place", "Kraft=1.9", "--place", "2.52", "--plane", "transverse,longitudinal")
     with terminal(workspace, export(tmp_path / "a.csv"), *said) as person:
+        for question in OF_TEST:
+            person.answer(question, "unknown")
         person.answer("Which hanger", "3")
         person.answer("of hanger 3, too?", "")
         assert person.end() == 0
     with terminal(workspace, export(tmp_path / "b.csv", 2)) as person:
+        for question, answer in OF_TEST.items():
+            person.answer(question, answer)
         person.answer("Which hanger", "4")
         assert person.end() == 0
     assert tomllib.loads((workspace.spool / "b.toml").read_text())["hanger"] == 4
@@ -194,6 +212,8 @@ def test_what_follows_from_an_answer_is_asked_next(workspace: Workspace, tmp_pat
     path = tmp_path / "tape.wav"
     wavfile.write(path, 1000, (rng.normal(0, 0.1, (3000, 2)) * 32767).astype(np.int16))
     with terminal(workspace, path, "--hanger", 3) as person:
+        for question, answer in OF_TEST.items():
+            person.answer(question, answer)
         person.answer("full scale of channel_1", "loud", "2000 N")
         person.answer("full scale of channel_2", "50 g")
         person.answer("hammer of channel_1", "unknown")
@@ -212,7 +232,7 @@ def test_what_follows_from_an_answer_is_asked_next(workspace: Workspace, tmp_pat
 def test_who_leaves_in_between_leaves_nothing(
     workspace: Workspace, tmp_path: Path, key: str, at: str
 ) -> None:
-    answers = {"Which hanger": "3", "hammer of Kraft": "2", "Where is A1": "2"}
+    answers = {**OF_TEST, "Which hanger": "3", "hammer of Kraft": "2", "Where is A1": "2"}
     answers |= {"which plane does A1": "t"}
     answers |= {"Where is A2": "2", "which plane does A2": "l", "of hanger 3, too?": "y"}
     with terminal(workspace, export(tmp_path / "a.csv")) as person:

@@ -69,12 +69,12 @@ def test_bounds_of_reading_that_are_not_in_force_are_told_and_why(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert only(workspace, "confinement").level is Level.OK
-    why = {"Landlock": "this kernel has none; Linux has it from 5.13"}
+    why = {"a limit of memory": "only Linux enforces one"}
     monkeypatch.setattr(sandbox, "missing_bounds", lambda: why)
     finding = only(workspace, "confinement")
     assert finding.level is Level.WARNING
-    assert "without Landlock: this kernel has none" in finding.found
-    with obeying_readers("confinement._RESTRICT_SELF = 9999"):
+    assert "without a limit of memory: only Linux" in finding.found
+    with obeying_readers("serving.resource.setrlimit = lambda *_: 1 / 0"):
         monkeypatch.undo()
         finding = only(workspace, "confinement")
     assert (finding.level, "nothing is read" in finding.found) == (Level.FAULT, True)

@@ -78,6 +78,13 @@ def whole_samples(folder: Path) -> list[Sample]:
     rng = np.random.default_rng(1)
     folder.mkdir(exist_ok=True)
     found: list[Sample] = []
+    for suffix in (".xlsx", ".wav", ".mseed", ".tob3"):
+        path = folder / f"Recording{suffix}"
+        write(a_recording(rng), path)
+        beside = sidecar_path(path)
+        sidecar = beside.read_bytes() if beside.is_file() else b""
+        beside.unlink(missing_ok=True)
+        found.append(Sample(path.name, suffix, path.read_bytes(), sidecar))
     for suffix in (".csv", ".uff", ".h5", ".mat", ".tdms", ".npz"):
         for made in (a_recording(rng), a_response(rng)):
             path = folder / f"{type(made).__name__}{suffix}"
@@ -85,7 +92,7 @@ def whole_samples(folder: Path) -> list[Sample]:
             beside = sidecar_path(path)
             sidecar = beside.read_bytes() if beside.is_file() else b""
             found.append(Sample(path.name, suffix, path.read_bytes(), sidecar))
-    recording = found[0]
+    recording, uff = found[4], found[6]
     archive = bundle([folder / "Recording.csv", folder / "Recording.npz"], folder / "test.zip")
     table = io.BytesIO()
     np.save(table, rng.standard_normal((3, SAMPLES)))
@@ -96,11 +103,13 @@ def whole_samples(folder: Path) -> list[Sample]:
         *found,
         replace(recording, name="with a sidecar", sidecar=_SIDECAR),
         Sample("gzipped csv", ".csv.gz", gzip.compress(recording.content, 1)),
-        Sample("gzipped uff", ".uff.gz", gzip.compress(found[2].content, 1)),
+        Sample("gzipped uff", ".uff.gz", gzip.compress(uff.content, 1)),
         Sample("test of two files", ".zip", archive.read_bytes()),
         Sample("packed npz", ".npz", _packed_npz(rng)),
         Sample("packed mat", ".mat", _packed_mat(rng, folder / "packed.mat")),
         Sample("packed hdf5", ".h5", _packed_hdf5(rng, folder / "packed.h5")),
+        Sample("mat of a struct", ".mat", _struct_mat(rng, folder / "struct.mat")),
+        Sample("labview", ".lvm", _labview(rng)),
         Sample("mat 7.3", ".mat", _mat_7_3(rng, folder / "new.mat"), units),
         Sample("npy", ".npy", table.getvalue(), rows),
         Sample("modal tests", ".modes.json", dump(modes_document(tests)).encode()),
@@ -119,6 +128,26 @@ def _packed_mat(rng: np.random.Generator, path: Path) -> bytes:
     units = {"force_unit": "N", "acc_1_unit": "m/s2"}
     savemat(path, {"force": force, "acc_1": first, "fs": 512.0, **units}, do_compression=True)
     return path.read_bytes()
+
+
+def _struct_mat(rng: np.random.Generator, path: Path) -> bytes:
+    force, first = _rows(rng)
+    units = np.array(["N", "m/s2"], dtype=object)
+    savemat(path, {"test": {"force": force, "acc_1": first, "fs": 512.0, "unit": units}})
+    return path.read_bytes()
+
+
+def _labview(rng: np.random.Generator) -> bytes:
+    """Two hits, each under a heading of its own."""
+    end = "***End_of_Header***"
+    head = f"LabVIEW Measurement\t\nSeparator\tTab\nMulti_Headings\tYes\nX_Columns\tNo\n{end}\t\n"
+    part = (
+        "\t\nChannels\t2\t\nSamples\t200\t200\t\nDate\t2026/05/14\t2026/05/14\t\n"
+        "Time\t10:12:40,5\t10:12:40,5\t\nY_Unit_Label\tN\tm/s^2\t\nX_Dimension\tTime\tTime\t\n"
+        f"Delta_X\t0.002\t0.002\t\n{end}\t\t\nX_Value\tHammer\tAcc\tComment\n"
+    )
+    rows = "".join(f"\t{f:.4f}\t{a:.4f}\n" for f, a in zip(*_rows(rng), strict=True))
+    return (head + 2 * (part + rows)).encode()
 
 
 def _packed_hdf5(rng: np.random.Generator, path: Path) -> bytes:

@@ -13,7 +13,7 @@ from shm.read import sandbox
 from shm.read.sandbox import reading_process
 
 _VERB = """
-from shm.read.sandbox import confinement, serving
+from shm.read.sandbox import serving
 known = serving._VERBS['read_test']
 def verb(path):
     if '.py' not in path.suffixes: return known(path)
@@ -28,7 +28,7 @@ serving._VERBS['read_test'] = verb
 def obeying_readers(first: str = "pass") -> Iterator[None]:
     """One reading process whose children run what a .py, or a .py.gz, says.
 
-    `first` is done in the reading process before, to `confinement` for example.
+    `first` is done in the reading process before, to `serving` for example.
     """
     reading_process._forget()
     with pytest.MonkeyPatch.context() as patch:

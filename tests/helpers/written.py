@@ -9,9 +9,11 @@ from collections.abc import Callable, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+import csiio
 import h5py
 import numpy as np
 import openpyxl
+import pandas as pd
 import pytest
 import scipy.io
 import scipy.io.wavfile
@@ -45,7 +47,11 @@ def write(described: Recording | FrequencyResponse, path: Path) -> None:
     if path.suffix in _WRITERS:
         _WRITERS[path.suffix](layout_of(described), path)
         return
-    if any(path.suffix in known.suffixes and known.write is None for known in FORMATS):
+    if path.suffix == ".tob3":
+        _campbell(described, path)
+        return
+    known = [each for each in FORMATS if path.suffix in each.suffixes]
+    if known and all(each.write is None for each in known):
         pytest.fail(f"shm only reads {path.suffix}: add a writer to _WRITERS of {__file__}.")
     write_ours(described, path)
 
@@ -127,6 +133,21 @@ def _mini_seed(described: Recording | FrequencyResponse, path: Path) -> None:
     write_sidecar(described, channels, described.sampling_rate_hz, path)
     text = sidecar_path(path).read_text()
     sidecar_path(path).write_text(f"calibration = {[float(one) for one in largest]}\n{text}")
+
+
+def _campbell(described: Recording | FrequencyResponse, path: Path) -> None:
+    """Single precision, as a logger has it; names and units stand in the file."""
+    assert isinstance(described, Recording)
+    step_ns = round(1e9 / described.sampling_rate_hz)
+    start = pd.Timestamp(described.time or datetime(2026, 1, 1, tzinfo=UTC)).tz_localize(None)
+    index = start + pd.to_timedelta(step_ns * np.arange(described.samples), unit="ns")
+    columns = {f"{c.name} ({SI[c.quantity]})": c.values for c in described.channels}
+    frame = pd.DataFrame(columns, index=pd.DatetimeIndex(index, name="TIMESTAMP"))
+    csiio.write_csi_tob3(str(path), frame.astype("float32"))
+    channels = [
+        PeekChannel(c.name, c.quantity, SI[c.quantity], c.plane, c.x_m) for c in described.channels
+    ]
+    write_sidecar(described, channels, math.nan, path)
 
 
 def mini_seed_names(channels: int) -> list[str]:

@@ -128,12 +128,11 @@ def test_the_sidecar_of_an_archive_tells_of_the_whole_test(
         assert found.time == datetime(2026, 7, 1, 10, tzinfo=UTC)
 
 
-@pytest.mark.parametrize("text", ['plane = "transverse"', '[channel.acc_1]\nunit = "g"'])
-def test_the_sidecar_of_an_archive_describes_no_channels(
-    files: list[Path], tmp_path: Path, text: str
+def test_the_sidecar_of_an_archive_lists_nothing_of_channels(
+    files: list[Path], tmp_path: Path
 ) -> None:
     archive = bundle(files, tmp_path / "test.zip")
-    sidecar_path(archive).write_text(text)
+    sidecar_path(archive).write_text('plane = "transverse"')
     with pytest.raises(BadInput, match="is said of a whole test") as refusal:
         read_test(archive)
     assert refusal.value.where == "test.toml"

@@ -24,18 +24,18 @@ def test_whole_numbers_are_shares_of_the_largest(
 ) -> None:
     path = tmp_path / "hanger7_a.wav"
     wavfile.write(path, 500, (ROWS + zero).astype(kind))
-    table = wave_file.table_of(path)
+    (table,) = wave_file.open_tables(path)
     assert [column.name for column in table.columns] == ["channel_1", "channel_2"]
     assert {column.unit for column in table.columns} == {"full scale"}
-    np.testing.assert_array_equal([c.values for c in table.columns], ROWS.T / full)
-    assert (table.said_rate_hz, table.hanger) == (500.0, 7)
+    np.testing.assert_array_equal([c.load() for c in table.columns], ROWS.T / full)
+    assert (table.own_header.sampling_rate_hz, table.own_header.hanger) == (500.0, 7)
 
 
 def test_floats_are_as_they_are_and_one_channel_is_one(tmp_path: Path) -> None:
     path = tmp_path / "a.wav"
     wavfile.write(path, 250, np.array([0.5, -2.0], np.float32))
-    (column,) = wave_file.table_of(path).columns
-    assert (column.unit, list(column.values)) == ("", [0.5, -2.0])
+    ((column,),) = (table.columns for table in wave_file.open_tables(path))
+    assert (column.unit, list(column.load())) == ("", [0.5, -2.0])
 
 
 def streamed(order: str, size: int, before: bytes = b"", after: bytes = b"") -> bytes:
@@ -65,8 +65,8 @@ def test_a_streamed_file_is_read_to_its_last_whole_frame(
     assert closed[place + 4 :] == whole[place + 4 :]
     path = tmp_path / "a.wav"
     path.write_bytes(content)
-    table = wave_file.table_of(path)
-    np.testing.assert_array_equal([c.values for c in table.columns], ROWS.T / 2**15)
+    (table,) = wave_file.open_tables(path)
+    np.testing.assert_array_equal([c.load() for c in table.columns], ROWS.T / 2**15)
 
 
 def test_a_file_that_says_its_size_is_left_as_it_is() -> None:
@@ -81,13 +81,13 @@ def test_what_holds_no_sample_or_too_many_channels_is_refused(tmp_path: Path) ->
     for channels, is_read in ((64, True), (65, False)):
         wavfile.write(path, 500, np.zeros((2, channels), np.int16))
         if is_read:
-            assert len(wave_file.table_of(path).columns) == channels
+            assert len(wave_file.open_tables(path)[0].columns) == channels
         else:
             with pytest.raises(BadInput, match="no channel holds a sample"):
-                wave_file.table_of(path)
+                wave_file.open_tables(path)
     path.write_bytes(streamed("<", 12)[:44])
     with pytest.raises(BadInput):
-        wave_file.table_of(path)
+        wave_file.open_tables(path)
 
 
 @pytest.mark.parametrize(

@@ -17,24 +17,19 @@ import subprocess
 import sys
 import threading
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from shm.errors import BadInput, ShmError, WorkerDied
 from shm.read.limits import Limits
-from shm.read.sandbox.protocol import (
-    BEGUN,
-    LARGEST_HEADER,
-    LENGTH_BYTES,
-    Answer,
-    arrays_of,
-    bytes_of_arrays,
-    header_of,
-)
+from shm.read.sandbox.protocol import Answer, decoded
 from shm.resources import KILLING
 
-ARRAYS_AT_ONCE = 2
-"""The arrays of an answer may be so many times what is read at once."""
+BEGUN = b"+"
+"""A child writes it once its limits are in force."""
+LARGEST_ANSWER = 2
+"""An answer may be so many times what is read at once."""
 WALL_SECONDS = 3.0
 """A child may take so many times its processor time: beyond, it waits for something."""
 # judgement: ending a child takes milliseconds, starting the reader seconds, far longer on a full
@@ -44,42 +39,30 @@ _CODE = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
     "from shm.read.sandbox.serving import serve; serve()"
 )
+_TIME_IS_UP = b"late"
 _KEPT = ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH")
+_OURS = {
+    "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
+    "HDF5_USE_FILE_LOCKING": "FALSE",  # nobody writes what is archived
+}  # fmt: skip
 _DAMAGED = "The file is damaged or made to harm: export it anew from its source."
 
 
-@dataclass(frozen=True)
-class Request:
-    """What a child is to do: `folder` is where it may unpack, empty where it may not write."""
+def ask(verb: str, path: Path, folder: str, limits: Limits) -> Answer:
+    """Return the answer of a child that has read a file, and may unpack it in a folder if any.
 
-    verb: str
-    path: str
-    working_folder: str
-    folder: str
-    limits: Limits
-
-    def as_bytes(self) -> bytes:
-        return json.dumps(asdict(self)).encode()
-
-
-def ask(request: Request) -> Answer:
-    """The answer of a child that has read the file; raises BadInput where it died of it."""
+    Raises BadInput where the child died of the file.
+    """
+    request = {
+        "verb": verb, "path": str(path), "working_folder": str(Path.cwd()), "folder": folder,
+        "limits": asdict(limits),
+    }  # fmt: skip
     with _one_at_a_time:
         try:
-            return _asked(request)
+            return _reader().ask(request, limits)
         except ConnectionError:  # the reading process died before: not the file's doing
-            return _asked(request)
-
-
-def _asked(request: Request) -> Answer:
-    reader = _reader()
-    try:
-        return reader.ask(request)
-    except BaseException as error:
-        # After a refusal of ours the child may still write, or the reader still wait for it.
-        if not isinstance(error, BadInput) or not reader.at_rest:
             _forget()
-        raise
+            return _reader().ask(request, limits)
 
 
 class _Reader:
@@ -87,29 +70,17 @@ class _Reader:
 
     def __init__(self) -> None:
         ours, theirs = socket.socketpair()
-        environment = {name: os.environ[name] for name in _KEPT if name in os.environ}
-        environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        environment["HDF5_USE_FILE_LOCKING"] = "FALSE"  # nobody writes what is archived
         paths = json.dumps([str(Path(each).absolute()) for each in sys.path])
         with theirs:
             self.process = subprocess.Popen(  # noqa: S603 - our own program
                 [sys.executable, "-I", "-X", "utf8", "-c", _CODE, paths],
                 stdin=theirs.fileno(),
                 stdout=subprocess.DEVNULL,
-                env=environment,
+                env={name: os.environ[name] for name in _KEPT if name in os.environ} | _OURS,
                 start_new_session=True,
             )
-        self.owner, self.requests, self.at_rest = os.getpid(), ours, True
-        self._begin()
-
-    def _begin(self) -> None:
-        """Waits until it is there, so that its start does not count as reading."""
-        self.requests.settimeout(_START_S)
-        try:
-            begun = self.requests.recv(1)
-        except TimeoutError:
-            begun = b""
-        if not begun:
+        self.owner, self.requests = os.getpid(), ours
+        if not self._heard(1, _START_S):  # its start does not count as reading
             self.end()
             raise ShmError(
                 "the process that reads files does not start.",
@@ -117,109 +88,72 @@ class _Reader:
                 retry_after_s=60.0,
             )
 
-    def ask(self, request: Request) -> Answer:
-        self.at_rest = False
+    def _heard(self, count: int, seconds: float) -> bytes:
+        self.requests.settimeout(seconds)
+        try:
+            return self.requests.recv(count)
+        except (TimeoutError, ConnectionError):
+            return b""
+
+    def ask(self, request: dict[str, Any], limits: Limits) -> Answer:
+        """Return an answer; where none comes this reader is ended, as it may still wait."""
         out, into = os.pipe()
-        with os.fdopen(out, "rb", buffering=0) as answer:
+        status = None
+        try:
             try:
-                socket.send_fds(self.requests, [request.as_bytes()], [into])
+                socket.send_fds(self.requests, [json.dumps(request).encode()], [into])
             finally:
                 os.close(into)
-            wall_s = WALL_SECONDS * request.limits.parse_seconds + _GRACE_S
-            pipe = _Pipe(answer.fileno(), time.monotonic() + wall_s, request)
-            found = _received(pipe, request)
-        status = self._status()
-        if found is None:
-            raise _death(status, request, pipe.begun)
-        return found
-
-    def _status(self) -> int:
-        """How the child ended: its exit code, or the signal that killed it, negative."""
-        self.requests.settimeout(_GRACE_S)
+            raw = _received(out, limits)
+            said = self._heard(4, _GRACE_S)
+            status = int(struct.unpack("i", said)[0]) if len(said) == 4 else None
+        finally:
+            os.close(out)
+            if status is None:
+                _forget()
         try:
-            said = self.requests.recv(4)
-        except (TimeoutError, ConnectionError):
-            said = b""
-        self.at_rest = len(said) == 4
-        return int(struct.unpack("i", said)[0]) if self.at_rest else -signal.SIGKILL
+            return decoded(raw)
+        except ValueError:
+            timed_out = -signal.SIGALRM if raw.startswith(_TIME_IS_UP) else -signal.SIGKILL
+            status = timed_out if status is None else status
+            raise _death(status, request["path"], limits, begun=raw[:1] == BEGUN) from None
 
     def end(self) -> None:
-        """Ends it and whatever it has begun; a copy in a forked process is only forgotten."""
+        """End it and whatever it has begun; a copy in a forked process is only forgotten."""
         self.requests.close()
-        if self.owner == os.getpid():
-            _kill_session(self.process)
-        else:
+        if self.owner != os.getpid():
             self.process.returncode = 0  # ours to forget, not to wait for
+        elif self.process.poll() is None:
+            os.killpg(self.process.pid, signal.SIGKILL)
+            self.process.wait()
 
 
-def _kill_session(process: subprocess.Popen[bytes]) -> None:
-    if process.poll() is None:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-
-
-@dataclass
-class _Pipe:
-    """The end of a pipe that is read until a deadline; `begun` once the child is confined."""
-
-    descriptor: int
-    deadline: float
-    request: Request
-    begun: bool = False
-
-    def bytes(self, count: int) -> bytearray:
-        """So many bytes, or fewer where the child ends before; raises BadInput when time is up."""
-        found = bytearray(count)
-        view, place = memoryview(found), 0
-        with open(self.descriptor, "rb", buffering=0, closefd=False) as stream:
-            while place < count:
-                self._wait()
-                got = stream.readinto(view[place : place + (1 << 20)])
-                if not got:
-                    break
-                place += got
-        view.release()
-        del found[place:]
-        return found
-
-    def _wait(self) -> None:
-        left = self.deadline - time.monotonic()
-        poll = select.poll()
-        poll.register(self.descriptor, select.POLLIN | select.POLLHUP)
+def _received(pipe: int, limits: Limits) -> bytes:
+    """Return all that a child writes, `_TIME_IS_UP` where that takes too long."""
+    deadline = time.monotonic() + WALL_SECONDS * limits.parse_seconds + _GRACE_S
+    most = LARGEST_ANSWER * limits.bytes_at_once + (1 << 21)
+    parts, poll = [b""], select.poll()
+    poll.register(pipe, select.POLLIN | select.POLLHUP)
+    while most > 0:
+        left = deadline - time.monotonic()
         if left <= 0 or not poll.poll(1000 * left):
-            raise _death(-signal.SIGALRM, self.request, self.begun)
+            return _TIME_IS_UP
+        parts.append(os.read(pipe, 1 << 20))
+        most -= len(parts[-1])
+        if not parts[-1]:
+            break
+    return b"".join(parts)
 
 
-def _received(pipe: _Pipe, request: Request) -> Answer | None:
-    """A whole answer within the limits, or None; raises BadInput when time is up."""
-    pipe.begun = pipe.bytes(len(BEGUN)) == BEGUN
-    length = int.from_bytes(pipe.bytes(LENGTH_BYTES), "little")
-    if not 0 < length <= LARGEST_HEADER:
-        return None
-    raw = pipe.bytes(length)
-    if len(raw) != length:
-        return None
-    try:
-        header = header_of(bytes(raw))
-        size = bytes_of_arrays(header)
-        if size > ARRAYS_AT_ONCE * request.limits.bytes_at_once:
-            return None
-        arrays = pipe.bytes(size)
-        return Answer(header["refused"], header["found"], arrays_of(header, arrays))
-    except ValueError:
-        return None
-
-
-def _death(status: int, request: Request, begun: bool) -> ShmError:
-    """Why a child gave no answer: a file is not to blame before it was opened."""
-    seconds = request.limits.parse_seconds
+def _death(status: int, path: str, limits: Limits, *, begun: bool) -> ShmError:
+    """Return why a child gave no answer: a file is not to blame before it was opened."""
     if status in (-signal.SIGXCPU, -signal.SIGALRM):
-        what = f"takes more than {seconds:g} s to read."
         remedy = f"{_DAMAGED} Split a long record, or raise the setting parse_seconds."
-        return BadInput(what, file=request.path, remedy=remedy)
+        what = f"takes more than {limits.parse_seconds:g} s to read."
+        return BadInput(what, file=path, remedy=remedy)
     if -status in KILLING:
         how = signal.Signals(-status).name
-        what = f"the process that read {Path(request.path).name} was killed ({how})."
+        what = f"the process that read {Path(path).name} was killed ({how})."
         return WorkerDied(what, how=how)
     if not begun:
         return ShmError(
@@ -228,7 +162,7 @@ def _death(status: int, request: Request, begun: bool) -> ShmError:
             retry_after_s=_UNCONFINED_S,
         )
     how = signal.Signals(-status).name if status < 0 else f"exit code {status}"
-    return BadInput(f"the file made the reader crash ({how}).", file=request.path, remedy=_DAMAGED)
+    return BadInput(f"the file made the reader crash ({how}).", file=path, remedy=_DAMAGED)
 
 
 _one_at_a_time = threading.Lock()
@@ -236,7 +170,7 @@ _known: list[_Reader] = []
 
 
 def _reader() -> _Reader:
-    """The reading process of this process, begun at the first file."""
+    """Return the reading process of this process, begun at the first file."""
     if _known and (_known[0].owner != os.getpid() or _known[0].process.poll() is not None):
         _forget()
     if not _known:
@@ -250,7 +184,7 @@ def _forget() -> None:
 
 
 def _after_fork() -> None:
-    """A forked process must not talk to the reader of its parent, nor inherit a held lock."""
+    """Let a forked process neither talk to its parent's reader nor inherit a held lock."""
     global _one_at_a_time
     _one_at_a_time = threading.Lock()
     _forget()

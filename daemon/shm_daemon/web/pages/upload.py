@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -20,7 +21,12 @@ from starlette.concurrency import run_in_threadpool
 
 from shm.errors import BadInput, UsageError
 from shm.pipeline import utc_now
-from shm.pipeline.import_answers import answer_time, answer_to, import_document
+from shm.pipeline.import_answers import (
+    answer_temperature,
+    answer_time,
+    answer_to,
+    import_document,
+)
 from shm.pipeline.importing import Answers, Import, Question, keep_profile, look_into, understand
 from shm.report import formatting
 from shm.store import Workspace
@@ -77,6 +83,7 @@ class ImportQuestion(BaseModel):
     channel: str
     text: str
     option: str
+    choices: list[str] = Field(description="The usual answers; empty where there are none.")
 
 
 class ImportLook(BaseModel):
@@ -91,6 +98,7 @@ class ImportLook(BaseModel):
     samples: int
     columns: list[ImportedColumn]
     questions: list[ImportQuestion]
+    of_test: list[ImportQuestion] = Field(description="What may stay open, of this file alone.")
     problems: list[str]
     remarks: list[str]
     sha256: str | None
@@ -185,12 +193,15 @@ def _answers(said: str, found: Import) -> Answers:
         tables,
         each_time=document.get("each_time") is True,
     )
-    return _with_time(answers, document["time"]) if "time" in document else answers
+    for key, answer in (("time", answer_time), ("temperature", answer_temperature)):
+        if key in document:
+            answers = _with(answer, answers, document[key])
+    return answers
 
 
-def _with_time(answers: Answers, text: object) -> Answers:
+def _with(answer: Callable[[str, Answers], Answers], answers: Answers, text: object) -> Answers:
     try:
-        return answer_time(str(text), answers)
+        return answer(str(text), answers)
     except UsageError as error:
         raise BadInput(error.message, remedy=error.remedy) from error
 

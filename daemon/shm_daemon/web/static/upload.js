@@ -121,11 +121,15 @@
     return new Promise((resolve) => {
       const part = made("div");
       const box = made("form", { className: "questions" });
-      const fields = found.questions.map((question, index) => {
+      const fields = [...found.of_test, ...found.questions].map((question, index) => {
         const id = `question-${row.number}-${index}`;
-        const input = made("input", { id, type: "text", required: true });
+        const input = made("input", { id, type: "text" });
+        input.required = found.questions.includes(question);
         const line = made("div");
-        line.append(made("label", { htmlFor: id, textContent: question.text }), input);
+        const choices = made("datalist", { id: `${id}-choices` });
+        choices.append(...question.choices.map((value) => made("option", { value })));
+        if (question.choices.length) input.setAttribute("list", choices.id);
+        line.append(made("label", { htmlFor: id, textContent: question.text }), input, choices);
         box.append(line);
         return [question, input];
       });
@@ -146,9 +150,10 @@
         event.preventDefault();
         const answers = { columns: {}, ...(carried.checked && { each_time: true }) };
         for (const [{ about, channel }, { value }] of fields) {
+          if (value === "") continue;
           if (about === "hanger") answers.hanger = Number(value);
           else if (about === "rate") answers.sampling_rate_hz = Number(value);
-          else if (about === "time") answers.time = value;
+          else if (about === "time" || about === "temperature") answers[about] = value;
           else (answers.columns[channel] ??= {})[about] = value;
         }
         ended(answers);
@@ -171,7 +176,10 @@
     } catch {
       return false; // sent as it is, it is refused with its reason
     }
-    found.questions = found.questions.filter(({ about }) => about !== "hanger" || !given.hanger);
+    const said = { hanger: given.hanger, temperature: given.temperature_c };
+    const isOpen = ({ about }) => said[about] === undefined;
+    found.questions = found.questions.filter(isOpen);
+    found.of_test = found.of_test.filter(isOpen);
     while (found.questions.length && !found.sha256) {
       state(row, "Say what the file does not: it is kept for all files of this logger.", "open");
       const answers = await asked(found, row);

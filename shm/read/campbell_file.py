@@ -1,0 +1,100 @@
+"""Binary tables of Campbell loggers, TOB1 and TOB3, by csiio; their texts (TOA5) are read as text.
+
+The file's own times give rate and start; array elements keep their numbers, `Acc_Z(1)`.
+"""
+
+from __future__ import annotations
+
+import io
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shm.errors import BadInput
+from shm.read.base import Format, at_once
+from shm.read.header import Entry
+from shm.read.limits import guarded, limits, refuse_large, refuse_many_samples, too_large
+from shm.read.logger_heading import unlike
+from shm.read.logger_text import is_measured, said_of
+from shm.read.logger_words import hanger_numbered, name_and_unit
+from shm.read.table import Column, Role, Table
+from shm.values import FloatArray
+
+_NAME = "Campbell"
+_MOST_COLUMNS = 200  # judgement: far more than the 16 accelerations that are read
+_NUMBERS = ("record", "record (rn)")
+
+
+def recognises(head: bytes) -> bool:
+    """Return whether the first bytes of a file are those of a binary table."""
+    return head.startswith((b'"TOB1"', b'"TOB3"'))
+
+
+def open_tables(path: Path) -> tuple[Table, ...]:
+    """Return the columns of a table; raises BadInput where it is damaged."""
+    if path.stat().st_size > limits().bytes_at_once:
+        raise too_large(path)
+    library = _library(path)
+    with guarded(path, "the table"), redirect_stdout(io.StringIO()):  # it prints what is damaged
+        frame = library.read_csi_files(str(path), quiet=True, sortindex=False)
+        frame = frame[0] if isinstance(frame, tuple) else frame
+        seconds = (frame.index - frame.index[0]).total_seconds().to_numpy(float)
+        start = frame.index[0].isoformat()
+        named = [str(name) for name in frame.columns]
+    refuse_many_samples(len(seconds), path)
+    refuse_large((len(seconds), min(len(named), _MOST_COLUMNS)), 8, "", path)
+    places = [place for place, name in enumerate(named) if name.lower() not in _NUMBERS]
+    split = [name_and_unit(named[place]) for place in places[:_MOST_COLUMNS]]
+    names = unlike([name for name, _ in split])
+    columns = [
+        _column(name, unit, _values(frame.iloc[:, place]), path)
+        for name, (_, unit), place in zip(names, split, places, strict=False)
+    ]
+    with path.open("rb") as stream:
+        station = stream.readline(500).decode("latin-1").partition(",")[2].partition(",")[0]
+    entries = {"time": Entry(start, path)}
+    if (hanger := hanger_numbered(station)) is not None:
+        entries["hanger"] = Entry(hanger, path)
+    times = Column("TIMESTAMP", len(seconds), seconds.copy, "s", "times")
+    layout = (_NAME, *(f"{name} [{unit}]" for name, (_, unit) in zip(names, split, strict=True)))
+    return (Table(path, (times, *columns), entries, layout),)
+
+
+def _column(name: str, unit: str, values: FloatArray, path: Path) -> Column:
+    role: Role = "channel" if is_measured(name, unit, None) else "other"
+    said = said_of(name, unit, None, None, path)
+    return Column(name, len(values), values.copy, unit, role, said)
+
+
+def _values(series: Any) -> FloatArray:
+    """Return numbers, NaN where a cell holds none."""
+    kind = series.dtype.kind
+    if kind in "iufb":
+        return np.asarray(series.to_numpy(), float)
+    return np.full(len(series), np.nan)
+
+
+def _library(path: Path) -> Any:
+    try:
+        import csiio
+    except ImportError:
+        raise BadInput(
+            "binary tables of Campbell loggers need the extra `campbell`, which is not installed.",
+            file=path,
+            remedy="Install it (pip install 'shm[campbell]'), or have the logger write TOA5.",
+        ) from None
+    return csiio
+
+
+FORMAT = Format(
+    _NAME,
+    (".tob3", ".tob1"),
+    recognises,
+    at_once(open_tables),
+    holds_responses=False,
+    names_channels=False,
+    library="csiio",
+    shared_suffixes=(".dat",),
+)

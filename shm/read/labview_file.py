@@ -1,0 +1,152 @@
+"""LabVIEW measurement files (.lvm) by lvm_read: a record for each heading of channels.
+
+`X_Columns` says whether none, one or each channel has a column of x before it, which is no channel;
+`X_Dimension` says of what x is. `Multi_Headings Yes` is LabVIEW's way to write hit after hit. A
+channel with 0 samples is empty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shm.documents import format_time
+from shm.errors import BadInput
+from shm.read import logger_text
+from shm.read.header import Entry
+from shm.read.limits import guarded, refuse_large, refuse_long_header, refuse_many_samples
+from shm.read.logger_heading import unlike, unrounded
+from shm.read.stamps import moment
+from shm.read.table import Column, Role, Table
+from shm.read.time_axis import rate_of
+from shm.values import NAN, FloatArray
+
+_FIRST = "LabVIEW Measurement"
+_X, _COMMENT = "X_Value", "Comment"
+_SEPARATORS = {"Tab": "\t", "Comma": ","}
+
+
+def recognises(text: str) -> bool:
+    """Return whether a text begins as LabVIEW's files do."""
+    return text.startswith(_FIRST)
+
+
+def tables_in(text: str, path: Path) -> tuple[Table, ...]:
+    """Return a table for each record of a file; raises BadInput where none is found."""
+    import lvm_read  # few files are of this kind
+
+    refuse_long_header(len(text.partition(_X)[0]), path)
+    refuse_large((text.count("\n") * (1 + text[:10_000].count("\t")),), 8, "", path)
+    with guarded(path, "the LabVIEW file"):
+        named = text.partition("Separator\t")[2].split("\n", 1)[0].strip()
+        lines = text.splitlines(keepends=True)
+        found: dict[Any, Any] = lvm_read.read_lines(lines, _SEPARATORS.get(named, "\t"))
+        records = [found[place] for place in range(found["Segments"])]
+        records = [record for record in records if len(record.get("data", ()))]
+    if not records:
+        raise BadInput(
+            "no record holds a sample.",
+            file=path,
+            remedy="Let LabVIEW write the channels behind the heading, or export as TDMS or CSV.",
+        )
+    names = [f"record_{place}" for place in range(1, len(records) + 1)]
+    return tuple(
+        _table(record, found, name if len(records) > 1 else "", text, path)
+        for record, name in zip(records, names, strict=True)
+    )
+
+
+def _table(
+    record: Mapping[str, Any], whole: Mapping[Any, Any], name: str, text: str, path: Path
+) -> Table:
+    data: FloatArray = np.asarray(record["data"], float)
+    refuse_many_samples(len(data), path)
+    with guarded(path, "the LabVIEW file"):
+        places = _channels(record, data.shape[1])
+        columns, remarks = _columns(record, places, data, path)
+    day, clock = _first(record, "Date"), _first(record, "Time")
+    time = moment(day, clock) or moment(str(whole.get("Date", "")), str(whole.get("Time", "")))
+    step = _number(_first(record, "Delta_X"))
+    times = _times(record, data, path)
+    of_time = any(each in ("", "Time") for each in record.get("X_Dimension", [""]))
+    rate = 1 / step if step > 0 and of_time else NAN
+    if times is not None and of_time:
+        by_times = rate_of(times.load(), Table(path, ()).uneven(times))
+        rate = unrounded(rate, by_times, [("Delta_X", repr(step))], ".")
+        columns = (*columns, times)
+    said = {"time": format_time(time), "sampling_rate_hz": rate}
+    known = {key: value for key, value in said.items() if value is not None and value == value}
+    entries = {key: Entry(value, path) for key, value in known.items()}
+    layout = _layout([column for column in columns if column is not times], text, path)
+    return Table(path, columns, entries, layout, remarks=remarks, record=name, local_time=time)
+
+
+def _times(record: Mapping[str, Any], data: FloatArray, path: Path) -> Column | None:
+    """Return the first column of x, in s; None where the file has none."""
+    if record["Channel names"][0] != _X or not np.isfinite(data[:, 0]).all() or len(data) < 2:
+        return None
+    return Column(_X, len(data), data[:, 0].copy, "s", "times")
+
+
+def _channels(record: Mapping[str, Any], width: int) -> list[int]:
+    """Return the columns of channels: all but those of x, comments, and what is empty."""
+    names = list(record["Channel names"])[:width]
+    return [place for place, name in enumerate(names) if name not in (_X, _COMMENT)]
+
+
+def _columns(
+    record: Mapping[str, Any],
+    places: Sequence[int],
+    data: FloatArray,
+    path: Path,
+) -> tuple[tuple[Column, ...], tuple[str, ...]]:
+    units = _of_channels(record, "Y_Unit_Label", places)
+    counts = [_number(each) for each in _of_channels(record, "Samples", places)]
+    names = unlike([str(record["Channel names"][place]) for place in places])
+    columns, remarks = [], []
+    for place, name, unit, count in zip(places, names, units, counts, strict=True):
+        values = data[:, place]
+        if count == 0 or np.isnan(values).all():
+            continue
+        missing = int(np.isnan(values).sum())
+        if missing:
+            remarks.append(f"{missing} values of {name} are no numbers; taken as missing.")
+        columns.append(_column(name, str(unit), values, path))
+    return tuple(columns), tuple(remarks)
+
+
+def _column(name: str, unit: str, values: FloatArray, path: Path) -> Column:
+    measured = logger_text.is_measured(name, unit, None)
+    said = logger_text.said_of(name, unit, None, None, path)
+    role: Role = "channel" if measured else "other"
+    return Column(name, len(values), lambda: values, unit, role, said)
+
+
+def _of_channels(record: Mapping[str, Any], key: str, places: Sequence[int]) -> list[Any]:
+    """Return a line of the heading for the channels in columns of numbers, "" where it ends."""
+    listed, with_x = list(record.get(key, [])), record["Channel names"][0] == _X
+    return [listed[p - with_x] if p - with_x < len(listed) else "" for p in places]
+
+
+def _first(record: Mapping[str, Any], key: str) -> Any:
+    return next((each for each in record.get(key, []) if each == each and each != ""), "")
+
+
+def _number(value: Any) -> float:
+    return float(value) if isinstance(value, int | float) else NAN
+
+
+def _layout(columns: Sequence[Column], text: str, path: Path) -> tuple[str, ...]:
+    """Return the words of the layout: those of a plain text where that is read alike.
+
+    So the profiles of loggers that were imported before this reader stay in force.
+    """
+    with suppress(BadInput):
+        plain = logger_text.table_in(text, path)
+        if plain is not None and [c.name for c in plain.columns] == [c.name for c in columns]:
+            return plain.layout
+    return ("LabVIEW", *(f"{column.name} [{column.unit}]" for column in columns))

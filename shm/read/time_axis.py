@@ -1,0 +1,74 @@
+"""Times of samples: the even grid that they lie on, and the gaps that they show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from shm.errors import BadInput
+from shm.values import NAN, FloatArray, IntArray
+
+REMEDY = "Export with an even time step, or drop the times and give sampling_rate_hz."
+_MOST_JITTER = 0.4  # samples: times rounded to milliseconds are off by 0.26 of one at 512 Hz
+_MANY_GAPS = 0.05  # judgement: no link loses every twentieth sample, one by one and evenly
+_WHOLE = 0.01  # of a sample: rounding of the sums
+_MOST_GAP = 2  # a file whose gaps outweigh its data is refused, not filled up
+
+Refusal = Callable[[int, str], BadInput]
+"""Makes the error for a sample (from 0) and a reason."""
+
+
+def on_even_grid(
+    times_s: FloatArray, values: FloatArray, refusal: Refusal
+) -> tuple[FloatArray, float]:
+    """Values (channels, samples) on an even grid, and the rate in Hz (NaN for a single time).
+
+    Samples that the times skip become NaN. Raises the refusal of a time that is uneven.
+    """
+    if len(times_s) < 2:
+        return values, NAN
+    places, rate = _places(times_s, refusal)
+    filled = np.full((len(values), places[-1] + 1), NAN)
+    filled[:, places] = values
+    return filled, rate
+
+
+def rate_of(times_s: FloatArray, refusal: Refusal) -> float:
+    """The rate that times tell, in Hz; raises the refusal of a time that is uneven."""
+    return _places(times_s, refusal)[1] if len(times_s) > 1 else NAN
+
+
+def _places(times: FloatArray, refusal: Refusal) -> tuple[IntArray, float]:
+    """The sample that each time belongs to, and the rate in Hz.
+
+    Two readings compete: times rounded but without gaps, and times exact but with gaps.
+    """
+    steps, since = np.diff(times), times - times[0]
+    if len(wrong := np.flatnonzero(~(steps > 0))):
+        raise refusal(int(wrong[0]) + 1, "the time does not increase")
+    multiples = np.rint(steps / np.median(steps))
+    plain, gapped = np.arange(len(times)), np.append(0, np.cumsum(np.maximum(multiples, 1)))
+    off_plain, off_gapped = (
+        float(np.abs(since * places[-1] / since[-1] - places).max()) for places in (plain, gapped)
+    )
+    rounded = np.mean(multiples != 1) > _MANY_GAPS and off_plain <= _rounding(since)
+    has_gaps = off_gapped < off_plain and not rounded
+    if not rounded and min(off_plain, off_gapped) > _MOST_JITTER:
+        oddest = int(np.argmax(np.abs(steps - np.median(steps))))
+        raise refusal(oddest + 1, "the times are uneven")
+    places = (gapped if has_gaps else plain).astype(np.int64)
+    if places[-1] >= _MOST_GAP * len(places):
+        raise refusal(int(np.argmax(np.diff(places))) + 1, "there is a long gap")
+    return places, float(places[-1] / since[-1])
+
+
+def _rounding(since: FloatArray) -> float:
+    """How far times may be off, in samples, by the rounding to the last digit of their clock.
+
+    At 800 Hz in ms the steps are 1, 1, 1, 2 ms. Half a digit is of the time itself, half of the
+    first and the last, that the others are held to.
+    """
+    digits = (10.0**-power for power in range(7))
+    last = next((d for d in digits if np.abs(since / d - np.rint(since / d)).max() < 1e-3), 0.0)
+    return last * (len(since) - 1) / float(since[-1]) + _WHOLE
