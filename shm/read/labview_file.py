@@ -27,7 +27,6 @@ from shm.values import NAN, FloatArray
 
 _FIRST = "LabVIEW Measurement"
 _X, _COMMENT = "X_Value", "Comment"
-_SAME_PLACE = 0.5  # judgement: of a step, which x is rounded to far less than
 _SEPARATORS = {"Tab": "\t", "Comma": ","}
 
 
@@ -80,12 +79,12 @@ def _goes_on(before: Mapping[str, Any], record: Mapping[str, Any]) -> bool:
     if not (alike and step > 0 and first.shape[1] == second.shape[1]):
         return False
     if record["Channel names"][0] == _X:
-        return bool(abs(second[0, 0] - first[-1, 0] - step) < _SAME_PLACE * step)
+        return bool(abs(second[0, 0] - first[-1, 0] - step) < step / 2)
     starts = [moment(_first(each, "Date"), _first(each, "Time")) for each in (before, record)]
     if starts[0] is None or starts[1] is None:
         return False
     apart = (starts[1] - starts[0]).total_seconds()
-    return abs(apart - step * len(first)) < _SAME_PLACE * step
+    return abs(apart - step * len(first)) < step / 2
 
 
 def _table(
