@@ -31,7 +31,7 @@ _RATES = {
 }  # fmt: skip
 _STEPS = {"dt", "dts", "timestep", "samplinginterval", "sampleinterval", "wfincrement"}
 _MOMENTS = {"time", "starttime", "wfstarttime", "timeutc"}
-_DAYS = {"date", "datetime"}
+_DAYS = {"date", "datetime", "start"}
 _KEYS = {
     "hanger": "hanger", "temperaturec": "temperature_c", "addedmasskg": "added_mass_kg",
     "addedmassatm": "added_mass_at_m", "addedmassradiusm": "added_mass_radius_m",

@@ -46,7 +46,7 @@ def tables_in(text: str, path: Path) -> tuple[Table, ...]:
         lines = text.splitlines(keepends=True)
         found: dict[Any, Any] = lvm_read.read_lines(lines, _SEPARATORS.get(named, "\t"))
         records = [found[place] for place in range(found["Segments"])]
-        records = [record for record in records if len(record.get("data", ()))]
+        records = _joined([record for record in records if len(record.get("data", ()))])
     if not records:
         raise BadInput(
             "no record holds a sample.",
@@ -58,6 +58,33 @@ def tables_in(text: str, path: Path) -> tuple[Table, ...]:
         _table(record, found, name if len(records) > 1 else "", text, path)
         for record, name in zip(records, names, strict=True)
     )
+
+
+def _joined(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the records, those as one of which each begins where the one before it ends."""
+    found: list[dict[str, Any]] = []
+    for record in records:
+        before = found[-1] if found else None
+        if before is not None and _goes_on(before, record):
+            found[-1] = {**before, "data": np.vstack([before["data"], record["data"]])}
+        else:
+            found.append(record)
+    return found
+
+
+def _goes_on(before: Mapping[str, Any], record: Mapping[str, Any]) -> bool:
+    """Return whether a record is the next piece of another: by its x column, else by its start."""
+    alike = all(before.get(key) == record.get(key) for key in ("Channel names", "Y_Unit_Label"))
+    step, first, second = _number(_first(record, "Delta_X")), before["data"], record["data"]
+    if not (alike and step > 0 and first.shape[1] == second.shape[1]):
+        return False
+    if record["Channel names"][0] == _X:
+        return bool(abs(second[0, 0] - first[-1, 0] - step) < step / 2)
+    starts = [moment(_first(each, "Date"), _first(each, "Time")) for each in (before, record)]
+    if starts[0] is None or starts[1] is None:
+        return False
+    apart = (starts[1] - starts[0]).total_seconds()
+    return abs(apart - step * len(first)) < step / 2
 
 
 def _table(

@@ -20,7 +20,7 @@ import io
 import math
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -79,6 +79,9 @@ FORMAT = format_of_arrays("MATLAB", (".mat",), _recognises, _opened, "scipy.io")
 
 _scipy: Any = scipy  # the stubs of its `io` know no streams
 _MOST_VARIABLES = 1000
+_OF = "\0"  # between a struct and its field, until names are told apart
+_NAME_FIELDS = ("channel_names", "names", "channels", "labels")
+_UNIT_FIELDS = ("unit", "units")
 _MOST_BESIDE = 20  # judgement: a struct among more is settings of a program, no recording
 _KINDS = {
     "double": ("f", 8), "single": ("f", 4), "char": ("U", 4), "int8": ("i", 1), "uint8": ("u", 1),
@@ -110,7 +113,7 @@ def arrays_in(path: Path) -> Arrays:
             left_out += [] if fields else [f"{name} ({kind})"]
         else:
             left_out.append(f"{name} ({kind})")
-    names = named_apart([tuple(variable.name.split(".")) for variable in found])
+    names = named_apart([tuple(variable.name.split(_OF)) for variable in found])
     apart = [replace(v, name=name) for v, name in zip(found, names, strict=True)]
     return Arrays(tuple(apart), {}, tuple(left_out))
 
@@ -118,7 +121,8 @@ def arrays_in(path: Path) -> Arrays:
 def _fields(name: str, element: Element, content: bytes, path: Path) -> list[Variable]:
     """Return the fields of a struct that hold numbers or a text; none where no record is in it.
 
-    A field `unit` of as many texts as there are records gives the unit of each, in their order.
+    A field `unit` of as many texts as there are records gives the unit of each, in their order; one
+    of names those of a table's columns.
     """
     with guarded(path, f"the struct {name!r}"):
         element.refuse_damaged_struct()
@@ -126,24 +130,51 @@ def _fields(name: str, element: Element, content: bytes, path: Path) -> list[Var
             name
         ]
         fields = {str(key): np.asarray(value) for key, value in found.items()}
-    plain = {key: value for key, value in fields.items() if value.dtype.kind in "iufcU"}
-    records = [key for key, value in plain.items() if value.ndim == 1 and value.size > 1]
-    units = next((fields[key] for key in ("unit", "units") if key in fields), np.zeros(0))
-    if not records:
+    rows = {
+        name: row
+        for key, value in fields.items()
+        if value.dtype.kind in "iufc"
+        for name, row in _rows(key, value, fields)
+    }
+    if not rows:
         return []
-    told = units.size == len(records) and all(isinstance(unit, str) for unit in units.flat)
-    by_name = dict(zip(records, units.flat, strict=True)) if told else {}
+    units = _listed(fields, _UNIT_FIELDS, len(rows))
+    by_name = dict(zip(rows, units, strict=True)) if units else {}
+    facts = {k: v for k, v in fields.items() if v.dtype.kind in "iufU" and v.size == 1}
     return [
         Variable(
-            f"{name}.{key}",
+            f"{name}{_OF}{key}",
             value.shape,
             value.dtype.kind,
             value.dtype.itemsize,
             partial(np.asarray, value),
             {"unit": by_name[key]} if key in by_name else {},
         )
-        for key, value in plain.items()
+        for key, value in {**facts, **rows}.items()
     ]
+
+
+def _rows(
+    key: str, value: NDArray[Any], fields: Mapping[str, NDArray[Any]]
+) -> list[tuple[str, NDArray[Any]]]:
+    """Return the records in a field: a row, or the columns of a table that another field names."""
+    if value.ndim == 1 and value.size > 1:
+        return [(key, value)]
+    if value.ndim != 2 or min(value.shape) > _MOST_BESIDE or max(value.shape) < 2:
+        return []
+    columns = value.T if value.shape[0] >= value.shape[1] else value
+    names = _listed(fields, _NAME_FIELDS, len(columns))
+    names = names or tuple(f"{key}_{place}" for place in range(1, len(columns) + 1))
+    return list(zip(names, columns, strict=True))
+
+
+def _listed(fields: Mapping[str, NDArray[Any]], keys: Sequence[str], count: int) -> tuple[str, ...]:
+    """Return as many texts as `count` of the first such field; empty where there is none."""
+    for key in keys:
+        texts = fields.get(key, np.zeros(0)).ravel()
+        if texts.size == count and all(isinstance(text, str) for text in texts):
+            return tuple(str(text) for text in texts)
+    return ()
 
 
 def _variable(

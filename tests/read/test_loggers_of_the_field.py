@@ -184,6 +184,22 @@ def test_labview_with_several_headings_is_a_test_of_as_many_hits(tmp_path: Path)
         read(path)
 
 
+def test_headings_of_labview_over_which_x_goes_on_are_one_record(tmp_path: Path) -> None:
+    def line(i: int) -> str:
+        return f"{i / RATE:.6f}\t{FORCE[i]}\t{ACC[i]}"
+
+    text = labview("One", "F\tp_1", line, 2, Y_Unit_Label="N\tm/s^2")
+    path = written(tmp_path, text, "a.lvm")
+    assert len(read_test(path)) == 2
+    for i in range(len(ACC)):
+        tail = f"\t{FORCE[i]}\t{ACC[i]}\n"
+        head, _, last = text.rpartition(f"{i / RATE:.6f}{tail}")
+        text = f"{head}{(i + len(ACC)) / RATE:.6f}{tail}{last}"
+    path.write_text(text)
+    found = recorded(path)
+    assert (found.samples, found.sampling_rate_hz) == (2 * len(ACC), pytest.approx(RATE))
+
+
 def test_labview_with_an_x_column_for_each_channel(tmp_path: Path) -> None:
     text = labview(
         "Multi", "Hammer\tX_Value\tAcc", lambda i: f"{i / RATE}\t{FORCE[i]}\t{i / RATE}\t{ACC[i]}",
@@ -219,6 +235,16 @@ def test_a_matlab_struct_counts_as_its_fields(tmp_path: Path) -> None:
     found = recorded(path)
     assert [channel.name for channel in found.channels] == ["force", "acc_1"]
     assert (found.sampling_rate_hz, found.time) == (RATE, datetime(2026, 5, 14, 9, 12, tzinfo=UTC))
+    cells = {key: np.array(texts, dtype=object) for key, texts in
+             {"channel_names": ["Hammer", "A1"], "units": ["N", "m/s^2"]}.items()}  # fmt: skip
+    meas = {"data": np.column_stack([FORCE, ACC]), "fs": RATE, **cells}
+    scipy.io.savemat(path, {"meas": {**meas, "start": "05-Jul-2025 10:51:43"}})
+    found = recorded(path)
+    assert [(c.name, c.quantity) for c in found.channels] == [
+        ("Hammer", "force"), ("A1", "acceleration"),
+    ]  # fmt: skip
+    np.testing.assert_allclose(found.channels[1].values, ACC)
+    assert found.time == datetime(2025, 7, 5, 10, 51, 43, tzinfo=UTC)
     scipy.io.savemat(path, {"test": {"gain": 2.0}, "two": [{"a": ACC}, {"a": ACC}]})
     assert "test (struct)" in peek(path).left_out
 
